@@ -17,13 +17,14 @@ from bridgegen import ego as egos
 from bridgegen import metrics as measures
 from bridgegen.adversary import AdversarySource, Arena
 from bridgegen.arrays import Bool, Float, Int
+from bridgegen.baseline import RECORDED, difference, difference_of_trials
 from bridgegen.cause import Cause, Counterfactual, causes, counterfactuals, require
 from bridgegen.conflict import quantities
 from bridgegen.conflict.analysis import analyse
 from bridgegen.conflict.findings import Findings
 from bridgegen.conflict.harm import Count
 from bridgegen.conflict.plausibility import Implausible, plausibility
-from bridgegen.criteria import Monitor, quantity
+from bridgegen.criteria import OF_BASELINE, Monitor, quantity
 from bridgegen.criteria import evaluate as measure
 from bridgegen.errors import InputError, UnknownNameError
 from bridgegen.evaluation import Evaluation, Replay, Replays, Trials
@@ -68,12 +69,13 @@ class Pipeline:
         source: makes its concrete scenarios.
         objective: set by ``choose_objective``.
         metrics: the names of all metrics that are recorded: those requested, and those that the
-            objective and the thresholds need; then the margins of criteria.
+            objective and the thresholds need; then the margins of criteria, and the baseline's.
         monitor: the pass criteria, of the scenario and of the options.
         simulator: runs the scenario's storyboard; the embedded one if only the workers' machines
             have the chosen one.
         cause: the only one that makes a scenario count as critical, if one was requested.
         seeks_causes: whether ``evaluate`` finds causes.
+        baseline: the same with the driver that the ego's is compared with; None without one.
     """
 
     objective: Objective
@@ -142,12 +144,40 @@ class Pipeline:
         if recorded is None:
             also = (*options.metrics, *self.monitor.metrics)
             recorded = metrics_of(scenario, self.driver, also, detects=sees)
+        self.baseline = self._baseline_of(options, road_map)
         margins = [name for name in recorded if name.startswith(PREFIX)]
-        known = quantities.require([one for one in recorded if one not in margins], held, named)
-        self.metrics = (*known, *(margins or self.monitor.names))
+        beside = [name for name in recorded if name.startswith(OF_BASELINE)]
+        own = [name for name in recorded if name not in (*margins, *beside)]
+        known = quantities.require(own, held, named)
+        if not beside and self.baseline is not None:
+            beside = list(RECORDED)
+        self.metrics = (*known, *(margins or self.monitor.names), *beside)
         self._roads: Any = self._static_roads(nominal)
         self._variants = Variants.of(scenario, space, self.source, embedded, driver)
         self._variant = lru_cache(maxsize=KEPT_VARIANTS)(self._make_variant)
+
+    def _baseline_of(self, options: PipelineOptions, road_map: RoadMap | None) -> "Pipeline | None":
+        """Return the pipeline of the driver that the ego's is compared with, if there is one.
+
+        Raises:
+            InputError: it is the ego's own, or the ego has none.
+        """
+        if options.worse_than is None:
+            return None
+        if self.driver == egos.STORYBOARD:
+            raise InputError(
+                f"{self.scenario.place}: a baseline is compared with the ego's driver, and the "
+                "file's own actions move the ego; name a driver (ego)"
+            )
+        alone = replace(
+            options, ego=options.worse_than, worse_than=None, metrics=(), causes=False, cause=None
+        )
+        one = Pipeline(options=alone, workers=self._workers, **self._made_with)
+        if one.driver == self.driver:
+            raise InputError(
+                f"a baseline must be another driver than the ego's, both are {one.driver.label}"
+            )
+        return one
 
     def _simulator_of(self, nominal: ConcreteScenario) -> Simulator[Any]:
         place = self.scenario.name
@@ -223,9 +253,9 @@ class Pipeline:
         return self._recipe_of(_remade)
 
     def _recipe_of(self, make: Callable[..., Any]) -> Recipe:
-        ego = self._options.ego
-        carried = CarriedDriver.of(ego) if ego else None
-        options = replace(self._options, ego=None)
+        named = (self._options.ego, self._options.worse_than)
+        carried = tuple(CarriedDriver.of(name) if name else None for name in named)
+        options = replace(self._options, ego=None, worse_than=None)
         return Recipe.of(make, carried, options, recorded=self.metrics, **self._made_with)
 
     @property
@@ -237,12 +267,16 @@ class Pipeline:
     @property
     def rows_at_once(self) -> int:
         """The number of rows of a chunk that is fastest; see `Simulator`."""
-        return FAR_ROWS if self._is_far else self.simulator.rows_at_once
+        if self._is_far:
+            return FAR_ROWS
+        own = self.simulator.rows_at_once
+        return own if self.baseline is None else max(own, self.baseline.rows_at_once)
 
     @property
     def runs_at_once(self) -> int:
         """The number of threads that is fastest; see `Simulator`."""
-        return self.simulator.runs_at_once
+        own = self.simulator.runs_at_once
+        return own if self.baseline is None else min(own, self.baseline.runs_at_once)
 
     @property
     def device(self) -> str:
@@ -337,6 +371,8 @@ class Pipeline:
             if is_shared and self.tries:
                 self._compile_first()
             self.measure_rows(nominal)
+        if self.baseline is not None:
+            self.baseline.warm_up()
 
     def _compile_first(self) -> None:
         batch = self._nominal_batch()
@@ -390,15 +426,21 @@ class Pipeline:
         fit = gate.code == Implausible.NONE if objective.gated else True
         F, ok = objective.F(metrics, self.metrics, fit)
         critical = objective.critical(metrics, self.metrics) & ok
+        found = Evaluation(metrics, F, critical, rollout.status, findings, rollout.messages)
+        if self.baseline is not None:
+            other = self.baseline.evaluate_rows(X, objective)
+            found = difference(
+                found, self.metrics, other, self.baseline.metrics, gated=objective.gated
+            )
         if not self.seeks_causes:
-            return Evaluation(metrics, F, critical, rollout.status, findings, rollout.messages)
+            return found
 
         def harmless(at: Int, replay: Counterfactual) -> Bool:
             return self._harmless(self._run(roads, rows[at], X[at], replay), objective)
 
-        cause = causes(self.driver, critical, harmless)
-        counts = critical if self.cause is None else cause == self.cause
-        return Evaluation(metrics, F, counts, rollout.status, findings, rollout.messages, cause)
+        cause = causes(self.driver, found.critical, harmless)
+        counts = found.critical if self.cause is None else cause == self.cause
+        return replace(found, critical=counts, cause=cause)
 
     def _harmless(self, rollout: Rollout, objective: Objective) -> Bool:
         """Return which rows succeed and are not critical."""
@@ -477,7 +519,11 @@ class Pipeline:
             )  # fmt: skip
             order.append(at)
             parts.append(Trials.of(rollout, roads, which[at], harm, count))
-        return Trials.join(parts).take(np.argsort(np.concatenate(order)))
+        found = Trials.join(parts).take(np.argsort(np.concatenate(order)))
+        if self.baseline is None:
+            return found
+        unchanged = np.concatenate([X, keys, np.full((len(X), 1), -1.0)], axis=1)
+        return difference_of_trials(found, self.baseline.try_rows(unchanged, harm, count))
 
     def noise_keys(self, X: Float) -> npt.NDArray[np.uint64]:
         """Return the keys of N rows' random numbers, ``(N,)``."""
@@ -605,8 +651,14 @@ class Pipeline:
         return self.measure(self.rollout(X))
 
     def measure(self, rollout: Rollout) -> Float:
-        """Return all recorded quantities of a rollout, ``(N, len(metrics))``."""
-        return measure(rollout, self.metrics, self.monitor)
+        """Return all recorded quantities of a rollout, ``(N, len(metrics))``.
+
+        Those of the baseline's driver, which drives in another rollout, are NaN.
+        """
+        own = [name for name in self.metrics if not name.startswith(OF_BASELINE)]
+        found = measure(rollout, own, self.monitor)
+        beside = len(self.metrics) - len(own)  # the last ones
+        return np.pad(found, ((0, 0), (0, beside)), constant_values=np.nan) if beside else found
 
     def _map(
         self, work: Callable[[Self, Float, *Args], Result], X: Float, *args: *Args
@@ -646,16 +698,23 @@ class Pipeline:
         return tuple(dict.fromkeys((*self.source.static_names, *self.source.course_names)))
 
 
-def _remade(ego: CarriedDriver | None, options: PipelineOptions, **made_with: Any) -> Pipeline:
+Carried = tuple[CarriedDriver | None, CarriedDriver | None]
+"""The ego's driver and the baseline's."""
+
+
+def _remade(carried: Carried, options: PipelineOptions, **made_with: Any) -> Pipeline:
     """Return a pipeline for a worker, in one thread, with its kernels compiled."""
-    options = replace(options, ego=ego.here() if ego else None)
+    ego, baseline = (one.here() if one else None for one in carried)
+    options = replace(options, ego=ego, worse_than=baseline)
     pipeline = Pipeline(options=options, **made_with, workers=Threads(1))
     pipeline.warm_up()
     return pipeline
 
 
-def _compile_ahead(ego: CarriedDriver | None, options: PipelineOptions, **made_with: Any) -> None:
+def _compile_ahead(carried: Carried, options: PipelineOptions, **made_with: Any) -> None:
     """Compile what a pipeline will need; a driver of the user's own is not made for it."""
+    ego, _ = carried
+    made_with["recorded"] = [n for n in made_with["recorded"] if not n.startswith(OF_BASELINE)]
     if ego and egos.is_spec(ego.name):
         options = replace(options, ego=None, ideal=(), metrics=())
         made_with["recorded"] = None

@@ -186,6 +186,7 @@ def resume(
     folder: Path | str,
     *,
     ego: str | None = None,
+    worse_than: str | None = None,
     simulator: SimulatorChoice | None = None,
     deliver: bool = True,
     workers: Choice = None,
@@ -199,6 +200,7 @@ def resume(
         folder: of the run.
         ego: where a driver of your own drives, that same driver: code that a folder names is never
             imported unasked.
+        worse_than: likewise, the driver that the ego's is compared with.
         simulator: the run's, with its place on this machine; as recorded by default.
         deliver: as for ``run_search``.
         workers: likewise.
@@ -215,8 +217,9 @@ def resume(
         callbacks.workers(pool)
         run = Run.of(store)
         pipeline = pipeline_of(
-            run, "resume", ego=ego, causes=True, simulator=simulator, workers=pool
-        )
+            run, "resume", ego=ego, worse_than=worse_than, compares=True, causes=True,
+            simulator=simulator, workers=pool,
+        )  # fmt: skip
         callbacks.stage("compile")
         pipeline.warm_up()
         searcher = _algorithm(pipeline, run.settings)

@@ -52,6 +52,7 @@ def regions_of(
     folder: Path | str,
     *,
     ego: str | None = None,
+    worse_than: str | None = None,
     simulator: SimulatorChoice | None = None,
     samples: int = SAMPLES,
     at_least: float = AT_LEAST,
@@ -68,6 +69,7 @@ def regions_of(
     Args:
         folder: of the run.
         ego: where a driver of your own drives, that same driver.
+        worse_than: likewise, the driver that the ego's is compared with.
         simulator: the run's, with its place on this machine; as recorded by default.
         samples: fresh scenarios to simulate in each region.
         at_least: the share of critical scenarios that makes a region critical.
@@ -88,7 +90,10 @@ def regions_of(
     run = Run(folder)
     rows, settings, place = run.rows(), run.settings, run.folder
     with open_workers(workers) as pool:
-        pipeline = pipeline_of(run, "regions", ego=ego, simulator=simulator, workers=pool)
+        pipeline = pipeline_of(
+            run, "regions", ego=ego, worse_than=worse_than, compares=True, simulator=simulator,
+            workers=pool,
+        )  # fmt: skip
         space, ok = pipeline.space, rows.status == 0
         check(space, rows.critical[ok], samples, at_least)
         stage("compile")

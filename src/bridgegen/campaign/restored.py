@@ -27,6 +27,8 @@ def pipeline_of(
     command: str,
     *,
     ego: str | None = None,
+    worse_than: str | None = None,
+    compares: bool = False,
     causes: bool = False,
     simulator: SimulatorChoice | None = None,
     elsewhere: SimulatorChoice | None = None,
@@ -38,6 +40,9 @@ def pipeline_of(
         run: on disk.
         command: the BridgeGen command that asks, for messages.
         ego: where a driver of the user's drives, that same driver.
+        worse_than: likewise, the driver that the ego's was compared with.
+        compares: whether rows are evaluated; else a baseline that is a driver of the user's, and is
+            not named, is left out.
         causes: whether to determine causes as the run did; where only one cause counts, they are
             determined all the same.
         simulator: the run's, with its place on this machine; as recorded by default.
@@ -51,8 +56,13 @@ def pipeline_of(
     """
     settings, folder = run.settings, run.folder
     if elsewhere is not None:
-        settings = replace(settings, simulator=elsewhere, cause=None)
-    _check_driver(settings, ego, folder, command)
+        settings = replace(settings, simulator=elsewhere, cause=None, worse_than=None)
+    _check_driver(settings.ego, ego, "ego", folder, command)
+    if settings.worse_than is not None:
+        if compares or worse_than is not None or not is_spec(settings.worse_than):
+            _check_driver(settings.worse_than, worse_than, "worse-than", folder, command)
+        else:
+            settings = replace(settings, worse_than=None)
     scenario, space, roads = searched(run)
     pipeline = Pipeline(
         scenario,
@@ -92,15 +102,27 @@ def _simulator(settings: Settings, given: SimulatorChoice | None, folder: Path) 
     return replace(settings.simulator, access=given.access)
 
 
-def _check_driver(settings: Settings, ego: str | None, folder: Path, command: str) -> None:
-    """Refuse another driver than the run's, and one of the user's that is not named again."""
-    if ego is None and is_spec(settings.ego):
+def _check_driver(
+    recorded: str, given: str | None, option: str, folder: Path, command: str
+) -> None:
+    """Refuse another driver than the run's, and one of the user's that is not named again.
+
+    Args:
+        recorded: the run's.
+        given: by the user, if at all.
+        option: "ego" or "worse-than", which names it.
+        folder: of the run.
+        command: the BridgeGen command that asks.
+    """
+    if given is None and is_spec(recorded):
         raise InputError(
-            f"{folder}: its ego is driven by {settings.ego}, which is code; to run it, name it: "
-            f"bridgegen {command} {folder} --ego {settings.ego}"
+            f"{folder}: its driver {recorded} is code; to run it, name it: "
+            f"bridgegen {command} {folder} --{option} {recorded}"
         )
-    if ego not in (None, settings.ego):
-        raise InputError(f"{folder}: the ego of this run must be {settings.ego}, got {ego}")
+    if given not in (None, recorded):
+        raise InputError(
+            f"{folder}: the driver of this run (--{option}) must be {recorded}, got {given}"
+        )
 
 
 def searched(run: Run) -> tuple[SearchedScenario, SearchSpace, RoadMap | None]:

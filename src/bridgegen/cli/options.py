@@ -21,6 +21,12 @@ OwnEgo = Annotated[
     str | None,
     typer.Option("--ego", help="The run's driver, if it is your own.", rich_help_panel=DRIVER),
 ]
+OwnBaseline = Annotated[
+    str | None,
+    typer.Option(
+        "--worse-than", help="The run's baseline, if it is your own driver.", rich_help_panel=DRIVER
+    ),
+]
 Ideal = Annotated[str | None, declaration("ideal", shown="the file's")]
 TimeLimit = Annotated[float | None, declaration("time_limit")]
 OnlyMetrics = Annotated[

@@ -125,6 +125,7 @@ def new(
 def resume(
     folder: Annotated[Path, typer.Argument(help="The folder of a run.")],
     ego: common.OwnEgo = None,
+    worse_than: common.OwnBaseline = None,
     connection: Connection = NO_CONNECTION,
     workers: common.Workers = None,
     fail_if: common.FailIf = None,
@@ -143,6 +144,7 @@ def resume(
         run = campaign.resume(
             folder,
             ego=ego,
+            worse_than=worse_than,
             simulator=read_access(connection),
             workers=workers,
             callbacks=screen.callbacks,
@@ -192,6 +194,7 @@ def regions(
         typer.Option(help="Seed of the fresh scenarios.", show_default="the run's"),
     ] = None,
     ego: common.OwnEgo = None,
+    worse_than: common.OwnBaseline = None,
     connection: Connection = NO_CONNECTION,
     workers: common.Workers = None,
     as_json: common.Json = False,
@@ -207,6 +210,7 @@ def regions(
         found = regions_of(
             run,
             ego=ego,
+            worse_than=worse_than,
             simulator=read_access(connection),
             samples=samples,
             at_least=at_least,

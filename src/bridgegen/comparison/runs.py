@@ -92,7 +92,7 @@ def attempt(
     begun = (task.folder / FILE).exists()
     try:
         if begun:
-            resume(task.folder, ego=task.options.ego, **how)
+            resume(task.folder, ego=task.options.ego, worse_than=task.options.worse_than, **how)
         else:
             run_search(task.scenario, **vars(task.options), out=task.folder, **how)
     except Interrupted:

@@ -1,11 +1,12 @@
 """Pass criteria applied to rollouts: signals, margins, and what of them a search records."""
 
-from bridgegen.criteria.measured import evaluate, quantity
+from bridgegen.criteria.measured import OF_BASELINE, evaluate, quantity
 from bridgegen.criteria.monitor import CriterionResult, Monitor, margin_in_words, unit_of
 from bridgegen.criteria.signals import SIGNALS, Signal
 from bridgegen.criteria.summary import CriterionSummary, by_gravity, headline, summarise_criteria
 
 __all__ = [
+    "OF_BASELINE",
     "SIGNALS",
     "CriterionResult",
     "CriterionSummary",

@@ -11,19 +11,28 @@ from bridgegen.metrics import Quantity
 from bridgegen.odd.criteria import PREFIX
 from bridgegen.simulation.rollout import Rollout
 
+OF_BASELINE = "baseline:"
+"""Begins the name of a quantity of the same scenario with the baseline's driver."""
+
 
 def quantity(name: str) -> Quantity:
     """Return the quantity of a name: a metric, a measure of the conflict analysis, or a margin.
+
+    Or one of these with the baseline's driver, ``baseline:harm`` say.
 
     Raises:
         UnknownNameError: no such quantity; the message suggests the nearest.
     """
     if name.startswith(PREFIX):
-        one = name.removeprefix(PREFIX)
+        text = f"margin by which criterion {name.removeprefix(PREFIX)} is met; violated below 0"
         return Quantity(
-            name, "1", f"margin by which criterion {one} is met; violated below 0", "smaller",
+            name, "1", text, "smaller",
             LARGEST,
         )  # fmt: skip
+    if name.startswith(OF_BASELINE):
+        one = quantity(name.removeprefix(OF_BASELINE))
+        text = f"{one.name} with the baseline's driver"
+        return Quantity(name, one.unit, text, one.sense, one.cap)
     return quantities.get(name)
 
 

@@ -65,6 +65,19 @@ class PipelineOptions:
             names="stage",
         ),
     )
+    worse_than: str | None = field(
+        default=None,
+        metadata=option(
+            TEXT,
+            "Another driver, the baseline: only scenarios are critical in which the ego fails and "
+            "this driver does not; the difference of their objectives is optimised.",
+            hint="E.g. the version before a change.",
+            shown="none",
+            before=None,
+            group=OF_DRIVER,
+            names="driver",
+        ),
+    )
     time_limit: float | None = field(
         default=None,
         metadata=option(

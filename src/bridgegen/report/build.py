@@ -8,13 +8,12 @@ from typing import Any
 import numpy as np
 
 from bridgegen.arrays import Taken
-from bridgegen.cause import Cause
 from bridgegen.confirmation.schema import Record
 from bridgegen.conflict.harm import NEAR_MISS, Count
 from bridgegen.criteria import by_gravity, quantity, summarise_criteria
 from bridgegen.errors import ScenarioError
 from bridgegen.evaluation import Replays
-from bridgegen.objective import Objective, Rule
+from bridgegen.objective import Rule
 from bridgegen.odd.coverage import CoverageMap, coverage_map
 from bridgegen.odd.criteria import PREFIX
 from bridgegen.odd.thresholds import Thresholds
@@ -110,13 +109,14 @@ def build_report(
         description=scenario.description.strip(),
         road=pipeline.source.road,
         ego=pipeline.driver.label,
+        baseline=pipeline.baseline.driver.label if pipeline.baseline else "",
         algorithm=algorithm,
         seed=seed,
         budget=budget,
         n_evaluations=summary.evaluations,
         n_critical=summary.critical,
         r_critic=summary.r_critic,
-        critical_rule=rule_in_words(pipeline.objective, pipeline.cause),
+        critical_rule=rule_in_words(pipeline),
         critical_distance=limits.d_min_below if rule == "thresholds" else None,
         first_critical=summary.first,
         fiftieth_critical=summary.fiftieth,
@@ -168,17 +168,14 @@ def build_report(
     )
 
 
-def rule_in_words(objective: Objective, cause: Cause | None = None) -> str:
-    """Return the criterion for critical scenarios, in words.
-
-    Args:
-        objective: with the rule.
-        cause: the only one that counts, if one was chosen.
-    """
+def rule_in_words(pipeline: Pipeline) -> str:
+    """Return when a scenario of a run is critical, in words."""
+    objective, cause, baseline = pipeline.objective, pipeline.cause, pipeline.baseline
     rule = critical_in_words(
         objective.rule, objective.count, objective.thresholds, objective.criteria
     )
-    return rule if cause is None else f"{rule}, put down to {cause.label}"
+    rule += "" if cause is None else f", put down to {cause.label}"
+    return rule if baseline is None else f"{rule}; not so with {baseline.driver.label}"
 
 
 def critical_in_words(

@@ -31,6 +31,7 @@ class RunSummary:
         description: one or two sentences more; may be empty.
         road: where it was searched ("generated crossroads", "Town05, junction 965").
         ego: the system under test ("route-follower").
+        baseline: the driver that it is compared with; "" without one.
         algorithm: the search algorithm's name ("pso").
         seed: the seed of the whole run.
         budget: requested number of evaluations.
@@ -89,6 +90,7 @@ class RunSummary:
     independent: bool = False
     harm: str = ""
     criteria: tuple[str, ...] = ()
+    baseline: str = ""
     hashes: Mapping[str, str] | None = None
     settings: Mapping[str, str] | None = None
 

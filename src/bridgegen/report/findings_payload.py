@@ -62,6 +62,7 @@ def triage_payload(found: Triage) -> dict[str, Any]:
     """Return the failure modes, or without any the bound and the nearest scenarios."""
     return {
         "ego": found.ego,
+        "baseline": found.baseline,
         "modes": [_mode(one, found.neighbourhood(one.shown)) for one in found.modes[:MOST_MODES]],
         "more": max(0, len(found.modes) - MOST_MODES) + found.unrecorded_modes,
         "robust": found.robust,

@@ -134,10 +134,11 @@ def news(data: ReportData, after: int) -> dict[str, Any]:
 
 def _summary(data: ReportData) -> dict[str, Any]:
     s = data.summary
+    baseline = [f"worse than {s.baseline}"] if s.baseline else []
     return {
         "title": s.title,
         "description": s.description,
-        "facts": [s.scenario, s.road, f"ego {s.ego}", s.algorithm, f"seed {s.seed}"],
+        "facts": [s.scenario, s.road, f"ego {s.ego}", *baseline, s.algorithm, f"seed {s.seed}"],
         "finished": s.finished,
         "budget": int(s.budget),
         "critical_rule": s.critical_rule,

@@ -184,6 +184,25 @@ class Conflict:
 
 
 @dataclass(frozen=True)
+class Beside:
+    """The motion of the same scenario with another driver of the ego.
+
+    Attributes:
+        label: of that driver.
+        entities: ``(n,)`` whose motion differs, numbers of the playback's entities.
+        x: ``(n, T)`` float64 [m], rear axle; NaN where an entity is not there.
+        y: ``(n, T)`` float64 [m], likewise.
+        h: ``(n, T)`` float64 [rad].
+    """
+
+    label: str
+    entities: tuple[int, ...]
+    x: Float
+    y: Float
+    h: Float
+
+
+@dataclass(frozen=True)
 class Playback:
     """One kept scenario, recorded: E entities over T instants, instant k at ``k · time_step``.
 
@@ -218,6 +237,7 @@ class Playback:
         conflict: the decisive one; None if there is none, or it was not analysed.
         shows: ``(E, T)`` int8, indicators and brake lights, see `bridgegen.ego.lamps`; None: not
             known.
+        beside: the same scenario with other drivers, drawn in outline.
     """
 
     name: str
@@ -247,6 +267,7 @@ class Playback:
     street_lights: Float | None = None
     conflict: Conflict | None = None
     shows: npt.NDArray[np.int8] | None = None
+    beside: tuple[Beside, ...] = ()
 
     def __post_init__(self) -> None:
         place = f"playback '{self.name}'"

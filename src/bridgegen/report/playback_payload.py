@@ -14,7 +14,7 @@ from bridgegen.arrays import Float
 from bridgegen.metrics.d_min import first_closest
 from bridgegen.participants import drawing_of
 from bridgegen.report.findings_payload import conflict_payload
-from bridgegen.report.playback import Course, Lamp, Playback, Sensed, Weather
+from bridgegen.report.playback import Beside, Course, Lamp, Playback, Sensed, Weather
 from bridgegen.report.series import packed
 from bridgegen.weather import in_words
 
@@ -90,6 +90,7 @@ def playback_payload(p: Playback, road: int, picture: int | None) -> dict[str, A
         "contacts": begins.tolist(),
         "sensed": None if p.sensed is None else _sensed(p.sensed, p),
         "course": None if p.course is None else _course(p.course, p.n_steps),
+        "beside": [_beside(one, p.n_steps) for one in p.beside if one.entities],
         "weather": [_weather(one) for one in p.weather if one.step < p.n_steps],
         "street_lights": lights,
     }
@@ -106,6 +107,17 @@ def _series(p: Playback) -> dict[str, Any]:
         if row is not None:
             found[name] = packed(row[: p.n_steps], SCALE[name])
     return found
+
+
+def _beside(one: Beside, n_steps: int) -> dict[str, Any]:
+    x = one.x[:, :n_steps]
+    y, h = (np.where(np.isnan(x), np.nan, row[:, :n_steps]) for row in (one.y, one.h))
+    series = {"x": x, "y": y, "h": h}
+    return {
+        "label": one.label,
+        "entities": list(one.entities),
+        **{name: [packed(row, SCALE[name]) for row in rows] for name, rows in series.items()},
+    }
 
 
 def _lamp(lamp: Lamp, n_steps: int) -> dict[str, Any]:

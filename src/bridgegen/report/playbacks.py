@@ -1,6 +1,6 @@
 """Scenarios of a run with all that their playback shows."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -19,16 +19,20 @@ from bridgegen.metrics.ttc import ttc_over_time
 from bridgegen.ontology.check import constraints_in_words
 from bridgegen.pipeline import Pipeline
 from bridgegen.report.painter import paint
-from bridgegen.report.playback import Conflict, Course, Playback, Weather
+from bridgegen.report.playback import Beside, Conflict, Course, Playback, Weather
 from bridgegen.report.scenery import Scenery, bodies, lamps, vehicle_lamps
 from bridgegen.report.sensing import sensed
-from bridgegen.simulation.rollout import STATUS_MESSAGES
+from bridgegen.simulation.rollout import STATUS_MESSAGES, Rollout
 from bridgegen.store import Recorded, Rows
 from bridgegen.triage.record import Minimal
 from bridgegen.weather import COLUMNS
 
 THIN = 0.01
 """How far a way's line may be off where its points lie nearly straight [m]."""
+
+
+APART = 0.05
+"""How far apart an entity is with two drivers at least for the playback to show both [m]."""
 
 
 @dataclass(frozen=True)
@@ -69,7 +73,7 @@ def playbacks(
         rows: all of the run, in order.
         kept: name, evaluation and files of each, most critical first.
         brief: without the individuals' picture and the ego's planned course, which take most of the
-            time.
+            time, and without the baseline.
         replays: of these scenarios; simulated here by default.
     """
     if not kept:
@@ -83,7 +87,8 @@ def playbacks(
         for k, (name, evaluation, files) in enumerate(kept)
     ]  # fmt: skip
     replays = pipeline.replays(some.X, plans=not brief) if replays is None else replays
-    return _all_played(pipeline, shown, replays, brief=brief)
+    played = _all_played(pipeline, shown, replays, brief=brief)
+    return played if brief else beside_others(played, some.X, others_of(pipeline))
 
 
 def minimal_playbacks(
@@ -100,7 +105,8 @@ def minimal_playbacks(
     X = np.array([one.x for *_, one in wanted])
     noise = np.array([one.noise_key for *_, one in wanted], dtype=np.uint64)
     names = [(name, evaluation, files) for name, evaluation, files, _ in wanted]
-    return measured_playbacks(pipeline, names, X, noise)
+    played = measured_playbacks(pipeline, names, X, noise)
+    return beside_others(played, X, others_of(pipeline), noise)
 
 
 def measured_playbacks(
@@ -127,6 +133,49 @@ def measured_playbacks(
         for k, (name, evaluation, files) in enumerate(wanted)
     ]
     return _all_played(pipeline, shown, replays, brief=True)
+
+
+def others_of(pipeline: Pipeline) -> Mapping[str, Pipeline]:
+    """Return the pipelines of the drivers that the ego's is compared with, by their labels."""
+    one = pipeline.baseline
+    return {} if one is None else {one.driver.label: one}
+
+
+def beside_others(
+    played: Sequence[Playback],
+    X: Float,
+    others: Mapping[str, Pipeline],
+    noise: npt.NDArray[np.uint64] | None = None,
+) -> tuple[Playback, ...]:
+    """Return playbacks with the motion of the same rows with other drivers of the ego.
+
+    Args:
+        played: the playbacks.
+        X: their rows, ``(N, len(space.names))``.
+        others: pipelines of the same scenario, by the labels of their drivers.
+        noise: keys of the sensors' noise, ``(N,)``; by default each row's own.
+    """
+    found: list[list[Beside]] = [[] for _ in played]
+    for label, pipeline in others.items() if played else ():
+        rollout = pipeline.rollout(X) if noise is None else pipeline.rollout_again(X, noise)
+        for k, one in enumerate(played):
+            if rollout.status[k] == 0:
+                found[k].append(_beside(label, one, rollout, k))
+    return tuple(
+        replace(one, beside=tuple(other)) for one, other in zip(played, found, strict=True)
+    )
+
+
+def _beside(label: str, playback: Playback, rollout: Rollout, row: int) -> Beside:
+    """Return the motion of a row, of the entities that move otherwise than in a playback."""
+    motion = {name: getattr(rollout, name)[row].copy() for name in "xyh"}
+    motion["x"][:, int(rollout.n_steps[row]) :] = np.nan
+    if rollout.present.size:
+        motion["x"][~rollout.present[row]] = np.nan
+    both = min(int(rollout.n_steps[row]), playback.n_steps)
+    x, y = (motion[name][:, :both] - getattr(playback, name)[:, :both] for name in "xy")
+    apart = np.nan_to_num(np.hypot(x, y), nan=0.0).max(axis=1, initial=0.0) > APART
+    return Beside(label, tuple(np.flatnonzero(apart).tolist()), *(motion[n][apart] for n in "xyh"))
 
 
 def nominal_playback(pipeline: Pipeline, name: str) -> Playback:

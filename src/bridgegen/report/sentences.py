@@ -37,9 +37,10 @@ def sentences(data: ReportData) -> list[str]:
 
 def _sentences(data: ReportData) -> list[str]:
     s = data.summary
+    also = f", and with {s.baseline} to compare," if s.baseline else ""
     words = [
         f"{_count(s.n_evaluations, 'concrete scenario')} of “{s.title}” "
-        f"{'was' if s.n_evaluations == 1 else 'were'} simulated with the driver {s.ego} "
+        f"{'was' if s.n_evaluations == 1 else 'were'} simulated with the driver {s.ego}{also} "
         f"on {s.road}, chosen by {s.algorithm} in {duration(s.wall_seconds)}."
     ]
     if not s.finished:
@@ -113,6 +114,7 @@ def provenance(s: RunSummary) -> list[tuple[str, str]]:
         ("Scenario", s.scenario),
         ("Road", s.road),
         ("Ego", s.ego),
+        ("Baseline", s.baseline),
         ("Algorithm", s.algorithm),
         ("Seed", str(s.seed)),
         ("Budget", _count(s.budget, "evaluation")),
@@ -176,7 +178,8 @@ def _modes(data: ReportData) -> str:
     n = len(data.triage.modes) + data.triage.unrecorded_modes
     titles = [f"{one.title} ({one.count:,})" for one in data.triage.modes[:MOST_TITLES]]
     more = ", …" if n > MOST_TITLES else ""
-    return f"{_ways(n)} in which {data.summary.ego} fails: {'; '.join(titles)}{more}."
+    other = f" and {data.summary.baseline} does not" if data.summary.baseline else ""
+    return f"{_ways(n)} in which {data.summary.ego} fails{other}: {'; '.join(titles)}{more}."
 
 
 def _ways(n: int) -> str:

@@ -8,6 +8,7 @@ from bridgegen.screen.live import Live
 if TYPE_CHECKING:
     from bridgegen.campaign import Run, SearchCallbacks
     from bridgegen.campaign.loop import Progress
+    from bridgegen.campaign.settings import Settings
     from bridgegen.triage import Triage
     from bridgegen.workers import Workers
 
@@ -88,7 +89,7 @@ def print_summary(run: "Run", seconds: float) -> None:
     s, settings, found = run.summary, run.settings, run.triage
     quick = "quick causes" if found is not None else "causes"
     rows = [
-        ("scenario", f"{Path(settings.scenario).stem}, ego {settings.ego}"),
+        ("scenario", f"{Path(settings.scenario).stem}, ego {settings.ego}{_worse(settings)}"),
         ("search", f"{settings.algorithm}, seed {settings.seed}"),
         ("evaluations", f"{s.evaluations}" + (f" ({s.failed} failed)" if s.failed else "")),
         ("R_critic", f"{s.r_critic:.3f} ({s.critical} critical{_by(settings.cause)})"),
@@ -164,6 +165,10 @@ def _print_modes(found: "Triage") -> None:
 def _minimal(run: "Run") -> str:
     n = len(run.minimal_scenarios)
     return f", and {n} minimal" if n else ""
+
+
+def _worse(settings: "Settings") -> str:
+    return f", worse than {settings.worse_than}" if settings.worse_than else ""
 
 
 def _by(cause: str | None) -> str:

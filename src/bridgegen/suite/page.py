@@ -11,7 +11,7 @@ from bridgegen.options.option import options_of
 from bridgegen.report.page import code_of, page_of
 from bridgegen.report.payload import script_json
 from bridgegen.report.playback import Playback
-from bridgegen.report.playbacks import measured_playbacks
+from bridgegen.report.playbacks import beside_others, measured_playbacks
 from bridgegen.simulation.choice import EMBEDDED
 from bridgegen.suite.evaluate import Job, pipeline_of, rows_of_job
 from bridgegen.suite.page_payload import Key, key_of, payload
@@ -85,21 +85,33 @@ def _playbacks(suite: SuiteRun, jobs: Mapping[Key, Job]) -> Iterator[tuple[Key, 
     )
     for one in failed[:MOST_PLAYBACKS]:
         job = jobs.get(key_of(one))
-        playback = None if job is None else _playback(job, one)
+        others = [jobs.get((one.entry, ego)) for ego in suite.egos if ego != one.ego]
+        playback = None if job is None else _playback(job, one, [o for o in others if o])
         if playback is not None:
             yield key_of(one), playback
 
 
-def _playback(job: Job, result: EntryResult) -> Playback | None:
-    """Return the playback of an entry's worst failed row; None if that is no longer to be had."""
+def _playback(job: Job, result: EntryResult, others: Sequence[Job]) -> Playback | None:
+    """Return the playback of an entry's worst failed row; None if that is no longer to be had.
+
+    Args:
+        job: the entry with the ego.
+        result: its.
+        others: the same with other egos, whose motion is shown beside.
+    """
     row = result.worst
     if row is None or job.entry.digest != result.digest:  # the files have changed since
         return None
     try:
         pipeline = pipeline_of(job)
-        X = rows_of_job(job, pipeline)
-        if row >= len(X):
+        X = rows_of_job(job, pipeline)[row : row + 1]
+        if not len(X):
             return None
-        return measured_playbacks(pipeline, [(job.name, row, ())], X[row : row + 1])[0]
+        played = measured_playbacks(pipeline, [(job.name, row, ())], X)
     except (BridgeGenError, OSError):
         return None  # its results stand, and the page has the command
+    try:
+        beside = {one.ego or one.name: pipeline_of(one) for one in others}
+        return beside_others(played, X, beside)[0]
+    except (BridgeGenError, OSError):
+        return played[0]

@@ -33,8 +33,8 @@ MOST_BYTES = 2**30
 SAMPLES = 100
 
 NOT_OF_A_SUITE = (
-    "ego", "metrics", "causes", "cause", "distribution", "axes", "fixed", "road_map", "junction",
-    "weights", "scale", "objectives", "adversary",
+    "ego", "worse_than", "metrics", "causes", "cause", "distribution", "axes", "fixed", "road_map",
+    "junction", "weights", "scale", "objectives", "adversary",
 )  # fmt: skip
 """Options of a search that would mean nothing in a suite."""
 

@@ -91,19 +91,22 @@ def bound(
     least: tuple[Least, ...],
     modes: int,
     ego: str,
+    baseline: str = "",
 ) -> Bound:
     """Return the bound of the space, in figures and in words."""
+    fails = f"{ego} fails, and {baseline} does not," if baseline else f"{ego} fails"
+    such = "such" if baseline else "harmful"
+    none = f"No scenario in which {fails} was found" if baseline else "No failure found"
     if evaluations == failed:
         text = f"No evaluation has a result, so nothing is known of {ego}."
     elif harmful:
         text = (
-            f"{ego} fails in {modes} way{'s' * (modes != 1)}: {harmful} of {evaluations} "
-            f"evaluations; {_of_the_space(space)}."
+            f"{fails} in {modes} way{'s' * (modes != 1)}: {harmful} of {evaluations} "
+            f"evaluations; {_of_the_space(space, such)}."
         )
     else:
         text = (
-            f"No failure found in {evaluations} evaluations: {_margin(least)}; "
-            f"{_of_the_space(space)}."
+            f"{none} in {evaluations} evaluations: {_margin(least)}; {_of_the_space(space, such)}."
         )
     return Bound(
         evaluations=evaluations, failed=failed, implausible=implausible, harmful=harmful,
@@ -111,14 +114,15 @@ def bound(
     )  # fmt: skip
 
 
-def _of_the_space(space: Estimate) -> str:
+def _of_the_space(space: Estimate, such: str) -> str:
+    """Return the share of the space that is such, with its interval."""
     if not space.drawn or not space.rows:
-        return "the harmful share of the space is not estimated, for the search chose its rows"
+        return "the share of the space is not estimated, for the search chose its rows"
     by = _DRAWN[space.drawn].format(space.rows)
     if not space.harmful:
-        return f"with 95 % confidence at most {_percent(space.high)} of the space is harmful ({by})"
+        return f"with 95 % confidence at most {_percent(space.high)} of the space is {such} ({by})"
     return (
-        f"{percent(space.share or 0.0)} of the space is harmful ({_percent(space.low)} to "
+        f"{percent(space.share or 0.0)} of the space is {such} ({_percent(space.low)} to "
         f"{_percent(space.high)} with 95 % confidence, {by})"
     )
 

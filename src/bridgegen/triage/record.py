@@ -297,6 +297,8 @@ class Triage(_Model):
         schema_version: 1.
         scenario: its name.
         ego: label of its driver.
+        baseline: label of the driver that the ego's is compared with: what that one fails in, too,
+            is not harmful; "" without one.
         count: whose conflicts count as harm, "ego" or "any".
         results: digest of the evaluations that it was made from, `Rows.digest`.
         seed: of the run, from which all random numbers follow.
@@ -313,6 +315,7 @@ class Triage(_Model):
     schema_version: Literal[1] = 1
     scenario: Text
     ego: Text
+    baseline: Text = ""
     count: Literal["ego", "any"]
     results: Text
     seed: Annotated[int, Field(ge=0)]

@@ -11,6 +11,8 @@ from bridgegen.arrays import Bool, Float, Numbers
 from bridgegen.cause import Cause
 from bridgegen.conflict.findings import Findings
 from bridgegen.conflict.harm import NEAR_MISS
+from bridgegen.conflict.quantities import HARM
+from bridgegen.criteria import OF_BASELINE
 from bridgegen.pipeline import Pipeline
 from bridgegen.store import Recorded, Rows
 from bridgegen.triage.bound import UNBIASED, bound, estimate, least_margins
@@ -130,6 +132,8 @@ class _Triage:
         )
         if pipeline.cause is not None:  # harm of another cause does not count
             harmful &= rows.critical
+        if pipeline.baseline is not None:  # nor does what the baseline's driver fails in, too
+            harmful &= ~_baseline_fails(pipeline, rows)
         self._at = np.flatnonzero(harmful)
         self._U: Float = rows.U[self._at]
         self._found: dict[int, Neighbourhood] = {}
@@ -341,12 +345,13 @@ class _Triage:
         ok = rows.status == 0
         implausible = _implausible(rows)
         known = [self._found[i] for i in dict.fromkeys([*tested, *sample]) if i in self._found]
-        untested = ""
+        untested, baseline = "", pipeline.baseline.driver.label if pipeline.baseline else ""
         if not pipeline.tries:
             untested = "neighbours are simulated in the embedded simulator only"
         return Triage(
             scenario=pipeline.scenario.name, ego=pipeline.driver.label,
-            count=pipeline.objective.count, results=rows.digest(), seed=self._seed,
+            baseline=baseline, count=pipeline.objective.count,
+            results=rows.digest(), seed=self._seed,
             neighbours=NEIGHBOURS if pipeline.tries else 0, radius=RADIUS, sampled=len(sample),
             bound=bound(
                 evaluations=len(ok), failed=int((~ok).sum()),
@@ -354,7 +359,7 @@ class _Triage:
                 least=least_margins(
                     rows.metrics, pipeline.metrics, self._harm, rows.id, ok & ~implausible,
                 ),
-                modes=len(modes), ego=pipeline.driver.label,
+                modes=len(modes), ego=pipeline.driver.label, baseline=baseline,
             ),
             modes=tuple(modes), unrecorded_modes=self._unrecorded,
             neighbourhoods=tuple(known), untested=untested,
@@ -385,6 +390,13 @@ class _Triage:
         parameter = self._space.parameters[names[k]]
         unit = "" if parameter.unit in ("1", "count", "?") else f" {parameter.unit}"
         return f"{text}, {names[k]} {parameter.kind.span_text(low, high, '{:.3g}'.format, unit)}"
+
+
+def _baseline_fails(pipeline: Pipeline, rows: Rows | Recorded) -> Bool:
+    """Return which rows the baseline's driver fails in, ``(N,)``, or has no usable result of."""
+    column = rows.metrics[:, pipeline.metrics.index(f"{OF_BASELINE}{HARM}")]
+    fails: Bool = ~(np.nan_to_num(column, nan=1.0) < NEAR_MISS)
+    return fails | ~rows.critical if pipeline.objective.rule == "harm" else fails
 
 
 def _implausible(rows: Rows | Recorded) -> Bool:

@@ -1,12 +1,14 @@
 // What the bird's-eye view shows at each instant: the conflict, the whole motion, or the ego in the middle.
 
 import { boxCentre, boxCorners, isPlaced, nearestTo, playersOf, stateAt } from "./geometry.js";
+import { ghostsAt } from "./ghosts.js";
 
 const AROUND_BODIES = 5; // m around the bodies
 const LEAST_SCALE = 8; // pixels per metre at which a car is still seen well
 const MOST_SCALE = 20;
 const EGO_WITHIN = 0.34; // share of the width and height within which the ego stays
 const TOO_SMALL = 2; // pixels per metre: below that a car is a few pixels
+const GHOST_WITHIN = 50; // m from the body: nearer ones, of another simulator or driver, are kept in sight
 const ACROSS = 100; // m across, that are shown where the ego is kept in the middle
 
 // The other participant of the conflict, else whoever comes nearest to the ego; 0 if nobody does.
@@ -48,6 +50,8 @@ export class Camera {
       const { x, y, h } = state.entities[e];
       return boxCorners(this.kept.entities[e], x, y, h);
     });
+    const ghosts = ghostsAt(this.kept, state).filter(({ entity, off }) => [0, this.partner].includes(entity) && off < GHOST_WITHIN);
+    corners.push(...ghosts.flatMap(({ entity, x, y, h }) => boxCorners(this.kept.entities[entity], x, y, h)));
     view.fit(corners, AROUND_BODIES, [LEAST_SCALE, MOST_SCALE]);
     view.keep(centre, EGO_WITHIN);
   }

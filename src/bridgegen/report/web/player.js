@@ -112,7 +112,8 @@ export class Player {
       $("course-button").textContent = tells ? "Planned path" : "Way ahead";
       $("course-means").textContent = `in 1, 2, 3 s${tells ? "" : " if it goes on like this"}; a thick bar: it stands`;
     }
-    if (has.elsewhere) $("elsewhere-means").textContent = `where ${[...new Set(ghostsOf(this.kept).map(({ label }) => label))].join(", ")} has them`;
+    if (has.elsewhere) $("elsewhere-means").textContent = [...new Set(ghostsOf(this.kept).map(({ means }) => means))].join("; ");
+    if (has.elsewhere) $("elsewhere-button").textContent = ghostsOf(this.kept).some(({ simulator }) => simulator) ? "Elsewhere" : "Other driver";
     if (this.kept.sensed) $("displaced-means").textContent = `displaced by over ${this.kept.sensed.tolerance} m`;
   }
 
