@@ -15,7 +15,8 @@ from bridgegen.suite.entries import find_entries
 from bridgegen.suite.results import EntryResult, RowResult, counts
 from bridgegen.suite.suite import FILE, read_suite, run_suite
 from bridgegen.verdict.fail_if import Comparison
-from bridgegen.verdict.of_suite import SuiteCriteria, figures_of, figures_of_difference
+from bridgegen.verdict.of_difference import figures_of as figures_of_difference
+from bridgegen.verdict.of_suite import SuiteCriteria, figures_of
 
 CRITERIA = CommonOptions(criteria=["C-1: always(ego.v < 12 m/s)"])
 
@@ -177,8 +178,9 @@ def test_a_difference_by_hand():
     low, high = found.interval("broken")
     assert low == pytest.approx(0.1181, abs=1e-3)  # Clopper-Pearson of 3 in 6
     assert high == pytest.approx(0.8819, abs=1e-3)
-    figures = figures_of_difference(found)
+    figures = figures_of_difference(found, ())
     assert (figures["broken"], figures["fixed"], figures["more_severe"]) == (3, 1, 0)
+    assert figures["worse"] == 0
     assert np.isfinite(list(figures.values())).all()
 
 

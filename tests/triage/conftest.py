@@ -42,7 +42,7 @@ def fix(cause, name, dry=False):
 class World:
     """A pipeline whose harm is ``harm(values, fix)`` of the rows; ``label`` names their rule."""
 
-    cause, seeks_causes, tries, metrics = None, True, True, METRICS
+    cause, baseline, seeks_causes, tries, metrics = None, None, True, True, METRICS
 
     def __init__(self, space, harm, fixes=(), label=None, fails=None):
         self.space, self._harm, self.fixes, self._label = space, harm, tuple(fixes), label

@@ -1,6 +1,6 @@
 """Options of the command line from the declarations in `bridgegen.options`."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import replace
 from inspect import signature
 from typing import Annotated, Any
@@ -14,8 +14,26 @@ from bridgegen.options import Option, PipelineOptions, SearchOptions, options_of
 
 def with_declared_options(command: Callable[..., None]) -> Callable[..., None]:
     """Give a command the options of the class that its parameter ``options`` is annotated with."""
+    return with_options(*_names(command))(command)
+
+
+def with_options(*names: str) -> Callable[[Callable[..., None]], Callable[..., None]]:
+    """Give a command some of these options; its parameter ``options`` has the others' defaults."""
+
+    def decorate(command: Callable[..., None]) -> Callable[..., None]:
+        return _with(command, names)
+
+    return decorate
+
+
+def _names(command: Callable[..., None]) -> list[str]:
     kind: type[PipelineOptions] = signature(command).parameters["options"].annotation
-    declared = {one.name: one for one in options_of(kind) if one.form.kind is not None}
+    return [one.name for one in options_of(kind) if one.form.kind is not None]
+
+
+def _with(command: Callable[..., None], names: Collection[str]) -> Callable[..., None]:
+    kind: type[PipelineOptions] = signature(command).parameters["options"].annotation
+    declared = {one.name: one for one in options_of(kind) if one.name in names}
 
     def fold(values: dict[str, Any]) -> PipelineOptions:
         given = {name: value for name, value in values.items() if value is not None}

@@ -9,12 +9,11 @@ from bridgegen.cli import options as common
 from bridgegen.cli.app import FAILED, app
 from bridgegen.cli.completion import completing
 from bridgegen.cli.connection import NO_CONNECTION, Connection, with_connection_options
-from bridgegen.cli.declared import declaration
+from bridgegen.cli.declared import with_options
 from bridgegen.cli.groups import SEARCH
 from bridgegen.cli.map_folder import with_map_folder
 from bridgegen.errors import InputError
 from bridgegen.options import CommonOptions
-from bridgegen.options.forms import read_names
 from bridgegen.options.option import DRIVER, OUTPUT, WHAT
 from bridgegen.options.option import SEARCH as HOW
 from bridgegen.simulation.choice import EMBEDDED
@@ -43,18 +42,28 @@ AtOnce = Annotated[
         rich_help_panel=HOW,
     ),
 ]
-Criteria = Annotated[list[str] | None, declaration("criteria")]
-Critical = Annotated[str | None, declaration("critical")]
-Count = Annotated[str | None, declaration("count")]
-OwnOthers = Annotated[str | None, declaration("others")]
-Stages = Annotated[str | None, declaration("ideal")]
+Out = Annotated[
+    Path | None,
+    typer.Option(
+        help="Folder of the results; those of a stopped one are resumed.",
+        show_default="suites/NAME",
+        rich_help_panel=OUTPUT,
+    ),
+]
+
+of_all_scenarios = with_options(
+    "ideal", "others", "time_limit", "criteria", "critical", "count", "empty_trigger"
+)
+"""Gives a command the options of how each scenario is run and judged."""
 
 
 @app.command(rich_help_panel=SEARCH)
 @with_map_folder(WHAT)
 @with_connection_options
+@of_all_scenarios
 def suite(
     files: Files,
+    options: CommonOptions,
     ego: Annotated[
         list[str] | None,
         typer.Option(
@@ -64,27 +73,13 @@ def suite(
             autocompletion=completing("driver"),
         ),
     ] = None,
-    ideal: Stages = None,
-    others: OwnOthers = None,
-    time_limit: common.TimeLimit = None,
-    criterion: Criteria = None,
-    critical: Critical = None,
-    count: Count = None,
-    empty_trigger: common.EmptyTrigger = None,
     samples: Samples = 100,
     seed: Seed = 0,
     simulator: common.Simulator = None,
     simulator_set: common.SimulatorSettings = None,
     connection: Connection = NO_CONNECTION,
     workers: AtOnce = None,
-    out: Annotated[
-        Path | None,
-        typer.Option(
-            help="Folder of the results; those of a stopped suite are resumed.",
-            show_default="suites/NAME",
-            rich_help_panel=OUTPUT,
-        ),
-    ] = None,
+    out: Out = None,
     fail_if: Annotated[
         list[str] | None,
         typer.Option(
@@ -107,7 +102,6 @@ def suite(
     from bridgegen.suite.suite import run_suite
     from bridgegen.verdict.of_suite import SuiteCriteria
 
-    options = _options(ideal, others, time_limit, criterion, critical, count, empty_trigger)
     judges = SuiteCriteria.read(
         fail_if or (), junit, [f"criterion:{one['id']}" for one in options.criteria]
     )
@@ -132,6 +126,7 @@ def suite(
 
 @app.command(rich_help_panel=SEARCH)
 @with_map_folder(WHAT)
+@of_all_scenarios
 def diff(
     files: Files,
     ego: Annotated[
@@ -142,52 +137,54 @@ def diff(
             autocompletion=completing("driver"),
         ),
     ],
-    others: OwnOthers = None,
-    time_limit: common.TimeLimit = None,
-    criterion: Criteria = None,
-    critical: Critical = None,
-    count: Count = None,
-    empty_trigger: common.EmptyTrigger = None,
+    options: CommonOptions,
     samples: Samples = 1000,
-    seed: Seed = 0,
-    workers: AtOnce = None,
-    out: Annotated[
-        Path | None,
+    budget: Annotated[
+        int,
         typer.Option(
-            help="Folder of the results; those of a stopped one are resumed.",
-            show_default="suites/NAME",
-            rich_help_panel=OUTPUT,
+            help="Evaluations of the search of each logical scenario for where the second is "
+            "worse; 0: none is searched.",
+            min=0,
+            rich_help_panel=HOW,
         ),
-    ] = None,
+    ] = 300,
+    seed: Annotated[
+        int, typer.Option(help="Seed of the variations, and of searches.", rich_help_panel=HOW)
+    ] = 0,
+    workers: AtOnce = None,
+    out: Out = None,
     fail_if: Annotated[
         list[str] | None,
         typer.Option(
             help="End with exit status 3 if this holds, e.g. 'broken > 0'; may be repeated.",
-            show_default=False,
+            show_default="none; with --junit, that one is broken or a search finds where",
             rich_help_panel=OUTPUT,
         ),
     ] = None,
+    junit: common.Junit = None,
     as_json: common.Json = False,
 ) -> None:
     """Compare two drivers on the same variations.
 
-    Lists what the second breaks and fixes, with the confidence of either share.
+    Lists what the second breaks and fixes, with the confidence of either share. Then searches the
+    logical scenarios for where the second is worse.
     """
     from bridgegen.screen.suite import SuiteScreen, print_difference
     from bridgegen.screen.verdict import print_outcomes
     from bridgegen.suite.difference import difference
     from bridgegen.suite.page import write_suite_page
     from bridgegen.suite.suite import run_suite
-    from bridgegen.verdict.of_suite import DifferenceCriteria
+    from bridgegen.suite.worse import search_worse
+    from bridgegen.verdict.of_difference import DifferenceCriteria
 
     if len(ego) != 2 or ego[0] == ego[1]:
         raise InputError(f"two different drivers are compared: --ego A --ego B, got {len(ego)}")
-    judges = DifferenceCriteria.read(fail_if or ())
-    options = _options(None, others, time_limit, criterion, critical, count, empty_trigger)
+    egos = (ego[0], ego[1])
+    judges = DifferenceCriteria.read(fail_if or (), junit)
     with SuiteScreen() as screen:
         found = run_suite(
             files,
-            egos=ego,
+            egos=egos,
             options=options,
             samples=samples,
             seed=seed,
@@ -195,33 +192,12 @@ def diff(
             out=out,
             callbacks=screen.callbacks,
         )
+        searches = search_worse(
+            found, egos, budget=budget, seed=seed, callbacks=screen.of_searches(budget)
+        )
         screen.show(what="page", facts="")
-        page = write_suite_page(found, found.jobs)
-    first, second = (found.of_ego(one) for one in ego)
-    made = difference(first, second, (ego[0], ego[1]))
-    print_difference(made, page, as_json=as_json)
-    if not print_outcomes(judges.judge(made)):
+        page = write_suite_page(found, found.jobs, searches)
+    made = difference(found.of_ego(egos[0]), found.of_ego(egos[1]), egos)
+    print_difference(made, searches, page, as_json=as_json)
+    if not print_outcomes(judges.judge(found, made, searches)):
         raise typer.Exit(FAILED)
-
-
-def _options(
-    ideal: str | None,
-    others: str | None,
-    time_limit: float | None,
-    criterion: list[str] | None,
-    critical: str | None,
-    count: str | None,
-    empty_trigger: str | None,
-) -> CommonOptions:
-    """Return the options of all scenarios of a suite."""
-    from bridgegen.odd.criteria import read_criteria
-
-    return CommonOptions(
-        ideal=read_names(ideal),
-        others=others,
-        time_limit=time_limit,
-        criteria=[one.to_dict() for one in read_criteria(criterion or ())],
-        critical=critical,
-        count=count,
-        empty_trigger=empty_trigger,
-    )

@@ -15,6 +15,10 @@ if TYPE_CHECKING:
     from bridgegen.suite.difference import Difference
     from bridgegen.suite.results import EntryResult
     from bridgegen.suite.suite import SuiteCallbacks, SuiteRun
+    from bridgegen.suite.worse import WorseCallbacks, WorseThan
+
+MOST_MODES = 3
+"""Failure modes of a search that are named."""
 
 MOST_ROWS = 40
 """Entries of the table; those that pass are left out first."""
@@ -33,6 +37,20 @@ class SuiteScreen(Live):
         from bridgegen.suite.suite import SuiteCallbacks
 
         return SuiteCallbacks(begun=self._begin, ended=self._end)
+
+    def of_searches(self, budget: int) -> "WorseCallbacks":
+        """Return the callbacks for ``search_worse``.
+
+        Args:
+            budget: evaluations of each search.
+        """
+        from bridgegen.suite.worse import WorseCallbacks
+
+        def begin(entry: str, number: int, count: int) -> None:
+            facts = f"{number + 1} of {count}: {entry}"
+            self.show(what="searching", done=0, total=budget, facts=facts)
+
+        return WorseCallbacks(begun=begin, batch=lambda evaluations: self.show(done=evaluations))
 
     def _begin(self, entries: int, done: int) -> None:
         self.say_compiling()
@@ -91,8 +109,10 @@ def print_suite(suite: "SuiteRun", seconds: float, page: Path, *, as_json: bool 
     print(f"page: {page} ({seconds:.1f} s)")
 
 
-def print_difference(found: "Difference", page: Path, *, as_json: bool = False) -> None:
-    """Print what is broken and fixed from the first ego to the second."""
+def print_difference(
+    found: "Difference", searches: Sequence["WorseThan"], page: Path, *, as_json: bool = False
+) -> None:
+    """Print what is broken and fixed from the first ego to the second, then what searches found."""
     counts = found.counts
     if as_json:
         facts: dict[str, Any] = {
@@ -101,6 +121,7 @@ def print_difference(found: "Difference", page: Path, *, as_json: bool = False) 
             "counts": counts,
             "p_value": found.p_value,
             "rows": [vars(one) for one in found.rows if one.change in ("broken", "fixed")],
+            "searches": [{**vars(one), "folder": str(one.folder)} for one in searches],
         }
         print(json.dumps(facts, indent=2, ensure_ascii=False))
         return
@@ -133,8 +154,31 @@ def print_difference(found: "Difference", page: Path, *, as_json: bool = False) 
     print(f"  {'both pass':<16}{counts['both pass']}")
     if counts["not comparable"]:
         print(f"  {'not comparable':<16}{counts['not comparable']}")
+    compared = [one.severity for one in found.rows if one.change != "not comparable"]
+    worse, better = (sum(sign * one > 0.0 for one in compared) for sign in (1.0, -1.0))
+    print(f"  {'severity':<16}higher in {worse}, lower in {better}")
     print(f"  {'by chance':<16}p = {found.p_value:.3g} (McNemar's exact test)")
+    _print_searches(searches, found)
     print(f"page: {page}")
+
+
+def _print_searches(searches: Sequence["WorseThan"], found: "Difference") -> None:
+    """Print where searches found the second ego worse; then how many found nothing."""
+    if not searches:
+        return
+    print(f"\nsearches for scenarios that {found.second} fails and {found.first} passes")
+    for one in searches:
+        if one.problem:
+            print(f"  {one.entry}: not searched: {one.problem}")
+        elif one.worse:
+            print(f"  {one.entry}: {one.sentence}")
+            for title in one.modes[:MOST_MODES]:
+                print(f"    {title}")
+            print(f"    {one.folder / 'report.html'}")
+    if none := [one for one in searches if not one.worse and not one.problem]:
+        evaluations = sum(one.evaluations for one in none)
+        print(f"  none in {len(none)} others ({evaluations} evaluations)")
+    print()
 
 
 def _verdict(one: "EntryResult") -> str:

@@ -1,5 +1,6 @@
 """An entry of a suite → its pipeline → the results of its rows."""
 
+import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -18,7 +19,7 @@ from bridgegen.simulation.rollout import STATUS_MESSAGES
 from bridgegen.suite.entries import Entry
 from bridgegen.suite.results import EntryResult, RowResult, finite
 from bridgegen.suite.rows import rows_of
-from bridgegen.workers import Threads
+from bridgegen.workers import CarriedDriver, Threads
 
 AT_ONCE = 512
 """Rows that are evaluated together; no result depends on it."""
@@ -47,6 +48,21 @@ class Job:
     seed: int
 
     @property
+    def digest(self) -> str:
+        """A digest of all files that it depends on; empty if they cannot be read.
+
+        The file of a driver of the user's is one of them, but not what that imports.
+        """
+        entry = self.entry.digest
+        try:
+            data = CarriedDriver.of(self.ego).data if self.ego else None
+        except InputError:
+            return ""
+        if not entry or data is None:
+            return entry
+        return hashlib.sha256(entry.encode() + data).hexdigest()
+
+    @property
     def name(self) -> str:
         """Of the entry, and of the ego if there is one."""
         return self.entry.name if self.ego is None else f"{self.entry.name} ({self.ego})"
@@ -58,7 +74,7 @@ def evaluate(job: Job) -> EntryResult:
     found = EntryResult(
         entry=entry.name,
         ego=job.ego or "",
-        digest=entry.digest,
+        digest=job.digest,
         scenario=entry.scenario,
         distribution=entry.distribution or "",
         problem=entry.problem,

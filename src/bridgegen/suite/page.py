@@ -17,6 +17,7 @@ from bridgegen.suite.evaluate import Job, pipeline_of, rows_of_job
 from bridgegen.suite.page_payload import Key, key_of, payload
 from bridgegen.suite.results import EntryResult, rank
 from bridgegen.suite.suite import SAMPLES, SuiteRun
+from bridgegen.suite.worse import WorseThan
 
 FILE = "suite.html"
 
@@ -29,12 +30,15 @@ _SIMULATE = ("ideal", "others", "time_limit", "criteria", "empty_trigger")
 """Options that ``bridgegen simulate`` has, too."""
 
 
-def write_suite_page(suite: SuiteRun, jobs: Sequence[Job]) -> Path:
+def write_suite_page(
+    suite: SuiteRun, jobs: Sequence[Job], searches: Sequence[WorseThan] = ()
+) -> Path:
     """Write the page of a suite, whole or not at all.
 
     Args:
         suite: its results.
         jobs: of which they are; those that fail the worst are simulated again, to be played.
+        searches: for where the second of two egos is worse.
 
     Returns:
         The page, in the folder of the results.
@@ -49,7 +53,7 @@ def write_suite_page(suite: SuiteRun, jobs: Sequence[Job]) -> Path:
         for one in suite.results
         if one.verdict == "failed" and key_of(one) in by_key
     }
-    data = payload(suite, played, commands, code=code_of(_MODULE))
+    data = payload(suite, played, commands, searches, code=code_of(_MODULE))
     path = suite.folder / FILE
     title = f"{suite.folder.resolve().name}: suite – BridgeGen"
     write_whole(path, page_of(_MODULE, title, script_json(data)))
@@ -100,7 +104,7 @@ def _playback(job: Job, result: EntryResult, others: Sequence[Job]) -> Playback 
         others: the same with other egos, whose motion is shown beside.
     """
     row = result.worst
-    if row is None or job.entry.digest != result.digest:  # the files have changed since
+    if row is None or job.digest != result.digest:  # the files have changed since
         return None
     try:
         pipeline = pipeline_of(job)

@@ -10,9 +10,11 @@ from bridgegen.report.packed import OF_ROW, deflated, road_key
 from bridgegen.report.payload import script_json
 from bridgegen.report.playback import Playback
 from bridgegen.report.playback_payload import ROAD_SCALE, SCALE, playback_payload, road_payload
+from bridgegen.suite.difference import difference as variations_compared
 from bridgegen.suite.results import EntryResult, RowResult, Verdict, rank
-from bridgegen.suite.sentences import difference, differences, headline, label_of
+from bridgegen.suite.sentences import changes, difference, differences, headline, label_of
 from bridgegen.suite.suite import SuiteRun
+from bridgegen.suite.worse import WorseThan
 
 SIZE, SIZE_OF_RESULT = 2_600_000, 600
 """Maximum number of characters of a page with 1,000 results, and how many more it may have for each
@@ -20,6 +22,9 @@ further one."""
 
 MOTIONS = 1_200_000
 """Maximum number of characters of all playbacks."""
+
+MOST_MODES = 10
+"""Failure modes that the page names of each search."""
 
 MOST_ROWS = 1000
 """Maximum number of variations that the page holds of an entry with an ego."""
@@ -41,6 +46,7 @@ def payload(
     suite: SuiteRun,
     played: Mapping[Key, Playback],
     commands: Mapping[Key, str],
+    searches: Sequence[WorseThan] = (),
     *,
     code: int = 0,
 ) -> dict[str, Any]:
@@ -53,6 +59,7 @@ def payload(
         suite: the results.
         played: playbacks of the worst failed rows.
         commands: that show failures again.
+        searches: for where the second of two egos is worse.
         code: characters that the page has besides its data.
     """
     labels = [label_of(suite, ego) for ego in suite.egos]
@@ -79,9 +86,11 @@ def payload(
                 for ego, label in zip(suite.egos, labels, strict=True)
             ],
             "differences": differences([one for one in complete if len(one) > 1], labels),
+            "changes": _changes(suite, labels),
             "facts": _facts(suite),
             "entries": entries,
             "criteria": _matrix(suite, criteria),
+            "searches": [_search(suite, one) for one in searches],
             "motions": motions,
         },
     }
@@ -89,6 +98,16 @@ def payload(
     room = most - code - len(script_json(page))
     page["suite"]["details"] = _details(suite, by_entry, criteria, commands, room)
     return page
+
+
+def _changes(suite: SuiteRun, labels: Sequence[str]) -> str:
+    """Return what the second of two egos breaks and fixes, in words; "" of any other number."""
+    if len(suite.egos) != 2:
+        return ""
+    first, second = (suite.of_ego(ego) for ego in suite.egos)
+    if [one.entry for one in first] != [one.entry for one in second]:  # it was stopped
+        return ""
+    return changes(variations_compared(first, second, (labels[0], labels[1])))
 
 
 def _verdicts(suite: SuiteRun, of_it: Mapping[str, EntryResult]) -> list[Verdict]:
@@ -147,6 +166,19 @@ def _result(one: EntryResult, criteria: Mapping[str, int], motion: int | None) -
 
 
 # ---- criteria ----
+
+
+def _search(suite: SuiteRun, one: WorseThan) -> dict[str, Any]:
+    report = one.folder / "report.html"
+    return {
+        "entry": one.entry,
+        "worse": one.worse,
+        "evaluations": one.evaluations,
+        "sentence": one.problem or one.sentence,
+        "problem": bool(one.problem),
+        "modes": list(one.modes[:MOST_MODES]),
+        "report": report.relative_to(suite.folder).as_posix() if report.exists() else "",
+    }
 
 
 def _text(criterion: Mapping[str, Any]) -> str:

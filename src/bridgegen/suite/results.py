@@ -67,7 +67,7 @@ class EntryResult(Strict):
     Attributes:
         entry: its name.
         ego: as the user names it; the scenario's own driver if none.
-        digest: of the entry's files.
+        digest: of the entry's files and the driver's.
         scenario: path or name.
         distribution: path, or "".
         driver: that drove the ego, by name.

@@ -48,6 +48,11 @@ def rows_of(
     return X[~excluded], int(excluded.sum())
 
 
+def is_sample(scenario: SearchedScenario) -> bool:
+    """Whether the rows that a suite runs of a scenario are some of very many, not all there are."""
+    return not isinstance(scenario, FileScenario) or isinstance(scenario.definition, dst.Stochastic)
+
+
 def _all(scenario: SearchedScenario, space: SearchSpace, samples: int, seed: int) -> Float:
     """Return all rows, those that the scenario's constraints exclude among them."""
     if not space.n_var:

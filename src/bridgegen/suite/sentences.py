@@ -3,6 +3,7 @@
 from collections import Counter
 from collections.abc import Sequence
 
+from bridgegen.suite.difference import Change, Difference
 from bridgegen.suite.results import EntryResult, Verdict, counts
 from bridgegen.suite.suite import SuiteRun
 
@@ -88,3 +89,20 @@ def differences(of_entries: Sequence[Sequence[Verdict]], labels: Sequence[str]) 
 
 def _of_many(word: str, number: int) -> str:
     return {"fails": "fail", "passes": "pass"}.get(word, word) if number > 1 else word
+
+
+def changes(found: Difference) -> str:
+    """Return what the second ego breaks and fixes of the variations, with intervals."""
+    counts = found.counts
+    n = len(found.rows) - counts["not comparable"]
+    if not n:
+        return ""
+    verbs: dict[Change, str] = {"broken": "breaks", "fixed": "fixes"}
+    words = []
+    for change, verb in verbs.items():
+        low, high = found.interval(change)
+        words.append(f"{verb} {counts[change]:,} ({low:.1%} to {high:.1%})")
+    return (
+        f"Of {n:,} variations, {found.second} {' and '.join(words)} against {found.first} "
+        f"(95 % confidence; McNemar’s exact test: p = {found.p_value:.2g})."
+    )

@@ -280,11 +280,11 @@ def _done(
             f"{path.parent}: holds the results of a suite with other settings "
             f"({', '.join(other)}); choose another folder with --out"
         )
-    wanted = {(job.entry.name, job.ego or ""): job.entry for job in jobs}
+    wanted = {(job.entry.name, job.ego or ""): job for job in jobs}
     found = {}
     for one in results:
-        entry = wanted.get((one.entry, one.ego))
-        if entry is not None and one.digest and one.digest == entry.digest:
+        job = wanted.get((one.entry, one.ego))
+        if job is not None and one.digest and one.digest == job.digest:
             found[one.entry, one.ego] = one
     if torn or len(found) < len(results):  # what has changed is run again, and said once
         lines = [header.model_dump_json(), *(one.model_dump_json() for one in found.values())]

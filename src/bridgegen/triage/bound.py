@@ -95,7 +95,7 @@ def bound(
 ) -> Bound:
     """Return the bound of the space, in figures and in words."""
     fails = f"{ego} fails, and {baseline} does not," if baseline else f"{ego} fails"
-    such = "such" if baseline else "harmful"
+    such = "harmful with it alone" if baseline else "harmful"
     none = f"No scenario in which {fails} was found" if baseline else "No failure found"
     if evaluations == failed:
         text = f"No evaluation has a result, so nothing is known of {ego}."
@@ -117,7 +117,9 @@ def bound(
 def _of_the_space(space: Estimate, such: str) -> str:
     """Return the share of the space that is such, with its interval."""
     if not space.drawn or not space.rows:
-        return "the share of the space is not estimated, for the search chose its rows"
+        return (
+            f"the share of the space that is {such} is not estimated, for the search chose its rows"
+        )
     by = _DRAWN[space.drawn].format(space.rows)
     if not space.harmful:
         return f"with 95 % confidence at most {_percent(space.high)} of the space is {such} ({by})"

@@ -1,12 +1,11 @@
-"""Pass/fail criteria for a suite, and for the difference of two egos in it."""
+"""Pass/fail criteria for a suite."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Self
+from typing import Literal, Self
 
 from bridgegen.odd.criteria import read_criterion
-from bridgegen.suite.difference import Difference
 from bridgegen.suite.results import EntryResult, RowResult, counts
 from bridgegen.suite.suite import SuiteRun
 from bridgegen.verdict.fail_if import (
@@ -30,17 +29,6 @@ FIGURES = {
     "worst_severity": "the worst probability of MAIS3+",
 }
 """The figures of a suite that ``--fail-if`` accepts."""
-
-OF_A_DIFFERENCE = {
-    "broken": "variations that the first ego passes and the second fails",
-    "fixed": "variations that the first ego fails and the second passes",
-    "both_fail": "variations that both fail",
-    "both_pass": "variations that both pass",
-    "not_comparable": "variations that one of them did not run",
-    "more_severe": "variations in which the second's severity is larger",
-    "p_value": "of McNemar's exact test",
-}
-"""The figures of the difference of two egos."""
 
 MOST_NAMED = 20
 """Variations that a test's text names."""
@@ -112,40 +100,6 @@ def figures_of(results: Sequence[EntryResult]) -> dict[str, float]:
     return figures
 
 
-def figures_of_difference(found: Difference) -> dict[str, float]:
-    """Return OF_A_DIFFERENCE."""
-    figures: dict[str, float] = {
-        change.replace(" ", "_"): count for change, count in found.counts.items()
-    }
-    more = sum(one.severity > 0.0 for one in found.rows if one.change != "not comparable")
-    return figures | {"more_severe": more, "p_value": found.p_value}
-
-
-@dataclass(frozen=True)
-class DifferenceCriteria:
-    """The criteria for a difference, checked before it is made.
-
-    Attributes:
-        conditions: each fails it if it holds; none: nothing does.
-    """
-
-    conditions: tuple[FailCondition, ...]
-
-    @classmethod
-    def read(cls, texts: Sequence[str]) -> Self:
-        """Read the criteria; their figures are OF_A_DIFFERENCE.
-
-        Raises:
-            InputError: a text is not a condition, or a figure is unknown.
-        """
-        return cls(read_conditions(texts, OF_A_DIFFERENCE))
-
-    def judge(self, found: Difference) -> tuple[Outcome, ...]:
-        """Apply the criteria to a difference."""
-        figures = figures_of_difference(found)
-        return tuple(one.judge(figures) for one in self.conditions)
-
-
 def _all_pass(suite: SuiteRun, ego: str) -> Outcome:
     number = counts(suite.of_ego(ego))
     details = ", ".join(f"{count} {name}" for name, count in number.items())
@@ -179,28 +133,42 @@ def _cases(one: EntryResult, group: str) -> list[Case]:
     if one.problem:
         return [Case(group, "runs", "error", one.problem)]
     lost = [i for i, row in enumerate(one.rows) if row.problem]
-    cases = [_case(group, "runs", one, lost, "did not run", "error")]
+    cases = [case_of_rows(group, "runs", one, lost, "did not run", "error")]
     critical = [i for i, row in enumerate(one.rows) if row.critical]
-    cases.append(_case(group, "no critical scenario", one, critical, "critical", "failure"))
+    cases.append(case_of_rows(group, "no critical scenario", one, critical, "critical", "failure"))
     for number, given in enumerate(one.criteria):
         violating = [i for i, row in enumerate(one.rows) if number in row.violated]
         words = words_of(read_criterion(given))
-        cases.append(_case(group, words, one, violating, "violate it", "failure"))
+        cases.append(case_of_rows(group, words, one, violating, "violate it", "failure"))
     return cases
 
 
-def _case(
-    group: str, name: str, one: EntryResult, rows: Sequence[int], what: str, problem: str
+def case_of_rows(
+    group: str,
+    name: str,
+    one: EntryResult,
+    rows: Sequence[int],
+    what: str,
+    problem: Literal["error", "failure"],
 ) -> Case:
+    """Return a test that has a problem if there are such variations, and names them.
+
+    Args:
+        group: of tests.
+        name: of the test.
+        one: the entry's results.
+        rows: the numbers of these variations.
+        what: what is wrong with them, in words.
+        problem: that the test has.
+    """
     message = f"{len(rows)} of {len(one.rows)} variations {what}"
-    lines = [_row_in_words(one, i, one.rows[i]) for i in rows[:MOST_NAMED]]
+    lines = [row_in_words(one, i, one.rows[i]) for i in rows[:MOST_NAMED]]
     if len(rows) > MOST_NAMED:
         lines.append(f"and {len(rows) - MOST_NAMED} more")
-    kind = problem if rows else None
-    return Case(group, name, kind, message, "\n".join(lines))  # type: ignore[arg-type]
+    return Case(group, name, problem if rows else None, message, "\n".join(lines))
 
 
-def _row_in_words(one: EntryResult, i: int, row: RowResult) -> str:
+def row_in_words(one: EntryResult, i: int, row: RowResult) -> str:
     """Return a variation in a line: its values, and what happened."""
     values = zip(one.parameters, row.x, one.units, strict=True)
     named = ", ".join(

@@ -4,6 +4,7 @@ import { darkScheme } from "./colours.js";
 import { $, element } from "./common.js";
 import { hook } from "./hook.js";
 import { showCriteria } from "./suite_criteria.js";
+import { showSearches } from "./suite_searches.js";
 import { motions } from "./suite_motions.js";
 import { table } from "./suite_table.js";
 import { bar, suite } from "./suite_words.js";
@@ -16,11 +17,14 @@ function showResult() {
     const count = (v) => suite.entries.filter(({ results }) => results[e]?.v === v).length;
     $("result").append(element("p", { class: "headline" }, `${headline}.`), bar([count("p"), count("f"), count("n")]));
   });
-  if (suite.differences) $("result").append(element("p", { class: "differences" }, suite.differences));
+  for (const text of [suite.differences, suite.changes]) {
+    if (text) $("result").append(element("p", { class: "differences" }, text));
+  }
 }
 
 showResult();
 showCriteria();
+showSearches();
 table.fill();
 table.go();
 hook.open = (name) => table.show(suite.entries.findIndex((one) => one.name === name));

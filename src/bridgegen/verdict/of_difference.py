@@ -1,0 +1,141 @@
+"""Pass/fail criteria for the difference of two egos in a suite."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Self
+
+from bridgegen.suite.difference import Difference
+from bridgegen.suite.results import EntryResult
+from bridgegen.suite.suite import SuiteRun
+from bridgegen.suite.worse import WorseThan
+from bridgegen.verdict.fail_if import FailCondition, Outcome, Verdict, read_conditions
+from bridgegen.verdict.junit import Case, Suite, case_of, refuse_junit, write_junit
+from bridgegen.verdict.of_suite import case_of_rows
+
+FIGURES = {
+    "broken": "variations that the first ego passes and the second fails",
+    "fixed": "variations that the first ego fails and the second passes",
+    "both_fail": "variations that both fail",
+    "both_pass": "variations that both pass",
+    "not_comparable": "variations that one of them did not run",
+    "more_severe": "variations in which the second's severity is larger",
+    "less_severe": "variations in which the second's severity is smaller",
+    "p_value": "of McNemar's exact test",
+    "worse": "evaluations of the searches that the second ego fails and the first passes",
+    "worse_modes": "failure modes that they make up",
+    "worse_scenarios": "scenarios in which a search finds any",
+    "not_searched": "scenarios whose search failed",
+}
+"""The figures of a difference that ``--fail-if`` accepts."""
+
+
+@dataclass(frozen=True)
+class DifferenceCriteria:
+    """The criteria for a difference, checked before it is made.
+
+    Attributes:
+        conditions: each fails it if it holds.
+        junit: path of the JUnit XML, or None. With it and without conditions, a variation that is
+            broken fails the difference, and a search that finds where the second ego is worse.
+    """
+
+    conditions: tuple[FailCondition, ...]
+    junit: Path | None
+
+    @classmethod
+    def read(cls, texts: Sequence[str], junit: Path | None = None) -> Self:
+        """Read the criteria; their figures are FIGURES.
+
+        Raises:
+            InputError: a text is not a condition, or a figure is unknown.
+            StorageError: the JUnit XML cannot be written.
+        """
+        found = cls(read_conditions(texts, FIGURES), junit)
+        if junit is not None:
+            refuse_junit(junit)
+        return found
+
+    def judge(
+        self, suite: SuiteRun, found: Difference, searches: Sequence[WorseThan]
+    ) -> tuple[Outcome, ...]:
+        """Apply the criteria, and write the JUnit XML if requested."""
+        figures = figures_of(found, searches)
+        outcomes = [one.judge(figures) for one in self.conditions]
+        if self.junit is not None:
+            if not outcomes:
+                outcomes = [
+                    _none(f"{found.second} breaks nothing", figures, "broken", "not_comparable"),
+                    _none(
+                        f"no search finds {found.second} worse", figures, "worse", "not_searched"
+                    ),
+                ]
+            conditions = outcomes if self.conditions else ()
+            write_junit(self.junit, _suites(suite, found, searches, conditions))
+        return tuple(outcomes)
+
+
+def figures_of(found: Difference, searches: Sequence[WorseThan]) -> dict[str, float]:
+    """Return FIGURES."""
+    compared = [one for one in found.rows if one.change != "not comparable"]
+    return {
+        **{change.replace(" ", "_"): count for change, count in found.counts.items()},
+        "more_severe": sum(one.severity > 0.0 for one in compared),
+        "less_severe": sum(one.severity < 0.0 for one in compared),
+        "p_value": found.p_value,
+        "worse": sum(one.worse for one in searches),
+        "worse_modes": sum(len(one.modes) for one in searches),
+        "worse_scenarios": sum(bool(one.worse) for one in searches),
+        "not_searched": sum(bool(one.problem) for one in searches),
+    }
+
+
+def _none(test: str, figures: dict[str, float], wrong: str, unknown: str) -> Outcome:
+    """Return the outcome of a test that passes if two figures are 0."""
+    verdict: Verdict = "failed" if figures[wrong] else "unknown" if figures[unknown] else "passed"
+    details = ", ".join(f"{name} {figures[name]:g}" for name in (wrong, unknown))
+    return Outcome(test, verdict, details, (wrong, unknown))
+
+
+def _suites(
+    suite: SuiteRun,
+    found: Difference,
+    searches: Sequence[WorseThan],
+    outcomes: Sequence[Outcome],
+) -> Iterator[Suite]:
+    """Yield a suite for each entry; before them, one of the conditions, if there are any."""
+    if outcomes:
+        yield Suite("conditions", [case_of("bridgegen.diff", one) for one in outcomes])
+    by_entry = {one.entry: one for one in searches}
+    broken: dict[str, list[int]] = {}
+    lost = {one.entry for one in found.rows if one.change == "not comparable"}
+    for one in found.rows:
+        if one.change == "broken":
+            broken.setdefault(one.entry, []).append(one.row)
+    for second in suite.of_ego(found.second):
+        group = f"bridgegen.{second.entry.replace('/', '.')}.{found.second}"
+        cases = [
+            _runs(group, second, second.entry in lost),
+            case_of_rows(
+                group, f"passes what {found.first} passes", second, broken.get(second.entry, []),
+                f"fail, and pass with {found.first}", "failure",
+            ),
+        ]  # fmt: skip
+        if search := by_entry.get(second.entry):
+            cases.append(_searched(group, search, found.first))
+        facts = {"scenario": second.scenario, "ego": found.second, "compared with": found.first}
+        yield Suite(second.entry, cases, facts)
+
+
+def _runs(group: str, one: EntryResult, lost: bool) -> Case:
+    why = one.problem or "a variation did not run with one of the drivers"
+    return Case(group, "runs with both", "error" if lost else None, why if lost else "")
+
+
+def _searched(group: str, search: WorseThan, first: str) -> Case:
+    name = f"no search finds it worse than {first}"
+    if search.problem:
+        return Case(group, name, "error", search.problem)
+    if not search.worse:
+        return Case(group, name, None, search.sentence)
+    return Case(group, name, "failure", search.sentence, "\n".join(search.modes))
