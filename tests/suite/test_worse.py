@@ -35,6 +35,7 @@ def test_a_search_finds_what_the_second_fails_and_the_first_passes(compared):
     assert (found.entry, found.evaluations, found.problem) == ("crossroads-s3", 40, "")
     run = Run(found.folder)
     settings = run.settings
+    assert settings.algorithm == "es"
     assert (settings.ego, settings.worse_than, settings.seed) == ("route-follower", "careful", 0)
     assert found.worse == run.summary.critical > 0
     assert found.modes == tuple(one.title for one in run.triage.modes)

@@ -22,6 +22,9 @@ FOLDER = "worse"
 BUDGET = 300
 """Evaluations of a search, each with both egos."""
 
+ALGORITHM = "es"
+"""It finds the most failure modes with few evaluations; see docs/decisions/search.md."""
+
 
 @dataclass(frozen=True)
 class WorseThan:
@@ -117,7 +120,7 @@ def _searched(
     """Search one scenario, resume the search, or read what it found."""
     options = SearchOptions.of(
         job.options, ego=job.ego, worse_than=first, distribution=job.entry.distribution,
-        budget=budget, seed=seed, simulator=job.simulator, causes=True,
+        algorithm=ALGORITHM, budget=budget, seed=seed, simulator=job.simulator, causes=True,
     )  # fmt: skip
     how = SearchCallbacks(batch=lambda progress: callbacks.batch(progress.evaluations))
     name = job.entry.name
