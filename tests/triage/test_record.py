@@ -66,6 +66,20 @@ def test_a_damaged_record_is_one_clear_error(found, tmp_path, place, to, said):
     assert "bridgegen resume" in problem
 
 
+def test_fresh_rows_are_those_of_the_share(space, world, fixed, tmp_path):
+    pipeline = world(space, planted, fixed, fails=lambda v: v["bv_start"] <= 9.0)
+    record = triage(pipeline, pipeline.rows(100), algorithm="pso", seed=0, keep=2).record
+    path = write_record(tmp_path, record)
+    assert read_record(path) == record
+    assert 0 < record.fresh.harm.count(None) == len(record.fresh.harm) - record.bound.space.rows
+    data = json.loads(path.read_text("utf-8"))
+    at = next(k for k, one in enumerate(record.fresh.harm) if one is not None and one < 0.3)
+    changed(data, "fresh", "harm", at, to=0.9)
+    path.write_text(json.dumps(data), encoding="utf-8")
+    with pytest.raises(FileFormatError, match="the fresh rows must be those"):
+        read_record(path)
+
+
 @pytest.mark.parametrize("data", [b"", b"{", b"[]", b"\xff", b"[" * 10_000, b"{}"])
 def test_what_is_no_record_is_refused(tmp_path, data):
     path = tmp_path / JSON_FILE

@@ -79,6 +79,12 @@ def test_an_optimiser_s_rows_tell_no_share_fresh_ones_do(made):
     pipeline, rows, _ = made
     found = triage(pipeline, rows, algorithm="pso", seed=0, keep=6).record
     assert (found.bound.space.drawn, found.bound.space.rows) == ("fresh", FRESH)
+    fresh = found.fresh
+    assert len(fresh.harm) == len(fresh.mode) == FRESH
+    assert sum(one >= 0.3 for one in fresh.harm) == found.bound.space.harmful
+    for mode in found.modes:
+        assert fresh.mode.count(mode.number) == mode.space.harmful
+    assert all(harm >= 0.3 for harm, mode in zip(fresh.harm, fresh.mode, strict=True) if mode)
     assert 0.15 < found.bound.space.share < 0.45
     assert sum(one.space.harmful for one in found.modes) == found.bound.space.harmful
 

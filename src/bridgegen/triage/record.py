@@ -8,6 +8,7 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
+from bridgegen.conflict.harm import NEAR_MISS
 from bridgegen.disk import write_whole
 from bridgegen.errors import FileFormatError
 from bridgegen.records import read_model
@@ -49,8 +50,8 @@ class Estimate(_Model):
         rows: that have a result.
         harmful: of them.
         share: harmful / rows; None where there are no rows.
-        low: lower end of the 95 % Clopper-Pearson interval.
-        high: its upper end; the one-sided 95 % upper bound where no row is harmful.
+        low: lower end of the two-sided 95 % Clopper-Pearson interval.
+        high: its upper end, also where no row is harmful: a one-sided 97.5 % upper bound.
     """
 
     drawn: Drawn
@@ -59,6 +60,18 @@ class Estimate(_Model):
     share: Share | None
     low: Share
     high: Share
+
+
+class FreshRows(_Model):
+    """The fresh random rows that shares of the space are estimated from, in their order.
+
+    Attributes:
+        harm: of each; None of one without a result, or with implausible traffic.
+        mode: the number of the failure mode that each is of; 0 of no recorded one.
+    """
+
+    harm: Annotated[tuple[Share | None, ...], Field(max_length=10_000)]
+    mode: Annotated[tuple[Count, ...], Field(max_length=10_000)]
 
 
 class Treatment(_Model):
@@ -310,6 +323,8 @@ class Triage(_Model):
         unrecorded_modes: further modes.
         neighbourhoods: of the exported rows, in their order, then of the others.
         untested: why no neighbours were tested; "" where they were.
+        fresh: the fresh random rows; None where none were drawn, and in records of earlier
+            versions.
     """
 
     schema_version: Literal[1] = 1
@@ -327,9 +342,17 @@ class Triage(_Model):
     unrecorded_modes: Count = 0
     neighbourhoods: Annotated[tuple[Neighbourhood, ...], Field(max_length=MOST_NEIGHBOURHOODS)]
     untested: Text = ""
+    fresh: FreshRows | None = None
 
     @model_validator(mode="after")
     def _consistent(self) -> "Triage":
+        if self.fresh is not None:
+            known = [one for one in self.fresh.harm if one is not None]
+            harmful = sum(one >= NEAR_MISS for one in known)
+            if (self.bound.space.rows, self.bound.space.harmful) != (len(known), harmful):
+                raise ValueError("the fresh rows must be those that the share is estimated from")
+            if len(self.fresh.mode) != len(self.fresh.harm):
+                raise ValueError("each fresh row must have its mode")
         if [one.number for one in self.modes] != list(range(1, len(self.modes) + 1)):
             raise ValueError("modes must be numbered 1, 2, …")
         if sum(one.count for one in self.modes) > self.bound.harmful:

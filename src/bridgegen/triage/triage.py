@@ -26,6 +26,7 @@ from bridgegen.triage.record import (
     MOST_MODES,
     Drawn,
     Estimate,
+    FreshRows,
     Minimal,
     Mode,
     Neighbourhood,
@@ -283,31 +284,32 @@ class _Triage:
                 found[k] = minimal
         return found
 
-    def _shares(self, groups: Sequence[Group]) -> tuple[Estimate, list[Estimate]]:
-        """Return the harmful share of the space, and that of each mode."""
+    def _shares(self, groups: Sequence[Group]) -> tuple[Estimate, list[Estimate], FreshRows | None]:
+        """Return the harmful share of the space, that of each mode, and the fresh rows drawn."""
         rows = self._rows
         fit = int(((rows.status == 0) & ~_implausible(rows)).sum())
         if self._algorithm in UNBIASED:
             drawn: Drawn = "sobol" if self._algorithm == "sobol" else "random"
             each = [estimate(drawn, len(one.rows), fit) for one in groups]
-            return estimate(drawn, len(self._at), fit), each
+            return estimate(drawn, len(self._at), fit), each, None
         if not self._pipeline.tries or self._pipeline.cause is not None or not self._space.n_var:
-            return estimate("", 0, 0), [estimate("", 0, 0) for _ in groups]
+            return estimate("", 0, 0), [estimate("", 0, 0) for _ in groups], None
         random = np.random.Generator(np.random.PCG64([self._seed, _FRESH]))
         U = random.random((FRESH, self._space.n_var))
         results = self._pipeline.try_all(self._space.decode(U) + 0.0)
         keys = keys_of(results.findings, self._pipeline.kinds, results.place.tolist(), [""] * FRESH)
-        held = [0] * len(groups)
+        mode = [0] * FRESH
         own = self._U
         for i in np.flatnonzero(results.harmful).tolist():
             same = [k for k, one in enumerate(groups) if one.key.way == keys[i]]
             if same:  # of several that differ in cause, the one with the nearest row
                 gaps = [float(((own[groups[k].rows] - U[i]) ** 2).sum(axis=1).min()) for k in same]
-                held[same[int(np.argmin(gaps))]] += 1
+                mode[i] = same[int(np.argmin(gaps))] + 1
         n = int(results.ok.sum())
-        return estimate("fresh", int(results.harmful.sum()), n), [
-            estimate("fresh", k, n) for k in held
-        ]
+        harm = zip(results.harm.tolist(), results.ok.tolist(), strict=True)
+        fresh = FreshRows(harm=tuple(one if ok else None for one, ok in harm), mode=tuple(mode))
+        each = [estimate("fresh", mode.count(k), n) for k in range(1, len(groups) + 1)]
+        return estimate("fresh", int(results.harmful.sum()), n), each, fresh
 
     def _record(
         self,
@@ -319,7 +321,7 @@ class _Triage:
         minimal: Sequence[Minimal | None],
     ) -> Triage:
         rows, pipeline = self._rows, self._pipeline
-        space, shares = self._shares(groups)
+        space, shares, fresh = self._shares(groups)
         ids = rows.id[self._at]
         order = self._at[exports].tolist() if self._chosen is None else list(self._chosen)
         names = {i: f"{order.index(self._at[i]) + 1:04d}" for i in exports}
@@ -362,7 +364,7 @@ class _Triage:
                 modes=len(modes), ego=pipeline.driver.label, baseline=baseline,
             ),
             modes=tuple(modes), unrecorded_modes=self._unrecorded,
-            neighbourhoods=tuple(known), untested=untested,
+            neighbourhoods=tuple(known), untested=untested, fresh=fresh,
         )  # fmt: skip
 
     def _severity(self, one: Group) -> float:
