@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from bridgegen.comparison import Comparison, compare
     from bridgegen.odd.reader import load
     from bridgegen.preventability import PreventabilityMap, map_preventability
+    from bridgegen.safety_case import SafetyCase, export_safety_case
     from bridgegen.simulate import simulate_file
     from bridgegen.simulation.choice import SimulatorChoice
 
@@ -20,9 +21,11 @@ __all__ = [
     "Comparison",
     "PreventabilityMap",
     "Run",
+    "SafetyCase",
     "SimulatorChoice",
     "compare",
     "confirm",
+    "export_safety_case",
     "load",
     "map_preventability",
     "resume",
@@ -40,6 +43,8 @@ _HOMES = {
     "PreventabilityMap": "bridgegen.preventability",
     "resume": "bridgegen.campaign",
     "run_search": "bridgegen.campaign",
+    "export_safety_case": "bridgegen.safety_case",
+    "SafetyCase": "bridgegen.safety_case",
     "simulate_file": "bridgegen.simulate",
     "SimulatorChoice": "bridgegen.simulation.choice",
 }

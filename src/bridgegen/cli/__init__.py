@@ -10,6 +10,7 @@ from bridgegen.cli import (
     suites,
     preventability,
     reproductions,
+    safety_cases,
     files,
     maps,
     lists,
@@ -30,6 +31,7 @@ __all__ = [
     "preventability",
     "reproductions",
     "runs",
+    "safety_cases",
     "suites",
     "views",
 ]

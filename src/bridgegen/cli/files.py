@@ -174,25 +174,29 @@ def validate(
 def schema(
     kind: Annotated[
         str | None,
-        typer.Argument(help="Of which files: scenario, fragment or run.", show_default="scenario"),
+        typer.Argument(
+            help="Of which files: scenario, fragment, run or safety-case.", show_default="scenario"
+        ),
     ] = None,
-    of: Annotated[
-        str | None, typer.Option(help="The same: scenario, fragment or run.", show_default=False)
-    ] = None,
+    of: Annotated[str | None, typer.Option(help="The same.", show_default=False)] = None,
     out: Annotated[
         Path | None, typer.Option(help="A file for it, new or an earlier schema; else printed.")
     ] = None,
 ) -> None:
     """Print the JSON Schema of scenario or run files.
 
-    Editors complete and check scenario files and run files with it.
+    Editors complete and check scenario files and run files with it; that of safety cases is for
+    programs which read them.
     """
     from bridgegen.cli.runs import run_file_schema
     from bridgegen.odd.json_schema import as_text, schema_of, write_schema
+    from bridgegen.safety_case.model import json_schema
 
     if None not in (kind, of) and kind != of:
         raise InputError(f"the schema of one kind of file is printed, got {kind} and --of {of}")
-    made = run_file_schema() if (name := kind or of or "scenario") == "run" else schema_of(name)
+    elsewhere = {"run": run_file_schema, "safety-case": json_schema}
+    name = kind or of or "scenario"
+    made = elsewhere[name]() if name in elsewhere else schema_of(name)
     if out is None:
         print(as_text(made), end="")
         return

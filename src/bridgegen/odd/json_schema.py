@@ -65,7 +65,7 @@ def schema_of(kind: str) -> dict[str, Any]:
     for one in get_args(Kind):
         if kind == one:
             return schema(one)
-    raise UnknownNameError("kind of files", kind, (*get_args(Kind), "run"))
+    raise UnknownNameError("kind of files", kind, (*get_args(Kind), "run", "safety-case"))
 
 
 def refuse_other_schema(path: Path) -> None:

@@ -1,0 +1,34 @@
+"""The command that exports a safety case of runs."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from bridgegen.cli import options as common
+from bridgegen.cli.app import app
+from bridgegen.cli.groups import RESULTS
+from bridgegen.cli.map_folder import with_map_folder
+
+
+@app.command("safety-case", rich_help_panel=RESULTS)
+@with_map_folder()
+def safety_case(
+    runs: Annotated[list[Path], typer.Argument(help="Folders of finished runs.")],
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            help="Folder for the files; by default RUN/safety-case, or safety-case for several "
+            "runs."
+        ),
+    ] = None,
+    as_json: common.Json = False,
+) -> None:
+    """Export what runs support: claims with evidence.
+
+    As Goal Structuring Notation, JSON and a page, with a script that recomputes every number.
+    """
+    from bridgegen.safety_case import export_safety_case
+    from bridgegen.screen.safety_case import print_safety_case
+
+    print_safety_case(export_safety_case(runs, out), as_json=as_json)

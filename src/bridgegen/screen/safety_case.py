@@ -1,0 +1,19 @@
+"""A safety case: the goals that decide, and the files."""
+
+from typing import TYPE_CHECKING
+
+from bridgegen.screen.tables import print_table
+
+if TYPE_CHECKING:
+    from bridgegen.safety_case import Exported
+
+
+def print_safety_case(exported: "Exported", *, as_json: bool) -> None:
+    """Print the status of the goals of each run, then the files."""
+    goals = [(one.id, one.status, one.statement.text) for one in exported.case.main_goals()]
+    print_table(("goal", "status", "claim"), goals, as_json=as_json)
+    if as_json:
+        return
+    print(f"\n{'page':<12}{exported.page}")
+    print(f"{'case':<12}{exported.file}")
+    print(f"{'check it':<12}python {exported.script}")
