@@ -81,7 +81,7 @@ def _over(runs: Sequence[Facts], numbers: dict[str, Number]) -> Draft:
     of = Numbers("all")
     bounded = sum(bool(one.triage.bound.space.rows) for one in runs)
     if bounded > 1:
-        of.add("joint", max(0.0, round(1.0 - bounded * (1.0 - CONFIDENCE), 12)), "percent_down")
+        of.add("joint", max(0.0, round(1.0 - bounded * (1.0 - CONFIDENCE), 12)), "percent")
         numbers |= {one.id: one for one in of.all}
         strategy.add(
             "Justification", "1.1",

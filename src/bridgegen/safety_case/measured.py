@@ -72,8 +72,9 @@ def _failures(facts: Facts, numbers: Numbers) -> None:
             name, of = one.quantity, one.quantity
             numbers.add(f"least:{name}", one.value, "number", of=of, unit=one.unit)
             numbers.add(f"least_at:{name}", one.evaluation + 1, of=of)
-    numbers.add("modes", len(triage.modes) + triage.unrecorded_modes, source=TRIAGE)
-    numbers.add("robust_modes", triage.robust, source=TRIAGE)
+    if triage.modes:
+        numbers.add("modes", len(triage.modes) + triage.unrecorded_modes, source=TRIAGE)
+        numbers.add("robust_modes", triage.robust, source=TRIAGE)
     if not triage.unrecorded_modes:
         for k, (way, count) in enumerate(ways(facts).items(), start=1):
             numbers.add(f"way{k}", count, of="|".join(way))
@@ -107,7 +108,8 @@ def _space(facts: Facts, numbers: Numbers) -> None:
     numbers.add("drawn_known", space.rows, source=source)
     numbers.add("drawn_harmful", space.harmful, source=source)
     numbers.add("share", space.share, "percent", source=source)
-    numbers.add("share_low", space.low, "percent_down", source=source)
+    if space.harmful:
+        numbers.add("share_low", space.low, "percent_down", source=source)
     numbers.add("share_high", space.high, "percent_up", source=source)
 
 

@@ -203,7 +203,9 @@ def main() -> int:
         word = "-" if same is None else "agrees" if same else "DIFFERS"
         print(f"{word:<8}{name:<32}{stated!s:.60} | {found!s:.60}")
     odd, rest = (sum(row[3] is kind for row in rows) for kind in (False, None))
-    print(f"\n{len(rows)} checks: {odd} differ, {rest} not recomputable from the files.")
+    digest = hashlib.sha256((base / "safety-case.json").read_bytes()).hexdigest()
+    print(f"\nSHA-256 of safety-case.json: {digest}")
+    print(f"{len(rows)} checks: {odd} differ, {rest} not recomputable from the files.")
     return int(odd > 0)
 
 
