@@ -12,6 +12,10 @@ import bridgegen as bg
 
 SEARCHES = {
     "fails": ("crossroads-s4", {"ego": "route-follower", "objective": {"harm": None}, "seed": 3}),
+    "unlucky": (  # the search finds nothing, the fresh draws do
+        "crossroads-s4",
+        {"ego": "route-follower", "objective": {"harm": None}, "budget": 10},
+    ),
     "clean": ("cut-in", {"ego": "reference", "algorithm": "random"}),
     "judged": (
         "cut-in",
@@ -29,7 +33,8 @@ def made(tmp_path_factory) -> dict[str, Path]:
     """The runs; read only."""
     base = tmp_path_factory.mktemp("runs")
     for name, (scenario, given) in SEARCHES.items():
-        bg.run_search(scenario, budget=200, keep=2, causes=False, out=base / name, **given)
+        given = {"budget": 200, "keep": 2, "causes": False, **given}
+        bg.run_search(scenario, **given, out=base / name)
     return {name: base / name for name in SEARCHES}
 
 

@@ -12,7 +12,7 @@ from bridgegen.safety_case.drawing import drawing
 from bridgegen.safety_case.layout import MOST_LINES, layout, wrapped
 from bridgegen.safety_case.numbers import written
 
-RUNS = ["fails", "clean", "judged", "all"]
+RUNS = ["fails", "unlucky", "clean", "judged", "all"]
 
 
 class Text(HTMLParser):

@@ -54,7 +54,7 @@ def test_it_needs_the_standard_library_alone():
     assert {one.partition(".")[0] for one in names} <= {*sys.stdlib_module_names}
 
 
-@pytest.mark.parametrize("name", ["fails", "clean", "judged", "all"])
+@pytest.mark.parametrize("name", ["fails", "unlucky", "clean", "judged", "all"])
 def test_it_agrees_and_says_what_it_cannot_recompute(cases, checked, name):
     assert checked(cases[name].folder) == (0, [], "")
     rest = {one.id.partition(".")[2] for one in cases[name].case.numbers if not one.source}

@@ -23,7 +23,7 @@ class RunArgument:
     def __init__(self, strategy: Draft, facts: Facts, files: Files, numbers: Numbers) -> None:
         self._strategy, self._at = strategy, strategy.at
         self._facts, self._files, self._numbers = facts, files, numbers
-        self._ego = facts.triage.ego
+        self._ego = facts.ego
 
     def build(self) -> None:
         """Add all goals."""
@@ -101,45 +101,71 @@ class RunArgument:
 
     def _failures(self) -> None:
         at, bound = f"{self._at}.3", self._facts.triage.bound
+        besides = ""
+        if self._facts.triage.fresh is not None:
+            besides = f" or in {self._n('drawn')} fresh random draws besides"
         goal = self._strategy.add(
             "Goal", at,
-            f"No failure of {self._ego} was found in {self._n('evaluations')} evaluations.",
-            holds=Condition(number=self._numbers.id("harmful"), equals=0),
+            f"No failure of {self._ego} was found in {self._n('evaluations')} evaluations"
+            f"{besides}.",
+            holds=Condition(number=self._numbers.id("failures"), equals=0),
             link="failure-modes.md",
         )  # fmt: skip
         self._not_counted(goal, at)
-        if not bound.harmful:
+        files = [self._files.run, self._files.triage]
+        if not bound.harmful and not self._facts.fresh_harmful:
             goal.add(
                 "Solution", f"{at}.1",
                 f"All evaluations: {self._n('harmful')} failures.{self._margins()}",
-                evidence=[self._files.run, self._files.triage],
+                evidence=files,
             )  # fmt: skip
             return
         counter = goal.challenge(
-            f"{self._ego} fails in {self._n('modes')} ways, {self._n('robust_modes')} of them "
-            f"robust: {self._n('harmful')} of {self._n('evaluations')} evaluations.",
+            f"{self._n('failures')} failures of {self._ego} were found: {self._n('harmful')} of "
+            f"{self._n('evaluations')} evaluations are harmful{self._kinds()}{self._drawn()}.",
             details=self._ways(),
         )
         counter.add(
-            "CounterSolution", at, "All evaluations, and their failure modes.",
-            evidence=[self._files.run, self._files.triage],
+            "CounterSolution", at, "All evaluations, their failure modes, and the draws.",
+            evidence=files,
         )  # fmt: skip
         for mode in self._facts.triage.modes[:MOST_SHOWN]:
             self._mode(counter, mode)
+
+    def _kinds(self) -> str:
+        """Return how many failure modes there are, as a clause."""
+        if "modes" not in self._numbers:
+            return ""
+        robust = (
+            ", of them robust: " + self._n("robust_modes")
+            if "robust_modes" in self._numbers
+            else ""
+        )
+        return f" (failure modes: {self._n('modes')}{robust})"
+
+    def _drawn(self) -> str:
+        """Return how many fresh draws are failures, as a clause."""
+        if not self._facts.fresh_harmful:
+            return ""
+        return f", and {self._n('drawn_harmful')} of {self._n('drawn_known')} fresh random draws"
 
     def _not_counted(self, goal: Draft, at: str) -> None:
         """Add what happened besides and does not count as a failure."""
         parts = []
         if "collisions" in self._numbers:
             parts.append(
-                f"{self._n('collisions')} evaluations have a collision of the ego, whoever is "
-                f"responsible; in {self._n('not_preventable')} of them, in plausible traffic, the "
-                "ego is neither responsible, nor would a careful driver have prevented it."
+                f"Evaluations with a collision of the ego, whoever is responsible: "
+                f"{self._n('collisions')}."
+            )
+        if "not_preventable" in self._numbers:
+            parts.append(
+                f"In {self._n('not_preventable')} of them, in plausible traffic, the ego is "
+                "neither responsible, nor would a careful driver have prevented it."
             )
         if "other_causes" in self._numbers:
             parts.append(
-                f"{self._n('other_causes')} harmful evaluations have another root cause and do "
-                "not count."
+                f"Harmful evaluations with another root cause, which do not count: "
+                f"{self._n('other_causes')}."
             )
         if parts:
             goal.add("Context", f"{at}.1", " ".join(parts), link="conflicts.md")

@@ -23,7 +23,7 @@ def build(runs: Sequence[Facts], out: Path) -> SafetyCase:
         out: the folder of the case, which its files are named from.
     """
     names = " and ".join(dict.fromkeys(one.triage.scenario for one in runs))
-    egos = " and ".join(dict.fromkeys(one.triage.ego for one in runs))
+    egos = " and ".join(dict.fromkeys(one.ego for one in runs))
     numbers: dict[str, Number] = {}
     top = Draft("Goal", "1", _claim(runs[0]))
     if len(runs) > 1:
@@ -66,7 +66,7 @@ _STRATEGY = (
 def _claim(facts: Facts) -> str:
     return (
         f"In the searched part of {facts.triage.scenario}, as simulated, no failure of "
-        f"{facts.triage.ego} was found, its requirements are met, and the harmful share that may "
+        f"{facts.ego} was found, its requirements are met, and the harmful share that may "
         "remain is bounded and acceptable."
     )
 
@@ -100,7 +100,7 @@ def _facts(facts: Facts, name: str, out: Path) -> RunFacts:
         id=name,
         folder=Path(folder).as_posix(),
         scenario=triage.scenario,
-        ego=triage.ego,
+        ego=facts.ego,
         algorithm=settings.algorithm,
         seed=settings.seed,
         version=facts.run.version,

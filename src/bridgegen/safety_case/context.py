@@ -46,8 +46,9 @@ def add_context(top: Draft, facts: Facts, files: Files) -> None:
     driver = [f"its code: file {files.driver}"] if files.driver else []
     top.add(
         "Context", f"{at}.3",
-        f"System under test: {facts.triage.ego}, simulated by {settings.simulator.name}.",
+        f"System under test: {facts.ego}, simulated by {settings.simulator.name}.",
         details=[
+            f"driver {settings.ego}",
             *driver,
             f"other participants: {settings.others or 'as the scenario declares'}",
             f"time limit: {settings.time_limit or 'that of the scenario'}",
@@ -76,7 +77,7 @@ def _failure(facts: Facts) -> str:
     cause = facts.run.settings.cause
     only = f" Only failures with the root cause {cause} count." if cause else ""
     return (
-        f"A failure of {facts.triage.ego}: a collision or a near miss of the ego, {whose}, in "
+        f"A failure of {facts.ego}: a collision or a near miss of the ego, {whose}, in "
         f"plausible traffic: harm of {NEAR_MISS:g} or more.{only}"
     )
 

@@ -11,6 +11,7 @@ from bridgegen.campaign.restored import searched
 from bridgegen.campaign.run import Run
 from bridgegen.confirmation.record import read_records
 from bridgegen.confirmation.schema import Record
+from bridgegen.ego import is_spec
 from bridgegen.errors import InputError, StorageError
 from bridgegen.odd.coverage import Coverage, coverage
 from bridgegen.odd.scenario import SearchedScenario
@@ -47,6 +48,19 @@ class Facts:
     rows: Recorded
     columns: Mapping[str, Float]
     severity: Sequence[float]
+
+    @property
+    def ego(self) -> str:
+        """The system under test, as people call it; of a user's file without its folder."""
+        named = self.run.settings.ego
+        return (
+            self.triage.ego.replace(named, Path(named).name) if is_spec(named) else self.triage.ego
+        )
+
+    @property
+    def fresh_harmful(self) -> int:
+        """How many of the fresh random rows, which no search chose, are failures."""
+        return 0 if self.triage.fresh is None else self.triage.bound.space.harmful
 
     @property
     def harm(self) -> Float:

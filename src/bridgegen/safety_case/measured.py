@@ -55,18 +55,21 @@ def _evaluations(facts: Facts, numbers: Numbers) -> None:
     if "n_collision" in facts.columns:
         collides = facts.columns["n_collision"] > 0.0
         numbers.add("collisions", int((ok & collides).sum()))
-        spared = fit & collides & (facts.harm < NEAR_MISS)
-        numbers.add("not_preventable", int(spared.sum()))
+        if (ok & collides).any() and facts.triage.count == "ego":
+            spared = fit & collides & (facts.harm < NEAR_MISS)
+            numbers.add("not_preventable", int(spared.sum()))
 
 
 def _failures(facts: Facts, numbers: Numbers) -> None:
     triage = facts.triage
+    found = triage.bound.harmful + facts.fresh_harmful
     numbers.add("harmful", triage.bound.harmful)
+    numbers.add("failures", found)
     if facts.run.settings.cause is not None:
         fit = (facts.rows.status == 0) & (facts.rows.findings.implausible == "")
         every = int((fit & (facts.harm >= NEAR_MISS)).sum())
         numbers.add("other_causes", every - triage.bound.harmful)
-    nearest = triage.bound.least if not triage.bound.harmful else ()
+    nearest = () if found else triage.bound.least
     for one in nearest:
         if one.value is not None and one.evaluation is not None:
             name, of = one.quantity, one.quantity
@@ -74,7 +77,8 @@ def _failures(facts: Facts, numbers: Numbers) -> None:
             numbers.add(f"least_at:{name}", one.evaluation + 1, of=of)
     if triage.modes:
         numbers.add("modes", len(triage.modes) + triage.unrecorded_modes, source=TRIAGE)
-        numbers.add("robust_modes", triage.robust, source=TRIAGE)
+        if not triage.untested:
+            numbers.add("robust_modes", triage.robust, source=TRIAGE)
     if not triage.unrecorded_modes:
         for k, (way, count) in enumerate(ways(facts).items(), start=1):
             numbers.add(f"way{k}", count, of="|".join(way))

@@ -132,6 +132,8 @@ def recompute(what: str, of: str, run: dict[str, Any], folder: Path, confidence:
         drawn, n, k = len(triage["fresh"]["harm"]), len(harm), sum(one >= 0.3 for one in harm)
     else:
         drawn, n, k = (ask(f"count(*) FROM evaluations WHERE {one}") for one in ("1", FIT, bad))
+    if what == "failures":  # those of the search, and of the draws besides
+        return ask(f"count(*) FROM evaluations WHERE {bad}") + k * (run["drawn"] == "fresh")
     if what in ("share_low", "share_high"):
         return bound(k, n, what == "share_high", confidence)
     return {"drawn": drawn, "drawn_known": n, "drawn_harmful": k, "share": k / n}[what]
