@@ -1,7 +1,7 @@
 """The runs below a folder, one line each: read quickly, whatever state they are in."""
 
 import os
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -37,6 +37,8 @@ class RunLine:
         size: of its folder on disk [bytes].
         triage: its failure modes; None before it has finished.
         criteria: how its evaluations meet its pass criteria.
+        settings: of the run.
+        version: of BridgeGen that made it.
         problem: why it cannot be read; empty if it can. All else but path, changed and size is
             then empty.
     """
@@ -53,6 +55,8 @@ class RunLine:
     finished: bool = False
     triage: Triage | None = field(default=None, repr=False)
     criteria: tuple[CriterionSummary, ...] = ()
+    settings: Settings | None = field(default=None, repr=False)
+    version: str = ""
     problem: str = ""
 
     @property
@@ -68,9 +72,14 @@ def is_run(folder: Path) -> bool:
 
 
 def find_runs(folder: Path) -> list[Path]:
-    """Return the folders of runs below a folder, sorted; links are not followed.
+    """Return the folders of runs below a folder; see `find_folders`."""
+    return find_folders(folder, is_run)
 
-    At most `MOST_RUNS`, at most `DEEPEST` folders deep.
+
+def find_folders(folder: Path, is_wanted: Callable[[Path], bool]) -> list[Path]:
+    """Return the wanted folders below a folder, sorted; links are not followed.
+
+    At most `MOST_RUNS`, at most `DEEPEST` folders deep; none inside another.
     """
     found: list[Path] = []
     level, seen = [folder], 0
@@ -80,7 +89,7 @@ def find_runs(folder: Path) -> list[Path]:
             seen += 1
             if len(found) >= MOST_RUNS or seen > MOST_FOLDERS:
                 return sorted(found)
-            if one != folder and is_run(one):
+            if one != folder and is_wanted(one):
                 found.append(one)
             else:
                 below += _folders_in(one)
@@ -109,6 +118,7 @@ def read_line(folder: Path, run: Path) -> RunLine:
         with Store.open(run) as store:
             settings, n = Settings.from_dict(store.settings, run), len(store)
             finished, criteria = store.finished is not None, judged(store, settings)
+            version = store.version
         triage = read_record(run / JSON_FILE)
     except BridgeGenError as error:
         return RunLine(path, changed, size, problem="; ".join(error.problems))
@@ -116,7 +126,7 @@ def read_line(folder: Path, run: Path) -> RunLine:
         path, changed, size,
         scenario=settings.scenario, ego=settings.ego, algorithm=settings.algorithm,
         seed=settings.seed, evaluations=n, budget=settings.budget, finished=finished,
-        triage=triage, criteria=criteria,
+        triage=triage, criteria=criteria, settings=settings, version=version,
     )  # fmt: skip
 
 

@@ -1,0 +1,113 @@
+"""A run's folder → a result."""
+
+from collections.abc import Iterator
+from math import isfinite
+from pathlib import Path
+
+import numpy as np
+
+from bridgegen.arrays import Float
+from bridgegen.campaign.run import REPORT
+from bridgegen.criteria import CriterionSummary
+from bridgegen.dashboard.names import Driver, driver_of, scenario_name
+from bridgegen.dashboard.results import Failure, Judged, ModeKey, Result, Seen
+from bridgegen.dashboard.sceneries import Sceneries
+from bridgegen.dashboard.scenery import Scenery
+from bridgegen.ego.drivers import join
+from bridgegen.errors import BridgeGenError, StorageError
+from bridgegen.store import Store
+from bridgegen.triage.record import Mode
+from bridgegen.view.overview import RunLine, read_line
+
+
+def read_run(project: Path, folder: Path, sceneries: Sceneries) -> Result:
+    """Return the result of a run.
+
+    Raises:
+        StorageError: it cannot be read.
+    """
+    line = read_line(project, folder)
+    settings = line.settings
+    if settings is None:
+        raise StorageError(line.problem)
+    scenario = scenario_name(settings.scenario, project, settings.distribution or "")
+    driver = driver_of(settings.ego, project, line.version)
+    if settings.ideal:
+        stages = f" (ideal {join(settings.ideal)})"
+        driver = Driver(driver.name + stages, driver.version, driver.label + stages)
+    source = (
+        settings.scenario,
+        settings.distribution or "",
+        settings.empty_trigger or "",
+        settings.road_map is not None,
+    )
+    scenery = sceneries.of(source, settings.fingerprint)
+    bound = line.triage.bound if line.triage else None
+    judged = tuple(map(_judged, line.criteria))
+    return Result(
+        "run",
+        line.path,
+        f"{line.path}/{REPORT}" if (folder / REPORT).is_file() else "",
+        line.changed,
+        scenario,
+        driver,
+        line.evaluations,
+        bound.harmful if bound else 0,
+        bound.failed if bound else 0,
+        line.finished,
+        bound.space if bound else None,
+        (*_failures(line, scenario, driver), *violations(judged, scenario, driver.name)),
+        judged,
+        None if scenery is None else _seen(folder, scenery),
+    )
+
+
+def violations(judged: tuple[Judged, ...], scenario: str, driver: str) -> Iterator[Failure]:
+    """Yield each violated requirement as a failure mode."""
+    for one in judged:
+        if one.violated:
+            key = ModeKey(scenario, driver, requirement=one.criterion.id)
+            words = one.criterion.text or one.criterion.states
+            yield Failure(key, f"violates {one.criterion.id}: {words}", one.violated)
+
+
+def _failures(line: RunLine, scenario: str, driver: Driver) -> Iterator[Failure]:
+    """Yield the failure modes of a run; those that differ in cause or cluster alone are one."""
+    held: dict[ModeKey, list[Mode]] = {}
+    for one in line.modes:
+        key = ModeKey(
+            scenario, driver.name, one.conflict, one.conflict_type, one.responsible, one.rule,
+            one.partner, one.place,
+        )  # fmt: skip
+        held.setdefault(key, []).append(one)
+    for key, modes in held.items():
+        yield Failure(
+            key,
+            modes[0].title,
+            sum(one.count for one in modes),
+            max(one.severity for one in modes),
+            all(one.knife_edge for one in modes),
+        )
+
+
+def _judged(one: CriterionSummary) -> Judged:
+    worst = one.worst if isfinite(one.worst) else None
+    return Judged(one.criterion, one.met, one.violated, one.unknown, worst, one.unit)
+
+
+def _seen(folder: Path, scenery: Scenery) -> Seen | None:
+    """Count a run's evaluations, a chunk at a time; None where they cannot be read."""
+    found = Seen()
+    try:
+        with Store.open(folder) as store:
+            column = dict(zip(store.parameters, store.columns.X, strict=True))
+            names = ["status", *column.values()]
+            for rows in store.select(names, 0, len(store)):
+                with store.damage():
+                    table: Float = np.array(rows, dtype=np.float64)
+                table = table[table[:, 0] == 0.0]
+                columns = {name: table[:, k] for k, name in enumerate(column, 1)}
+                found.add(scenery.seen(columns, len(table)))
+    except BridgeGenError:
+        return None
+    return found
