@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from bridgegen.campaign import Run, resume, run_search
     from bridgegen.campaign.confirm import confirm
     from bridgegen.comparison import Comparison, compare
+    from bridgegen.dashboard import Dashboard, build_dashboard
     from bridgegen.odd.reader import load
     from bridgegen.preventability import PreventabilityMap, map_preventability
     from bridgegen.safety_case import SafetyCase, export_safety_case
@@ -19,10 +20,12 @@ if TYPE_CHECKING:
 
 __all__ = [
     "Comparison",
+    "Dashboard",
     "PreventabilityMap",
     "Run",
     "SafetyCase",
     "SimulatorChoice",
+    "build_dashboard",
     "compare",
     "confirm",
     "export_safety_case",
@@ -36,6 +39,8 @@ __all__ = [
 _HOMES = {
     "Comparison": "bridgegen.comparison",
     "compare": "bridgegen.comparison",
+    "Dashboard": "bridgegen.dashboard",
+    "build_dashboard": "bridgegen.dashboard",
     "confirm": "bridgegen.campaign.confirm",
     "Run": "bridgegen.campaign",
     "load": "bridgegen.odd.reader",

@@ -30,14 +30,15 @@ def read_run(project: Path, folder: Path, sceneries: Sceneries) -> Result:
     settings = line.settings
     if settings is None:
         raise StorageError(line.problem)
-    scenario = scenario_name(settings.scenario, project, settings.distribution or "")
+    distribution = str(settings.distribution or "")
+    scenario = scenario_name(settings.scenario, project, distribution)
     driver = driver_of(settings.ego, project, line.version)
     if settings.ideal:
         stages = f" (ideal {join(settings.ideal)})"
         driver = Driver(driver.name + stages, driver.version, driver.label + stages)
     source = (
         settings.scenario,
-        settings.distribution or "",
+        distribution,
         settings.empty_trigger or "",
         settings.road_map is not None,
     )

@@ -66,7 +66,7 @@ def _row(one: OpenMode, base: str) -> list[str]:
     versions = joined([label for label in one.versions if label != one.key.driver], 3)
     labels = f"<small>{text(versions)}</small>" if versions else ""
     return [
-        f"{text(one.title)}{edge}{note}<small class=\"id\">{one.key.id}</small>",
+        f'{text(one.title)}{edge}{note}<small class="id">{one.key.id}</small>',
         f'<span class="status {word}">{text(said)}</span>',
         text(one.key.scenario),
         f"{text(one.key.driver)}{labels}",
@@ -84,6 +84,11 @@ def _decisions(some: list[Decision]) -> str:
     ]  # fmt: skip
     more = len(some) - len(rows)
     after = f'<p class="muted">and {more:,} more</p>' if more else ""
-    return table(
-        "Failure modes in no result", ("failure mode", "status", "scenario", "driver", "note"), rows
-    ) + after
+    return (
+        table(
+            "Failure modes in no result",
+            ("failure mode", "status", "scenario", "driver", "note"),
+            rows,
+        )
+        + after
+    )

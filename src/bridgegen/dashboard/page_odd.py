@@ -13,7 +13,7 @@ MOST_SCENARIOS = 100
 
 MOST_PARAMETERS = 60
 
-_MARK = {"covered": "✓", "not covered": "○", "not expressible": "–"}
+_MARK = {"covered": "✓", "not covered": "○"}
 
 
 def odd_part(found: Dashboard) -> str:
@@ -57,14 +57,26 @@ def _summary(name: str, some: list[Covered]) -> str:
 
 
 def _groups(some: list[Covered]) -> str:
-    keyed = groupby(some, lambda one: one.attribute.path[1:-1])
     body = []
-    for path, each in keyed:
-        rows = list(each)
-        body.append(f"<h3>{text(' / '.join(path))}</h3>")
+    for path, each in groupby(some, lambda one: one.attribute.path[1:-1]):
+        members = list(each)
+        rows = [_row(one) for one in members if one.attribute.expressible]
+        name = " / ".join(path)
         heads = ("attribute", "state", "evaluations", "covered by")
-        body.append(table(" / ".join(path), heads, [_row(one) for one in rows], "list odd"))
-    return "".join(body)
+        lines = table(name, heads, rows, "list odd") if rows else ""
+        body.append(f'<div class="group"><h3>{text(name)}</h3>{lines}{_cannot(members)}</div>')
+    return f'<div class="groups">{"".join(body)}</div>'
+
+
+def _cannot(some: list[Covered]) -> str:
+    """Return the attributes of a group that are not expressible, in a line."""
+    names = [
+        one.attribute.path[-1] + (f" ({one.attribute.note})" if one.attribute.note else "")
+        for one in some
+        if not one.attribute.expressible
+    ]
+    words = f"Not expressible: {'; '.join(names)}."
+    return f'<p class="not-expressible">{text(words)}</p>' if names else ""
 
 
 def _row(one: Covered) -> list[str]:

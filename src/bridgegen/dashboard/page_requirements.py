@@ -3,7 +3,7 @@
 from bridgegen.criteria import margin_in_words
 from bridgegen.dashboard.dashboard import Dashboard
 from bridgegen.dashboard.markup import counted, folded, joined, link, section, table, text
-from bridgegen.dashboard.requirements import Cell, Matrix
+from bridgegen.dashboard.requirements import Cell, Matrix, statements
 
 MOST_REQUIREMENTS = 60
 """Columns of a matrix; the gravest."""
@@ -41,7 +41,7 @@ def _in_words(one: Matrix) -> str:
 
 
 def _list(found: Dashboard) -> str:
-    rows = []
+    rows, stated = [], statements(found.project.results)
     for one in found.criteria[:MOST_SCENARIOS]:
         violated = found.violated.get(one.id, [])
         who = "; ".join(f"{matrix.driver} in {joined(names, 3)}" for matrix, names in violated)
@@ -52,6 +52,9 @@ def _list(found: Dashboard) -> str:
         else:
             state = '<span class="status fixed">met</span>'
         words = f"{text(one.text)}<code>{text(one.states)}</code>"
+        others = [each for each in stated.get(one.id, []) if each != one.states]
+        if others:
+            words += f"<small>stated otherwise in some results: {text(joined(others, 3))}</small>"
         rows.append([f'<span class="id">{text(one.id)}</span>', words, text(one.severity), state])
     return table("Requirements", ("id", "requirement", "severity", "state"), rows)
 

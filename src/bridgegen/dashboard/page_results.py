@@ -96,8 +96,7 @@ def _run(one: Result, base: str) -> list[str]:
     space = one.space
     known = space is not None and space.share is not None
     return [
-        link(base, one.page, one.source)
-        + ("" if one.finished else "<small>not finished</small>"),
+        link(base, one.page, one.source) + ("" if one.finished else "<small>not finished</small>"),
         text(one.scenario),
         text(one.driver.label),
         f"{one.evaluations:,}",

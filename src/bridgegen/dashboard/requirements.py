@@ -107,6 +107,15 @@ def matrices(results: Sequence[Result], declared: Iterable[Criterion] = ()) -> l
     ]
 
 
+def statements(results: Iterable[Result]) -> dict[str, list[str]]:
+    """Return all formulas of each requirement, by its id; they should be one."""
+    found: dict[str, dict[str, None]] = {}
+    for result in results:
+        for judged in result.judged:
+            found.setdefault(judged.criterion.id, {})[judged.criterion.states] = None
+    return {name: list(some) for name, some in found.items()}
+
+
 def _cells(results: Iterable[Result]) -> dict[tuple[str, str], Cell]:
     found: dict[tuple[str, str], Cell] = {}
     for result in results:

@@ -26,6 +26,8 @@ MOST_BINS = 40
 Columns = Mapping[str, Float]
 """Values of parameters by name, ``(N,)`` each, with those that stand at their default."""
 
+_OF_FILES = "weather and speeds of an OpenSCENARIO file, of which the whole map counts"
+
 _KMH = 3.6
 _NOON = 100_000.0  # [lx] direct sunlight, OpenSCENARIO's figure; see weather.ILLUMINANCE
 
@@ -125,11 +127,11 @@ def scenery_of(scenario: SearchedScenario, *, on_map: bool = False) -> Scenery:
     if isinstance(scenario, LogicalScenario):
         defaults = scenario.usual_values()
         facts, quantities = _of_logical(scenario, on_map)
-        partly = "its map's roads" if on_map else ""
+        partly = "roads of a map that a scenario is placed on" if on_map else ""
     elif isinstance(scenario, FileScenario):
-        facts, quantities, partly = _of_file(scenario), {}, "its weather and speeds; its whole map counts"
+        facts, quantities, partly = _of_file(scenario), {}, _OF_FILES
     else:
-        facts, quantities, partly = set[str](), {}, "all but its parameters"
+        facts, quantities, partly = set[str](), {}, "all but the parameters"
     return Scenery(
         scenario.title, frozenset(facts), parameters, defaults, quantities, partly=partly
     )
@@ -149,15 +151,16 @@ def _of_logical(
     facts |= {"participant:emergency" for one in scenario.participants if one.siren}
     facts |= {"jam"} if scenario.story.jams else set()
     facts |= {"road works", "warning sign"} if scenario.story.works else set()
-    quantities = {
-        name: (lambda columns, of=of, source=source: of(columns[source]))
-        for name, (source, of) in _WEATHER.items()
-    }
+    quantities = {name: _of_weather(*law) for name, law in _WEATHER.items()}
     quantities["ego_speed"] = _scaled(scenario.ego.speed, _KMH)
     if not on_map:
         facts |= _facts_of_roads(scenario.roads)
         quantities |= _quantities_of_roads(scenario.roads)
-    return facts, quantities  # type: ignore[return-value]
+    return facts, quantities
+
+
+def _of_weather(source: str, of: Callable[[Float], Float]) -> Callable[[Columns], Float]:
+    return lambda columns: of(columns[source])
 
 
 def _kind(name: str) -> str:
@@ -191,7 +194,7 @@ def _quantities_of_roads(roads: RoadsSpec) -> dict[str, Callable[[Columns], Floa
     knobs = roads.knobs
     found = {
         "lane_width": _scaled(knobs["lane_width"], 1.0),
-        "speed_limit": _scaled(knobs["speed_limit"], _KMH),
+        "speed_limit": _whole(_scaled(knobs["speed_limit"], _KMH)),
         "grade": _scaled(knobs.get("grade", 0.0), 1.0),
     }
     lanes = next((knobs[one] for one in ("lanes", "lanes_per_direction") if one in knobs), None)
@@ -213,6 +216,11 @@ def _scaled(quantity: Quantity, factor: float) -> Callable[[Columns], Float]:
     if isinstance(quantity, str):
         return lambda columns: columns[quantity] * factor
     return lambda columns: np.array([quantity * factor])
+
+
+def _whole(of: Callable[[Columns], Float]) -> Callable[[Columns], Float]:
+    """Return a quantity in whole units: 13.9 m/s stand for 50 km/h."""
+    return lambda columns: np.rint(of(columns))
 
 
 def _radius(curvatures: list[Float]) -> Float:

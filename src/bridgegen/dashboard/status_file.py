@@ -1,7 +1,7 @@
 """``failure-modes.yaml``: what a person decides about each failure mode of a project.
 
 The file is the person's. BridgeGen adds blocks, and keeps all others as they are, with their
-comments; blocks are sorted by id, so that two branches that add different ones merge.
+comments. Blocks are sorted by scenario, driver and id, so that git merges what two branches add.
 """
 
 from collections.abc import Iterable, Mapping
@@ -117,11 +117,13 @@ def add_decisions(path: Path, file: StatusFile, new: Iterable[Decision]) -> int:
     Raises:
         StorageError: it cannot be written.
     """
-    added = {one.id: _block(one) for one in new if one.id not in file.blocks}
+    added = [one for one in new if one.id not in file.blocks]
     if not added:
         return 0
-    whole = {**file.blocks, **added}
-    texts = [text if text.endswith("\n") else f"{text}\n" for _, text in sorted(whole.items())]
+    whole = {**file.blocks, **{one.id: _block(one) for one in added}}
+    known = {**file.decisions, **{one.id: one for one in added}}
+    order = sorted(whole, key=lambda name: (known[name].scenario, known[name].driver, name))
+    texts = [whole[name].rstrip("\n") + "\n" for name in order]
     write_whole(path, [(file.head + "".join(texts)).encode()])
     return len(added)
 
@@ -167,7 +169,7 @@ def _decisions(document: Document) -> list[Decision]:
         problems += wrong
         if not wrong:
             assert isinstance(block, dict)
-            found.append(Decision(**{key: value or "" for key, value in block.items()}))
+            found.append(_decision(block))
     first: dict[str, int] = {}
     for number, one in enumerate(found if not problems else ()):
         if one.id in first:
@@ -177,6 +179,13 @@ def _decisions(document: Document) -> list[Decision]:
     if problems:
         raise FileFormatError(*problems)
     return found
+
+
+def _decision(block: Mapping[str, str | None]) -> Decision:
+    """Return a block that breaks no rule."""
+    texts = {key: block.get(key) or "" for key in KEYS if key != "status"}
+    status = next(one for one in STATUSES if one == block["status"])
+    return Decision(status=status, **texts)
 
 
 def _problems(block: object, number: int, document: Document) -> list[str]:

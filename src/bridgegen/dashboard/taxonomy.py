@@ -281,7 +281,7 @@ _GROUPS: Mapping[str, Mapping[str, str]] = {
         "above 130 km/h": "ego_speed:5",
     },
 }
-"""By group each attribute with its evidence: a fact, ``quantity:band``, or nothing; then ``# note``."""
+"""By group each attribute with its evidence: a fact, ``quantity:band``, or nothing; ``# note``."""
 
 
 def _read(groups: Mapping[str, Mapping[str, str]]) -> Iterator[Attribute]:

@@ -1,0 +1,55 @@
+"""Pass/fail criteria for the dashboard of a project."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Self
+
+from bridgegen.dashboard import Dashboard
+from bridgegen.verdict.fail_if import FailCondition, Outcome, read_conditions
+
+FIGURES = {
+    "new": "failure modes of current results with the status new, or with none",
+    "known": "failure modes of current results with the status known",
+    "accepted": "failure modes of current results with the status accepted",
+    "fixed": "failure modes with the status fixed that no current result has",
+    "regressions": "failure modes with the status fixed that a current result has",
+    "failing": "all failure modes of current results",
+    "worst_severity": "the worst probability of MAIS3+ of these",
+    "requirements": "requirements",
+    "violated_requirements": "requirements that a driver violates",
+    "untested_requirements": "requirements that no scenario tests",
+    "scenarios_without_requirement": "scenarios that test no requirement",
+    "runs": "runs",
+    "suites": "suites",
+    "maps": "preventability maps",
+    "comparisons": "comparisons of algorithms",
+    "scenarios": "scenarios that runs and suites test",
+    "drivers": "drivers, each version by itself",
+    "evaluations": "evaluations of runs and variations of suites",
+    "problems": "folders and scenarios that cannot be read",
+}
+"""The figures of a dashboard that ``--fail-if`` accepts."""
+
+
+@dataclass(frozen=True)
+class DashboardCriteria:
+    """The criteria for a dashboard, checked before it is made.
+
+    Attributes:
+        conditions: each fails it if it holds; none: nothing does.
+    """
+
+    conditions: tuple[FailCondition, ...]
+
+    @classmethod
+    def read(cls, texts: Sequence[str]) -> Self:
+        """Read the criteria; their figures are FIGURES.
+
+        Raises:
+            InputError: a text is not a condition, or a figure is unknown.
+        """
+        return cls(read_conditions(texts, FIGURES))
+
+    def judge(self, found: Dashboard) -> tuple[Outcome, ...]:
+        """Apply the criteria to a dashboard."""
+        return tuple(one.judge(found.figures) for one in self.conditions)
