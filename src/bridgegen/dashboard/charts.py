@@ -84,13 +84,13 @@ def _versions(points: tuple[Point, ...], at: list[float], step: float) -> list[s
     for start, end in zip(starts, [*starts[1:], len(points)], strict=True):
         left, right = at[start] - 0.5 * step, at[end - 1] + 0.5 * step
         room = max(3, int((right - left) / 6.0))
-        label = points[start].driver
+        label = points[start].version
         short = label if len(label) <= room else f"…{label[-(room - 1) :]}"
         if start:
             parts.append(f'<path class="new" d="M{left:.1f} {_TOP:g}V{HEIGHT - _BELOW:g}"/>')
         parts.append(
             f'<text x="{0.5 * (left + right):.1f}" y="{HEIGHT - 14.0:g}" text-anchor="middle">'
-            f"{escape(short)}<title>{escape(label)}</title></text>"
+            f"{escape(short)}<title>{escape(points[start].driver)}</title></text>"
         )
     return parts
 

@@ -20,7 +20,8 @@ class OpenMode:
         count: of evaluations in the current results that have it, else in the latest.
         severity: the worst probability of MAIS3+ in these.
         knife_edge: whether in all of these small changes make it vanish.
-        versions: of the driver that have it, by label, in the order of first appearance.
+        versions: of the driver that have it, in the order of first appearance; without those that
+            are not known.
         results: that have it, the latest first.
     """
 
@@ -70,7 +71,7 @@ def failure_modes(results: Sequence[Result], file: StatusFile) -> list[OpenMode]
                 sum(failure.count for _, failure in shown),
                 max(failure.severity for _, failure in shown),
                 all(failure.knife_edge for _, failure in shown),
-                tuple(dict.fromkeys(result.driver.label for result, _ in some)),
+                tuple(dict.fromkeys(filter(None, (one.driver.version for one, _ in some)))),
                 tuple(result for result, _ in reversed(some)),
             )
         )

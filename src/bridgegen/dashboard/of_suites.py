@@ -56,27 +56,32 @@ def read_suite_line(project: Path, folder: Path, sceneries: Sceneries) -> SuiteL
     source, time = folder.relative_to(project).as_posix(), (folder / FILE).stat().st_mtime
     page = f"{source}/{PAGE}" if (folder / PAGE).is_file() else ""
     made = str(suite.settings.get("version", ""))
-    results = tuple(_result(project, source, page, time, made, one, sceneries)
-                    for one in suite.results)  # fmt: skip
+    results = tuple(  # the file has them as they ended
+        _result(project, source, page, time, made, one, sceneries)
+        for one in sorted(suite.results, key=lambda one: (one.entry, one.ego))
+    )
     egos = tuple(dict.fromkeys(one.driver.label for one in results))
     lost = tuple(
         (f"{one.entry} ({one.ego})" if one.ego else one.entry, one.problem)
         for one in suite.results
         if one.problem
     )
-    return SuiteLine(source, page, time, egos, results, _difference(suite), lost)
+    return SuiteLine(source, page, time, egos, results, _difference(project, suite, made), lost)
 
 
-def _difference(suite: SuiteRun) -> Difference | None:
+def _difference(project: Path, suite: SuiteRun, made: str) -> Difference | None:
+    """Compare two egos, in the order of names: results do not say which was given first."""
     if len(suite.egos) != 2:
         return None
+    egos = sorted(suite.egos)
+    labels = [driver_of(ego or "the scenarios' own", project, made).label for ego in egos]
     first, second = (
-        {one.entry: one for one in suite.of_ego(ego)} for ego in suite.egos
+        {one.entry: one for one in suite.of_ego(ego)} for ego in egos
     )  # a suite that was stopped lacks some
-    both = [name for name in first if name in second]
+    both = sorted(name for name in first if name in second)
     return difference(
         [first[name] for name in both], [second[name] for name in both],
-        (suite.egos[0], suite.egos[1]),
+        (labels[0], labels[1]),
     )  # fmt: skip
 
 

@@ -63,8 +63,7 @@ def _row(one: OpenMode, base: str) -> list[str]:
     )
     more = len(one.results) - MOST_RESULTS
     links += f" and {more:,} more" if more > 0 else ""
-    versions = joined([label for label in one.versions if label != one.key.driver], 3)
-    labels = f"<small>{text(versions)}</small>" if versions else ""
+    labels = f"<small>{text(joined(one.versions, 6))}</small>" if one.versions else ""
     return [
         f'{text(one.title)}{edge}{note}<small class="id">{one.key.id}</small>',
         f'<span class="status {word}">{text(said)}</span>',

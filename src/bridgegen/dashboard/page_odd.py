@@ -62,7 +62,7 @@ def _groups(some: list[Covered]) -> str:
         members = list(each)
         rows = [_row(one) for one in members if one.attribute.expressible]
         name = " / ".join(path)
-        heads = ("attribute", "state", "evaluations", "covered by")
+        heads = ("attribute", "evaluations", "covered by")
         lines = table(name, heads, rows, "list odd") if rows else ""
         body.append(f'<div class="group"><h3>{text(name)}</h3>{lines}{_cannot(members)}</div>')
     return f'<div class="groups">{"".join(body)}</div>'
@@ -84,12 +84,9 @@ def _row(one: Covered) -> list[str]:
     note = f"<small>{text(attribute.note)}</small>" if attribute.note else ""
     names = [f"{name} ({count:,})" for name, count in one.scenarios.items()]
     kind = state.replace(" ", "-")
-    return [
-        f"{text(attribute.path[-1])}{note}",
-        f'<span class="{kind}">{_MARK[state]} {state}</span>',
-        f"{one.evaluations:,}" if one.scenarios else "",
-        text(joined(names, 3)),
-    ]
+    mark = f'<span class="{kind}" aria-hidden="true">{_MARK[state]}</span>'
+    by = text(joined(names, 2)) if names else f'<span class="{kind}">{state}</span>'
+    return [f"{mark} {text(attribute.path[-1])}{note}", f"{one.evaluations:,}", by]
 
 
 def _parameters(of: Coverage) -> str:

@@ -13,6 +13,9 @@ MOST_SCENARIOS = 300
 
 MOST_MATRICES = 30
 
+_OPEN = 40
+"""Matrices with more rows together are folded."""
+
 
 def requirements_part(found: Dashboard, base: str) -> str:
     """Return the section: all requirements, then scenarios × requirements by driver."""
@@ -21,13 +24,15 @@ def requirements_part(found: Dashboard, base: str) -> str:
         lead = f"No pass criterion is stated in any result. Scenarios: {names or 'none'}."
         return section("requirements", "Requirements", lead=lead)
     parts = [_list(found)]
-    some = found.requirements[:MOST_MATRICES]
-    for number, one in enumerate(some):
+    some, body = found.requirements[:MOST_MATRICES], []
+    is_open = sum(len(one.scenarios) for one in some) <= _OPEN
+    for one in some:
         names = joined([label for label in one.labels if label != one.driver], 3)
         summary = f"{one.driver}{f' ({names})' if names else ''}: {_in_words(one)}"
-        parts.append(folded(summary, _matrix(one, base), is_open=number == 0 or len(some) < 4))
+        body.append(folded(summary, _matrix(one, base), is_open=is_open))
     if len(found.requirements) > len(some):
-        parts.append(f'<p class="muted">and {len(found.requirements) - len(some):,} drivers</p>')
+        body.append(f'<p class="muted">and {len(found.requirements) - len(some):,} drivers</p>')
+    parts.append("".join(body))
     lead = "By the current results: those of the version of each driver that was tested last."
     return section("requirements", "Requirements", *parts, lead=lead)
 
@@ -56,7 +61,7 @@ def _list(found: Dashboard) -> str:
         if others:
             words += f"<small>stated otherwise in some results: {text(joined(others, 3))}</small>"
         rows.append([f'<span class="id">{text(one.id)}</span>', words, text(one.severity), state])
-    return table("Requirements", ("id", "requirement", "severity", "state"), rows)
+    return table("Requirements", ("id", "requirement", "severity", "state"), rows, "list ids")
 
 
 def _matrix(one: Matrix, base: str) -> str:

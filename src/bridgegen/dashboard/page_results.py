@@ -42,7 +42,8 @@ def results_part(found: Dashboard, base: str) -> str:
             [_suite(one, base) for one in suites],
         ),
         _folded(
-            "difference of two drivers", ("suite", "first", "second", "broken", "fixed",
+            "difference of two drivers", ("suite", "first driver", "second driver",
+                                          "only the first fails", "only the second fails",
                                           "both fail", "both pass", "by chance"),
             [_difference(one, base) for one in suites if one.difference],
             "differences of two drivers",
@@ -125,8 +126,9 @@ def _difference(one: SuiteLine, base: str) -> list[str]:
     counts = found.counts
     return [
         link(base, one.page, one.source),
-        *(text(label) for label in one.egos),
-        *(f"{counts[name]:,}" for name in ("broken", "fixed", "both fail", "both pass")),
+        text(found.first),
+        text(found.second),
+        *(f"{counts[name]:,}" for name in ("fixed", "broken", "both fail", "both pass")),
         f"p = {found.p_value:.2g}",
     ]
 

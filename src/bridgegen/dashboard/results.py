@@ -43,9 +43,9 @@ class ModeKey:
 
     @property
     def id(self) -> str:
-        """Short and the same on every machine: a digest of all of it."""
+        """Short and the same on every machine: a digest of all of it, never like a number."""
         text = "\0".join(vars(self).values())
-        return sha256(text.encode("utf-8", "surrogatepass")).hexdigest()[:10]
+        return f"fm-{sha256(text.encode('utf-8', 'surrogatepass')).hexdigest()[:10]}"
 
 
 @dataclass(frozen=True)

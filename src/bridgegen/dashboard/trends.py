@@ -4,6 +4,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
+from bridgegen.dashboard.markup import counted
 from bridgegen.dashboard.of_suites import SuiteLine
 from bridgegen.dashboard.results import Result, in_order
 
@@ -19,6 +20,7 @@ class Point:
 
     Attributes:
         driver: label of the version.
+        version: of the driver, or the label where it is not known.
         source: folder of the result.
         page: of the result, or "".
         time: of the result [s since 1970].
@@ -30,6 +32,7 @@ class Point:
     """
 
     driver: str
+    version: str
     source: str
     page: str
     time: float
@@ -45,7 +48,7 @@ class Series:
     """A chart.
 
     Attributes:
-        title: the scenario or suite.
+        title: the scenario; of a suite where its latest results are, and how many scenarios.
         driver: name of the driver, without version.
         measure: what is drawn.
         points: by time; the latest ``MOST_POINTS``.
@@ -76,14 +79,13 @@ def trends(runs: Sequence[Result], suites: Iterable[SuiteLine]) -> list[Series]:
         if point is not None:
             key = (run.scenario, run.driver.name, _RUN)
             held.setdefault(key, []).append(point)
-    names: dict[frozenset[str], str] = {}
-    for suite in sorted(suites, key=lambda one: (one.time, one.source)):
-        entries = frozenset(one.entry for one in suite.results)
-        names[entries] = suite.source  # the latest
-    for suite in sorted(suites, key=lambda one: (one.time, one.source)):
-        entries = frozenset(one.entry for one in suite.results)
+    in_time = sorted(suites, key=lambda one: (one.time, one.source))
+    latest = {_entries(suite): suite.source for suite in in_time}
+    for suite in in_time:
+        entries = _entries(suite)
+        title = f"{latest[entries]} ({counted(len(entries), 'scenario')})"
         for name, point in _of_suite(suite):
-            held.setdefault((names[entries], name, _SUITE), []).append(point)
+            held.setdefault((title, name, _SUITE), []).append(point)
     found = [
         Series(title, driver, measure, tuple(some[-MOST_POINTS:]), max(0, len(some) - MOST_POINTS))
         for (title, driver, measure), some in held.items()
@@ -95,15 +97,23 @@ _RUN: Measure = "harmful share"
 _SUITE: Measure = "failed variations"
 
 
+def _entries(suite: SuiteLine) -> frozenset[str]:
+    return frozenset(one.entry for one in suite.results)
+
+
 def _of_run(run: Result) -> Point | None:
     """Return the point of a run; None of one whose harmful share is not known."""
     space = run.space
     if space is None or space.share is None:
         return None
     return Point(
-        run.driver.label, run.source, run.page, run.time, space.harmful, space.rows, space.share,
-        space.low, space.high,
+        run.driver.label, _version(run), run.source, run.page, run.time, space.harmful, space.rows,
+        space.share, space.low, space.high,
     )  # fmt: skip
+
+
+def _version(result: Result) -> str:
+    return result.driver.version or result.driver.label
 
 
 def _of_suite(suite: SuiteLine) -> list[tuple[str, Point]]:
@@ -113,7 +123,9 @@ def _of_suite(suite: SuiteLine) -> list[tuple[str, Point]]:
         count, of = (sum(getattr(one, name) for one in some) for name in ("failed", "evaluations"))
         if of:
             share = count / of
-            point = Point(label, suite.source, suite.page, suite.time, count, of, share, share,
-                          share)  # fmt: skip
+            point = Point(
+                label, _version(some[0]), suite.source, suite.page, suite.time, count, of,
+                share, share, share,
+            )  # fmt: skip
             found.append((some[0].driver.name, point))
     return found
