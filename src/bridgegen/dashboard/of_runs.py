@@ -8,13 +8,13 @@ import numpy as np
 
 from bridgegen.arrays import Float
 from bridgegen.campaign.run import REPORT
+from bridgegen.campaign.settings import Settings
 from bridgegen.criteria import CriterionSummary
 from bridgegen.dashboard.names import Driver, driver_of, scenario_name
 from bridgegen.dashboard.results import Failure, Judged, ModeKey, Result, Seen
 from bridgegen.dashboard.sceneries import Sceneries
-from bridgegen.dashboard.scenery import Scenery
 from bridgegen.ego.drivers import join
-from bridgegen.errors import BridgeGenError, StorageError
+from bridgegen.errors import StorageError
 from bridgegen.store import Store
 from bridgegen.triage.record import Mode
 from bridgegen.view.overview import RunLine, read_line
@@ -26,7 +26,10 @@ def read_run(project: Path, folder: Path, sceneries: Sceneries) -> Result:
     Raises:
         StorageError: it cannot be read.
     """
-    line = read_line(project, folder)
+    seen: list[Seen | None] = []
+    line = read_line(
+        project, folder, lambda store, settings: seen.append(_seen(store, settings, sceneries))
+    )
     settings = line.settings
     if settings is None:
         raise StorageError(line.problem)
@@ -36,13 +39,6 @@ def read_run(project: Path, folder: Path, sceneries: Sceneries) -> Result:
     if settings.ideal:
         stages = f" (ideal {join(settings.ideal)})"
         driver = Driver(driver.name + stages, driver.version, driver.label + stages)
-    source = (
-        settings.scenario,
-        distribution,
-        settings.empty_trigger or "",
-        settings.road_map is not None,
-    )
-    scenery = sceneries.of(source, settings.fingerprint)
     bound = line.triage.bound if line.triage else None
     judged = tuple(map(_judged, line.criteria))
     return Result(
@@ -59,7 +55,7 @@ def read_run(project: Path, folder: Path, sceneries: Sceneries) -> Result:
         bound.space if bound else None,
         (*_failures(line, scenario, driver), *violations(judged, scenario, driver.name)),
         judged,
-        None if scenery is None else _seen(folder, scenery),
+        seen[0],
     )
 
 
@@ -96,19 +92,27 @@ def _judged(one: CriterionSummary) -> Judged:
     return Judged(one.criterion, one.met, one.violated, one.unknown, worst, one.unit)
 
 
-def _seen(folder: Path, scenery: Scenery) -> Seen | None:
-    """Count a run's evaluations, a chunk at a time; None where they cannot be read."""
-    found = Seen()
-    try:
-        with Store.open(folder) as store:
-            column = dict(zip(store.parameters, store.columns.X, strict=True))
-            names = ["status", *column.values()]
-            for rows in store.select(names, 0, len(store)):
-                with store.damage():
-                    table: Float = np.array(rows, dtype=np.float64)
-                table = table[table[:, 0] == 0.0]
-                columns = {name: table[:, k] for k, name in enumerate(column, 1)}
-                found.add(scenery.seen(columns, len(table)))
-    except BridgeGenError:
+def _seen(store: Store, settings: Settings, sceneries: Sceneries) -> Seen | None:
+    """Count a run's evaluations, a chunk at a time; None where its scenario cannot be read.
+
+    Raises:
+        StorageError: the database is damaged.
+    """
+    source = (
+        settings.scenario,
+        str(settings.distribution or ""),
+        settings.empty_trigger or "",
+        settings.road_map is not None,
+    )
+    scenery = sceneries.of(source, settings.fingerprint)
+    if scenery is None:
         return None
+    found = Seen()
+    column = dict(zip(store.parameters, store.columns.X, strict=True))
+    for rows in store.select(["status", *column.values()], 0, len(store)):
+        with store.damage():
+            table: Float = np.array(rows, dtype=np.float64)
+        table = table[table[:, 0] == 0.0]
+        columns = {name: table[:, k] for k, name in enumerate(column, 1)}
+        found.add(scenery.seen(columns, len(table)))
     return found

@@ -106,8 +106,16 @@ def _folders_in(folder: Path) -> list[Path]:
     return [Path(one) for one in sorted(inner) if not Path(one).name.startswith(".")]
 
 
-def read_line(folder: Path, run: Path) -> RunLine:
-    """Return what is known of a run; a run that cannot be read has its problem."""
+def read_line(
+    folder: Path, run: Path, also: Callable[[Store, Settings], None] | None = None
+) -> RunLine:
+    """Return what is known of a run; a run that cannot be read has its problem.
+
+    Args:
+        folder: of all runs.
+        run: folder of the run.
+        also: called with the open store, to read more of it.
+    """
     path = run.relative_to(folder).as_posix()
     try:
         changed = (run / FILE).stat().st_mtime
@@ -119,6 +127,8 @@ def read_line(folder: Path, run: Path) -> RunLine:
             settings, n = Settings.from_dict(store.settings, run), len(store)
             finished, criteria = store.finished is not None, judged(store, settings)
             version = store.version
+            if also is not None:
+                also(store, settings)
         triage = read_record(run / JSON_FILE)
     except BridgeGenError as error:
         return RunLine(path, changed, size, problem="; ".join(error.problems))
