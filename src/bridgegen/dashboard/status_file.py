@@ -4,6 +4,7 @@ The file is the person's. BridgeGen adds blocks, and keeps all others as they ar
 comments. Blocks are sorted by scenario, driver and id, so that git merges what two branches add.
 """
 
+import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -23,6 +24,11 @@ KEYS = ("id", "status", "scenario", "driver", "title", "note")
 
 MOST_TEXT = 2000
 """Characters of a title or a note."""
+
+_LINE = re.compile(
+    r"[^\n\r\x85\u2028\u2029]*(?:\r\n|[\n\r\x85\u2028\u2029])|[^\n\r\x85\u2028\u2029]+$"
+)
+"""A line as YAML counts them."""
 
 _HEAD = """\
 # Failure modes of this project. 'bridgegen dashboard --update' adds those that it does not name,
@@ -60,11 +66,13 @@ class StatusFile:
         head: text before the first block.
         blocks: the text of each block, with the comments above it, by id.
         decisions: what each says, by id.
+        indent: spaces before the dash of a block.
     """
 
     head: str
     blocks: Mapping[str, str]
     decisions: Mapping[str, Decision]
+    indent: int = 0
 
     def status(self, mode: str) -> Status:
         """Return the status of a failure mode; "new" if the file does not name it."""
@@ -93,17 +101,22 @@ def read_status_file(path: Path) -> StatusFile:
         raise StorageError(f"{path}: cannot be read: {error.strerror}") from None
     document = read_plain_yaml(data, str(path))
     decisions = _decisions(document)
-    lines = data.decode("utf-8-sig").splitlines(keepends=True)
-    starts = [
-        _start(lines, document.lines["modes", number] - 1) for number in range(len(decisions))
-    ]
+    if not decisions:
+        return StatusFile(_HEAD, {}, {})
+    lines = _LINE.findall(data.decode("utf-8-sig"))
+    starts = _starts(lines, document, len(decisions))
     ends = [*starts[1:], len(lines)]
     blocks = {
         one.id: "".join(lines[start:end])
         for one, start, end in zip(decisions, starts, ends, strict=True)
     }
-    head = "".join(lines[: starts[0]]) if decisions else _HEAD
-    return StatusFile(head, blocks, {one.id: one for one in decisions})
+    first = lines[document.lines["modes", 0] - 1]
+    return StatusFile(
+        "".join(lines[: starts[0]]),
+        blocks,
+        {one.id: one for one in decisions},
+        len(first) - len(first.lstrip(" ")),
+    )
 
 
 def add_decisions(path: Path, file: StatusFile, new: Iterable[Decision]) -> int:
@@ -115,17 +128,50 @@ def add_decisions(path: Path, file: StatusFile, new: Iterable[Decision]) -> int:
         new: decisions whose ids it may name already: these are left alone.
 
     Raises:
+        FileFormatError: it is laid out so that no block can be added.
         StorageError: it cannot be written.
     """
     added = [one for one in new if one.id not in file.blocks]
     if not added:
         return 0
-    whole = {**file.blocks, **{one.id: _block(one) for one in added}}
     known = {**file.decisions, **{one.id: one for one in added}}
-    order = sorted(whole, key=lambda name: (known[name].scenario, known[name].driver, name))
-    texts = [whole[name].rstrip("\n") + "\n" for name in order]
-    write_whole(path, [(file.head + "".join(texts)).encode()])
+    texts = {**file.blocks, **{one.id: _block(one, file.indent) for one in added}}
+    order = sorted(known, key=lambda name: (known[name].scenario, known[name].driver, name))
+    whole = file.head + "".join(_ended(texts[name]) for name in order)
+    data = whole.encode()
+    try:
+        again = [one.id for one in _decisions(read_plain_yaml(data, str(path)))]
+    except FileFormatError:
+        again = []
+    if again != order:
+        raise FileFormatError(
+            f"{path}: no blocks can be added to it as it is laid out; write each failure mode as a "
+            "block that begins with '- id: …', and nothing behind the last"
+        )
+    write_whole(path, [data])
     return len(added)
+
+
+def _ended(text: str) -> str:
+    return text if text.endswith("\n") else f"{text}\n"
+
+
+def _starts(lines: list[str], document: Document, count: int) -> list[int]:
+    """Return the first line of each block.
+
+    Raises:
+        FileFormatError: a block does not begin a line.
+    """
+    firsts = [document.lines["modes", number] - 1 for number in range(count)]
+    problems = [
+        "each failure mode must begin on a line of its own with '- id: …' "
+        f"({document.at(('modes', number))})"
+        for number, first in enumerate(firsts)
+        if not lines[first].lstrip(" ").startswith("- ") or first in firsts[:number]
+    ]
+    if problems:
+        raise FileFormatError(*problems)
+    return [_start(lines, first) for first in firsts]
 
 
 def _start(lines: list[str], first: int) -> int:
@@ -140,14 +186,14 @@ def _start(lines: list[str], first: int) -> int:
     return first
 
 
-def _block(one: Decision) -> str:
+def _block(one: Decision, indent: int) -> str:
     lines = [f"- id: {one.id}", f"  status: {one.status}"]
     lines += [
         f"  {key}: {_quoted(getattr(one, key))}"
         for key in ("scenario", "driver", "title", "note")
         if getattr(one, key)
     ]
-    return "\n".join(lines) + "\n"
+    return "".join(f"{' ' * indent}{line}\n" for line in lines)
 
 
 def _quoted(text: str) -> str:
