@@ -1,0 +1,295 @@
+"""A project's folder → its page, from the command line and from Python."""
+
+import json
+import os
+import re
+import shutil
+from html.parser import HTMLParser
+from pathlib import Path
+from urllib.parse import unquote
+
+import pytest
+from tests.dashboard.conftest import R_12
+
+import bridgegen as bg
+from bridgegen.dashboard.dashboard import Dashboard
+from bridgegen.dashboard.modes import failure_modes
+from bridgegen.dashboard.odd import coverage
+from bridgegen.dashboard.page import write_page
+from bridgegen.dashboard.page_modes import MOST_MODES
+from bridgegen.dashboard.project import Problem, Project
+from bridgegen.dashboard.requirements import matrices
+from bridgegen.dashboard.scenery import scenery_of
+from bridgegen.dashboard.sentences import failing_sentence, requirements_sentence
+from bridgegen.dashboard.status_file import FILE, StatusFile, read_status_file
+from bridgegen.dashboard.trends import trends
+from bridgegen.errors import FileFormatError, StorageError
+from bridgegen.odd.reader import load
+from bridgegen.suite.suite import read_suite
+from bridgegen.triage.record import Estimate, read_record
+from bridgegen.verdict.of_dashboard import FIGURES
+
+
+class Tags(HTMLParser):
+    """Collects the elements of a page, and which are open at its end."""
+
+    def __init__(self, page: Path) -> None:
+        super().__init__()
+        self.text = page.read_text("utf-8")
+        self.open: list[str] = []
+        self.links: list[str] = []
+        self.names: set[str] = set()
+        self.feed(self.text)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.names.add(tag)
+        if tag not in ("meta", "link", "path", "rect", "circle", "polyline"):
+            self.open.append(tag)
+        self.links += [value or "" for name, value in attrs if tag == "a" and name == "href"]
+
+    def handle_endtag(self, tag: str) -> None:
+        if self.open and self.open[-1] == tag:
+            self.open.pop()
+
+
+@pytest.fixture(scope="module")
+def found(project, tmp_path_factory) -> Dashboard:
+    return bg.build_dashboard(project, out=tmp_path_factory.mktemp("page") / "all.html")
+
+
+@pytest.fixture
+def copy(project, tmp_path) -> Path:
+    return shutil.copytree(project, tmp_path / "project")
+
+
+def test_it_finds_all_results_and_names_what_is_damaged(found):
+    figures = found.figures
+    assert (figures["runs"], figures["suites"], figures["maps"]) == (2, 1, 1)
+    assert figures["scenarios"] == 2
+    assert figures["evaluations"] == 2 * 40 + 4 * 7  # 6 variations and the defaults
+    (problem,) = found.project.problems
+    assert problem.place == "damaged <b>"
+    assert "SQLite" in problem.why
+
+
+def test_modes_are_those_of_the_records(found, project):
+    triage = read_record(project / "runs" / "route-follower" / "triage.json")
+    titles = {one.title for one in triage.modes}
+    assert titles <= {one.title for one in found.modes}
+    suite = read_suite(project / "suites" / "change")
+    failing = [one for one in suite.results if any(row.critical for row in one.rows)]
+    assert {one.key.driver for one in found.modes if "suite" in {r.kind for r in one.results}} == {
+        one.ego for one in failing
+    }
+
+
+def test_the_requirement_is_as_the_run_says(found, project):
+    (judged,) = bg.Run(project / "runs" / "route-follower").criteria
+    matrix = next(one for one in found.requirements if one.driver == "route-follower")
+    cell = matrix.cell("cut-in", "R-12")
+    assert (cell.met, cell.violated) == (judged.met, judged.violated)
+    assert cell.page == "runs/route-follower/report.html"
+    assert matrix.without == ["left-across-path"]
+
+
+def test_coverage_counts_every_evaluation_with_a_result(found):
+    rain = [one for one in found.coverage.attributes if one.attribute.path[-2] == "Rainfall"]
+    total = sum(one.evaluations for one in rain)
+    assert total == sum(one.evaluations for one in found.coverage.seen.values())
+    assert total == found.figures["evaluations"]  # none failed
+
+
+def test_the_page_is_whole_and_its_links_lead_to_results(found):
+    page = Tags(found.page)
+    assert page.open == []
+    assert not page.names & {"script", "img", "iframe", "object", "form"}
+    assert re.search("https?:", page.text.replace("http://www.w3.org", "")) is None
+    outside = [link for link in page.links if not link.startswith("#")]
+    assert outside
+    for link in outside:
+        assert (found.page.parent / unquote(link)).is_file(), link
+    for link in page.links:
+        assert not link.startswith("#") or f'id="{link[1:]}"' in page.text or link == "#modes"
+    assert "damaged &lt;b&gt;" in page.text
+    assert "damaged <b>" not in page.text
+
+
+def test_the_same_project_makes_the_same_page(found, project, tmp_path):
+    out = found.page.parent / "again.html"
+    assert bg.build_dashboard(project, out=out).page.read_bytes() == found.page.read_bytes()
+
+
+def test_the_command_judges_and_keeps_statuses(cli, copy):
+    status, out, err = cli("dashboard", copy, "--update", "--fail-if", "new > 0")
+    assert status == 3
+    assert "FAILED: not new > 0" in err
+    assert str(copy / "dashboard.html") in out
+    file = copy / FILE
+    text = file.read_text("utf-8")
+    file.write_text(text.replace("status: new", "status: accepted # in May"), "utf-8")
+    status, out, err = cli("dashboard", copy, "--update", "--fail-if", "new > 0", "--json")
+    assert status == 0
+    facts = json.loads(out)
+    assert facts["added"] == 0
+    assert facts["figures"]["accepted"] == text.count("status: new") > 0
+    file.write_text(text.replace("status: new", "status: fixed"), "utf-8")
+    status, out, err = cli("dashboard", copy, "--fail-if", "regressions > 0")
+    assert status == 3
+    assert "regression" in out
+    assert "fixed, but fails again" in (copy / "dashboard.html").read_text("utf-8")
+
+
+def test_without_update_the_file_is_not_touched(cli, copy):
+    assert cli("dashboard", copy)[0] == 0
+    assert not (copy / FILE).exists()
+
+
+def test_requirements_of_the_project_that_nothing_tests_are_seen(copy):
+    declared = ["R-99: min(ego.v) > 0 m/s", R_12]
+    found = bg.build_dashboard(copy, criteria=declared)
+    assert found.untested == ["R-99"]
+    assert "tested by no scenario" in found.page.read_text("utf-8")
+    assert "R-99 is tested by no scenario" in requirements_sentence(found)
+
+
+def test_an_earlier_result_of_the_same_version_still_counts(copy):
+    before = {one.key for one in bg.build_dashboard(copy).failing}
+    run = copy / "runs" / "route-follower"
+    again = shutil.copytree(run, copy / "runs" / "later")
+    record = json.loads((again / "triage.json").read_text("utf-8"))
+    record["modes"] = record["modes"][:0]
+    (again / "triage.json").write_text(json.dumps(record), "utf-8")
+    later = (again / "run.sqlite").stat().st_mtime + 100.0
+    os.utime(again / "run.sqlite", (later, later))
+    # the same version of BridgeGen, so the earlier result still says how things stand
+    assert {one.key for one in bg.build_dashboard(copy).failing} == before
+
+
+def test_links_hold_from_another_folder(copy, tmp_path):
+    out = tmp_path / "public" / "deep"
+    out.mkdir(parents=True)
+    page = Tags(bg.build_dashboard(copy, out=out / "index.html").page)
+    outside = [link for link in page.links if not link.startswith("#")]
+    assert all((out / unquote(link)).is_file() for link in outside)
+
+
+def test_damaged_statuses_are_an_error_before_anything_is_written(cli, copy):
+    (copy / FILE).write_text("modes:\n- id: fm-1\n  status: maybe\n", "utf-8")
+    with pytest.raises(FileFormatError):
+        bg.build_dashboard(copy)
+    status, _, err = cli("dashboard", copy)
+    assert status == 2
+    assert "line 3" in err
+    assert not (copy / "dashboard.html").exists()
+
+
+def test_another_file_is_not_overwritten(copy):
+    (copy / "dashboard.html").write_text("mine", "utf-8")
+    with pytest.raises(StorageError, match="is not a dashboard"):
+        bg.build_dashboard(copy, update=True)
+    assert not (copy / FILE).exists()
+
+
+@pytest.mark.parametrize("make", [False, True])
+def test_a_folder_without_results_is_an_error(tmp_path, make):
+    folder = tmp_path / "empty"
+    if make:
+        folder.mkdir()
+    with pytest.raises(StorageError, match=r"contains no run|no such folder"):
+        bg.build_dashboard(folder)
+
+
+def test_an_unknown_figure_is_named(cli, copy):
+    status, _, err = cli("dashboard", copy, "--fail-if", "old > 0")
+    assert status == 2
+    assert "unknown figure" in err
+
+
+def test_every_figure_is_there_and_explained(found):
+    assert set(found.figures) == set(FIGURES)
+
+
+def test_a_changed_scenario_is_named_and_not_counted(copy, tmp_path):
+    text = (Path(bg.__file__).parent / "catalogue" / "cut-in.yaml").read_text("utf-8")
+    file = tmp_path / "mine.yaml"
+    file.write_text(text, "utf-8")
+    bg.run_search(file, ego="reference", algorithm="random", budget=2, out=copy / "runs" / "mine")
+    file.write_text(text.replace("high: ", "high: 1", 1), "utf-8")
+    found = bg.build_dashboard(copy)
+    assert any("has changed" in one.why and "mine.yaml" in one.place
+               for one in found.project.problems)  # fmt: skip
+
+
+# ---- sizes, and what strangers write ----
+
+
+def made(results, folder, problems=()):
+    """Return a dashboard of results that are not on disk."""
+    sceneries = {"cut-in": scenery_of(load("cut-in"))}
+    project = Project(folder, tuple(results), (), (), (), sceneries, tuple(problems))
+    file = StatusFile("", {}, {})
+    page = folder / "dashboard.html"
+    return Dashboard(
+        project, page, file, folder / FILE, tuple(failure_modes(results, file)),
+        tuple(matrices(results)), (), tuple(trends(results, ())), coverage(results, sceneries),
+    )  # fmt: skip
+
+
+def test_a_page_of_a_thousand_runs_is_small(result, tmp_path):
+    space = Estimate(drawn="fresh", rows=256, harmful=3, share=3 / 256, low=0.002, high=0.03)
+    judged = tuple((f"R-{k}", 5, k % 2) for k in range(20))
+    results = [
+        result(
+            f"scenario-{k % 100}", f"1.{k // 100}", float(k), modes=("turn", f"rear {k % 7}"),
+            judged=judged, space=space, source=f"runs/{'week ' * 4}{k}", page=f"runs/{k}.html",
+        )
+        for k in range(1000)
+    ]  # fmt: skip
+    found = made(results, tmp_path)
+    write_page(found)
+    assert found.page.stat().st_size < 5_000_000
+    assert Tags(found.page).open == []
+
+
+def test_more_modes_than_the_page_holds_are_counted(result, tmp_path):
+    results = [result(modes=tuple(map(str, range(MOST_MODES + 30))))]
+    found = made(results, tmp_path)
+    write_page(found)
+    assert "and 30 more" in found.page.read_text("utf-8")
+
+
+def test_texts_of_strangers_are_escaped(result, tmp_path):
+    hostile = '"><script>alert(1)</script>&\ud800'
+    results = [
+        result(hostile, name=hostile, modes=(hostile,), source=f"javascript:{hostile}",
+               page=f"javascript:{hostile}/report.html"),
+    ]  # fmt: skip
+    found = made(results, tmp_path, [Problem(hostile, hostile)])
+    write_page(found)
+    page = Tags(found.page)
+    assert "script" not in page.names
+    assert all(link.startswith(("./", "#")) for link in page.links)
+    assert page.open == []
+
+
+def test_the_sentences_name_who_fails_where(result, tmp_path):
+    results = [
+        result("a", modes=("turn",), judged=(("R-1", 1, 2),)),
+        result("b", judged=(("R-1", 3, 0),)),
+    ]
+    found = made(results, tmp_path)
+    assert failing_sentence(found) == "stack fails in 1 of 2 scenarios, in 1 way: 1 new."
+    assert requirements_sentence(found) == (
+        "1 of 1 requirement is violated: R-1 (major) by stack in a."
+    )
+
+
+def test_the_sentences_of_a_clean_project(result, tmp_path):
+    found = made([result("a")], tmp_path)
+    assert failing_sentence(found) == "No failure mode is in any current result."
+    assert "No pass criterion" in requirements_sentence(found)
+
+
+def test_statuses_are_read_back(copy):
+    found = bg.build_dashboard(copy, update=True)
+    assert set(read_status_file(copy / FILE).decisions) == {one.key.id for one in found.modes}
