@@ -21,14 +21,24 @@ from bridgegen.simulation.choice import EMBEDDED
 Files = Annotated[
     list[str],
     typer.Argument(
-        help="Folders, scenario files (.xosc, .yaml), distribution files, or catalogue names.",
+        help="Folders, scenario files (.xosc, .yaml), distribution files, names of the catalogue, "
+        "packs.",
         autocompletion=completing("scenario"),
     ),
 ]
 Samples = Annotated[
     int,
     typer.Option(
-        help="Evenly spread variations of each logical scenario, besides its defaults.",
+        help="Evenly spread variations of each logical scenario without a matrix, besides its "
+        "defaults.",
+        rich_help_panel=HOW,
+    ),
+]
+Matrix = Annotated[
+    str | None,
+    typer.Option(
+        help="Edition of the scenarios' matrices, such as 2026; 'none' for --samples instead.",
+        show_default="all editions",
         rich_help_panel=HOW,
     ),
 ]
@@ -73,6 +83,7 @@ def suite(
             autocompletion=completing("driver"),
         ),
     ] = None,
+    matrix: Matrix = None,
     samples: Samples = 100,
     seed: Seed = 0,
     simulator: common.Simulator = None,
@@ -110,6 +121,7 @@ def suite(
             files,
             egos=ego or (),
             options=options,
+            matrix=matrix,
             samples=samples,
             seed=seed,
             simulator=common.read_simulator(simulator, simulator_set, connection) or EMBEDDED,
@@ -138,6 +150,7 @@ def diff(
         ),
     ],
     options: CommonOptions,
+    matrix: Matrix = None,
     samples: Samples = 1000,
     budget: Annotated[
         int,
@@ -186,6 +199,7 @@ def diff(
             files,
             egos=egos,
             options=options,
+            matrix=matrix,
             samples=samples,
             seed=seed,
             workers=workers,

@@ -16,6 +16,7 @@ from bridgegen.metrics import (
     d_min,
     drac,
     e_position,
+    impact_speed,
     iou,
     l_offset,
     mean_average_precision,
@@ -23,7 +24,9 @@ from bridgegen.metrics import (
     n_collision,
     pet,
     r_red,
+    relative_impact_speed,
     rss,
+    speed_reduction,
     tet,
     thw,
     tit,
@@ -39,7 +42,9 @@ _TABLE_I = (
     a_change, n_brake,
 )  # fmt: skip
 
-_BEYOND = (pet, drac, btn, thw, tet, tit, rss)
+_BEYOND = (
+    pet, drac, btn, thw, tet, tit, rss, impact_speed, relative_impact_speed, speed_reduction,
+)  # fmt: skip
 
 _OURS: dict[str, Metric] = {module.METRIC.name: module.METRIC for module in (*_TABLE_I, *_BEYOND)}
 

@@ -15,6 +15,7 @@ from bridgegen.odd.constraints import problems_of
 from bridgegen.odd.criteria import read_criteria_in, unknown_entities
 from bridgegen.odd.expression import Expression, parse
 from bridgegen.odd.kinds import KEYS, KINDS
+from bridgegen.odd.matrix import read_matrix
 from bridgegen.odd.objectives import HARM, read_objective
 from bridgegen.odd.others import DRIVERS, SCRIPTED, driven
 from bridgegen.odd.parameters import Axis, Bound, Derived, Parameter, at, nearest, read_axes
@@ -367,6 +368,7 @@ def _build(document: Document, folder: Path | None) -> LogicalScenario:
     objective = _objective(document.data.get("objective", "harm"), quantities)
     criteria, wrong = read_criteria_in(document)
     problems += wrong + unknown_entities(criteria, [one.name for one in story.participants])
+    matrix = read_matrix(document, parameters, derived, quantities.report)
     declarations.derived += changes.derived
     derived |= {one.name: one for one in changes.derived}
     between = bounds_between_layers(roads, story, parameters, declarations.prefixes, document.place)
@@ -406,6 +408,7 @@ def _build(document: Document, folder: Path | None) -> LogicalScenario:
         derived=tuple(declarations.derived),
         objective=objective,
         criteria=criteria,
+        matrix=matrix,
     )
     try_out(scenario)
     return scenario

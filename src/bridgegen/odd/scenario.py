@@ -18,6 +18,7 @@ from bridgegen.odd.thresholds import Thresholds
 
 if TYPE_CHECKING:  # the checks of individuals start without pydantic
     from bridgegen.odd.criteria import Criterion
+    from bridgegen.odd.matrix import Grid
 
 
 @dataclass(frozen=True)
@@ -202,6 +203,7 @@ class LogicalScenario(SearchedScenario):
         effects: the user's functions that add to each scenario, as ``file.py:function`` or the
             name of an entry point.
         adversary: driver of a participant, if `bridgegen.odd.adversary.adversarial` made it.
+        matrix: values that are tested of it, by edition.
     """
 
     source: str
@@ -213,6 +215,7 @@ class LogicalScenario(SearchedScenario):
     effects: tuple[str, ...]
     road_end: Literal["leave", "stand"] = field(default="leave", kw_only=True)
     adversary: Adversary | None = field(default=None, repr=False, kw_only=True)
+    matrix: "tuple[Grid, ...]" = field(default=(), repr=False, kw_only=True)
 
     @property
     def fingerprint(self) -> str:
@@ -226,7 +229,10 @@ class LogicalScenario(SearchedScenario):
         types = {one.name: (one.type_by, one.types) for one in self.participants if one.type_by}
         ways = {one.name: (one.place_by, one.ways) for one in self.participants if one.ways}
         models = {one.name: one.model for one in self.participants if one.model}
-        parts = (drivers, headings, lifted, sirens, bodies, types, models, ways, self.criteria)
+        parts = (
+            drivers, headings, lifted, sirens, bodies, types, models, ways, self.criteria,
+            self.matrix,
+        )  # fmt: skip
         more = "".join(repr(one) for one in parts if one)
         return sha256((content + more).encode()).hexdigest()
 

@@ -9,6 +9,7 @@ from typing import Annotated, Literal
 from pydantic import Field, ValidationInfo, field_validator
 
 from bridgegen.odd.criteria import CriterionSection
+from bridgegen.odd.matrix import GridSection
 from bridgegen.odd.roads_schema import RoadsSection
 from bridgegen.odd.shape import (
     AxisName,
@@ -201,6 +202,8 @@ class ScenarioFile(ShapedSection):
     """By name: what follows from parameters."""
     criteria: list[CriterionSection] = []
     """Pass criteria: formulas that a scenario must keep, each with an id."""
+    matrix: list[GridSection] = []
+    """Values to test instead of a sample of the ranges: what 'bridgegen suite' runs."""
     objective: Annotated[ObjectiveSection | Literal["harm"], OrWord(ObjectiveSection, "harm")] = (
         "harm"
     )

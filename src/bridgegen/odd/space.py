@@ -214,6 +214,32 @@ class SearchSpace:
             raise ScenarioError(*(one.reason for one in broken))
         return row
 
+    def rows(self, columns: Mapping[str, Float], count: int) -> Float:
+        """Return rows with given values, and the others at their defaults, as `row` does.
+
+        Args:
+            columns: ``(count,)`` values by parameter; they may break a constraint.
+            count: number of rows.
+
+        Returns:
+            ``(count, len(names))``; `violations` says which break one.
+
+        Raises:
+            ScenarioError: the constraints leave a parameter no value at some row.
+        """
+        result = np.empty((len(self.names), count))
+        table: dict[str, Float | float] = {}
+        for name in self.order:
+            out = result[self._columns[name]]
+            if name in columns:
+                out[:] = columns[name]
+            elif name in self.derived:
+                out[:] = self.derived[name].value.evaluate(table)
+            else:
+                out[:] = np.clip(self.defaults[name], *self.interval(name, table))
+            table[name] = out
+        return np.ascontiguousarray(result.T)
+
     def violations(self, X: npt.ArrayLike) -> list[Violation]:
         """Check rows against every range, bound and formula, independently of the decoder.
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from bridgegen.errors import BridgeGenError, InputError
 from bridgegen.odd.plain_yaml import MAX_BYTES
-from bridgegen.odd.reader import load
+from bridgegen.odd.reader import load, pack_names
 from bridgegen.odd.reader import names as catalogue_names
 from bridgegen.openx.openscenario.kind import files_named_in, kind_of_file
 
@@ -54,12 +54,13 @@ def find_entries(given: Sequence[str | Path]) -> tuple[Entry, ...]:
 
     In a folder, and the folders in it: scenario files (``.xosc`` with a storyboard, ``.yaml`` with
     a logical scenario), and distribution files, which stand for variations of the scenario that
-    they name. A scenario that a distribution of the suite names runs with its variations only.
+    they name. A scenario that a distribution of the suite names runs with its variations only. The
+    name of a pack stands for all of its scenarios.
     Catalogues, fragments, maps and other files are passed over. A file that is named itself must be
     one of them.
 
     Args:
-        given: paths, or names of the catalogue.
+        given: paths, or names of the catalogue, of a pack, or of a pack's scenario.
 
     Returns:
         The entries, in the order of their paths; one with a ``problem`` where a file is broken.
@@ -68,6 +69,7 @@ def find_entries(given: Sequence[str | Path]) -> tuple[Entry, ...]:
         InputError: a path does not exist, or a file that is named is no scenario; nothing is found.
     """
     problems, found = list[str](), dict[str, Entry]()
+    shipped = (*catalogue_names(), *pack_names())
     for one in given:
         path = Path(one)
         if path.is_dir():
@@ -80,10 +82,11 @@ def find_entries(given: Sequence[str | Path]) -> tuple[Entry, ...]:
                 problems.append(f"{path}: is no scenario and no distribution of one")
             else:
                 found.setdefault(entry.distribution or entry.scenario, entry)
-        elif str(one) in catalogue_names():
-            found.setdefault(str(one), Entry(str(one), str(one)))
+        elif some := [name for name in shipped if name == str(one) or name.startswith(f"{one}/")]:
+            for name in some:
+                found.setdefault(name, Entry(name, name))
         else:
-            problems.append(f"{one}: no such file, folder or scenario of the catalogue")
+            problems.append(f"{one}: no such file, folder, pack or scenario that ships")
     if problems:
         raise InputError(*problems)
     if not found:

@@ -17,14 +17,19 @@ from bridgegen.pipeline import Pipeline
 from bridgegen.simulation.choice import SimulatorChoice
 from bridgegen.simulation.rollout import STATUS_MESSAGES
 from bridgegen.suite.entries import Entry
-from bridgegen.suite.results import EntryResult, RowResult, finite
-from bridgegen.suite.rows import rows_of
+from bridgegen.suite.results import EntryResult, GridResult, RowResult, finite
+from bridgegen.suite.rows import Rows, rows_of
 from bridgegen.workers import CarriedDriver, Threads
 
 AT_ONCE = 512
 """Rows that are evaluated together; no result depends on it."""
 
-QUANTITIES = ("harm", "severity", "n_collision", "d_min")
+IMPACT = ("impact_speed", "relative_impact_speed", "speed_reduction")
+
+QUANTITIES = ("harm", "severity", "n_collision", "d_min", *IMPACT)
+
+MATRIX = "matrix"
+"""The column that names a row's grid."""
 
 
 @dataclass(frozen=True)
@@ -38,6 +43,7 @@ class Job:
         simulator: which runs them.
         samples: rows of a logical scenario besides its defaults.
         seed: of samples.
+        edition: of a logical scenario's matrix; None: all, "none": samples instead.
     """
 
     entry: Entry
@@ -46,6 +52,7 @@ class Job:
     simulator: SimulatorChoice
     samples: int
     seed: int
+    edition: str | None = None
 
     @property
     def digest(self) -> str:
@@ -101,7 +108,7 @@ def pipeline_of(job: Job) -> Pipeline:
     scenario = driven_by(load(entry.scenario, entry.distribution, trigger), job.options.others)
     spec = chosen_objective(scenario.objective, job.options, "one")
     scenario = as_judged(replace(scenario, objective=spec), spec.rule)
-    options = replace(job.options, ego=job.ego)
+    options = replace(job.options, ego=job.ego, metrics=IMPACT)
     pipeline = Pipeline(
         scenario, scenario.space(), options, simulator=job.simulator, workers=Threads(1)
     )
@@ -111,29 +118,45 @@ def pipeline_of(job: Job) -> Pipeline:
 
 def rows_of_job(job: Job, pipeline: Pipeline) -> np.ndarray:
     """Return the rows of an entry, ``(N, len(pipeline.space.names))``."""
-    return rows_of(pipeline.scenario, pipeline.space, job.samples, job.seed)[0]
+    return _rows_of(job, pipeline).X
+
+
+def _rows_of(job: Job, pipeline: Pipeline) -> Rows:
+    return rows_of(pipeline.scenario, pipeline.space, job.samples, job.seed, job.edition)
 
 
 def _evaluated(job: Job, found: EntryResult) -> EntryResult:
     pipeline = pipeline_of(job)
     space = pipeline.space
-    X, excluded = rows_of(pipeline.scenario, space, job.samples, job.seed)
+    given = _rows_of(job, pipeline)
+    X, names = given.X, given.names
     notes = [*pipeline.scenario.notes, *pipeline.notes]
-    if excluded:
-        notes.append(f"{excluded} combinations are excluded by the scenario's own constraints")
-    names = [name for name in space.names if name in {*space.variables, *space.derived}]
+    if given.excluded:
+        notes.append(
+            f"{given.excluded} combinations are excluded by the scenario's own constraints"
+        )
     rows: list[RowResult] = []
     for start in range(0, len(X), AT_ONCE):
         some = X[start : start + AT_ONCE]
         evaluation = pipeline.evaluate(some)
         rows += _rows(pipeline, some, evaluation, names)
     units = dict(zip(space.names, space.units, strict=True))
+    labels = [one.label for one in given.grids]
+    if labels:
+        rows = [
+            one.model_copy(update={"x": [labels[number], *one.x]})
+            for one, number in zip(rows, given.grid, strict=True)
+        ]
     return found.model_copy(
         update={
             "driver": pipeline.driver.label,
             "title": pipeline.scenario.title,
-            "parameters": names,
-            "units": [units[name] for name in names],
+            "parameters": [*([MATRIX] if labels else []), *names],
+            "units": [*(["1"] if labels else []), *(units[name] for name in names)],
+            "grids": [
+                GridResult(label=one.label, edition=one.edition, score=one.score, points=one.points)
+                for one in given.grids
+            ],
             "criteria": [one.to_dict() for one in pipeline.monitor],
             "rows": rows,
             "notes": notes,
@@ -175,6 +198,9 @@ def _rows(
                 severity=float(metrics["severity"][i]),
                 collisions=float(metrics["n_collision"][i]),
                 d_min=finite(float(metrics["d_min"][i])),
+                impact_speed=float(metrics["impact_speed"][i]),
+                relative_impact_speed=float(metrics["relative_impact_speed"][i]),
+                speed_reduction=float(metrics["speed_reduction"][i]),
                 conflict=texts["conflict"],
                 conflict_type=texts["conflict_type"],
                 responsible=texts["responsible"],

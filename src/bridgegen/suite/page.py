@@ -76,6 +76,7 @@ def command_of(job: Job, result: EntryResult) -> str:
     if logical:
         words += ["--samples", str(job.samples)] if job.samples != SAMPLES else []
         words += ["--seed", str(job.seed)] if job.seed else []
+        words += ["--matrix", job.edition] if job.edition else []
     if job.simulator.name != EMBEDDED.name:
         words += ["--simulator", job.simulator.name]
     return shlex.join(words)

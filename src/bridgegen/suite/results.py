@@ -8,6 +8,17 @@ from pydantic import BaseModel, ConfigDict, Field
 
 Verdict = Literal["passed", "failed", "not run"]
 
+Outcome = Literal["avoided", "mitigated", "not avoided"]
+OUTCOMES: tuple[Outcome, ...] = ("avoided", "mitigated", "not avoided")
+
+STANDS = 0.1 / 3.6
+"""[m/s] Up to which the ego counts as standing. Euro NCAP measures speeds to 0.1 km/h (Crash
+Avoidance protocol, Frontal Collisions, 1.1, section 1.5.2)."""
+
+REDUCED = 1.0 / 3.6
+"""[m/s] More than which the ego must be slower at its impact than at the start. It is the tolerance
+of the test speed in that protocol (section 4.3.2)."""
+
 
 class Strict(BaseModel):
     """Part of a record; it is untrusted when it is read."""
@@ -26,6 +37,9 @@ class RowResult(Strict):
         severity: probability of MAIS3+ in the ego's collision.
         collisions: number of the ego's contacts.
         d_min: smallest distance to others [m]; None: there are none.
+        impact_speed: the ego's at its first contact [m/s]; 0: none, or it stands.
+        relative_impact_speed: the same, less the other's speed along the ego's heading [m/s].
+        speed_reduction: the ego's speed at the start less that at its first contact [m/s].
         conflict: of the decisive conflict: "contact", "near miss", … , or "".
         conflict_type: its type.
         responsible: who is, for a contact or near miss.
@@ -41,6 +55,9 @@ class RowResult(Strict):
     severity: float = 0.0
     collisions: float = 0.0
     d_min: float | None = None
+    impact_speed: float = 0.0
+    relative_impact_speed: float = 0.0
+    speed_reduction: float = 0.0
     conflict: str = ""
     conflict_type: str = ""
     responsible: str = ""
@@ -56,9 +73,37 @@ class RowResult(Strict):
         return "failed" if self.critical or self.violated else "passed"
 
     @property
+    def outcome(self) -> Outcome | None:
+        """Whether the ego avoids the collision, or reduces its speed; None without a result.
+
+        A contact while the ego stands, of one who walks or drives into it, counts as avoided.
+        """
+        if self.problem:
+            return None
+        if self.collisions == 0.0 or self.impact_speed <= STANDS:
+            return "avoided"
+        return "mitigated" if self.speed_reduction > REDUCED else "not avoided"
+
+    @property
     def violated(self) -> list[int]:
         """The numbers of the criteria that it violates."""
         return [i for i, margin in enumerate(self.margins) if margin < 0.0]
+
+
+class GridResult(Strict):
+    """A grid of a matrix that an entry runs; see `bridgegen.odd.matrix.Grid`.
+
+    Attributes:
+        label: the text of the column ``matrix`` in its rows.
+        edition: of the protocol.
+        score: how its rows are rated, or "".
+        points: that they are worth together.
+    """
+
+    label: str
+    edition: str
+    score: str = ""
+    points: float = 0.0
 
 
 class EntryResult(Strict):
@@ -75,6 +120,7 @@ class EntryResult(Strict):
         parameters: the names of what varies.
         units: theirs.
         criteria: as `bridgegen.odd.criteria.Criterion.to_dict` gives them.
+        grids: of the matrix that it runs, if it has one.
         rows: of each variation; empty if the entry cannot run.
         problem: why it cannot; empty if it can.
         notes: what runs otherwise than one may expect.
@@ -90,6 +136,7 @@ class EntryResult(Strict):
     parameters: list[str] = []
     units: list[str] = []
     criteria: list[dict[str, Any]] = []
+    grids: list[GridResult] = []
     rows: list[RowResult] = []
     problem: str = ""
     notes: list[str] = []
@@ -107,6 +154,11 @@ class EntryResult(Strict):
         if self.problem:
             return int(verdict == "not run")
         return sum(one.verdict == verdict for one in self.rows)
+
+    def outcomes(self) -> dict[Outcome, int]:
+        """Return the numbers of rows by outcome."""
+        found = [one.outcome for one in self.rows]
+        return {one: found.count(one) for one in OUTCOMES}
 
     @property
     def worst(self) -> int | None:

@@ -1,16 +1,19 @@
 """The rows of a scenario that a suite runs: all variations, or a sample of its space."""
 
 import math
+from collections.abc import Sequence
+from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
 
-from bridgegen.arrays import Float
+from bridgegen.arrays import Bool, Float
 from bridgegen.errors import InputError
 from bridgegen.odd.distributions import Discrete
 from bridgegen.odd.kinds import INTEGER
+from bridgegen.odd.matrix import Grid
 from bridgegen.odd.parameters import Parameter
-from bridgegen.odd.scenario import SearchedScenario
+from bridgegen.odd.scenario import LogicalScenario, SearchedScenario
 from bridgegen.odd.space import SearchSpace
 from bridgegen.openx.file_scenario import FileScenario
 from bridgegen.openx.openscenario import distributions as dst
@@ -22,30 +25,80 @@ MOST_ROWS = 100_000
 _DRAWS = 31  # a stream of random numbers of its own
 
 
+NO_MATRIX = "none"
+"""In place of an edition: evenly spread rows, of scenarios with a matrix too."""
+
+
+@dataclass(frozen=True)
+class Rows:
+    """What a suite runs of a scenario.
+
+    Attributes:
+        X: ``(N, len(space.names))``.
+        names: of the columns that tell its rows apart.
+        excluded: number of combinations that the scenario's own constraints exclude.
+        grids: of the matrix that it runs; empty: none.
+        grid: ``(N,)`` which of them each row belongs to.
+    """
+
+    X: Float
+    names: tuple[str, ...]
+    excluded: int
+    grids: tuple[Grid, ...] = ()
+    grid: tuple[int, ...] = ()
+
+
+def matrix_of(scenario: SearchedScenario, edition: str | None) -> tuple[Grid, ...]:
+    """Return the grids of an edition, of all if it is None; none if rows are drawn instead."""
+    if not isinstance(scenario, LogicalScenario) or edition == NO_MATRIX:
+        return ()
+    return tuple(one for one in scenario.matrix if edition in (None, one.edition))
+
+
 def rows_of(
-    scenario: SearchedScenario, space: SearchSpace, samples: int, seed: int
-) -> tuple[Float, int]:
+    scenario: SearchedScenario,
+    space: SearchSpace,
+    samples: int,
+    seed: int,
+    edition: str | None = None,
+) -> Rows:
     """Return the rows that a suite runs of a scenario.
 
     Of a deterministic distribution all combinations of its values; of a stochastic one as many
-    draws as it asks for; of a logical scenario its defaults, then ``samples`` evenly spread rows (a
-    scrambled Sobol sequence); of a scenario in which nothing varies that one.
-
-    Returns:
-        X: ``(N, len(space.names))``; and the number of combinations that the scenario's own
-        constraints exclude, which are not among them.
+    draws as it asks for; of a logical scenario its matrix, or else its defaults, then ``samples``
+    evenly spread rows (a scrambled Sobol sequence); of a scenario in which nothing varies that one.
 
     Raises:
         InputError: there are more than MOST_ROWS, or none is left.
     """
+    if grids := matrix_of(scenario, edition):
+        return _of_matrix(scenario, space, grids)
     X = _all(scenario, space, samples, seed)
     table = {name: X[:, i] for i, name in enumerate(space.names)}
     excluded = np.zeros(len(X), np.bool_)
     for rows in scenario.broken(table).values():
         excluded |= rows
+    shown = {*space.variables, *space.derived}
+    names = tuple(name for name in space.names if name in shown)
+    return Rows(_some(X, excluded, scenario), names, int(excluded.sum()))
+
+
+def _of_matrix(scenario: SearchedScenario, space: SearchSpace, grids: Sequence[Grid]) -> Rows:
+    """Return all combinations of some grids that keep the scenario's constraints."""
+    X = np.concatenate([space.rows(one.columns(), len(one)) for one in grids])
+    grid = np.repeat(np.arange(len(grids)), [len(one) for one in grids])
+    excluded = np.zeros(len(X), np.bool_)
+    excluded[[one.row for one in space.violations(X)]] = True
+    set_by_it = {name for one in grids for name in one.names}
+    names = tuple(name for name in space.names if name in set_by_it)
+    kept = _some(X, excluded, scenario)
+    return Rows(kept, names, int(excluded.sum()), tuple(grids), tuple(grid[~excluded].tolist()))
+
+
+def _some(X: Float, excluded: Bool, scenario: SearchedScenario) -> Float:
     if excluded.all():
         raise InputError(f"{scenario.place}: the scenario's constraints exclude all variations")
-    return X[~excluded], int(excluded.sum())
+    return X[~excluded]
 
 
 def is_sample(scenario: SearchedScenario) -> bool:

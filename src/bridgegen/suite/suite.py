@@ -13,15 +13,17 @@ from pydantic import ValidationError
 from bridgegen import ego as egos
 from bridgegen.campaign.chosen import PAPER
 from bridgegen.disk import write_whole
-from bridgegen.errors import InputError, Interrupted, StorageError
+from bridgegen.errors import BridgeGenError, InputError, Interrupted, StorageError
 from bridgegen.odd.criteria import read_criterion
+from bridgegen.odd.reader import load
 from bridgegen.options import CommonOptions, called_with
 from bridgegen.records import parse_json
 from bridgegen.simulation.choice import EMBEDDED, SimulatorChoice
 from bridgegen.store.sqlite import Lock
-from bridgegen.suite.entries import find_entries
+from bridgegen.suite.entries import Entry, find_entries
 from bridgegen.suite.evaluate import Job, evaluate
 from bridgegen.suite.results import EntryResult, Header
+from bridgegen.suite.rows import NO_MATRIX
 from bridgegen.workers.process import cores
 from bridgegen.workers.tasks import TaskPool
 
@@ -58,7 +60,10 @@ class SuiteArguments:
 
     files: Sequence[str | Path] | str | Path = field(
         kw_only=False,
-        metadata={"help": "Folders, scenario and distribution files, or names of the catalogue."},
+        metadata={
+            "help": "Folders, scenario and distribution files, or names of the catalogue, of a "
+            "pack or of its scenarios."
+        },
     )
     egos: Sequence[str] = field(
         default=(), metadata={"help": "Drivers to test; the scenarios' own by default."}
@@ -72,7 +77,17 @@ class SuiteArguments:
     )
     samples: int = field(
         default=SAMPLES,
-        metadata={"help": "Evenly spread rows of each logical scenario, besides its defaults."},
+        metadata={
+            "help": "Evenly spread rows of each logical scenario without a matrix, besides its "
+            "defaults."
+        },
+    )
+    matrix: str | None = field(
+        default=None,
+        metadata={
+            "help": "Edition of the logical scenarios' matrices; all by default, ``none`` for "
+            "``samples`` instead."
+        },
     )
     seed: int = field(default=0, metadata={"help": "Of these rows."})
     simulator: SimulatorChoice = field(
@@ -131,12 +146,20 @@ def run_suite(given: SuiteArguments) -> SuiteRun:
     callbacks = given.callbacks or SuiteCallbacks()
     files = [given.files] if isinstance(given.files, str | Path) else list(given.files)
     _check(given)
-    entries = find_entries(files)
+    entries = of_edition(find_entries(files), given.matrix)
     drivers = tuple(dict.fromkeys(given.egos)) or ("",)
     folder = Path(given.out) if given.out is not None else Path("suites") / _name(files)
     settings = _settings(given)
     jobs = [
-        Job(one, ego or None, given.options, given.simulator, given.samples, given.seed)
+        Job(
+            one,
+            ego or None,
+            given.options,
+            given.simulator,
+            given.samples,
+            given.seed,
+            given.matrix,
+        )
         for one in entries
         for ego in drivers
     ]
@@ -159,6 +182,36 @@ def run_suite(given: SuiteArguments) -> SuiteRun:
         lock.release()
     results = tuple(done[job.entry.name, job.ego or ""] for job in jobs)
     return SuiteRun(folder, drivers, results, settings, tuple(jobs))
+
+
+def of_edition(entries: Sequence[Entry], edition: str | None) -> tuple[Entry, ...]:
+    """Return the entries without those whose matrix lacks an edition.
+
+    Raises:
+        InputError: no scenario has that edition.
+    """
+    if edition in (None, NO_MATRIX):
+        return tuple(entries)
+    kept, known = list[Entry](), set[str]()
+    for one in entries:
+        editions = _editions(one)
+        known |= editions
+        if not editions or edition in editions:
+            kept.append(one)
+    if edition not in known:
+        some = f"; editions: {', '.join(sorted(known))}" if known else ""
+        raise InputError(f"no scenario has a matrix of the edition '{edition}'{some}")
+    return tuple(kept)
+
+
+def _editions(entry: Entry) -> set[str]:
+    """Return the editions of an entry's matrix; none if it has no matrix, or cannot be read."""
+    if entry.scenario.lower().endswith(".xosc"):
+        return set()
+    try:
+        return {one.edition for one in load(entry.scenario).matrix}
+    except BridgeGenError:
+        return set()
 
 
 def read_suite(folder: Path) -> SuiteRun:
@@ -204,6 +257,7 @@ def _settings(given: SuiteArguments) -> dict[str, Any]:
     options = given.options
     return {
         "samples": given.samples,
+        "matrix": given.matrix,
         "seed": given.seed,
         "simulator": given.simulator.name,
         "simulator_settings": dict(given.simulator.settings),

@@ -1,0 +1,36 @@
+"""relative_impact_speed: how much faster the ego is than what it touches first."""
+
+import numpy as np
+
+from bridgegen.arrays import Float
+from bridgegen.metrics.impact import at_contact, first_contact
+from bridgegen.metrics.metric import Metric, without_failed
+from bridgegen.simulation.rollout import Rollout
+
+
+def relative_impact_speed(rollout: Rollout) -> Float:
+    """Return the ego's speed less the other's speed along the ego's heading, at the first contact.
+
+    Returns:
+        ``(N,)`` float64 [m/s], ≥ 0: the ego's own speed if the other crosses at a right angle, the
+        sum of both head-on; 0 without a contact, or if the other is faster; NaN where the scenario
+        failed.
+
+    Source: Vrel_impact of Euro NCAP's Crash Avoidance protocol, Frontal Collisions, 1.1 (2025).
+    """
+    entity, instant = first_contact(rollout)
+    other = np.maximum(entity, 0)
+    angle = at_contact(rollout, "h", other) - at_contact(rollout, "h", 0)
+    along = at_contact(rollout, "v", other) * np.cos(angle)
+    relative = np.maximum(at_contact(rollout, "v", 0) - along, 0.0)
+    return without_failed(rollout, np.where(instant < 0, 0.0, relative))
+
+
+METRIC = Metric(
+    name="relative_impact_speed",
+    unit="m/s",
+    description="ego speed less the other's along the ego's heading, at its first contact",
+    sense="larger",
+    cap=0.0,
+    compute=relative_impact_speed,
+)
