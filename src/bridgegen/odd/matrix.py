@@ -22,7 +22,7 @@ from bridgegen.odd.shape import Number, NumberOrName, ShapedSection, Text, secti
 MOST_ROWS = 100_000
 """Combinations of all grids of a file together."""
 
-Score = Literal["relative impact speed", "speed reduction", "avoidance"]
+Score = Literal["relative impact speed", "impact speed", "speed reduction", "avoidance"]
 """How a row is rated."""
 
 Some = Annotated[list[NumberOrName], Field(min_length=1, max_length=1000)]
