@@ -45,6 +45,8 @@ class GridSection(ShapedSection):
     """How its rows are rated; see docs/suites.md."""
     points: Annotated[Number, Field(gt=0.0, le=1000.0)] | None = None
     """What all of its rows are worth together, if they are rated."""
+    graded: Annotated[bool, Field(strict=True)] = True
+    """Whether colours count in part; if not, any colour but red counts fully (extended ranges)."""
 
 
 @dataclass(frozen=True)
@@ -59,6 +61,7 @@ class Grid:
         sets: values of several parameters that go together; empty: none.
         score: how its rows are rated, a name of ``Score``; "" if they are not.
         points: that its rows are worth together, if they are rated.
+        graded: whether colours count in part; if not, any but red counts fully.
     """
 
     edition: str
@@ -68,6 +71,7 @@ class Grid:
     sets: tuple[tuple[tuple[str, float], ...], ...] = ()
     score: str = ""
     points: float = 0.0
+    graded: bool = True
 
     @property
     def label(self) -> str:
@@ -138,7 +142,7 @@ def read_matrix(
         found.append(
             Grid(
                 one.edition, one.name, one.source, tuple(values), tuple(sets),
-                one.score or "", one.points or 0.0,
+                one.score or "", one.points or 0.0, one.graded,
             )
         )  # fmt: skip
     labels = [one.label for one in found]

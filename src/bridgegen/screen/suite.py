@@ -71,6 +71,7 @@ class SuiteScreen(Live):
 def print_suite(suite: "SuiteRun", seconds: float, page: Path, *, as_json: bool = False) -> None:
     """Print the entries that fail or did not run, others if there is room; then the totals."""
     from bridgegen.suite.results import counts
+    from bridgegen.suite.sentences import outcomes, points
 
     if as_json:
         print(json.dumps(_facts(suite), indent=2, ensure_ascii=False))
@@ -106,6 +107,8 @@ def print_suite(suite: "SuiteRun", seconds: float, page: Path, *, as_json: bool 
             f"variations {number['passed']} pass, {number['failed']} fail, "
             f"{number['not run']} did not run"
         )
+        for text in filter(None, (outcomes(results), points(results))):
+            print(f"  {text}")
     print(f"page: {page} ({seconds:.1f} s)")
 
 
@@ -189,6 +192,8 @@ def _verdict(one: "EntryResult") -> str:
     if not failed and not lost:
         return "pass" if n == 1 else f"pass ({n})"
     parts = ([f"{failed} of {n} fail"] if failed else []) + ([f"{lost} not run"] if lost else [])
+    mitigated = one.outcomes()["mitigated"]
+    parts += [f"{mitigated} mitigated"] if mitigated else []
     return ", ".join(parts)
 
 
@@ -199,6 +204,7 @@ def _worst(some: Sequence["EntryResult"]) -> str:
             row = one.rows[one.worst]
             violated = ", ".join(str(one.criteria[i]["id"]) for i in row.violated)
             texts = [f"{row.conflict} with {row.partner}"] if row.critical and row.conflict else []
+            texts += [f"impact at {row.impact_speed:.1f} m/s"] if row.impact_speed else []
             texts += [f"MAIS3+ {row.severity:.2%}"] if row.severity else []
             texts += [f"violates {violated}"] if violated else []
             return "; ".join(texts)
@@ -207,12 +213,17 @@ def _worst(some: Sequence["EntryResult"]) -> str:
 
 
 def _facts(suite: "SuiteRun") -> dict[str, Any]:
+    from bridgegen.suite.rating import points_of
     from bridgegen.suite.results import counts
 
     return {
         "folder": str(suite.folder),
         "egos": list(suite.egos),
         "counts": {ego: counts(suite.of_ego(ego)) for ego in suite.egos},
+        "points": {
+            ego: {one.edition: [one.reached, one.most] for one in points_of(suite.of_ego(ego))}
+            for ego in suite.egos
+        },
         "entries": [
             {
                 "entry": one.entry,
@@ -221,6 +232,7 @@ def _facts(suite: "SuiteRun") -> dict[str, Any]:
                 "variations": len(one.rows),
                 "failed": one.count("failed"),
                 "not_run": one.count("not run"),
+                "outcomes": one.outcomes(),
                 "problem": one.problem or None,
             }
             for one in suite.results

@@ -154,7 +154,13 @@ def _evaluated(job: Job, found: EntryResult) -> EntryResult:
             "parameters": [*([MATRIX] if labels else []), *names],
             "units": [*(["1"] if labels else []), *(units[name] for name in names)],
             "grids": [
-                GridResult(label=one.label, edition=one.edition, score=one.score, points=one.points)
+                GridResult(
+                    label=one.label,
+                    edition=one.edition,
+                    score=one.score,
+                    points=one.points,
+                    graded=one.graded,
+                )
                 for one in given.grids
             ],
             "criteria": [one.to_dict() for one in pipeline.monitor],

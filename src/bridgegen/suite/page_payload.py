@@ -11,8 +11,17 @@ from bridgegen.report.payload import script_json
 from bridgegen.report.playback import Playback
 from bridgegen.report.playback_payload import ROAD_SCALE, SCALE, playback_payload, road_payload
 from bridgegen.suite.difference import difference as variations_compared
-from bridgegen.suite.results import EntryResult, RowResult, Verdict, rank
-from bridgegen.suite.sentences import changes, difference, differences, headline, label_of
+from bridgegen.suite.rating import colours_of
+from bridgegen.suite.results import EntryResult, Outcome, RowResult, Verdict, rank
+from bridgegen.suite.sentences import (
+    changes,
+    difference,
+    differences,
+    headline,
+    label_of,
+    outcomes,
+    points,
+)
 from bridgegen.suite.suite import SuiteRun
 from bridgegen.suite.worse import WorseThan
 
@@ -33,6 +42,9 @@ Key = tuple[str, str]
 """Name of an entry, and the ego as the user names it."""
 
 _LETTER: dict[Verdict, str] = {"passed": "p", "failed": "f", "not run": "n"}
+_OUTCOME: dict[Outcome | None, str] = {
+    "avoided": "a", "mitigated": "m", "not avoided": "n", None: "-",
+}  # fmt: skip
 _HAPPENED = ("contact", "near miss")
 _SEVERITIES = ("critical", "major", "minor")
 
@@ -84,6 +96,10 @@ def payload(
             "headlines": [
                 headline(suite.of_ego(ego), label)
                 for ego, label in zip(suite.egos, labels, strict=True)
+            ],
+            "outcomes": [
+                [text for text in (outcomes(suite.of_ego(ego)), points(suite.of_ego(ego))) if text]
+                for ego in suite.egos
             ],
             "differences": differences([one for one in complete if len(one) > 1], labels),
             "changes": _changes(suite, labels),
@@ -151,6 +167,9 @@ def _result(one: EntryResult, criteria: Mapping[str, int], motion: int | None) -
     blameless = sum(row.verdict == "passed" and row.collisions > 0 for row in one.rows)
     if blameless:
         found["blameless"] = blameless
+    _, mitigated, unavoided = one.outcomes().values()
+    if mitigated or unavoided:
+        found["hits"] = [mitigated, unavoided]
     if one.worst is None:
         return found
     row = one.rows[one.worst]
@@ -289,6 +308,7 @@ def _of_entry(
         order = sorted(range(len(one.rows)), key=lambda i: (*_order(one.rows[i]), i))
         kept = order[:most]
         rows = [one.rows[i] for i in kept]
+        colours = colours_of(one)
         found["results"].append(
             {
                 "driver": one.driver,
@@ -306,6 +326,10 @@ def _of_entry(
                 "margins": _columns([row.margins for row in rows], len(one.criteria)),
                 "severity": [_short(row.severity) for row in rows],
                 "d_min": [_short(row.d_min) for row in rows],
+                "outcome": "".join(_OUTCOME[row.outcome] for row in rows),
+                "impact": [_short(row.impact_speed) for row in rows],
+                "relative": [_short(row.relative_impact_speed) for row in rows],
+                "colour": words.at(colours[i] or "" for i in kept),
                 "conflict": words.at(row.conflict for row in rows),
                 "type": words.at(row.conflict_type for row in rows),
                 "partner": words.at(row.partner for row in rows),

@@ -98,12 +98,14 @@ class GridResult(Strict):
         edition: of the protocol.
         score: how its rows are rated, or "".
         points: that they are worth together.
+        graded: whether colours count in part; if not, any but red counts fully.
     """
 
     label: str
     edition: str
     score: str = ""
     points: float = 0.0
+    graded: bool = True
 
 
 class EntryResult(Strict):

@@ -4,7 +4,8 @@ from collections import Counter
 from collections.abc import Sequence
 
 from bridgegen.suite.difference import Change, Difference
-from bridgegen.suite.results import EntryResult, Verdict, counts
+from bridgegen.suite.rating import points_of
+from bridgegen.suite.results import OUTCOMES, EntryResult, Verdict, counts
 from bridgegen.suite.suite import SuiteRun
 
 MOST_DIFFERENCES = 4
@@ -45,6 +46,28 @@ def headline(results: Sequence[EntryResult], label: str) -> str:
     lost = [f"{number['not run'] - partly:,} did not run"] if number["not run"] > partly else []
     lost += [f"{partly:,} ran only in part"] if partly else []
     return "; ".join([words, *lost])
+
+
+def outcomes(results: Sequence[EntryResult]) -> str:
+    """Return in how many variations with a result an ego avoids a collision, as a sentence.
+
+    Empty if it touches nothing in any.
+    """
+    number = Counter(one.outcome for each in results for one in each.rows if one.outcome)
+    n = number.total()
+    if number["avoided"] == n:
+        return ""
+    hit = [one for each in results for one in each.rows if one.outcome in OUTCOMES[1:]]
+    worst = max(one.impact_speed for one in hit)
+    shares = ", ".join(f"{number[one]:,} {one} ({number[one] / n:.1%})" for one in OUTCOMES)
+    return f"Collisions: {shares}; fastest impact {worst:.1f} m/s"
+
+
+def points(results: Sequence[EntryResult]) -> str:
+    """Return what an ego reaches of a matrix's points, as a sentence; empty without points."""
+    found = points_of(results)
+    parts = [f"{one.reached:.2f} of {one.most:.2f} ({one.edition})" for one in found]
+    return f"Points by colour: {', '.join(parts)}" if parts else ""
 
 
 def difference(verdicts: Sequence[Verdict], labels: Sequence[str]) -> str:

@@ -26,6 +26,9 @@ FIGURES = {
     "failed_entries": "entries in which a variation fails",
     "critical": "variations that are critical",
     "collisions": "variations in which the ego collides",
+    "mitigated": "variations in which it hits something, slower than at the start",
+    "not_avoided": "variations in which it hits something, not slower than at the start",
+    "worst_impact": "the fastest impact [m/s]",
     "worst_severity": "the worst probability of MAIS3+",
 }
 """The figures of a suite that ``--fail-if`` accepts."""
@@ -90,6 +93,9 @@ def figures_of(results: Sequence[EntryResult]) -> dict[str, float]:
         "failed_entries": sum(one.verdict == "failed" for one in results),
         "critical": sum(row.critical for row in rows),
         "collisions": sum(row.collisions > 0 for row in rows),
+        "mitigated": sum(row.outcome == "mitigated" for row in rows),
+        "not_avoided": sum(row.outcome == "not avoided" for row in rows),
+        "worst_impact": max((row.impact_speed for row in rows), default=0.0),
         "worst_severity": max((row.severity for row in rows), default=0.0),
     }
     for one in results:
@@ -123,6 +129,7 @@ def _suites(suite: SuiteRun, outcomes: Sequence[Outcome]) -> list[Suite]:
             "distribution": one.distribution,
             "ego": one.driver or one.ego,
             "variations": str(len(one.rows)),
+            **{name.replace(" ", "_"): str(n) for name, n in one.outcomes().items()},
         }
         found.append(Suite(one.entry, _cases(one, group), facts))
     return found
@@ -181,4 +188,6 @@ def row_in_words(one: EntryResult, i: int, row: RowResult) -> str:
         if row.conflict
         else "no conflict"
     )
+    if row.outcome not in (None, "avoided"):
+        happened += f"; {row.outcome}, impact at {row.impact_speed:.3g} m/s"
     return f"variation {i + 1}{f' ({named})' if named else ''}: {happened}"

@@ -54,7 +54,8 @@ function resultCell(result) {
   if (!result) return ["–"];
   const words = element("span", { class: { f: "failed", n: "lost", p: "passed" }[result.v] }, verdictWords(result));
   const more = result.blameless ? element("small", { title: "others are responsible, or their motion is implausible" }, `${counted(result.blameless)} blameless collision${result.blameless > 1 ? "s" : ""}`) : "";
-  return [words, bar(result.n), more];
+  const hits = result.hits ? element("small", {}, `${counted(result.hits[0])} mitigated, ${counted(result.hits[1])} not avoided`) : "";
+  return [words, bar(result.n), hits, more];
 }
 
 function failureCell(k) {

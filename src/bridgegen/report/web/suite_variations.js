@@ -7,6 +7,9 @@ import { MARKS, PASSES, WORSE, button, counted, suite } from "./suite_words.js";
 
 const ROWS_AT_ONCE = 100;
 const FEW_PARAMETERS = 6; // parameters that stand before the results
+const OUTCOMES = { a: "avoided", m: "mitigated", n: "not avoided" };
+const WORST_OUTCOME = { n: 0, m: 1, a: 2 };
+const hits = ({ outcome }, i) => outcome[i] === "m" || outcome[i] === "n";
 const valueText = (value) => (typeof value === "string" ? value : number(value));
 
 // The columns: title, values by row, the cell's text, its class, an explanation.
@@ -28,6 +31,15 @@ function columnsOf(found, words, ego) {
     const { id, text, formula } = suite.criteria[at];
     columns.push([`margin ${id}`, found.margins[k], (value) => element("span", { class: value < 0 ? "failed" : "" }, quantity(value, "")), "number", `${text || formula}; below 0 it is violated`]);
   });
+  if ([...found.outcome].some((letter) => letter === "m" || letter === "n")) {
+    columns.push(
+      ["outcome", [...found.outcome].map((letter) => WORST_OUTCOME[letter] ?? 3), (_, i) => OUTCOMES[found.outcome[i]] ?? "–", "", "whether the ego avoids the collision, or hits slower than it was at the start"],
+      ["impact [m/s]", found.impact, (value, i) => (hits(found, i) ? quantity(value, "") : "–"), "number", "the ego's speed at its first contact"],
+      ["relative [m/s]", found.relative, (value, i) => (hits(found, i) ? quantity(value, "") : "–"), "number", "the same, less the other's speed along the ego's heading"],
+    );
+  }
+  const colours = word("colour");
+  if (colours.some(Boolean)) columns.push(["colour", colours, (value) => value || "–", "", "by the bands of Euro NCAP's protocol of 2026"]);
   columns.push(
     ["severity", found.severity, (value, i) => (found.verdict[i] === "n" ? "–" : shareText(value)), "number", "probability of a MAIS3+ injury in the ego's collision"],
     ["d_min [m]", found.d_min, (value) => quantity(value, ""), "number", "minimum distance to others"],
