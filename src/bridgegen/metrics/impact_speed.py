@@ -18,7 +18,7 @@ def impact_speed(rollout: Rollout) -> Float:
     Source: Vimpact of Euro NCAP's Crash Avoidance protocol, Frontal Collisions, 1.1 (2025).
     """
     _, instant = first_contact(rollout)
-    speed = np.abs(at_contact(rollout, "v", 0))
+    speed = np.abs(at_contact(rollout, "v")[:, 0])
     return without_failed(rollout, np.where(instant < 0, 0.0, speed))
 
 

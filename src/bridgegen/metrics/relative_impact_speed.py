@@ -13,17 +13,16 @@ def relative_impact_speed(rollout: Rollout) -> Float:
 
     Returns:
         ``(N,)`` float64 [m/s], ≥ 0: the ego's own speed if the other crosses at a right angle, the
-        sum of both head-on; 0 without a contact, or if the other is faster; NaN where the scenario
-        failed.
+        sum of both head-on; the largest, if it touches several at once; 0 without a contact, or if
+        the other is faster; NaN where the scenario failed.
 
     Source: Vrel_impact of Euro NCAP's Crash Avoidance protocol, Frontal Collisions, 1.1 (2025).
     """
-    entity, instant = first_contact(rollout)
-    other = np.maximum(entity, 0)
-    angle = at_contact(rollout, "h", other) - at_contact(rollout, "h", 0)
-    along = at_contact(rollout, "v", other) * np.cos(angle)
-    relative = np.maximum(at_contact(rollout, "v", 0) - along, 0.0)
-    return without_failed(rollout, np.where(instant < 0, 0.0, relative))
+    touching, _ = first_contact(rollout)
+    v, h = (at_contact(rollout, field) for field in ("v", "h"))
+    relative = v[:, :1] - v * np.cos(h - h[:, :1])
+    largest = np.where(touching, relative, 0.0).max(axis=1)
+    return without_failed(rollout, np.maximum(largest, 0.0))
 
 
 METRIC = Metric(

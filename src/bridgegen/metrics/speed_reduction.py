@@ -19,7 +19,7 @@ def speed_reduction(rollout: Rollout) -> Float:
     its test speed is the ego's first speed.
     """
     _, instant = first_contact(rollout)
-    before, after = recorded(rollout, "v")[:, 0, 0], at_contact(rollout, "v", 0)
+    before, after = recorded(rollout, "v")[:, 0, 0], at_contact(rollout, "v")[:, 0]
     reduction = np.abs(before) - np.abs(after)
     return without_failed(rollout, np.where(instant < 0, 0.0, reduction))
 

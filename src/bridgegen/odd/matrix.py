@@ -129,12 +129,12 @@ def read_matrix(
             where: Path = (*path, "sets", k)
             if together.keys() != one.sets[0].keys():
                 report("all sets of a grid must name the same parameters", where)
-            if both := sorted(together.keys() & one.values.keys()):
-                report(f"{', '.join(both)} must stand in values or in sets, not in both", where)
             inner = [_value(name, each, parameters, derived) for name, each in together.items()]
             _report_all(inner, where, report)
             pairs = zip(together, inner, strict=True)
             sets.append(tuple((name, each) for name, each in pairs if isinstance(each, float)))
+        if both := sorted(one.values.keys() & set().union(*one.sets)):
+            report(f"{', '.join(both)} must stand in values or in sets, not in both", path)
         if not one.values and not one.sets:
             report("a grid must have values or sets", path)
         if (one.score is None) != (one.points is None):
@@ -157,9 +157,8 @@ def read_matrix(
 def _report_all(
     values: Iterable[float | str], path: Path, report: Callable[[str, Path], None]
 ) -> None:
-    for problem in values:
-        if isinstance(problem, str):
-            report(problem, path)
+    for problem in dict.fromkeys(one for one in values if isinstance(one, str)):
+        report(problem, path)
 
 
 def _value(
