@@ -46,7 +46,7 @@ def test_what_is_no_scenario_is_refused(folder, tmp_path):
         find_entries([tmp_path / "notes.yaml", "nowhere", folder])
     problems = "\n".join(refused.value.problems)
     assert "notes.yaml: is no scenario" in problems
-    assert "nowhere: no such file, folder or scenario" in problems
+    assert "nowhere: no such file, folder, pack or scenario" in problems
     (tmp_path / "empty").mkdir()
     with pytest.raises(InputError, match="no scenario in"):
         find_entries([tmp_path / "empty"])

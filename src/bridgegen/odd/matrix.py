@@ -112,39 +112,12 @@ def read_matrix(
         derived: likewise; a grid cannot set them.
         report: is given each problem, and where it is.
     """
-    found = list[Grid]()
-    for number, data in entries(document, "matrix"):
-        if (one := section(GridSection, data)) is None:
-            continue
-        path: Path = ("matrix", number)
-        values, sets = list[tuple[str, tuple[float, ...]]](), list[tuple[tuple[str, float], ...]]()
-        for name, some in one.values.items():
-            inner = [_value(name, each, parameters, derived) for each in some]
-            _report_all(inner, (*path, "values", name), report)
-            kept = tuple(each for each in inner if isinstance(each, float))
-            if len(set(kept)) < len(kept):
-                report(f"{name} has a value twice", (*path, "values", name))
-            values.append((name, kept))
-        for k, together in enumerate(one.sets):
-            where: Path = (*path, "sets", k)
-            if together.keys() != one.sets[0].keys():
-                report("all sets of a grid must name the same parameters", where)
-            inner = [_value(name, each, parameters, derived) for name, each in together.items()]
-            _report_all(inner, where, report)
-            pairs = zip(together, inner, strict=True)
-            sets.append(tuple((name, each) for name, each in pairs if isinstance(each, float)))
-        if both := sorted(one.values.keys() & set().union(*one.sets)):
-            report(f"{', '.join(both)} must stand in values or in sets, not in both", path)
-        if not one.values and not one.sets:
-            report("a grid must have values or sets", path)
-        if (one.score is None) != (one.points is None):
-            report("a grid that is rated must have both score and points", path)
-        found.append(
-            Grid(
-                one.edition, one.name, one.source, tuple(values), tuple(sets),
-                one.score or "", one.points or 0.0, one.graded,
-            )
-        )  # fmt: skip
+    declared: dict[str, Parameter | Derived] = {**derived, **parameters}
+    found = [
+        _read_grid(one, ("matrix", number), declared, report)
+        for number, data in entries(document, "matrix")
+        if (one := section(GridSection, data)) is not None
+    ]
     labels = [one.label for one in found]
     for number, label in enumerate(labels):
         if label in labels[:number]:
@@ -154,25 +127,63 @@ def read_matrix(
     return tuple(found)
 
 
-def _report_all(
-    values: Iterable[float | str], path: Path, report: Callable[[str, Path], None]
-) -> None:
-    for problem in dict.fromkeys(one for one in values if isinstance(one, str)):
+def _read_grid(
+    given: GridSection,
+    path: Path,
+    declared: Mapping[str, Parameter | Derived],
+    report: Callable[[str, Path], None],
+) -> Grid:
+    values = []
+    for name, some in given.values.items():
+        inner = _numbers([(name, one) for one in some], declared, (*path, "values", name), report)
+        if len(set(inner)) < len(inner):
+            report(f"{name} has a value twice", (*path, "values", name))
+        values.append((name, tuple(value for _, value in inner)))
+    sets = []
+    for k, together in enumerate(given.sets):
+        if together.keys() != given.sets[0].keys():
+            report("all sets of a grid must name the same parameters", (*path, "sets", k))
+        sets.append(tuple(_numbers(together.items(), declared, (*path, "sets", k), report)))
+    if both := sorted(given.values.keys() & set().union(*given.sets)):
+        report(f"{', '.join(both)} must stand in values or in sets, not in both", path)
+    if not given.values and not given.sets:
+        report("a grid must have values or sets", path)
+    if (given.score is None) != (given.points is None):
+        report("a grid that is rated must have both score and points", path)
+    return Grid(
+        given.edition, given.name, given.source, tuple(values), tuple(sets),
+        given.score or "", given.points or 0.0, given.graded,
+    )  # fmt: skip
+
+
+def _numbers(
+    given: Iterable[tuple[str, float | str]],
+    declared: Mapping[str, Parameter | Derived],
+    path: Path,
+    report: Callable[[str, Path], None],
+) -> list[tuple[str, float]]:
+    """Return inner values with their parameters; what is none is reported, each problem once."""
+    found, problems = [], []
+    for name, value in given:
+        inner = _value(name, value, declared)
+        if isinstance(inner, str):
+            problems.append(inner)
+        else:
+            found.append((name, inner))
+    for problem in dict.fromkeys(problems):
         report(problem, path)
+    return found
 
 
 def _value(
-    name: str,
-    given: float | str,
-    parameters: Mapping[str, Parameter],
-    derived: Mapping[str, Derived],
+    name: str, given: float | str, declared: Mapping[str, Parameter | Derived]
 ) -> float | str:
     """Return a parameter's inner value, or in words why it has none."""
-    if name in derived:
+    one = declared.get(name)
+    if one is None:
+        return f"there is no parameter '{name}'{nearest(name, declared)}"
+    if isinstance(one, Derived):
         return f"{name} is derived, and cannot be set"
-    if name not in parameters:
-        return f"there is no parameter '{name}'{nearest(name, parameters)}"
-    one = parameters[name]
     try:
         value = one.read(given)
     except InputError as error:
