@@ -10,6 +10,7 @@ from bridgegen.errors import InputError
 from bridgegen.options import CommonOptions
 from bridgegen.suite.difference import difference
 from bridgegen.suite.page import write_suite_page
+from bridgegen.suite.sentences import changes
 from bridgegen.suite.suite import SuiteCallbacks, run_suite
 from bridgegen.suite.worse import WorseCallbacks, WorseThan, search_worse
 from bridgegen.verdict.of_difference import DifferenceCriteria
@@ -94,6 +95,18 @@ def test_the_page_names_what_searches_found(compared):
     text = write_suite_page(suite, suite.jobs, searches).read_text("utf-8")
     assert f'"report":"worse/{searches[0].folder.name}/report.html"' in text
     assert "Of 21 variations, route-follower breaks" in text
+
+
+def test_intervals_are_stated_where_variations_are_a_sample(compared, folder, tmp_path):
+    suite, *_ = compared
+    made = difference(suite.of_ego(EGOS[0]), suite.of_ego(EGOS[1]), EGOS)
+    assert made.sampled
+    assert "95 % confidence" in changes(made)
+    varied = folder / "varied_distribution.xosc"  # all of its combinations run
+    whole = run_suite(varied, egos=EGOS, out=tmp_path / "a", workers=1)
+    made = difference(whole.of_ego(EGOS[0]), whole.of_ego(EGOS[1]), EGOS)
+    assert not made.sampled
+    assert "95 % confidence" not in changes(made)
 
 
 def test_a_changed_driver_runs_again(folder, tmp_path):

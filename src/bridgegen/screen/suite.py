@@ -152,7 +152,8 @@ def print_difference(
     print(f"{found.second} against {found.first}, {n} variations")
     for change in ("broken", "fixed"):
         low, high = found.interval(change)
-        print(f"  {change:<16}{counts[change]} ({low:.2%} to {high:.2%} with 95 % confidence)")
+        sure = f" ({low:.2%} to {high:.2%} with 95 % confidence)" if found.sampled else ""
+        print(f"  {change:<16}{counts[change]}{sure}")
     print(f"  {'both fail':<16}{counts['both fail']}")
     print(f"  {'both pass':<16}{counts['both pass']}")
     if counts["not comparable"]:
@@ -160,7 +161,8 @@ def print_difference(
     compared = [one.severity for one in found.rows if one.change != "not comparable"]
     worse, better = (sum(sign * one > 0.0 for one in compared) for sign in (1.0, -1.0))
     print(f"  {'severity':<16}higher in {worse}, lower in {better}")
-    print(f"  {'by chance':<16}p = {found.p_value:.3g} (McNemar's exact test)")
+    if found.sampled:
+        print(f"  {'by chance':<16}p = {found.p_value:.3g} (McNemar's exact test)")
     _print_searches(searches, found)
     print(f"page: {page}")
 

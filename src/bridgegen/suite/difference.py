@@ -39,11 +39,13 @@ class Difference:
         first: the ego that is compared with, as named.
         second: the ego that is compared.
         rows: what changes in each variation; of an entry that one of them cannot run, one.
+        sampled: whether the variations are a sample, so that there are confidence intervals.
     """
 
     first: str
     second: str
     rows: tuple[RowChange, ...]
+    sampled: bool = True
 
     @property
     def counts(self) -> dict[Change, int]:
@@ -89,15 +91,16 @@ def difference(
         second: of the other, in the same order.
         egos: their names.
     """
-    rows = []
+    rows, sampled = list[RowChange](), True
     for a, b in zip(first, second, strict=True):
         if a.problem or b.problem or len(a.rows) != len(b.rows):
             rows.append(RowChange(a.entry, 0, "not comparable", 0.0, 0.0))
             continue
+        sampled = sampled and a.sampled
         rows += [
             _change(a.entry, i, *both) for i, both in enumerate(zip(a.rows, b.rows, strict=True))
         ]
-    return Difference(*egos, tuple(rows))
+    return Difference(*egos, tuple(rows), sampled)
 
 
 def _change(entry: str, row: int, a: RowResult, b: RowResult) -> RowChange:

@@ -18,7 +18,7 @@ from bridgegen.simulation.choice import SimulatorChoice
 from bridgegen.simulation.rollout import STATUS_MESSAGES
 from bridgegen.suite.entries import Entry
 from bridgegen.suite.results import EntryResult, GridResult, RowResult, finite
-from bridgegen.suite.rows import Rows, rows_of
+from bridgegen.suite.rows import Rows, is_sample, rows_of
 from bridgegen.workers import CarriedDriver, Threads
 
 AT_ONCE = 512
@@ -163,6 +163,7 @@ def _evaluated(job: Job, found: EntryResult) -> EntryResult:
                 )
                 for one in given.grids
             ],
+            "sampled": bool(space.n_var) and not labels and is_sample(pipeline.scenario),
             "criteria": [one.to_dict() for one in pipeline.monitor],
             "rows": rows,
             "notes": notes,

@@ -123,6 +123,7 @@ class EntryResult(Strict):
         units: theirs.
         criteria: as `bridgegen.odd.criteria.Criterion.to_dict` gives them.
         grids: of the matrix that it runs, if it has one.
+        sampled: whether its rows are some of very many, drawn evenly or at random.
         rows: of each variation; empty if the entry cannot run.
         problem: why it cannot; empty if it can.
         notes: what runs otherwise than one may expect.
@@ -139,6 +140,7 @@ class EntryResult(Strict):
     units: list[str] = []
     criteria: list[dict[str, Any]] = []
     grids: list[GridResult] = []
+    sampled: bool = False
     rows: list[RowResult] = []
     problem: str = ""
     notes: list[str] = []

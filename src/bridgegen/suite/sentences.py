@@ -124,8 +124,9 @@ def changes(found: Difference) -> str:
     words = []
     for change, verb in verbs.items():
         low, high = found.interval(change)
-        words.append(f"{verb} {counts[change]:,} ({low:.1%} to {high:.1%})")
-    return (
-        f"Of {n:,} variations, {found.second} {' and '.join(words)} against {found.first} "
-        f"(95 % confidence; McNemar’s exact test: p = {found.p_value:.2g})."
-    )
+        sure = f" ({low:.1%} to {high:.1%})" if found.sampled else ""
+        words.append(f"{verb} {counts[change]:,}{sure}")
+    text = f"Of {n:,} variations, {found.second} {' and '.join(words)} against {found.first}"
+    if not found.sampled:
+        return f"{text}."
+    return f"{text} (95 % confidence; McNemar’s exact test: p = {found.p_value:.2g})."
