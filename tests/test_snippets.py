@@ -139,7 +139,10 @@ class Page:
             return int(end.value.code or 0)
         if words[0] == "python":
             self.patch.setattr(sys, "argv", words[1:])
-            runpy.run_path(words[1], run_name="__main__")
+            try:
+                runpy.run_path(words[1], run_name="__main__")
+            except SystemExit as end:
+                return int(end.code or 0)
             return 0
         return subprocess.run(words, check=False).returncode
 
