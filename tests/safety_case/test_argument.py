@@ -1,10 +1,14 @@
 """The argument is well formed by the notation's rules, and says what the rows say."""
 
 import re
+import sqlite3
 
 import pytest
 
 import bridgegen as bg
+from bridgegen.confirmation.record import digest_of, write_record
+from bridgegen.confirmation.schema import Change, Differences, Outcome, Record, Scenario
+from bridgegen.odd.thresholds import Thresholds
 
 RUNS = ["fails", "unlucky", "clean", "judged", "all"]
 PREFIXES = {
@@ -156,6 +160,64 @@ def test_collisions_that_do_not_count_are_said(cases, made):
     assert spared > 0
     assert f"responsible: {(frame['n_collision'] > 0).sum()}." in text
     assert f"In {spared} of them, in plausible traffic, the ego is neither responsible" in text
+
+
+def confirmed_in_double(folder, there):
+    """Write a confirmation of as many exported scenarios: critical, not critical, or not run."""
+    run = bg.Run(folder)
+    rows, scenarios = run.rows(), []
+    for kept, critical in zip(run.exported(), there, strict=False):
+        k, here = kept.evaluation, Outcome(critical=True, d_min=0.0, v_d=1.0, n_collision=1.0, F=())
+        ran = {} if critical is None else {
+            "there": here.model_copy(update={"critical": critical}),
+            "change": Change.between(here, here), "differences": Differences(),
+        }  # fmt: skip
+        digest = digest_of(rows.X[k], rows.metrics[k])
+        scenarios.append(Scenario(evaluation=k, name=kept.name, row=digest, here=here, **ran))
+    record = Record(
+        simulator="double", label="double 1", settings={}, reference="embedded", run=str(folder),
+        scenario="", ego="", thresholds=Thresholds(), objectives=(), scenarios=tuple(scenarios),
+    )  # fmt: skip
+    write_record(folder, record)
+
+
+@pytest.mark.parametrize(
+    ("there", "status", "said"),
+    [
+        ((True, True), "supported", "2 of 2"),
+        ((True, False), "not supported", "1 of 2"),
+        ((True, None), "supported", "1 of 1"),
+        ((None, None), "undeveloped", "0 of 0"),
+    ],
+)
+def test_a_confirmation_is_evidence_of_what_ran_there(run, checked, there, status, said):
+    folder = run("fails")
+    confirmed_in_double(folder, there)
+    made = bg.export_safety_case([folder])
+    one = made.case.element("G1.6.1.1")
+    assert (one.status, one.undeveloped) == (status, status == "undeveloped")
+    assert said in one.statement.text
+    assert statuses(made.case)["G1.6"] == (
+        "not supported" if status == "not supported" else "incomplete"
+    )
+    assert checked(made.folder) == (0, [], "")
+
+
+def test_a_run_without_any_result_supports_nothing(run, checked):
+    """As if every simulation had failed; its triage is made of the same rows again."""
+    folder = run("judged")
+    with sqlite3.connect(folder / "run.sqlite") as connection:
+        names = [row[1] for row in connection.execute("PRAGMA table_info(evaluations)")]
+        metrics = names[names.index("r_red") : names.index("f0")]
+        nothing = ", ".join(f'"{name}" = NULL' for name in metrics)
+        connection.execute(f"UPDATE evaluations SET status = 2, critical = 0, {nothing}")
+    connection.close()
+    bg.resume(folder)
+    made = bg.export_safety_case([folder])
+    found = statuses(made.case)
+    assert found["G1.1"] == "not supported"
+    assert found["G1.3"] == found["G1.5.1"] == found["G1.4"] == "undeveloped"
+    assert checked(made.folder) == (0, [], "")
 
 
 def test_several_runs_are_one_case_with_a_goal_each(cases):

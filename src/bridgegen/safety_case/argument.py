@@ -101,6 +101,14 @@ class RunArgument:
 
     def _failures(self) -> None:
         at, bound = f"{self._at}.3", self._facts.triage.bound
+        if not self._known():
+            self._strategy.add(
+                "Goal", at,
+                f"No failure of {self._ego} was found. None of {self._n('evaluations')} "
+                f"evaluations has a result in plausible traffic.",
+                undeveloped=True, link="failure-modes.md",
+            )  # fmt: skip
+            return
         besides = ""
         if self._facts.triage.fresh is not None:
             besides = f" or in {self._n('drawn')} fresh random draws besides"
@@ -131,6 +139,11 @@ class RunArgument:
         )  # fmt: skip
         for mode in self._facts.triage.modes[:MOST_SHOWN]:
             self._mode(counter, mode)
+
+    def _known(self) -> int:
+        """Return how many evaluations have a result in plausible traffic."""
+        bound = self._facts.triage.bound
+        return bound.evaluations - bound.failed - bound.implausible
 
     def _kinds(self) -> str:
         """Return how many failure modes there are, as a clause."""
@@ -297,7 +310,10 @@ class RunArgument:
             f"{name}{words} is met in every evaluation with a result: {one.criterion.states}",
             holds=Condition(number=self._numbers.id(f"violated:{name}"), equals=0),
             details=[f"severity of a violation: {one.criterion.severity}"],
+            undeveloped=not one.met + one.violated,
         )  # fmt: skip
+        if not one.met + one.violated:
+            return
         least = ""
         if f"worst:{name}" in self._numbers:
             unit = "" if one.unit == "1" else f" {one.unit}"
@@ -331,6 +347,7 @@ class RunArgument:
             undeveloped=not self._files.confirmations, link="confirm.md",
         )  # fmt: skip
         for k, (name, file) in enumerate(self._files.confirmations.items(), start=1):
+            ran = self._numbers[f"ran:{name}"].value
             one = confirmed.add(
                 "Goal", f"{at}.1.{k}",
                 f"In {name} each scenario that ran is critical, too: "
@@ -339,8 +356,10 @@ class RunArgument:
                     number=self._numbers.id(f"confirmed:{name}"),
                     equals=self._numbers.id(f"ran:{name}"),
                 ),
+                undeveloped=not ran,
             )  # fmt: skip
-            one.add("Solution", f"{at}.1.{k}", f"Confirmation in {name}.", evidence=[file])
+            if ran:
+                one.add("Solution", f"{at}.1.{k}", f"Confirmation in {name}.", evidence=[file])
         strategy.add(
             "Goal", f"{at}.2",
             "It misses no failure that the vehicle has. No result was compared with a vehicle.",
