@@ -13,6 +13,7 @@ from tests.dashboard.conftest import R_12
 
 import bridgegen as bg
 from bridgegen.dashboard.dashboard import Dashboard
+from bridgegen.dashboard.markup import within
 from bridgegen.dashboard.modes import failure_modes
 from bridgegen.dashboard.odd import coverage
 from bridgegen.dashboard.page import write_page
@@ -293,3 +294,31 @@ def test_the_sentences_of_a_clean_project(result, tmp_path):
 def test_statuses_are_read_back(copy):
     found = bg.build_dashboard(copy, update=True)
     assert set(read_status_file(copy / FILE).decisions) == {one.key.id for one in found.modes}
+
+
+def test_a_suite_of_a_stranger_is_read_or_named(copy):
+    file = copy / "suites" / "change" / "results.jsonl"
+    head, *lines = file.read_text("utf-8").splitlines()
+    first = json.loads(lines[0])
+    hostile = [
+        {**first, "scenario": "a\0b.yaml", "entry": "<script>"},
+        {**first, "scenario": "../" * 400 + "x.yaml", "entry": "far"},
+        {**first, "rows": [{**first["rows"][0], "x": ["text"] * len(first["parameters"])}]},
+        {**first, "entry": "short", "rows": [{**first["rows"][0], "x": []}]},
+    ]
+    file.write_text("\n".join([head, *map(json.dumps, hostile)]) + "\n", "utf-8")
+    found = bg.build_dashboard(copy)
+    assert found.figures["suites"] + found.figures["problems"] >= 2
+    assert "script" not in Tags(found.page).names
+
+
+@pytest.mark.parametrize("damage", ["", "{", "[]", '{"cells": -1}', '{"scenario": 3}', "\xff"])
+def test_a_damaged_map_is_named(copy, damage):
+    (copy / "maps" / "half" / "summary.json").write_bytes(damage.encode("latin-1"))
+    found = bg.build_dashboard(copy)
+    assert "maps/half" in {one.place for one in found.project.problems}
+
+
+def test_parts_that_do_not_fit_are_counted():
+    assert within(["aaa", "bb", "cc"], 5, "x") == 'aaabb<p class="muted">and 1 x more</p>'
+    assert within(["aaaaaaaa"], 5, "x") == "aaaaaaaa"

@@ -2,7 +2,7 @@
 
 from itertools import permutations
 
-from bridgegen.dashboard.results import ModeKey, current, versions
+from bridgegen.dashboard.results import ModeKey, Seen, current, versions
 
 
 def test_the_version_that_was_tested_last_counts_with_all_its_results(result):
@@ -44,3 +44,18 @@ def test_each_part_of_a_key_makes_another_id():
     one = ModeKey("a", "b")
     others = [ModeKey("ab", ""), ModeKey("a", "b", "contact"), ModeKey("a", "b", "", "contact")]
     assert len({key.id for key in (one, *others)}) == 4
+
+
+def test_a_run_that_has_not_finished_clears_nothing(result):
+    old = result(version="1.1", time=1.0, modes=("turn",))
+    new = result(version="1.2", time=2.0, finished=False)
+    assert current([old, new]) == [old]
+    assert current([new]) == [new]
+    later = result(version="1.2", time=3.0, source="b")
+    assert current([old, new, later]) == [new, later]
+
+
+def test_bins_of_two_scenarios_with_one_name_are_not_mixed():
+    one, two = Seen(1, bins={"a": [1, 0]}), Seen(1, bins={"a": [0, 0, 1], "b": [1]})
+    one.add(two)
+    assert (one.evaluations, one.bins) == (2, {"a": [1, 0], "b": [1]})

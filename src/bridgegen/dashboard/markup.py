@@ -96,6 +96,25 @@ def span(value: float, low: float, high: float) -> str:
     return f"{text(share(value))} <small>{text(share(low))} to {text(share(high))}</small>"
 
 
+def within(parts: Iterable[str], most: int, noun: str) -> str:
+    """Return parts as long as they fit, and how many do not; the first is always there.
+
+    Args:
+        parts: HTML.
+        most: characters of all of them.
+        noun: what one of them is.
+    """
+    found, left = list[str](), 0
+    for one in parts:
+        most -= len(one)
+        if found and most < 0:
+            left += 1
+        else:
+            found.append(one)
+    after = f'<p class="muted">and {counted(left, noun)} more</p>' if left else ""
+    return "".join(found) + after
+
+
 def joined(names: Sequence[str], most: int = 4) -> str:
     """Return names in words: "a, b and 3 others"."""
     if len(names) > most + 1:

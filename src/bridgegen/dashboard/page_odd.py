@@ -4,12 +4,12 @@ from itertools import groupby
 
 from bridgegen.dashboard.charts import strip
 from bridgegen.dashboard.dashboard import Dashboard
-from bridgegen.dashboard.markup import counted, folded, joined, section, table, text
+from bridgegen.dashboard.markup import counted, folded, joined, section, table, text, within
 from bridgegen.dashboard.odd import Coverage, Covered
 from bridgegen.dashboard.taxonomy import SOURCE
 
-MOST_SCENARIOS = 100
-"""Scenarios whose parameters the page shows."""
+SIZE = 1_000_000
+"""Characters of the parameters of all scenarios."""
 
 MOST_PARAMETERS = 60
 
@@ -90,19 +90,15 @@ def _row(one: Covered) -> list[str]:
 
 
 def _parameters(of: Coverage) -> str:
-    names = list(of.seen)
-    body = [
-        folded(f"{name}: {_in_words(of, name)}", _of_scenario(of, name))
-        for name in names[:MOST_SCENARIOS]
-    ]
-    more = len(names) - MOST_SCENARIOS
-    after = f'<p class="muted">and {counted(more, "scenario")} more</p>' if more > 0 else ""
+    scenarios = (
+        folded(f"{name}: {_in_words(of, name)}", _of_scenario(of, name)) for name in of.seen
+    )
     lead = (
         '<h3>By parameter</h3><p class="muted">The declared range of each parameter in bins, the '
         "darker the more evaluations; an outlined bin has none. A bin may be empty because the "
         "scenario's constraints leave nothing there.</p>"
     )
-    return lead + "".join(body) + after
+    return lead + within(scenarios, SIZE, "scenario")
 
 
 def _in_words(of: Coverage, name: str) -> str:

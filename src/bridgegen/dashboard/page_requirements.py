@@ -2,16 +2,17 @@
 
 from bridgegen.criteria import margin_in_words
 from bridgegen.dashboard.dashboard import Dashboard
-from bridgegen.dashboard.markup import counted, folded, joined, link, section, table, text
+from bridgegen.dashboard.markup import counted, folded, joined, link, section, table, text, within
 from bridgegen.dashboard.requirements import Cell, Matrix, statements
 
-MOST_REQUIREMENTS = 60
+MOST_REQUIREMENTS = 40
 """Columns of a matrix; the gravest."""
 
-MOST_SCENARIOS = 300
+MOST_SCENARIOS = 200
 """Rows of a matrix."""
 
-MOST_MATRICES = 30
+SIZE = 1_000_000
+"""Characters of all matrices; the first is always there."""
 
 _OPEN = 40
 """Matrices with more rows together are folded."""
@@ -24,17 +25,19 @@ def requirements_part(found: Dashboard, base: str) -> str:
         lead = f"No pass criterion is stated in any result. Scenarios: {names or 'none'}."
         return section("requirements", "Requirements", lead=lead)
     parts = [_list(found)]
-    some, body = found.requirements[:MOST_MATRICES], []
-    is_open = sum(len(one.scenarios) for one in some) <= _OPEN
-    for one in some:
-        names = joined([label for label in one.labels if label != one.driver], 3)
-        summary = f"{one.driver}{f' ({names})' if names else ''}: {_in_words(one)}"
-        body.append(folded(summary, _matrix(one, base), is_open=is_open))
-    if len(found.requirements) > len(some):
-        body.append(f'<p class="muted">and {len(found.requirements) - len(some):,} drivers</p>')
-    parts.append("".join(body))
+    is_open = sum(len(one.scenarios) for one in found.requirements) <= _OPEN
+    matrices = (
+        folded(f"{_label(one)}: {_in_words(one)}", _matrix(one, base), is_open=is_open)
+        for one in found.requirements
+    )
+    parts.append(within(matrices, SIZE, "driver"))
     lead = "By the current results: those of the version of each driver that was tested last."
     return section("requirements", "Requirements", *parts, lead=lead)
+
+
+def _label(one: Matrix) -> str:
+    names = joined([label for label in one.labels if label != one.driver], 3)
+    return one.driver + (f" ({names})" if names else "")
 
 
 def _in_words(one: Matrix) -> str:

@@ -105,12 +105,16 @@ class Seen:
     bands: dict[str, list[int]] = field(default_factory=dict)
 
     def add(self, other: "Seen") -> None:
-        """Add what another result evaluated."""
+        """Add what another result evaluated.
+
+        Of two scenarios with one name, bins that are not the same are those of the first.
+        """
         self.evaluations += other.evaluations
         for mine, its in ((self.bins, other.bins), (self.bands, other.bands)):
             for name, counts in its.items():
                 held = mine.setdefault(name, [0] * len(counts))
-                mine[name] = [a + b for a, b in zip(held, counts, strict=True)]
+                if len(held) == len(counts):
+                    mine[name] = [a + b for a, b in zip(held, counts, strict=True)]
         for name, count in other.outside.items():
             self.outside[name] = self.outside.get(name, 0) + count
 
@@ -163,15 +167,17 @@ def current(results: Iterable[Result]) -> list[Result]:
     """Return the results that say how things stand.
 
     Of each scenario, driver and kind of result: those of the version that was tested last. Where
-    no version is known, the latest alone: an earlier one may be of other software.
+    no version is known, the latest alone: an earlier one may be of other software. What has not
+    finished says nothing against what has: its failures are not known yet.
     """
     held: dict[tuple[str, str, str], list[Result]] = {}
     for one in in_order(results):
         held.setdefault((one.scenario, one.driver.name, one.kind), []).append(one)
     found = []
     for some in held.values():
-        version = some[-1].driver.version
-        found += [one for one in some if one.driver.version == version] if version else some[-1:]
+        last = next((one for one in reversed(some) if one.finished), some[-1])
+        version = last.driver.version
+        found += [one for one in some if one.driver.version == version] if version else [last]
     return in_order(found)
 
 

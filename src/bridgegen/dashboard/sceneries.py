@@ -44,5 +44,5 @@ class Sceneries:
         try:
             scenario = load(text, distribution or None, trigger or None)
             return scenery_of(scenario, on_map=on_map), scenario.fingerprint
-        except (BridgeGenError, OSError):
+        except (BridgeGenError, OSError, ValueError):  # ValueError: NUL in a path
             return None
