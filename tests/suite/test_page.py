@@ -245,7 +245,7 @@ def test_no_playback_of_files_that_have_changed(run, folder):
 def test_the_command_shows_the_failure_again(run, folder):
     by_name = {(job.entry.name, job.ego): job for job in run.jobs}
     plain = next(one for one in run.results if one.entry == "plain")
-    words = shlex.split(page.command_of(by_name["plain", plain.ego], plain))
+    words = shlex.split(page.command_of(run.folder, by_name["plain", plain.ego], plain))
     assert words[:3] == ["bridgegen", "simulate", str(folder / "plain.xosc")]
     found = subprocess.run(
         [Path(sys.executable).with_name("bridgegen"), *words[1:], "--json"],
@@ -253,9 +253,10 @@ def test_the_command_shows_the_failure_again(run, folder):
     )  # fmt: skip
     assert found.returncode == (3 if plain.verdict == "failed" else 0), found.stderr
     varied = next(one for one in run.results if one.entry != "plain")
-    words = shlex.split(page.command_of(by_name[varied.entry, varied.ego], varied))
-    assert words[:3] == ["bridgegen", "suite", str(folder / "varied_distribution.xosc")]
-    assert words[3:] == ["--ego", varied.ego, "--criterion", "C-1: always(ego.v < 12 m/s)"]
+    words = shlex.split(page.command_of(run.folder, by_name[varied.entry, varied.ego], varied))
+    number = str(varied.worst + 1)
+    assert words[:5] == ["bridgegen", "suite", "replay", str(run.folder), varied.entry]
+    assert words[5:] == [number, "--ego", varied.ego]
 
 
 def test_hostile_texts_stay_texts(tmp_path):

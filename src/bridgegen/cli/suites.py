@@ -6,11 +6,11 @@ from typing import Annotated
 import typer
 
 from bridgegen.cli import options as common
-from bridgegen.cli.app import FAILED, app
+from bridgegen.cli.app import FAILED, app, suites
 from bridgegen.cli.completion import completing
 from bridgegen.cli.connection import NO_CONNECTION, Connection, with_connection_options
 from bridgegen.cli.declared import declaration
-from bridgegen.cli.groups import SEARCH
+from bridgegen.cli.groups import DEFAULT, SEARCH, DefaultCommand
 from bridgegen.cli.map_folder import with_map_folder
 from bridgegen.errors import InputError
 from bridgegen.options import CommonOptions
@@ -50,7 +50,7 @@ OwnOthers = Annotated[str | None, declaration("others")]
 Stages = Annotated[str | None, declaration("ideal")]
 
 
-@app.command(rich_help_panel=SEARCH)
+@suites.command(DEFAULT, cls=DefaultCommand)
 @with_map_folder(WHAT)
 @with_connection_options
 def suite(

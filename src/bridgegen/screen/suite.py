@@ -71,7 +71,7 @@ def print_suite(suite: "SuiteRun", seconds: float, page: Path, *, as_json: bool 
     table.add_column("worst", overflow="fold")
     for name, some in by_entry.items():
         if name in listed:
-            table.add_row(name, *(_verdict(one) for one in some), _worst(some))
+            table.add_row(name, *(_verdict(suite, one) for one in some), _worst(some))
     console = Console(markup=False, emoji=False, highlight=False)
     if not sys.stdout.isatty():
         console.width = 160
@@ -88,7 +88,27 @@ def print_suite(suite: "SuiteRun", seconds: float, page: Path, *, as_json: bool 
             f"variations {number['passed']} pass, {number['failed']} fail, "
             f"{number['not run']} did not run"
         )
+        _print_standing(suite, ego)
+    if gone := suite.baseline.gone(suite.results):
+        print(f"not there any more, set their status to fixed: {', '.join(gone)}")
     print(f"page: {page} ({seconds:.1f} s)")
+
+
+def _print_standing(suite: "SuiteRun", ego: str) -> None:
+    """Print how the failures of an ego stand, where indexes name some."""
+    from bridgegen.suite.baseline import EXCUSED
+
+    baseline, results = suite.baseline, suite.of_ego(ego)
+    standing = baseline.counts(results)
+    failed = standing["new"] + standing["regression"] + sum(standing[one] for one in EXCUSED)
+    if not baseline.failures or not failed:
+        return
+    print(
+        f"  of the variations that fail, {sum(standing[one] for one in EXCUSED)} are known or "
+        f"accepted, {standing['new']} new, {standing['regression']} regressions"
+    )
+    for id in baseline.regressions(results):
+        print(f"  regression: {id} was fixed, and fails again")
 
 
 def print_difference(found: "Difference", page: Path, *, as_json: bool = False) -> None:
@@ -137,7 +157,14 @@ def print_difference(found: "Difference", page: Path, *, as_json: bool = False) 
     print(f"page: {page}")
 
 
-def _verdict(one: "EntryResult") -> str:
+def _verdict(suite: "SuiteRun", one: "EntryResult") -> str:
+    from bridgegen.suite.baseline import words
+
+    said = words(suite.baseline.worst(one), suite.baseline.failures.get(one.entry))
+    return f"{_counted(one)} ({said})" if said else _counted(one)
+
+
+def _counted(one: "EntryResult") -> str:
     if one.problem:
         return "not run"
     n = len(one.rows)
@@ -178,6 +205,8 @@ def _facts(suite: "SuiteRun") -> dict[str, Any]:
                 "failed": one.count("failed"),
                 "not_run": one.count("not run"),
                 "problem": one.problem or None,
+                "status": suite.baseline.status_of(one.entry),
+                "standing": suite.baseline.worst(one),
             }
             for one in suite.results
         ],

@@ -1,7 +1,8 @@
 """An entry of a suite → its pipeline → the results of its rows."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -10,6 +11,7 @@ from bridgegen.campaign.scenarios import driven_by, load
 from bridgegen.errors import BridgeGenError, InputError
 from bridgegen.evaluation import Evaluation
 from bridgegen.odd.parameters import Parameter
+from bridgegen.odd.scenario import SearchedScenario
 from bridgegen.openx.file_scenario import FileScenario
 from bridgegen.options import CommonOptions
 from bridgegen.pipeline import Pipeline
@@ -37,6 +39,7 @@ class Job:
         simulator: which runs them.
         samples: rows of a logical scenario besides its defaults.
         seed: of samples.
+        only: the number of the one row that is run, from 0 on; None: all.
     """
 
     entry: Entry
@@ -45,6 +48,7 @@ class Job:
     simulator: SimulatorChoice
     samples: int
     seed: int
+    only: int | None = None
 
     @property
     def name(self) -> str:
@@ -83,9 +87,14 @@ def pipeline_of(job: Job) -> Pipeline:
     is_file = entry.scenario.lower().endswith(".xosc")
     trigger = job.options.empty_trigger if is_file else None
     scenario = driven_by(load(entry.scenario, entry.distribution, trigger), job.options.others)
-    spec = chosen_objective(scenario.objective, job.options, "one")
+    options = replace(
+        job.options,
+        ego=job.ego,
+        criteria=[*job.options.criteria, *_further_criteria(job, scenario)],
+        count=job.options.count or entry.count,
+    )
+    spec = chosen_objective(scenario.objective, options, "one")
     scenario = as_judged(replace(scenario, objective=spec), spec.rule)
-    options = replace(job.options, ego=job.ego)
     pipeline = Pipeline(
         scenario, scenario.space(), options, simulator=job.simulator, workers=Threads(1)
     )
@@ -93,15 +102,37 @@ def pipeline_of(job: Job) -> Pipeline:
     return pipeline
 
 
+def _further_criteria(job: Job, scenario: SearchedScenario) -> list[Mapping[str, Any]]:
+    """Return the criteria of the index whose ids neither the options nor the scenario have."""
+    known = {one.id for one in scenario.criteria} | {one["id"] for one in job.options.criteria}
+    return [one for one in job.entry.criteria if one["id"] not in known]
+
+
 def rows_of_job(job: Job, pipeline: Pipeline) -> np.ndarray:
-    """Return the rows of an entry, ``(N, len(pipeline.space.names))``."""
-    return rows_of(pipeline.scenario, pipeline.space, job.samples, job.seed)[0]
+    """Return the rows of an entry, ``(N, len(pipeline.space.names))``.
+
+    Raises:
+        InputError: it has not the one that is asked for.
+    """
+    return _rows_of(job, pipeline)[0]
+
+
+def _rows_of(job: Job, pipeline: Pipeline) -> tuple[np.ndarray, int]:
+    """Return the rows of an entry, and the number of those that its constraints exclude."""
+    X, excluded = rows_of(pipeline.scenario, pipeline.space, job.samples, job.seed)
+    if job.only is None:
+        return X, excluded
+    if not 0 <= job.only < len(X):
+        raise InputError(
+            f"{job.entry.name}: variations are numbered from 1 to {len(X)}, got {job.only + 1}"
+        )
+    return X[job.only : job.only + 1], 0
 
 
 def _evaluated(job: Job, found: EntryResult) -> EntryResult:
     pipeline = pipeline_of(job)
     space = pipeline.space
-    X, excluded = rows_of(pipeline.scenario, space, job.samples, job.seed)
+    X, excluded = _rows_of(job, pipeline)
     notes = [*pipeline.scenario.notes, *pipeline.notes]
     if excluded:
         notes.append(f"{excluded} combinations are excluded by the scenario's own constraints")

@@ -10,6 +10,7 @@ from bridgegen.report.packed import OF_ROW, deflated, road_key
 from bridgegen.report.payload import script_json
 from bridgegen.report.playback import Playback
 from bridgegen.report.playback_payload import ROAD_SCALE, SCALE, playback_payload, road_payload
+from bridgegen.suite.baseline import EXCUSED, words
 from bridgegen.suite.results import EntryResult, RowResult, Verdict, rank
 from bridgegen.suite.sentences import difference, differences, headline, label_of
 from bridgegen.suite.suite import SuiteRun
@@ -114,13 +115,15 @@ def _entry(
         "title": next((one.title for one in of_it.values() if one.title), ""),
         "differ": difference(verdicts, labels) if whole else "",
         "results": [
-            _result(of_it[ego], criteria, at.get((name, ego))) if ego in of_it else None
+            _result(suite, of_it[ego], criteria, at.get((name, ego))) if ego in of_it else None
             for ego in suite.egos
         ],
     }
 
 
-def _result(one: EntryResult, criteria: Mapping[str, int], motion: int | None) -> dict[str, Any]:
+def _result(
+    suite: SuiteRun, one: EntryResult, criteria: Mapping[str, int], motion: int | None
+) -> dict[str, Any]:
     """Return a cell of the table; what is absent is not said."""
     found: dict[str, Any] = {
         "v": _LETTER[one.verdict],
@@ -134,6 +137,11 @@ def _result(one: EntryResult, criteria: Mapping[str, int], motion: int | None) -
         found["blameless"] = blameless
     if one.worst is None:
         return found
+    baseline = suite.baseline
+    if said := words(baseline.worst(one), baseline.failures.get(one.entry)):
+        found["standing"] = said
+        found["excused"] = baseline.worst(one) in EXCUSED
+        found["comment"] = baseline.failures[one.entry][1].comment
     row = one.rows[one.worst]
     found["severity"] = _short(max(one.severity for one in one.rows if one.verdict == "failed"))
     if row.critical or row.conflict in _HAPPENED:

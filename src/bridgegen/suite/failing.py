@@ -1,0 +1,321 @@
+"""Failures for a suite that grows: where they are found, and what fails in a row in which way."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from bridgegen.arrays import Float
+from bridgegen.campaign.exported import FOLDER, exported_scenarios, read_facts
+from bridgegen.campaign.run import Run
+from bridgegen.cause import Cause
+from bridgegen.conflict.harm import NEAR_MISS
+from bridgegen.ego import is_spec
+from bridgegen.errors import BridgeGenError, InputError
+from bridgegen.odd.criteria import PREFIX
+from bridgegen.openx.file_scenario import FileScenario
+from bridgegen.openx.openscenario.declarations import CAUSE
+from bridgegen.options import CommonOptions
+from bridgegen.pipeline import Pipeline
+from bridgegen.simulation.choice import EMBEDDED
+from bridgegen.simulation.rollout import STATUS_MESSAGES
+from bridgegen.store.run_file import FILE as RUN_FILE
+from bridgegen.suite.entries import RESULTS, Entry, find_entries
+from bridgegen.suite.evaluate import Job, evaluate, pipeline_of, rows_of_job
+from bridgegen.suite.replay import job_of, refuse_code
+from bridgegen.suite.results import EntryResult
+from bridgegen.suite.suite import SAMPLES, read_suite
+from bridgegen.triage.modes import Key, keys_of, title
+from bridgegen.triage.record import Mode
+
+OURS = "BridgeGen"
+"""The author of the files that are exported here."""
+
+NO_KEY = Key("", "", "", "", "", "")
+"""Of a scenario that is no failure by its conflict, but violates pass criteria."""
+
+
+@dataclass(frozen=True)
+class Failing:
+    """A scenario that was found to fail.
+
+    Attributes:
+        source: where, for people: "runs/a, mode 1 (0001)".
+        job: runs it; one row.
+        scenario: in which it was found, by name.
+        found: what found it, in words.
+        seed: of the search or suite, if there was one.
+        key: of its mode, with the tested cause, where a triage says; None: to be found out.
+        metrics: as recorded, by name; empty where they are not.
+        minimal: runs its minimal form, if there is one.
+        needs: what that needs, in words.
+    """
+
+    source: str
+    job: Job
+    scenario: str
+    found: str
+    seed: int | None = None
+    key: Key | None = None
+    metrics: Mapping[str, float] = field(default_factory=dict)
+    minimal: Job | None = None
+    needs: str = ""
+
+
+@dataclass(frozen=True)
+class NotFailing:
+    """What is no failure to keep.
+
+    Attributes:
+        source: where, for people.
+        reason: why not.
+    """
+
+    source: str
+    reason: str
+
+
+@dataclass(frozen=True)
+class Way:
+    """How a row fails.
+
+    Attributes:
+        key: of its mode; NO_KEY where it only violates criteria.
+        violates: the criteria that it violates, as `Criterion.to_dict` gives them.
+        metrics: by name, all that are recorded.
+        harm: that counts.
+        title: in words.
+        driver: that drove the ego, by name.
+        problem: why it does not fail; empty if it does.
+    """
+
+    key: Key
+    violates: tuple[Mapping[str, Any], ...]
+    metrics: Mapping[str, float]
+    harm: float
+    title: str
+    driver: str
+    problem: str = ""
+
+
+def ways(pipeline: Pipeline, X: Float) -> list[Way]:
+    """Return how rows fail as a suite judges them.
+
+    Args:
+        pipeline: with the quick causes.
+        X: ``(N, len(pipeline.space.names))``.
+    """
+    found = pipeline.evaluate(X)
+    places = pipeline.try_all(X).place.tolist()
+    causes = [""] * len(X) if found.cause is None else [Cause(k).label for k in found.cause]
+    keys = keys_of(found.findings, pipeline.kinds, places, causes)
+    margins = found.metrics[:, [pipeline.metrics.index(one) for one in pipeline.monitor.names]]
+    made = []
+    for i, key in enumerate(keys):
+        metrics = dict(zip(pipeline.metrics, found.metrics[i].tolist(), strict=True))
+        harm = float(np.nan_to_num(metrics[pipeline.objective.harm]))
+        violates = tuple(
+            one.to_dict()
+            for one, margin in zip(pipeline.monitor, margins[i], strict=True)
+            if margin < 0.0
+        )
+        problem = ""
+        if found.status[i]:
+            text = STATUS_MESSAGES[int(found.status[i])]
+            problem = ": ".join(filter(None, (text, found.messages.get(i, ""))))
+        elif not found.critical[i]:
+            key = NO_KEY
+            if not violates:
+                why = found.findings.implausible[i]
+                problem = f"it is no failure of the ego: harm {harm:.2g} of {NEAR_MISS:g}"
+                problem = f"its traffic is implausible: {why}" if why else problem
+        ids = ", ".join(one["id"] for one in violates)
+        words = title(key, pipeline.objective.count) if key is not NO_KEY else f"violates {ids}"
+        made.append(Way(key, violates, metrics, harm, words, pipeline.driver.label, problem))
+    return made
+
+
+def seeking_causes(job: Job) -> Job:
+    """Return a job whose pipeline is the embedded simulator's, and finds quick causes."""
+    return replace(job, options=replace(job.options, causes=True), simulator=EMBEDDED)
+
+
+def failing_in(given: Path | str, egos: Sequence[str]) -> Iterator[Failing | NotFailing]:
+    """Yield the failures in a run, in a suite's results, or among scenarios; the worst of a mode.
+
+    Args:
+        given: folder of a run or of a suite's results; or scenarios, as
+            `bridgegen.suite.entries.find_entries` takes them.
+        egos: drivers of the user's own that may be run; of scenarios, their drivers; of a suite,
+            those that count.
+
+    Raises:
+        InputError: nothing is found there, or a driver that is code must be named.
+        StorageError: a run or results are damaged.
+    """
+    folder = Path(given)
+    if (folder / RUN_FILE).is_file():
+        yield from _of_run(folder, egos)
+    elif folder.parent.name == FOLDER and (folder.parent.parent / RUN_FILE).is_file():
+        yield from _of_run(folder.parent.parent, egos, folder.stem)
+    elif (folder / RESULTS).is_file():
+        yield from _of_suite(folder, egos)
+    else:
+        for entry in find_entries([given]):
+            for ego in egos or (None,):
+                job = Job(entry, ego, CommonOptions(), EMBEDDED, SAMPLES, 0)
+                yield from _of_rows(job, evaluate(job), entry.distribution or entry.scenario)
+
+
+# ---- of a run ----
+
+
+def _of_run(
+    folder: Path, egos: Sequence[str], only: str | None = None
+) -> Iterator[Failing | NotFailing]:
+    """Yield the failures of a run, of each mode the scenario that stands for it.
+
+    Args:
+        folder: of the run.
+        egos: drivers of the user's own that may be run.
+        only: the name of one exported scenario, of which alone it is asked.
+    """
+    run = Run(folder)
+    if run.triage is None:
+        raise InputError(
+            f"{folder}: its failure modes are not known yet; finish it: bridgegen resume {folder}"
+        )
+    settings = run.settings
+    code = is_spec(settings.ego)
+    if code and settings.ego not in egos:
+        raise InputError(
+            f"{folder}: its ego is driven by {settings.ego}, which is code; to run it, name it: "
+            f"--ego {settings.ego}"
+        )
+    ego = settings.ego if code else None
+    options = CommonOptions(
+        criteria=settings.criteria, count=run.triage.count,
+        ideal=settings.ideal if ego else (),
+    )  # fmt: skip
+    exported = {one.name: one.evaluation for one in exported_scenarios(folder)}
+    by_mode: dict[str, Mode | None] = dict.fromkeys(exported)
+    shown = set[str]()
+    for one in run.modes:
+        kept = [name for name in one.exports if name in exported]
+        by_mode.update(dict.fromkeys(kept, one))
+        names = {*kept, one.minimal.name if one.minimal else ""}
+        if kept and only is None:
+            shown.add(kept[0])
+        elif kept and only in names:
+            shown.add(only if only in kept else kept[0])
+        elif only is None:
+            why = "no scenario of it was exported; search again, and --keep more"
+            yield NotFailing(f"{folder}, mode {one.number}", why)
+
+    def job(name: str) -> Job:
+        return Job(Entry(name, str(folder / FOLDER / f"{name}.xosc")), ego, options, EMBEDDED, 0, 0)
+
+    for name, mode in by_mode.items():
+        if name not in shown and (mode is not None or only not in (None, name)):
+            continue  # another one of its mode, or one that is not asked for
+        made = Failing(
+            f"{folder}, {f'mode {mode.number}, ' if mode else ''}{name}",
+            job(name),
+            scenario=run.triage.scenario,
+            found=f"search by {settings.algorithm}, evaluation {exported[name] + 1}",
+            seed=settings.seed,
+            metrics={
+                key: one.value
+                for key, one in read_facts(folder / FOLDER / f"{name}.json").metrics.items()
+                if one.value is not None
+            },
+        )
+        if mode is None:
+            if name == only or any(
+                key.startswith(PREFIX) and value < 0.0 for key, value in made.metrics.items()
+            ):
+                yield made
+            continue
+        key = Key(
+            mode.conflict, mode.conflict_type, mode.responsible, mode.rule, mode.partner,
+            mode.place, mode.cause,
+        )  # fmt: skip
+        minimal = mode.minimal
+        if minimal is None or not (folder / FOLDER / f"{minimal.name}.xosc").is_file():
+            yield replace(made, key=key)
+        else:
+            yield replace(made, key=key, minimal=job(minimal.name), needs=minimal.sentence)
+
+
+# ---- of a suite, and of files ----
+
+
+def _of_suite(folder: Path, egos: Sequence[str]) -> Iterator[Failing | NotFailing]:
+    suite = read_suite(folder)
+    results = [one for one in suite.results if not egos or one.ego in egos]
+    refuse_code(results, egos, f"bridgegen suite add {folder}")
+    for one in results:
+        job = job_of(suite, one)
+        source = f"{folder}, {one.entry}"
+        if one.verdict == "failed" and job.entry.digest != one.digest:
+            yield NotFailing(source, "it is not what it was when the suite was run")
+        elif one.verdict == "failed":
+            yield from _of_rows(job, one, source)
+
+
+def _of_rows(job: Job, result: EntryResult, source: str) -> Iterator[Failing | NotFailing]:
+    """Yield the worst failing row of each mode of an entry."""
+    failed = [i for i, row in enumerate(result.rows) if row.verdict == "failed"]
+    if result.problem or not failed:
+        yield NotFailing(source, result.problem or "no variation of it fails")
+        return
+    job = seeking_causes(job)
+    try:
+        pipeline = pipeline_of(job)
+        X = rows_of_job(job, pipeline)[failed]
+        found = ways(pipeline, X)
+    except BridgeGenError as error:
+        yield NotFailing(source, "; ".join(error.problems))
+        return
+    seen = set()
+    several = len(result.rows) > 1
+    order = sorted(range(len(failed)), key=lambda k: (-found[k].harm, failed[k]))
+    for k in order:
+        way, number = found[k], failed[k] + 1
+        if (same := (way.key, tuple(one["id"] for one in way.violates))) in seen:
+            continue
+        seen.add(same)
+        where = f"{source}, variation {number}" if several else source
+        if way.problem:
+            yield NotFailing(where, way.problem)
+            continue
+        is_file = job.entry.scenario.lower().endswith(".xosc")
+        yield Failing(
+            where,
+            replace(job, only=failed[k]),
+            scenario=scenario_name(pipeline),
+            found=f"suite, variation {number} of {len(result.rows)}" if several else "suite",
+            seed=None if is_file else job.seed,
+            metrics=way.metrics,
+            key=_stated(job, pipeline, way.key) if way.key is not NO_KEY else None,
+        )
+
+
+def scenario_name(pipeline: Pipeline) -> str:
+    """Return the scenario's name; of a file that BridgeGen exported, that of the searched one."""
+    if isinstance(pipeline.scenario, FileScenario):
+        header = pipeline.scenario.storyboard.file_header
+        if str(header.author) == OURS and str(header.description):
+            return str(header.description)
+    return pipeline.scenario.name
+
+
+def _stated(job: Job, pipeline: Pipeline, key: Key) -> Key:
+    """Return a key with the cause that a file states of its own driver: neighbours tested it."""
+    if job.ego is not None or not isinstance(pipeline.scenario, FileScenario):
+        return key
+    properties = pipeline.scenario.storyboard.file_header.properties
+    stated = properties.get(CAUSE) if properties is not None else None
+    return key if stated is None else key._replace(cause=str(stated))
