@@ -23,7 +23,7 @@ Files = Annotated[
     list[str],
     typer.Argument(
         help="Folders, scenario files (.xosc, .yaml), distribution files, or catalogue names.",
-        autocompletion=completing("scenario"),
+        autocompletion=completing("suite"),
     ),
 ]
 Samples = Annotated[

@@ -12,7 +12,9 @@ from bridgegen.errors import BridgeGenError, InputError
 from bridgegen.evaluation import Evaluation
 from bridgegen.odd.parameters import Parameter
 from bridgegen.odd.scenario import SearchedScenario
+from bridgegen.odd.space import SearchSpace
 from bridgegen.openx.file_scenario import FileScenario
+from bridgegen.openx.openscenario.ranges import FileParameter
 from bridgegen.options import CommonOptions
 from bridgegen.pipeline import Pipeline
 from bridgegen.simulation.choice import SimulatorChoice
@@ -147,13 +149,26 @@ def _evaluated(job: Job, found: EntryResult) -> EntryResult:
         update={
             "driver": pipeline.driver.label,
             "title": pipeline.scenario.title,
-            "parameters": names,
+            "parameters": _shown(names, space),
             "units": [units[name] for name in names],
             "criteria": [one.to_dict() for one in pipeline.monitor],
             "rows": rows,
             "notes": notes,
         }
     )
+
+
+def _shown(names: Sequence[str], space: SearchSpace) -> list[str]:
+    """Return what parameters are called: a set of values, whose name is ours, by what it is."""
+    made = list(names)
+    sets = [
+        i
+        for i, name in enumerate(names)
+        if isinstance(one := space.parameters.get(name), FileParameter) and one.is_set
+    ]
+    for k, i in enumerate(sets, start=1):
+        made[i] = f"value set {k}" if len(sets) > 1 else "value set"
+    return made
 
 
 def _rows(
@@ -173,6 +188,9 @@ def _rows(
             value = float(X[i, column])
             if name in of_file:  # of a set of values, too, which has no parameter of its own
                 x.append(of_file[name][round(value)])
+                continue
+            if isinstance(one, FileParameter) and one.is_set:
+                x.append(f"{round(value) + 1} of {round(one.high) + 1}")
                 continue
             written = value if one is None else one.kind.written(value)
             x.append(written if isinstance(written, str) else float(written))

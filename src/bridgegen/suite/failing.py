@@ -1,6 +1,6 @@
 """Failures for a suite that grows: where they are found, and what fails in a row in which way."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -200,53 +200,74 @@ def _of_run(
         ideal=settings.ideal if ego else (),
     )  # fmt: skip
     exported = {one.name: one.evaluation for one in exported_scenarios(folder)}
-    by_mode: dict[str, Mode | None] = dict.fromkeys(exported)
-    shown = set[str]()
-    for one in run.modes:
-        kept = [name for name in one.exports if name in exported]
-        by_mode.update(dict.fromkeys(kept, one))
-        names = {*kept, one.minimal.name if one.minimal else ""}
-        if kept and only is None:
-            shown.add(kept[0])
-        elif kept and only in names:
-            shown.add(only if only in kept else kept[0])
-        elif only is None:
-            why = "no scenario of it was exported; search again, and --keep more"
-            yield NotFailing(f"{folder}, mode {one.number}", why)
+    moded = {name for mode in run.modes for name in mode.exports}
 
-    def job(name: str) -> Job:
-        return Job(Entry(name, str(folder / FOLDER / f"{name}.xosc")), ego, options, EMBEDDED, 0, 0)
-
-    for name, mode in by_mode.items():
-        if name not in shown and (mode is not None or only not in (None, name)):
-            continue  # another one of its mode, or one that is not asked for
-        made = Failing(
-            f"{folder}, {f'mode {mode.number}, ' if mode else ''}{name}",
-            job(name),
-            scenario=run.triage.scenario,
-            found=f"search by {settings.algorithm}, evaluation {exported[name] + 1}",
+    def failing(name: str, found: str) -> Failing:
+        path = folder / FOLDER / f"{name}.xosc"
+        return Failing(
+            f"{folder}, {name}",
+            Job(Entry(name, str(path)), ego, options, EMBEDDED, 0, 0),
+            scenario=scenario,
+            found=f"search by {settings.algorithm}, {found}",
             seed=settings.seed,
-            metrics={
-                key: one.value
-                for key, one in read_facts(folder / FOLDER / f"{name}.json").metrics.items()
-                if one.value is not None
-            },
         )
-        if mode is None:
-            if name == only or any(
-                key.startswith(PREFIX) and value < 0.0 for key, value in made.metrics.items()
-            ):
-                yield made
+
+    scenario = run.triage.scenario
+    for mode in run.modes:
+        found = _of_mode(folder, mode, failing, exported, only)
+        if found is not None:
+            yield found
+    for name, evaluation in exported.items():
+        if name in moded or only not in (None, name):
             continue
-        key = Key(
-            mode.conflict, mode.conflict_type, mode.responsible, mode.rule, mode.partner,
-            mode.place, mode.cause,
-        )  # fmt: skip
-        minimal = mode.minimal
-        if minimal is None or not (folder / FOLDER / f"{minimal.name}.xosc").is_file():
-            yield replace(made, key=key)
-        else:
-            yield replace(made, key=key, minimal=job(minimal.name), needs=minimal.sentence)
+        metrics = _recorded(folder, name)
+        violates = any(key.startswith(PREFIX) and one < 0.0 for key, one in metrics.items())
+        if violates or name == only:
+            made = failing(name, f"evaluation {evaluation + 1}")
+            yield replace(made, metrics=metrics)
+
+
+def _of_mode(
+    folder: Path,
+    mode: Mode,
+    failing: Callable[[str, str], Failing],
+    exported: Mapping[str, int],
+    only: str | None,
+) -> Failing | NotFailing | None:
+    """Return what stands for a mode: its worst robust exported scenario, else its minimal one.
+
+    None if only another scenario is asked for.
+    """
+    key = Key(
+        mode.conflict, mode.conflict_type, mode.responsible, mode.rule, mode.partner, mode.place,
+        mode.cause,
+    )  # fmt: skip
+    kept = [name for name in mode.exports if name in exported]
+    minimal = mode.minimal
+    if minimal is None or not (folder / FOLDER / f"{minimal.name}.xosc").is_file():
+        minimal = None
+    if only not in (None, *kept, minimal.name if minimal else None):
+        return None
+    if not kept:
+        if minimal is None:
+            why = "no scenario of it was exported; search again, and --keep more"
+            return NotFailing(f"{folder}, mode {mode.number}", why)
+        made = failing(minimal.name, f"minimal form of evaluation {mode.shown + 1}")
+        metrics = {"harm": minimal.harm, "severity": minimal.severity}
+        return replace(made, key=key, metrics=metrics, needs=minimal.sentence)
+    name = only if only in kept else kept[0]
+    assert name is not None
+    made = failing(name, f"evaluation {exported[name] + 1}")
+    made = replace(made, key=key, metrics=_recorded(folder, name))
+    if minimal is None:
+        return made
+    return replace(made, minimal=failing(minimal.name, "minimal form").job, needs=minimal.sentence)
+
+
+def _recorded(folder: Path, name: str) -> dict[str, float]:
+    """Return the metrics of an exported scenario as the run recorded them, as far as finite."""
+    facts = read_facts(folder / FOLDER / f"{name}.json")
+    return {key: one.value for key, one in facts.metrics.items() if one.value is not None}
 
 
 # ---- of a suite, and of files ----

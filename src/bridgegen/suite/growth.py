@@ -159,7 +159,7 @@ def _kept(found: Failing, way: Way, id: str, to: Path) -> tuple[Failure, str]:
         StorageError: the folder cannot be written.
     """
     stage, notes = to / _STAGING, []
-    files, needs = [f"{id}.xosc"], ""
+    files, needs = [f"{id}.xosc"], "" if found.minimal else found.needs
     try:
         shutil.rmtree(stage, ignore_errors=True)
         stage.mkdir(parents=True)

@@ -251,7 +251,7 @@ def _block(before: Index, id: str, failure: Failure) -> str:
 
 def _emitted(id: str, failure: Failure, own: Mapping[str, str] | None = None) -> str:
     """Return a failure as a block of YAML."""
-    lines = [f"  {id}:\n"]
+    lines = [f"  {_flow(id)}:\n"]
     defaults = {name: one.default for name, one in type(failure).model_fields.items()}
     for name, value in failure.model_dump(exclude_none=True).items():
         if own and name in own:
@@ -264,9 +264,9 @@ def _emitted(id: str, failure: Failure, own: Mapping[str, str] | None = None) ->
     return "".join(lines)
 
 
-_PLAIN = re.compile(r"[A-Za-z][A-Za-z0-9_./;()%=<>+ -]*[A-Za-z0-9_.)%]", re.ASCII)
+_PLAIN = re.compile(r"[A-Za-z]([A-Za-z0-9_./;()%=<>+ -]*[A-Za-z0-9_.)%])?", re.ASCII)
 _UNPRINTABLE = re.compile("[\x7f-\x9f\u2028\u2029\ufeff\ufffe\uffff]")
-_WORDS = ("true", "false", "null", "yes", "no", "on", "off")
+_WORDS = ("true", "false", "null", "yes", "no", "on", "off", "y", "n")
 
 
 def _flow(value: Any) -> str:

@@ -135,6 +135,8 @@ def _result(
     blameless = sum(row.verdict == "passed" and row.collisions > 0 for row in one.rows)
     if blameless:
         found["blameless"] = blameless
+    if motion is not None:
+        found["motion"] = motion
     if one.worst is None:
         return found
     baseline = suite.baseline
@@ -149,8 +151,6 @@ def _result(
     violated = {i for each in one.rows for i in each.violated if i < len(one.criteria)}
     if violated:
         found["violated"] = [criteria[_text(one.criteria[i])] for i in sorted(violated)]
-    if motion is not None:
-        found["motion"] = motion
     return found
 
 
