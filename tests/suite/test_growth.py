@@ -7,7 +7,7 @@ import pytest
 from tests.campaign.braking import USUAL, value_sets, write_pair
 
 import bridgegen as bg
-from bridgegen.errors import InputError, StorageError
+from bridgegen.errors import InputError, StorageError, UnknownNameError
 from bridgegen.options import CommonOptions
 from bridgegen.simulate import simulate_file
 from bridgegen.suite.growth import add_failures
@@ -18,6 +18,18 @@ from bridgegen.verdict.of_suite import SuiteCriteria, figures_of
 
 FAST = "R-1: always(ego.v < 13 m/s)"
 """A rule that faster scenarios violate."""
+
+BLIND = """
+import numpy as np
+from bridgegen.ego.interface import Control
+
+class Blind:
+    def reset(self, n, scene):
+        pass
+
+    def act(self, observation):
+        return Control(np.zeros_like(observation.v), np.zeros_like(observation.v))
+"""
 
 
 @pytest.fixture(scope="module")
@@ -48,6 +60,7 @@ def test_each_mode_is_kept_once_and_fails_there_to_the_bit(run, tmp_path):
     made = add_failures([run.folder], to)
     failures = read_index(to).failures
     assert outcomes(made) == ["added"] * len(run.modes)
+    assert all(one.is_same and not one.reason for one in made)
     assert {one.id for one in made} == failures.keys()
     assert {bool(mode.exports) for mode in run.modes} == {True, False}
     for mode in run.modes:
@@ -179,6 +192,41 @@ def test_only_new_failures_stop_a_suite(run, tmp_path):
     assert (outcome.verdict, counted) == ("failed", (0, 0, n))
     assert "was fixed, and fails again" in outcome.details
     assert "regression, this failure was fixed" in xml
+
+
+def test_violations_that_make_a_scenario_critical_are_kept_by_their_criterion(tmp_path):
+    write_pair(tmp_path / "files", value_sets({"EgoSpeed": 14, "Gap": 60}))
+    options = CommonOptions(criteria=[FAST], critical="criterion:R-1")
+    suite = run_suite(
+        tmp_path / "files", egos=["reference"], options=options, out=tmp_path / "out", workers=1
+    )
+    assert suite.results[0].rows[0].critical
+    (made,) = add_failures([suite.folder], tmp_path / "mine")
+    assert (made.outcome, made.title) == ("added", "violates R-1")
+    assert (
+        run_suite(tmp_path / "mine", out=tmp_path / "o", workers=1).results[0].verdict == "failed"
+    )
+
+
+def test_a_driver_is_that_of_the_run_and_code_is_named(run, tmp_path):
+    with pytest.raises(InputError, match="must be route-follower, got reference"):
+        add_failures([run.folder], tmp_path / "mine", egos=["reference"])
+    scenario, _ = write_pair(tmp_path / "files", value_sets({"EgoSpeed": 14, "Gap": 20}))
+    driver = tmp_path / "blind.py"
+    driver.write_text(BLIND)
+    ego = f"{driver}:Blind"
+    suite = run_suite(scenario, egos=[ego], out=tmp_path / "out", workers=1)
+    assert suite.results[0].verdict == "failed"
+    with pytest.raises(InputError, match="which is code; to run it, name it"):
+        add_failures([suite.folder], tmp_path / "mine")
+    with pytest.raises(UnknownNameError, match="unknown driver"):
+        add_failures([suite.folder], tmp_path / "mine", egos=["reference"])
+    (made,) = add_failures([suite.folder], tmp_path / "mine", egos=[ego])
+    assert (made.outcome, made.is_same) == ("added", True)
+    (kept,) = read_index(tmp_path / "mine").failures.values()
+    assert kept.driver.startswith(str(driver))
+    again = run_suite(tmp_path / "mine", egos=[ego], out=tmp_path / "again", workers=1)
+    assert again.results[0].rows[0].harm == suite.results[0].rows[0].harm
 
 
 def test_what_a_catalogue_scenario_or_a_plain_file_does_is_said(tmp_path):

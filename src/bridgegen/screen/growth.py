@@ -53,8 +53,13 @@ def print_additions(made: "Sequence[Addition]", to: Path, *, as_json: bool = Fal
         parts[-1] += f", {count['worse']} of them by a less severe scenario (--replace-worse)"
     parts += [f"{count['refused']} refused"]
     print(f"{to}: {', '.join(parts)}")
-    if count["added"] or count["replaced"]:
-        print("Each fails there as it did where it was found.")
+    written = [one for one in made if one.outcome in ("added", "replaced")]
+    if written:
+        same = sum(one.is_same for one in written)
+        all_same = "with the recorded values, to the bit" if same == len(written) else (
+            f"{same} with the recorded values, to the bit"
+        )  # fmt: skip
+        print(f"Run again there, each fails in its mode, {all_same}.")
 
 
 def print_replayed(made: "Replayed", page: Path, *, as_json: bool = False) -> None:

@@ -3,38 +3,29 @@
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
 
-import numpy as np
-
-from bridgegen.arrays import Float
 from bridgegen.campaign.exported import FOLDER, exported_scenarios, read_facts
 from bridgegen.campaign.run import Run
-from bridgegen.cause import Cause
-from bridgegen.conflict.harm import NEAR_MISS
 from bridgegen.ego import is_spec
-from bridgegen.errors import BridgeGenError, InputError
+from bridgegen.errors import BridgeGenError, InputError, UnknownNameError
 from bridgegen.odd.criteria import PREFIX
 from bridgegen.openx.file_scenario import FileScenario
 from bridgegen.openx.openscenario.declarations import CAUSE
 from bridgegen.options import CommonOptions
 from bridgegen.pipeline import Pipeline
 from bridgegen.simulation.choice import EMBEDDED
-from bridgegen.simulation.rollout import STATUS_MESSAGES
 from bridgegen.store.run_file import FILE as RUN_FILE
 from bridgegen.suite.entries import RESULTS, Entry, find_entries
 from bridgegen.suite.evaluate import Job, evaluate, pipeline_of, rows_of_job
 from bridgegen.suite.replay import job_of, refuse_code
 from bridgegen.suite.results import EntryResult
 from bridgegen.suite.suite import SAMPLES, read_suite
-from bridgegen.triage.modes import Key, keys_of, title
+from bridgegen.suite.ways import NO_KEY, seeking_causes, ways
+from bridgegen.triage.modes import Key
 from bridgegen.triage.record import Mode
 
 OURS = "BridgeGen"
 """The author of the files that are exported here."""
-
-NO_KEY = Key("", "", "", "", "", "")
-"""Of a scenario that is no failure by its conflict, but violates pass criteria."""
 
 
 @dataclass(frozen=True)
@@ -77,79 +68,14 @@ class NotFailing:
     reason: str
 
 
-@dataclass(frozen=True)
-class Way:
-    """How a row fails.
-
-    Attributes:
-        key: of its mode; NO_KEY where it only violates criteria.
-        violates: the criteria that it violates, as `Criterion.to_dict` gives them.
-        metrics: by name, all that are recorded.
-        harm: that counts.
-        title: in words.
-        driver: that drove the ego, by name.
-        problem: why it does not fail; empty if it does.
-    """
-
-    key: Key
-    violates: tuple[Mapping[str, Any], ...]
-    metrics: Mapping[str, float]
-    harm: float
-    title: str
-    driver: str
-    problem: str = ""
-
-
-def ways(pipeline: Pipeline, X: Float) -> list[Way]:
-    """Return how rows fail as a suite judges them.
-
-    Args:
-        pipeline: with the quick causes.
-        X: ``(N, len(pipeline.space.names))``.
-    """
-    found = pipeline.evaluate(X)
-    places = pipeline.try_all(X).place.tolist()
-    causes = [""] * len(X) if found.cause is None else [Cause(k).label for k in found.cause]
-    keys = keys_of(found.findings, pipeline.kinds, places, causes)
-    margins = found.metrics[:, [pipeline.metrics.index(one) for one in pipeline.monitor.names]]
-    made = []
-    for i, key in enumerate(keys):
-        metrics = dict(zip(pipeline.metrics, found.metrics[i].tolist(), strict=True))
-        harm = float(np.nan_to_num(metrics[pipeline.objective.harm]))
-        violates = tuple(
-            one.to_dict()
-            for one, margin in zip(pipeline.monitor, margins[i], strict=True)
-            if margin < 0.0
-        )
-        problem = ""
-        if found.status[i]:
-            text = STATUS_MESSAGES[int(found.status[i])]
-            problem = ": ".join(filter(None, (text, found.messages.get(i, ""))))
-        elif not found.critical[i]:
-            key = NO_KEY
-            if not violates:
-                why = found.findings.implausible[i]
-                problem = f"it is no failure of the ego: harm {harm:.2g} of {NEAR_MISS:g}"
-                problem = f"its traffic is implausible: {why}" if why else problem
-        ids = ", ".join(one["id"] for one in violates)
-        words = title(key, pipeline.objective.count) if key is not NO_KEY else f"violates {ids}"
-        made.append(Way(key, violates, metrics, harm, words, pipeline.driver.label, problem))
-    return made
-
-
-def seeking_causes(job: Job) -> Job:
-    """Return a job whose pipeline is the embedded simulator's, and finds quick causes."""
-    return replace(job, options=replace(job.options, causes=True), simulator=EMBEDDED)
-
-
 def failing_in(given: Path | str, egos: Sequence[str]) -> Iterator[Failing | NotFailing]:
     """Yield the failures in a run, in a suite's results, or among scenarios; the worst of a mode.
 
     Args:
         given: folder of a run or of a suite's results; or scenarios, as
             `bridgegen.suite.entries.find_entries` takes them.
-        egos: drivers of the user's own that may be run; of scenarios, their drivers; of a suite,
-            those that count.
+        egos: of scenarios, their drivers; of a suite, those whose failures count; of a run, its
+            driver. A driver of the user's own must be named.
 
     Raises:
         InputError: nothing is found there, or a driver that is code must be named.
@@ -179,7 +105,7 @@ def _of_run(
 
     Args:
         folder: of the run.
-        egos: drivers of the user's own that may be run.
+        egos: see `failing_in`.
         only: the name of one exported scenario, of which alone it is asked.
     """
     run = Run(folder)
@@ -189,11 +115,14 @@ def _of_run(
         )
     settings = run.settings
     code = is_spec(settings.ego)
-    if code and settings.ego not in egos:
+    if code and not egos:
         raise InputError(
             f"{folder}: its ego is driven by {settings.ego}, which is code; to run it, name it: "
             f"--ego {settings.ego}"
         )
+    if egos and settings.ego not in egos:
+        given = ", ".join(egos)
+        raise InputError(f"{folder}: the ego of this run must be {settings.ego}, got {given}")
     ego = settings.ego if code else None
     options = CommonOptions(
         criteria=settings.criteria, count=run.triage.count,
@@ -275,6 +204,10 @@ def _recorded(folder: Path, name: str) -> dict[str, float]:
 
 def _of_suite(folder: Path, egos: Sequence[str]) -> Iterator[Failing | NotFailing]:
     suite = read_suite(folder)
+    known = [one for one in suite.egos if one]
+    for ego in egos:
+        if ego not in known:
+            raise UnknownNameError(f"driver of {folder}", ego, known)
     results = [one for one in suite.results if not egos or one.ego in egos]
     refuse_code(results, egos, f"bridgegen suite add {folder}")
     for one in results:

@@ -21,17 +21,10 @@ from bridgegen.simulation.choice import EMBEDDED
 from bridgegen.store.run_file import FILE as RUN_FILE
 from bridgegen.suite.entries import RESULTS, Entry
 from bridgegen.suite.evaluate import Job, pipeline_of, rows_of_job
-from bridgegen.suite.failing import (
-    NO_KEY,
-    Failing,
-    NotFailing,
-    Way,
-    failing_in,
-    seeking_causes,
-    ways,
-)
-from bridgegen.suite.index import Failure, Index, read_index, write_index
+from bridgegen.suite.failing import Failing, NotFailing, failing_in
+from bridgegen.suite.index import MOST_TEXT, Failure, Index, read_index, write_index
 from bridgegen.suite.replay import slug
+from bridgegen.suite.ways import NO_KEY, Way, seeking_causes, ways
 from bridgegen.triage.modes import Key
 
 Outcome = Literal["added", "replaced", "known", "worse", "refused"]
@@ -55,6 +48,7 @@ class Addition:
         title: in words.
         status: that a person gave a known one.
         reason: why it is refused; or what one should know.
+        is_same: whether all values are the recorded ones, to the bit.
     """
 
     source: str
@@ -63,6 +57,7 @@ class Addition:
     title: str = ""
     status: str = ""
     reason: str = ""
+    is_same: bool = False
 
 
 class _Refused(Exception):
@@ -100,7 +95,7 @@ def add_failures(
     made = []
     for one in given:
         inside = Path(one).resolve()
-        if inside == to.resolve() or inside.parent == to.resolve():
+        if inside.exists() and to.resolve() in (inside, inside.parent):
             raise InputError(f"{one}: is in the suite {to} already")
         for found in failing_in(one, egos):
             made.append(_add(found, to, replace_worse))
@@ -125,15 +120,20 @@ def _add(found: Failing | NotFailing, to: Path, replace_worse: bool) -> Addition
             return Addition(
                 found.source, "worse" if is_worse else "known", id, before.title, before.status
             )
-        failure, notes = _kept(found, replace(way, key=key), id, to)
+        failure, notes, is_same = _kept(found, replace(way, key=key), id, to)
         if before is not None:
             own = {"status": before.status, "comment": before.comment}
             failure = failure.model_copy(update=own)
             for name in {*before.files} - {*failure.files}:
                 _remove(to / name)
-        write_index(to, index, {**index.failures, id: failure})
+        try:
+            write_index(to, index, {**index.failures, id: failure})
+        except BridgeGenError:
+            for name in failure.files if before is None else ():
+                _remove(to / name)
+            raise
         outcome: Outcome = "added" if before is None else "replaced"
-        return Addition(found.source, outcome, id, failure.title, failure.status, notes)
+        return Addition(found.source, outcome, id, failure.title, failure.status, notes, is_same)
     except _Refused as error:
         return Addition(found.source, "refused", reason=str(error))
     except StorageError:
@@ -151,8 +151,11 @@ def identity(scenario: str, key: Key, way: Way) -> str:
     return f"{slug(scenario)[:50]}-{slug(what)[:30]}-{digest}"
 
 
-def _kept(found: Failing, way: Way, id: str, to: Path) -> tuple[Failure, str]:
-    """Write a failure's files into the suite's folder; return its block, and what to know of it.
+def _kept(found: Failing, way: Way, id: str, to: Path) -> tuple[Failure, str, bool]:
+    """Write a failure's files into the suite's folder.
+
+    Returns:
+        Its block; what one should know of it; whether its values are the recorded ones, to the bit.
 
     Raises:
         _Refused: it does not fail there as it did.
@@ -164,7 +167,8 @@ def _kept(found: Failing, way: Way, id: str, to: Path) -> tuple[Failure, str]:
         shutil.rmtree(stage, ignore_errors=True)
         stage.mkdir(parents=True)
         there = _put(found.job, way, stage, id)
-        if not _is_same(way, there.metrics) or not _is_same(there, found.metrics):
+        is_same = _is_same(way, there.metrics) and _is_same(there, found.metrics)
+        if not is_same:
             notes.append("it fails in the same way, but with other values than recorded")
         if found.minimal is not None:
             try:
@@ -181,15 +185,21 @@ def _kept(found: Failing, way: Way, id: str, to: Path) -> tuple[Failure, str]:
         shutil.rmtree(stage, ignore_errors=True)
     key, metrics = way.key, there.metrics
     failure = Failure(
-        title=way.title, scenario=found.scenario, conflict=key.conflict, type=key.conflict_type,
+        title=_cut(way.title), scenario=_cut(found.scenario),
+        conflict=key.conflict, type=key.conflict_type,
         responsible=key.responsible, rule=key.rule, partner=key.partner, place=key.place,
-        cause=key.cause, minimal=needs,
+        cause=key.cause, minimal=_cut(needs),
         violates=[CriterionSection.model_validate(one) for one in way.violates],
-        count="any" if found.job.options.count == "any" else "ego", driver=way.driver,
+        count="any" if found.job.options.count == "any" else "ego", driver=_cut(way.driver),
         found=found.found, seed=found.seed, version=version("bridgegen"), harm=there.harm,
         severity=float(np.nan_to_num(metrics["severity"])), files=files,
     )  # fmt: skip
-    return failure, "; ".join(notes)
+    return failure, "; ".join(notes), is_same
+
+
+def _cut(text: str) -> str:
+    """Return a text, which may come from a file, as long as an index takes it."""
+    return text if len(text) <= MOST_TEXT else f"{text[: MOST_TEXT - 1]}…"
 
 
 def _put(job: Job, way: Way, folder: Path, name: str) -> Way:

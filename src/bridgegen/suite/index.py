@@ -32,7 +32,10 @@ HEAD = """\
 
 ID = r"[a-z0-9][a-z0-9-]{0,99}"
 _File = Annotated[str, Field(pattern=rf"^{ID}\.xosc$")]
-_Text = Annotated[str, Field(max_length=2000)]
+MOST_TEXT = 2000
+"""Characters of one text."""
+
+_Text = Annotated[str, Field(max_length=MOST_TEXT)]
 _OWN = ("status", "comment")
 """The keys that people write."""
 
