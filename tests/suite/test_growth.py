@@ -10,6 +10,7 @@ import bridgegen as bg
 from bridgegen.errors import InputError, StorageError, UnknownNameError
 from bridgegen.options import CommonOptions
 from bridgegen.simulate import simulate_file
+from bridgegen.suite import growth
 from bridgegen.suite.growth import add_failures
 from bridgegen.suite.index import FILE, read_index
 from bridgegen.suite.results import counts
@@ -36,8 +37,8 @@ class Blind:
 def run(tmp_path_factory):
     place = tmp_path_factory.mktemp("runs") / "s4"
     return bg.run_search(
-        "crossroads-s3", algorithm="random", budget=150, seed=0, ego="route-follower", keep=1,
-        objective={"harm": None}, workers=1, out=place, criteria=[FAST],
+        "crossroads-s3", algorithm="random", budget=100, seed=0, ego="route-follower", keep=1,
+        objective={"harm": None}, out=place, criteria=[FAST],
     )  # fmt: skip
 
 
@@ -133,8 +134,48 @@ def test_what_does_not_fail_there_is_refused_and_named(copied, tmp_path):
     made = add_failures([path], tmp_path / "mine")
     assert outcomes(made) == ["refused"]
     assert "0001" in made[0].source
-    assert "no failure of the ego" in made[0].reason or "fails otherwise" in made[0].reason
+    assert made[0].reason.startswith("it is no failure of the ego: harm 0")
     assert read_index(tmp_path / "mine") is None
+
+
+def test_what_fails_otherwise_than_it_was_found_is_refused(copied, tmp_path):
+    path = copied / "triage.json"
+    data = json.loads(path.read_text("utf-8"))
+    rules = [one["rule"] for one in data["modes"]]
+    data["modes"][0]["rule"] = "rear distance"
+    path.write_text(json.dumps(data), "utf-8")
+    made = add_failures([copied], tmp_path / "mine")
+    assert outcomes(made) == ["refused", *["added"] * (len(rules) - 1)]
+    assert made[0].reason == (
+        f"it fails otherwise than where it was found: rule '{rules[0]}' instead of 'rear distance'"
+    )
+
+
+def test_what_fails_otherwise_in_its_new_place_is_refused(run, tmp_path, monkeypatch):
+    """As if the export wrote another scenario: first the worst, then the minimal form."""
+    write, source = growth.write_scenario, run.folder / "critical"
+    wrong = ""
+
+    def written(pipeline, x, folder, name, cause):
+        files = write(pipeline, x, folder, name, cause)
+        if name.endswith("-minimal") == (wrong == "minimal"):
+            text = (source / "minimal-02.xosc").read_text("utf-8")
+            (folder / f"{name}.xosc").write_text(text.replace("minimal-02.xodr", f"{name}.xodr"))
+            shutil.copy(source / "minimal-02.xodr", folder / f"{name}.xodr")
+        return files
+
+    monkeypatch.setattr(growth, "write_scenario", written)
+    (made,) = add_failures([source / "0001.xosc"], tmp_path / "mine")
+    assert made.outcome == "refused"
+    assert f"fails otherwise in {tmp_path / 'mine'}: rule" in made.reason
+    assert [*(tmp_path / "mine").iterdir()] == []
+    wrong = "minimal"
+    (made,) = add_failures([source / "0001.xosc"], tmp_path / "mine")
+    assert (made.outcome, made.is_same) == ("added", True)
+    assert "without its minimal form: it fails otherwise" in made.reason
+    assert [one.suffix for one in sorted((tmp_path / "mine").iterdir())] == [
+        ".xodr", ".xosc", ".yaml",
+    ]  # fmt: skip
 
 
 def test_the_worst_variation_of_a_suite_is_kept_and_its_criterion_judges_there(tmp_path):
@@ -240,3 +281,31 @@ def test_what_a_catalogue_scenario_or_a_plain_file_does_is_said(tmp_path):
     inside = shutil.copy(scenario, tmp_path / "mine")
     with pytest.raises(InputError, match="is in the suite"):
         add_failures([inside], tmp_path / "mine")
+
+
+def test_the_command_prints_what_became_of_each(run, tmp_path, cli):
+    to = tmp_path / "mine"
+    code, out, err = cli("suite", "add", run.folder, "--to", to)
+    n = len(run.modes)
+    assert (code, err) == (0, "")
+    assert f"{to}: {n} added, 0 already known, 0 refused" in out
+    assert "each fails in its mode, with the recorded values, to the bit" in out
+    path = to / FILE
+    path.write_text(path.read_text("utf-8").replace("status: new", "status: fixed", 1), "utf-8")
+    code, out, _ = cli("suite", "add", run.folder, "--to", to)
+    assert f"{to}: 0 added, {n} already known, 0 refused" in out
+    assert "called fixed: it is there again" in " ".join(out.split())
+    code, out, _ = cli("suite", "add", run.folder, "--to", to, "--json")
+    facts = json.loads(out)
+    assert [one["outcome"] for one in facts] == ["known"] * n
+    assert sorted(one["status"] for one in facts) == ["fixed", *["new"] * (n - 1)]
+    code, out, err = cli("suite", to, "--out", tmp_path / "out", "--workers", 1)
+    assert code == 3
+    (again,) = [one["id"] for one in facts if one["status"] == "fixed"]
+    assert f"regression: {again} was fixed, and fails again" in out
+    assert f"regression: {again} was fixed, and fails again" in err
+    assert "(regression: it was fixed)" in out
+    path.write_text("failures: [1]\n")
+    code, _, err = cli("suite", to, "--out", tmp_path / "out")
+    assert (code, err.count("\n")) == (2, 1)
+    assert "failures must be a mapping" in err

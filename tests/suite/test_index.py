@@ -63,6 +63,18 @@ def test_a_changed_block_keeps_status_and_comment_as_they_are_written(tmp_path):
     assert read_index(tmp_path).failures["b"].harm == 1.0
 
 
+def test_a_comment_of_several_lines_costs_no_other_block_its_own(tmp_path):
+    write_index(tmp_path, Index({}), {"b": failure("b"), "c": failure("c")})
+    path = tmp_path / FILE
+    text = path.read_text("utf-8").replace('comment: ""', "comment: |\n      one\n      two", 1)
+    path.write_text(text.replace("  c:\n", "  # c's\n  c:\n"), "utf-8")
+    before = read_index(tmp_path)
+    changed = before.failures["b"].model_copy(update={"harm": 1.0})
+    write_index(tmp_path, before, {**before.failures, "b": changed})
+    assert read_index(tmp_path).failures["b"] == changed
+    assert "  # c's\n  c:\n" in path.read_text("utf-8")
+
+
 def test_another_layout_is_understood(tmp_path):
     write_index(tmp_path, Index({}), {"b": failure("b")})
     path = tmp_path / FILE

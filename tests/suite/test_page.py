@@ -12,9 +12,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tests.suite.test_index import failure
 
 from bridgegen.options import CommonOptions
 from bridgegen.suite import page
+from bridgegen.suite.index import Index, write_index
 from bridgegen.suite.page import FILE, write_suite_page
 from bridgegen.suite.page_payload import payload
 from bridgegen.suite.results import EntryResult, RowResult
@@ -139,6 +141,25 @@ def test_criteria_are_counted_by_ego():
     details = unpacked(found["details"][0])["results"]
     assert details[0]["margins"] == [[-1e-9, None, 2.0]]  # rounding keeps the sign
     assert details[1]["beside"] == []  # not the same variations
+
+
+def test_a_known_failure_is_told_from_a_new_one(tmp_path):
+    hit = HIT.model_copy(update={"conflict": "contact", "conflict_type": "turning",
+                                 "responsible": "ego"})  # fmt: skip
+    named = {id: failure(id, type="turning") for id in ("a", "b", "c")}
+    named["a"] = named["a"].model_copy(update={"status": "known", "comment": "<b> JIRA-3"})
+    named["c"] = named["c"].model_copy(update={"status": "fixed"})
+    write_index(tmp_path, Index({}), named)
+    made = [
+        one.model_copy(update={"scenario": str(tmp_path / one.scenario)})
+        for one in (result(id, rows=(hit,)) for id in "abcd")
+    ]
+    cells = [one["results"][0] for one in payload(suite_of(*made), {}, {})["suite"]["entries"]]
+    stand = [(one.get("standing"), one.get("excused"), one.get("comment")) for one in cells]
+    assert stand == [
+        ("known failure", True, "<b> JIRA-3"), ("new failure", False, ""),
+        ("regression: it was fixed", False, ""), (None, None, None),
+    ]  # fmt: skip
 
 
 def test_egos_are_compared_on_the_same_variations():

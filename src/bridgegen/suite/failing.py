@@ -1,4 +1,4 @@
-"""Failures for a suite that grows: where they are found, and what fails in a row in which way."""
+"""Failures for a suite that grows: in runs, in results of suites, and in scenario files."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace

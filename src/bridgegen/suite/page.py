@@ -2,6 +2,7 @@
 
 import shlex
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from bridgegen.disk import write_whole
@@ -61,9 +62,11 @@ def write_replay_page(made: Replayed) -> Path:
     Raises:
         StorageError: it cannot be written.
     """
-    one = made.result
+    name = f"{made.result.entry}, variation {made.number}"
+    one = made.result.model_copy(update={"entry": name})
     suite = SuiteRun(made.folder, (one.ego,), (one,), {})
-    playback = _playback(made.job, one, 0)
+    job = replace(made.job, entry=replace(made.job.entry, name=name))
+    playback = _playback(job, one, 0)
     played = {} if playback is None else {key_of(one): playback}
     return _write(suite, played, {key_of(one): made.command})
 
