@@ -11,6 +11,7 @@ from typing import Any
 from typer.main import get_command
 
 from bridgegen.cli import app
+from bridgegen.cli.groups import DEFAULT
 from bridgegen.odd.json_schema import schema, schema_text
 from bridgegen.odd.parameters import Axis
 from bridgegen.odd.reader import load
@@ -58,7 +59,7 @@ def commands(command: Any, path: tuple[str, ...]) -> Iterator[tuple[tuple[str, .
         yield path, command
         return
     for name, one in command.commands.items():
-        yield from commands(one, (*path, name))
+        yield from commands(one, path if name == DEFAULT else (*path, name))
 
 
 def row(one: Any, context: Any) -> str:

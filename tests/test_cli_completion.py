@@ -40,6 +40,12 @@ def completed(line: str) -> list[str]:
         ("bridgegen export run --flavour rec", ["recorded"]),
         ("bridgegen confirm run --simulator es", ["esmini"]),
         ("bridgegen sea", ["search"]),
+        ("bridgegen suite crossroads-s", [f"crossroads-s{k}" for k in (1, 2, 3, 4)]),
+        ("bridgegen suite --jun", ["--junit"]),
+        ("bridgegen suite cut-in --ego ref", ["reference"]),
+        ("bridgegen suite ad", ["add"]),
+        ("bridgegen suite cut-in rep", []),
+        ("bridgegen suite add runs/a --to", ["--to"]),
     ],
 )
 def test_what_is_completed(line, expected):

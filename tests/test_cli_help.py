@@ -35,6 +35,25 @@ def test_a_group_s_summaries_are_not_cut(cli, monkeypatch, group):
     assert "..." not in out.partition("Commands:")[2]
 
 
+def test_a_suite_needs_no_other_word_and_its_help_lists_the_others(cli, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "80")
+    _, out, _ = cli("suite", "--help")
+    assert out.startswith("Usage: bridgegen suite [OPTIONS]")
+    assert "--junit" in out
+    commands = out.partition("\nCommands:\n")[2]
+    assert re.findall(r"^  (suite [a-z]+)  ", commands, re.MULTILINE) == [
+        "suite add", "suite replay",
+    ]  # fmt: skip
+    assert "..." not in commands
+    assert max(len(line) for line in out.splitlines()) <= 80
+    for words in (("suite", "add"), ("suite", "replay")):
+        _, out, _ = cli(*words, "--help")
+        assert out.startswith(f"Usage: bridgegen {' '.join(words)} [OPTIONS]")
+        assert max(len(line) for line in out.splitlines()) <= 80
+    code, _, err = cli("suite")
+    assert (code, "Missing argument" in err) == (2, True)
+
+
 def test_a_bare_call_is_the_help(cli):
     code, out, _ = cli()
     assert code == 0

@@ -30,6 +30,7 @@ from typer.main import get_command
 
 from bridgegen.campaign.exported import NOT_EXPORTED
 from bridgegen.cli import app, main
+from bridgegen.cli.groups import DEFAULT
 from bridgegen.cli.run_files import keys_of, read_runs
 from bridgegen.cli.runs import search
 from bridgegen.odd.json_schema import schema
@@ -101,10 +102,11 @@ def shortened(words: list[str]) -> list[str]:
 
 
 def must_parse(words: list[str]) -> None:
-    command = get_command(app)
-    rest = words[1:]
+    command, rest = get_command(app), words[1:]
     while hasattr(command, "commands"):
-        command = command.commands[rest.pop(0)]
+        named = command.commands.get(rest[0])
+        command = named or command.commands[DEFAULT]
+        rest = rest[1:] if named else rest
     command.make_context(command.name, rest)
 
 

@@ -6,7 +6,8 @@ line that it names (``None``: the file is named, no line).
 
 import pytest
 
-from bridgegen.errors import ScenarioError
+from bridgegen.errors import InputError, ScenarioError
+from bridgegen.odd.criteria import read_criterion
 from bridgegen.odd.reader import load
 
 MISTAKES = [
@@ -442,3 +443,12 @@ def test_a_share_says_how_per_cent_are_written(tmp_path):
     assert problem.startswith(
         "grade needs a parameter in 1 (a share: 5 % is 0.05), 'road_grade' is in % (FILE, line "
     )
+
+
+@pytest.mark.parametrize("id", ["R 12", ".R", "R" * 65])
+def test_an_id_says_what_it_may_be(id):
+    with pytest.raises(InputError) as refused:
+        read_criterion({"id": id, "formula": "ttc >= 1 s"})
+    (problem,) = refused.value.problems
+    assert "letters, digits, '.', '_' and '-', at most 64 characters" in problem
+    assert read_criterion({"id": "R" * 60 + ".1_a", "formula": "ttc >= 1 s"}).id.endswith(".1_a")

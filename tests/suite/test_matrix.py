@@ -1,16 +1,20 @@
 """A suite of matrices: packs by name, editions, collisions avoided and mitigated, points."""
 
+from dataclasses import replace
+
 import pytest
 from tests.suite.test_page import unpacked
 
 from bridgegen.errors import InputError
 from bridgegen.odd.reader import pack_names
 from bridgegen.suite.entries import find_entries
+from bridgegen.suite.page import command_of
 from bridgegen.suite.page_payload import payload
 from bridgegen.suite.rating import colour_of, points_of
+from bridgegen.suite.replay import replay
 from bridgegen.suite.results import EntryResult, GridResult, RowResult
 from bridgegen.suite.sentences import outcomes, points
-from bridgegen.suite.suite import SuiteRun, of_edition, run_suite
+from bridgegen.suite.suite import of_edition, run_suite
 from bridgegen.verdict.of_suite import SuiteCriteria, figures_of
 
 
@@ -55,8 +59,9 @@ def test_the_matrix_is_run_and_its_impacts_are_told(turn):
     for row in braking.rows:
         assert row.impact_speed + row.speed_reduction == pytest.approx(row.x[1])
     assert blind.outcomes() == {"avoided": 0, "mitigated": 0, "not avoided": 2}
-    assert figures_of([blind])["not_avoided"] == 2
-    assert figures_of([blind])["worst_impact"] == pytest.approx(70 / 3.6)
+    figures = figures_of(replace(turn, results=(blind,)))
+    assert figures["not_avoided"] == 2
+    assert figures["worst_impact"] == pytest.approx(70 / 3.6)
 
 
 def test_junit_and_the_page_tell_outcomes(turn, tmp_path):
@@ -158,9 +163,11 @@ def test_a_suite_without_collisions_tells_none():
     )
 
 
-def test_the_same_command_plays_the_same_rows(turn):
-    from bridgegen.suite.page import command_of
-
-    command = command_of(turn.jobs[0], turn.results[0])
-    assert command == "bridgegen suite ncap-aeb/ccfhos --ego route-follower --matrix 2023"
-    assert isinstance(turn, SuiteRun)
+def test_the_page_s_command_runs_the_same_row(turn):
+    row = turn.results[0].worst
+    command = command_of(turn.folder, turn.jobs[0], turn.results[0])
+    assert command == (
+        f"bridgegen suite replay {turn.folder} ccfhos {row + 1} --ego route-follower"
+    )
+    made = replay(turn.folder, "ccfhos", row + 1, ego="route-follower")
+    assert made.result.rows[0] == turn.results[0].rows[row]

@@ -12,9 +12,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tests.suite.test_index import failure
 
 from bridgegen.options import CommonOptions
 from bridgegen.suite import page
+from bridgegen.suite.index import Index, write_index
 from bridgegen.suite.page import FILE, write_suite_page
 from bridgegen.suite.page_payload import payload
 from bridgegen.suite.results import EntryResult, RowResult
@@ -141,6 +143,25 @@ def test_criteria_are_counted_by_ego():
     assert details[1]["beside"] == []  # not the same variations
 
 
+def test_a_known_failure_is_told_from_a_new_one(tmp_path):
+    hit = HIT.model_copy(update={"conflict": "contact", "conflict_type": "turning",
+                                 "responsible": "ego"})  # fmt: skip
+    named = {id: failure(id, type="turning") for id in ("a", "b", "c")}
+    named["a"] = named["a"].model_copy(update={"status": "known", "comment": "<b> JIRA-3"})
+    named["c"] = named["c"].model_copy(update={"status": "fixed"})
+    write_index(tmp_path, Index({}), named)
+    made = [
+        one.model_copy(update={"scenario": str(tmp_path / one.scenario)})
+        for one in (result(id, rows=(hit,)) for id in "abcd")
+    ]
+    cells = [one["results"][0] for one in payload(suite_of(*made), {}, {})["suite"]["entries"]]
+    stand = [(one.get("standing"), one.get("excused"), one.get("comment")) for one in cells]
+    assert stand == [
+        ("known failure", True, "<b> JIRA-3"), ("new failure", False, ""),
+        ("regression: it was fixed", False, ""), (None, None, None),
+    ]  # fmt: skip
+
+
 def test_egos_are_compared_on_the_same_variations():
     rows = [KEPT.model_copy(update={"x": [value]}) for value in (1.0, 2.0)]
     more = {"parameters": ["v"], "units": ["m/s"]}
@@ -245,7 +266,7 @@ def test_no_playback_of_files_that_have_changed(run, folder):
 def test_the_command_shows_the_failure_again(run, folder):
     by_name = {(job.entry.name, job.ego): job for job in run.jobs}
     plain = next(one for one in run.results if one.entry == "plain")
-    words = shlex.split(page.command_of(by_name["plain", plain.ego], plain))
+    words = shlex.split(page.command_of(run.folder, by_name["plain", plain.ego], plain))
     assert words[:3] == ["bridgegen", "simulate", str(folder / "plain.xosc")]
     found = subprocess.run(
         [Path(sys.executable).with_name("bridgegen"), *words[1:], "--json"],
@@ -253,9 +274,10 @@ def test_the_command_shows_the_failure_again(run, folder):
     )  # fmt: skip
     assert found.returncode == (3 if plain.verdict == "failed" else 0), found.stderr
     varied = next(one for one in run.results if one.entry != "plain")
-    words = shlex.split(page.command_of(by_name[varied.entry, varied.ego], varied))
-    assert words[:3] == ["bridgegen", "suite", str(folder / "varied_distribution.xosc")]
-    assert words[3:] == ["--ego", varied.ego, "--criterion", "C-1: always(ego.v < 12 m/s)"]
+    words = shlex.split(page.command_of(run.folder, by_name[varied.entry, varied.ego], varied))
+    number = str(varied.worst + 1)
+    assert words[:5] == ["bridgegen", "suite", "replay", str(run.folder), varied.entry]
+    assert words[5:] == [number, "--ego", varied.ego]
 
 
 def test_hostile_texts_stay_texts(tmp_path):

@@ -64,7 +64,7 @@ def test_all_variations_run_and_are_judged(folder, tmp_path):
     assert any("2 combinations are excluded" in note for note in varied.notes)
     assert [row.x[0] for row in varied.rows if row.violated] == [14.0]  # faster than 12 m/s
     assert varied.verdict == "failed"
-    figures = figures_of(suite.results)
+    figures = figures_of(suite)
     assert figures["criterion:C-1"] == 2  # and the scenario alone, at 15 m/s
     assert figures["variations"] == 5
 

@@ -26,6 +26,7 @@ SCHEMA = {
     ),
     "failure": ((), {"type", "message"}, set()),
     "error": ((), {"type", "message"}, set()),
+    "skipped": ((), {"type", "message"}, set()),
     "system-out": ((), set(), set()),
 }
 
@@ -41,11 +42,13 @@ def check(data: bytes) -> ElementTree.Element:
     for element in (root, *root.iter("testsuite")):
         for name, tag in (("tests", "testcase"), ("failures", "failure"), ("errors", "error")):
             assert element.get(name) == str(len([*element.iter(tag)]))
+    for element in root.iter("testsuite"):
+        assert element.get("skipped") == str(len([*element.iter("skipped")]))
     return root
 
 
 texts = st.text(max_size=20)
-problems = st.sampled_from([None, "failure", "error"])
+problems = st.sampled_from([None, "failure", "error", "skipped"])
 cases = st.builds(Case, texts, texts, problems, texts, texts)
 suites = st.builds(
     Suite,

@@ -10,7 +10,7 @@ from typing import Annotated
 
 import typer
 
-from bridgegen.cli.groups import ONTOLOGY, SEARCH, Application, PanelledGroup
+from bridgegen.cli.groups import ONTOLOGY, SEARCH, Application, PanelledGroup, WithDefault
 from bridgegen.errors import BridgeGenError, Interrupted
 
 FAILED = 3
@@ -31,6 +31,13 @@ listing = Application(
     rich_markup_mode=None,
 )
 app.add_typer(listing, name="list", rich_help_panel=SEARCH)
+
+suites = Application(
+    cls=WithDefault,
+    help="Run many scenario files with all their variations.",
+    rich_markup_mode=None,
+)
+app.add_typer(suites, name="suite", rich_help_panel=SEARCH)
 
 ontology = Application(help="Document the ontology.", no_args_is_help=True, rich_markup_mode=None)
 app.add_typer(ontology, name="ontology", rich_help_panel=ONTOLOGY)

@@ -7,6 +7,8 @@ from collections.abc import Callable, Iterable
 
 import typer
 
+from bridgegen.cli.groups import DEFAULT
+
 Complete = Callable[[typer.Context, str], list[str]]
 """Of a command line so far and the beginning of a word: the words that it may become."""
 
@@ -35,6 +37,14 @@ def _scenarios(_: typer.Context) -> Iterable[str]:
     from bridgegen.odd.reader import names, pack_names
 
     return (*names(), *pack_names())
+
+
+def _scenarios_of_suite(ctx: typer.Context) -> Iterable[str]:
+    """Return scenarios; before the first, what else one may do with a suite."""
+    from bridgegen.cli.app import suites
+
+    others = [one.name for one in suites.registered_commands if one.name not in (None, DEFAULT)]
+    return (*_scenarios(ctx), *(() if ctx.params.get("files") else map(str, others)))
 
 
 def _algorithms(_: typer.Context) -> Iterable[str]:
@@ -122,6 +132,7 @@ def _fixed(*words: str) -> Callable[[typer.Context], Iterable[str]]:
 
 NAMES: dict[str, Callable[[typer.Context], Iterable[str]]] = {
     "scenario": _scenarios,
+    "suite": _scenarios_of_suite,
     "algorithm": _algorithms,
     "setting": _settings,
     "driver": _drivers,

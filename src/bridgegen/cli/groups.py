@@ -20,6 +20,12 @@ OTHER = "Options"
 """The group of the options that belong to none of `GROUPS`."""
 
 
+DEFAULT = "default"
+"""The name, which nobody types, of a `WithDefault`'s default command."""
+
+_BESIDE = "bridgegen.group"
+
+
 class PanelledGroup(TyperGroup):
     """Commands whose help lists them by panel, which typer does with rich's markup only."""
 
@@ -87,6 +93,42 @@ class GroupedCommand(TyperCommand):
             if rows:
                 with formatter.section(title):
                     formatter.write_dl(rows)
+
+
+class WithDefault(TyperGroup):
+    """Commands one of which is meant where no other is named: ``suite FILES``, ``suite add``."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Parse the words of a command line; before those of the default, put its name."""
+        others = [name for name in self.commands if name != DEFAULT]
+        named = bool(args) and args[0] in others
+        return list(super().parse_args(ctx, args if named else [DEFAULT, *args]))
+
+
+class DefaultCommand(GroupedCommand):
+    """The command of a `WithDefault` that needs no name; its help lists the others."""
+
+    def make_context(
+        self, info_name: str | None, args: list[str], parent: Any = None, **extra: Any
+    ) -> Any:
+        """Return its context, in which it has the name of its group."""
+        if parent is None:
+            return super().make_context(info_name, args, **extra)
+        parent.meta[_BESIDE] = parent.command
+        return super().make_context(parent.info_name, args, parent=parent.parent, **extra)
+
+    def format_options(self, ctx: Any, formatter: Any) -> None:
+        """Write arguments and options, then the other commands of the group."""
+        super().format_options(ctx, formatter)
+        group = ctx.meta.get(_BESIDE)
+        rows = [
+            (f"{ctx.info_name} {name}", one.get_short_help_str(formatter.width - 20))
+            for name, one in (group.commands if group else {}).items()
+            if one is not self
+        ]
+        if rows:
+            with formatter.section("Commands"):
+                formatter.write_dl(rows)
 
 
 class Application(typer.Typer):

@@ -6,11 +6,11 @@ from typing import Annotated
 import typer
 
 from bridgegen.cli import options as common
-from bridgegen.cli.app import FAILED, app
+from bridgegen.cli.app import FAILED, app, suites
 from bridgegen.cli.completion import completing
 from bridgegen.cli.connection import NO_CONNECTION, Connection, with_connection_options
 from bridgegen.cli.declared import with_options
-from bridgegen.cli.groups import SEARCH
+from bridgegen.cli.groups import DEFAULT, SEARCH, DefaultCommand
 from bridgegen.cli.map_folder import with_map_folder
 from bridgegen.errors import InputError
 from bridgegen.options import CommonOptions
@@ -23,7 +23,7 @@ Files = Annotated[
     typer.Argument(
         help="Folders, scenario files (.xosc, .yaml), distribution files, names of the catalogue, "
         "packs.",
-        autocompletion=completing("scenario"),
+        autocompletion=completing("suite"),
     ),
 ]
 Samples = Annotated[
@@ -67,7 +67,7 @@ of_all_scenarios = with_options(
 """Gives a command the options of how each scenario is run and judged."""
 
 
-@app.command(rich_help_panel=SEARCH)
+@suites.command(DEFAULT, cls=DefaultCommand)
 @with_map_folder(WHAT)
 @with_connection_options
 @of_all_scenarios

@@ -15,9 +15,10 @@ from bridgegen.dashboard.sceneries import Sceneries
 from bridgegen.dashboard.scenery import Scenery
 from bridgegen.odd.criteria import read_criterion
 from bridgegen.suite.difference import Difference, difference
+from bridgegen.suite.entries import RESULTS
 from bridgegen.suite.page import FILE as PAGE
 from bridgegen.suite.results import EntryResult, RowResult
-from bridgegen.suite.suite import FILE, SuiteRun, read_suite
+from bridgegen.suite.suite import SuiteRun, read_suite
 from bridgegen.triage.modes import Key, title
 
 _NO_CONFLICT = ("", "none")
@@ -53,7 +54,7 @@ def read_suite_line(project: Path, folder: Path, sceneries: Sceneries) -> SuiteL
         StorageError: it cannot be read.
     """
     suite = read_suite(folder)
-    source, time = folder.relative_to(project).as_posix(), (folder / FILE).stat().st_mtime
+    source, time = folder.relative_to(project).as_posix(), (folder / RESULTS).stat().st_mtime
     page = f"{source}/{PAGE}" if (folder / PAGE).is_file() else ""
     made = str(suite.settings.get("version", ""))
     results = tuple(  # the file has them as they ended

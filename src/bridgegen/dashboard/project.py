@@ -19,7 +19,7 @@ from bridgegen.dashboard.scenery import Scenery
 from bridgegen.errors import BridgeGenError, StorageError
 from bridgegen.preventability.chunks import SETTINGS as MAP_FILE
 from bridgegen.store.run_file import FILE as RUN_FILE
-from bridgegen.suite.suite import FILE as SUITE_FILE
+from bridgegen.suite.entries import RESULTS as SUITE_FILE
 from bridgegen.view.overview import MOST_RUNS, find_folders
 
 _FILES = (RUN_FILE, SUITE_FILE, MAP_FILE, COMPARISON_FILE)

@@ -11,14 +11,11 @@ from pydantic import Field
 from bridgegen.errors import FileFormatError, InputError
 from bridgegen.odd.parameters import at, nearest
 from bridgegen.odd.plain_yaml import MAX_BYTES, Document, entries, read_plain_yaml
-from bridgegen.odd.shape import ShapedSection, Text, section, shape_problems
+from bridgegen.odd.shape import ID, ShapedSection, Text, section, shape_problems
 from bridgegen.plugins import PlugIns
 from bridgegen.stl import Formula, parse, readings
 
 Severity = Literal["minor", "major", "critical"]
-
-ID = r"[A-Za-z0-9][A-Za-z0-9_.-]{0,63}"
-"""The pattern of an id."""
 
 ADDED = PlugIns("criterion", "bridgegen.criteria")
 

@@ -25,6 +25,9 @@ from bridgegen.units import PATTERN, has_unit, in_unit
 
 _PARAMETER = "[A-Za-z][A-Za-z0-9_]{0,63}"
 
+ID = r"[A-Za-z0-9][A-Za-z0-9_.-]{0,63}"
+"""The pattern of the id of a requirement, and of a tag."""
+
 
 def _with_unit(text: str, unit: str) -> float:
     try:
@@ -193,6 +196,13 @@ _MESSAGES = {
 }
 
 
+_WORDS = {
+    f"^{ID}$": "must be a word of letters, digits, '.', '_' and '-', at most 64 characters, the "
+    "first a letter or digit",
+}
+"""By the pattern of a text: what it must be."""
+
+
 def section(model: type[Section], data: object) -> Section | None:
     """Return data as a section of a file, or ``None`` if it is not of that shape."""
     try:
@@ -232,7 +242,10 @@ def _describe(model: type[ShapedSection], document: Document, error: ErrorDetail
         name = f"the key '{parents[-1]}'" + (
             f" of {inside.rpartition('.')[0]}" if parents[:-1] else ""
         )
-    return f"{name} {_MESSAGES.get(error['type'], error['msg'])}, got {got} ({where})"
+    must = _MESSAGES.get(error["type"], error["msg"])
+    if error["type"] == "string_pattern_mismatch":
+        must = _WORDS.get(error["ctx"]["pattern"], must)
+    return f"{name} {must}, got {got} ({where})"
 
 
 def _model_at(model: type[BaseModel], path: Path) -> type[BaseModel]:

@@ -90,7 +90,7 @@ def print_suite(suite: "SuiteRun", seconds: float, page: Path, *, as_json: bool 
     table.add_column("worst", overflow="fold")
     for name, some in by_entry.items():
         if name in listed:
-            table.add_row(name, *(_verdict(one) for one in some), _worst(some))
+            table.add_row(name, *(_verdict(suite, one) for one in some), _worst(some))
     console = Console(markup=False, emoji=False, highlight=False)
     if not sys.stdout.isatty():
         console.width = 160
@@ -109,7 +109,27 @@ def print_suite(suite: "SuiteRun", seconds: float, page: Path, *, as_json: bool 
         )
         for text in filter(None, (outcomes(results), points(results))):
             print(f"  {text}")
+        _print_standing(suite, ego)
+    if gone := suite.baseline.gone(suite.results):
+        print(f"not there any more, set their status to fixed: {', '.join(gone)}")
     print(f"page: {page} ({seconds:.1f} s)")
+
+
+def _print_standing(suite: "SuiteRun", ego: str) -> None:
+    """Print how the failures of an ego stand, where indexes name some."""
+    from bridgegen.suite.baseline import EXCUSED
+
+    baseline, results = suite.baseline, suite.of_ego(ego)
+    standing = baseline.counts(results)
+    failed = standing["new"] + standing["regression"] + sum(standing[one] for one in EXCUSED)
+    if not baseline.failures or not failed:
+        return
+    print(
+        f"  of the variations that fail, {sum(standing[one] for one in EXCUSED)} are known or "
+        f"accepted, {standing['new']} new, {standing['regression']} regressions"
+    )
+    for id in baseline.regressions(results):
+        print(f"  regression: {id} was fixed, and fails again")
 
 
 def print_difference(
@@ -186,7 +206,14 @@ def _print_searches(searches: Sequence["WorseThan"], found: "Difference") -> Non
     print()
 
 
-def _verdict(one: "EntryResult") -> str:
+def _verdict(suite: "SuiteRun", one: "EntryResult") -> str:
+    from bridgegen.suite.baseline import words
+
+    said = words(suite.baseline.worst(one), suite.baseline.failures.get(one.entry))
+    return f"{_counted(one)} ({said})" if said else _counted(one)
+
+
+def _counted(one: "EntryResult") -> str:
     if one.problem:
         return "not run"
     n = len(one.rows)
@@ -236,6 +263,8 @@ def _facts(suite: "SuiteRun") -> dict[str, Any]:
                 "not_run": one.count("not run"),
                 "outcomes": one.outcomes(),
                 "problem": one.problem or None,
+                "status": suite.baseline.status_of(one.entry),
+                "standing": suite.baseline.worst(one),
             }
             for one in suite.results
         ],

@@ -1,18 +1,27 @@
 """What a suite consists of: scenario files and their variations, found in folders."""
 
 import hashlib
-from collections.abc import Iterable, Sequence
+import json
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any, Literal
 
 from bridgegen.errors import BridgeGenError, InputError
 from bridgegen.odd.plain_yaml import MAX_BYTES
 from bridgegen.odd.reader import load, pack_names
 from bridgegen.odd.reader import names as catalogue_names
 from bridgegen.openx.openscenario.kind import files_named_in, kind_of_file
+from bridgegen.suite.index import Indexes
 
 MOST_FILES = 100_000
 """Files that are looked at in all folders together."""
+
+RESULTS = "results.jsonl"
+"""The file of a suite's results, in their folder."""
+
+VARIATIONS = "variations"
+"""The folder beside it of variations that were run again."""
 
 _YAML = (".yaml", ".yml")
 _STORYBOARD = ".xosc"
@@ -27,12 +36,17 @@ class Entry:
         scenario: the path of a file, or a name of the catalogue.
         distribution: the file with its variations, or None.
         problem: why it cannot run; empty if nothing is known to be wrong.
+        criteria: pass criteria that the index of its folder states for it, besides its own; see
+            `bridgegen.suite.index`.
+        count: whose conflicts count as harm by that index; None leaves it to the scenario.
     """
 
     name: str
     scenario: str
     distribution: str | None = None
     problem: str = ""
+    criteria: tuple[Mapping[str, Any], ...] = ()
+    count: Literal["any"] | None = None
 
     @property
     def digest(self) -> str:
@@ -41,6 +55,8 @@ class Entry:
         try:
             if not self.scenario.lower().endswith(_STORYBOARD):
                 return load(self.scenario).fingerprint
+            if self.criteria or self.count:
+                made.update(json.dumps([self.criteria, self.count], sort_keys=True).encode())
             for one in filter(None, (self.scenario, self.distribution)):
                 for path in (Path(one), *files_named_in(Path(one))):
                     made.update(hashlib.sha256(path.read_bytes()).digest())
@@ -98,15 +114,38 @@ def find_entries(given: Sequence[str | Path]) -> tuple[Entry, ...]:
         if one.distribution or not Path(one.scenario).is_file()
         or Path(one.scenario).resolve() not in varied
     ]  # fmt: skip
-    return _named(kept)
+    indexes = Indexes()
+    return _named([indexed(one, indexes) for one in kept])
+
+
+def indexed(one: Entry, indexes: Indexes | None = None) -> Entry:
+    """Return an entry with what the index of its folder states for it.
+
+    Raises:
+        FileFormatError: the index is damaged.
+    """
+    indexes = indexes or Indexes()
+    found = indexes.failure_of(one.scenario, one.distribution)
+    if found is None:
+        return one
+    _, failure = found
+    count: Literal["any"] | None = "any" if failure.count == "any" else None
+    return replace(one, criteria=tuple(failure.criteria), count=count)
 
 
 def _files(folder: Path) -> Iterable[Path]:
-    """Return the files of a folder that may be scenarios, in order."""
-    found = []
+    """Return the files of a folder that may be scenarios, in order.
+
+    Variations that were run again are none; see `bridgegen.suite.replay`.
+    """
+    found, again = [], set[Path]()
     for count, path in enumerate(sorted(folder.rglob("*"))):
         if count >= MOST_FILES:
             raise InputError(f"{folder}: a suite has at most {MOST_FILES} files")
+        if path.name == RESULTS:  # sorted before the folder beside it
+            again.add(path.parent / VARIATIONS)
+        if again and not again.isdisjoint(path.parents):
+            continue
         hidden = any(part.startswith(".") for part in path.relative_to(folder).parts)
         if path.suffix.lower() in (*_YAML, _STORYBOARD) and not hidden and path.is_file():
             found.append(path)

@@ -1,8 +1,9 @@
 """An entry of a suite → its pipeline → the results of its rows."""
 
 import hashlib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -11,7 +12,10 @@ from bridgegen.campaign.scenarios import driven_by, load
 from bridgegen.errors import BridgeGenError, InputError
 from bridgegen.evaluation import Evaluation
 from bridgegen.odd.parameters import Parameter
+from bridgegen.odd.scenario import SearchedScenario
+from bridgegen.odd.space import SearchSpace
 from bridgegen.openx.file_scenario import FileScenario
+from bridgegen.openx.openscenario.ranges import FileParameter
 from bridgegen.options import CommonOptions
 from bridgegen.pipeline import Pipeline
 from bridgegen.simulation.choice import SimulatorChoice
@@ -44,6 +48,7 @@ class Job:
         samples: rows of a logical scenario besides its defaults.
         seed: of samples.
         edition: of a logical scenario's matrix; None: all, "none": samples instead.
+        only: the number of the one row that is run, from 0 on; None: all.
     """
 
     entry: Entry
@@ -53,21 +58,22 @@ class Job:
     samples: int
     seed: int
     edition: str | None = None
+    only: int | None = None
 
     @property
-    def digest(self) -> str:
-        """A digest of all files that it depends on; empty if they cannot be read.
-
-        The file of a driver of the user's is one of them, but not what that imports.
-        """
-        entry = self.entry.digest
+    def driver_digest(self) -> str:
+        """A digest of the file of a driver of the user's, without what it imports; else empty."""
         try:
             data = CarriedDriver.of(self.ego).data if self.ego else None
         except InputError:
             return ""
-        if not entry or data is None:
-            return entry
-        return hashlib.sha256(entry.encode() + data).hexdigest()
+        return "" if data is None else hashlib.sha256(data).hexdigest()
+
+    def is_of(self, result: EntryResult) -> bool:
+        """Whether a result is that of the files as they are now."""
+        if not result.digest or self.driver_digest != result.driver_digest:
+            return False
+        return self.entry.digest == result.digest
 
     @property
     def name(self) -> str:
@@ -81,7 +87,8 @@ def evaluate(job: Job) -> EntryResult:
     found = EntryResult(
         entry=entry.name,
         ego=job.ego or "",
-        digest=job.digest,
+        digest=entry.digest,
+        driver_digest=job.driver_digest,
         scenario=entry.scenario,
         distribution=entry.distribution or "",
         problem=entry.problem,
@@ -106,9 +113,15 @@ def pipeline_of(job: Job) -> Pipeline:
     is_file = entry.scenario.lower().endswith(".xosc")
     trigger = job.options.empty_trigger if is_file else None
     scenario = driven_by(load(entry.scenario, entry.distribution, trigger), job.options.others)
-    spec = chosen_objective(scenario.objective, job.options, "one")
+    options = replace(
+        job.options,
+        ego=job.ego,
+        metrics=IMPACT,
+        criteria=[*job.options.criteria, *_further_criteria(job, scenario)],
+        count=job.options.count or entry.count,
+    )
+    spec = chosen_objective(scenario.objective, options, "one")
     scenario = as_judged(replace(scenario, objective=spec), spec.rule)
-    options = replace(job.options, ego=job.ego, metrics=IMPACT)
     pipeline = Pipeline(
         scenario, scenario.space(), options, simulator=job.simulator, workers=Threads(1)
     )
@@ -116,13 +129,33 @@ def pipeline_of(job: Job) -> Pipeline:
     return pipeline
 
 
+def _further_criteria(job: Job, scenario: SearchedScenario) -> list[Mapping[str, Any]]:
+    """Return the criteria of the index whose ids neither the options nor the scenario have."""
+    known = {one.id for one in scenario.criteria} | {one["id"] for one in job.options.criteria}
+    return [one for one in job.entry.criteria if one["id"] not in known]
+
+
 def rows_of_job(job: Job, pipeline: Pipeline) -> np.ndarray:
-    """Return the rows of an entry, ``(N, len(pipeline.space.names))``."""
+    """Return the rows of an entry, ``(N, len(pipeline.space.names))``.
+
+    Raises:
+        InputError: it has not the one that is asked for.
+    """
     return _rows_of(job, pipeline).X
 
 
 def _rows_of(job: Job, pipeline: Pipeline) -> Rows:
-    return rows_of(pipeline.scenario, pipeline.space, job.samples, job.seed, job.edition)
+    """Return what is run of an entry."""
+    found = rows_of(pipeline.scenario, pipeline.space, job.samples, job.seed, job.edition)
+    if job.only is None:
+        return found
+    if not 0 <= job.only < len(found.X):
+        raise InputError(
+            f"{job.entry.name}: variations are numbered from 1 to {len(found.X)}, got "
+            f"{job.only + 1}"
+        )
+    at = slice(job.only, job.only + 1)
+    return replace(found, X=found.X[at], grid=found.grid[at], excluded=0)
 
 
 def _evaluated(job: Job, found: EntryResult) -> EntryResult:
@@ -151,7 +184,7 @@ def _evaluated(job: Job, found: EntryResult) -> EntryResult:
         update={
             "driver": pipeline.driver.label,
             "title": pipeline.scenario.title,
-            "parameters": [*([MATRIX] if labels else []), *names],
+            "parameters": [*([MATRIX] if labels else []), *_shown(names, space)],
             "units": [*(["1"] if labels else []), *(units[name] for name in names)],
             "grids": [
                 GridResult(
@@ -171,6 +204,19 @@ def _evaluated(job: Job, found: EntryResult) -> EntryResult:
     )
 
 
+def _shown(names: Sequence[str], space: SearchSpace) -> list[str]:
+    """Return what parameters are called: a set of values, whose name is ours, by what it is."""
+    made = list(names)
+    sets = [
+        i
+        for i, name in enumerate(names)
+        if isinstance(one := space.parameters.get(name), FileParameter) and one.is_set
+    ]
+    for k, i in enumerate(sets, start=1):
+        made[i] = f"value set {k}" if len(sets) > 1 else "value set"
+    return made
+
+
 def _rows(
     pipeline: Pipeline, X: np.ndarray, evaluation: Evaluation, names: Sequence[str]
 ) -> list[RowResult]:
@@ -188,6 +234,9 @@ def _rows(
             value = float(X[i, column])
             if name in of_file:  # of a set of values, too, which has no parameter of its own
                 x.append(of_file[name][round(value)])
+                continue
+            if isinstance(one, FileParameter) and one.is_set:
+                x.append(f"{round(value) + 1} of {round(one.high) + 1}")
                 continue
             written = value if one is None else one.kind.written(value)
             x.append(written if isinstance(written, str) else float(written))

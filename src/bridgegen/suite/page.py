@@ -2,6 +2,7 @@
 
 import shlex
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from bridgegen.disk import write_whole
@@ -15,8 +16,9 @@ from bridgegen.report.playbacks import beside_others, measured_playbacks
 from bridgegen.simulation.choice import EMBEDDED
 from bridgegen.suite.evaluate import Job, pipeline_of, rows_of_job
 from bridgegen.suite.page_payload import Key, key_of, payload
+from bridgegen.suite.replay import Replayed, replay_command
 from bridgegen.suite.results import EntryResult, rank
-from bridgegen.suite.suite import SAMPLES, SuiteRun
+from bridgegen.suite.suite import SuiteRun
 from bridgegen.suite.worse import WorseThan
 
 FILE = "suite.html"
@@ -47,12 +49,38 @@ def write_suite_page(
         StorageError: it cannot be written.
     """
     by_key = {(job.entry.name, job.ego or ""): job for job in jobs}
-    played = dict(_playbacks(suite, by_key))
     commands = {
-        key_of(one): command_of(by_key[key_of(one)], one)
+        key_of(one): command_of(suite.folder, by_key[key_of(one)], one)
         for one in suite.results
         if one.verdict == "failed" and key_of(one) in by_key
     }
+    return _write(suite, dict(_playbacks(suite, by_key)), commands, searches)
+
+
+def write_replay_page(made: Replayed) -> Path:
+    """Write the page of a variation that was run again, with its playback, whether it fails or not.
+
+    Returns:
+        The page, in the folder of its files.
+
+    Raises:
+        StorageError: it cannot be written.
+    """
+    name = f"{made.result.entry}, variation {made.number}"
+    one = made.result.model_copy(update={"entry": name})
+    suite = SuiteRun(made.folder, (one.ego,), (one,), {})
+    job = replace(made.job, entry=replace(made.job.entry, name=name))
+    playback = _playback(job, one, 0)
+    played = {} if playback is None else {key_of(one): playback}
+    return _write(suite, played, {key_of(one): made.command})
+
+
+def _write(
+    suite: SuiteRun,
+    played: Mapping[Key, Playback],
+    commands: Mapping[Key, str],
+    searches: Sequence[WorseThan] = (),
+) -> Path:
     data = payload(suite, played, commands, searches, code=code_of(_MODULE))
     path = suite.folder / FILE
     title = f"{suite.folder.resolve().name}: suite – BridgeGen"
@@ -60,23 +88,20 @@ def write_suite_page(
     return path
 
 
-def command_of(job: Job, result: EntryResult) -> str:
-    """Return the command that shows a failure again.
+def command_of(folder: Path, job: Job, result: EntryResult) -> str:
+    """Return the command that shows the worst failure of an entry again.
 
-    A file in which nothing varies is simulated; anything else is a suite of its own, whose page
-    plays its worst variation.
+    A file in which nothing varies is simulated; of anything else that one variation is run again.
     """
-    entry, logical = job.entry, not job.entry.scenario.lower().endswith(".xosc")
-    alone = entry.distribution is None and not logical and not result.parameters
-    words = ["bridgegen", "simulate" if alone else "suite", entry.distribution or entry.scenario]
+    entry = job.entry
+    is_alone = entry.distribution is None and entry.scenario.lower().endswith(".xosc")
+    if not is_alone or result.parameters or entry.criteria or entry.count:
+        return replay_command(folder, result, result.worst or 0)
+    words = ["bridgegen", "simulate", entry.scenario]
     words += ["--ego", job.ego] if job.ego else []
     for one in options_of(CommonOptions):
-        if one.name in _SIMULATE or (not alone and one.name in ("critical", "count")):
+        if one.name in _SIMULATE:
             words += one.words(getattr(job.options, one.name))
-    if logical:
-        words += ["--samples", str(job.samples)] if job.samples != SAMPLES else []
-        words += ["--seed", str(job.seed)] if job.seed else []
-        words += ["--matrix", job.edition] if job.edition else []
     if job.simulator.name != EMBEDDED.name:
         words += ["--simulator", job.simulator.name]
     return shlex.join(words)
@@ -91,21 +116,24 @@ def _playbacks(suite: SuiteRun, jobs: Mapping[Key, Job]) -> Iterator[tuple[Key, 
     for one in failed[:MOST_PLAYBACKS]:
         job = jobs.get(key_of(one))
         others = [jobs.get((one.entry, ego)) for ego in suite.egos if ego != one.ego]
-        playback = None if job is None else _playback(job, one, [o for o in others if o])
+        shown = [other for other in others if other is not None]
+        playback = None if job is None else _playback(job, one, one.worst or 0, shown)
         if playback is not None:
             yield key_of(one), playback
 
 
-def _playback(job: Job, result: EntryResult, others: Sequence[Job]) -> Playback | None:
-    """Return the playback of an entry's worst failed row; None if that is no longer to be had.
+def _playback(
+    job: Job, result: EntryResult, row: int, others: Sequence[Job] = ()
+) -> Playback | None:
+    """Return the playback of an entry's row; None if that is no longer to be had.
 
     Args:
         job: the entry with the ego.
         result: its.
+        row: its number.
         others: the same with other egos, whose motion is shown beside.
     """
-    row = result.worst
-    if row is None or job.digest != result.digest:  # the files have changed since
+    if not job.is_of(result):  # the files have changed since
         return None
     try:
         pipeline = pipeline_of(job)

@@ -10,6 +10,7 @@ from bridgegen.report.packed import OF_ROW, deflated, road_key
 from bridgegen.report.payload import script_json
 from bridgegen.report.playback import Playback
 from bridgegen.report.playback_payload import ROAD_SCALE, SCALE, playback_payload, road_payload
+from bridgegen.suite.baseline import EXCUSED, words
 from bridgegen.suite.difference import difference as variations_compared
 from bridgegen.suite.rating import colours_of
 from bridgegen.suite.results import EntryResult, Outcome, RowResult, Verdict, rank
@@ -149,13 +150,15 @@ def _entry(
         "title": next((one.title for one in of_it.values() if one.title), ""),
         "differ": difference(verdicts, labels) if whole else "",
         "results": [
-            _result(of_it[ego], criteria, at.get((name, ego))) if ego in of_it else None
+            _result(suite, of_it[ego], criteria, at.get((name, ego))) if ego in of_it else None
             for ego in suite.egos
         ],
     }
 
 
-def _result(one: EntryResult, criteria: Mapping[str, int], motion: int | None) -> dict[str, Any]:
+def _result(
+    suite: SuiteRun, one: EntryResult, criteria: Mapping[str, int], motion: int | None
+) -> dict[str, Any]:
     """Return a cell of the table; what is absent is not said."""
     found: dict[str, Any] = {
         "v": _LETTER[one.verdict],
@@ -170,8 +173,15 @@ def _result(one: EntryResult, criteria: Mapping[str, int], motion: int | None) -
     _, mitigated, unavoided = one.outcomes().values()
     if mitigated or unavoided:
         found["hits"] = [mitigated, unavoided]
+    if motion is not None:
+        found["motion"] = motion
     if one.worst is None:
         return found
+    baseline = suite.baseline
+    if said := words(baseline.worst(one), baseline.failures.get(one.entry)):
+        found["standing"] = said
+        found["excused"] = baseline.worst(one) in EXCUSED
+        found["comment"] = baseline.failures[one.entry][1].comment
     row = one.rows[one.worst]
     found["severity"] = _short(max(one.severity for one in one.rows if one.verdict == "failed"))
     if row.critical or row.conflict in _HAPPENED:
@@ -179,8 +189,6 @@ def _result(one: EntryResult, criteria: Mapping[str, int], motion: int | None) -
     violated = {i for each in one.rows for i in each.violated if i < len(one.criteria)}
     if violated:
         found["violated"] = [criteria[_text(one.criteria[i])] for i in sorted(violated)]
-    if motion is not None:
-        found["motion"] = motion
     return found
 
 

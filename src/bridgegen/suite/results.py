@@ -114,7 +114,8 @@ class EntryResult(Strict):
     Attributes:
         entry: its name.
         ego: as the user names it; the scenario's own driver if none.
-        digest: of the entry's files and the driver's.
+        digest: of the entry's files.
+        driver_digest: of the file of a driver of the user's.
         scenario: path or name.
         distribution: path, or "".
         driver: that drove the ego, by name.
@@ -132,6 +133,7 @@ class EntryResult(Strict):
     entry: str
     ego: str
     digest: str
+    driver_digest: str = ""
     scenario: str
     distribution: str = ""
     driver: str = ""

@@ -4,6 +4,7 @@ import json
 import os
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -20,6 +21,8 @@ from bridgegen.options import CommonOptions, called_with
 from bridgegen.records import parse_json
 from bridgegen.simulation.choice import EMBEDDED, SimulatorChoice
 from bridgegen.store.sqlite import Lock
+from bridgegen.suite.baseline import Baseline
+from bridgegen.suite.entries import RESULTS as FILE
 from bridgegen.suite.entries import Entry, find_entries
 from bridgegen.suite.evaluate import Job, evaluate
 from bridgegen.suite.results import EntryResult, Header
@@ -27,7 +30,6 @@ from bridgegen.suite.rows import NO_MATRIX
 from bridgegen.workers.process import cores
 from bridgegen.workers.tasks import TaskPool
 
-FILE = "results.jsonl"
 LOCK = "suite.lock"
 MOST_BYTES = 2**30
 """Of a file of results."""
@@ -123,6 +125,15 @@ class SuiteRun:
     settings: dict[str, Any]
     jobs: tuple[Job, ...] = ()
 
+    @cached_property
+    def baseline(self) -> Baseline:
+        """What the indexes of its folders say of its failures.
+
+        Raises:
+            FileFormatError: an index is damaged.
+        """
+        return Baseline.of(self.results)
+
     def of_ego(self, ego: str) -> tuple[EntryResult, ...]:
         """Return the results with one ego."""
         return tuple(one for one in self.results if one.ego == ego)
@@ -148,7 +159,7 @@ def run_suite(given: SuiteArguments) -> SuiteRun:
     _check(given)
     entries = of_edition(find_entries(files), given.matrix)
     drivers = tuple(dict.fromkeys(given.egos)) or ("",)
-    folder = Path(given.out) if given.out is not None else Path("suites") / _name(files)
+    folder = Path(given.out) if given.out is not None else _folder(files)
     settings = _settings(given)
     jobs = [
         Job(
@@ -247,9 +258,13 @@ def _check(given: SuiteArguments) -> None:
         raise InputError(*problems)
 
 
-def _name(files: Sequence[str | Path]) -> str:
+def _folder(files: Sequence[str | Path]) -> Path:
+    """Return the folder of results by default: none of those that hold the scenarios."""
     names = [Path(one).resolve().stem for one in files]
-    return "-".join(names[:3]) + ("-and-more" if len(names) > 3 else "")
+    folder = Path("suites") / ("-".join(names[:3]) + ("-and-more" if len(names) > 3 else ""))
+    if folder.resolve() in {Path(one).resolve() for one in files}:
+        return folder.with_name(f"{folder.name}-results")
+    return folder
 
 
 def _settings(given: SuiteArguments) -> dict[str, Any]:
@@ -338,7 +353,7 @@ def _done(
     found = {}
     for one in results:
         job = wanted.get((one.entry, one.ego))
-        if job is not None and one.digest and one.digest == job.digest:
+        if job is not None and job.is_of(one):
             found[one.entry, one.ego] = one
     if torn or len(found) < len(results):  # what has changed is run again, and said once
         lines = [header.model_dump_json(), *(one.model_dump_json() for one in found.values())]

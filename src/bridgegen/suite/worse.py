@@ -147,6 +147,6 @@ def _searched(
 
 def _folder_name(job: Job, first: Job, options: SearchOptions) -> str:
     """Return a name that is another one for each scenario, driver and option."""
-    facts = [job.digest, first.digest, repr(options)]
+    facts = [job.entry.digest, job.driver_digest, first.driver_digest, repr(options)]
     short = hashlib.sha256(json.dumps(facts).encode()).hexdigest()[:8]
     return f"{re.sub(r'[^A-Za-z0-9._-]+', '-', job.entry.name)}-{short}"

@@ -17,7 +17,7 @@ from bridgegen.disk import write_whole
 from bridgegen.errors import StorageError
 from bridgegen.verdict.fail_if import Outcome
 
-Problem = Literal["failure", "error"]
+Problem = Literal["failure", "error", "skipped"]
 
 _ILLEGAL = re.compile("[^\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 _PROBLEMS: Mapping[str, Problem | None] = {
@@ -36,7 +36,8 @@ class Case:
     Attributes:
         group: of tests, separated by dots; Jenkins shows it as package and class.
         name: the same in each run.
-        problem: "failure", "error" (it could not be judged), or None if it passed.
+        problem: "failure", "error" (it could not be judged), "skipped" (its failure is known), or
+            None if it passed.
         message: the result in one line.
         text: further details.
     """
@@ -82,7 +83,8 @@ def junit_xml(suites: Iterable[Suite]) -> bytes:
             "errors": sum(one.problem == "error" for one in suite.cases),
         }
         total = {name: total[name] + count for name, count in counts.items()}
-        element = etree.SubElement(root, "testsuite", name=_legal(suite.name), skipped="0")
+        skipped = sum(one.problem == "skipped" for one in suite.cases)
+        element = etree.SubElement(root, "testsuite", name=_legal(suite.name), skipped=f"{skipped}")
         for name, count in counts.items():
             element.set(name, str(count))
         if suite.seconds is not None:

@@ -3,9 +3,11 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal, Self
+from typing import Self
 
 from bridgegen.odd.criteria import read_criterion
+from bridgegen.suite.baseline import EXCUSED
+from bridgegen.suite.replay import replay_command
 from bridgegen.suite.results import EntryResult, RowResult, counts
 from bridgegen.suite.suite import SuiteRun
 from bridgegen.verdict.fail_if import (
@@ -15,13 +17,16 @@ from bridgegen.verdict.fail_if import (
     read_conditions,
     words_of,
 )
-from bridgegen.verdict.junit import Case, Suite, case_of, refuse_junit, write_junit
+from bridgegen.verdict.junit import Case, Problem, Suite, case_of, refuse_junit, write_junit
 
 FIGURES = {
     "entries": "scenarios with their variations, of all egos",
     "variations": "variations, of all egos",
     "passed": "variations that pass",
     "failed": "variations that fail: critical, or a pass criterion is violated",
+    "known": "failed ones that the suite's index calls known or accepted",
+    "regressions": "failed ones that the suite's index calls fixed",
+    "new_failures": "the other failed ones",
     "not_run": "variations that did not run; an entry that cannot run is one",
     "failed_entries": "entries in which a variation fails",
     "critical": "variations that are critical",
@@ -71,7 +76,7 @@ class SuiteCriteria:
 
     def judge(self, suite: SuiteRun) -> tuple[Outcome, ...]:
         """Apply the criteria to a suite, and write the JUnit XML if requested."""
-        figures = figures_of(suite.results)
+        figures = figures_of(suite)
         outcomes = [one.judge(figures) for one in self.conditions]
         if not outcomes:
             outcomes = [_all_pass(suite, ego) for ego in suite.egos]
@@ -80,8 +85,10 @@ class SuiteCriteria:
         return tuple(outcomes)
 
 
-def figures_of(results: Sequence[EntryResult]) -> dict[str, float]:
-    """Return FIGURES of results, and of each criterion the variations that violate it."""
+def figures_of(suite: SuiteRun) -> dict[str, float]:
+    """Return FIGURES of a suite, and of each criterion the variations that violate it."""
+    results = suite.results
+    standing = suite.baseline.counts(results)
     rows = [row for one in results for row in one.rows]
     number = counts(results)
     figures: dict[str, float] = {
@@ -89,6 +96,9 @@ def figures_of(results: Sequence[EntryResult]) -> dict[str, float]:
         "variations": len(rows),
         "passed": number["passed"],
         "failed": number["failed"],
+        "known": sum(standing[one] for one in EXCUSED),
+        "regressions": standing["regression"],
+        "new_failures": standing["new"],
         "not_run": number["not run"],
         "failed_entries": sum(one.verdict == "failed" for one in results),
         "critical": sum(row.critical for row in rows),
@@ -107,14 +117,23 @@ def figures_of(results: Sequence[EntryResult]) -> dict[str, float]:
 
 
 def _all_pass(suite: SuiteRun, ego: str) -> Outcome:
-    number = counts(suite.of_ego(ego))
+    results = suite.of_ego(ego)
+    number = counts(results)
     details = ", ".join(f"{count} {name}" for name, count in number.items())
+    standing = suite.baseline.counts(results)
+    known = sum(standing[one] for one in EXCUSED)
+    if known:
+        details += f"; {known} of the failed {'is' if known == 1 else 'are'} known"
+    if again := suite.baseline.regressions(results):
+        details += f"; regression: {', '.join(again)} {'was' if len(again) == 1 else 'were'} fixed"
+        details += f", and {'fails' if len(again) == 1 else 'fail'} again"
     verdict: Verdict = "passed"
-    if number["failed"]:
+    if number["failed"] > known:
         verdict = "failed"
-    elif number["not run"] or not number["passed"]:
+    elif number["not run"] or not number["passed"] + known:
         verdict = "unknown"
-    return Outcome(f"all variations pass{f' with {ego}' if ego else ''}", verdict, details)
+    test = "all variations pass" + (" but known failures" if suite.baseline.failures else "")
+    return Outcome(test + (f" with {ego}" if ego else ""), verdict, details)
 
 
 def _suites(suite: SuiteRun, outcomes: Sequence[Outcome]) -> list[Suite]:
@@ -131,22 +150,43 @@ def _suites(suite: SuiteRun, outcomes: Sequence[Outcome]) -> list[Suite]:
             "variations": str(len(one.rows)),
             **{name.replace(" ", "_"): str(n) for name, n in one.outcomes().items()},
         }
-        found.append(Suite(one.entry, _cases(one, group), facts))
+        failure = suite.baseline.failures.get(one.entry)
+        if failure is not None:
+            facts |= {"failure": failure[0], "status": failure[1].status}
+        found.append(Suite(one.entry, _cases(suite, one, group), facts))
     return found
 
 
-def _cases(one: EntryResult, group: str) -> list[Case]:
-    """Return the tests of an entry: that it runs, that no variation is critical, its criteria."""
+def _cases(suite: SuiteRun, one: EntryResult, group: str) -> list[Case]:
+    """Return the tests of an entry: that it runs, that no variation is critical, its criteria.
+
+    What fails as it is known to is skipped.
+    """
     if one.problem:
         return [Case(group, "runs", "error", one.problem)]
+    baseline = suite.baseline
+    failure = baseline.failures.get(one.entry)
+    again = failure is not None and failure[1].status == "fixed"
+
+    def case(name: str, rows: Sequence[int], what: str, known: bool) -> Case:
+        if rows and known and failure is not None:
+            return case_of_rows(
+                group, name, one, rows, f"{what}: {failure[1].status} failure", "skipped"
+            )
+        what += ": regression, this failure was fixed" if again and rows else ""
+        return case_of_rows(group, name, one, rows, what, "failure", suite)
+
     lost = [i for i, row in enumerate(one.rows) if row.problem]
     cases = [case_of_rows(group, "runs", one, lost, "did not run", "error")]
     critical = [i for i, row in enumerate(one.rows) if row.critical]
-    cases.append(case_of_rows(group, "no critical scenario", one, critical, "critical", "failure"))
+    excused = all(baseline.is_excused(one, one.rows[i]) for i in critical)
+    cases.append(case("no critical scenario", critical, "critical", excused))
     for number, given in enumerate(one.criteria):
         violating = [i for i, row in enumerate(one.rows) if number in row.violated]
         words = words_of(read_criterion(given))
-        cases.append(case_of_rows(group, words, one, violating, "violate it", "failure"))
+        cases.append(
+            case(words, violating, "violate it", baseline.is_criterion_excused(one, number))
+        )
     return cases
 
 
@@ -156,7 +196,8 @@ def case_of_rows(
     one: EntryResult,
     rows: Sequence[int],
     what: str,
-    problem: Literal["error", "failure"],
+    problem: Problem,
+    suite: SuiteRun | None = None,
 ) -> Case:
     """Return a test that has a problem if there are such variations, and names them.
 
@@ -167,11 +208,14 @@ def case_of_rows(
         rows: the numbers of these variations.
         what: what is wrong with them, in words.
         problem: that the test has.
+        suite: to say how to see the first again; not said without.
     """
     message = f"{len(rows)} of {len(one.rows)} variations {what}"
     lines = [row_in_words(one, i, one.rows[i]) for i in rows[:MOST_NAMED]]
     if len(rows) > MOST_NAMED:
         lines.append(f"and {len(rows) - MOST_NAMED} more")
+    if rows and suite is not None:
+        lines.append(f"the first again: {replay_command(suite.folder, one, rows[0])}")
     return Case(group, name, problem if rows else None, message, "\n".join(lines))
 
 

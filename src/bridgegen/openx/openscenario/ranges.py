@@ -38,6 +38,10 @@ _AT_LEAST = (osc.Rule.GREATER_THAN, osc.Rule.GREATER_OR_EQUAL, osc.Rule.EQUAL_TO
 _AT_MOST = (osc.Rule.LESS_THAN, osc.Rule.LESS_OR_EQUAL, osc.Rule.EQUAL_TO)
 
 
+WHICH_SET = "Which of the value sets is taken, from 0."
+"""The description of the parameter that numbers the sets of a joint distribution."""
+
+
 @dataclass(frozen=True)
 class FileParameter(Parameter):
     """A parameter of a scenario file: of any name, perhaps of no known unit, distributed.
@@ -47,6 +51,11 @@ class FileParameter(Parameter):
     """
 
     distribution: Distribution | None = None
+
+    @property
+    def is_set(self) -> bool:
+        """Whether it is the number, from 0 on, of a set of values that come together."""
+        return self.description == WHICH_SET
 
     def at(self, share: Float, lo: Float | float, hi: Float | float) -> Float:
         """See `Parameter`."""
@@ -353,7 +362,7 @@ class _Builder:
             last = len(next(iter(columns.values()))) - 1
             parameters[index] = FileParameter(
                 index, Axis.PARTICIPANTS, "count", 0.0, float(last), 0.0, INTEGER,
-                "Which of the value sets is taken, from 0.",
+                WHICH_SET,
             )  # fmt: skip
             joint += [
                 DerivedParameter(

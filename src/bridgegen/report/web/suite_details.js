@@ -47,7 +47,7 @@ export class Details {
     const stage = element("div", { class: of.motion === undefined ? "playback none" : "playback" });
     const parts = [this.facts(found, of), stage, ...(found.total ? [new Variations(found, words, ego, of.motion !== undefined).node] : [])];
     this.body.replaceChildren(...parts);
-    if (of.v !== "f") return void stage.remove();
+    if (of.v !== "f" && of.motion === undefined) return void stage.remove(); // one that was asked for is played though it passes
     if (of.motion === undefined) stage.append(element("p", { class: "muted" }, "This page holds no playback of it: only of the most severe failures, and where the files are unchanged."));
     if (of.motion !== undefined) await motions.show(of.motion, stage, seconds);
     if (found.command) stage.append(this.command(found.command));
@@ -58,8 +58,8 @@ export class Details {
     return element("div", { class: "replay" }, element("p", { class: "muted" }, "To run it again, in the folder in which the suite was run:"), element("div", { class: "command" }, code, copying));
   }
 
-  facts({ driver, files, notes }, { problem, blameless }) {
-    const lines = [problem ? element("p", { class: "lost" }, `Did not run: ${problem}`) : "", element("p", { class: "muted files" }, [...files, driver ? `driver ${driver}` : ""].filter(Boolean).join("  ·  "))];
+  facts({ driver, files, notes }, { problem, blameless, standing, comment }) {
+    const lines = [standing ? element("p", {}, `${standing[0].toUpperCase()}${standing.slice(1)}${comment ? `: ${comment}` : ""}.`) : "", problem ? element("p", { class: "lost" }, `Did not run: ${problem}`) : "", element("p", { class: "muted files" }, [...files, driver ? `driver ${driver}` : ""].filter(Boolean).join("  ·  "))];
     if (blameless) lines.push(element("p", {}, `${blameless} of the variations that pass ${blameless === 1 ? "has a collision that is" : "have collisions that are"} no failure of the ego: others are responsible, or their motion is implausible.`));
     if (notes.length) lines.push(element("details", {}, element("summary", {}, notes.length === 1 ? "1 note" : `${notes.length} notes`), element("ul", {}, ...notes.map((note) => element("li", {}, note)))));
     return element("div", { class: "told" }, ...lines);

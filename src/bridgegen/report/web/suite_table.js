@@ -24,7 +24,8 @@ const told = entries.map(({ results }) => {
 });
 const texts = entries.map((entry, k) => {
   const { worst, violated, problem } = told[k];
-  return [entry.name, entry.title, entry.differ, problem, ...(worst?.conflict ?? []), ...violated.map((i) => suite.criteria[i].id)].join("\n").toLowerCase();
+  const standing = entry.results.flatMap((result) => [result?.standing ?? "", result?.comment ?? ""]);
+  return [entry.name, entry.title, entry.differ, problem, ...standing, ...(worst?.conflict ?? []), ...violated.map((i) => suite.criteria[i].id)].join("\n").toLowerCase();
 });
 
 /** @type {[string, (k: number) => any[], (k: number) => any[], string][]} title, by what it is sorted (the least first), its cell, its class */
@@ -52,10 +53,11 @@ function scenarioCell(k) {
 
 function resultCell(result) {
   if (!result) return ["–"];
-  const words = element("span", { class: { f: "failed", n: "lost", p: "passed" }[result.v] }, verdictWords(result));
+  const words = element("span", { class: result.excused ? "excused" : { f: "failed", n: "lost", p: "passed" }[result.v] }, verdictWords(result));
   const more = result.blameless ? element("small", { title: "others are responsible, or their motion is implausible" }, `${counted(result.blameless)} blameless collision${result.blameless > 1 ? "s" : ""}`) : "";
   const hits = result.hits ? element("small", {}, `${counted(result.hits[0])} mitigated, ${counted(result.hits[1])} not avoided`) : "";
-  return [words, bar(result.n), hits, more];
+  const standing = result.standing ? element("small", { class: result.excused ? "" : "failed", title: result.comment }, result.standing) : "";
+  return [words, bar(result.n), standing, hits, more];
 }
 
 function failureCell(k) {

@@ -91,7 +91,7 @@ export class Variations {
 
   lead() {
     const { at, total } = this.found;
-    if (total === 1) return "Nothing varies.";
+    if (total === 1) return this.found.parameters.length ? "One variation." : "Nothing varies.";
     const all = at.length === total ? `${counted(total)}, the failed ones first.` : `The first ${counted(at.length)} of ${counted(total)}, the failed ones first; the others are in results.jsonl.`;
     return this.played ? `${all} No. ${counted(this.found.worst + 1)} is the one that is played.` : all;
   }

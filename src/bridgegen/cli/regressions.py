@@ -1,0 +1,109 @@
+"""The commands of a suite that grows: ``suite add``, and ``suite replay`` of one variation."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from bridgegen.cli import options as common
+from bridgegen.cli.app import FAILED, suites
+from bridgegen.cli.completion import completing
+from bridgegen.cli.connection import NO_CONNECTION, Connection, read_access, with_connection_options
+from bridgegen.cli.map_folder import with_map_folder
+from bridgegen.options.option import DRIVER, OUTPUT, WHAT
+
+Results = Annotated[
+    Path, typer.Argument(metavar="FOLDER", help="Folder of a suite's results, suites/NAME.")
+]
+
+
+@suites.command("add")
+@with_map_folder(WHAT)
+def add(
+    given: Annotated[
+        list[str],
+        typer.Argument(
+            metavar="FAILURES...",
+            help="Folders of runs or of suites' results; or scenario files (.xosc).",
+        ),
+    ],
+    to: Annotated[
+        Path,
+        typer.Option(
+            "--to", help="Folder of the suite that grows, new or not.", rich_help_panel=OUTPUT
+        ),
+    ],
+    ego: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="Driver of the scenario files, or your own driver of the run; may be repeated.",
+            show_default="the files' own",
+            rich_help_panel=DRIVER,
+            autocompletion=completing("driver"),
+        ),
+    ] = None,
+    replace_worse: Annotated[
+        bool,
+        typer.Option(
+            "--replace-worse",
+            help="Replace the scenario of a known failure mode by one with more harm.",
+            rich_help_panel=OUTPUT,
+        ),
+    ] = False,
+    as_json: common.Json = False,
+) -> None:
+    """Keep new failures in a suite that grows.
+
+    Of each failure mode that is not there yet, the worst robust scenario and its minimal form; each
+    is run again there. The index failures.yaml holds a status for each, which you set.
+    """
+    from bridgegen.screen.growth import print_additions
+    from bridgegen.suite.growth import add_failures
+
+    made = add_failures(given, to, egos=ego or (), replace_worse=replace_worse)
+    print_additions(made, to, as_json=as_json)
+
+
+@suites.command("replay")
+@with_map_folder(WHAT)
+@with_connection_options
+def replay(
+    folder: Results,
+    scenario: Annotated[str, typer.Argument(help="The scenario, by its name in the suite.")],
+    variation: Annotated[int, typer.Argument(help="Number of the variation, from 1 on.")],
+    ego: Annotated[
+        str | None,
+        typer.Option(
+            help="Driver, where the suite has several, or it is your own.",
+            show_default=False,
+            rich_help_panel=DRIVER,
+            autocompletion=completing("driver"),
+        ),
+    ] = None,
+    connection: Connection = NO_CONNECTION,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            help="Folder for the scenario's files and its page.",
+            show_default="FOLDER/variations/NAME",
+            rich_help_panel=OUTPUT,
+        ),
+    ] = None,
+    as_json: common.Json = False,
+) -> None:
+    """Run one variation of a suite again, exactly.
+
+    Exports it as scenario files, and plays it on a page. The exit status is 3 if its result is not
+    the recorded one.
+    """
+    from bridgegen.screen.growth import print_replayed
+    from bridgegen.suite.page import write_replay_page
+    from bridgegen.suite.replay import replay as run_again
+
+    made = run_again(
+        folder, scenario, variation, ego=ego, out=out, simulator=read_access(connection)
+    )
+    page = write_replay_page(made)
+    print_replayed(made, page, as_json=as_json)
+    if not (made.is_same and made.is_same_exported):
+        raise typer.Exit(FAILED)
