@@ -23,14 +23,14 @@ CELLS = {
     "cmcscp-open": (0, 0, 16), "cpna": (44, 36, 24), "cpfa": (22, 12, 48), "cpnco": (22, 12, 24),
     "cpla": (32, 20, 60), "cbla": (15, 9, 27), "cbna": (11, 12, 18), "cbfa": (11, 12, 18),
     "cbnao": (11, 12, 18), "cpta-fs": (3, 3, 17), "cpta-fo": (3, 3, 17), "cpta-ns": (0, 1, 4),
-    "cpta-no": (1, 1, 4), "cbta-fo": (0, 3, 17),
+    "cpta-no": (1, 1, 4), "cbta-fo": (0, 3, 17), "cbta-no": (0, 1, 2),
 }  # fmt: skip
 """Grid cells by the protocols' tables: of 2023, of 2026's standard and extended ranges. Those of
 crossing vehicles count twice, for either side."""
 
 POINTS = {
     "cc": 1.35 + 2.7 + 1.8 + 2.25 + 2.25 + 4.5 + 6.75, "cm": 1.35 + 1.8 + 4.5 + 6.75,
-    "cp": 2.25 + 2.25 + 4.5, "cb": 2.25 + 4.5 + 0.75 + 0.125 * 17 / 19,
+    "cp": 2.25 + 2.25 + 4.5, "cb": 2.25 + 4.5 + 1.0 + 0.125,
 }  # fmt: skip
 """Crash Avoidance, Frontal Collisions, 1.1, tables 3.1.1 to 3.2.3: standard and extended range."""
 
@@ -143,10 +143,10 @@ def test_who_crosses_beyond_the_turn_is_met_at_the_location(name):
         assert 50.0 + 100.0 * left / WIDTH == pytest.approx(row["location"], abs=9.0)  # 0.16 m
 
 
-@pytest.mark.parametrize("name", ["ccftap", "cmftap", "cbta-fo"])
+@pytest.mark.parametrize("name", ["ccftap", "cmftap", "cbta-fo", "cbta-no"])
 def test_in_a_turn_the_front_of_the_target_meets_the_location(name):
-    half = {"ccftap": 0.856, "cmftap": 0.0, "cbta-fo": 0.0}[name]
-    front = {"ccftap": 3.3395, "cmftap": 1.713, "cbta-fo": 1.55}[name]
+    half = {"ccftap": 0.856, "cmftap": 0.0, "cbta-fo": 0.0, "cbta-no": 0.0}[name]
+    front = {"ccftap": 3.3395, "cmftap": 1.713}.get(name, 1.55)
     found, step = contacts(f"ncap-aeb/{name}")
     for row, _, ahead, left, angle, v, k in found:
         assert k * step == pytest.approx(5.0, abs=2 * step)
