@@ -392,6 +392,9 @@ def test_the_paper_s_eleven_and_their_units():
         ("tet", "s", "larger", 0.0),
         ("tit", "s²", "larger", 0.0),
         ("rss", "1", "larger", 0.0),
+        ("impact_speed", "m/s", "larger", 0.0),
+        ("relative_impact_speed", "m/s", "larger", 0.0),
+        ("speed_reduction", "m/s", "smaller", 60.0),
     ],
 )
 def test_what_counts_as_critical_and_as_not_at_all(name, unit, sense, cap):

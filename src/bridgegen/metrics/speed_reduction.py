@@ -12,7 +12,7 @@ def speed_reduction(rollout: Rollout) -> Float:
     """Return the ego's speed at the start less that at its first contact.
 
     Returns:
-        ``(N,)`` float64 [m/s]; below 0 if it is faster then; 0 without a contact; NaN where the
+        ``(N,)`` float64 [m/s]; below 0 if it is faster then; +inf without a contact; NaN where the
         scenario failed.
 
     Source: Vreduction of Euro NCAP's Crash Avoidance protocol, Frontal Collisions, 1.1 (2025);
@@ -21,7 +21,7 @@ def speed_reduction(rollout: Rollout) -> Float:
     _, instant = first_contact(rollout)
     before, after = recorded(rollout, "v")[:, 0, 0], at_contact(rollout, "v")[:, 0]
     reduction = np.abs(before) - np.abs(after)
-    return without_failed(rollout, np.where(instant < 0, 0.0, reduction))
+    return without_failed(rollout, np.where(instant < 0, np.inf, reduction))
 
 
 METRIC = Metric(
@@ -29,6 +29,6 @@ METRIC = Metric(
     unit="m/s",
     description="ego speed at the start less that at its first contact",
     sense="smaller",
-    cap=0.0,
+    cap=60.0,  # more than any vehicle is fast
     compute=speed_reduction,
 )

@@ -256,7 +256,7 @@ def _rows(
                 d_min=finite(float(metrics["d_min"][i])),
                 impact_speed=float(metrics["impact_speed"][i]),
                 relative_impact_speed=float(metrics["relative_impact_speed"][i]),
-                speed_reduction=float(metrics["speed_reduction"][i]),
+                speed_reduction=finite(float(metrics["speed_reduction"][i])) or 0.0,
                 conflict=texts["conflict"],
                 conflict_type=texts["conflict_type"],
                 responsible=texts["responsible"],

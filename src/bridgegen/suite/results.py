@@ -39,7 +39,8 @@ class RowResult(Strict):
         d_min: smallest distance to others [m]; None: there are none.
         impact_speed: the ego's at its first contact [m/s]; 0: none, or it stands.
         relative_impact_speed: the same, less the other's speed along the ego's heading [m/s].
-        speed_reduction: the ego's speed at the start less that at its first contact [m/s].
+        speed_reduction: the ego's speed at the start less that at its first contact [m/s]; 0
+            without one.
         conflict: of the decisive conflict: "contact", "near miss", … , or "".
         conflict_type: its type.
         responsible: who is, for a contact or near miss.
