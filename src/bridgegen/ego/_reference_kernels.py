@@ -30,7 +30,7 @@ from bridgegen.ego._perception_kernels import perceive
 from bridgegen.ego._prediction_kernels import predict, predict_truly
 from bridgegen.ego._route_follower_kernels import hold_speed, keep_to_route, preview
 from bridgegen.ego._shift_kernels import UNSHIFTED, pursue_beside, shift_speed
-from bridgegen.ego._sight_kernels import LIGHT, REAR, WALKER, sight
+from bridgegen.ego._sight_kernels import LIGHT, REAR, WALKER, column_of, seen_in
 from bridgegen.ego._speed_kernels import (
     FAST_ROAD,
     LIMIT,
@@ -64,8 +64,8 @@ def reach_of(v):
 
 @kernel
 def plan(path, bends, road, drops, n, road_n, ds, s, v, body, target, friction_limit, seen,
-         light_seen, in_town, around, tracks, passages, n_passages, crosswalks, stop_stations, halts,
-         lights, elapsed, mind):  # fmt: skip
+         light_seen, in_town, around, tracks, passages, n_passages, crosswalks, stop_stations,
+         halts, lights, elapsed, mind):  # fmt: skip
     """Return the acceleration [m/s²] that the planner wants.
 
     Args:
@@ -178,8 +178,9 @@ def drive(k, plan_, roads, state, record):
         seen = light_seen = math.inf
         if not plan_.ideal_perception:
             cosine, sine = math.cos(record.h[0, k]), math.sin(record.h[0, k])
-            seen = sight(state.weather, WALKER if in_town else REAR, cosine, sine)
-            light_seen = sight(state.weather, LIGHT, cosine, sine)
+            column, share = column_of(state.weather, cosine, sine)
+            seen = seen_in(state.weather, WALKER if in_town else REAR, column, share)
+            light_seen = seen_in(state.weather, LIGHT, column, share)
         mind[PLANNED] = plan(
             path, roads.bends[p], roads.road, roads.drops, n, road_n, ds, s, v, body,
             state.command[0], friction_limit, seen, light_seen, in_town, state.around,

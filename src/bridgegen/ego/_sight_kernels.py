@@ -112,11 +112,25 @@ def sight(weather, thing, cosine, sine):
         cosine: of the heading in which one looks.
         sine: of it.
     """
+    i, share = column_of(weather, cosine, sine)
+    return seen_in(weather, thing, i, share)
+
+
+@kernel
+def column_of(weather, cosine, sine):
+    """Return the column of the table by the angle to the sun of a heading, and the share beyond."""
     if weather[GLARE] <= 0.0:
-        return tabulated(weather, thing, 0)
+        return 0, 0.0
     angle = math.acos(min(max(weather[SUN_X] * cosine + weather[SUN_Y] * sine, -1.0), 1.0))
     halvings = N_GLARES - 1 - math.log2(min(max(math.degrees(angle), 1.0), 64.0))
     i = min(int(halvings), N_GLARES - 2)
-    share = halvings - i
+    return i, halvings - i
+
+
+@kernel
+def seen_in(weather, thing, i, share):
+    """Return how far [m] a thing is seen between two columns of the table."""
     off = tabulated(weather, thing, i)
+    if share == 0.0:
+        return off
     return off + share * (tabulated(weather, thing, i + 1) - off)

@@ -84,6 +84,7 @@ class Plan(NamedTuple):
     heeds: int
     begins_waiting: int
     is_driven: int
+    until_collision: int
     has_pedals: int
     driver_code: int
     own_code: int

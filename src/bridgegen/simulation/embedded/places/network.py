@@ -181,8 +181,8 @@ class Network:
         nodes = max(each.numbers.shape[1] for each in ways)
         return Roads(
             paths=paths,
-            bends=_bends(paths),
-            drops=_drops(self.scene.road),
+            bends=next_bends(paths),
+            drops=next_drops(self.scene.road),
             counts=counts,
             steps=np.ascontiguousarray(steps[:, :, 0, 0]),
             follows=_numbers([[path.follows for path in each.paths] for each in ways]),
@@ -238,7 +238,7 @@ class Network:
         return whole
 
 
-def _bends(paths: Float) -> Int:
+def next_bends(paths: Float) -> Int:
     """Return the first row from each on that is in a bend, ``(P, K, L)`` int64; L: none is."""
     from bridgegen.ego._path_kernels import CURVATURE  # numba is slow to import
     from bridgegen.ego._speed_kernels import STRAIGHT
@@ -249,7 +249,7 @@ def _bends(paths: Float) -> Int:
     return np.ascontiguousarray(first)
 
 
-def _drops(roads: Float) -> Int:
+def next_drops(roads: Float) -> Int:
     """Return the first row after each with a lower speed limit, ``(P, L)`` int64; L: none has."""
     from bridgegen.ego._speed_kernels import LIMIT
 
