@@ -8,6 +8,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, ValidationInfo, field_validator
 
+from bridgegen.odd.clauses import ClauseSection
 from bridgegen.odd.criteria import CriterionSection
 from bridgegen.odd.roads_schema import RoadsSection
 from bridgegen.odd.shape import (
@@ -201,6 +202,8 @@ class ScenarioFile(ShapedSection):
     """By name: what follows from parameters."""
     criteria: list[CriterionSection] = []
     """Pass criteria: formulas that a scenario must keep, each with an id."""
+    clauses: list[ClauseSection] = []
+    """Clauses of a regulation or protocol, which a suite judges."""
     objective: Annotated[ObjectiveSection | Literal["harm"], OrWord(ObjectiveSection, "harm")] = (
         "harm"
     )

@@ -3,6 +3,7 @@
 import json
 import sys
 from collections.abc import Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -78,6 +79,7 @@ def print_suite(suite: "SuiteRun", seconds: float, page: Path, *, as_json: bool 
     console.print(table)
     if len(by_entry) > len(listed):
         print(f"and {len(by_entry) - len(listed)} more")
+    _print_clauses(suite, console)
     print()
     for ego in suite.egos:
         results = suite.of_ego(ego)
@@ -89,6 +91,23 @@ def print_suite(suite: "SuiteRun", seconds: float, page: Path, *, as_json: bool 
             f"{number['not run']} did not run"
         )
     print(f"page: {page} ({seconds:.1f} s)")
+
+
+def _print_clauses(suite: "SuiteRun", console: Console) -> None:
+    """Print what each ego makes of each clause, if entries state any."""
+    from bridgegen.suite.clauses import clause_results
+    from bridgegen.suite.sentences import clause_in_words
+
+    by_ego = [clause_results(suite.results, ego) for ego in suite.egos]
+    if not any(by_ego):
+        return
+    table = Table(box=None, pad_edge=False, header_style="bold")
+    for head in ("clause", *(ego or "ego's own driver" for ego in suite.egos), "requirement"):
+        table.add_column(head, overflow="fold")
+    for of_it in zip(*by_ego, strict=True):
+        table.add_row(of_it[0].id, *map(clause_in_words, of_it), of_it[0].text)
+    print()
+    console.print(table)
 
 
 def print_difference(found: "Difference", page: Path, *, as_json: bool = False) -> None:
@@ -163,12 +182,18 @@ def _worst(some: Sequence["EntryResult"]) -> str:
 
 
 def _facts(suite: "SuiteRun") -> dict[str, Any]:
+    from bridgegen.suite.clauses import clause_results
     from bridgegen.suite.results import counts
 
     return {
         "folder": str(suite.folder),
         "egos": list(suite.egos),
         "counts": {ego: counts(suite.of_ego(ego)) for ego in suite.egos},
+        "clauses": [
+            {"verdict": one.verdict, **asdict(one)}
+            for ego in suite.egos
+            for one in clause_results(suite.results, ego)
+        ],
         "entries": [
             {
                 "entry": one.entry,

@@ -15,6 +15,7 @@ from bridgegen.options import CommonOptions
 from bridgegen.pipeline import Pipeline
 from bridgegen.simulation.choice import SimulatorChoice
 from bridgegen.simulation.rollout import STATUS_MESSAGES
+from bridgegen.suite.clauses import judged
 from bridgegen.suite.entries import Entry
 from bridgegen.suite.results import EntryResult, RowResult, finite
 from bridgegen.suite.rows import rows_of
@@ -110,7 +111,8 @@ def _evaluated(job: Job, found: EntryResult) -> EntryResult:
     for start in range(0, len(X), AT_ONCE):
         some = X[start : start + AT_ONCE]
         evaluation = pipeline.evaluate(some)
-        rows += _rows(pipeline, some, evaluation, names)
+        found_here = _rows(pipeline, some, evaluation, names)
+        rows += judged(pipeline, job.simulator, some, found_here)
     units = dict(zip(space.names, space.units, strict=True))
     return found.model_copy(
         update={
@@ -119,6 +121,7 @@ def _evaluated(job: Job, found: EntryResult) -> EntryResult:
             "parameters": names,
             "units": [units[name] for name in names],
             "criteria": [one.to_dict() for one in pipeline.monitor],
+            "clauses": [one.to_dict() for one in pipeline.scenario.clauses],
             "rows": rows,
             "notes": notes,
         }

@@ -10,8 +10,15 @@ from bridgegen.report.packed import OF_ROW, deflated, road_key
 from bridgegen.report.payload import script_json
 from bridgegen.report.playback import Playback
 from bridgegen.report.playback_payload import ROAD_SCALE, SCALE, playback_payload, road_payload
+from bridgegen.suite.clauses import clause_results
 from bridgegen.suite.results import EntryResult, RowResult, Verdict, rank
-from bridgegen.suite.sentences import difference, differences, headline, label_of
+from bridgegen.suite.sentences import (
+    clause_in_words,
+    difference,
+    differences,
+    headline,
+    label_of,
+)
 from bridgegen.suite.suite import SuiteRun
 
 SIZE, SIZE_OF_RESULT = 2_600_000, 600
@@ -82,6 +89,7 @@ def payload(
             "facts": _facts(suite),
             "entries": entries,
             "criteria": _matrix(suite, criteria),
+            "clauses": _clauses(suite),
             "motions": motions,
         },
     }
@@ -190,6 +198,21 @@ def _matrix(suite: SuiteRun, criteria: Mapping[str, int]) -> list[dict[str, Any]
         for criterion, table in zip(found, of, strict=True):
             criterion["of"].append(table)
     return found
+
+
+def _clauses(suite: SuiteRun) -> list[dict[str, Any]]:
+    """Return each clause of a regulation with what each ego makes of it."""
+    by_ego = [clause_results(suite.results, ego) for ego in suite.egos]
+    found: dict[str, dict[str, Any]] = {}
+    for e, clauses in enumerate(by_ego):
+        for one in clauses:
+            shown = {"id": one.id, "text": one.text, "entries": one.entries, "of": {}}
+            found.setdefault(one.id, shown)["of"][str(e)] = {
+                "v": _LETTER[one.verdict],
+                "words": clause_in_words(one),
+                "rows": [one.passed, one.failed, one.not_run],
+            }
+    return list(found.values())
 
 
 def _facts(suite: SuiteRun) -> list[str]:

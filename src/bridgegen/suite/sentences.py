@@ -3,6 +3,7 @@
 from collections import Counter
 from collections.abc import Sequence
 
+from bridgegen.suite.clauses import ClauseResult
 from bridgegen.suite.results import EntryResult, Verdict, counts
 from bridgegen.suite.suite import SuiteRun
 
@@ -44,6 +45,18 @@ def headline(results: Sequence[EntryResult], label: str) -> str:
     lost = [f"{number['not run'] - partly:,} did not run"] if number["not run"] > partly else []
     lost += [f"{partly:,} ran only in part"] if partly else []
     return "; ".join([words, *lost])
+
+
+def clause_in_words(one: ClauseResult) -> str:
+    """Return what an ego makes of a clause: "3 of 101 fail, 2 collisions not preventable" say."""
+    n = one.passed + one.failed
+    parts = [f"{one.failed:,} of {n:,} fail"] if one.failed else [f"pass ({n:,})"] if n else []
+    if one.unpreventable:
+        some = "collision" if one.unpreventable == 1 else "collisions"
+        parts.append(f"{one.unpreventable:,} {some} not preventable")
+    parts += [f"{one.not_run:,} not run"] if one.not_run else []
+    parts += [f"{one.not_applicable:,} not applicable"] if one.not_applicable else []
+    return ", ".join(parts)
 
 
 def difference(verdicts: Sequence[Verdict], labels: Sequence[str]) -> str:

@@ -5,9 +5,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Self
 
+from bridgegen.odd.clauses import read_clause
 from bridgegen.odd.criteria import read_criterion
+from bridgegen.suite.clauses import clause_results
 from bridgegen.suite.difference import Difference
-from bridgegen.suite.results import EntryResult, RowResult, counts
+from bridgegen.suite.results import FAILED, EntryResult, RowResult, counts
+from bridgegen.suite.sentences import clause_in_words
 from bridgegen.suite.suite import SuiteRun
 from bridgegen.verdict.fail_if import (
     FailCondition,
@@ -22,9 +25,10 @@ FIGURES = {
     "entries": "scenarios with their variations, of all egos",
     "variations": "variations, of all egos",
     "passed": "variations that pass",
-    "failed": "variations that fail: critical, or a pass criterion is violated",
+    "failed": "variations that fail: critical, or a pass criterion or clause is violated",
     "not_run": "variations that did not run; an entry that cannot run is one",
     "failed_entries": "entries in which a variation fails",
+    "failed_clauses": "clauses of a regulation that an ego fails",
     "critical": "variations that are critical",
     "collisions": "variations in which the ego collides",
     "worst_severity": "the worst probability of MAIS3+",
@@ -100,6 +104,11 @@ def figures_of(results: Sequence[EntryResult]) -> dict[str, float]:
         "failed": number["failed"],
         "not_run": number["not run"],
         "failed_entries": sum(one.verdict == "failed" for one in results),
+        "failed_clauses": sum(
+            one.verdict == "failed"
+            for ego in dict.fromkeys(each.ego for each in results)
+            for one in clause_results(results, ego)
+        ),
         "critical": sum(row.critical for row in rows),
         "collisions": sum(row.collisions > 0 for row in rows),
         "worst_severity": max((row.severity for row in rows), default=0.0),
@@ -170,6 +179,10 @@ def _suites(suite: SuiteRun, outcomes: Sequence[Outcome]) -> list[Suite]:
             "ego": one.driver or one.ego,
             "variations": str(len(one.rows)),
         }
+        facts |= {
+            f"clause {clause.id}": clause_in_words(clause)
+            for clause in clause_results([one], one.ego)
+        }
         found.append(Suite(one.entry, _cases(one, group), facts))
     return found
 
@@ -186,6 +199,11 @@ def _cases(one: EntryResult, group: str) -> list[Case]:
         violating = [i for i, row in enumerate(one.rows) if number in row.violated]
         words = words_of(read_criterion(given))
         cases.append(_case(group, words, one, violating, "violate it", "failure"))
+    for number, given in enumerate(one.clauses):
+        clause = read_clause(given)
+        failing = [i for i, letter in enumerate(one.letters(number)) if letter == FAILED]
+        name = f"clause {clause.id}: {clause.text}"
+        cases.append(_case(group, name, one, failing, "fail it", "failure"))
     return cases
 
 

@@ -3,6 +3,7 @@
 import { darkScheme } from "./colours.js";
 import { $, element } from "./common.js";
 import { hook } from "./hook.js";
+import { showClauses } from "./suite_clauses.js";
 import { showCriteria } from "./suite_criteria.js";
 import { motions } from "./suite_motions.js";
 import { table } from "./suite_table.js";
@@ -20,6 +21,7 @@ function showResult() {
 }
 
 showResult();
+showClauses();
 showCriteria();
 table.fill();
 table.go();
