@@ -13,6 +13,7 @@ from rich.table import Table
 from bridgegen.screen.live import Live
 
 if TYPE_CHECKING:
+    from bridgegen.preventability import PreventabilityMap
     from bridgegen.suite.difference import Difference
     from bridgegen.suite.results import EntryResult
     from bridgegen.suite.suite import SuiteCallbacks, SuiteRun
@@ -46,17 +47,32 @@ class SuiteScreen(Live):
         self._lost += result.verdict == "not run"
         self._show()
 
+    def show_cells(self, done: int, total: int) -> None:
+        """Show how far a preventability map is."""
+        self.show(what="cells of a map", done=done, total=total, facts="")
+
     def _show(self) -> None:
         facts = f"{self._failed} failed" + (f", {self._lost} not run" if self._lost else "")
         self.show(what="scenarios", done=self._done, total=self._entries, facts=facts)
 
 
-def print_suite(suite: "SuiteRun", seconds: float, page: Path, *, as_json: bool = False) -> None:
+def print_suite(
+    suite: "SuiteRun",
+    seconds: float,
+    page: Path,
+    maps: "Sequence[PreventabilityMap]" = (),
+    *,
+    as_json: bool = False,
+) -> None:
     """Print the entries that fail or did not run, others if there is room; then the totals."""
     from bridgegen.suite.results import counts
 
     if as_json:
-        print(json.dumps(_facts(suite), indent=2, ensure_ascii=False))
+        found = [
+            {"scenario": one.scenario.name, "drivers": [one.figures(name) for name in one.drivers]}
+            for one in maps
+        ]
+        print(json.dumps(_facts(suite) | {"maps": found}, indent=2, ensure_ascii=False))
         return
     by_entry: dict[str, list[EntryResult]] = {}
     for one in suite.results:
@@ -90,6 +106,8 @@ def print_suite(suite: "SuiteRun", seconds: float, page: Path, *, as_json: bool 
             f"variations {number['passed']} pass, {number['failed']} fail, "
             f"{number['not run']} did not run"
         )
+    for made in maps:
+        print(f"map: {made.page}")
     print(f"page: {page} ({seconds:.1f} s)")
 
 

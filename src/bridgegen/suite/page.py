@@ -8,12 +8,14 @@ from bridgegen.disk import write_whole
 from bridgegen.errors import BridgeGenError
 from bridgegen.options import CommonOptions
 from bridgegen.options.option import options_of
+from bridgegen.preventability.result import PreventabilityMap
 from bridgegen.report.page import code_of, page_of
 from bridgegen.report.payload import script_json
 from bridgegen.report.playback import Playback
 from bridgegen.report.playbacks import measured_playbacks
 from bridgegen.simulation.choice import EMBEDDED
 from bridgegen.suite.evaluate import Job, pipeline_of, rows_of_job
+from bridgegen.suite.maps import picture_payload
 from bridgegen.suite.page_payload import Key, key_of, payload
 from bridgegen.suite.results import EntryResult, rank
 from bridgegen.suite.suite import SAMPLES, SuiteRun
@@ -29,12 +31,15 @@ _SIMULATE = ("ideal", "others", "time_limit", "criteria", "empty_trigger")
 """Options that ``bridgegen simulate`` has, too."""
 
 
-def write_suite_page(suite: SuiteRun, jobs: Sequence[Job]) -> Path:
+def write_suite_page(
+    suite: SuiteRun, jobs: Sequence[Job], maps: Sequence[PreventabilityMap] = ()
+) -> Path:
     """Write the page of a suite, whole or not at all.
 
     Args:
         suite: its results.
         jobs: of which they are; those that fail the worst are simulated again, to be played.
+        maps: of its scenarios, in its folder.
 
     Returns:
         The page, in the folder of the results.
@@ -49,7 +54,8 @@ def write_suite_page(suite: SuiteRun, jobs: Sequence[Job]) -> Path:
         for one in suite.results
         if one.verdict == "failed" and key_of(one) in by_key
     }
-    data = payload(suite, played, commands, code=code_of(_MODULE))
+    pictures = [picture_payload(one, suite.folder) for one in maps]
+    data = payload(suite, played, commands, pictures, code=code_of(_MODULE))
     path = suite.folder / FILE
     title = f"{suite.folder.resolve().name}: suite – BridgeGen"
     write_whole(path, page_of(_MODULE, title, script_json(data)))

@@ -48,6 +48,7 @@ def payload(
     suite: SuiteRun,
     played: Mapping[Key, Playback],
     commands: Mapping[Key, str],
+    maps: Sequence[Mapping[str, Any]] = (),
     *,
     code: int = 0,
 ) -> dict[str, Any]:
@@ -60,6 +61,7 @@ def payload(
         suite: the results.
         played: playbacks of the worst failed rows.
         commands: that show failures again.
+        maps: see `bridgegen.suite.maps.picture_payload`.
         code: characters that the page has besides its data.
     """
     labels = [label_of(suite, ego) for ego in suite.egos]
@@ -90,6 +92,7 @@ def payload(
             "entries": entries,
             "criteria": _matrix(suite, criteria),
             "clauses": _clauses(suite),
+            "maps": list(maps),
             "motions": motions,
         },
     }

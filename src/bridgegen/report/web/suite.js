@@ -5,6 +5,7 @@ import { $, element } from "./common.js";
 import { hook } from "./hook.js";
 import { showClauses } from "./suite_clauses.js";
 import { showCriteria } from "./suite_criteria.js";
+import { showMaps } from "./suite_maps.js";
 import { motions } from "./suite_motions.js";
 import { table } from "./suite_table.js";
 import { bar, suite } from "./suite_words.js";
@@ -23,6 +24,7 @@ function showResult() {
 showResult();
 showClauses();
 showCriteria();
+showMaps();
 table.fill();
 table.go();
 hook.open = (name) => table.show(suite.entries.findIndex((one) => one.name === name));
