@@ -274,23 +274,47 @@ def address_of(function: Callable[..., Any], kinds: tuple[Any, ...]) -> int:
         if function not in _INTERPRETED:
             _INTERPRETED.append(function)
         return 1 + _INTERPRETED.index(function)
+    key = (function, *map(id, kinds))  # to hash the types of a hundred arrays takes a millisecond
+    if key in _ADDRESSES:
+        return _ADDRESSES[key][0]
     compiled: Any = function
     with compiled._cache.compiling():
         found = compile_for_kernels(function, kinds)
         address: int = found.library.get_pointer_to_function(found.fndesc.llvm_func_name)
+    _ADDRESSES[key] = address, kinds
     return address
+
+
+_ADDRESSES: dict[tuple[Any, ...], tuple[int, tuple[Any, ...]]] = {}
+"""Where kernels lie in this process; with the types, which must live as long as their ids count."""
 
 
 def row_type(rows: Any, axes: int = 1) -> Any:
     """Return the type of the bundle of one row of a named tuple of arrays.
 
     Args:
-        rows: its arrays, of N rows, and numbers.
+        rows: its arrays, of N rows, and numbers of less than 64 bits.
         axes: how many first axes a row has not.
+
+    Returns:
+        The same object for rows of the same types.
     """
     if numba.config.DISABLE_JIT:
         return None
-    return Bundle(_row_tuple([numba.typeof(one) for one in rows], type(rows), axes))
+    key = (type(rows), axes, *map(_look_of, rows))
+    if key not in _ROW_TYPES:
+        _ROW_TYPES[key] = Bundle(_row_tuple([numba.typeof(one) for one in rows], type(rows), axes))
+    return _ROW_TYPES[key]
+
+
+_ROW_TYPES: dict[tuple[Any, ...], Bundle] = {}
+
+
+def _look_of(one: Any) -> Any:
+    """Return all that Numba's type of an array or a number depends on."""
+    if isinstance(one, np.ndarray):
+        return one.dtype, one.ndim, one.flags.num
+    return type(one)
 
 
 def _row_tuple(kinds: Sequence[Any], named: type, axes: int) -> Any:

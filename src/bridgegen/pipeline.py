@@ -562,11 +562,19 @@ class Pipeline:
         """
         return self.source.concrete(self.space.values(x), road_file)
 
-    def rollout(self, X: Float) -> Rollout:
-        """Roll out N rows as ``evaluate`` does, and keep the motion."""
+    def rollout(self, X: Float, *, until_collision: bool = False) -> Rollout:
+        """Roll out N rows as ``evaluate`` does, and keep the motion.
+
+        Args:
+            X: ``(N, len(space.names))`` float64.
+            until_collision: whether rows may end where the ego collides, to save time.
+        """
         if not self._is_far:
             return joined_rollouts(
-                [(at, one._run(*one._roads_of(X[at]), X[at])) for at, one in self.by_variant(X)]
+                [
+                    (at, one._run(*one._roads_of(X[at]), X[at], until_collision=until_collision))
+                    for at, one in self.by_variant(X)
+                ]
             )
         parts, start = [], 0
         for part in self._map(type(self).rollout, X):
@@ -636,12 +644,20 @@ class Pipeline:
         return batch.rollout()
 
     def _run(
-        self, roads: Any, rows: Int, X: Float, replay: Counterfactual | None = None
+        self,
+        roads: Any,
+        rows: Int,
+        X: Float,
+        replay: Counterfactual | None = None,
+        *,
+        until_collision: bool = False,
     ) -> Rollout:
         """Roll out N rows of one storyboard."""
         if self._refused:
             return self._failed(X)
         columns = {name: X[:, i] for i, name in enumerate(self.space.names)}
+        if until_collision and self.simulator is self.simulator.embedded:
+            return self.simulator.run(roads, rows, columns, until_collision=True)
         if replay is None:
             return self.simulator.run(roads, rows, columns)
         return self.simulator.run(roads, rows, columns, driver=replay.driver, dry=replay.dry)

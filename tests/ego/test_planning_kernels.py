@@ -13,11 +13,17 @@ from bridgegen.ego import kinds
 from bridgegen.ego._caution_kernels import careful_speed, safe_speed
 from bridgegen.ego._control_kernels import EMERGENCY_JERK, JERK, SIZE, actuate
 from bridgegen.ego._emergency_kernels import boxes_meet, must_brake
-from bridgegen.ego._following_kernels import follow, idm, keep_distance, stop_for
+from bridgegen.ego._following_kernels import (
+    COMFORT_DECELERATION,
+    follow,
+    idm,
+    keep_distance,
+    stop_for,
+)
 from bridgegen.ego._lights_kernels import stop_at_lights, stop_at_signs
 from bridgegen.ego._prediction_kernels import LOST, PASSAGE, add_straight, predict
 from bridgegen.ego._shift_kernels import UNSHIFTED as STAYS
-from bridgegen.ego._speed_kernels import bend_speed, limit_speed, sight_speed
+from bridgegen.ego._speed_kernels import bend_speed, limit_speed, scan_length, sight_speed
 from bridgegen.ego._surroundings_kernels import AROUND, surround
 from bridgegen.ego._yielding_kernels import (
     EDGE,
@@ -32,6 +38,7 @@ from bridgegen.ego._yielding_kernels import (
     yield_to_all,
 )
 from bridgegen.simulation.boxes import box_distance
+from bridgegen.simulation.embedded.places.network import next_bends, next_drops
 
 DS = 0.5
 GRIP = 0.85 * 9.81
@@ -129,13 +136,45 @@ def test_stopping_for_a_point_is_the_textbooks_deceleration() -> None:
 
 def test_limits_and_bends_are_braked_for_in_time() -> None:
     path, road = line(0.0, 0.0, 0.0, 200.0), np.full((401, 3), math.inf)
-    assert limit_speed(road, 401, DS, 0.0, 20.0) == math.inf
+
+    def limited(s: float) -> float:
+        return limit_speed(road, next_drops(road[None])[0], 401, DS, s, 20.0)
+
+    def bent(grip: float) -> float:
+        bends = next_bends(path[None, None])[0, 0]
+        return bend_speed(path, bends, 401, DS, 50.0, 5.0, 20.0, grip)
+
+    assert limited(0.0) == math.inf
     road[100:, 0] = 10.0  # from 50 m on
-    assert limit_speed(road, 401, DS, 0.0, 20.0) == pytest.approx(math.sqrt(100.0 + 4.0 * 50.0))
-    assert limit_speed(road, 401, DS, 60.0, 20.0) == pytest.approx(10.0)
+    assert limited(0.0) == pytest.approx(math.sqrt(100.0 + 4.0 * 50.0))
+    assert limited(60.0) == pytest.approx(10.0)
     path[100:, 5] = 0.1
-    assert bend_speed(path, 401, DS, 50.0, 5.0, 20.0, GRIP) == pytest.approx(math.sqrt(30.0))
-    assert bend_speed(path, 401, DS, 50.0, 5.0, 20.0, 2.0) == pytest.approx(math.sqrt(12.0))
+    assert bent(GRIP) == pytest.approx(math.sqrt(30.0))
+    assert bent(2.0) == pytest.approx(math.sqrt(12.0))
+
+
+PIECES = st.lists(st.tuples(st.integers(1, 60), st.sampled_from([0, 1, 2, 3])), max_size=8)
+
+
+@given(PIECES, PIECES, st.floats(0.0, 130.0), st.floats(0.0, 40.0))
+def test_what_is_skipped_changes_no_bit(bends, limits, s, v) -> None:
+    """Beside a look at every metre; straight pieces and limits that do not fall are skipped."""
+    curvatures, allowed = (0.0, 5e-5, -0.004, 0.03), (math.inf, 30.0, 13.9, 8.3)
+    path, road = line(0.0, 0.0, 0.0, 130.0), np.full((261, 3), math.inf)
+    for column, values, pieces in ((path[:, 5], curvatures, bends), (road[:, 0], allowed, limits)):
+        at = 0
+        for rows, which in pieces:
+            column[at : at + rows] = values[which]
+            at += rows
+    n, first = 261, min(int(s / DS), 260)
+    seen = range(first, min(n - 1, first + int(scan_length(v) / DS)), max(int(1.0 / DS), 1))
+    ahead = {i: 2.0 * COMFORT_DECELERATION * max(i * DS - s, 0.0) for i in seen}
+    lateral = min(3.0, 0.6 * GRIP)
+    least = [lateral / abs(path[i, 5]) + ahead[i] for i in seen if abs(path[i, 5]) > 1e-4]
+    bend = bend_speed(path, next_bends(path[None, None])[0, 0], n, DS, s, v, 36.0, GRIP)
+    assert bend == math.sqrt(min([36.0 * 36.0, *least]))
+    least = [road[first, 0] ** 2, *(road[i, 0] * road[i, 0] + ahead[i] for i in seen)]
+    assert limit_speed(road, next_drops(road[None])[0], n, DS, s, v) == math.sqrt(min(least))
 
 
 @given(seen_at=st.floats(4.0, 200.0), grip=st.floats(2.0, 9.0))

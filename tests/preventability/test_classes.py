@@ -1,8 +1,13 @@
 """The class of a cell, by the outcomes of the driver and of the models."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from bridgegen.odd.reader import load
+from bridgegen.options import PipelineOptions
+from bridgegen.pipeline import Pipeline
 from bridgegen.preventability.classes import CellClass, Outcome, classes, collides
 from bridgegen.simulation.rollout import Rollout
 
@@ -65,3 +70,24 @@ def still(x: float, y: float = 0.0, h: float = 0.0, n_steps: int = 2) -> Rollout
 )
 def test_boxes_collide_that_overlap_by_more_than_a_centimetre(rollout, expected):
     assert collides(rollout).tolist() == [expected]
+
+
+def test_rows_that_end_where_the_ego_collides_have_the_same_outcomes():
+    """And the same motion until then."""
+    scenario = load("r157/cut-in")
+    space = scenario.space()
+    X = space.decode(np.random.default_rng(5).random((96, space.n_var)))
+    pipeline = Pipeline(scenario, space, PipelineOptions(ego="route-follower"))
+    whole, short = pipeline.rollout(X), pipeline.rollout(X, until_collision=True)
+    hit = collides(whole)
+    assert 10 < hit.sum() < 86
+    np.testing.assert_array_equal(collides(short), hit)
+    assert (short.n_steps[hit] < whole.n_steps[hit]).all()
+    np.testing.assert_array_equal(short.n_steps[~hit], whole.n_steps[~hit])
+    real = np.arange(whole.shape[2]) < short.n_steps[:, np.newaxis]
+    for name in ("x", "y", "h", "v"):
+        at = np.broadcast_to(real[:, np.newaxis], whole.shape)
+        np.testing.assert_array_equal(getattr(short, name)[at], getattr(whole, name)[at])
+    last = short.take(np.flatnonzero(hit))
+    deep = collides(replace(last, n_steps=last.n_steps - 1))
+    assert deep.mean() < 0.5  # they end at once: most overlap by 2 cm within a time step

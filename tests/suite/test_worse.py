@@ -92,7 +92,7 @@ def test_conditions_name_figures_that_exist():
 
 def test_the_page_names_what_searches_found(compared):
     suite, searches, _ = compared
-    text = write_suite_page(suite, suite.jobs, searches).read_text("utf-8")
+    text = write_suite_page(suite, suite.jobs, searches=searches).read_text("utf-8")
     assert f'"report":"worse/{searches[0].folder.name}/report.html"' in text
     assert "Of 21 variations, route-follower breaks" in text
 

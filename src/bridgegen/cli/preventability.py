@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from bridgegen.cli import options as common
-from bridgegen.cli.app import app
+from bridgegen.cli.app import FAILED, app
 from bridgegen.cli.completion import completing
 from bridgegen.cli.groups import SEARCH
 from bridgegen.options.forms import read_fixed, read_names
@@ -65,6 +65,16 @@ def preventability(
             rich_help_panel=OUTPUT,
         ),
     ] = None,
+    fail_if: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="End with exit status 3 if this holds for a driver, e.g. 'preventable > 0'; may "
+            "be repeated.",
+            show_default=False,
+            rich_help_panel=OUTPUT,
+        ),
+    ] = None,
+    junit: common.Junit = None,
     as_json: common.Json = False,
 ) -> None:
     """Map which scenarios of a grid a driver avoids.
@@ -73,7 +83,10 @@ def preventability(
     """
     from bridgegen.preventability import map_preventability
     from bridgegen.screen.preventability import MapScreen, print_map
+    from bridgegen.screen.verdict import print_outcomes
+    from bridgegen.verdict.of_map import MapCriteria
 
+    judges = MapCriteria.read(fail_if or (), junit)
     with MapScreen() as screen:
         result = map_preventability(
             scenario,
@@ -87,3 +100,5 @@ def preventability(
             callbacks=screen.callbacks,
         )
     print_map(result, screen.seconds, as_json=as_json)
+    if not print_outcomes(judges.judge(result)):
+        raise typer.Exit(FAILED)

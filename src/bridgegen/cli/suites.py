@@ -100,6 +100,14 @@ def suite(
         ),
     ] = None,
     junit: common.Junit = None,
+    with_map: Annotated[
+        bool,
+        typer.Option(
+            "--map",
+            help="Draw the preventability map of each scenario that has a grid of its own.",
+            rich_help_panel=OUTPUT,
+        ),
+    ] = False,
     as_json: common.Json = False,
 ) -> None:
     """Run many scenario files with all their variations.
@@ -109,6 +117,7 @@ def suite(
     """
     from bridgegen.screen.suite import SuiteScreen, print_suite
     from bridgegen.screen.verdict import print_outcomes
+    from bridgegen.suite.maps import map_suite
     from bridgegen.suite.page import write_suite_page
     from bridgegen.suite.suite import run_suite
     from bridgegen.verdict.of_suite import SuiteCriteria
@@ -129,9 +138,10 @@ def suite(
             out=out,
             callbacks=screen.callbacks,
         )
+        maps = map_suite(found, screen.show_cells) if with_map else ()
         screen.show(what="page", facts="")
-        page = write_suite_page(found, found.jobs)
-    print_suite(found, screen.seconds, page, as_json=as_json)
+        page = write_suite_page(found, found.jobs, maps=maps)
+    print_suite(found, screen.seconds, page, maps, as_json=as_json)
     if not print_outcomes(judges.judge(found)):
         raise typer.Exit(FAILED)
 
@@ -210,7 +220,7 @@ def diff(
             found, egos, budget=budget, seed=seed, callbacks=screen.of_searches(budget)
         )
         screen.show(what="page", facts="")
-        page = write_suite_page(found, found.jobs, searches)
+        page = write_suite_page(found, found.jobs, searches=searches)
     made = difference(found.of_ego(egos[0]), found.of_ego(egos[1]), egos)
     print_difference(made, searches, page, as_json=as_json)
     if not print_outcomes(judges.judge(found, made, searches)):

@@ -30,7 +30,7 @@ from bridgegen.ego._perception_kernels import perceive
 from bridgegen.ego._prediction_kernels import predict, predict_truly
 from bridgegen.ego._route_follower_kernels import hold_speed, keep_to_route, preview
 from bridgegen.ego._shift_kernels import UNSHIFTED, pursue_beside, shift_speed
-from bridgegen.ego._sight_kernels import LIGHT, REAR, WALKER, sight
+from bridgegen.ego._sight_kernels import LIGHT, REAR, WALKER, column_of, seen_in
 from bridgegen.ego._speed_kernels import (
     FAST_ROAD,
     LIMIT,
@@ -63,14 +63,16 @@ def reach_of(v):
 
 
 @kernel
-def plan(path, road, n, road_n, ds, s, v, body, target, friction_limit, seen, light_seen,
-         in_town, around, tracks, passages, n_passages, crosswalks, stop_stations, halts, lights,
-         elapsed, mind):  # fmt: skip
+def plan(path, bends, road, drops, n, road_n, ds, s, v, body, target, friction_limit, seen,
+         light_seen, in_town, around, tracks, passages, n_passages, crosswalks, stop_stations,
+         halts, lights, elapsed, mind):  # fmt: skip
     """Return the acceleration [m/s²] that the planner wants.
 
     Args:
         path: the ego's route, ``(n, 6)``.
+        bends: ``(n,)``, see `bend_speed`.
         road: the road along it, ``(n, ROAD)``, see `bridgegen.ego.scene.road_along`.
+        drops: ``(n,)``, see `limit_speed`.
         n: its samples.
         road_n: those of ``road``; 0 where the map has no data along this route.
         ds: between two of them [m].
@@ -94,12 +96,12 @@ def plan(path, road, n, road_n, ds, s, v, body, target, friction_limit, seen, li
         mind: see above.
     """
     front, rear, half_width = body[2] + 0.5 * body[0], 0.5 * body[0] - body[2], 0.5 * body[1]
-    speed = bend_speed(path, n, ds, s, v, target, friction_limit)
+    speed = bend_speed(path, bends, n, ds, s, v, target, friction_limit)
     speed = min(speed, sight_speed(seen, friction_limit))
     if road_n == 0:
         crosswalks, stop_stations, halts = crosswalks[:0], stop_stations[:0], halts[:0]
     else:
-        speed = min(speed, limit_speed(road, road_n, ds, s, v))
+        speed = min(speed, limit_speed(road, drops, road_n, ds, s, v))
     asked = math.inf
     if road_n > 0:
         asked = change_lane(
@@ -176,12 +178,14 @@ def drive(k, plan_, roads, state, record):
         seen = light_seen = math.inf
         if not plan_.ideal_perception:
             cosine, sine = math.cos(record.h[0, k]), math.sin(record.h[0, k])
-            seen = sight(state.weather, WALKER if in_town else REAR, cosine, sine)
-            light_seen = sight(state.weather, LIGHT, cosine, sine)
+            column, share = column_of(state.weather, cosine, sine)
+            seen = seen_in(state.weather, WALKER if in_town else REAR, column, share)
+            light_seen = seen_in(state.weather, LIGHT, column, share)
         mind[PLANNED] = plan(
-            path, roads.road, n, road_n, ds, s, v, body, state.command[0], friction_limit, seen,
-            light_seen, in_town, state.around, state.tracks, state.passages, count,
-            roads.crosswalks, roads.stops, roads.halts, state.lights, elapsed, mind,
+            path, roads.bends[p], roads.road, roads.drops, n, road_n, ds, s, v, body,
+            state.command[0], friction_limit, seen, light_seen, in_town, state.around,
+            state.tracks, state.passages, count, roads.crosswalks, roads.stops, roads.halts,
+            state.lights, elapsed, mind,
         )  # fmt: skip
     if shift_of(mind) != UNSHIFTED and state.on[0] == 0:
         curvature = pursue_beside(

@@ -1,7 +1,7 @@
 """Range of sight in this weather: the distance at which half of the frames show a thing.
 
-`sight` reads it from a table by thing and angle to the sun, which it fills first if the weather is
-new.
+`sight` reads it from a table by thing and angle to the sun, of which it computes what it needs once
+in each weather.
 """
 
 # mypy: allow-untyped-defs
@@ -77,22 +77,29 @@ def glare_of(weather, i):
 
 
 @kernel
-def fill_sight(weather):
-    """Fill the table of sight, by camera or LiDAR, whichever sees farther."""
+def range_of(weather, thing, i):
+    """Return how far a thing is seen in column i, by camera or LiDAR, whichever sees farther."""
+    dazzle = glare_of(weather, i)
+    if thing == LIGHT:
+        signal = SIGNAL_LAMP / (0.25 * math.pi * SIGNAL_SIZE * SIGNAL_SIZE)
+        return camera_sight(weather, SIGNAL_SIZE, signal, NOTICE, dazzle)
+    if thing == REAR:
+        rear = math.sqrt(CAR_WIDTH * CAR_HEIGHT)
+        by_lidar = lidar_sight(weather, rear * rear, REFLECTANCE[CAR])
+        lamp = LAMPS[CAR] / (rear * rear)
+        return max(camera_sight(weather, rear, lamp, IDENTIFY, dazzle), by_lidar)
     walker = math.sqrt(WALKER_WIDTH * WALKER_HEIGHT)
-    rear = math.sqrt(CAR_WIDTH * CAR_HEIGHT)
-    tail = LAMPS[CAR] / (rear * rear)
-    signal = SIGNAL_LAMP / (0.25 * math.pi * SIGNAL_SIZE * SIGNAL_SIZE)
-    by_lidar = lidar_sight(weather, rear * rear, REFLECTANCE[CAR])
-    walker_by_lidar = lidar_sight(weather, walker * walker, REFLECTANCE[PEDESTRIAN])
-    for i in range(N_GLARES):
-        dazzle = glare_of(weather, i)
-        light = camera_sight(weather, SIGNAL_SIZE, signal, NOTICE, dazzle)
-        car = camera_sight(weather, rear, tail, IDENTIFY, dazzle)
-        person = camera_sight(weather, walker, 0.0, IDENTIFY, dazzle)
-        weather[SIGHT + LIGHT * N_GLARES + i] = light
-        weather[SIGHT + REAR * N_GLARES + i] = max(car, by_lidar)
-        weather[SIGHT + WALKER * N_GLARES + i] = max(person, walker_by_lidar)
+    by_lidar = lidar_sight(weather, walker * walker, REFLECTANCE[PEDESTRIAN])
+    return max(camera_sight(weather, walker, 0.0, IDENTIFY, dazzle), by_lidar)
+
+
+@kernel
+def tabulated(weather, thing, i):
+    """Return a number of the table, which is computed when it is first asked for."""
+    at = SIGHT + thing * N_GLARES + i
+    if weather[at] == 0.0:
+        weather[at] = range_of(weather, thing, i)
+    return weather[at]
 
 
 @kernel
@@ -105,13 +112,25 @@ def sight(weather, thing, cosine, sine):
         cosine: of the heading in which one looks.
         sine: of it.
     """
-    if weather[SIGHT] == 0.0:
-        fill_sight(weather)
-    row = SIGHT + thing * N_GLARES
+    i, share = column_of(weather, cosine, sine)
+    return seen_in(weather, thing, i, share)
+
+
+@kernel
+def column_of(weather, cosine, sine):
+    """Return the column of the table by the angle to the sun of a heading, and the share beyond."""
     if weather[GLARE] <= 0.0:
-        return weather[row]
+        return 0, 0.0
     angle = math.acos(min(max(weather[SUN_X] * cosine + weather[SUN_Y] * sine, -1.0), 1.0))
     halvings = N_GLARES - 1 - math.log2(min(max(math.degrees(angle), 1.0), 64.0))
     i = min(int(halvings), N_GLARES - 2)
-    share = halvings - i
-    return weather[row + i] + share * (weather[row + i + 1] - weather[row + i])
+    return i, halvings - i
+
+
+@kernel
+def seen_in(weather, thing, i, share):
+    """Return how far [m] a thing is seen between two columns of the table."""
+    off = tabulated(weather, thing, i)
+    if share == 0.0:
+        return off
+    return off + share * (tabulated(weather, thing, i + 1) - off)

@@ -30,6 +30,6 @@ FRICTION = STATED + 5  # m/s², what the tyres can give: μ·g
 SUN_X, SUN_Y = STATED + 6, STATED + 7  # horizontal components of the direction to the sun
 
 # How far one sees, see ``_sight_kernels``: a row per thing, a column per angle to the sun.
-SIGHT = STATED + 8  # 0 here until somebody asks
+SIGHT = STATED + 8  # each 0 until it is asked for
 N_THINGS, N_GLARES = 3, 7
 WEATHER = SIGHT + N_THINGS * N_GLARES

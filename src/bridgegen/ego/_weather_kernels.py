@@ -76,7 +76,7 @@ def change(weather, environments, row, slots):
 @kernel
 def derive(weather):
     """Set the numbers from ``EXTINCTION`` to ``SUN_Y`` by what is stated; forget ``SIGHT``."""
-    weather[SIGHT] = 0.0
+    weather[SIGHT:] = 0.0
     rain = RAIN_EXTINCTION * max(weather[RAIN], 0.0) ** RAIN_POWER
     snow = SNOW_EXTINCTION * max(weather[SNOW], 0.0) ** SNOW_POWER
     # The drops of fog, too, are larger than either wavelength: Kim, McArthur, Korevaar, SPIE 4214

@@ -11,6 +11,7 @@ from typing import Any, TypeVar
 from bridgegen.errors import FileFormatError, InputError, ScenarioError, UnknownNameError
 from bridgegen.odd.changes import TemporaryChanges, jam_members
 from bridgegen.odd.checks import NEEDED, time_problems, try_out, use_problems
+from bridgegen.odd.clauses import read_clauses_in
 from bridgegen.odd.constraints import problems_of
 from bridgegen.odd.criteria import read_criteria_in, unknown_entities
 from bridgegen.odd.expression import Expression, parse
@@ -369,6 +370,8 @@ def _build(document: Document, folder: Path | None) -> LogicalScenario:
     criteria, wrong = read_criteria_in(document)
     problems += wrong + unknown_entities(criteria, [one.name for one in story.participants])
     matrix = read_matrix(document, parameters, derived, quantities.report)
+    clauses, wrong = read_clauses_in(document, criteria)
+    problems += wrong
     declarations.derived += changes.derived
     derived |= {one.name: one for one in changes.derived}
     between = bounds_between_layers(roads, story, parameters, declarations.prefixes, document.place)
@@ -409,6 +412,7 @@ def _build(document: Document, folder: Path | None) -> LogicalScenario:
         objective=objective,
         criteria=criteria,
         matrix=matrix,
+        clauses=clauses,
     )
     try_out(scenario)
     return scenario

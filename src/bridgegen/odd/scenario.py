@@ -17,6 +17,7 @@ from bridgegen.odd.story import Adversary, EventSpec, Participant, Story
 from bridgegen.odd.thresholds import Thresholds
 
 if TYPE_CHECKING:  # the checks of individuals start without pydantic
+    from bridgegen.odd.clauses import Clause
     from bridgegen.odd.criteria import Criterion
     from bridgegen.odd.matrix import Grid
 
@@ -101,6 +102,7 @@ class SearchedScenario:
             shape how a value is drawn: it is no scenario then.
         notes: what is searched otherwise than its files may lead one to expect.
         criteria: pass criteria, which a search measures besides.
+        clauses: of a regulation or protocol, which a suite judges besides.
     """
 
     name: str
@@ -118,6 +120,7 @@ class SearchedScenario:
     checks: tuple[Bound, ...] = field(default=(), kw_only=True, compare=False, repr=False)
     notes: tuple[str, ...] = field(default=(), kw_only=True, compare=False, repr=False)
     criteria: "tuple[Criterion, ...]" = field(default=(), kw_only=True, repr=False)
+    clauses: "tuple[Clause, ...]" = field(default=(), kw_only=True, repr=False)
 
     @property
     def fingerprint(self) -> str:
@@ -231,7 +234,7 @@ class LogicalScenario(SearchedScenario):
         models = {one.name: one.model for one in self.participants if one.model}
         parts = (
             drivers, headings, lifted, sirens, bodies, types, models, ways, self.criteria,
-            self.matrix,
+            self.clauses, self.matrix,
         )  # fmt: skip
         more = "".join(repr(one) for one in parts if one)
         return sha256((content + more).encode()).hexdigest()

@@ -8,6 +8,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, ValidationInfo, field_validator
 
+from bridgegen.odd.clauses import ClauseSection
 from bridgegen.odd.criteria import CriterionSection
 from bridgegen.odd.matrix import GridSection
 from bridgegen.odd.roads_schema import RoadsSection
@@ -204,6 +205,8 @@ class ScenarioFile(ShapedSection):
     """Pass criteria: formulas that a scenario must keep, each with an id."""
     matrix: list[GridSection] = []
     """Values to test instead of a sample of the ranges: what 'bridgegen suite' runs."""
+    clauses: list[ClauseSection] = []
+    """Clauses of a regulation or protocol, which a suite judges."""
     objective: Annotated[ObjectiveSection | Literal["harm"], OrWord(ObjectiveSection, "harm")] = (
         "harm"
     )

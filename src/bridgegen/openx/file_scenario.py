@@ -10,6 +10,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from types import MappingProxyType
+from typing import Any
 
 from bridgegen.arrays import Float
 from bridgegen.errors import FileFormatError, InputError, ScenarioError
@@ -244,7 +245,7 @@ def _variant(
         raise type(error)(*(f"{problem} [with {said}]" for problem in error.problems)) from None
 
 
-def _of_draws(definition: dst.Deterministic | dst.Stochastic | None, place: str) -> dict[str, int]:
+def _of_draws(definition: dst.Deterministic | dst.Stochastic | None, place: str) -> dict[str, Any]:
     """Return the budget and the seed that a stochastic distribution asks for."""
     if not isinstance(definition, dst.Stochastic):
         return {}

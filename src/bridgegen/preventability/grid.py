@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Self
 
 import numpy as np
@@ -212,6 +212,29 @@ DEFAULT_GRIDS: Mapping[str, Mapping[str, GridAxis]] = {
     },
 }
 """The grids of the regulation's three disturbances, by the scenario's name, where none is given."""
+
+
+def coarse_axes(name: str, space: SearchSpace, most: int) -> Mapping[str, GridAxis] | None:
+    """Return the default grid of a scenario with every second value of its longest axes, or less.
+
+    Args:
+        name: of the scenario.
+        space: its space.
+        most: cells.
+
+    Returns:
+        The axes; None for a scenario without a default that fits its space.
+    """
+    axes = dict(DEFAULT_GRIDS.get(name, {}))
+    try:
+        grid = Grid.of(space, axes)
+    except InputError:
+        return None
+    while grid.cells > most:
+        longest = max(axes, key=lambda axis: axes[axis].n)
+        axes[longest] = replace(axes[longest], n=(axes[longest].n + 1) // 2)
+        grid = Grid.of(space, axes)
+    return axes
 
 
 def grid_of(

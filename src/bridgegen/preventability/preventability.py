@@ -101,7 +101,7 @@ def map_preventability(
         "fixed": space.fixed,
         "drivers": list(drivers),
         "models": list(judges),
-        "files of drivers": {name: _digest(name) for name in names},
+        "files of drivers": {name: digest_of(name) for name in names},
     }
     command = _command(scenario, drivers, judges, cells, fixed or {}, others, folder)
     store = ChunkStore(folder, settings, len(names), cells.cells)
@@ -195,7 +195,7 @@ def _distinct(names: Iterable[str], what: str) -> tuple[str, ...]:
     return found
 
 
-def _digest(name: str) -> str | None:
+def digest_of(name: str) -> str | None:
     """Return a digest of the file of a user's driver; None where it has none."""
     data = CarriedDriver.of(name).data
     return None if data is None else hashlib.sha256(data).hexdigest()

@@ -3,6 +3,7 @@
 import json
 import sys
 from collections.abc import Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,6 +13,7 @@ from rich.table import Table
 from bridgegen.screen.live import Live
 
 if TYPE_CHECKING:
+    from bridgegen.preventability import PreventabilityMap
     from bridgegen.suite.difference import Difference
     from bridgegen.suite.results import EntryResult
     from bridgegen.suite.suite import SuiteCallbacks, SuiteRun
@@ -63,18 +65,33 @@ class SuiteScreen(Live):
         self._lost += result.verdict == "not run"
         self._show()
 
+    def show_cells(self, done: int, total: int) -> None:
+        """Show how far a preventability map is."""
+        self.show(what="cells of a map", done=done, total=total, facts="")
+
     def _show(self) -> None:
         facts = f"{self._failed} failed" + (f", {self._lost} not run" if self._lost else "")
         self.show(what="scenarios", done=self._done, total=self._entries, facts=facts)
 
 
-def print_suite(suite: "SuiteRun", seconds: float, page: Path, *, as_json: bool = False) -> None:
+def print_suite(
+    suite: "SuiteRun",
+    seconds: float,
+    page: Path,
+    maps: "Sequence[PreventabilityMap]" = (),
+    *,
+    as_json: bool = False,
+) -> None:
     """Print the entries that fail or did not run, others if there is room; then the totals."""
     from bridgegen.suite.results import counts
     from bridgegen.suite.sentences import outcomes, points
 
     if as_json:
-        print(json.dumps(_facts(suite), indent=2, ensure_ascii=False))
+        found = [
+            {"scenario": one.scenario.name, "drivers": [one.figures(name) for name in one.drivers]}
+            for one in maps
+        ]
+        print(json.dumps(_facts(suite) | {"maps": found}, indent=2, ensure_ascii=False))
         return
     by_entry: dict[str, list[EntryResult]] = {}
     for one in suite.results:
@@ -97,6 +114,7 @@ def print_suite(suite: "SuiteRun", seconds: float, page: Path, *, as_json: bool 
     console.print(table)
     if len(by_entry) > len(listed):
         print(f"and {len(by_entry) - len(listed)} more")
+    _print_clauses(suite, console)
     print()
     for ego in suite.egos:
         results = suite.of_ego(ego)
@@ -112,7 +130,26 @@ def print_suite(suite: "SuiteRun", seconds: float, page: Path, *, as_json: bool 
         _print_standing(suite, ego)
     if gone := suite.baseline.gone(suite.results):
         print(f"not there any more, set their status to fixed: {', '.join(gone)}")
+    for made in maps:
+        print(f"map: {made.page}")
     print(f"page: {page} ({seconds:.1f} s)")
+
+
+def _print_clauses(suite: "SuiteRun", console: Console) -> None:
+    """Print what each ego makes of each clause, if entries state any."""
+    from bridgegen.suite.clauses import clause_results
+    from bridgegen.suite.sentences import clause_in_words
+
+    by_ego = [clause_results(suite.results, ego) for ego in suite.egos]
+    if not any(by_ego):
+        return
+    table = Table(box=None, pad_edge=False, header_style="bold")
+    for head in ("clause", *(ego or "ego's own driver" for ego in suite.egos), "requirement"):
+        table.add_column(head, overflow="fold")
+    for of_it in zip(*by_ego, strict=True):
+        table.add_row(of_it[0].id, *map(clause_in_words, of_it), of_it[0].text)
+    print()
+    console.print(table)
 
 
 def _print_standing(suite: "SuiteRun", ego: str) -> None:
@@ -242,6 +279,7 @@ def _worst(some: Sequence["EntryResult"]) -> str:
 
 
 def _facts(suite: "SuiteRun") -> dict[str, Any]:
+    from bridgegen.suite.clauses import clause_results
     from bridgegen.suite.rating import points_of
     from bridgegen.suite.results import counts
 
@@ -253,6 +291,11 @@ def _facts(suite: "SuiteRun") -> dict[str, Any]:
             ego: {one.edition: [one.reached, one.most] for one in points_of(suite.of_ego(ego))}
             for ego in suite.egos
         },
+        "clauses": [
+            {"verdict": one.verdict, **asdict(one)}
+            for ego in suite.egos
+            for one in clause_results(suite.results, ego)
+        ],
         "entries": [
             {
                 "entry": one.entry,

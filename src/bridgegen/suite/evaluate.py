@@ -20,6 +20,7 @@ from bridgegen.options import CommonOptions
 from bridgegen.pipeline import Pipeline
 from bridgegen.simulation.choice import SimulatorChoice
 from bridgegen.simulation.rollout import STATUS_MESSAGES
+from bridgegen.suite.clauses import judged
 from bridgegen.suite.entries import Entry
 from bridgegen.suite.results import EntryResult, GridResult, RowResult, finite
 from bridgegen.suite.rows import Rows, is_sample, rows_of
@@ -172,7 +173,8 @@ def _evaluated(job: Job, found: EntryResult) -> EntryResult:
     for start in range(0, len(X), AT_ONCE):
         some = X[start : start + AT_ONCE]
         evaluation = pipeline.evaluate(some)
-        rows += _rows(pipeline, some, evaluation, names)
+        found_here = _rows(pipeline, some, evaluation, names)
+        rows += judged(pipeline, job.simulator, some, found_here)
     units = dict(zip(space.names, space.units, strict=True))
     labels = [one.label for one in given.grids]
     if labels:
@@ -198,6 +200,7 @@ def _evaluated(job: Job, found: EntryResult) -> EntryResult:
             ],
             "sampled": bool(space.n_var) and not labels and is_sample(pipeline.scenario),
             "criteria": [one.to_dict() for one in pipeline.monitor],
+            "clauses": [one.to_dict() for one in pipeline.scenario.clauses],
             "rows": rows,
             "notes": notes,
         }

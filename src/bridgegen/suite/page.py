@@ -9,12 +9,14 @@ from bridgegen.disk import write_whole
 from bridgegen.errors import BridgeGenError
 from bridgegen.options import CommonOptions
 from bridgegen.options.option import options_of
+from bridgegen.preventability.result import PreventabilityMap
 from bridgegen.report.page import code_of, page_of
 from bridgegen.report.payload import script_json
 from bridgegen.report.playback import Playback
 from bridgegen.report.playbacks import beside_others, measured_playbacks
 from bridgegen.simulation.choice import EMBEDDED
 from bridgegen.suite.evaluate import Job, pipeline_of, rows_of_job
+from bridgegen.suite.maps import picture_payload
 from bridgegen.suite.page_payload import Key, key_of, payload
 from bridgegen.suite.replay import Replayed, replay_command
 from bridgegen.suite.results import EntryResult, rank
@@ -33,7 +35,11 @@ _SIMULATE = ("ideal", "others", "time_limit", "criteria", "empty_trigger")
 
 
 def write_suite_page(
-    suite: SuiteRun, jobs: Sequence[Job], searches: Sequence[WorseThan] = ()
+    suite: SuiteRun,
+    jobs: Sequence[Job],
+    *,
+    searches: Sequence[WorseThan] = (),
+    maps: Sequence[PreventabilityMap] = (),
 ) -> Path:
     """Write the page of a suite, whole or not at all.
 
@@ -41,6 +47,7 @@ def write_suite_page(
         suite: its results.
         jobs: of which they are; those that fail the worst are simulated again, to be played.
         searches: for where the second of two egos is worse.
+        maps: of its scenarios, in its folder.
 
     Returns:
         The page, in the folder of the results.
@@ -54,7 +61,7 @@ def write_suite_page(
         for one in suite.results
         if one.verdict == "failed" and key_of(one) in by_key
     }
-    return _write(suite, dict(_playbacks(suite, by_key)), commands, searches)
+    return _write(suite, dict(_playbacks(suite, by_key)), commands, searches, maps)
 
 
 def write_replay_page(made: Replayed) -> Path:
@@ -80,8 +87,10 @@ def _write(
     played: Mapping[Key, Playback],
     commands: Mapping[Key, str],
     searches: Sequence[WorseThan] = (),
+    maps: Sequence[PreventabilityMap] = (),
 ) -> Path:
-    data = payload(suite, played, commands, searches, code=code_of(_MODULE))
+    pictures = [picture_payload(one, suite.folder) for one in maps]
+    data = payload(suite, played, commands, searches=searches, maps=pictures, code=code_of(_MODULE))
     path = suite.folder / FILE
     title = f"{suite.folder.resolve().name}: suite – BridgeGen"
     write_whole(path, page_of(_MODULE, title, script_json(data)))

@@ -11,11 +11,13 @@ from bridgegen.report.payload import script_json
 from bridgegen.report.playback import Playback
 from bridgegen.report.playback_payload import ROAD_SCALE, SCALE, playback_payload, road_payload
 from bridgegen.suite.baseline import EXCUSED, words
+from bridgegen.suite.clauses import clause_results
 from bridgegen.suite.difference import difference as variations_compared
 from bridgegen.suite.rating import colours_of
 from bridgegen.suite.results import EntryResult, Outcome, RowResult, Verdict, rank
 from bridgegen.suite.sentences import (
     changes,
+    clause_in_words,
     difference,
     differences,
     headline,
@@ -59,8 +61,9 @@ def payload(
     suite: SuiteRun,
     played: Mapping[Key, Playback],
     commands: Mapping[Key, str],
-    searches: Sequence[WorseThan] = (),
     *,
+    searches: Sequence[WorseThan] = (),
+    maps: Sequence[Mapping[str, Any]] = (),
     code: int = 0,
 ) -> dict[str, Any]:
     """Return the page's data as plain dicts, lists, numbers and strings.
@@ -73,6 +76,7 @@ def payload(
         played: playbacks of the worst failed rows.
         commands: that show failures again.
         searches: for where the second of two egos is worse.
+        maps: see `bridgegen.suite.maps.picture_payload`.
         code: characters that the page has besides its data.
     """
     labels = [label_of(suite, ego) for ego in suite.egos]
@@ -108,6 +112,8 @@ def payload(
             "entries": entries,
             "criteria": _matrix(suite, criteria),
             "searches": [_search(suite, one) for one in searches],
+            "clauses": _clauses(suite),
+            "maps": list(maps),
             "motions": motions,
         },
     }
@@ -249,6 +255,21 @@ def _matrix(suite: SuiteRun, criteria: Mapping[str, int]) -> list[dict[str, Any]
         for criterion, table in zip(found, of, strict=True):
             criterion["of"].append(table)
     return found
+
+
+def _clauses(suite: SuiteRun) -> list[dict[str, Any]]:
+    """Return each clause of a regulation with what each ego makes of it."""
+    by_ego = [clause_results(suite.results, ego) for ego in suite.egos]
+    found: dict[str, dict[str, Any]] = {}
+    for e, clauses in enumerate(by_ego):
+        for one in clauses:
+            shown = {"id": one.id, "text": one.text, "entries": one.entries, "of": {}}
+            found.setdefault(one.id, shown)["of"][str(e)] = {
+                "v": _LETTER[one.verdict],
+                "words": clause_in_words(one),
+                "rows": [one.passed, one.failed, one.not_run],
+            }
+    return list(found.values())
 
 
 def _facts(suite: SuiteRun) -> list[str]:

@@ -19,6 +19,10 @@ REDUCED = 1.0 / 3.6
 """[m/s] More than which the ego must be slower at its impact than at the start. It is the tolerance
 of the test speed in that protocol (section 4.3.2)."""
 
+PASSED, FAILED, EXCUSED, NOT_RUN, NOT_APPLICABLE = "pfunx"
+"""What a variation means for a clause: it passes, or fails; passes although the ego collides, for
+the models do, too; has no result; or has traffic that could not happen."""
+
 
 class Strict(BaseModel):
     """Part of a record; it is untrusted when it is read."""
@@ -47,6 +51,8 @@ class RowResult(Strict):
         partner: the other participant.
         implausible: why its traffic could not happen, or "".
         margins: of the entry's criteria; None: without a result.
+        clauses: what it means for each of the entry's clauses, a letter each; empty without a
+            result.
     """
 
     x: list[float | str] = []
@@ -65,13 +71,15 @@ class RowResult(Strict):
     partner: str = ""
     implausible: str = ""
     margins: list[float] = []
+    clauses: str = Field(default="", pattern="^[pfunx]{0,1000}$")
 
     @property
     def verdict(self) -> Verdict:
-        """Whether the ego passes: it neither is critical nor violates a criterion."""
+        """Whether the ego passes: it neither is critical nor violates a criterion or a clause."""
         if self.problem:
             return "not run"
-        return "failed" if self.critical or self.violated else "passed"
+        failed = self.critical or self.violated or FAILED in self.clauses
+        return "failed" if failed else "passed"
 
     @property
     def outcome(self) -> Outcome | None:
@@ -126,6 +134,7 @@ class EntryResult(Strict):
         criteria: as `bridgegen.odd.criteria.Criterion.to_dict` gives them.
         grids: of the matrix that it runs, if it has one.
         sampled: whether its rows are some of very many, drawn evenly or at random.
+        clauses: as `bridgegen.odd.clauses.Clause.to_dict` gives them.
         rows: of each variation; empty if the entry cannot run.
         problem: why it cannot; empty if it can.
         notes: what runs otherwise than one may expect.
@@ -144,6 +153,7 @@ class EntryResult(Strict):
     criteria: list[dict[str, Any]] = []
     grids: list[GridResult] = []
     sampled: bool = False
+    clauses: list[dict[str, Any]] = []
     rows: list[RowResult] = []
     problem: str = ""
     notes: list[str] = []
@@ -172,6 +182,15 @@ class EntryResult(Strict):
         """The number of the worst failed row: by harm, then by the least margin."""
         failed = [i for i, one in enumerate(self.rows) if one.verdict == "failed"]
         return min(failed, key=lambda i: (*rank(self.rows[i]), i), default=None)
+
+    def letters(self, clause: int) -> str:
+        """Return what each variation means for a clause, by its number.
+
+        An entry that cannot run counts as one.
+        """
+        if not self.rows:
+            return NOT_RUN
+        return "".join(row.clauses[clause : clause + 1] or NOT_RUN for row in self.rows)
 
     def worst_of(self, criterion: int) -> int | None:
         """Return the number of the row that violates a criterion the most, or None."""

@@ -3,6 +3,7 @@
 from collections import Counter
 from collections.abc import Sequence
 
+from bridgegen.suite.clauses import ClauseResult
 from bridgegen.suite.difference import Change, Difference
 from bridgegen.suite.rating import points_of
 from bridgegen.suite.results import OUTCOMES, EntryResult, Verdict, counts
@@ -68,6 +69,18 @@ def points(results: Sequence[EntryResult]) -> str:
     found = points_of(results)
     parts = [f"{one.reached:.2f} of {one.most:.2f} ({one.edition})" for one in found]
     return f"Points by colour: {', '.join(parts)}" if parts else ""
+
+
+def clause_in_words(one: ClauseResult) -> str:
+    """Return what an ego makes of a clause: "3 of 101 fail, 2 collisions not preventable" say."""
+    n = one.passed + one.failed
+    parts = [f"{one.failed:,} of {n:,} fail"] if one.failed else [f"pass ({n:,})"] if n else []
+    if one.unpreventable:
+        some = "collision" if one.unpreventable == 1 else "collisions"
+        parts.append(f"{one.unpreventable:,} {some} not preventable")
+    parts += [f"{one.not_run:,} not run"] if one.not_run else []
+    parts += [f"{one.not_applicable:,} not applicable"] if one.not_applicable else []
+    return ", ".join(parts)
 
 
 def difference(verdicts: Sequence[Verdict], labels: Sequence[str]) -> str:

@@ -15,6 +15,7 @@ from bridgegen import ego as egos
 from bridgegen.campaign.chosen import PAPER
 from bridgegen.disk import write_whole
 from bridgegen.errors import BridgeGenError, InputError, Interrupted, StorageError
+from bridgegen.odd.clauses import read_clause
 from bridgegen.odd.criteria import read_criterion
 from bridgegen.odd.reader import load
 from bridgegen.options import CommonOptions, called_with
@@ -387,6 +388,8 @@ def _read(path: Path) -> tuple[Header | None, list[EntryResult], bool]:
         for one in results:
             for criterion in one.criteria:
                 read_criterion(criterion)
+            for clause in one.clauses:
+                read_clause(clause)
     except ValidationError as error:
         first = error.errors(include_input=False, include_url=False)[0]
         where = ".".join(map(str, first["loc"]))

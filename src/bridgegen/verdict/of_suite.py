@@ -5,10 +5,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Self
 
+from bridgegen.odd.clauses import read_clause
 from bridgegen.odd.criteria import read_criterion
 from bridgegen.suite.baseline import EXCUSED
+from bridgegen.suite.clauses import clause_results
 from bridgegen.suite.replay import replay_command
-from bridgegen.suite.results import EntryResult, RowResult, counts
+from bridgegen.suite.results import FAILED, EntryResult, RowResult, counts
+from bridgegen.suite.sentences import clause_in_words
 from bridgegen.suite.suite import SuiteRun
 from bridgegen.verdict.fail_if import (
     FailCondition,
@@ -23,12 +26,13 @@ FIGURES = {
     "entries": "scenarios with their variations, of all egos",
     "variations": "variations, of all egos",
     "passed": "variations that pass",
-    "failed": "variations that fail: critical, or a pass criterion is violated",
+    "failed": "variations that fail: critical, or a pass criterion or clause is violated",
     "known": "failed ones that the suite's index calls known or accepted",
     "regressions": "failed ones that the suite's index calls fixed",
     "new_failures": "the other failed ones",
     "not_run": "variations that did not run; an entry that cannot run is one",
     "failed_entries": "entries in which a variation fails",
+    "failed_clauses": "clauses of a regulation that an ego fails",
     "critical": "variations that are critical",
     "collisions": "variations in which the ego collides",
     "mitigated": "variations in which it hits something, slower than at the start",
@@ -101,6 +105,11 @@ def figures_of(suite: SuiteRun) -> dict[str, float]:
         "new_failures": standing["new"],
         "not_run": number["not run"],
         "failed_entries": sum(one.verdict == "failed" for one in results),
+        "failed_clauses": sum(
+            one.verdict == "failed"
+            for ego in dict.fromkeys(each.ego for each in results)
+            for one in clause_results(results, ego)
+        ),
         "critical": sum(row.critical for row in rows),
         "collisions": sum(row.collisions > 0 for row in rows),
         "mitigated": sum(row.outcome == "mitigated" for row in rows),
@@ -150,6 +159,10 @@ def _suites(suite: SuiteRun, outcomes: Sequence[Outcome]) -> list[Suite]:
             "variations": str(len(one.rows)),
             **{name.replace(" ", "_"): str(n) for name, n in one.outcomes().items()},
         }
+        facts |= {
+            f"clause {clause.id}": clause_in_words(clause)
+            for clause in clause_results([one], one.ego)
+        }
         failure = suite.baseline.failures.get(one.entry)
         if failure is not None:
             facts |= {"failure": failure[0], "status": failure[1].status}
@@ -187,6 +200,11 @@ def _cases(suite: SuiteRun, one: EntryResult, group: str) -> list[Case]:
         cases.append(
             case(words, violating, "violate it", baseline.is_criterion_excused(one, number))
         )
+    for number, given in enumerate(one.clauses):
+        clause = read_clause(given)
+        failing = [i for i, letter in enumerate(one.letters(number)) if letter == FAILED]
+        name = f"clause {clause.id}: {clause.text}"
+        cases.append(case(name, failing, "fail it", known=False))
     return cases
 
 

@@ -1,8 +1,12 @@
 """Rows by one instant at a time, with the driver asked in between, are the rows of a rollout."""
 
+from typing import NamedTuple
+
+import numba
 import numpy as np
 import pytest
 
+from bridgegen.compiled import address_of, kernel, row_type
 from bridgegen.odd.reader import load
 from bridgegen.options import PipelineOptions
 from bridgegen.pipeline import Pipeline
@@ -62,3 +66,29 @@ def test_a_row_that_has_ended_stays_as_it_is():
     batch.before_driver(100)
     batch.after_driver(100, np.ones(1), np.zeros(1))
     assert np.array_equal(batch.record.x, before)
+
+
+def test_rows_of_the_same_types_have_one_type_and_kernels_one_address():
+    """To derive both took longer than the rollout; kernels of other types lie elsewhere."""
+    if numba.config.DISABLE_JIT:
+        pytest.skip("nothing has a type")
+    rows = [Pair(np.zeros((n, 2)), 1) for n in (3, 5)]
+    assert row_type(rows[0]) is row_type(rows[1])
+    other = row_type(Pair(np.zeros((3, 2), np.int64), 1))
+    assert other != row_type(rows[0])
+    assert row_type(Pair(np.zeros((3, 4))[:, ::2], 1)) not in (other, row_type(rows[0]))
+    at = address_of(_first, (row_type(rows[0]),))
+    assert address_of(_first, (row_type(rows[1]),)) == at
+    assert address_of(_first, (other,)) != at
+
+
+class Pair(NamedTuple):
+    """Rows of an array, and a number."""
+
+    values: np.ndarray
+    number: int
+
+
+@kernel
+def _first(pair):
+    return float(pair.values[0]), 0.0

@@ -3,8 +3,10 @@
 import { darkScheme } from "./colours.js";
 import { $, element } from "./common.js";
 import { hook } from "./hook.js";
+import { showClauses } from "./suite_clauses.js";
 import { showCriteria } from "./suite_criteria.js";
 import { showSearches } from "./suite_searches.js";
+import { showMaps } from "./suite_maps.js";
 import { motions } from "./suite_motions.js";
 import { table } from "./suite_table.js";
 import { bar, suite } from "./suite_words.js";
@@ -23,7 +25,9 @@ function showResult() {
 }
 
 showResult();
+showClauses();
 showCriteria();
+showMaps();
 showSearches();
 table.fill();
 table.go();

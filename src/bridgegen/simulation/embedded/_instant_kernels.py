@@ -8,6 +8,7 @@ import math
 from bridgegen.compiled import inlined_kernel, kernel, run_kernel_at
 from bridgegen.ego.drivers import ATTENTIVE
 from bridgegen.simulation.embedded._codes import LATERALLY, LONGITUDINALLY
+from bridgegen.simulation.embedded._collision_kernels import collides
 from bridgegen.simulation.embedded._memory_kernels import (
     N_STEPS,
     NOT_FINITE,
@@ -109,6 +110,8 @@ def after_driver(k, demanded, curvature, plan, roads, state, record):
             move_along_path(e, k, plan, roads, state, record)
     if record.present.shape[0] > 0:
         note_presence(k, plan, roads, state, record)
+    if plan.until_collision and collides(k, plan, record):
+        state.ending[STOPS] = 1
     if not (math.isfinite(x) and math.isfinite(y) and math.isfinite(h)):
         state.ending[STATUS], state.ending[STOPS] = NOT_FINITE, 1
     if state.ending[STOPS]:

@@ -9,6 +9,7 @@ all kernels but the outermost take a bundle of one, without its first axis (see
 # Numba infers what kernels take; their wrappers are typed.
 
 from collections.abc import Mapping
+from functools import cache
 from typing import Annotated, Any, NamedTuple, get_args, get_type_hints
 
 import numpy as np
@@ -83,6 +84,7 @@ class Plan(NamedTuple):
     heeds: int
     begins_waiting: int
     is_driven: int
+    until_collision: int
     has_pedals: int
     driver_code: int
     own_code: int
@@ -97,10 +99,14 @@ class Roads(NamedTuple):
 
     `Network` and `bridgegen.ego.scene.Scene` document the shapes. ``slopes`` are ``(K, L, 3)``:
     of gravity [m/s²] what acts against the motion, and to the right, and the share [1] by which it
-    presses less on the road; L is 0 on a network whose roads are level.
+    presses less on the road; L is 0 on a network whose roads are level. ``bends`` ``(K, L)`` and
+    ``drops`` ``(L,)`` are where the next bend of each path is, and the next lower speed limit; see
+    ``ego._speed_kernels``.
     """
 
     paths: Float
+    bends: Int
+    drops: Int
     counts: Int
     steps: Float
     follows: Int
@@ -354,10 +360,18 @@ def states(n: int, sizes: Mapping[str, int], given: Mapping[str, np.ndarray]) ->
         given: ``(N, …)`` arrays by name.
     """
     arrays: dict[str, Any] = dict(given)
-    for name, declared in get_type_hints(State, include_extras=True).items():
-        array, *axes = get_args(declared)
+    for name, number, axes in _declared():
         if name not in arrays:
-            number = get_args(get_args(array)[1])[0]
             shape = (one if isinstance(one, int) else sizes[one] for one in axes)
             arrays[name] = np.zeros((n, *shape), dtype=number)
     return State(**arrays)
+
+
+@cache
+def _declared() -> tuple[tuple[str, Any, tuple[Any, ...]], ...]:
+    """Return name, type of number and axes of each array of a `State`."""
+    found = []
+    for name, declared in get_type_hints(State, include_extras=True).items():
+        array, *axes = get_args(declared)
+        found.append((name, get_args(get_args(array)[1])[0], tuple(axes)))
+    return tuple(found)

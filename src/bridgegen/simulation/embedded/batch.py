@@ -60,6 +60,8 @@ class Batch:
         values: ``(N,)`` float64 per parameter; see `Simulator.run`.
         own_memory: how many numbers a compiled driver of the user's own keeps; None without one.
         noise: ``(N,)`` uint64, keys of the rows' random numbers; see `noise_keys`.
+        until_collision: whether a row ends once the ego collides, see ``_collision_kernels``; not
+            where there are trailers, whose boxes may overlap the one of what tows them.
 
     Attributes:
         record: x, y, h, v, a, offset ``(N, E, T)`` and more, up to the present instant.
@@ -77,12 +79,13 @@ class Batch:
         values: Mapping[str, npt.ArrayLike],
         own_memory: int | None = None,
         noise: npt.NDArray[np.uint64] | None = None,
+        until_collision: bool = False,
     ) -> None:
         n = len(rows)
         if n and not (rows.min() >= 0 and rows.max() < roads.n_networks):
             raise InputError(f"rows must name one of {roads.n_networks} road networks")
         self._program, self._roads, self._rows = program, roads, rows
-        self._plan = _plan(program)
+        self._plan = _plan(program, until_collision and not len(program.tows))
         slots = program.fill(values, n)
         key = noise_keys(program, values, n) if noise is None else noise
         state = _state(program, roads, rows, slots, key, own_memory)
@@ -310,7 +313,7 @@ def _known(program: Program, values: Mapping[str, npt.ArrayLike]) -> dict[str, n
     return {name: value for name, value in values.items() if name in program.parameters}
 
 
-def _plan(program: Program) -> memory.Plan:
+def _plan(program: Program, until_collision: bool) -> memory.Plan:
     """Return the program's tables, and the rest of a plan."""
     stages = {f"ideal_{stage}": int(stage in program.driver.ideal) for stage in STAGES}
     given: dict[str, Any] = {
@@ -328,6 +331,7 @@ def _plan(program: Program) -> memory.Plan:
         "heeds": 0,
         "begins_waiting": 0,
         "is_driven": int(program.driver != STORYBOARD),
+        "until_collision": int(until_collision),
         "has_pedals": int((program.actions[:, DOES] == PRESS).any()),
         "driver_code": 0,
         "own_code": 0,

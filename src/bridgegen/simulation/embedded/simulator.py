@@ -148,6 +148,7 @@ class EmbeddedSimulator:
         driver: Driver | None = None,
         dry: bool = False,
         noise: npt.NDArray[np.uint64] | None = None,
+        until_collision: bool = False,
     ) -> Rollout:
         """See `Simulator`; runs without the GIL.
 
@@ -158,6 +159,7 @@ class EmbeddedSimulator:
             driver: another one.
             dry: the road.
             noise: ``(N,)`` keys of the rows' random numbers; see ``noise_keys``.
+            until_collision: whether a row ends soon after the ego collides; see `Batch`.
 
         Raises:
             InputError: see `Simulator`; or a user's driver that cannot be made, or a driver that
@@ -169,7 +171,10 @@ class EmbeddedSimulator:
                 f"the driver '{chosen.driver.name}' drives in {chosen.driver.home} alone"
             )
         if not chosen.driver.is_own:
-            return self.batch(roads, rows, values, driver=driver, dry=dry, noise=noise).run()
+            return self.batch(
+                roads, rows, values, driver=driver, dry=dry, noise=noise,
+                until_collision=until_collision,
+            ).run()  # fmt: skip
         own, memory = self._own, self._own.memory
         columns = {name: np.broadcast_to(value, len(rows)) for name, value in values.items()}
 
@@ -177,8 +182,9 @@ class EmbeddedSimulator:
             taken = {name: column[at] for name, column in columns.items()}
             key = None if noise is None else noise[at]
             return self.batch(
-                roads, rows[at], taken, driver=driver, dry=dry, own_memory=memory, noise=key
-            )
+                roads, rows[at], taken, driver=driver, dry=dry, own_memory=memory, noise=key,
+                until_collision=until_collision,
+            )  # fmt: skip
 
         return own.drive(chosen.changed(dry=dry), some, len(rows))
 
@@ -275,6 +281,7 @@ class EmbeddedSimulator:
         dry: bool = False,
         own_memory: int | None = None,
         noise: npt.NDArray[np.uint64] | None = None,
+        until_collision: bool = False,
     ) -> "Batch":
         """Set N rows up, for a driver that is asked at every instant.
 
@@ -286,8 +293,9 @@ class EmbeddedSimulator:
             dry: the road.
             own_memory: see `Batch`.
             noise: likewise.
+            until_collision: likewise.
         """
         from bridgegen.simulation.embedded.batch import Batch  # numba is slow to import
 
         program = self.program.changed(driver=driver, dry=dry)
-        return Batch(program, roads, rows, values, own_memory, noise)
+        return Batch(program, roads, rows, values, own_memory, noise, until_collision)

@@ -165,12 +165,15 @@ def nearest_lane(points, point_nodes, x, y, h):
         dx, dy = x - points[i, 0], y - points[i, 1]
         if abs(dx) > 20.0 or abs(dy) > 20.0:
             continue
+        reach = points[i, 3] + MARGIN
+        if dx * dx + dy * dy > 1.000001 * (1.0 + reach * reach):  # it is beyond one of them
+            continue
         c, s = math.cos(points[i, 2]), math.sin(points[i, 2])
         along = dx * c + dy * s
         if abs(along) > 1.0:
             continue
         aside = abs(dy * c - dx * s)
-        if aside > points[i, 3] + MARGIN:
+        if aside > reach:
             continue
         turn = abs(turned(h, points[i, 2]))
         cost, node = aside, point_nodes[i]

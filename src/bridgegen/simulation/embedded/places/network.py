@@ -181,6 +181,8 @@ class Network:
         nodes = max(each.numbers.shape[1] for each in ways)
         return Roads(
             paths=paths,
+            bends=next_bends(paths),
+            drops=next_drops(self.scene.road),
             counts=counts,
             steps=np.ascontiguousarray(steps[:, :, 0, 0]),
             follows=_numbers([[path.follows for path in each.paths] for each in ways]),
@@ -234,6 +236,36 @@ class Network:
         for p, found in enumerate(self._zones):
             whole[p, : len(found)] = found
         return whole
+
+
+def next_bends(paths: Float) -> Int:
+    """Return the first row from each on that is in a bend, ``(P, K, L)`` int64; L: none is."""
+    from bridgegen.ego._path_kernels import CURVATURE  # numba is slow to import
+    from bridgegen.ego._speed_kernels import STRAIGHT
+
+    length = paths.shape[2]
+    found = np.where(np.abs(paths[..., CURVATURE]) > STRAIGHT, np.arange(length), length)
+    first: Int = np.minimum.accumulate(found[..., ::-1], axis=-1)[..., ::-1]
+    return np.ascontiguousarray(first)
+
+
+def next_drops(roads: Float) -> Int:
+    """Return the first row after each with a lower speed limit, ``(P, L)`` int64; L: none has."""
+    from bridgegen.ego._speed_kernels import LIMIT
+
+    limits = roads[..., LIMIT]
+    length = limits.shape[1]
+    found = np.full(limits.shape, length, dtype=np.int64)
+    for row, limit in zip(found, limits, strict=True):
+        changes = np.flatnonzero(limit[1:] != limit[:-1]) + 1
+        end, lower = length, list[int]()  # first rows of lower limits ahead, the nearest last
+        for first in (*changes[::-1].tolist(), 0):
+            while lower and limit[lower[-1]] >= limit[first]:
+                lower.pop()
+            row[first:end] = lower[-1] if lower else length
+            lower.append(first)
+            end = first
+    return found
 
 
 def _stop_lines(

@@ -1,0 +1,85 @@
+"""Clauses of a regulation in scenario files: read, checked, part of the fingerprint."""
+
+from importlib import resources
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from bridgegen.errors import InputError, ScenarioError
+from bridgegen.odd.clauses import Clause, read_clause
+from bridgegen.odd.reader import load, pack_names
+
+R157 = [name for name in pack_names() if name.startswith("r157/")]
+FOLLOWING = (resources.files("bridgegen.packs.r157") / "following.yaml").read_text("utf-8")
+
+
+def edited(folder, old: str, new: str):
+    assert old in FOLLOWING
+    path = folder / "mine.yaml"
+    path.write_text(FOLLOWING.replace(old, new), "utf-8")
+    return path
+
+
+@pytest.mark.parametrize("name", R157)
+def test_each_scenario_of_the_pack_states_a_clause_that_its_source_names(name):
+    scenario = load(name)
+    assert scenario.clauses
+    for one in scenario.clauses:
+        assert one.id.startswith("R157-5.2")
+        assert one.collisions or one.criteria
+
+
+def test_what_is_wrong_is_named_with_its_line(tmp_path):
+    path = edited(
+        tmp_path, "    criteria: [following-distance]",
+        "    criteria: [following-distanc]\n"
+        "  - {id: R157-5.2.3.3, text: again, collisions: any}\n"
+        "  - {id: R157-5.2, text: nothing}",
+    )  # fmt: skip
+    with pytest.raises(ScenarioError) as error:
+        load(path)
+    said = "\n".join(error.value.problems)
+    assert "clause R157-5.2.3.3: unknown criterion 'following-distanc'; did you mean" in said
+    assert "clause R157-5.2.3.3: it is there twice, each has an id of its own" in said
+    assert "clause R157-5.2: nothing can violate it, state 'collisions' or 'criteria'" in said
+    assert said.count("mine.yaml, line") == 3
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ("{id: 5 2, text: a, collisions: any}", "clauses.0.id"),
+        ("{id: A-1, collisions: any}", "must have the key 'text'"),
+        ("{id: A-1, text: a, collisions: all}", "clauses.0.collisions"),
+        ("{id: A-1, text: a, collision: any}", "unknown key 'collision' in clauses.0"),
+    ],
+)
+def test_the_shape_is_checked(tmp_path, given, message):
+    start = FOLLOWING.index("  - id: R157-5.2.3.3")
+    stop = FOLLOWING.index("objective:")
+    path = tmp_path / "mine.yaml"
+    path.write_text(FOLLOWING[:start] + f"  - {given}\n\n" + FOLLOWING[stop:], "utf-8")
+    with pytest.raises(ScenarioError, match=message):
+        load(path)
+
+
+def test_another_clause_is_another_scenario(tmp_path):
+    """So a suite runs it again."""
+    path = edited(tmp_path, "id: R157-5.2.3.3", "id: R157-5.2.3.4")
+    assert load(path).fingerprint != load("r157/following").fingerprint
+
+
+IDS = st.from_regex(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,63}", fullmatch=True)
+TEXTS = st.text(st.characters(codec="ascii", categories=["L", "N"]), min_size=1, max_size=30)
+
+
+@given(IDS, TEXTS, st.sampled_from([None, "any", "preventable"]), st.lists(IDS, max_size=3))
+def test_a_clause_is_read_again_as_it_is_recorded(id, text, collisions, criteria):
+    one = Clause(id, text, collisions, tuple(criteria))
+    assert read_clause(one.to_dict()) == one
+
+
+def test_a_record_that_is_no_clause_is_refused():
+    with pytest.raises(InputError, match="a clause has an id"):
+        read_clause({"id": "A-1", "text": "a", "collisions": "none"})
