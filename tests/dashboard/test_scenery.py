@@ -55,7 +55,7 @@ def test_wind_by_beaufort():
 )
 def test_the_laws_are_those_of_the_simulator(quantity, parameter, values):
     for value in values:
-        x = CUT_IN.quantities[quantity]({parameter: np.array([value])})
+        x = CUT_IN.quantities[quantity].values({parameter: np.array([value])})
         assert PARAMETERS[parameter].law.inverse(float(x[0])) == pytest.approx(value)
 
 

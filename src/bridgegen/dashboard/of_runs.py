@@ -108,7 +108,8 @@ def _seen(store: Store, settings: Settings, sceneries: Sceneries) -> Seen | None
     if scenery is None:
         return None
     found = Seen()
-    column = dict(zip(store.parameters, store.columns.X, strict=True))
+    stored = dict(zip(store.parameters, store.columns.X, strict=True))
+    column = {name: stored[name] for name in sorted(scenery.columns & stored.keys())}
     for rows in store.select(["status", *column.values()], 0, len(store)):
         with store.damage():
             table: Float = np.array(rows, dtype=np.float64)

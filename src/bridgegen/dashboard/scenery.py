@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, reduce
 
 import numpy as np
 
@@ -49,6 +49,29 @@ _WEATHER: Mapping[str, tuple[str, Callable[[Float], Float]]] = {
 
 
 @dataclass(frozen=True)
+class Measure:
+    """A quantity of the taxonomy in a scenario.
+
+    Attributes:
+        sources: names of parameters, or constants.
+        of: the quantity, in its unit, of their values ``(N,)``.
+    """
+
+    sources: tuple[Quantity, ...]
+    of: Callable[..., Float]
+
+    def values(self, columns: Columns) -> Float:
+        """Return the quantity, ``(N,)``, or ``(1,)`` where it is constant.
+
+        Raises:
+            KeyError: a parameter is not among the columns.
+        """
+        return self.of(
+            *(columns[one] if isinstance(one, str) else np.array([one]) for one in self.sources)
+        )
+
+
+@dataclass(frozen=True)
 class Scenery:
     """What a scenario states.
 
@@ -57,7 +80,7 @@ class Scenery:
         facts: that hold in all its evaluations.
         parameters: that its file lets vary.
         defaults: of all parameters.
-        quantities: by name, each from the columns that it needs.
+        quantities: of the taxonomy, by name.
         partly: what is not read of it; "" where all is.
     """
 
@@ -65,7 +88,7 @@ class Scenery:
     facts: frozenset[str]
     parameters: tuple[Parameter, ...]
     defaults: Mapping[str, float]
-    quantities: Mapping[str, Callable[[Columns], Float]] = field(repr=False)
+    quantities: Mapping[str, Measure] = field(repr=False)
     partly: str = ""
 
     @cached_property
@@ -78,6 +101,12 @@ class Scenery:
                 edges = np.linspace(one.low, one.high, BINS + 1)
             found[one.name] = edges
         return found
+
+    @cached_property
+    def columns(self) -> frozenset[str]:
+        """The parameters on whose values the counts depend."""
+        sources = (one for each in self.quantities.values() for one in each.sources)
+        return frozenset(self.edges) | {one for one in sources if isinstance(one, str)}
 
     def inner(self, name: str, value: float | str) -> float:
         """Return the inner value of a parameter that varies, from what people read."""
@@ -106,7 +135,7 @@ class Scenery:
         for name, of in self.quantities.items():
             upper = QUANTITIES[name].upper
             try:
-                x = np.broadcast_to(of(filled), (n,))
+                x = np.broadcast_to(of.values(filled), (n,))
             except KeyError:
                 continue  # of a column that the result does not hold
             known = x[~np.isnan(x)]
@@ -140,9 +169,7 @@ def scenery_of(scenario: SearchedScenario, *, on_map: bool = False) -> Scenery:
 # ---- logical scenarios ----
 
 
-def _of_logical(
-    scenario: LogicalScenario, on_map: bool
-) -> tuple[set[str], dict[str, Callable[[Columns], Float]]]:
+def _of_logical(scenario: LogicalScenario, on_map: bool) -> tuple[set[str], dict[str, Measure]]:
     kinds = {
         kind for one in scenario.participants if one.name != "ego"
         for kind in (one.types or (one.type,))
@@ -151,16 +178,12 @@ def _of_logical(
     facts |= {"participant:emergency" for one in scenario.participants if one.siren}
     facts |= {"jam"} if scenario.story.jams else set()
     facts |= {"road works", "warning sign"} if scenario.story.works else set()
-    quantities = {name: _of_weather(*law) for name, law in _WEATHER.items()}
-    quantities["ego_speed"] = _scaled(scenario.ego.speed, _KMH)
+    quantities = {name: Measure((source,), of) for name, (source, of) in _WEATHER.items()}
+    quantities["ego_speed"] = Measure((scenario.ego.speed,), lambda v: _KMH * v)
     if not on_map:
         facts |= _facts_of_roads(scenario.roads)
         quantities |= _quantities_of_roads(scenario.roads)
     return facts, quantities
-
-
-def _of_weather(source: str, of: Callable[[Float], Float]) -> Callable[[Columns], Float]:
-    return lambda columns: of(columns[source])
 
 
 def _kind(name: str) -> str:
@@ -190,44 +213,33 @@ def _facts_of_roads(roads: RoadsSpec) -> set[str]:
     return facts
 
 
-def _quantities_of_roads(roads: RoadsSpec) -> dict[str, Callable[[Columns], Float]]:
+def _quantities_of_roads(roads: RoadsSpec) -> dict[str, Measure]:
     knobs = roads.knobs
     found = {
-        "lane_width": _scaled(knobs["lane_width"], 1.0),
-        "speed_limit": _whole(_scaled(knobs["speed_limit"], _KMH)),
-        "grade": _scaled(knobs.get("grade", 0.0), 1.0),
+        "lane_width": Measure((knobs["lane_width"],), _same),
+        # in whole km/h: 13.9 m/s stand for 50 km/h
+        "speed_limit": Measure((knobs["speed_limit"],), lambda v: np.rint(_KMH * v)),
+        "grade": Measure((knobs.get("grade", 0.0),), _same),
     }
     lanes = next((knobs[one] for one in ("lanes", "lanes_per_direction") if one in knobs), None)
     if lanes is not None:
-        found["lanes"] = _scaled(lanes, 1.0)
+        found["lanes"] = Measure((lanes,), _same)
     if roads.template == "roundabout":
-        radius, ring = (_scaled(knobs[one], 1.0) for one in ("radius", "ring_lane_width"))
-        found["roundabout_diameter"] = lambda columns: 2.0 * radius(columns) + ring(columns)
+        measures = (knobs["radius"], knobs["ring_lane_width"])
+        found["roundabout_diameter"] = Measure(measures, lambda r, width: 2.0 * r + width)
         return found
-    bends = [
-        _scaled(one, 1.0) for each in roads.segments for one in (each.curvature, each.end_curvature)
-    ]
-    found["curve_radius"] = lambda columns: _radius([one(columns) for one in bends])
+    bends = [one for each in roads.segments for one in (each.curvature, each.end_curvature)]
+    found["curve_radius"] = Measure((0.0, *bends), _radius)
     return found
 
 
-def _scaled(quantity: Quantity, factor: float) -> Callable[[Columns], Float]:
-    """Return a constant, or the column of a parameter, times a factor."""
-    if isinstance(quantity, str):
-        return lambda columns: columns[quantity] * factor
-    return lambda columns: np.array([quantity * factor])
+def _same(x: Float) -> Float:
+    return x
 
 
-def _whole(of: Callable[[Columns], Float]) -> Callable[[Columns], Float]:
-    """Return a quantity in whole units: 13.9 m/s stand for 50 km/h."""
-    return lambda columns: np.rint(of(columns))
-
-
-def _radius(curvatures: list[Float]) -> Float:
+def _radius(*curvatures: Float) -> Float:
     """Return the radius of the tightest bend [m]; inf where there is none."""
-    tightest = np.array([0.0])
-    for one in curvatures:
-        tightest = np.maximum(tightest, np.abs(one))
+    tightest = reduce(np.maximum, map(np.abs, curvatures))
     with np.errstate(divide="ignore"):
         return np.asarray(1.0 / tightest)
 
