@@ -164,8 +164,8 @@ def build_dashboard(
     status_path = folder / FILE
     file = read_status_file(status_path)
     declared = read_criteria(criteria)
-    project = read_project(folder, begun)
     refuse_other(page, GENERATOR, "dashboard")
+    project = read_project(folder, begun)
     modes = failure_modes(project.results, file)
     added = add_decisions(status_path, file, decisions_of(modes)) if update else 0
     found = Dashboard(
