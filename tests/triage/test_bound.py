@@ -22,6 +22,18 @@ def test_nothing_in_a_thousand_draws_bounds_the_share_by_0_37_per_cent():
     assert text().startswith("No failure found in 1000 evaluations: ")
 
 
+def test_an_upper_bound_is_rounded_up():
+    """By hand: 1 − 0.025^(1/256) = 0.014306, which is more than 1.4 %."""
+    assert "at most 1.5 % of the space" in text(space=estimate("fresh", 0, 256))
+
+
+def test_failures_of_fresh_draws_are_said_where_the_search_found_none():
+    assert text(space=estimate("fresh", 6, 256), evaluations=30).startswith(
+        "No failure found in 30 evaluations, but in 6 of 256 fresh random draws: "
+    )
+    assert "but in" not in text(space=estimate("fresh", 0, 256))
+
+
 @pytest.mark.parametrize(("harmful", "rows"), [(0, 40), (3, 256), (17, 17)])
 def test_shares_have_scipy_s_exact_interval(harmful, rows):
     ours = estimate("fresh", harmful, rows)

@@ -1,6 +1,7 @@
 """Bounds of a run for the whole space: its least margins, and the harmful share."""
 
 from collections.abc import Sequence
+from decimal import ROUND_CEILING, Context, Decimal
 
 import numpy as np
 
@@ -105,8 +106,12 @@ def bound(
             f"evaluations; {_of_the_space(space, such)}."
         )
     else:
+        besides = ""
+        if space.drawn == "fresh" and space.harmful:
+            besides = f", but in {space.harmful} of {space.rows} fresh random draws"
         text = (
-            f"{none} in {evaluations} evaluations: {_margin(least)}; {_of_the_space(space, such)}."
+            f"{none} in {evaluations} evaluations{besides}: {_margin(least)}; "
+            f"{_of_the_space(space, such)}."
         )
     return Bound(
         evaluations=evaluations, failed=failed, implausible=implausible, harmful=harmful,
@@ -122,7 +127,7 @@ def _of_the_space(space: Estimate, such: str) -> str:
         )
     by = _DRAWN[space.drawn].format(space.rows)
     if not space.harmful:
-        return f"with 95 % confidence at most {_percent(space.high)} of the space is {such} ({by})"
+        return f"with 95 % confidence at most {_at_most(space.high)} of the space is {such} ({by})"
     return (
         f"{percent(space.share or 0.0)} of the space is {such} ({_percent(space.low)} to "
         f"{_percent(space.high)} with 95 % confidence, {by})"
@@ -137,6 +142,12 @@ def _margin(least: Sequence[Least]) -> str:
         if one is not None and one.value is not None and one.evaluation is not None:
             parts.append(f"{words.format(one.value)} (evaluation {one.evaluation + 1})")
     return "least margin " + ", ".join(parts) if parts else "no margin is known"
+
+
+def _at_most(share: float) -> str:
+    """Return an upper bound in per cent, rounded up to two digits, so that it remains one."""
+    rounded = Context(prec=2, rounding=ROUND_CEILING).create_decimal(Decimal(share) * 100)
+    return f"{rounded.normalize():f} %"
 
 
 def _percent(share: float) -> str:
