@@ -51,6 +51,7 @@ def add_context(top: Draft, facts: Facts, files: Files) -> None:
             f"driver {settings.ego}",
             *driver,
             f"other participants: {settings.others or 'as the scenario declares'}",
+            f"participant whose course the search decides: {settings.adversary or 'none'}",
             f"time limit: {settings.time_limit or 'that of the scenario'}",
             f"map: {settings.road_map or 'that of the scenario'}"
             + (f", digest {settings.map_digest}" if settings.map_digest else ""),
