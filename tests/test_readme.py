@@ -6,9 +6,9 @@ import sys
 from pathlib import Path
 
 import pytest
-from typer.main import get_command
+from tests.command_lines import must_parse
 
-from bridgegen.cli import app, main
+from bridgegen.cli import main
 
 README = (Path(__file__).parents[1] / "README.md").read_text("utf-8")
 
@@ -47,10 +47,7 @@ def test_the_output_is_what_the_main_job_prints(tmp_path, monkeypatch, capsys):
 def test_every_command_line_parses(line):
     words = shlex.split(line)
     assert words.pop(0) == "bridgegen"
-    command = get_command(app)
-    while hasattr(command, "commands"):
-        command = command.commands[words.pop(0)]
-    command.make_context(command.name, words)
+    must_parse(words)
 
 
 def test_links_lead_somewhere():

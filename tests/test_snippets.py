@@ -26,11 +26,10 @@ from xml.etree import ElementTree
 
 import pytest
 import yaml
-from typer.main import get_command
+from tests.command_lines import must_parse
 
 from bridgegen.campaign.exported import NOT_EXPORTED
-from bridgegen.cli import app, main
-from bridgegen.cli.groups import DEFAULT
+from bridgegen.cli import main
 from bridgegen.cli.run_files import keys_of, read_runs
 from bridgegen.cli.runs import search
 from bridgegen.odd.json_schema import schema
@@ -101,15 +100,6 @@ def shortened(words: list[str]) -> list[str]:
     return found
 
 
-def must_parse(words: list[str]) -> None:
-    command, rest = get_command(app), words[1:]
-    while hasattr(command, "commands"):
-        named = command.commands.get(rest[0])
-        command = named or command.commands[DEFAULT]
-        rest = rest[1:] if named else rest
-    command.make_context(command.name, rest)
-
-
 class Page:
     """Runs a page's blocks."""
 
@@ -128,7 +118,7 @@ class Page:
             if not words:
                 continue
             if words[0] == "bridgegen":
-                must_parse(words)
+                must_parse(words[1:])
             if block.mark in ELSEWHERE:
                 continue
             assert self.command(words) == int(block.value if block.mark == "exit" else 0), line
@@ -157,7 +147,7 @@ class Page:
     def yaml(self, block: Block) -> None:
         if block.mark == "ci":
             for line in re.findall(r"bridgegen search.*", block.text):
-                must_parse(words_of(line))
+                must_parse(words_of(line)[1:])
             yaml.safe_load(block.text)
             return
         path = Path("a_scenario.yaml")

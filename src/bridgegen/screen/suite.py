@@ -154,18 +154,10 @@ def _print_clauses(suite: "SuiteRun", console: Console) -> None:
 
 def _print_standing(suite: "SuiteRun", ego: str) -> None:
     """Print how the failures of an ego stand, where indexes name some."""
-    from bridgegen.suite.baseline import EXCUSED
-
-    baseline, results = suite.baseline, suite.of_ego(ego)
-    standing = baseline.counts(results)
-    failed = standing["new"] + standing["regression"] + sum(standing[one] for one in EXCUSED)
-    if not baseline.failures or not failed:
-        return
-    print(
-        f"  of the variations that fail, {sum(standing[one] for one in EXCUSED)} are known or "
-        f"accepted, {standing['new']} new, {standing['regression']} regressions"
-    )
-    for id in baseline.regressions(results):
+    results = suite.of_ego(ego)
+    if sentence := suite.baseline.sentence(results):
+        print(f"  {sentence}")
+    for id in suite.baseline.regressions(results):
         print(f"  regression: {id} was fixed, and fails again")
 
 

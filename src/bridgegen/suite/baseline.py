@@ -91,6 +91,22 @@ class Baseline:
         found["not run"] += sum(bool(one.problem) for one in results)
         return found
 
+    def sentence(self, results: Sequence[EntryResult]) -> str:
+        """Return how failing variations stand, in words; empty if none fails or no index names any.
+
+        Args:
+            results: with one ego.
+        """
+        count = self.counts(results)
+        known = sum(count[one] for one in EXCUSED)
+        if not self.failures or not known + count["new"] + count["regression"]:
+            return ""
+        again = count["regression"]
+        return (
+            f"of the variations that fail, {known} {'is' if known == 1 else 'are'} known or "
+            f"accepted, {count['new']} new, {again} {'regression' if again == 1 else 'regressions'}"
+        )
+
     def regressions(self, results: Sequence[EntryResult]) -> list[str]:
         """Return the ids of the failures that were fixed, and are there again."""
         again = (one.entry for one in results if self.worst(one) == "regression")

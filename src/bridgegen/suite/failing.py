@@ -33,9 +33,9 @@ class Failing:
     """A scenario that was found to fail.
 
     Attributes:
-        source: where, for people: "runs/a, mode 1 (0001)".
+        source: where, for people: "runs/a, 0001".
         job: runs it; one row.
-        scenario: in which it was found, by name.
+        scenario: in which it was found, by name, and the map if it was found on one.
         found: what found it, in words.
         seed: of the search or suite, if there was one.
         key: of its mode, with the tested cause, where a triage says; None: to be found out.
@@ -141,7 +141,8 @@ def _of_run(
             seed=settings.seed,
         )
 
-    scenario = run.triage.scenario
+    on = f" on {Path(settings.road_map).stem}" if settings.road_map else ""
+    scenario = f"{run.triage.scenario}{on}"
     for mode in run.modes:
         found = _of_mode(folder, mode, failing, exported, only)
         if found is not None:

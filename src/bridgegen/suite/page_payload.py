@@ -273,13 +273,16 @@ def _clauses(suite: SuiteRun) -> list[dict[str, Any]]:
 
 
 def _facts(suite: SuiteRun) -> list[str]:
-    """Return what the results depend on, in words, where it is not the default."""
+    """Return what the results depend on, where it is not the default; and how failures stand."""
     s = suite.settings
     facts = [f"simulator {s['simulator']}"] if s.get("simulator", "embedded") != "embedded" else []
     for name in ("critical", "count", "others", "empty_trigger"):
         facts += [f"{name.replace('_', ' ')}: {s[name]}"] if s.get(name) else []
     facts += [f"ideal {', '.join(map(str, s['ideal']))}"] if s.get("ideal") else []
     facts += [f"seed {s['seed']}"] if s.get("seed") else []
+    for ego in suite.egos:
+        if sentence := suite.baseline.sentence(suite.of_ego(ego)):
+            facts.append(f"{label_of(suite, ego)}: {sentence}" if len(suite.egos) > 1 else sentence)
     return facts
 
 
