@@ -7,14 +7,14 @@ from tests.suite.test_page import unpacked
 
 from bridgegen.errors import InputError
 from bridgegen.odd.reader import pack_names
-from bridgegen.suite.entries import find_entries
+from bridgegen.suite.entries import find_entries, of_edition
 from bridgegen.suite.page import command_of
 from bridgegen.suite.page_payload import payload
 from bridgegen.suite.rating import colour_of, points_of
 from bridgegen.suite.replay import replay
 from bridgegen.suite.results import EntryResult, GridResult, RowResult
 from bridgegen.suite.sentences import outcomes, points
-from bridgegen.suite.suite import of_edition, run_suite
+from bridgegen.suite.suite import run_suite
 from bridgegen.verdict.of_suite import SuiteCriteria, figures_of
 
 

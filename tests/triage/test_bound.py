@@ -46,8 +46,8 @@ def test_where_an_algorithm_chose_the_rows_no_share_is_stated():
     assert (space.share, space.low, space.high) == (None, 0.0, 1.0)
     said = text(space=space, harmful=3, modes=2)
     assert said == (
-        "reference fails in 2 ways: 3 of 1000 evaluations; the harmful share of the space "
-        "is not estimated, for the search chose its rows."
+        "reference fails in 2 ways: 3 of 1000 evaluations; the share of the space that is "
+        "harmful is not estimated, for the search chose its rows."
     )
 
 

@@ -13,6 +13,7 @@ from bridgegen.odd.reader import load, pack_names
 from bridgegen.odd.reader import names as catalogue_names
 from bridgegen.openx.openscenario.kind import files_named_in, kind_of_file
 from bridgegen.suite.index import Indexes
+from bridgegen.suite.rows import NO_MATRIX
 
 MOST_FILES = 100_000
 """Files that are looked at in all folders together."""
@@ -131,6 +132,36 @@ def indexed(one: Entry, indexes: Indexes | None = None) -> Entry:
     _, failure = found
     count: Literal["any"] | None = "any" if failure.count == "any" else None
     return replace(one, criteria=tuple(failure.criteria), count=count)
+
+
+def of_edition(entries: Sequence[Entry], edition: str | None) -> tuple[Entry, ...]:
+    """Return the entries without those whose matrix lacks an edition.
+
+    Raises:
+        InputError: no scenario has that edition.
+    """
+    if edition in (None, NO_MATRIX):
+        return tuple(entries)
+    kept, known = list[Entry](), set[str]()
+    for one in entries:
+        editions = _editions(one)
+        known |= editions
+        if not editions or edition in editions:
+            kept.append(one)
+    if edition not in known:
+        some = f"; editions: {', '.join(sorted(known))}" if known else ""
+        raise InputError(f"no scenario has a matrix of the edition '{edition}'{some}")
+    return tuple(kept)
+
+
+def _editions(entry: Entry) -> set[str]:
+    """Return the editions of an entry's matrix; none if it has no matrix, or cannot be read."""
+    if entry.scenario.lower().endswith(_STORYBOARD):
+        return set()
+    try:
+        return {one.edition for one in load(entry.scenario).matrix}
+    except BridgeGenError:
+        return set()
 
 
 def _files(folder: Path) -> Iterable[Path]:

@@ -14,20 +14,18 @@ from pydantic import ValidationError
 from bridgegen import ego as egos
 from bridgegen.campaign.chosen import PAPER
 from bridgegen.disk import write_whole
-from bridgegen.errors import BridgeGenError, InputError, Interrupted, StorageError
+from bridgegen.errors import InputError, Interrupted, StorageError
 from bridgegen.odd.clauses import read_clause
 from bridgegen.odd.criteria import read_criterion
-from bridgegen.odd.reader import load
 from bridgegen.options import CommonOptions, called_with
 from bridgegen.records import parse_json
 from bridgegen.simulation.choice import EMBEDDED, SimulatorChoice
 from bridgegen.store.sqlite import Lock
 from bridgegen.suite.baseline import Baseline
 from bridgegen.suite.entries import RESULTS as FILE
-from bridgegen.suite.entries import Entry, find_entries
+from bridgegen.suite.entries import find_entries, of_edition
 from bridgegen.suite.evaluate import Job, evaluate
 from bridgegen.suite.results import EntryResult, Header
-from bridgegen.suite.rows import NO_MATRIX
 from bridgegen.workers.process import cores
 from bridgegen.workers.tasks import TaskPool
 
@@ -194,36 +192,6 @@ def run_suite(given: SuiteArguments) -> SuiteRun:
         lock.release()
     results = tuple(done[job.entry.name, job.ego or ""] for job in jobs)
     return SuiteRun(folder, drivers, results, settings, tuple(jobs))
-
-
-def of_edition(entries: Sequence[Entry], edition: str | None) -> tuple[Entry, ...]:
-    """Return the entries without those whose matrix lacks an edition.
-
-    Raises:
-        InputError: no scenario has that edition.
-    """
-    if edition in (None, NO_MATRIX):
-        return tuple(entries)
-    kept, known = list[Entry](), set[str]()
-    for one in entries:
-        editions = _editions(one)
-        known |= editions
-        if not editions or edition in editions:
-            kept.append(one)
-    if edition not in known:
-        some = f"; editions: {', '.join(sorted(known))}" if known else ""
-        raise InputError(f"no scenario has a matrix of the edition '{edition}'{some}")
-    return tuple(kept)
-
-
-def _editions(entry: Entry) -> set[str]:
-    """Return the editions of an entry's matrix; none if it has no matrix, or cannot be read."""
-    if entry.scenario.lower().endswith(".xosc"):
-        return set()
-    try:
-        return {one.edition for one in load(entry.scenario).matrix}
-    except BridgeGenError:
-        return set()
 
 
 def read_suite(folder: Path) -> SuiteRun:
