@@ -141,6 +141,19 @@ def test_what_is_not_expressible_is_not_called_uncovered(result):
     assert not tunnels.scenarios
 
 
+def test_what_is_not_read_may_be_covered(result):
+    file = replace(CUT_IN, quantities={}, facts=frozenset(), partly="its weather")
+    some = [result(seen=CUT_IN.seen({}, 5)), result("file", seen=file.seen({}, 5))]
+    found = {
+        one.attribute.path[-2:]: one
+        for one in coverage(some, {"cut-in": CUT_IN, "file": file}).attributes
+    }
+    fog = found["Particulates", "fog, up to 1 km"]
+    assert (fog.scenarios, fog.unread) == ({}, 1)
+    assert found["Type", "bicycles"].unread == 0  # participants are always read
+    assert found["Special structures", "tunnels"].unread == 0
+
+
 def test_evaluations_of_several_results_are_added(result):
     some = [result(seen=CUT_IN.seen({"precipitation": np.array(x)}, len(x)), source=str(k))
             for k, x in enumerate(([0.0, 0.0], [0.0, 100.0, 100.0]))]  # fmt: skip

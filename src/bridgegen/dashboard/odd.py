@@ -15,10 +15,12 @@ class Covered:
     Attributes:
         attribute: it.
         scenarios: evaluations by scenario, the most first; empty: it is not covered.
+        unread: number of scenarios of which it is not read, so that they may cover it.
     """
 
     attribute: Attribute
     scenarios: Mapping[str, int]
+    unread: int = 0
 
     @property
     def evaluations(self) -> int:
@@ -59,8 +61,23 @@ def coverage(results: Sequence[Result], sceneries: Mapping[str, Scenery]) -> Cov
     for result in results:
         if result.seen is not None and result.scenario in sceneries:
             seen.setdefault(result.scenario, Seen()).add(result.seen)
-    attributes = tuple(Covered(one, _scenarios(one, seen, sceneries)) for one in TAXONOMY)
+    attributes = tuple(
+        Covered(one, _scenarios(one, seen, sceneries), _unread(one, seen, sceneries))
+        for one in TAXONOMY
+    )
     return Coverage(attributes, dict(sorted(seen.items())), sceneries)
+
+
+def _unread(
+    attribute: Attribute, seen: Mapping[str, Seen], sceneries: Mapping[str, Scenery]
+) -> int:
+    """Return of how many scenarios an attribute is not read."""
+    if not attribute.expressible or attribute.fact.startswith("participant:"):
+        return 0
+    partly = [name for name in seen if sceneries[name].partly]
+    if attribute.band is not None:
+        return sum(attribute.band[0] not in seen[name].bands for name in partly)
+    return sum(attribute.fact not in sceneries[name].facts for name in partly)
 
 
 def _scenarios(

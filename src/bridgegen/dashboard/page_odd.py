@@ -86,6 +86,8 @@ def _row(one: Covered) -> list[str]:
     kind = state.replace(" ", "-")
     mark = f'<span class="{kind}" aria-hidden="true">{_MARK[state]}</span>'
     by = text(joined(names, 2)) if names else f'<span class="{kind}">{state}</span>'
+    if one.unread and not names:
+        by += f"<small>not read of {counted(one.unread, 'scenario')}</small>"
     return [f"{mark} {text(attribute.path[-1])}{note}", f"{one.evaluations:,}", by]
 
 
