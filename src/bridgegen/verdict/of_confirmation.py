@@ -1,14 +1,13 @@
 """Pass/fail criteria for a confirmation."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Self
 
 from bridgegen.campaign.confirm import RunConfirmation
 from bridgegen.confirmation.schema import Scenario
-from bridgegen.verdict.fail_if import FailCondition, Outcome, read_conditions
-from bridgegen.verdict.junit import Case, Suite, case_of, refuse_junit, write_junit
+from bridgegen.verdict.conditions import Conditions
+from bridgegen.verdict.fail_if import Outcome
+from bridgegen.verdict.junit import Case, Suite, case_of, write_junit
 
 FIGURES = {
     "confirmed": "scenarios that are critical there, too / scenarios that ran there",
@@ -26,34 +25,10 @@ _OF_THE_LOST = ("confirmed", "lost")
 """Scenarios that are not confirmed fail these; those that failed there fail ``not_run``."""
 
 
-@dataclass(frozen=True)
-class ConfirmationCriteria:
-    """The criteria for a confirmation, checked before it starts.
+class ConfirmationCriteria(Conditions):
+    """The criteria for a confirmation."""
 
-    Attributes:
-        conditions: each fails the confirmation if it holds.
-        junit: path of the JUnit XML, or None.
-    """
-
-    conditions: tuple[FailCondition, ...]
-    junit: Path | None
-
-    @classmethod
-    def read(cls, texts: Sequence[str], junit: Path | None) -> Self:
-        """Read the criteria.
-
-        Args:
-            texts: see `read_conditions`; their figures are FIGURES.
-            junit: a new file, or an earlier JUnit XML.
-
-        Raises:
-            InputError: a text is not a condition, or a figure is unknown.
-            StorageError: the JUnit XML cannot be written.
-        """
-        criteria = cls(read_conditions(texts, FIGURES), junit)
-        if junit is not None:
-            refuse_junit(junit)
-        return criteria
+    known = FIGURES
 
     def judge(self, found: RunConfirmation) -> tuple[Outcome, ...]:
         """Apply the criteria to a confirmation, and write the JUnit XML if requested.

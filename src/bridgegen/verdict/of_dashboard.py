@@ -1,11 +1,8 @@
 """Pass/fail criteria for the dashboard of a project."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Self
-
 from bridgegen.dashboard import Dashboard
-from bridgegen.verdict.fail_if import FailCondition, Outcome, read_conditions
+from bridgegen.verdict.conditions import Conditions
+from bridgegen.verdict.fail_if import Outcome
 
 FIGURES = {
     "new": "failure modes of current results with the status new, or with none",
@@ -31,24 +28,10 @@ FIGURES = {
 """The figures of a dashboard that ``--fail-if`` accepts."""
 
 
-@dataclass(frozen=True)
-class DashboardCriteria:
-    """The criteria for a dashboard, checked before it is made.
+class DashboardCriteria(Conditions):
+    """The criteria for a dashboard; without conditions, nothing fails it."""
 
-    Attributes:
-        conditions: each fails it if it holds; none: nothing does.
-    """
-
-    conditions: tuple[FailCondition, ...]
-
-    @classmethod
-    def read(cls, texts: Sequence[str]) -> Self:
-        """Read the criteria; their figures are FIGURES.
-
-        Raises:
-            InputError: a text is not a condition, or a figure is unknown.
-        """
-        return cls(read_conditions(texts, FIGURES))
+    known = FIGURES
 
     def judge(self, found: Dashboard) -> tuple[Outcome, ...]:
         """Apply the criteria to a dashboard."""

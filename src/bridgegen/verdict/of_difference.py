@@ -1,16 +1,14 @@
 """Pass/fail criteria for the difference of two egos in a suite."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
-from pathlib import Path
-from typing import Self
 
 from bridgegen.suite.difference import Difference
 from bridgegen.suite.results import EntryResult
 from bridgegen.suite.suite import SuiteRun
 from bridgegen.suite.worse import WorseThan
-from bridgegen.verdict.fail_if import FailCondition, Outcome, Verdict, read_conditions
-from bridgegen.verdict.junit import Case, Suite, case_of, refuse_junit, write_junit
+from bridgegen.verdict.conditions import Conditions
+from bridgegen.verdict.fail_if import Outcome, Verdict
+from bridgegen.verdict.junit import Case, Suite, case_of, write_junit
 from bridgegen.verdict.of_suite import case_of_rows
 
 FIGURES = {
@@ -30,31 +28,14 @@ FIGURES = {
 """The figures of a difference that ``--fail-if`` accepts."""
 
 
-@dataclass(frozen=True)
-class DifferenceCriteria:
-    """The criteria for a difference, checked before it is made.
+class DifferenceCriteria(Conditions):
+    """The criteria for a difference of two egos.
 
-    Attributes:
-        conditions: each fails it if it holds.
-        junit: path of the JUnit XML, or None. With it and without conditions, a variation that is
-            broken fails the difference, and a search that finds where the second ego is worse.
+    With a JUnit XML and without conditions, a variation that is broken fails the difference, and so
+    does a search that finds where the second ego is worse.
     """
 
-    conditions: tuple[FailCondition, ...]
-    junit: Path | None
-
-    @classmethod
-    def read(cls, texts: Sequence[str], junit: Path | None = None) -> Self:
-        """Read the criteria; their figures are FIGURES.
-
-        Raises:
-            InputError: a text is not a condition, or a figure is unknown.
-            StorageError: the JUnit XML cannot be written.
-        """
-        found = cls(read_conditions(texts, FIGURES), junit)
-        if junit is not None:
-            refuse_junit(junit)
-        return found
+    known = FIGURES
 
     def judge(
         self, suite: SuiteRun, found: Difference, searches: Sequence[WorseThan]

@@ -1,14 +1,13 @@
 """Pass/fail criteria for a preventability map."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from math import isnan
-from pathlib import Path
-from typing import Self
 
 from bridgegen.preventability import PreventabilityMap
-from bridgegen.verdict.fail_if import FailCondition, Outcome, Verdict, read_conditions
-from bridgegen.verdict.junit import Suite, case_of, refuse_junit, write_junit
+from bridgegen.verdict.conditions import Conditions
+from bridgegen.verdict.fail_if import Outcome, Verdict
+from bridgegen.verdict.junit import Suite, case_of, write_junit
 
 FIGURES = {
     "avoided": "cells in which the driver does not collide",
@@ -25,34 +24,10 @@ FIGURES = {
 _OUTCOMES = ("avoided", "preventable", "unpreventable")
 
 
-@dataclass(frozen=True)
-class MapCriteria:
-    """The criteria for a map, checked before it is made.
+class MapCriteria(Conditions):
+    """The criteria for a map; a condition is applied to each driver under test."""
 
-    Attributes:
-        conditions: each fails the map if it holds for one of the drivers under test.
-        junit: path of the JUnit XML, or None.
-    """
-
-    conditions: tuple[FailCondition, ...]
-    junit: Path | None
-
-    @classmethod
-    def read(cls, texts: Sequence[str], junit: Path | None) -> Self:
-        """Read the criteria.
-
-        Args:
-            texts: see `read_conditions`; their figures are FIGURES.
-            junit: a new file, or an earlier JUnit XML.
-
-        Raises:
-            InputError: a text is not a condition, or a figure is unknown.
-            StorageError: the JUnit XML cannot be written.
-        """
-        found = cls(read_conditions(texts, FIGURES), junit)
-        if junit is not None:
-            refuse_junit(junit)
-        return found
+    known = FIGURES
 
     def judge(self, result: PreventabilityMap) -> tuple[Outcome, ...]:
         """Apply the criteria to each driver of a map, and write the JUnit XML if requested.

@@ -1,9 +1,6 @@
 """Pass/fail criteria for a suite."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from pathlib import Path
-from typing import Self
 
 from bridgegen.odd.clauses import read_clause
 from bridgegen.odd.criteria import read_criterion
@@ -13,14 +10,13 @@ from bridgegen.suite.replay import replay_command
 from bridgegen.suite.results import FAILED, EntryResult, RowResult, counts
 from bridgegen.suite.sentences import clause_in_words
 from bridgegen.suite.suite import SuiteRun
+from bridgegen.verdict.conditions import Conditions
 from bridgegen.verdict.fail_if import (
-    FailCondition,
     Outcome,
     Verdict,
-    read_conditions,
     words_of,
 )
-from bridgegen.verdict.junit import Case, Problem, Suite, case_of, refuse_junit, write_junit
+from bridgegen.verdict.junit import Case, Problem, Suite, case_of, write_junit
 
 FIGURES = {
     "entries": "scenarios with their variations, of all egos",
@@ -46,37 +42,13 @@ MOST_NAMED = 20
 """Variations that a test's text names."""
 
 
-@dataclass(frozen=True)
-class SuiteCriteria:
-    """The criteria for a suite, checked before it starts.
+class SuiteCriteria(Conditions):
+    """The criteria for a suite.
 
-    Attributes:
-        conditions: each fails the suite if it holds; none: a variation that fails or did not run
-            does.
-        junit: path of the JUnit XML, or None.
+    Without conditions, a variation that fails or did not run fails it.
     """
 
-    conditions: tuple[FailCondition, ...]
-    junit: Path | None
-
-    @classmethod
-    def read(cls, texts: Sequence[str], junit: Path | None, criteria: Sequence[str] = ()) -> Self:
-        """Read the criteria.
-
-        Args:
-            texts: see `read_conditions`; their figures are FIGURES.
-            junit: a new file, or an earlier JUnit XML.
-            criteria: the margins of pass criteria that are given for all scenarios: figures too,
-                each the number of variations that violate it.
-
-        Raises:
-            InputError: a text is not a condition, or a figure is unknown.
-            StorageError: the JUnit XML cannot be written.
-        """
-        found = cls(read_conditions(texts, (*FIGURES, *criteria)), junit)
-        if junit is not None:
-            refuse_junit(junit)
-        return found
+    known = FIGURES
 
     def judge(self, suite: SuiteRun) -> tuple[Outcome, ...]:
         """Apply the criteria to a suite, and write the JUnit XML if requested."""
