@@ -296,7 +296,7 @@ def test_every_mistake_is_one_clear_error(folder, double, cli, tmp_path):
         folder, "--simulator", "embedded"
     )
     assert "1 <= rows must hold, got 0" in refused(folder, *there, "--rows", 0)
-    assert "the ego of this run must be route-follower" in refused(folder, *there, "--ego", "fsm")
+    assert "(--ego) must be route-follower" in refused(folder, *there, "--ego", "fsm")
     assert "unknown figure of --fail-if 'r_critic'" in refused(
         folder, *there, "--fail-if", "r_critic > 1"
     )

@@ -163,7 +163,7 @@ def test_every_mistake_is_one_clear_error(folder, tmp_path, cli):
     assert "1 <= samples" in refused(folder, "--samples", 0)
     assert "0 < at_least < 1 must hold, got 2" in refused(folder, "--at-least", 2)
     assert "0 <= seed" in refused(folder, "--seed", -1)
-    assert "the ego of this run must be route-follower, got fsm" in refused(folder, "--ego", "fsm")
+    assert "(--ego) must be route-follower, got fsm" in refused(folder, "--ego", "fsm")
     calm = copied(folder, tmp_path / "calm", sql=["UPDATE evaluations SET critical = 0"])
     assert "none of 400 evaluations is critical" in refused(calm)
     empty = copied(folder, tmp_path / "empty", sql=["DELETE FROM evaluations"])

@@ -8,12 +8,13 @@ from typing import Any
 import numpy as np
 
 from bridgegen.arrays import Taken
+from bridgegen.cause import Cause
 from bridgegen.confirmation.schema import Record
 from bridgegen.conflict.harm import NEAR_MISS, Count
 from bridgegen.criteria import by_gravity, quantity, summarise_criteria
 from bridgegen.errors import ScenarioError
 from bridgegen.evaluation import Replays
-from bridgegen.objective import Rule
+from bridgegen.objective import Objective, Rule
 from bridgegen.odd.coverage import CoverageMap, coverage_map
 from bridgegen.odd.criteria import PREFIX
 from bridgegen.odd.thresholds import Thresholds
@@ -116,7 +117,7 @@ def build_report(
         n_evaluations=summary.evaluations,
         n_critical=summary.critical,
         r_critic=summary.r_critic,
-        critical_rule=rule_in_words(pipeline),
+        critical_rule=rule_in_words(pipeline.objective, pipeline.cause, pipeline.baseline),
         critical_distance=limits.d_min_below if rule == "thresholds" else None,
         first_critical=summary.first,
         fiftieth_critical=summary.fiftieth,
@@ -168,9 +169,16 @@ def build_report(
     )
 
 
-def rule_in_words(pipeline: Pipeline) -> str:
-    """Return when a scenario of a run is critical, in words."""
-    objective, cause, baseline = pipeline.objective, pipeline.cause, pipeline.baseline
+def rule_in_words(
+    objective: Objective, cause: Cause | None = None, baseline: Pipeline | None = None
+) -> str:
+    """Return when a scenario is critical, in words.
+
+    Args:
+        objective: with the rule.
+        cause: the only one that counts, if one was chosen.
+        baseline: of the driver that the ego's is compared with, if there is one.
+    """
     rule = critical_in_words(
         objective.rule, objective.count, objective.thresholds, objective.criteria
     )
