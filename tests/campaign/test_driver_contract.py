@@ -8,6 +8,8 @@ from bridgegen.campaign.driver_contract import check_driver
 from bridgegen.cli import app
 
 DRIVERS = Path(__file__).parents[1] / "ego" / "drivers.py"
+NETWORKS = DRIVERS.with_name("network_drivers.py")
+EXAMPLES = Path(__file__).parents[2] / "docs" / "examples"
 
 
 def broken(name, file=DRIVERS):
@@ -49,6 +51,29 @@ def test_a_driver_that_mixes_its_scenarios_is_found_out():
 
 def test_a_driver_that_remembers_is_found_out():
     assert "the same row again gives the same motion" in broken("Remembers")
+
+
+def test_a_driver_that_rounds_by_the_batch_is_told_what_to_do():
+    found = broken("RoundsByBatch")
+    problem = found["a row alone moves as it does among others"]
+    assert "bridgegen.ego.batches.FixedBatch" in problem
+    before, after = (
+        words.split()[0].rstrip(";") for words in problem.split(" = ")[1].split("then ")
+    )
+    assert before != after  # enough digits are shown
+    assert "FixedBatch" not in broken("Mixes")["a row alone moves as it does among others"]
+
+
+@pytest.mark.parametrize(
+    ("file", "name"),
+    [
+        (EXAMPLES / "my_network.py", "MyNetwork"),
+        (EXAMPLES / "my_torch_network.py", "MyTorchNetwork"),
+        (NETWORKS, "Policy"),
+    ],
+)
+def test_a_network_in_a_fixed_batch_keeps_everything(file, name):
+    assert broken(name, file) == {}
 
 
 def test_a_driver_that_fails_is_found_out():

@@ -119,6 +119,14 @@ class Mixes(Cruises):
         return Control(np.clip(demanded, -3.0, 2.0), np.zeros(self.n))
 
 
+class RoundsByBatch(Cruises):
+    """Rounds differently by the size of the batch, as linear algebra does."""
+
+    def act(self, observation):
+        control = super().act(observation)
+        return Control(control.acceleration + 1e-12 * self.n, control.curvature)
+
+
 class Remembers(Cruises):
     """Drives more slowly in every batch."""
 

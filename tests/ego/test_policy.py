@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 
 from bridgegen.ego.interface import ROUTE_POINTS, Observation, Scene
 from bridgegen.ego.policy import NEAREST, SIZE, PolicyDriver, control, vectors
+from bridgegen.errors import InputError
 
 ANGLE = st.floats(-np.pi, np.pi)
 PLACE = st.floats(-1000.0, 1000.0)
@@ -96,3 +97,37 @@ def test_actions_are_shares_of_the_vehicles_limits():
     assert answer.acceleration.tolist() == [3.0, 3.0]
     assert answer.curvature.tolist() == [-0.2, -0.2]
     assert control(np.array([[-1.0, 0.5]]), scene).acceleration.tolist() == [-8.0]
+
+
+class Counts:
+    """Steers by how often its state has been handed on: each block has a state of its own."""
+
+    def predict(self, seen, state=None, episode_start=None, deterministic=False):
+        assert len(seen) == len(episode_start) == 64
+        state = np.zeros(len(seen)) if state is None else state + seen[:, 0]
+        return np.stack([state, state], axis=1), state
+
+
+class Recurs(PolicyDriver):
+    def load(self):
+        return Counts()
+
+
+def test_each_block_of_scenarios_has_its_own_state():
+    scene = Scene(0.05, 9, ("bv",), np.zeros(1, np.int64), 4.5, 1.8, 1.4, 50.0, 1.0, 1.0, 1.0)
+    one = observation(n=2)
+    many = one.take(np.arange(130) % 2)
+    driver = Recurs()
+    driver.reset(130, scene)
+    answers = [driver.act(many).curvature for _ in range(3)]
+    for k, answer in enumerate(answers):
+        expected = k * vectors(one)[:, 0].astype(float)
+        np.testing.assert_allclose(answer, np.clip(expected, -1.0, 1.0)[np.arange(130) % 2])
+
+
+def test_a_block_that_cuts_vectors_is_refused():
+    class Cut(Recurs):
+        block = 50
+
+    with pytest.raises(InputError, match="multiple of 64, got 50"):
+        Cut()

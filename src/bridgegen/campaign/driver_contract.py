@@ -27,6 +27,15 @@ MANY, SECONDS = 512, 1.0
 """Rows in the batch that measures the driver's speed, at most; fewer if they would take longer than
 so many seconds."""
 
+FIXED_BATCH = (
+    "so little is rounding: networks and matrix products round differently by the size of the "
+    "batch, unless they are called through bridgegen.ego.batches.FixedBatch"
+)
+"""What to do about a driver that differs by rounding only."""
+
+ROUNDING = 1e-5
+"""A relative difference below which rounding explains that a motion differs."""
+
 _STATES = ("x", "y", "h", "v", "a", "n_steps", "status")
 
 
@@ -128,6 +137,8 @@ def _difference(whole: Rollout, other: Rollout, rows: Sequence[int]) -> str:
             continue
         place = tuple(int(i) for i in np.argwhere(one != two)[0])
         when = f" at {place[2] * whole.time_step:g} s" if len(place) == 3 else ""
-        row, before, after = at[place[0]], one[place], two[place]
-        return f"row {row} has {name} = {before:.9g}{when}, and then {after:.9g}"
+        row, before, after = at[place[0]], float(one[place]), float(two[place])
+        problem = f"row {row} has {name} = {before:.17g}{when}, and then {after:.17g}"
+        rounded = abs(before - after) <= ROUNDING * max(abs(before), abs(after))
+        return f"{problem}; {FIXED_BATCH}" if rounded else problem
     return ""

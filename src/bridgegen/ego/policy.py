@@ -9,7 +9,7 @@
 
 A policy is anything with ``predict(observation, state=None, deterministic=True)`` that returns
 (action, state), as Stable-Baselines3's are; the observation is a vector in ``[-1, 1]``, the action
-a pair there. It is called for all scenarios of a batch at once.
+a pair there. It is called with blocks of one size, see `bridgegen.ego.batches`.
 """
 
 from abc import ABC, abstractmethod
@@ -19,6 +19,8 @@ import numpy as np
 import numpy.typing as npt
 
 from bridgegen.arrays import Float
+from bridgegen.ego.batches import SIZE as BLOCK
+from bridgegen.ego.batches import blocks, checked_size
 from bridgegen.ego.interface import Control, Observation, Scene
 
 if TYPE_CHECKING:
@@ -38,7 +40,13 @@ SIZE = 6 + 5 + 10 * 3 + NEAREST * 8
 
 
 class PolicyDriver(ABC):
-    """A driver that runs a policy; derive from it and implement ``load``."""
+    """A driver that runs a policy; derive from it and implement ``load``.
+
+    Attributes:
+        block: how many scenarios the policy is called with, a multiple of 64, or 1.
+    """
+
+    block: int = BLOCK
 
     @abstractmethod
     def load(self) -> Any:
@@ -52,22 +60,28 @@ class PolicyDriver(ABC):
         return Box(-1.0, 1.0, (SIZE,), np.float32), Box(-1.0, 1.0, (2,), np.float32)
 
     def __init__(self) -> None:
+        checked_size(self.block)
         self._policy = self.load()
 
     def reset(self, n: int, scene: Scene) -> None:
         """See `BatchDriver`."""
         self._scene = scene
-        self._state: Any = None
-        self._first = np.ones(n, dtype=bool)
+        self._states: dict[int, Any] = {}  # of each block, by its first row
+        self._first = np.ones(self.block, dtype=bool)
 
     def act(self, observation: Observation) -> Control:
         """See `BatchDriver`."""
-        seen = vectors(observation)
-        action, self._state = self._policy.predict(
-            seen, state=self._state, episode_start=self._first, deterministic=True
-        )
+        actions = np.empty((len(observation.x), 2))
+        for rows, (seen,) in blocks(vectors(observation), size=self.block):
+            answer, self._states[rows.start] = self._policy.predict(
+                seen,
+                state=self._states.get(rows.start),
+                episode_start=self._first,
+                deterministic=True,
+            )
+            actions[rows] = np.asarray(answer)[: rows.stop - rows.start]
         self._first = np.zeros_like(self._first)
-        return control(np.asarray(action, dtype=np.float64), self._scene)
+        return control(actions, self._scene)
 
 
 def control(action: Float, scene: Scene) -> Control:
