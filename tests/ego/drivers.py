@@ -48,6 +48,18 @@ class AnswersOneNumber(Cruises):
         return 1.0, np.zeros(self.n)
 
 
+class AnswersOneForAll(Cruises):
+    """Drives all scenarios of a batch as the first one."""
+
+    def act(self, observation):
+        return np.clip(observation.target_speed - observation.v, -3.0, 2.0)[:1], np.zeros(1)
+
+
+class AnswersAColumn(Cruises):
+    def act(self, observation):
+        return np.zeros((self.n, 1)), np.zeros((self.n, 1))
+
+
 class AnswersNothing(Cruises):
     def act(self, observation):
         return None

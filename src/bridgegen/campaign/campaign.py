@@ -12,6 +12,7 @@ from bridgegen.arrays import Int
 from bridgegen.campaign.chosen import as_judged, chosen_objective, columns_of
 from bridgegen.campaign.critical import export_critical, most_critical
 from bridgegen.campaign.exportable import require_exportable
+from bridgegen.campaign.failing_driver import FailingDriver
 from bridgegen.campaign.loop import Progress, Reason, run_loop
 from bridgegen.campaign.report import write_run_report
 from bridgegen.campaign.restored import pipeline_of, placed
@@ -248,14 +249,17 @@ def _go(
 ) -> Run:
     """Search up to the budget; then export and report, if ``deliver``."""
     callbacks.stage("search")
+    on_batch = callbacks.batch
+    if pipeline.driver.is_own:
+        failing = FailingDriver(store, pipeline.driver.name, settings.budget)
+
+        def on_batch(progress: Progress) -> None:
+            callbacks.batch(progress)
+            failing.after_batch(progress)
+
     try:
         result = run_loop(
-            algorithm,
-            pipeline.space.decode,
-            pipeline.evaluate,
-            store,
-            settings.budget,
-            callbacks.batch,
+            algorithm, pipeline.space.decode, pipeline.evaluate, store, settings.budget, on_batch
         )
     except WorkersError as error:
         raise _workers_lost(error, store) from error

@@ -46,9 +46,11 @@ class DriverProcess:
     Attributes:
         memory: how many numbers a compiled driver keeps; None for one called in Python. Known
             when the process has started.
+        answers_each_row: whether it has answered several rows at once in the right shape.
     """
 
     memory: int | None
+    answers_each_row: bool = False
 
     def __init__(self, spec: str, time_limit: float = TIME_LIMIT) -> None:
         if not 0.0 < time_limit < float("inf"):
@@ -94,6 +96,7 @@ class DriverProcess:
         demanded: tuple[Float, Float] = self._process.ask(
             "act", observation, seconds=self.time_limit
         )
+        self.answers_each_row = self.answers_each_row or len(observation.x) > 1
         return demanded
 
     def call(
