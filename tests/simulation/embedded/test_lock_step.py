@@ -46,6 +46,17 @@ def test_a_driver_that_looks_stays_on_its_lane():
 
 
 @pytest.mark.parametrize(
+    ("name", "got"),
+    [("AnswersOneForAll", "(1,)"), ("AnswersOneNumber", "()"), ("AnswersAColumn", "(2, 1)")],
+)
+def test_one_answer_for_all_rows_is_none_for_one_row_either(name, got):
+    pipeline = made(name)
+    alone = pipeline.rollout(rows(pipeline)[:1])
+    assert alone.status.tolist() == [23]
+    assert alone.messages[0] == f"acceleration must have the shape (2,), got {got}"
+
+
+@pytest.mark.parametrize(
     ("name", "status", "message"),
     [
         ("FailsFast", 20, "ValueError: too fast for me"),
