@@ -91,10 +91,12 @@ def test_what_nobody_knows_is_no_pass(tmp_path):
         "    def reset(self, n, scene): pass\n"
         "    def act(self, observation): raise ValueError('no map <&')\n"
     )
-    run = bg.run_search(
-        "crossroads-s4", ego=f"{driver}:Broken", budget=3, algorithm="random", causes=False,
-        out=tmp_path / "run",
-    )  # fmt: skip
+    with pytest.raises(InputError, match="no map <&"):
+        bg.run_search(
+            "crossroads-s4", ego=f"{driver}:Broken", budget=3, algorithm="random", causes=False,
+            out=tmp_path / "run",
+        )  # fmt: skip
+    run = bg.Run(tmp_path / "run")
     outcomes = PassFailCriteria.read(["critical > 0", "failed > 3"], tmp_path / "j.xml").judge(run)
     assert [one.verdict for one in outcomes] == ["unknown", "unknown", "passed"]
     root = ElementTree.parse(tmp_path / "j.xml").getroot()
