@@ -10,6 +10,7 @@ import bridgegen as bg
 from bridgegen.baseline import RECORDED
 from bridgegen.campaign.regions import regions_of
 from bridgegen.conflict.harm import NEAR_MISS
+from bridgegen.dashboard.project import read_project
 from bridgegen.errors import InputError, UnknownNameError
 from bridgegen.odd.reader import load
 from bridgegen.options import PipelineOptions
@@ -133,6 +134,13 @@ def test_a_run_says_where_the_driver_is_worse_and_its_files_show_it(tmp_path):
     assert "worse than careful" in run.report.read_text("utf-8")
     found = regions_of(run.folder, samples=20, at_least=0.2)
     assert found is not None
+    with pytest.raises(InputError, match="compares route-follower with careful"):
+        bg.export_safety_case([run.folder], out=tmp_path / "case")
+    project = read_project(tmp_path)
+    one = next(one for one in project.results if one.source == "run")
+    assert (one.kind, one.worse_than, one.space) == ("difference", "careful", None)
+    assert one.failures
+    assert "worse than careful" in bg.build_dashboard(tmp_path).page.read_text("utf-8")
 
 
 def test_a_driver_of_one_s_own_is_named_again_to_resume(tmp_path):

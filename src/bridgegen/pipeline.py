@@ -144,7 +144,7 @@ class Pipeline:
         if recorded is None:
             also = (*options.metrics, *self.monitor.metrics)
             recorded = metrics_of(scenario, self.driver, also, detects=sees)
-        self.baseline = self._baseline_of(options, road_map)
+        self.baseline = self._baseline_of(options)
         margins = [name for name in recorded if name.startswith(PREFIX)]
         beside = [name for name in recorded if name.startswith(OF_BASELINE)]
         own = [name for name in recorded if name not in (*margins, *beside)]
@@ -156,7 +156,7 @@ class Pipeline:
         self._variants = Variants.of(scenario, space, self.source, embedded, driver)
         self._variant = lru_cache(maxsize=KEPT_VARIANTS)(self._make_variant)
 
-    def _baseline_of(self, options: PipelineOptions, road_map: RoadMap | None) -> "Pipeline | None":
+    def _baseline_of(self, options: PipelineOptions) -> "Pipeline | None":
         """Return the pipeline of the driver that the ego's is compared with, if there is one.
 
         Raises:

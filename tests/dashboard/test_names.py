@@ -6,17 +6,17 @@ import pytest
 
 from bridgegen.dashboard.names import driver_of, place_of, scenario_name
 
-PROJECT = Path("/work/project")
+PROJECT = Path("/srv/project")
 
 
 @pytest.mark.parametrize(
     ("text", "name", "version"),
     [
-        ("/work/project/drivers/stack-1.2.py:Stack", "drivers/stack.py:Stack", "1.2"),
-        ("/work/project/stack_v3.py:Stack", "stack.py:Stack", "3"),
-        ("/work/project/stack@7/driver.py:Stack", "stack/driver.py:Stack", "7"),
-        ("/work/project/stack-2_1.fmu", "stack.fmu", "2_1"),
-        ("/work/stack.py:Stack2", "../stack.py:Stack2", ""),
+        ("/srv/project/drivers/stack-1.2.py:Stack", "drivers/stack.py:Stack", "1.2"),
+        ("/srv/project/stack_v3.py:Stack", "stack.py:Stack", "3"),
+        ("/srv/project/stack@7/driver.py:Stack", "stack/driver.py:Stack", "7"),
+        ("/srv/project/stack-2_1.fmu", "stack.fmu", "2_1"),
+        ("/srv/stack.py:Stack2", "../stack.py:Stack2", ""),
         ("reference", "reference", "BridgeGen 0.9"),
         ("un-r157", "un-r157", "BridgeGen 0.9"),  # r157 is no version
     ],
@@ -27,7 +27,7 @@ def test_a_version_ends_the_name(text, name, version):
 
 
 def test_two_versions_of_a_driver_are_one_driver():
-    one, two = (driver_of(f"/work/project/stack-{v}.py:S", PROJECT, "") for v in ("1.2", "1.10"))
+    one, two = (driver_of(f"/srv/project/stack-{v}.py:S", PROJECT, "") for v in ("1.2", "1.10"))
     assert one.name == two.name
     assert one.label != two.label
 
@@ -37,12 +37,12 @@ def test_names_do_not_depend_on_where_the_project_is(tmp_path):
     other.mkdir()
     (other / "scenarios").mkdir()
     (other / "scenarios" / "mine.yaml").write_text("", "utf-8")
-    here = scenario_name("/work/project/scenarios/mine.yaml", PROJECT)
+    here = scenario_name("/srv/project/scenarios/mine.yaml", PROJECT)
     assert here == scenario_name("scenarios/mine.yaml", other) == "scenarios/mine.yaml"
 
 
 def test_a_distribution_names_its_scenario():
-    found = scenario_name("a/cut.xosc", PROJECT, "/work/project/a/ranges.xosc")
+    found = scenario_name("a/cut.xosc", PROJECT, "/srv/project/a/ranges.xosc")
     assert found == "a/ranges.xosc"
 
 

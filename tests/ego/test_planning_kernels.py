@@ -410,6 +410,14 @@ def test_one_does_not_wait_in_somebody_elses_way() -> None:
     assert before_near == pytest.approx(stop_for(40.0 - 33.65, 6.0))
 
 
+@pytest.mark.parametrize("d", [-0.1, -3.0, -500.0])
+def test_what_has_been_covered_takes_no_time(d):
+    t = time_to(d, 5.0, 10.0)
+    assert math.isfinite(t)
+    assert t < 0.0
+    assert t == time_to.py_func(d, 5.0, 10.0)
+
+
 @given(d=st.floats(0.0, 100.0), v=st.floats(0.0, 20.0), pace=st.floats(2.0, 20.0))
 def test_arrival_is_that_of_a_comfortable_start(d: float, v: float, pace: float) -> None:
     t, x, now = time_to(d, v, pace), 0.0, v

@@ -21,7 +21,7 @@ OTHER = "Options"
 
 
 DEFAULT = "default"
-"""The name, which nobody types, of a `WithDefault`'s default command."""
+"""The internal name of a `WithDefault`'s default command; users do not type it."""
 
 _BESIDE = "bridgegen.group"
 

@@ -4,7 +4,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from bridgegen.dashboard.results import Failure, ModeKey, Result, current, in_order
-from bridgegen.dashboard.status_file import Decision, Status, StatusFile
+from bridgegen.dashboard.status_file import Decision, StatusFile
+from bridgegen.suite.index import Status
 
 
 @dataclass(frozen=True)

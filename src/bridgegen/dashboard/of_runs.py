@@ -41,8 +41,9 @@ def read_run(project: Path, folder: Path, sceneries: Sceneries) -> Result:
         driver = Driver(driver.name + stages, driver.version, driver.label + stages)
     bound = line.triage.bound if line.triage else None
     judged = tuple(map(_judged, line.criteria))
+    other = settings.worse_than
     return Result(
-        "run",
+        "run" if other is None else "difference",
         line.path,
         f"{line.path}/{REPORT}" if (folder / REPORT).is_file() else "",
         line.changed,
@@ -52,10 +53,11 @@ def read_run(project: Path, folder: Path, sceneries: Sceneries) -> Result:
         bound.harmful if bound else 0,
         bound.failed if bound else 0,
         line.finished,
-        bound.space if bound else None,
+        bound.space if bound and other is None else None,
         (*_failures(line, scenario, driver), *violations(judged, scenario, driver.name)),
         judged,
         seen[0],
+        worse_than="" if other is None else driver_of(other, project, line.version).label,
     )
 
 

@@ -99,9 +99,10 @@ def _run(one: Result, base: str) -> list[str]:
     return [
         link(base, one.page, one.source) + ("" if one.finished else "<small>not finished</small>"),
         text(one.scenario),
-        text(one.driver.label),
+        text(one.driver.label)
+        + (f"<small>worse than {text(one.worse_than)}</small>" if one.worse_than else ""),
         f"{one.evaluations:,}",
-        f"{one.failed:,}" if space else "–",
+        f"{one.failed:,}" if space or one.worse_than else "–",
         span(space.share or 0.0, space.low, space.high) if space and known else "–",
         when(one.time),
     ]

@@ -97,7 +97,7 @@ def read_project(folder: Path, begun: Callable[[int, int], None] | None = None) 
 
 
 def _kind(folder: Path) -> str | None:
-    """Return the file by which a folder is one of ours; None if it is none."""
+    """Return the file that identifies a folder of results; None if it is another folder."""
     for name in _FILES:
         file = folder / name
         if file.is_file() and not file.is_symlink():

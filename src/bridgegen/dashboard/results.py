@@ -9,7 +9,8 @@ from bridgegen.dashboard.names import Driver
 from bridgegen.odd.criteria import Criterion
 from bridgegen.triage.record import Estimate
 
-Kind = Literal["run", "suite"]
+Kind = Literal["run", "difference", "suite"]
+"""A run that counts only what another driver avoids (``--worse-than``) is a difference."""
 
 
 @dataclass(frozen=True, order=True)
@@ -24,7 +25,7 @@ class ModeKey:
         driver: without its version.
         conflict: see `bridgegen.triage.modes.Key`, as the next five.
         conflict_type: its type.
-        responsible: who is.
+        responsible: the responsible party.
         rule: that decides on it.
         partner: the other participant.
         place: on the ego's route.
@@ -124,7 +125,7 @@ class Result:
     """A scenario, driven by one driver.
 
     Attributes:
-        kind: a run, or an entry of a suite with one ego.
+        kind: a run, also one that compares two drivers, or an entry of a suite with one ego.
         source: folder, as seen from the project's.
         page: where its page is, as seen from the project's folder; "" if there is none.
         time: when its file was last written [s since 1970].
@@ -133,12 +134,13 @@ class Result:
         evaluations: number of evaluations, or of variations.
         failed: number of those that harm; of a suite's that fail.
         lost: number of those without a result.
-        space: harmful share of the search space, of a finished run.
+        space: harmful share of the search space, of a finished run that compares no drivers.
         finished: whether all is done.
         failures: its failure modes.
         judged: its requirements.
         seen: which values were evaluated; None where the scenario cannot be read any more.
         entry: of the suite, by name.
+        worse_than: the driver that a difference is of, as people call it; else "".
     """
 
     kind: Kind
@@ -156,6 +158,7 @@ class Result:
     judged: tuple[Judged, ...] = ()
     seen: Seen | None = field(default=None, repr=False, compare=False)
     entry: str = ""
+    worse_than: str = ""
 
 
 def in_order(results: Iterable[Result]) -> list[Result]:

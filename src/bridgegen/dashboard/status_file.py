@@ -8,15 +8,14 @@ import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal, get_args
+from typing import get_args
 
 from bridgegen.disk import write_whole
 from bridgegen.errors import FileFormatError, StorageError
 from bridgegen.odd.plain_yaml import MAX_BYTES, Document, read_plain_yaml
+from bridgegen.suite.index import Status
 
 FILE = "failure-modes.yaml"
-
-Status = Literal["new", "known", "accepted", "fixed"]
 
 STATUSES: tuple[Status, ...] = get_args(Status)
 

@@ -101,11 +101,15 @@ def find_zone(path, n, ds, body, other_path, other_n, other_ds, other_body, zone
 
 @kernel
 def time_to(distance, v, pace):
-    """Return the time [s] to cover a distance [m], accelerating comfortably from v to ``pace``."""
+    """Return the time [s] to cover a distance [m], accelerating comfortably from v to ``pace``.
+
+    Below 0 where the distance is: it has been covered.
+    """
     pace = max(pace, v, 1.0)
     gained = (pace * pace - v * v) / (2.0 * COMFORT_ACCELERATION)
     if distance <= gained:
-        return (math.sqrt(v * v + 2.0 * COMFORT_ACCELERATION * distance) - v) / COMFORT_ACCELERATION
+        reached = math.sqrt(max(v * v + 2.0 * COMFORT_ACCELERATION * distance, 0.0))
+        return (reached - v) / COMFORT_ACCELERATION
     return (pace - v) / COMFORT_ACCELERATION + (distance - gained) / pace
 
 

@@ -78,10 +78,16 @@ def read_facts(folder: Path) -> Facts:
 
     Raises:
         StorageError: not a run, damaged, not closed, or its scenario has changed since.
-        InputError: not finished, without a triage, or of a version that recorded too little.
+        InputError: not finished, of two drivers, without a triage, or of a version that recorded
+            too little.
         FileFormatError: its triage, or a confirmation, is damaged or another run's.
     """
     run = Run(folder)
+    if run.settings.worse_than is not None:
+        raise InputError(
+            f"{folder}: compares {run.settings.ego} with {run.settings.worse_than}: failures of "
+            "both do not count in it, so it supports no claim of one; search without --worse-than"
+        )
     triage = _triage(run)
     wanted = (harm_name(triage), "d_min", "n_collision", "severity")
     scenario, space, _ = searched(run)

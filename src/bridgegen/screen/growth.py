@@ -24,7 +24,7 @@ _WORDS = {
 
 
 def print_additions(made: "Sequence[Addition]", to: Path, *, as_json: bool = False) -> None:
-    """Print what became of each failure, then the totals."""
+    """Print the outcome of each failure, then the totals."""
     if as_json:
         print(json.dumps([vars(one) for one in made], indent=2, ensure_ascii=False))
         return

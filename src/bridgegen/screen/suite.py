@@ -128,8 +128,8 @@ def print_suite(
         for text in filter(None, (outcomes(results), points(results))):
             print(f"  {text}")
         _print_standing(suite, ego)
-    if gone := suite.baseline.gone(suite.results):
-        print(f"not there any more, set their status to fixed: {', '.join(gone)}")
+    if gone := suite.known_failures.gone(suite.results):
+        print(f"no longer fail, set their status to fixed: {', '.join(gone)}")
     for made in maps:
         print(f"map: {made.page}")
     print(f"page: {page} ({seconds:.1f} s)")
@@ -155,9 +155,9 @@ def _print_clauses(suite: "SuiteRun", console: Console) -> None:
 def _print_standing(suite: "SuiteRun", ego: str) -> None:
     """Print how the failures of an ego stand, where indexes name some."""
     results = suite.of_ego(ego)
-    if sentence := suite.baseline.sentence(results):
+    if sentence := suite.known_failures.sentence(results):
         print(f"  {sentence}")
-    for id in suite.baseline.regressions(results):
+    for id in suite.known_failures.regressions(results):
         print(f"  regression: {id} was fixed, and fails again")
 
 
@@ -236,9 +236,9 @@ def _print_searches(searches: Sequence["WorseThan"], found: "Difference") -> Non
 
 
 def _verdict(suite: "SuiteRun", one: "EntryResult") -> str:
-    from bridgegen.suite.baseline import words
+    from bridgegen.suite.known_failures import words
 
-    said = words(suite.baseline.worst(one), suite.baseline.failures.get(one.entry))
+    said = words(suite.known_failures.worst(one), suite.known_failures.failures.get(one.entry))
     return f"{_counted(one)} ({said})" if said else _counted(one)
 
 
@@ -298,8 +298,8 @@ def _facts(suite: "SuiteRun") -> dict[str, Any]:
                 "not_run": one.count("not run"),
                 "outcomes": one.outcomes(),
                 "problem": one.problem or None,
-                "status": suite.baseline.status_of(one.entry),
-                "standing": suite.baseline.worst(one),
+                "status": suite.known_failures.status_of(one.entry),
+                "standing": suite.known_failures.worst(one),
             }
             for one in suite.results
         ],

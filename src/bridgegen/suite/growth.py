@@ -38,7 +38,7 @@ _CAUSES = tuple(one.label for one in CAUSES)
 
 @dataclass(frozen=True)
 class Addition:
-    """What became of a failure.
+    """The outcome of adding a failure.
 
     Attributes:
         source: where it was found, for people.
@@ -82,7 +82,7 @@ def add_failures(
         to: the folder; made if there is none.
         egos: see `failing_in`.
         replace_worse: replace the scenario of a known mode by one with more harm.
-        progress: called with what became of each.
+        progress: called with each outcome.
 
     Raises:
         InputError: nothing is found in what is given, or a driver that is code must be named.

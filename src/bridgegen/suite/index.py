@@ -59,7 +59,7 @@ class Failure(ShapedSection):
     type: _Text
     """Of the conflict."""
     responsible: _Text
-    """Who is."""
+    """The responsible party."""
     rule: _Text
     """That decides on the responsibility."""
     partner: _Text

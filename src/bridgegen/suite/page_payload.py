@@ -10,9 +10,9 @@ from bridgegen.report.packed import OF_ROW, deflated, road_key
 from bridgegen.report.payload import script_json
 from bridgegen.report.playback import Playback
 from bridgegen.report.playback_payload import ROAD_SCALE, SCALE, playback_payload, road_payload
-from bridgegen.suite.baseline import EXCUSED, words
 from bridgegen.suite.clauses import clause_results
 from bridgegen.suite.difference import difference as variations_compared
+from bridgegen.suite.known_failures import EXCUSED, words
 from bridgegen.suite.rating import colours_of
 from bridgegen.suite.results import EntryResult, Outcome, RowResult, Verdict, rank
 from bridgegen.suite.sentences import (
@@ -183,11 +183,11 @@ def _result(
         found["motion"] = motion
     if one.worst is None:
         return found
-    baseline = suite.baseline
-    if said := words(baseline.worst(one), baseline.failures.get(one.entry)):
+    stated = suite.known_failures
+    if said := words(stated.worst(one), stated.failures.get(one.entry)):
         found["standing"] = said
-        found["excused"] = baseline.worst(one) in EXCUSED
-        found["comment"] = baseline.failures[one.entry][1].comment
+        found["excused"] = stated.worst(one) in EXCUSED
+        found["comment"] = stated.failures[one.entry][1].comment
     row = one.rows[one.worst]
     found["severity"] = _short(max(one.severity for one in one.rows if one.verdict == "failed"))
     if row.critical or row.conflict in _HAPPENED:
@@ -281,7 +281,7 @@ def _facts(suite: SuiteRun) -> list[str]:
     facts += [f"ideal {', '.join(map(str, s['ideal']))}"] if s.get("ideal") else []
     facts += [f"seed {s['seed']}"] if s.get("seed") else []
     for ego in suite.egos:
-        if sentence := suite.baseline.sentence(suite.of_ego(ego)):
+        if sentence := suite.known_failures.sentence(suite.of_ego(ego)):
             facts.append(f"{label_of(suite, ego)}: {sentence}" if len(suite.egos) > 1 else sentence)
     return facts
 

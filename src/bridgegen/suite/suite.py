@@ -21,10 +21,10 @@ from bridgegen.options import CommonOptions, called_with
 from bridgegen.records import parse_json
 from bridgegen.simulation.choice import EMBEDDED, SimulatorChoice
 from bridgegen.store.sqlite import Lock
-from bridgegen.suite.baseline import Baseline
 from bridgegen.suite.entries import RESULTS as FILE
 from bridgegen.suite.entries import find_entries, of_edition
 from bridgegen.suite.evaluate import Job, evaluate
+from bridgegen.suite.known_failures import KnownFailures
 from bridgegen.suite.results import EntryResult, Header
 from bridgegen.workers.process import cores
 from bridgegen.workers.tasks import TaskPool
@@ -125,13 +125,13 @@ class SuiteRun:
     jobs: tuple[Job, ...] = ()
 
     @cached_property
-    def baseline(self) -> Baseline:
+    def known_failures(self) -> KnownFailures:
         """What the indexes of its folders say of its failures.
 
         Raises:
             FileFormatError: an index is damaged.
         """
-        return Baseline.of(self.results)
+        return KnownFailures.of(self.results)
 
     def of_ego(self, ego: str) -> tuple[EntryResult, ...]:
         """Return the results with one ego."""

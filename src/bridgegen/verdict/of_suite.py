@@ -4,8 +4,8 @@ from collections.abc import Sequence
 
 from bridgegen.odd.clauses import read_clause
 from bridgegen.odd.criteria import read_criterion
-from bridgegen.suite.baseline import EXCUSED
 from bridgegen.suite.clauses import clause_results
+from bridgegen.suite.known_failures import EXCUSED
 from bridgegen.suite.replay import replay_command
 from bridgegen.suite.results import FAILED, EntryResult, RowResult, counts
 from bridgegen.suite.sentences import clause_in_words
@@ -64,7 +64,7 @@ class SuiteCriteria(Conditions):
 def figures_of(suite: SuiteRun) -> dict[str, float]:
     """Return FIGURES of a suite, and of each criterion the variations that violate it."""
     results = suite.results
-    standing = suite.baseline.counts(results)
+    standing = suite.known_failures.counts(results)
     rows = [row for one in results for row in one.rows]
     number = counts(results)
     figures: dict[str, float] = {
@@ -101,11 +101,11 @@ def _all_pass(suite: SuiteRun, ego: str) -> Outcome:
     results = suite.of_ego(ego)
     number = counts(results)
     details = ", ".join(f"{count} {name}" for name, count in number.items())
-    standing = suite.baseline.counts(results)
+    standing = suite.known_failures.counts(results)
     known = sum(standing[one] for one in EXCUSED)
     if known:
         details += f"; {known} of the failed {'is' if known == 1 else 'are'} known"
-    if again := suite.baseline.regressions(results):
+    if again := suite.known_failures.regressions(results):
         details += f"; regression: {', '.join(again)} {'was' if len(again) == 1 else 'were'} fixed"
         details += f", and {'fails' if len(again) == 1 else 'fail'} again"
     verdict: Verdict = "passed"
@@ -113,7 +113,7 @@ def _all_pass(suite: SuiteRun, ego: str) -> Outcome:
         verdict = "failed"
     elif number["not run"] or not number["passed"] + known:
         verdict = "unknown"
-    test = "all variations pass" + (" but known failures" if suite.baseline.failures else "")
+    test = "all variations pass" + (" but known failures" if suite.known_failures.failures else "")
     return Outcome(test + (f" with {ego}" if ego else ""), verdict, details)
 
 
@@ -135,7 +135,7 @@ def _suites(suite: SuiteRun, outcomes: Sequence[Outcome]) -> list[Suite]:
             f"clause {clause.id}": clause_in_words(clause)
             for clause in clause_results([one], one.ego)
         }
-        failure = suite.baseline.failures.get(one.entry)
+        failure = suite.known_failures.failures.get(one.entry)
         if failure is not None:
             facts |= {"failure": failure[0], "status": failure[1].status}
         found.append(Suite(one.entry, _cases(suite, one, group), facts))
@@ -149,8 +149,8 @@ def _cases(suite: SuiteRun, one: EntryResult, group: str) -> list[Case]:
     """
     if one.problem:
         return [Case(group, "runs", "error", one.problem)]
-    baseline = suite.baseline
-    failure = baseline.failures.get(one.entry)
+    stated = suite.known_failures
+    failure = stated.failures.get(one.entry)
     again = failure is not None and failure[1].status == "fixed"
 
     def case(name: str, rows: Sequence[int], what: str, known: bool) -> Case:
@@ -164,14 +164,12 @@ def _cases(suite: SuiteRun, one: EntryResult, group: str) -> list[Case]:
     lost = [i for i, row in enumerate(one.rows) if row.problem]
     cases = [case_of_rows(group, "runs", one, lost, "did not run", "error")]
     critical = [i for i, row in enumerate(one.rows) if row.critical]
-    excused = all(baseline.is_excused(one, one.rows[i]) for i in critical)
+    excused = all(stated.is_excused(one, one.rows[i]) for i in critical)
     cases.append(case("no critical scenario", critical, "critical", excused))
     for number, given in enumerate(one.criteria):
         violating = [i for i, row in enumerate(one.rows) if number in row.violated]
         words = words_of(read_criterion(given))
-        cases.append(
-            case(words, violating, "violate it", baseline.is_criterion_excused(one, number))
-        )
+        cases.append(case(words, violating, "violate it", stated.is_criterion_excused(one, number)))
     for number, given in enumerate(one.clauses):
         clause = read_clause(given)
         failing = [i for i, letter in enumerate(one.letters(number)) if letter == FAILED]

@@ -3,7 +3,7 @@
 import pytest
 from tests.suite.test_index import failure
 
-from bridgegen.suite.baseline import Baseline, words
+from bridgegen.suite.known_failures import KnownFailures, words
 from bridgegen.suite.results import EntryResult, RowResult
 
 WAY = {"conflict": "contact", "conflict_type": "front-to-rear striking", "responsible": "ego"}
@@ -19,7 +19,7 @@ def stands(status, row, **more):
     one = EntryResult(
         entry="b", ego="", digest="", scenario="b.xosc", criteria=RULES, rows=[row]
     )  # fmt: skip
-    return Baseline({"b": ("b", failure(status=status, **more))}).standing(one, row)
+    return KnownFailures({"b": ("b", failure(status=status, **more))}).standing(one, row)
 
 
 @pytest.mark.parametrize(
@@ -58,16 +58,16 @@ def test_what_is_gone_and_what_is_back_is_named():
 
     of = {"b": ("b", failure(status="known")), "b-minimal": ("b", failure(status="known")),
           "c": ("c", failure(status="fixed")), "d": ("d", failure(status="new"))}  # fmt: skip
-    baseline = Baseline(of)
+    known = KnownFailures(of)
     results = [
         result("b", "A", KEPT), result("b-minimal", "A", KEPT), result("c", "A", HIT),
         result("d", "A", KEPT), result("d", "B", HIT), result("e", "A", HIT),
     ]  # fmt: skip
-    assert baseline.gone(results) == ["b"]  # with B, d is there
-    assert baseline.regressions(results) == ["c"]
-    assert baseline.counts(results) == {
+    assert known.gone(results) == ["b"]  # with B, d is there
+    assert known.regressions(results) == ["c"]
+    assert known.counts(results) == {
         "passed": 3, "regression": 1, "new": 2, "not run": 0,
     }  # fmt: skip
-    assert baseline.gone([*results, result("b-minimal", "B", HIT)]) == []
-    assert words(baseline.worst(results[2]), of["c"]) == "regression: it was fixed"
+    assert known.gone([*results, result("b-minimal", "B", HIT)]) == []
+    assert words(known.worst(results[2]), of["c"]) == "regression: it was fixed"
     assert words("new", of["b"]) == "new: not the known failure"

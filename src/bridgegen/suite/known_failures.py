@@ -16,7 +16,7 @@ EXCUSED: tuple[Standing, ...] = ("known", "accepted")
 
 
 @dataclass(frozen=True)
-class Baseline:
+class KnownFailures:
     """The failures that indexes state, by entry.
 
     Attributes:
