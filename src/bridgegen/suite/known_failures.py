@@ -113,7 +113,7 @@ class KnownFailures:
         return sorted({self.failures[name][0] for name in again})
 
     def gone(self, results: Sequence[EntryResult]) -> list[str]:
-        """Return the ids of the failures that are not there any more, and are not called fixed.
+        """Return the ids of the failures that no longer fail, and are not called fixed.
 
         Of all egos together: all of its files pass.
         """
