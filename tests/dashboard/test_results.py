@@ -59,3 +59,9 @@ def test_bins_of_two_scenarios_with_one_name_are_not_mixed():
     one, two = Seen(1, bins={"a": [1, 0]}), Seen(1, bins={"a": [0, 0, 1], "b": [1]})
     one.add(two)
     assert (one.evaluations, one.bins) == (2, {"a": [1, 0], "b": [1]})
+
+
+def test_a_search_for_where_it_is_worse_clears_nothing(result):
+    old = result(version="", time=1.0, modes=("turning",))
+    worse = result(version="", time=2.0, kind="difference", worse_than="stack-0.9")
+    assert current([old, worse]) == [old, worse]
