@@ -298,9 +298,10 @@ def _parse(one: Field, raw: str) -> float | int | bool | str:
         return raw in ("true", "1")
     try:
         value = int(raw) if kind is int else float(raw)
-    except ValueError:
-        value = math.nan
-    if not math.isfinite(value) or "_" in raw:
+        is_number = math.isfinite(value) and "_" not in raw
+    except (OverflowError, ValueError):
+        is_number = False
+    if not is_number:
         raise ValueError("a whole number" if kind is int else "a finite number")
     high = NUMBER_LIMIT if form.high is None else form.high
     if abs(value) > high:
