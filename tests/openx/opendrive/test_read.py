@@ -247,7 +247,7 @@ def test_links_to_nothing_are_left_out_and_said(
 def test_a_whole_number_beyond_all_floats_is_one_clear_error() -> None:
     huge = "9" * 400
     read(DOCUMENT.replace('revMinor="7"', f'revMinor="{huge}"').encode())  # taken for the default
-    with pytest.raises(FileFormatError, match="lane .*a whole number"):
+    with pytest.raises(FileFormatError, match=r"lane .*a whole number"):
         read(DOCUMENT.replace('<lane id="-1"', f'<lane id="-{huge}"', 1).encode())
 
 
