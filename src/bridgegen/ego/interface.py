@@ -8,10 +8,15 @@ A driver is a class without arguments:
 
 ``reset`` is called before the first instant of every batch, ``act`` once per instant. Scenario i of
 a batch must not depend on the other ones: how batches are cut depends on the machine.
+
+What costs time is given only to a driver that asks for it, by a class attribute:
+
+    class MyDriver:
+        wants = ("lanes", "map")
 """
 
-from dataclasses import dataclass, fields
-from typing import Any, Protocol, Self
+from dataclasses import dataclass, field, fields, is_dataclass
+from typing import Any, Protocol, Self, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -23,6 +28,18 @@ ROUTE_POINTS = 40
 
 ROUTE_STEP = 2.0
 """Metres between two of them."""
+
+HISTORY, HISTORY_STEP = 11, 0.1
+"""H, how many instants a history has; seconds between two of them."""
+
+
+WANTS = {
+    "lanes": "speed limit, width and the lanes beside along the route; the way to its end",
+    "map": "the road network: lanes, markings, crosswalks, lights; the part of it around the ego",
+    "conflicts": "where the ways of others meet the route, and who gives way there",
+    "history": "the tracks of the last second",
+}
+"""What a driver may ask for, by its attribute ``wants``."""
 
 
 @dataclass(frozen=True)
@@ -41,6 +58,8 @@ class Scene:
         max_acceleration: [m/s²].
         max_deceleration: [m/s²], > 0.
         max_curvature: of its path at full lock [1/m].
+        maps: of the R road networks of the batch, if the driver wants "map"; else empty.
+        map_of: ``(N,)`` int64, which of them each scenario has; empty if it does not.
     """
 
     time_step: float
@@ -54,6 +73,8 @@ class Scene:
     max_acceleration: float
     max_deceleration: float
     max_curvature: float
+    maps: tuple["RoadMap", ...] = ()
+    map_of: Int = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
 
 
 @dataclass(frozen=True)
@@ -83,6 +104,11 @@ class Observation:
         stop_distance: ``(N,)`` float64 [m], from the front of the ego to the next stop line of a
             light on its route; +inf where there is none.
         light: ``(N,)`` int8, that light's state, see `Rollout.lights`; 0 where there is none.
+        lanes: along the route, if the driver wants "lanes".
+        map: what of the road network is near, if it wants "map".
+        conflicts: where others' ways meet the route, if it wants "conflicts".
+        history: ``(N, M, H, 13)`` float64, if it wants "history": `tracks` of the last second, now
+            first, one for each ``HISTORY_STEP``; state 0 before the scenario began.
     """
 
     time: float
@@ -98,11 +124,111 @@ class Observation:
     tracks: Float
     stop_distance: Float
     light: npt.NDArray[np.int8]
+    lanes: "Lanes | None" = None
+    map: "MapView | None" = None
+    conflicts: "Conflicts | None" = None
+    history: Float | None = None
 
     def take(self, rows: Int | slice) -> Self:
         """Return the observation of some of the scenarios."""
-        named = {one.name: getattr(self, one.name) for one in fields(self)}
-        return type(self)(**{k: v if k == "time" else v[rows] for k, v in named.items()})
+        return _taken(self, rows)
+
+
+Part = TypeVar("Part")
+
+
+def _taken(part: Part, rows: Int | slice) -> Part:
+    """Return some of the rows of an observation, or of a part of one."""
+    found = {}
+    for one in fields(part):  # type: ignore[arg-type]
+        value = getattr(part, one.name)
+        if isinstance(value, np.ndarray):
+            value = value[rows]
+        elif is_dataclass(value):
+            value = _taken(value, rows)
+        found[one.name] = value
+    return type(part)(**found)
+
+
+@dataclass(frozen=True)
+class Lanes:
+    """The road along the route, at its P points.
+
+    Attributes:
+        speed_limit: ``(N, P)`` float64 [m/s]; +inf where none is posted.
+        width: ``(N, P)`` float64 [m], of the route's own lane.
+        junction: ``(N, P)`` bool, whether the point is inside a junction.
+        beside: ``(N, P, 2, 4)`` float64, the lane to the left (0) and to the right (1): how far to
+            the left of the route its centre is [m] (so the right one's is negative), its width
+            [m], its direction (1 as the route, -1 against it, 0: there is none), and whether the
+            marking between allows to change to it (1).
+        ends: ``(N,)`` float64 [m], along the route to its end, where the scenario's goal is.
+        goal: ``(N, 3)`` float64, x, y [m] and heading [rad] there.
+    """
+
+    speed_limit: Float
+    width: Float
+    junction: Bool
+    beside: Float
+    ends: Float
+    goal: Float
+
+
+@dataclass(frozen=True)
+class MapView:
+    """What of the road networks is near the ego, in the frame of `RoadMap`: the world.
+
+    `bridgegen.ego.polylines` makes of it arrays of fixed size in the ego's frame, as learned
+    planners take them.
+
+    Attributes:
+        lane: ``(N,)`` int64, the index in `RoadMap.lanes` of the lane that the ego is on; -1 off
+            all lanes.
+        near: ``(N, Q)`` int32, the indices of the nearest pieces of `RoadMap.pieces`, the nearest
+            first; -1 beyond the last one.
+        lights: ``(N, L)`` int8, the states of all traffic lights, in the order of
+            `RoadMap.lights`.
+    """
+
+    lane: Int
+    near: npt.NDArray[np.int32]
+    lights: npt.NDArray[np.int8]
+
+
+@dataclass(frozen=True)
+class Conflicts:
+    """Where ways that others may take meet the ego's route; a participant may have W ways.
+
+    Attributes:
+        zones: ``(N, M, W, 5)`` float64: from the ego's front along the route to the zone's begin
+            and from its rear to its end [m] (negative once passed); the same of the other's box
+            along its way; and the priority: 1 they give way, 0 no rule, -1 the ego gives way.
+            NaN where there is no way, no meeting, or the participant is not tracked.
+    """
+
+    zones: Float
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """What a driver plans in N scenarios, instead of a `Control`; the house follows it.
+
+    A driver that plans may say how often, by a class attribute ``period`` [s]; it is then asked
+    so often, and its last plan is followed meanwhile.
+
+    Attributes:
+        time: ``(K,)`` or ``(N, K)`` float64 [s] from now on, increasing; beyond the period.
+        x: ``(N, K)`` float64 [m], the reference point, the rear axle's centre.
+        y: ``(N, K)`` float64 [m].
+        h: ``(N, K)`` float64 [rad], heading.
+        v: ``(N, K)`` float64 [m/s], forward speed.
+    """
+
+    time: npt.ArrayLike
+    x: npt.ArrayLike
+    y: npt.ArrayLike
+    h: npt.ArrayLike
+    v: npt.ArrayLike
 
 
 @dataclass(frozen=True)
@@ -124,5 +250,99 @@ class BatchDriver(Protocol):
     def reset(self, n: int, scene: Scene) -> None:
         """Begin N scenarios; discard the state of earlier ones."""
 
-    def act(self, observation: Observation) -> Control | Any:
+    def act(self, observation: Observation) -> Control | Trajectory | Any:
         """Return the control at one instant: a `Control`, or a pair (acceleration, curvature)."""
+
+
+# --- The road network, for drivers that want "map" -------------------------------------------------
+
+CENTRE, BORDER, CROSSWALK, STOP_LINE = range(4)
+"""What a piece of the map is."""
+
+PIECE_POINTS = 11
+"""V, how many points a piece has at most, 2 m apart at most."""
+
+
+@dataclass(frozen=True)
+class Lane:
+    """One lane of one section of a road, in its direction of travel.
+
+    Attributes:
+        id: ``road:section:lane``, as OpenDRIVE names them.
+        kind: OpenDRIVE's type of the lane: "driving", "shoulder", "biking" …
+        centre: ``(K, 3)`` float64: x, y [m], heading [rad], every 2 m at most.
+        left: ``(K, 2)`` float64 [m], its left border at the same stations.
+        right: ``(K, 2)`` float64 [m].
+        speed_limit: ``(K,)`` float64 [m/s]; +inf where none is posted.
+        junction: the id of the junction that it leads through, or "".
+        next: ids of the lanes that lead on.
+        previous: ids of the lanes that lead here.
+        left_lane: the id of the lane on its left, or "".
+        right_lane: the id of the lane on its right, or "".
+        left_is_same_way: whether that one goes the same way.
+        right_is_same_way: likewise.
+        left_marking: OpenDRIVE's type of the marking: "solid", "broken", "none" …
+        right_marking: likewise.
+        may_change_left: whether the marking allows it, and there is a lane of the same way.
+        may_change_right: likewise.
+    """
+
+    id: str
+    kind: str
+    centre: Float
+    left: Float
+    right: Float
+    speed_limit: Float
+    junction: str
+    next: tuple[str, ...]
+    previous: tuple[str, ...]
+    left_lane: str
+    right_lane: str
+    left_is_same_way: bool
+    right_is_same_way: bool
+    left_marking: str
+    right_marking: str
+    may_change_left: bool
+    may_change_right: bool
+
+
+@dataclass(frozen=True)
+class Light:
+    """A traffic light.
+
+    Attributes:
+        id: as OpenDRIVE names it.
+        lanes: ids of the lanes that it governs.
+        stop: ``(2, 2)`` float64, x and y [m] of the ends of its stop line.
+    """
+
+    id: str
+    lanes: tuple[str, ...]
+    stop: Float
+
+
+@dataclass(frozen=True)
+class RoadMap:
+    """A road network, in world coordinates.
+
+    Attributes:
+        lanes: all that vehicles, cyclists or pedestrians use.
+        route: ids of the lanes of the ego's route, in its order; empty off the lanes.
+        crosswalks: their outlines, ``(C, 2)`` float64 [m] each.
+        lights: the traffic lights that change.
+        pieces: ``(K, V, 3)`` float64: the same as polylines of V points: x, y [m], heading [rad].
+        piece_points: ``(K,)`` int64, how many points count; the last is repeated.
+        piece_kind: ``(K,)`` int8: CENTRE, BORDER, CROSSWALK or STOP_LINE.
+        piece_lane: ``(K,)`` int64, the index of the lane that it belongs to, or -1.
+        piece_light: ``(K,)`` int64, the index of the light that governs that lane, or -1.
+    """
+
+    lanes: tuple[Lane, ...]
+    route: tuple[str, ...]
+    crosswalks: tuple[Float, ...]
+    lights: tuple[Light, ...]
+    pieces: Float
+    piece_points: Int
+    piece_kind: npt.NDArray[np.int8]
+    piece_lane: Int
+    piece_light: Int

@@ -5,6 +5,7 @@ that it cannot drive. So a failure costs the row that it belongs to, whatever th
 """
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
@@ -125,8 +126,5 @@ class Wheel:
 
 
 def _scene(program: Program) -> Scene:
-    length, width, centre, *limits = (float(value) for value in program.bodies[0, :7])
-    return Scene(
-        program.time_step, program.n_steps, program.names[1:], program.kinds[1:],
-        length, width, centre, *limits,
-    )  # fmt: skip
+    sizes: Any = (float(value) for value in program.bodies[0, :7])
+    return Scene(program.time_step, program.n_steps, program.names[1:], program.kinds[1:], *sizes)
