@@ -254,7 +254,7 @@ class BatchDriver(Protocol):
         """Return the control at one instant: a `Control`, or a pair (acceleration, curvature)."""
 
 
-# --- The road network, for drivers that want "map" -------------------------------------------------
+# --- The road network, for drivers that want "map" ------------------------------------------------
 
 CENTRE, BORDER, CROSSWALK, STOP_LINE = range(4)
 """What a piece of the map is."""
