@@ -19,7 +19,9 @@ import numpy as np
 from bridgegen.arrays import Float
 from bridgegen.ego.compiled import CompiledDriver
 from bridgegen.ego.drivers import TIME_LIMIT, is_spec
-from bridgegen.ego.interface import BatchDriver, Control, Observation, Scene
+from bridgegen.ego.interface import BatchDriver, Control, Observation, Scene, Trajectory
+from bridgegen.ego.traits import NAMES, Traits, traits_of
+from bridgegen.ego.trajectory import Plans, checked_plans
 from bridgegen.errors import InputError
 from bridgegen.isolated import Answer, CallError, IsolatedProcess, serve
 
@@ -44,12 +46,12 @@ class DriverProcess:
         time_limit: seconds that a call may take.
 
     Attributes:
-        memory: how many numbers a compiled driver keeps; None for one called in Python. Known
-            when the process has started.
+        traits: what the driver says of itself. Known when the process has started.
         answers_each_row: whether it has answered several rows at once in the right shape.
+        answers: what it has answered so far: "control", "trajectory" or both.
     """
 
-    memory: int | None
+    traits: Traits
     answers_each_row: bool = False
 
     def __init__(self, spec: str, time_limit: float = TIME_LIMIT) -> None:
@@ -61,6 +63,7 @@ class DriverProcess:
             )
         self.spec = spec
         self.time_limit = time_limit
+        self.answers: set[str] = set()
         self._process = IsolatedProcess("bridgegen.ego.driver_process", [spec], DriverError)
 
     def start(self) -> None:
@@ -72,7 +75,7 @@ class DriverProcess:
         if self._process.runs:
             return
         try:
-            self.memory = self._process.start(START_SECONDS)
+            self.traits = self._process.start(START_SECONDS)
         except DriverError as error:
             raise InputError(f"the driver '{self.spec}' cannot be made: {error}") from None
 
@@ -86,18 +89,20 @@ class DriverProcess:
         self.start()
         self._process.ask("reset", n, scene, seconds=self.time_limit)
 
-    def act(self, observation: Observation) -> tuple[Float, Float]:
-        """Return its control, ``(N,)`` acceleration [m/s²] and curvature [1/m].
+    def act(self, observation: Observation) -> tuple[Float, Float] | Plans:
+        """Return its control, ``(N,)`` acceleration [m/s²] and curvature [1/m], or its plans.
 
         Raises:
             DriverError: it raised, timed out, died, or its answer is invalid: another shape, NaN or
-                an infinite value for a scenario that is running.
+                an infinite value for a scenario that is running, or a trajectory that
+                `checked_plans` refuses.
         """
-        demanded: tuple[Float, Float] = self._process.ask(
+        answer: tuple[Float, Float] | Plans = self._process.ask(
             "act", observation, seconds=self.time_limit
         )
         self.answers_each_row = self.answers_each_row or len(observation.x) > 1
-        return demanded
+        self.answers.add("trajectory" if isinstance(answer, Plans) else "control")
+        return answer
 
     def call(
         self,
@@ -183,18 +188,29 @@ def module_of(where: str) -> ModuleType:
     return module
 
 
-def checked(control: Any, running: Any) -> tuple[Float, Float]:
-    """Return a driver's answer as two arrays ``(N,)``; 0 where a scenario has ended.
+def checked(answer: Any, seen: Observation, period: float) -> tuple[Float, Float] | Plans:
+    """Return a driver's answer: plans, or two arrays ``(N,)``, 0 where a scenario has ended.
+
+    Args:
+        answer: of ``act``.
+        seen: what it was asked about.
+        period: the time until it is asked again [s].
 
     Raises:
-        DriverError: another shape, not numbers, or not finite.
+        DriverError: another shape, not numbers, not finite, or a trajectory that cannot be driven.
     """
-    pair = (control.acceleration, control.curvature) if isinstance(control, Control) else control
+    if isinstance(answer, Trajectory):
+        try:
+            return checked_plans(answer, seen, period)
+        except InputError as error:
+            raise DriverError("answered nonsense", str(error)) from None
+    running = seen.running
+    pair = (answer.acceleration, answer.curvature) if isinstance(answer, Control) else answer
     try:
         acceleration, curvature = pair
         arrays = [np.asarray(one, dtype=np.float64) for one in (acceleration, curvature)]
     except (TypeError, ValueError) as error:
-        text = f"act must return a Control or (acceleration, curvature): {error}"
+        text = f"act must return a Control, (acceleration, curvature) or a Trajectory: {error}"
         raise DriverError("answered nonsense", text) from None
     for what, array in zip(("acceleration", "curvature"), arrays, strict=True):
         if array.shape != running.shape:
@@ -208,8 +224,8 @@ def checked(control: Any, running: Any) -> tuple[Float, Float]:
     return np.where(running, arrays[0], 0.0), np.where(running, arrays[1], 0.0)
 
 
-def answering(spec: str) -> tuple[int | None, Answer]:
-    """Construct a driver; return its memory, if it is compiled, and its answering function."""
+def answering(spec: str) -> tuple[Traits, Answer]:
+    """Construct a driver; return what it says of itself, and its answering function."""
     driver = make(spec)
     if isinstance(driver, CompiledDriver):
         address = driver.address
@@ -217,15 +233,19 @@ def answering(spec: str) -> tuple[int | None, Answer]:
         def call(_: str, function: Callable[..., Any], *arguments: Any) -> Any:
             return function(address, *arguments)
 
-        return driver.memory, call
+        return Traits(memory=driver.memory), call
+    traits = traits_of({name: getattr(driver, name, None) for name in NAMES})
+    period = 0.0
 
     def answer(what: str, *rest: Any) -> Any:
+        nonlocal period
         if what == "reset":
+            period = traits.steps(rest[1].time_step) * rest[1].time_step
             driver.reset(*rest)
             return None
-        return checked(driver.act(*rest), rest[0].running)
+        return checked(driver.act(*rest), rest[0], period)
 
-    return None, answer
+    return traits, answer
 
 
 def _described(error: Exception) -> str:

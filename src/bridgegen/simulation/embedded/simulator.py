@@ -1,7 +1,8 @@
 """The embedded simulator: N rows of parameters against one compiled storyboard."""
 
 import os
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import replace
 from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any
 
@@ -175,18 +176,31 @@ class EmbeddedSimulator:
                 roads, rows, values, driver=driver, dry=dry, noise=noise,
                 until_collision=until_collision,
             ).run()  # fmt: skip
-        own, memory = self._own, self._own.memory
+        some = self._some(
+            roads, rows, values, driver=driver, dry=dry, noise=noise,
+            until_collision=until_collision,
+        )  # fmt: skip
+        return self._own.drive(chosen.changed(dry=dry), some, len(rows))
+
+    def _some(
+        self,
+        roads: Network,
+        rows: Int,
+        values: Mapping[str, npt.ArrayLike],
+        *,
+        noise: npt.NDArray[np.uint64] | None = None,
+        **how: Any,
+    ) -> "Callable[[Int], Batch]":
+        """Return what sets up some of the rows for the user's driver."""
+        memory = self._own.memory
         columns = {name: np.broadcast_to(value, len(rows)) for name, value in values.items()}
 
         def some(at: Int) -> "Batch":
             taken = {name: column[at] for name, column in columns.items()}
             key = None if noise is None else noise[at]
-            return self.batch(
-                roads, rows[at], taken, driver=driver, dry=dry, own_memory=memory, noise=key,
-                until_collision=until_collision,
-            )  # fmt: skip
+            return self.batch(roads, rows[at], taken, own_memory=memory, noise=key, **how)
 
-        return own.drive(chosen.changed(dry=dry), some, len(rows))
+        return some
 
     def co_simulation(
         self,
@@ -268,8 +282,15 @@ class EmbeddedSimulator:
     def intentions(
         self, roads: Network, rows: Int, values: Mapping[str, npt.ArrayLike], rollout: Rollout
     ) -> Intentions:
-        """Return what the egos of a rollout meant to do; see `intentions.intentions`."""
-        return intentions(self.program, roads, rows, values, rollout)
+        """Return what the egos of a rollout meant to do; see `intentions.intentions`.
+
+        A user's driver that plans drives these rows once more, and its trajectories are kept.
+        """
+        found = intentions(self.program, roads, rows, values, rollout)
+        if not (self._asks_python and self._own.has_planned):
+            return found
+        some = self._some(roads, rows, values)
+        return replace(found, plans=self._own.plans(self.program, some, len(rows)))
 
     def batch(
         self,

@@ -13,9 +13,13 @@ from bridgegen.arrays import Float, Int
 from bridgegen.ego._tracking_kernels import TRACK
 from bridgegen.ego.driver_process import DriverError, DriverProcess
 from bridgegen.ego.interface import ROUTE_POINTS, ROUTE_STEP, Observation, Scene
+from bridgegen.ego.trajectory import Follower, Plans
 from bridgegen.simulation.embedded.batch import Batch
 from bridgegen.simulation.embedded.program import Program
 from bridgegen.simulation.rollout import FAILURES, Rollout, joined
+
+Note = Callable[[int, Plans], None]
+"""Takes the instant at which plans were made, and these."""
 
 
 def drive_in_lock_step(
@@ -24,6 +28,7 @@ def drive_in_lock_step(
     n: int,
     driver: DriverProcess,
     is_stopped: Callable[[], bool] = lambda: False,
+    note: Callable[[Int], Note] | None = None,
 ) -> Rollout:
     """Roll out rows 0 … n − 1 with a user's driver.
 
@@ -33,6 +38,8 @@ def drive_in_lock_step(
         n: how many there are.
         driver: the user's own; its process is started if it is not running.
         is_stopped: returns whether it has been stopped from elsewhere.
+        note: returns what takes the plans of some of the rows. Where the driver fails, rows are
+            driven again.
 
     Raises:
         DriverError: it has been stopped.
@@ -44,7 +51,7 @@ def drive_in_lock_step(
         rows = waiting.pop()
         batch = setup(rows)
         try:
-            _together(program, batch, driver)
+            _together(program, batch, driver, note(rows) if note else None)
         except DriverError as error:
             if is_stopped():
                 raise
@@ -59,7 +66,7 @@ def drive_in_lock_step(
     return joined(parts)
 
 
-def _together(program: Program, batch: Batch, driver: DriverProcess) -> None:
+def _together(program: Program, batch: Batch, driver: DriverProcess, note: Note | None) -> None:
     """Drive a batch from its first instant to its last.
 
     Raises:
@@ -68,7 +75,7 @@ def _together(program: Program, batch: Batch, driver: DriverProcess) -> None:
     batch.start()
     if not batch.running.any():
         return
-    wheel = Wheel(program, batch, driver)
+    wheel = Wheel(program, batch, driver, note)
     for k in range(program.n_steps):
         if not batch.running.any():
             return
@@ -79,27 +86,62 @@ def _together(program: Program, batch: Batch, driver: DriverProcess) -> None:
 class Wheel:
     """A driver in Python at the wheel of a batch that has started.
 
+    It is asked once per period; meanwhile its control is held, or its plan is followed.
+
+    Args:
+        program: the compiled storyboard.
+        batch: which has started.
+        driver: the user's own.
+        note: takes the plans that it makes.
+
     Raises:
         DriverError: the driver failed.
     """
 
-    def __init__(self, program: Program, batch: Batch, driver: DriverProcess) -> None:
+    def __init__(
+        self, program: Program, batch: Batch, driver: DriverProcess, note: Note | None = None
+    ) -> None:
         n, m = len(batch.running), len(program.names) - 1
         self._time_step, self._batch, self._driver = program.time_step, batch, driver
         self._route, self._tracks = np.zeros((n, ROUTE_POINTS, 4)), np.zeros((n, m, TRACK))
         self._stop, self._light = np.full(n, np.inf), np.zeros(n, dtype=np.int8)
-        self._scene = _scene(program)
+        self._scene, self._note = _scene(program), note
         driver.reset(n, self._scene)
+        self._every, self._asked = driver.traits.steps(program.time_step), 0
+        self._answer: tuple[Float, Float] | Follower
 
     def demand(self, k: int) -> tuple[Float, Float]:
         """Return what it demands at instant k: ``(N,)`` [m/s²] and ``(N,)`` [1/m].
 
+        Args:
+            k: each instant in order, from 0 on.
+
         Raises:
             DriverError: it failed.
         """
-        batch, route, tracks = self._batch, self._route, self._tracks
-        batch.observe(k, ROUTE_STEP, route, tracks, self._stop, self._light)
-        record, state = batch.record, batch.state
+        batch, record = self._batch, self._batch.record
+        batch.observe(k, ROUTE_STEP, self._route, self._tracks, self._stop, self._light)
+        if k % self._every == 0:
+            answer, self._asked = self._ask(k), k
+            if isinstance(answer, Plans):
+                self._answer = Follower(answer, self._time_step)
+                if self._note:
+                    self._note(k, answer)
+            else:
+                self._answer = answer
+        if not isinstance(self._answer, Follower):
+            return self._answer
+        since = (k - self._asked) * self._time_step
+        ego = [array[:, 0, k] for array in (record.x, record.y, record.h, record.v)]
+        return self._answer.demand(since, np.stack(ego, axis=1), batch.running)
+
+    def _ask(self, k: int) -> tuple[Float, Float] | Plans:
+        """Ask the driver at instant k.
+
+        Raises:
+            DriverError: it failed.
+        """
+        batch, record, state = self._batch, self._batch.record, self._batch.state
         x, y, h, v = (array[:, 0, k] for array in (record.x, record.y, record.h, record.v))
         observation = Observation(
             time=k * self._time_step,
@@ -108,7 +150,7 @@ class Wheel:
             a=record.a[:, 0, k - 1] if k else np.zeros(len(x)),
             target_speed=state.command[:, 0],
             offset=record.offset[:, 0, k],
-            route=route, tracks=tracks, stop_distance=self._stop, light=self._light,
+            route=self._route, tracks=self._tracks, stop_distance=self._stop, light=self._light,
         )  # fmt: skip
         if len(x) == 1 and not self._driver.answers_each_row:
             self._try_two(observation)

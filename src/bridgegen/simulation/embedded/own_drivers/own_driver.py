@@ -18,6 +18,7 @@ from bridgegen.arrays import Float, Int
 from bridgegen.compiled import call_from_python
 from bridgegen.ego import Driver
 from bridgegen.ego.driver_process import START_SECONDS, DriverError, DriverProcess
+from bridgegen.ego.trajectory import Plans
 from bridgegen.simulation.embedded._memory_kernels import (
     N_STEPS,
     NO_CONTROL,
@@ -40,7 +41,7 @@ from bridgegen.simulation.embedded.drivers import (
     ask,
     code_of,
 )
-from bridgegen.simulation.embedded.own_drivers.lock_step import Wheel, drive_in_lock_step
+from bridgegen.simulation.embedded.own_drivers.lock_step import Note, Wheel, drive_in_lock_step
 from bridgegen.simulation.embedded.own_drivers.shared_arrays import Layout, SharedArrays, seen
 from bridgegen.simulation.embedded.program import Program
 from bridgegen.simulation.rollout import FAILURES, Rollout, joined
@@ -72,7 +73,7 @@ class OwnDriver:
             if not self._is_known:
                 self._first.process.start()
                 self._is_known = True
-        return self._first.process.memory
+        return self._first.process.traits.memory
 
     def drive(self, program: Program, setup: Callable[[Int], Batch], n: int) -> Rollout:
         """Roll out rows 0 … n − 1.
@@ -100,6 +101,36 @@ class OwnDriver:
         finally:
             with self._lock:
                 self._idle.append(seat)
+
+    @property
+    def has_planned(self) -> bool:
+        """Whether it has answered a trajectory so far."""
+        return "trajectory" in self._first.process.answers
+
+    def plans(
+        self, program: Program, setup: Callable[[Int], Batch], n: int
+    ) -> tuple[dict[int, Float], ...]:
+        """Drive rows 0 … n − 1 again; return the trajectories of each by the instant of the call.
+
+        Args:
+            program: as of ``drive``, and so are those that follow.
+            setup: likewise.
+            n: likewise.
+        """
+        found: tuple[dict[int, Float], ...] = tuple({} for _ in range(n))
+
+        def note(rows: Int) -> Note:
+            def keep(k: int, plans: Plans) -> None:
+                for row, states in zip(rows.tolist(), plans.states, strict=True):
+                    found[row][k] = states
+
+            return keep
+
+        with self._turn:
+            drive_in_lock_step(
+                program, setup, n, self._first.process, self._is_stopped.is_set, note
+            )
+        return found
 
     def wheel(self, program: Program, batch: Batch) -> Callable[[int], tuple[Float, Float]]:
         """Return what asks the driver at an instant of a batch of one row that has started.
