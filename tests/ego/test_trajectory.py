@@ -98,8 +98,8 @@ def test_what_is_planned_for_an_ended_scenario_is_not_looked_at():
          "180° off"),
         (changed("x", 2, 5, 120.0 + 200.0), "must not jump, got 112.00 m from 0.4 s to 0.5 s, "
          "where its speeds allow 2.90 m"),
-        (changed("x", 1, slice(3, None), 101.0 + np.arange(8)), "must not go backwards, got 1.00 m against its heading from "
-         "0.2 s to 0.3 s"),
+        (changed("x", 1, slice(3, None), 101.0 + np.arange(8)), "must not go backwards, got 1.00 m "
+         "against its heading from 0.2 s to 0.3 s"),
     ],
 )  # fmt: skip
 def test_a_bad_plan_is_refused_in_one_sentence(planned, message):

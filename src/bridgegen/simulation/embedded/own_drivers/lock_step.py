@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from bridgegen.arrays import Float, Int
+from bridgegen.arrays import Bool, Float, Int
 from bridgegen.ego._tracking_kernels import TRACK
 from bridgegen.ego.driver_process import DriverError, DriverProcess
 from bridgegen.ego.interface import ROUTE_POINTS, ROUTE_STEP, Observation, Scene
@@ -18,8 +18,8 @@ from bridgegen.simulation.embedded.batch import Batch
 from bridgegen.simulation.embedded.program import Program
 from bridgegen.simulation.rollout import FAILURES, Rollout, joined
 
-Note = Callable[[int, Plans], None]
-"""Takes the instant at which plans were made, and these."""
+Note = Callable[[int, Plans, Bool], None]
+"""Takes the instant at which plans were made, these, and ``(N,)`` which rows ran."""
 
 
 def drive_in_lock_step(
@@ -126,7 +126,7 @@ class Wheel:
             if isinstance(answer, Plans):
                 self._answer = Follower(answer, self._time_step)
                 if self._note:
-                    self._note(k, answer)
+                    self._note(k, answer, batch.running)
             else:
                 self._answer = answer
         if not isinstance(self._answer, Follower):

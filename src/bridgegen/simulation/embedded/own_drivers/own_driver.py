@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from bridgegen.arrays import Float, Int
+from bridgegen.arrays import Bool, Float, Int
 from bridgegen.compiled import call_from_python
 from bridgegen.ego import Driver
 from bridgegen.ego.driver_process import START_SECONDS, DriverError, DriverProcess
@@ -120,9 +120,9 @@ class OwnDriver:
         found: tuple[dict[int, Float], ...] = tuple({} for _ in range(n))
 
         def note(rows: Int) -> Note:
-            def keep(k: int, plans: Plans) -> None:
-                for row, states in zip(rows.tolist(), plans.states, strict=True):
-                    found[row][k] = states
+            def keep(k: int, plans: Plans, running: Bool) -> None:
+                for i in np.flatnonzero(running).tolist():
+                    found[rows[i]][k] = plans.states[i]
 
             return keep
 
