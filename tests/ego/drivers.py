@@ -206,3 +206,34 @@ class PlansThePastFast(Plans):
 
 class PeriodOfAnHour(Cruises):
     period = 3600.0
+
+
+class PlansThePast(Plans):
+    def act(self, observation):
+        made = self.plan(observation)
+        return replace(made, time=made.time - 2.0)
+
+
+class ReadsTheClock(Cruises):
+    def act(self, observation):
+        control = super().act(observation)
+        noise = np.random.default_rng(time.time_ns()).random(self.n)
+        return Control(control.acceleration + noise, control.curvature)
+
+
+class IsBornByChance(Cruises):
+    def __init__(self):
+        self.bias = np.random.default_rng(time.time_ns()).random()
+
+    def act(self, observation):
+        control = super().act(observation)
+        return Control(control.acceleration - self.bias, control.curvature)
+
+
+class NaNLater(Cruises):
+    """Answers NaN at 3 s where the ego is asked to drive fast."""
+
+    def act(self, observation):
+        control = super().act(observation)
+        bad = (observation.time >= 3.0) & (observation.target_speed > FailsFast.LIMIT)
+        return Control(np.where(bad, np.nan, control.acceleration), control.curvature)

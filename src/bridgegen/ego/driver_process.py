@@ -7,7 +7,9 @@ process is ended, and another is started for the next batch.
 import importlib
 import importlib.util
 import sys
+import time
 import traceback
+from collections import deque
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
@@ -27,6 +29,9 @@ from bridgegen.isolated import Answer, CallError, IsolatedProcess, serve
 
 START_SECONDS = 120.0
 """Time limit [s] to import and construct a driver, which may load a network."""
+
+TIMED_CALLS = 10_000
+"""Calls whose duration is kept."""
 
 
 class DriverError(CallError):
@@ -49,6 +54,8 @@ class DriverProcess:
         traits: what the driver says of itself. Known when the process has started.
         answers_each_row: whether it has answered several rows at once in the right shape.
         answers: what it has answered so far: "control", "trajectory" or both.
+        asked_at: the time of the last observation that it was shown [s].
+        call_seconds: how long its last calls took [s], the way there and back included.
     """
 
     traits: Traits
@@ -64,6 +71,8 @@ class DriverProcess:
         self.spec = spec
         self.time_limit = time_limit
         self.answers: set[str] = set()
+        self.asked_at = 0.0
+        self.call_seconds: deque[float] = deque(maxlen=TIMED_CALLS)
         self._process = IsolatedProcess("bridgegen.ego.driver_process", [spec], DriverError)
 
     def start(self) -> None:
@@ -97,9 +106,11 @@ class DriverProcess:
                 an infinite value for a scenario that is running, or a trajectory that
                 `checked_plans` refuses.
         """
+        self.asked_at, start = observation.time, time.perf_counter()
         answer: tuple[Float, Float] | Plans = self._process.ask(
             "act", observation, seconds=self.time_limit
         )
+        self.call_seconds.append(time.perf_counter() - start)
         self.answers_each_row = self.answers_each_row or len(observation.x) > 1
         self.answers.add("trajectory" if isinstance(answer, Plans) else "control")
         return answer

@@ -259,6 +259,11 @@ class EmbeddedSimulator:
         if self.program.driver.is_own:
             self._own.stop()
 
+    @property
+    def own_driver(self) -> "OwnDriver":
+        """The user's driver; only if the storyboard's is the user's own."""
+        return self._own
+
     @cached_property
     def _own(self) -> "OwnDriver":
         from bridgegen.simulation.embedded.own_drivers import (

@@ -103,6 +103,17 @@ class OwnDriver:
                 self._idle.append(seat)
 
     @property
+    def process(self) -> DriverProcess:
+        """The process of one in Python; of a compiled one, the first."""
+        return self._first.process
+
+    def restart(self) -> None:
+        """End its processes; others begin when it drives next. Nothing may be driven meanwhile."""
+        with self._lock:
+            for seat in self._seats:
+                seat.close()
+
+    @property
     def has_planned(self) -> bool:
         """Whether it has answered a trajectory so far."""
         return "trajectory" in self._first.process.answers
@@ -192,6 +203,11 @@ class Seat:
         for array, view in zip(whole, views, strict=True):
             array[...] = view
         return messages
+
+    def close(self) -> None:
+        """End the process; the next one is sent the road networks again."""
+        self.process.close()
+        self._roads = None
 
     def _begin(self, plan: Plan, roads: Roads, state: State, record: Record) -> None:
         """Let the kernel be compiled here, if need be, and loaded there: no driver's time."""
