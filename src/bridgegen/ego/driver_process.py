@@ -17,9 +17,12 @@ from typing import Any
 import numpy as np
 
 from bridgegen.arrays import Float
+from bridgegen.ego.address import is_remote
 from bridgegen.ego.compiled import CompiledDriver
 from bridgegen.ego.drivers import TIME_LIMIT, is_spec
 from bridgegen.ego.interface import BatchDriver, Control, Observation, Scene
+from bridgegen.ego.remote.process import RemoteProcess
+from bridgegen.ego.traits import NAMES, Traits, traits_of
 from bridgegen.errors import InputError
 from bridgegen.isolated import Answer, CallError, IsolatedProcess, serve
 
@@ -40,16 +43,16 @@ class DriverProcess:
 
     Args:
         spec: ``package.module:Class``, ``file.py:Class``, the same of a compiled driver's function,
-            or a co-simulation unit, ``file.fmu``.
+            a co-simulation unit, ``file.fmu``; or a driver in a process of the user's own, see
+            `bridgegen.ego.remote`.
         time_limit: seconds that a call may take.
 
     Attributes:
-        memory: how many numbers a compiled driver keeps; None for one called in Python. Known
-            when the process has started.
+        traits: what the driver says of itself. Known when the process has started.
         answers_each_row: whether it has answered several rows at once in the right shape.
     """
 
-    memory: int | None
+    traits: Traits
     answers_each_row: bool = False
 
     def __init__(self, spec: str, time_limit: float = TIME_LIMIT) -> None:
@@ -61,7 +64,11 @@ class DriverProcess:
             )
         self.spec = spec
         self.time_limit = time_limit
-        self._process = IsolatedProcess("bridgegen.ego.driver_process", [spec], DriverError)
+        self._process: IsolatedProcess | RemoteProcess
+        if is_remote(spec):
+            self._process = RemoteProcess(spec, DriverError, checked)
+        else:
+            self._process = IsolatedProcess("bridgegen.ego.driver_process", [spec], DriverError)
 
     def start(self) -> None:
         """Start the process, if it is not running, and construct the driver in it.
@@ -72,7 +79,7 @@ class DriverProcess:
         if self._process.runs:
             return
         try:
-            self.memory = self._process.start(START_SECONDS)
+            self.traits = self._process.start(START_SECONDS)
         except DriverError as error:
             raise InputError(f"the driver '{self.spec}' cannot be made: {error}") from None
 
@@ -208,8 +215,8 @@ def checked(control: Any, running: Any) -> tuple[Float, Float]:
     return np.where(running, arrays[0], 0.0), np.where(running, arrays[1], 0.0)
 
 
-def answering(spec: str) -> tuple[int | None, Answer]:
-    """Construct a driver; return its memory, if it is compiled, and its answering function."""
+def answering(spec: str) -> tuple[Traits, Answer]:
+    """Construct a driver; return what it says of itself, and its answering function."""
     driver = make(spec)
     if isinstance(driver, CompiledDriver):
         address = driver.address
@@ -217,7 +224,7 @@ def answering(spec: str) -> tuple[int | None, Answer]:
         def call(_: str, function: Callable[..., Any], *arguments: Any) -> Any:
             return function(address, *arguments)
 
-        return driver.memory, call
+        return Traits(memory=driver.memory), call
 
     def answer(what: str, *rest: Any) -> Any:
         if what == "reset":
@@ -225,7 +232,7 @@ def answering(spec: str) -> tuple[int | None, Answer]:
             return None
         return checked(driver.act(*rest), rest[0].running)
 
-    return None, answer
+    return traits_of({name: getattr(driver, name, None) for name in NAMES}), answer
 
 
 def _described(error: Exception) -> str:

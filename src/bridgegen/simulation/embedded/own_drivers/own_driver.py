@@ -72,7 +72,7 @@ class OwnDriver:
             if not self._is_known:
                 self._first.process.start()
                 self._is_known = True
-        return self._first.process.memory
+        return self._first.process.traits.memory
 
     def drive(self, program: Program, setup: Callable[[Int], Batch], n: int) -> Rollout:
         """Roll out rows 0 … n − 1.
