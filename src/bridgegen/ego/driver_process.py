@@ -66,7 +66,7 @@ class DriverProcess:
         self.time_limit = time_limit
         self._process: IsolatedProcess | RemoteProcess
         if is_remote(spec):
-            self._process = RemoteProcess(spec, DriverError, checked)
+            self._process = RemoteProcess(spec, DriverError, answering_of)
         else:
             self._process = IsolatedProcess("bridgegen.ego.driver_process", [spec], DriverError)
 
@@ -225,6 +225,12 @@ def answering(spec: str) -> tuple[Traits, Answer]:
             return function(address, *arguments)
 
         return Traits(memory=driver.memory), call
+
+    return answering_of(driver)
+
+
+def answering_of(driver: BatchDriver) -> tuple[Traits, Answer]:
+    """Return what a driver says of itself, and the function that answers requests to it."""
 
     def answer(what: str, *rest: Any) -> Any:
         if what == "reset":

@@ -35,7 +35,7 @@ class CarriedDriver:
         """
         path = file_of(name)
         try:
-            return cls(name, path.read_bytes() if path and path.isfile_of() else None)
+            return cls(name, path.read_bytes() if path and path.is_file() else None)
         except OSError as error:
             raise InputError(f"{path}: cannot be read: {error.strerror}") from None
 

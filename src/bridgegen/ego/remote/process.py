@@ -2,11 +2,12 @@
 
 import time
 from collections.abc import Callable
+from functools import partial
 from importlib.metadata import version
 from typing import Any
 
 from bridgegen.ego.address import Command, address_of
-from bridgegen.ego.interface import Control, Observation, Scene, Trajectory
+from bridgegen.ego.interface import BatchDriver, Control, Observation, Scene, Trajectory
 from bridgegen.ego.remote.messages import (
     NONSENSE,
     PROTOCOL,
@@ -17,9 +18,9 @@ from bridgegen.ego.remote.messages import (
     unpack,
 )
 from bridgegen.ego.remote.wire import ClosedError, Wire, connected
-from bridgegen.ego.traits import Traits, traits_of
+from bridgegen.ego.traits import NAMES, Traits
 from bridgegen.errors import InputError
-from bridgegen.isolated import CallError
+from bridgegen.isolated import Answer, CallError
 
 AGAIN_SECONDS = 10.0
 """For so long [s] a server is tried again that has been there: it may be starting again."""
@@ -34,23 +35,65 @@ _PAUSE = 0.1
 _TRAJECTORY = ("time", "x", "y", "h", "v")
 
 
+class RemoteDriver:
+    """A driver at the other end of a connection; its time limit is set before each call.
+
+    Args:
+        wire: the connection, on which the driver has been greeted.
+        said: what the driver says of itself.
+        error: is raised if a call is not answered.
+    """
+
+    def __init__(self, wire: Wire, said: Message, error: type[CallError]) -> None:
+        self.wants, self.period, self.max_rows = (said.get(name) for name in NAMES)
+        self.seconds = 0.0
+        self._wire, self._error = wire, error
+
+    def reset(self, n: int, scene: Scene) -> None:
+        """See `BatchDriver`.
+
+        Raises:
+            CallError: it was not answered.
+        """
+        self._ask({"type": "reset", "n": n, "scene": scene}, partial(_expect, "ready"))
+
+    def act(self, observation: Observation) -> Control | Trajectory:
+        """See `BatchDriver`.
+
+        Raises:
+            CallError: it was not answered.
+        """
+        answer: Control | Trajectory = self._ask(
+            {"type": "act", "observation": observation}, _control
+        )
+        return answer
+
+    def _ask(self, message: Message, take: Callable[[Message], Any]) -> Any:
+        try:
+            return take(exchange(self._wire, message, self.seconds, self._error))
+        except ProtocolError as error:
+            raise self._error(NONSENSE, str(error)) from None
+
+
 class RemoteProcess:
-    """A driver in another process; `bridgegen.isolated.IsolatedProcess` is its like for Python.
+    """A driver in another process, like `bridgegen.isolated.IsolatedProcess` one in Python.
 
     Args:
         spec: ``connect:HOST:PORT``, ``unix:PATH`` or ``exec:COMMAND``.
         error: is raised if a call is not answered.
-        checked: returns an answer of ``act`` as the simulator takes it; it is also given which
-            scenarios are running.
+        answering: returns what a driver says of itself, and the function that answers requests.
 
     Raises:
         InputError: no such address can be.
     """
 
     def __init__(
-        self, spec: str, error: type[CallError], checked: Callable[[Any, Any], Any]
+        self,
+        spec: str,
+        error: type[CallError],
+        answering: Callable[[BatchDriver], tuple[Traits, Answer]],
     ) -> None:
-        self._spec, self._error, self._checked = spec, error, checked
+        self._spec, self._error, self._answering = spec, error, answering
         self._address = address_of(spec)
         self._wire: Wire | None = None
         self._was_there = False
@@ -58,7 +101,7 @@ class RemoteProcess:
     @property
     def runs(self) -> bool:
         """Whether it has been started and not closed since."""
-        return self._wire is not None
+        return self._wire is not None and self._wire.is_open
 
     def start(self, seconds: float) -> Traits:
         """Connect to the process, or start it, and greet it; return what it says of itself.
@@ -69,13 +112,15 @@ class RemoteProcess:
         Raises:
             InputError: it cannot be reached, or it does not speak this protocol.
         """
-        deadline = time.monotonic() + seconds
         is_command = isinstance(self._address, Command)
+        hello = {"type": "hello", "protocol": PROTOCOL, "software": _software()}
         try:
             self._wire = self._connected()
-            hello = {"type": "hello", "protocol": PROTOCOL, "software": _software()}
-            answer = self._message(hello, max(deadline - time.monotonic(), 0.0))
-            traits = _greeted(answer)
+            said = exchange(self._wire, hello, seconds, self._error)
+            _expect("hello", said)
+            _refuse_version(said)
+            self._driver = RemoteDriver(self._wire, said, self._error)
+            traits, self._answer = self._answering(self._driver)
         except (CallError, InputError, ProtocolError) as error:
             self.close()
             hint = ""
@@ -86,43 +131,30 @@ class RemoteProcess:
         self._was_there = True
         return traits
 
-    def ask(
-        self, what: str, *rest: Any, seconds: float, progress: Callable[[], int] | None = None
-    ) -> Any:
-        """Return the answer to "reset" or "act"; the process must run.
+    def ask(self, *request: Any, seconds: float, progress: Callable[[], int] | None = None) -> Any:
+        """Return the answer to a request; the process must run.
 
         Args:
-            what: "reset", with n and a scene; or "act", with an observation.
-            rest: its arguments.
+            request: "reset" or "act", and its arguments.
             seconds: time limit [s].
             progress: is of no use here.
 
         Raises:
-            CallError: it was not answered. The connection has ended, unless the kind is "raised",
-                or the answer is a message.
+            CallError: it was not answered. The connection has ended, unless the driver reports an
+                error or answers a message that is none.
         """
-        if what == "reset":
-            n, scene = rest
-            return self._reset(n, scene, seconds)
-        (observation,) = rest
-        return self._act(observation, seconds)
+        self._driver.seconds = seconds
+        return self._answer(*request)
 
     def kill(self) -> None:
         """End the connection from another thread: a waiting ``ask`` raises `CallError`."""
-        wire = self._wire
-        if wire is not None:
-            wire.kill()
+        if self._wire is not None:
+            self._wire.kill()
 
     def close(self) -> None:
         """End the connection, and the process of a command."""
         if self._wire is not None:
-            self._wire.kill()
             self._wire.close()
-        self._wire = None
-
-    def __del__(self) -> None:
-        if getattr(self, "_wire", None) is not None:
-            self.close()
 
     def _connected(self) -> Wire:
         """Connect; wait a little for a server that has been there."""
@@ -135,77 +167,43 @@ class RemoteProcess:
                     raise
             time.sleep(_PAUSE)
 
-    def _reset(self, n: int, scene: Scene, seconds: float) -> None:
-        answer = self._answer({"type": "reset", "n": n, "scene": scene}, seconds)
-        self._judged(lambda: _expect(answer, "ready"))
 
-    def _act(self, observation: Observation, seconds: float) -> Any:
-        answer = self._answer({"type": "act", "observation": observation}, seconds)
-        control = self._judged(lambda: _control(answer))
-        return self._checked(control, observation.running)
+def exchange(wire: Wire, message: Message, seconds: float, error: type[CallError]) -> Message:
+    """Send a message, return the answer; the connection is closed if none comes that can be read.
 
-    def _judged(self, take: Callable[[], Any]) -> Any:
-        """Return what is taken of an answer."""
-        try:
-            return take()
-        except ProtocolError as error:
-            raise self._error(NONSENSE, str(error)) from None
+    Args:
+        wire: the connection.
+        message: to send.
+        seconds: time limit [s].
+        error: is raised if there is no answer.
 
-    def _answer(self, message: Message, seconds: float) -> Message:
-        """Send a message, return the answer; after bytes that are none, the connection ends."""
-        try:
-            return self._message(message, seconds)
-        except ProtocolError as error:
-            self.close()
-            raise self._error(NONSENSE, str(error)) from None
-
-    def _message(self, message: Message, seconds: float) -> Message:
-        """Send a message, return the answer.
-
-        Raises:
-            CallError: timed out, the connection is closed, or the driver reports an error.
-            ProtocolError: what came is no message.
-        """
-        assert self._wire is not None
-        wire = self._wire
-        frame = pack(message)
-        try:
-            answer = unpack(wire.ask(frame, seconds), MAX_ITEMS)
-        except TimeoutError:
-            self.close()
-            raise self._error("timed out", f"no answer within {seconds:g} s") from None
-        except ClosedError:
-            self._wire = None
-            raise self._error("died", wire.close()) from None
+    Raises:
+        CallError: timed out, the connection is closed, or the driver reports an error.
+        ProtocolError: what came is no message.
+    """
+    try:
+        answer = unpack(wire.ask(pack(message), seconds), MAX_ITEMS)
         if wire.has_more:
             raise ProtocolError("more than one message came as an answer")
-        if answer["type"] == "error":
-            kind = NONSENSE if answer.get("kind") == NONSENSE else RAISED
-            raise self._error(kind, _line(str(answer.get("message", ""))))
-        return answer
+    except TimeoutError:
+        wire.close()
+        raise error("timed out", f"no answer within {seconds:g} s") from None
+    except ClosedError:
+        raise error("died", wire.end()) from None
+    except ProtocolError:
+        wire.close()
+        raise
+    if answer["type"] == "error":
+        kind = NONSENSE if answer.get("kind") == NONSENSE else RAISED
+        raise error(kind, _line(str(answer.get("message", ""))))
+    return answer
 
 
 def _software() -> str:
     return f"BridgeGen {version('bridgegen')}"
 
 
-def _greeted(answer: Message) -> Traits:
-    """Return what a driver says of itself.
-
-    Raises:
-        InputError: it is none, or of another version.
-    """
-    _expect(answer, "hello")
-    spoken = answer.get("protocol")
-    if type(spoken) is not int or spoken != PROTOCOL:
-        raise InputError(
-            f"it speaks version {_short(spoken)} of the protocol, BridgeGen "
-            f"{version('bridgegen')} speaks {PROTOCOL}"
-        )
-    return traits_of(answer)
-
-
-def _expect(answer: Message, kind: str) -> None:
+def _expect(kind: str, answer: Message) -> None:
     """Raise an error unless a message is of a type.
 
     Raises:
@@ -213,6 +211,19 @@ def _expect(answer: Message, kind: str) -> None:
     """
     if answer["type"] != kind:
         raise ProtocolError(f"the answer must be of type '{kind}', got {_short(answer['type'])}")
+
+
+def _refuse_version(said: Message) -> None:
+    """Refuse a driver that speaks another version of the protocol.
+
+    Raises:
+        InputError: it does.
+    """
+    spoken = said.get("protocol")
+    if type(spoken) is not int or spoken != PROTOCOL:
+        raise InputError(
+            f"it speaks version {_short(spoken)} of the protocol, {_software()} speaks {PROTOCOL}"
+        )
 
 
 def _control(answer: Message) -> Control | Trajectory:

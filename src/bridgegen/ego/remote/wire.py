@@ -36,13 +36,13 @@ class Wire:
         reads: descriptor to read from.
         writes: descriptor to write to; may be the same.
         kill: ends the connection from any thread; a pending read then ends.
-        close: releases it; returns how it ended, in words.
+        release: closes the descriptors when the other end has closed them; returns how it ended.
     """
 
     def __init__(
-        self, reads: int, writes: int, kill: Callable[[], None], close: Callable[[], str]
+        self, reads: int, writes: int, kill: Callable[[], None], release: Callable[[], str]
     ) -> None:
-        self.kill, self.close = kill, close
+        self.kill, self._release, self._is_open = kill, release, True
         self._reads, self._writes = reads, writes
         for descriptor in (reads, writes):
             os.set_blocking(descriptor, False)
@@ -50,6 +50,25 @@ class Wire:
         self._readable.register(reads, select.POLLIN)
         self._writable.register(writes, select.POLLOUT)
         self._ahead = bytearray()
+
+    @property
+    def is_open(self) -> bool:
+        """Whether it has not been closed."""
+        return self._is_open
+
+    def close(self) -> None:
+        """End the connection, as does this object's deletion."""
+        if self._is_open:
+            self.kill()
+            self.end()
+
+    def end(self) -> str:
+        """Release a connection that the other end has closed; return how it ended, in words."""
+        self._is_open = False
+        return self._release()
+
+    def __del__(self) -> None:
+        self.close()
 
     def ask(self, frame: bytes, seconds: float) -> bytes:
         """Send a frame; return the message that answers it.
@@ -132,11 +151,11 @@ def connected(address: Address) -> Wire:
         with suppress(OSError):
             connection.shutdown(socket.SHUT_RDWR)
 
-    def close() -> str:
+    def release() -> str:
         connection.close()
         return "it closed the connection"
 
-    return Wire(connection.fileno(), connection.fileno(), kill, close)
+    return Wire(connection.fileno(), connection.fileno(), kill, release)
 
 
 def _socket(address: Tcp | Unix) -> socket.socket:
@@ -174,7 +193,7 @@ def _started(command: Command) -> Wire:
             with suppress(OSError):
                 fcntl.fcntl(pipe, _SET_PIPE_SIZE, BUFFER)
 
-    def close() -> str:
+    def release() -> str:
         return f"its process ended with status {program.end(END_SECONDS)}"
 
-    return Wire(*program.pipes, program.kill, close)
+    return Wire(*program.pipes, program.kill, release)
