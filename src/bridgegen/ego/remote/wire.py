@@ -5,6 +5,7 @@ import select
 import socket
 import sys
 import time
+import weakref
 from collections.abc import Callable
 from contextlib import suppress
 
@@ -42,7 +43,8 @@ class Wire:
     def __init__(
         self, reads: int, writes: int, kill: Callable[[], None], release: Callable[[], str]
     ) -> None:
-        self.kill, self._release, self._is_open = kill, release, True
+        self.kill, self._release = kill, release
+        self._end = weakref.finalize(self, _end, kill, release)
         self._reads, self._writes = reads, writes
         for descriptor in (reads, writes):
             os.set_blocking(descriptor, False)
@@ -54,21 +56,16 @@ class Wire:
     @property
     def is_open(self) -> bool:
         """Whether it has not been closed."""
-        return self._is_open
+        return self._end.alive
 
     def close(self) -> None:
         """End the connection, as does this object's deletion."""
-        if self._is_open:
-            self.kill()
-            self.end()
+        self._end()
 
     def end(self) -> str:
         """Release a connection that the other end has closed; return how it ended, in words."""
-        self._is_open = False
+        self._end.detach()
         return self._release()
-
-    def __del__(self) -> None:
-        self.close()
 
     def ask(self, frame: bytes, seconds: float) -> bytes:
         """Send a frame; return the message that answers it.
@@ -114,6 +111,11 @@ class Wire:
                 if not part:
                     raise ClosedError
                 ahead += part
+
+
+def _end(kill: Callable[[], None], release: Callable[[], str]) -> None:
+    kill()
+    release()
 
 
 def _wait(poll: select.poll, deadline: float) -> None:
