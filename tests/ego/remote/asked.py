@@ -3,6 +3,7 @@
 import socket
 import threading
 from contextlib import suppress
+from dataclasses import replace
 from itertools import chain, cycle
 
 import numpy as np
@@ -29,12 +30,12 @@ def scene(**changed):
 
 def observation(running=(True, True, True), **changed):
     one = np.arange(N, dtype=np.float64)
-    return Observation(
+    plain = Observation(
         time=0.0, running=np.array(running), x=one, y=one, h=one, v=one, a=one,
         target_speed=one + 1.0, offset=one, route=np.zeros((N, ROUTE_POINTS, 4)),
         tracks=np.zeros((N, 1, 13)), stop_distance=np.full(N, np.inf), light=np.zeros(N, np.int8),
-        **changed,
     )  # fmt: skip
+    return replace(plain, **changed)
 
 
 def road_map():
