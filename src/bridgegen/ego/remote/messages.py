@@ -23,7 +23,11 @@ MAX_FRAME = 64 * 2**20
 DTYPES = ("float64", "float32", "int64", "int32", "int8", "bool")
 """What the elements of an array may be."""
 
-_KINDS = {name: np.dtype("uint8" if name == "bool" else name).newbyteorder("<") for name in DTYPES}
+_KINDS = {
+    name: (np.dtype("uint8" if name == "bool" else name).newbyteorder("<"), np.dtype(name))
+    for name in DTYPES
+}
+"""Of the elements of an array: as they are in messages, and here."""
 
 MAX_ITEMS, MAX_DEPTH, MAX_DIMENSIONS = 5_000_000, 16, 8
 """Most elements of the lists and maps of a message, how deep they are, dimensions of an array."""
@@ -247,13 +251,22 @@ class _Reader:
             return [self.value(depth + 1) for _ in range(n)]
         return self._map(n, depth)
 
+    def _key(self, depth: int) -> str:
+        begin = self.at + 1
+        tag = self._data[begin - 1]
+        if 0xA0 <= tag < 0xC0:  # most keys: without a call more
+            self.at = end = begin + (tag & 0x1F)
+            if end > len(self._data):
+                raise IndexError
+            return self._data[begin:end].decode()
+        if not 0xD9 <= tag <= 0xDB:
+            raise ProtocolError("the keys of a map must be texts")
+        return str(self.value(depth + 1))
+
     def _map(self, n: int, depth: int) -> Any:
         data, found, start = self._data, {}, self.at
         for _ in range(n):
-            tag = data[self.at]
-            if not (0xA0 <= tag < 0xC0 or 0xD9 <= tag <= 0xDB):
-                raise ProtocolError("the keys of a map must be texts")
-            name = self.value(depth + 1)
+            name = self._key(depth)
             head = _heads.get(self.at)
             if head is None or not data.startswith(head.data, self.at):
                 found[name] = self.value(depth + 1)
@@ -261,7 +274,7 @@ class _Reader:
             self._left -= _ITEMS_OF_ARRAY
             begin = self.at + len(head.data)
             self.at = begin + head.size
-            found[name] = head.array(data[begin : self.at])
+            found[name] = head.array(data, begin)
         if "dtype" not in found:
             return found
         head = _head(found)
@@ -269,7 +282,7 @@ class _Reader:
             if len(_heads) >= _MOST_HEADS:
                 _heads.clear()
             _heads[start - 1] = head._replace(data=data[start - 1 : self.at - len(found["data"])])
-        return head.array(found["data"])
+        return head.array(found["data"], 0)
 
 
 class _Head(NamedTuple):
@@ -280,14 +293,13 @@ class _Head(NamedTuple):
     shape: tuple[int, ...]
     size: int
 
-    def array(self, data: bytes) -> Any:
-        if len(data) != self.size:
-            raise ProtocolError(
-                f"an array of {self.dtype} of shape {self.shape} must have {self.size} bytes, got "
-                f"{len(data)}"
-            )
-        flat = np.frombuffer(data, _KINDS[self.dtype])
-        return (flat != 0 if self.dtype == "bool" else flat.astype(self.dtype)).reshape(self.shape)
+    def array(self, data: bytes, begin: int) -> Any:
+        """Return the array whose elements begin at a byte."""
+        if len(data) - begin < self.size:
+            raise IndexError
+        little, kind = _KINDS[self.dtype]
+        seen: Any = np.ndarray(self.shape, little, data, begin)
+        return seen != 0 if kind == np.bool_ else seen.astype(kind)
 
 
 _heads: dict[int, _Head] = {}
@@ -309,7 +321,11 @@ def _head(part: Message) -> _Head:
         raise ProtocolError("the shape of an array must be a list of sizes")
     if type(data) is not bytes:
         raise ProtocolError("the data of an array must be bytes")
-    size = _KINDS[dtype].itemsize
+    size = _KINDS[dtype][0].itemsize
     for n in shape:
         size *= n
+    if len(data) != size:
+        raise ProtocolError(
+            f"an array of {dtype} of shape {tuple(shape)} must have {size} bytes, got {len(data)}"
+        )
     return _Head(b"", dtype, tuple(shape), size)

@@ -188,7 +188,12 @@ def _record(name: str, values: messages.Message) -> Any:
     key = (name, *values)
     if key not in _classes:
         _classes[key] = make_dataclass(name, values, frozen=True, namespace={"take": _take})
-    return _classes[key](**{one: _part(one, value) for one, value in values.items()})
+    record = object.__new__(_classes[key])
+    parts = vars(record)  # a frozen class sets its attributes slowly
+    for one, value in values.items():
+        kind = type(value)
+        parts[one] = _part(one, value) if kind is dict or kind is list else value
+    return record
 
 
 def _part(name: str, value: Any) -> Any:

@@ -23,6 +23,7 @@ CONNECT_SECONDS = 10.0
 END_SECONDS = 2.0
 """Time for a program to end by itself after its standard output [s]."""
 
+_PART = 2**14  # bytes to read at least: what a control of some hundred rows has
 _SET_PIPE_SIZE = 1031  # F_SETPIPE_SZ of Linux
 
 
@@ -107,7 +108,7 @@ class Wire:
         while len(ahead) < least:
             _wait(self._readable, deadline)
             with suppress(BlockingIOError):
-                part = os.read(self._reads, max(BUFFER, least - len(ahead)))
+                part = os.read(self._reads, max(_PART, least - len(ahead)))
                 if not part:
                     raise ClosedError
                 ahead += part
