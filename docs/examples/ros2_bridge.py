@@ -8,7 +8,7 @@ file where BridgeGen is not installed for it. Published at each instant, in this
 
     /bridgegen/reset          std_msgs/Empty       only when a scenario begins: forget the last one
     /bridgegen/target_speed   std_msgs/Float64     what the scenario asks for [m/s]
-    /bridgegen/stop_distance  std_msgs/Float64     to the line of a light that is not green [m]; or inf
+    /bridgegen/stop_distance  std_msgs/Float64     to the line of a light, unless it is green [m]
     /bridgegen/route          nav_msgs/Path        the route ahead, a pose every 2 m
     /bridgegen/tracks         nav_msgs/Odometry    one for each track; child_frame_id is its name
     /bridgegen/ego            nav_msgs/Odometry    rear axle's centre

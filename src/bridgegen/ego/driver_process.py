@@ -60,7 +60,8 @@ class DriverProcess:
             raise InputError(f"a driver's time limit [s] must be > 0 and finite, got {time_limit}")
         if not is_spec(spec):
             raise InputError(
-                f"a driver is named package.module:Class, file.py:Class or file.fmu, got '{spec}'"
+                "a driver is named package.module:Class, file.py:Class, file.fmu, "
+                f"connect:HOST:PORT, unix:PATH or exec:COMMAND; got '{spec}'"
             )
         self.spec = spec
         self.time_limit = time_limit

@@ -298,8 +298,7 @@ class _Head(NamedTuple):
         if len(data) - begin < self.size:
             raise IndexError
         little, kind = _KINDS[self.dtype]
-        seen: Any = np.ndarray(self.shape, little, data, begin)
-        return seen != 0 if kind == np.bool_ else seen.astype(kind)
+        return np.ndarray(self.shape, little, data, begin).astype(kind)
 
 
 _heads: dict[int, _Head] = {}
