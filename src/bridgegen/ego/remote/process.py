@@ -126,6 +126,8 @@ class RemoteProcess:
             hint = ""
             if is_command and isinstance(error, ProtocolError):
                 hint = " (its standard output is for messages; print to the standard error)"
+            elif self._was_there and not is_command:
+                hint = "; start it again, and resume what has begun"
             what = "does not start" if is_command else "does not answer"
             raise InputError(f"the driver '{self._spec}' {what}: {error}{hint}") from None
         self._was_there = True
