@@ -86,7 +86,7 @@ def check_driver(
 
     Args:
         spec: ``package.module:Class``, ``file.py:Class``, a compiled driver's function, or
-            ``file.fmu``.
+            ``file.fmu``, ``connect:HOST:PORT``, ``unix:PATH``, ``exec:COMMAND``.
         scenarios: names of the catalogue, or paths.
         time_limit: [s] that one call may take.
 

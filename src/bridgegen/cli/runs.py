@@ -318,7 +318,11 @@ def simulate(
 @app.command("check-driver", rich_help_panel=SEARCH)
 def check_driver(
     driver: Annotated[
-        str, typer.Argument(help="module:Class, file.py:Class, file.py:function, file.fmu.")
+        str,
+        typer.Argument(
+            help="module:Class, file.py:Class, file.py:function, file.fmu, connect:HOST:PORT, "
+            "unix:PATH, 'exec:COMMAND'."
+        ),
     ],
     scenario: Annotated[
         list[str] | None,

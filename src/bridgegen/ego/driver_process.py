@@ -20,9 +20,11 @@ from typing import Any
 import numpy as np
 
 from bridgegen.arrays import Float
+from bridgegen.ego.address import is_remote
 from bridgegen.ego.compiled import CompiledDriver
 from bridgegen.ego.drivers import TIME_LIMIT, is_spec
 from bridgegen.ego.interface import BatchDriver, Control, Observation, Scene, Trajectory
+from bridgegen.ego.remote.process import RemoteProcess
 from bridgegen.ego.traits import NAMES, Traits, traits_of
 from bridgegen.ego.trajectory import Plans, checked_plans
 from bridgegen.ego.views import MapSender, Viewer, Views
@@ -49,7 +51,8 @@ class DriverProcess:
 
     Args:
         spec: ``package.module:Class``, ``file.py:Class``, the same of a compiled driver's function,
-            or a co-simulation unit, ``file.fmu``.
+            a co-simulation unit, ``file.fmu``; or a driver in a process of the user's own, see
+            `bridgegen.ego.remote`.
         time_limit: seconds that a call may take.
 
     Attributes:
@@ -68,14 +71,19 @@ class DriverProcess:
             raise InputError(f"a driver's time limit [s] must be > 0 and finite, got {time_limit}")
         if not is_spec(spec):
             raise InputError(
-                f"a driver is named package.module:Class, file.py:Class or file.fmu, got '{spec}'"
+                "a driver is named package.module:Class, file.py:Class, file.fmu, "
+                f"connect:HOST:PORT, unix:PATH or exec:COMMAND; got '{spec}'"
             )
         self.spec = spec
         self.time_limit = time_limit
         self.answers: set[str] = set()
         self.asked_at = 0.0
         self.call_seconds: deque[float] = deque(maxlen=TIMED_CALLS)
-        self._process = IsolatedProcess("bridgegen.ego.driver_process", [spec], DriverError)
+        self._process: IsolatedProcess | RemoteProcess
+        if is_remote(spec):
+            self._process = RemoteProcess(spec, DriverError, answering_of)
+        else:
+            self._process = IsolatedProcess("bridgegen.ego.driver_process", [spec], DriverError)
 
     def start(self) -> None:
         """Start the process, if it is not running, and construct the driver in it.
@@ -256,6 +264,12 @@ def answering(spec: str) -> tuple[Traits, Answer]:
             return function(address, *arguments)
 
         return Traits(memory=driver.memory, wants=driver.wants), call
+
+    return answering_of(driver)
+
+
+def answering_of(driver: BatchDriver) -> tuple[Traits, Answer]:
+    """Return what a driver says of itself, and the function that answers requests to it."""
     traits = traits_of({name: getattr(driver, name, None) for name in NAMES})
     viewer = Viewer(traits.wants)
     period = 0.0

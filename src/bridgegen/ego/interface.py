@@ -13,6 +13,8 @@ What costs time is given only to a driver that asks for it, by a class attribute
 
     class MyDriver:
         wants = ("lanes", "map")
+
+A driver that can drive so many scenarios at once at most says so likewise: ``max_rows = 1``.
 """
 
 from dataclasses import dataclass, field, fields, is_dataclass

@@ -1,4 +1,4 @@
-"""What a driver of the user's says of itself, by attributes of its class."""
+"""What a driver of the user's says of itself, by attributes of its class or by a message."""
 
 import math
 from collections.abc import Mapping
@@ -8,7 +8,7 @@ from typing import Any
 from bridgegen.ego.interface import WANTS
 from bridgegen.errors import InputError, UnknownNameError
 
-NAMES = ("wants", "period")
+NAMES = ("wants", "period", "max_rows")
 """What a driver may say; each may be left out."""
 
 PERIODS = (0.05, 0.5)
@@ -22,11 +22,13 @@ class Traits:
     Attributes:
         wants: what it asks for, of `bridgegen.ego.interface.WANTS`.
         period: [s] between two calls of it; None if it is called at every instant.
+        max_rows: how many scenarios it can drive at once; None for any number.
         memory: how many numbers a compiled driver keeps; None for one that is called.
     """
 
     wants: tuple[str, ...] = ()
     period: float | None = None
+    max_rows: int | None = None
     memory: int | None = None
 
     def steps(self, time_step: float) -> int:
@@ -45,12 +47,14 @@ def traits_of(said: Mapping[str, Any]) -> Traits:
     Raises:
         InputError: a value that cannot be.
     """
-    wants, period = (said.get(name) for name in NAMES)
+    wants, period, most = (said.get(name) for name in NAMES)
     wants = checked_wants(() if wants is None else wants)
     low, high = PERIODS
     if period is not None and not (type(period) in (int, float) and low <= period <= high):
         raise InputError(f"period [s] must be in {low:g}..{high:g}, got {_short(period)}")
-    return Traits(wants, None if period is None else float(period))
+    if most is not None and not (type(most) is int and most > 0):
+        raise InputError(f"max_rows must be a whole number > 0, got {_short(most)}")
+    return Traits(wants, None if period is None else float(period), most)
 
 
 def checked_wants(wants: Any) -> tuple[str, ...]:

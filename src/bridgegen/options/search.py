@@ -47,7 +47,8 @@ class PipelineOptions:
         metadata=option(
             TEXT,
             "Driver of the ego, see 'bridgegen list drivers'; or your own: module:Class, "
-            "file.py:Class (or a compiled driver's function), file.fmu.",
+            "file.py:Class (or a compiled driver's function), file.fmu; or where it runs: "
+            "connect:HOST:PORT, unix:PATH, 'exec:COMMAND'.",
             shown="the scenario's choice",
             group=OF_DRIVER,
             names="driver",

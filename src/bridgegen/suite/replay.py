@@ -190,7 +190,7 @@ def refuse_code(results: Sequence[EntryResult], named: Sequence[str], command: s
         raise InputError(
             *(
                 f"the ego is driven by {one}, which is code; to run it, name it: "
-                f"{command} --ego {one}"
+                f"{command} --ego {shlex.quote(one)}"
                 for one in sorted(code)
             )
         )

@@ -1,5 +1,7 @@
 """Declarations in a file's properties: the time step, drivers, the key of the ego's noise."""
 
+import shlex
+
 from bridgegen.ego import DRIVERS, GUESTS, STORYBOARD, Driver, is_spec, split
 from bridgegen.ego.drivers import ATTENTIVE, OTHERS, SCRIPTED
 from bridgegen.errors import InputError, UnsupportedError
@@ -69,7 +71,7 @@ def driver(controllers: Controllers, place: str) -> Driver:
             if is_spec(str(name)):
                 raise UnsupportedError(
                     f"{place}, line {controller.line}: the ego is driven by '{name}', "
-                    f"which is code; to run it, name it: --ego {name}"
+                    f"which is code; to run it, name it: --ego {shlex.quote(str(name))}"
                 )
             known = DRIVERS | GUESTS
             if str(name) not in known:

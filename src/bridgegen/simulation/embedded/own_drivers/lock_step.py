@@ -57,7 +57,8 @@ def drive_in_lock_step(
         InputError: the driver cannot be made.
     """
     parts: list[tuple[Int, Rollout]] = []
-    waiting = [np.arange(n)]
+    driver.start()
+    waiting = _batches(n, driver.traits.max_rows)
     while waiting:
         rows = waiting.pop()
         batch = setup(rows)
@@ -75,6 +76,13 @@ def drive_in_lock_step(
     if len(parts) == 1:
         return parts[0][1]
     return joined(parts)
+
+
+def _batches(n: int, most: int | None) -> list[Int]:
+    """Return rows 0 … n − 1 in batches of at most so many, the last batch first."""
+    if most is None or n <= most:
+        return [np.arange(n)]
+    return [np.arange(at, min(at + most, n)) for at in range(0, n, most)][::-1]
 
 
 def _together(program: Program, batch: Batch, driver: DriverProcess, note: Note | None) -> None:
@@ -179,7 +187,8 @@ class Wheel:
             offset=record.offset[:, 0, k],
             route=self._route, tracks=self._tracks, stop_distance=self._stop, light=self._light,
         )  # fmt: skip
-        if len(x) == 1 and not self._driver.answers_each_row:
+        takes_two = self._driver.traits.max_rows != 1
+        if len(x) == 1 and takes_two and not self._driver.answers_each_row:
             self._try_two(observation)
         return self._driver.act(observation, self._views)
 
