@@ -46,6 +46,7 @@ class EmbeddedSimulator:
         ideal: idealised stages of the driver; its own by default.
         others: "attentive" or "scripted": the driver of all other participants; the file's by
             default.
+        vehicle: how the ego moves, see `bridgegen.simulation.vehicles`; the file's by default.
         time_step: [s]; the file's by default.
         skipped: gets a sentence for each unsupported element, which is then left out instead of
             rejected, with the event, action, entity or condition group that contains it.
@@ -66,6 +67,7 @@ class EmbeddedSimulator:
         driver: Driver | None = None,
         ideal: Iterable[str] | None = None,
         others: str | None = None,
+        vehicle: str | None = None,
         time_step: float | None = None,
         skipped: list[str] | None = None,
     ) -> None:
@@ -75,6 +77,7 @@ class EmbeddedSimulator:
             driver=driver,
             ideal=ideal,
             others=others,
+            vehicle=vehicle,
             time_step=time_step,
             skipped=skipped,
         )
@@ -147,6 +150,7 @@ class EmbeddedSimulator:
         *,
         driver: Driver | None = None,
         dry: bool = False,
+        kinematic: bool = False,
         noise: npt.NDArray[np.uint64] | None = None,
         until_collision: bool = False,
     ) -> Rollout:
@@ -158,6 +162,7 @@ class EmbeddedSimulator:
             values: by parameter.
             driver: another one.
             dry: the road.
+            kinematic: whether the ego's vehicle is, whatever its own is.
             noise: ``(N,)`` keys of the rows' random numbers; see ``noise_keys``.
             until_collision: whether a row ends soon after the ego collides; see `Batch`.
 
@@ -172,7 +177,7 @@ class EmbeddedSimulator:
             )
         if not chosen.driver.is_own:
             return self.batch(
-                roads, rows, values, driver=driver, dry=dry, noise=noise,
+                roads, rows, values, driver=driver, dry=dry, kinematic=kinematic, noise=noise,
                 until_collision=until_collision,
             ).run()  # fmt: skip
         own, memory = self._own, self._own.memory
@@ -182,11 +187,11 @@ class EmbeddedSimulator:
             taken = {name: column[at] for name, column in columns.items()}
             key = None if noise is None else noise[at]
             return self.batch(
-                roads, rows[at], taken, driver=driver, dry=dry, own_memory=memory, noise=key,
-                until_collision=until_collision,
+                roads, rows[at], taken, driver=driver, dry=dry, kinematic=kinematic,
+                own_memory=memory, noise=key, until_collision=until_collision,
             )  # fmt: skip
 
-        return own.drive(chosen.changed(dry=dry), some, len(rows))
+        return own.drive(chosen.changed(dry=dry, kinematic=kinematic), some, len(rows))
 
     def co_simulation(
         self,
@@ -279,6 +284,7 @@ class EmbeddedSimulator:
         *,
         driver: Driver | None = None,
         dry: bool = False,
+        kinematic: bool = False,
         own_memory: int | None = None,
         noise: npt.NDArray[np.uint64] | None = None,
         until_collision: bool = False,
@@ -291,11 +297,12 @@ class EmbeddedSimulator:
             values: by parameter.
             driver: another one.
             dry: the road.
+            kinematic: the vehicle.
             own_memory: see `Batch`.
             noise: likewise.
             until_collision: likewise.
         """
         from bridgegen.simulation.embedded.batch import Batch  # numba is slow to import
 
-        program = self.program.changed(driver=driver, dry=dry)
+        program = self.program.changed(driver=driver, dry=dry, kinematic=kinematic)
         return Batch(program, roads, rows, values, own_memory, noise, until_collision)

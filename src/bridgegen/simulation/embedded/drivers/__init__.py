@@ -1,5 +1,6 @@
 """What drives the ego and attentive participants, and how their demands move them."""
 
+from bridgegen.simulation.embedded.drivers._chassis_kernels import move_chassis
 from bridgegen.simulation.embedded.drivers._control_kernels import (
     begin_control,
     is_steered,
@@ -41,6 +42,7 @@ __all__ = [
     "heed",
     "impose_rows",
     "is_steered",
+    "move_chassis",
     "move_heeding",
     "move_paced",
     "move_steered",
