@@ -19,43 +19,75 @@ from bridgegen.simulation.embedded.chassis._chassis_columns import (
     C_XA,
     C_Y,
     C_YK,
-    E_X,
     E_XA,
     E_Y,
     E_YK,
     K_X,
     MU_X,
     MU_Y,
-    PEAK,
+    SLIP,
+    SLIPS,
 )
 
 
 @inlined_kernel
 def _bent(z, e):
     """Return the argument of the magic formula's arc tangent."""
-    return z - e * (z - math.atan(z))
+    return z if e == 0.0 else z - e * (z - math.atan(z))
 
 
 @inlined_kernel
-def lateral(alpha, kappa, load, mu, stiffness, chassis):
+def lateral(alpha, most, b, chassis):
     """Return an axle's lateral force per mass [m/s²], left positive.
 
     Args:
         alpha: its slip angle [rad], positive where it moves to its left.
-        kappa: its longitudinal slip [1], negative where it brakes.
-        load: on it, per mass [m/s²].
-        mu: the road's friction [1].
-        stiffness: cornering stiffness, per load [1/rad].
+        most: its largest force, μ times the load, as far as brakes and drive leave it [m/s²].
+        b: the magic formula's B [1/rad], see ``stiffness_factor``.
         chassis: see ``_chassis_columns``.
     """
-    peak = mu * chassis[MU_Y]
-    z = stiffness / (chassis[C_Y] * peak) * alpha
-    force = -peak * load * math.sin(chassis[C_Y] * math.atan(_bent(z, chassis[E_Y])))
-    if kappa != 0.0:
-        along = chassis[B_YK2] * alpha
-        z = chassis[B_YK] / math.sqrt(1.0 + along * along) * kappa
-        force *= math.cos(chassis[C_YK] * math.atan(_bent(z, chassis[E_YK])))
-    return force
+    shape, z = chassis[C_Y], _bent(b * alpha, chassis[E_Y])
+    if abs(z) < SMALL:  # the series, to a millionth
+        return -most * shape * z * (1.0 - z * z * (2.0 + shape * shape) * (1.0 / 6.0))
+    return -most * math.sin(shape * math.atan(z))
+
+
+@inlined_kernel
+def stiffness_factor(stiffness, mu, chassis):
+    """Return B of the lateral force [1/rad] for a cornering stiffness per load [1/rad]."""
+    return stiffness / (chassis[C_Y] * mu * chassis[MU_Y])
+
+
+SMALL = 0.03
+
+
+@kernel
+def lateral_left(alpha, kappa, chassis):
+    """Return the share of the lateral force that is left at a longitudinal slip."""
+    if kappa == 0.0:
+        return 1.0
+    along = chassis[B_YK2] * alpha
+    z = chassis[B_YK] / math.sqrt(1.0 + along * along) * kappa
+    return math.cos(chassis[C_YK] * math.atan(_bent(z, chassis[E_YK])))
+
+
+@kernel
+def longitudinal_left(alpha, kappa, chassis):
+    """Return the share of the longitudinal force that is left at a slip angle."""
+    along = chassis[B_XA2] * kappa
+    z = chassis[B_XA] / math.sqrt(1.0 + along * along) * alpha
+    return max(math.cos(chassis[C_XA] * math.atan(_bent(z, chassis[E_XA]))), LEAST)
+
+
+LEAST = 0.01  # of the longitudinal force, however far a tyre slides sideways
+
+
+@inlined_kernel
+def _slip_of(share, chassis):
+    """Return B·κ of a share of the largest longitudinal force, from the table."""
+    at = math.sqrt(1.0 - min(share, 1.0)) * SLIPS
+    i = min(int(at), SLIPS - 1)
+    return chassis[SLIP + i] + (at - i) * (chassis[SLIP + i + 1] - chassis[SLIP + i])
 
 
 @kernel
@@ -76,28 +108,14 @@ def longitudinal(wanted, alpha, load, mu, chassis):
     if wanted == 0.0 or load <= 0.0:
         return 0.0, 0.0
     peak = mu * chassis[MU_X]
-    most, stiffness = peak * load, chassis[K_X] / (chassis[C_X] * peak)
-    best = chassis[PEAK] / stiffness
-    force = most * _left_by(alpha, best, chassis)
-    if abs(wanted) >= force:
-        return math.copysign(force, wanted), math.copysign(best, wanted)
-    kappa = 0.0
-    for _ in range(2):
-        share = min(abs(wanted) / (most * _left_by(alpha, kappa, chassis)), 1.0)
-        bent = math.tan(math.asin(share) / chassis[C_X])
-        e, z = chassis[E_X], bent
-        for _ in range(2):  # Newton's steps for (1 − E)·z + E·atan z = bent
-            z -= (_bent(z, e) - bent) / (1.0 - e + e / (1.0 + z * z))
-        kappa = min(z / stiffness, best)
-    return wanted, math.copysign(kappa, wanted)
-
-
-@inlined_kernel
-def _left_by(alpha, kappa, chassis):
-    """Return the share of the longitudinal force that is left at a slip angle."""
-    along = chassis[B_XA2] * kappa
-    z = chassis[B_XA] / math.sqrt(1.0 + along * along) * alpha
-    return max(math.cos(chassis[C_XA] * math.atan(_bent(z, chassis[E_XA]))), LEAST)
-
-
-LEAST = 0.01  # of the longitudinal force, however far a tyre slides sideways
+    most, b = peak * load, chassis[K_X] / (chassis[C_X] * peak)
+    share = abs(wanted) / most
+    kappa = _slip_of(share / longitudinal_left(alpha, 0.0, chassis), chassis) / b
+    left = longitudinal_left(alpha, kappa, chassis)  # more than without slip
+    if share >= left:
+        kappa = chassis[SLIP] / b
+        force = most * longitudinal_left(alpha, kappa, chassis)
+        if abs(wanted) >= force:
+            return math.copysign(force, wanted), math.copysign(kappa, wanted)
+        return wanted, math.copysign(kappa, wanted)
+    return wanted, math.copysign(_slip_of(share / left, chassis) / b, wanted)

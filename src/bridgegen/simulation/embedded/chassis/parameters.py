@@ -43,7 +43,7 @@ class Tyre:
     k_x: float = 22.303
     c_y: float = 1.3507
     mu_y: float = 1.0
-    e_y: float = -0.0074722
+    e_y: float = 0.0  # −0.007 there
     b_xa: float = 13.276
     b_xa2: float = -13.778
     c_xa: float = 1.2568
@@ -53,15 +53,12 @@ class Tyre:
     c_yk: float = 1.0719
     e_yk: float = -0.27572
 
-    @property
-    def peak(self) -> float:
-        """B·κ at the largest longitudinal force: E bends it from tan(π/2C)."""
-        bent = math.tan(0.5 * math.pi / self.c_x)
-        z = bent
+    def slip(self, share: Float) -> Float:
+        """Return B·κ of shares of the largest longitudinal force: the magic formula's inverse."""
+        bent = np.tan(np.arcsin(share) / self.c_x)
+        z, e = bent.copy(), self.e_x
         for _ in range(50):
-            z -= (z - self.e_x * (z - math.atan(z)) - bent) / (
-                1.0 - self.e_x + self.e_x / (1.0 + z * z)
-            )
+            z -= (z - e * (z - np.arctan(z)) - bent) / (1.0 - e + e / (1.0 + z * z))
         return z
 
 
@@ -146,9 +143,10 @@ def chassis(found: VehicleClass, wheelbase: float, height: float, lock: float) -
     made = np.zeros(columns.CHASSIS)
     made[columns.TO_FRONT], made[columns.TO_REAR] = front, rear
     made[columns.HEIGHT] = found.height * height
-    made[columns.INERTIA] = found.inertia * front * rear
+    made[columns.AGILITY] = 1.0 / (found.inertia * front * rear)
     made[columns.LOCK] = lock
-    made[columns.PEAK] = found.tyre.peak
+    at = np.linspace(0.0, 1.0, columns.SLIPS + 1)
+    made[columns.SLIP :] = found.tyre.slip(1.0 - at * at)
     for one in (found, found.tyre):
         for name in (each.name for each in fields(one)):
             if (column := getattr(columns, name.upper(), None)) is not None and name not in (

@@ -81,23 +81,26 @@ def move_chassis(k, demanded, curvature, plan, roads, state, record):
     wanted = min(wanted, (limits[3] - v) / dt + uphill)
     vx, vy, turn = motion[VX], motion[VY], motion[YAW_RATE]
     angle, force = motion[STEER], motion[FORCE]
-    lag = chassis[BRAKE_LAG] if wanted < force else chassis[DRIVE_LAG]
-    parts = sub_steps(math.hypot(vx, vy), dt, chassis)
+    steering, rate = chassis[STEERING_LAG], chassis[STEERING_RATE]
+    parts = sub_steps(math.sqrt(vx * vx + vy * vy), dt, chassis)
     part = dt / parts
-    turns_left = math.exp(-0.5 * part / chassis[STEERING_LAG])
-    force_left = math.exp(-0.5 * part / lag)
-    cx, cy = x + rear * math.cos(h), y + rear * math.sin(h)
+    angle_left = math.exp(-0.5 * part / steering)
+    force_left = math.exp(-0.5 * part / chassis[BRAKE_LAG if wanted < force else DRIVE_LAG])
+    heads = math.cos(h), math.sin(h)
+    wheels = math.cos(angle), math.sin(angle)
+    place = x + rear * heads[0], y + rear * heads[1], h
     for _ in range(parts):
-        middle = lagged(angle, asked, turns_left, chassis[STEERING_LAG], chassis[STEERING_RATE])
-        last = lagged(middle, asked, turns_left, chassis[STEERING_LAG], chassis[STEERING_RATE])
+        middle = lagged(angle, asked, angle_left, steering, rate)
+        last = lagged(middle, asked, angle_left, steering, rate)
         acts = wanted - force_left * (wanted - force)
         force = wanted - force_left * (wanted - acts)
-        cx, cy, h, vx, vy, turn = advance(
-            cx, cy, h, vx, vy, turn, (angle, middle, last), acts, friction / GRAVITY, press,
-            uphill, aside, part, chassis,
+        place, vx, vy, turn, heads, wheels = advance(
+            place, vx, vy, turn, heads, wheels, (middle - angle, last - middle), acts,
+            friction / GRAVITY, press, uphill, aside, part, chassis,
         )  # fmt: skip
         angle = last
     motion[VX], motion[VY], motion[YAW_RATE] = vx, vy, turn
     motion[STEER], motion[FORCE] = angle, force
-    motion[X], motion[Y], motion[H] = cx - rear * math.cos(h), cy - rear * math.sin(h), h
-    motion[SPEED] = math.hypot(vx, vy - rear * turn)
+    motion[X], motion[Y] = place[0] - rear * heads[0], place[1] - rear * heads[1]
+    motion[H] = place[2]
+    motion[SPEED] = math.sqrt(vx * vx + (vy - rear * turn) ** 2)
