@@ -3,19 +3,19 @@
 The first of these that makes the scenario uncritical is the cause:
 
 1. *perception*: the driver perceives ideally;
-2. *planning*: a careful and competent driver drives, who perceives ideally, too: that of UN R157
+2. *vehicle dynamics*: the vehicle is kinematic: it goes where it is steered, at once;
+3. *planning*: a careful and competent driver drives, who perceives ideally, too: that of UN R157
    or of the fuzzy safety model, each extended to any road (`careful`, `careful-fsm`);
-3. *vehicle dynamics*: the vehicle is kinematic: it goes where it is steered, at once;
 4. *control*: the driver's control is ideal, or the road is dry;
 5. *unavoidable*: none of them.
 
 Everything else is the same, the random numbers included, which depend on the parameters' values
 alone. A driver without one of these stages, or with one that is ideal already, skips its replay:
 the route follower perceives nothing, so where a careful driver avoids harm, its cause is planning.
-Prediction is a part of planning: the careful drivers have their own. A careful driver drives the
-same vehicle, so harm that careful planning avoids with it is the planning's; a vehicle that is
-kinematic already skips its replay. A dry road comes after it: it hides what tyres do near their
-limit.
+Prediction is a part of planning: the careful drivers have their own. A vehicle that
+is kinematic already skips its replay. Dynamics come before planning: the same driver copes with the
+kinematic vehicle, so what it lacks is knowledge of the other one; a careful driver, who keeps room
+for more, copes with most vehicles, and would hide them.
 """
 
 from collections.abc import Callable, Sequence
@@ -64,7 +64,7 @@ class Cause(IntEnum):
 
 
 CAUSES = (
-    Cause.PERCEPTION, Cause.PLANNING, Cause.VEHICLE_DYNAMICS, Cause.CONTROL, Cause.UNAVOIDABLE,
+    Cause.PERCEPTION, Cause.VEHICLE_DYNAMICS, Cause.PLANNING, Cause.CONTROL, Cause.UNAVOIDABLE,
 )  # fmt: skip
 """In the order in which they are sought."""
 
@@ -107,8 +107,8 @@ def counterfactuals(driver: Driver, vehicle: str = KINEMATIC) -> tuple[Counterfa
     others = [egos.get(name) for name in CAREFUL if name != driver.name]
     return (
         *(Counterfactual(Cause.PERCEPTION, one) for one in ideal("perception")),
-        *(Counterfactual(Cause.PLANNING, one) for one in others),
         *([Counterfactual(Cause.VEHICLE_DYNAMICS, driver, kinematic=True)] if dynamics else []),
+        *(Counterfactual(Cause.PLANNING, one) for one in others),
         *(Counterfactual(Cause.CONTROL, one) for one in ideal("control")),
         Counterfactual(Cause.CONTROL, driver, dry=True),
     )

@@ -130,8 +130,8 @@ class PipelineOptions:
         default=None,
         metadata=option(
             TEXT,
-            "Count only critical scenarios of this cause: perception, planning, 'vehicle "
-            "dynamics', control or unavoidable.",
+            "Count only critical scenarios of this cause: perception, 'vehicle dynamics', "
+            "planning, control or unavoidable.",
             shown="any",
             before=None,
             group=OBJECTIVE,

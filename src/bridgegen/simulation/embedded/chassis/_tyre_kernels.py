@@ -95,8 +95,8 @@ def longitudinal(wanted, alpha, load, mu, chassis):
     """Return an axle's longitudinal force per mass [m/s²], and the slip that gives it [1].
 
     The force is the one that is wanted, as far as the tyres can: control of slip (ABS, traction
-    control) keeps the slip at the one of the largest force. The wheel is taken to be in balance:
-    it follows its brake within milliseconds.
+    control) keeps the slip at the one of the largest force straight ahead. The wheel is taken to be
+    in balance: it follows its brake within milliseconds.
 
     Args:
         wanted: of brakes or drive, per mass [m/s²].
@@ -109,13 +109,20 @@ def longitudinal(wanted, alpha, load, mu, chassis):
         return 0.0, 0.0
     peak = mu * chassis[MU_X]
     most, b = peak * load, chassis[K_X] / (chassis[C_X] * peak)
-    share = abs(wanted) / most
-    kappa = _slip_of(share / longitudinal_left(alpha, 0.0, chassis), chassis) / b
-    left = longitudinal_left(alpha, kappa, chassis)  # more than without slip
-    if share >= left:
-        kappa = chassis[SLIP] / b
-        force = most * longitudinal_left(alpha, kappa, chassis)
-        if abs(wanted) >= force:
-            return math.copysign(force, wanted), math.copysign(kappa, wanted)
-        return wanted, math.copysign(kappa, wanted)
-    return wanted, math.copysign(_slip_of(share / left, chassis) / b, wanted)
+    share, best = abs(wanted) / most, chassis[SLIP] / b
+    kappa, left = 0.0, longitudinal_left(alpha, 0.0, chassis)
+    for i in range(ROUNDS):
+        before, kappa = kappa, _slip_of(share / left, chassis) / b
+        if abs(kappa - before) < NEAR * best:
+            break
+        if kappa == best:
+            left = longitudinal_left(alpha, best, chassis)  # more than without slip
+            if share >= left:
+                return math.copysign(most * left, wanted), math.copysign(best, wanted)
+        if i > 0:  # half way, so that it does not go to and fro
+            kappa = 0.5 * (before + kappa)
+        left = longitudinal_left(alpha, kappa, chassis)
+    return wanted, math.copysign(kappa, wanted)
+
+
+ROUNDS, NEAR = 12, 0.01  # to find the slip, to such a share of the largest one
