@@ -127,7 +127,7 @@ def _of_run(
     ego = settings.ego if code else None
     options = CommonOptions(
         criteria=settings.criteria, count=run.triage.count,
-        ideal=settings.ideal if ego else (),
+        ideal=settings.ideal if ego else (), vehicle=settings.vehicle,
     )  # fmt: skip
     exported = {one.name: one.evaluation for one in exported_scenarios(folder)}
     moded = {name for mode in run.modes for name in mode.exports}

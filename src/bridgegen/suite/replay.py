@@ -37,6 +37,7 @@ class _Settings(Strict):
     empty_trigger: str | None
     time_limit: float | None
     matrix: str | None = None
+    vehicle: str | None = None
     version: str
 
 
@@ -166,8 +167,9 @@ def job_of(suite: SuiteRun, result: EntryResult, simulator: SimulatorChoice | No
         )
     options = CommonOptions(
         criteria=settings.criteria, critical=settings.critical, objective=settings.objective,
-        count=settings.count, ideal=settings.ideal, others=settings.others,
-        empty_trigger=settings.empty_trigger, time_limit=settings.time_limit,
+        count=settings.count, ideal=settings.ideal, vehicle=settings.vehicle,
+        others=settings.others, empty_trigger=settings.empty_trigger,
+        time_limit=settings.time_limit,
     )  # fmt: skip
     entry = indexed(Entry(result.entry, result.scenario, result.distribution or None))
     chosen = SimulatorChoice(

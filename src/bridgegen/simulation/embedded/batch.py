@@ -35,6 +35,7 @@ from bridgegen.simulation.embedded._codes import (
     PRESS,
 )
 from bridgegen.simulation.embedded.addresses import addressed
+from bridgegen.simulation.embedded.chassis._chassis_columns import MOTION
 from bridgegen.simulation.embedded.drivers import (
     ANSWER,
     DEMANDS,
@@ -367,6 +368,7 @@ def _plan(program: Program, until_collision: bool) -> memory.Plan:
         "until_collision": int(until_collision),
         "has_pedals": int((program.actions[:, DOES] == PRESS).any()),
         "driver_code": 0,
+        "moves_chassis": 0,
         "own_code": 0,
         "dt": program.time_step,
         **stages,
@@ -457,6 +459,7 @@ def _state(
         "seen": SEEN,
         "sensors": MEMORY,
         "track": TRACK,
+        "motion": MOTION if program.chassis.size else 0,
         "around": AROUND,
         "passages": 2 * e + hypotheses,
         "passage": PASSAGE,

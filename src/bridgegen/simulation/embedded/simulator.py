@@ -48,6 +48,7 @@ class EmbeddedSimulator:
         ideal: idealised stages of the driver; its own by default.
         others: "attentive" or "scripted": the driver of all other participants; the file's by
             default.
+        vehicle: how the ego moves, see `bridgegen.simulation.vehicles`; the file's by default.
         time_step: [s]; the file's by default.
         skipped: gets a sentence for each unsupported element, which is then left out instead of
             rejected, with the event, action, entity or condition group that contains it.
@@ -68,6 +69,7 @@ class EmbeddedSimulator:
         driver: Driver | None = None,
         ideal: Iterable[str] | None = None,
         others: str | None = None,
+        vehicle: str | None = None,
         time_step: float | None = None,
         skipped: list[str] | None = None,
     ) -> None:
@@ -77,6 +79,7 @@ class EmbeddedSimulator:
             driver=driver,
             ideal=ideal,
             others=others,
+            vehicle=vehicle,
             time_step=time_step,
             skipped=skipped,
         )
@@ -149,6 +152,7 @@ class EmbeddedSimulator:
         *,
         driver: Driver | None = None,
         dry: bool = False,
+        kinematic: bool = False,
         noise: npt.NDArray[np.uint64] | None = None,
         until_collision: bool = False,
     ) -> Rollout:
@@ -160,6 +164,7 @@ class EmbeddedSimulator:
             values: by parameter.
             driver: another one.
             dry: the road.
+            kinematic: whether the ego's vehicle is, whatever its own is.
             noise: ``(N,)`` keys of the rows' random numbers; see ``noise_keys``.
             until_collision: whether a row ends soon after the ego collides; see `Batch`.
 
@@ -174,14 +179,14 @@ class EmbeddedSimulator:
             )
         if not chosen.driver.is_own:
             return self.batch(
-                roads, rows, values, driver=driver, dry=dry, noise=noise,
+                roads, rows, values, driver=driver, dry=dry, kinematic=kinematic, noise=noise,
                 until_collision=until_collision,
             ).run()  # fmt: skip
         some = self._some(
-            roads, rows, values, driver=driver, dry=dry, noise=noise,
+            roads, rows, values, driver=driver, dry=dry, kinematic=kinematic, noise=noise,
             until_collision=until_collision,
         )  # fmt: skip
-        return self._own.drive(chosen.changed(dry=dry), some, len(rows))
+        return self._own.drive(chosen.changed(dry=dry, kinematic=kinematic), some, len(rows))
 
     def _some(
         self,
@@ -308,6 +313,7 @@ class EmbeddedSimulator:
         *,
         driver: Driver | None = None,
         dry: bool = False,
+        kinematic: bool = False,
         own: Traits | None = None,
         noise: npt.NDArray[np.uint64] | None = None,
         until_collision: bool = False,
@@ -320,11 +326,12 @@ class EmbeddedSimulator:
             values: by parameter.
             driver: another one.
             dry: the road.
+            kinematic: the vehicle.
             own: what a driver of the user's own needs; None without one.
             noise: likewise.
             until_collision: likewise.
         """
         from bridgegen.simulation.embedded.batch import Batch  # numba is slow to import
 
-        program = self.program.changed(driver=driver, dry=dry)
+        program = self.program.changed(driver=driver, dry=dry, kinematic=kinematic)
         return Batch(program, roads, rows, values, own, noise, until_collision)
