@@ -3,7 +3,6 @@
 import json
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
 
@@ -16,24 +15,9 @@ from bridgegen.simulate import simulate_file
 
 
 @pytest.fixture
-def package(tmp_path, monkeypatch):
-    """Install a package that adds planners, here and in processes that begin."""
-
-    def install(**points: str) -> None:
-        info = tmp_path / "site" / "planner_packages-1.0.dist-info"
-        info.mkdir(parents=True, exist_ok=True)
-        (info / "METADATA").write_text(
-            "Metadata-Version: 2.1\nName: planner-packages\nVersion: 1\n"
-        )
-        lines = [f"{name} = planner_packages:{value}" for name, value in points.items()]
-        (info / "entry_points.txt").write_text("\n".join(["[bridgegen.drivers]", *lines]))
-        monkeypatch.setattr(registry.planners(), "_loaded", {})
-
-    monkeypatch.setenv("PYTHONPATH", f"{tmp_path / 'site'}:{Path(__file__).parent}")
-    for folder in (tmp_path / "site", Path(__file__).parent):
-        monkeypatch.syspath_prepend(str(folder))
-    install(**{"house:cruises": "CRUISES", "absent": "ABSENT", "old": "OLD"})
-    return install
+def package(add_planners):
+    add_planners(**{"house:cruises": "CRUISES", "absent": "ABSENT", "old": "OLD"})
+    return add_planners
 
 
 def test_what_is_declared_here_is_complete():

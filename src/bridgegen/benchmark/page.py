@@ -9,7 +9,7 @@ from pathlib import Path
 
 from bridgegen.benchmark.domain import in_words
 from bridgegen.benchmark.failures import CAREFUL
-from bridgegen.benchmark.plan import COLUMNS, SENSED, Entrant, Plan
+from bridgegen.benchmark.plan import COLUMNS, PERFECT, SENSED, Entrant, Plan
 from bridgegen.benchmark.results import Outcome, Standing, Way
 from bridgegen.comparison.words import number
 from bridgegen.disk import write_whole
@@ -62,7 +62,9 @@ def _standings(plan: Plan, standings: Sequence[Standing]) -> str:
         ("no result", "scenarios"), ("failed rows", "evaluations without a result"),
     )  # fmt: skip
     head = "".join(
-        f'<th scope="col" title="{escape(why)}">{escape(one)}</th>' for one, why in heads
+        f'<th scope="col"{" class=words" if one in ("perception", "causes") else ""} '
+        f'title="{escape(why)}">{escape(one)}</th>'
+        for one, why in heads
     )
     body = []
     for one in standings:
@@ -146,24 +148,33 @@ def _driver(entrant: Entrant, found: Sequence[Outcome]) -> str:
         planner = entrant.planner
         about = (
             f"<p>{escape(planner.description)} {escape(planner.licence)}; "
-            f"{escape(planner.source)}; {escape(available(planner))}. Domain: {escape(in_words(entrant.domain))}.</p>"
+            f"{escape(planner.source)}; {escape(available(planner))}. "
+            f"Domain: {escape(in_words(entrant.domain))}.</p>"
         )
     if entrant.problem:
         about += f"<p><b>It did not drive:</b> {escape(entrant.problem)}</p>"
     if outside:
         about += f'<p class="muted">Not applicable: {escape(", ".join(outside))}.</p>'
+    head = "".join(
+        f'<th scope="col"{" class=words" if name != "severity" else ""}>{name}</th>'
+        for name in (
+            "scenario", "perception", "failure mode", "severity", "cause", "minimal", "look"
+        )
+    )  # fmt: skip
     table = (
-        '<div class="wide"><table><thead><tr><th scope="col">scenario</th>'
-        '<th scope="col">perception</th><th scope="col">failure mode</th>'
-        '<th scope="col">severity</th><th scope="col">cause</th><th scope="col">minimal</th>'
-        f'<th scope="col">look</th></tr></thead><tbody>{rows}</tbody></table></div>'
+        f'<div class="wide"><table><thead><tr>{head}</tr></thead>'
+        f"<tbody>{rows}</tbody></table></div>"
         if rows and not entrant.problem
         else ""
     )
-    modes = sum(len(one.ways) for one in own)
+    modes = "; ".join(
+        f"{_many(sum(len(one.ways) for one in own if one.column == column), 'failure mode')} "
+        f"{'with ' if column == PERFECT else ''}{COLUMNS[column]}"
+        for column in entrant.columns
+    )
     return (
         f'<details class="card" id="{_anchor(entrant.name)}"><summary>{escape(entrant.name)}: '
-        f"{_many(modes, 'failure mode')}</summary>{about}{table}</details>"
+        f"{modes}</summary>{about}{table}</details>"
     )
 
 
@@ -221,8 +232,8 @@ def _method(plan: Plan) -> str:
         "its map and actors: a junction on the ego’s route in which ways cross or turn; opposite "
         "lanes or traffic against the ego’s direction; pedestrians and cyclists.",
         "A failure is a collision or near miss with plausible traffic for which the ego, or the "
-        "ego and another, are responsible. A mode is its conflict, type, rule, other participant and "
-        "place on the route; modes of several seeds are counted once. It is robust if at least "
+        "ego and another, are responsible. A mode is its conflict, type, rule, other participant "
+        "and place on the route; modes of several seeds are counted once. It is robust if at least "
         "half of 32 small changes of its scenario fail, too.",
         f"Of the {plan.seeds} seeds of a driver, scenario and perception, the first is triaged, "
         "and each other one that fails in a way that is new.",
