@@ -122,3 +122,28 @@ def declare_entry_points(monkeypatch: pytest.MonkeyPatch) -> Any:
         monkeypatch.setattr("importlib.metadata.entry_points", entry_points)
 
     return declare
+
+
+@pytest.fixture(scope="module")
+def add_planners(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
+    """Return what installs a package with planners, here and in processes that begin.
+
+    They are those of ``ego/planner_packages.py``: the name of each, and that of its constant.
+    """
+    from bridgegen.ego.planners import registry
+
+    site, code = tmp_path_factory.mktemp("site"), Path(__file__).with_name("ego")
+    info = site / "planner_packages-1.0.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: planner-packages\nVersion: 1\n")
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setenv("PYTHONPATH", f"{site}:{code}")
+        for folder in (site, code):
+            patched.syspath_prepend(str(folder))
+
+        def install(**points: str) -> None:
+            lines = [f"{name} = planner_packages:{value}" for name, value in points.items()]
+            (info / "entry_points.txt").write_text("\n".join(["[bridgegen.drivers]", *lines]))
+            patched.setattr(registry.planners(), "_loaded", {})
+
+        yield install

@@ -7,6 +7,7 @@ from bridgegen.cli import (
     views,
     confirmations,
     comparisons,
+    benchmarks,
     suites,
     regressions,
     preventability,
@@ -22,6 +23,7 @@ from bridgegen.cli.app import app, main
 
 __all__ = [
     "app",
+    "benchmarks",
     "comparisons",
     "confirmations",
     "dashboard",

@@ -39,6 +39,13 @@ suites = Application(
 )
 app.add_typer(suites, name="suite", rich_help_panel=SEARCH)
 
+benchmarks = Application(
+    help="Compare planners by the failures that a search finds.",
+    no_args_is_help=True,
+    rich_markup_mode=None,
+)
+app.add_typer(benchmarks, name="benchmark", rich_help_panel=SEARCH)
+
 ontology = Application(help="Document the ontology.", no_args_is_help=True, rich_markup_mode=None)
 app.add_typer(ontology, name="ontology", rich_help_panel=ONTOLOGY)
 

@@ -212,31 +212,49 @@ def begin(plan: Plan) -> None:
     Raises:
         StorageError: the folder holds something else, or runs with other settings.
     """
-    file, mine = plan.out / FILE, plan.identity()
+    claim(plan.out, FILE, plan.identity(), "comparison", asdict(CommonOptions()))
+
+
+def claim(
+    out: Path, name: str, mine: Mapping[str, Any], what: str, defaults: Mapping[str, Any]
+) -> None:
+    """Create the folder of a grid of runs, or check that it holds this grid.
+
+    Args:
+        out: the folder; its runs are in ``RUNS``.
+        name: of the file in it that says what is equal in all runs.
+        mine: what that is, as JSON's types; it may say more than before.
+        what: a comparison, say, for messages.
+        defaults: of what did not exist when the folder was made.
+
+    Raises:
+        StorageError: the folder holds something else, or runs with other settings.
+    """
+    file = out / name
     try:
         before = parse_json(read_bytes(file)) if file.exists() else None
         if before is not None and not isinstance(before, dict):
             raise ValueError("it must hold an object")
-        if before is None and plan.out.exists() and any(plan.out.iterdir()):
+        if before is None and out.exists() and any(out.iterdir()):
             raise StorageError(
-                f"{plan.out}: is not empty and holds no comparison, so it is left alone; "
+                f"{out}: is not empty and holds no {what}, so it is left alone; "
                 "choose another --out"
             )
-        plan.out.joinpath(RUNS).mkdir(parents=True, exist_ok=True)
+        out.joinpath(RUNS).mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise StorageError(f"{plan.out}: cannot be used: {error.strerror}") from None
+        raise StorageError(f"{out}: cannot be used: {error.strerror}") from None
     except ValueError as error:
         raise StorageError(f"{file}: the file is damaged: {error}") from None
-    if not any(plan.out.glob(f"{RUNS}/*/{RUN_FILE}")):
+    if not any(out.glob(f"{RUNS}/*/{RUN_FILE}")):
         before = None  # there is no run yet that must match
     before = before or {}
     # An option that did not exist then had its default.
-    made_with = {**_plain(asdict(CommonOptions())), **before} if before else {}
+    made_with = {**_plain(defaults), **before} if before else {}
     differ = [name for name in mine if name in made_with and made_with[name] != mine[name]]
     if differ:
         differences = ", ".join(_difference(name, made_with[name], mine[name]) for name in differ)
         raise StorageError(
-            f"{plan.out}: holds a comparison with other settings, and runs of both cannot be "
+            f"{out}: holds a {what} with other settings, and runs of both cannot be "
             f"compared: {differences}; choose another --out"
         )
     text = json.dumps({**before, **mine}, indent=1)

@@ -23,12 +23,16 @@ class Task:
         folder: of the run.
         scenario: to search, as ``run_search`` takes it.
         options: of the run.
+        deliver: whether to export its scenarios and write its report, too.
+        may_be_refused: whether an argument that breaks a rule costs this run alone.
     """
 
     name: str
     folder: Path
     scenario: str
     options: SearchOptions
+    deliver: bool = False
+    may_be_refused: bool = False
 
 
 @dataclass(frozen=True)
@@ -64,7 +68,7 @@ def attempt(
     batch: Callable[[int], None],
     stage: Callable[[str], None],
 ) -> str | None:
-    """Search or resume a run, without export and report.
+    """Search or resume a run.
 
     Args:
         task: the run.
@@ -85,7 +89,7 @@ def attempt(
 
     callbacks = SearchCallbacks(stage=stage, batch=count)
     how: dict[str, Any] = {
-        "deliver": False,
+        "deliver": task.deliver,
         "workers": cluster or Threads(1),
         "callbacks": callbacks,
     }
@@ -98,7 +102,7 @@ def attempt(
     except Interrupted:
         raise KeyboardInterrupt from None
     except InputError as error:
-        if not (task.folder / FILE).exists():
+        if not (task.may_be_refused or (task.folder / FILE).exists()):
             raise
         return str(error)
     except BridgeGenError as error:

@@ -113,10 +113,12 @@ def write_tables(
     out, cells = plan.out, plan.cells_in_order
     settled = [one for one in measures if not one.timed]
     timed = [one for one in measures if one.timed]
-    _write(out / RUNS_FILE, RUNS_HEAD, _runs(cells, records, values, gaps, settled))
-    _write(out / TIMES_FILE, RUNS_HEAD[:5], _times(cells, values, timed))
+    write_csv(out / RUNS_FILE, RUNS_HEAD, _runs(cells, records, values, gaps, settled))
+    write_csv(out / TIMES_FILE, RUNS_HEAD[:5], _times(cells, values, timed))
     kept = {one.name for one in settled}
-    _write(out / SUMMARY_FILE, SUMMARY_HEAD, (_line(one) for one in lines if one.measure in kept))
+    write_csv(
+        out / SUMMARY_FILE, SUMMARY_HEAD, (_line(one) for one in lines if one.measure in kept)
+    )
 
 
 RUNS_HEAD = (
@@ -166,7 +168,12 @@ def _line(line: Line) -> Sequence[object]:
     )  # fmt: skip
 
 
-def _write(path: Path, head: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
+def write_csv(path: Path, head: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
+    """Write a table as CSV, the same bytes for the same values.
+
+    Raises:
+        StorageError: it cannot be written.
+    """
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(head)

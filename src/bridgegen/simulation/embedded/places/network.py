@@ -116,6 +116,11 @@ class Network:
         way: Float = self.tables.paths[p, number, : self.tables.counts[p, number], :2]
         return way
 
+    def roads_ahead(self, p: int) -> tuple[str, ...]:
+        """Return the ids of the roads of the ego's first path on road network p, in its order."""
+        route = self._ways[p].routes[0]
+        return tuple(dict.fromkeys(one.road_id for one in route.steps)) if route else ()
+
     def in_junctions(self, p: int) -> Float:
         """Return where the ego's first path leads through junctions on road network p.
 

@@ -1,0 +1,105 @@
+"""The part of an operational design domain that a scenario needs, from its map and its actors."""
+
+import math
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+
+from bridgegen.arrays import Float
+from bridgegen.campaign.scenarios import load
+from bridgegen.ego.planners.planner import DOMAINS
+from bridgegen.openx.opendrive.geometry import reference_pose
+from bridgegen.openx.opendrive.model import OpenDrive, Road
+from bridgegen.options import PipelineOptions
+from bridgegen.participants import PARTICIPANTS
+from bridgegen.pipeline import Pipeline
+from bridgegen.workers import Threads
+
+CROSSES = math.radians(45.0)
+"""Ways through a junction whose directions differ by more cross or turn; those of a merge do
+not."""
+
+AGAINST = math.radians(135.0)
+"""A participant whose heading at the start differs by more from the ego's comes towards it."""
+
+VULNERABLE = frozenset({"pedestrian", "bicycle"})
+"""Conduct of vulnerable participants."""
+
+
+def domain_of(scenario: str) -> frozenset[str]:
+    """Return which of `DOMAINS` a logical scenario needs, at its nominal values.
+
+    One of "junction" (the ego's route leads through one in which ways cross or turn), "road" (there
+    are opposite lanes, or somebody drives against the ego's direction) and "motorway"; and
+    "vulnerable" if a pedestrian or a cyclist takes part.
+
+    Args:
+        scenario: name of the catalogue, or path of a file.
+
+    Raises:
+        InputError: no such scenario, or an invalid one.
+    """
+    logical = load(scenario)
+    options = PipelineOptions(ego="route-follower")
+    pipeline = Pipeline(logical, logical.space(), options, workers=Threads(1))
+    nominal = pipeline.space.row({})
+    _, one = next(pipeline.by_variant(nominal[np.newaxis]))
+    model = one.source.roads(one.space.values(nominal))
+    ahead = one.simulator.embedded.roads([model]).roads_ahead(0)
+    headings = one.rollout(nominal[np.newaxis]).h[0, :, 0]
+    kinds = [kind for text in pipeline.kinds.values() for kind in text.split(" or ")]
+    return needed(model, ahead, headings, kinds)
+
+
+def needed(
+    model: OpenDrive, ahead: Sequence[str], headings: Float, kinds: Iterable[str]
+) -> frozenset[str]:
+    """Return which of `DOMAINS` a concrete scenario needs.
+
+    Args:
+        model: its road network.
+        ahead: ids of the roads of the ego's route.
+        headings: ``(E,)`` [rad] at the start, the ego first.
+        kinds: of the other participants, see `PARTICIPANTS`.
+    """
+    roads = {one.id: one for one in model.roads}
+    own = [roads[one] for one in ahead]
+    known = [PARTICIPANTS[kind] for kind in kinds if kind in PARTICIPANTS]
+    beside = any(one.seen_as.conduct in VULNERABLE for one in known)
+    turned = np.abs(_wrapped(headings[1:] - headings[0]))
+    if any(
+        _crosses(model, junction) for junction in {one.junction for one in own if one.is_connecting}
+    ):
+        place = "junction"
+    elif any(_has_opposite_lanes(one) for one in own) or (turned > AGAINST).any():
+        place = "road"
+    else:
+        place = "motorway"
+    return frozenset({place, *(["vulnerable"] if beside else [])})
+
+
+def in_words(domain: Iterable[str]) -> str:
+    """Return words of `DOMAINS` in their order."""
+    return ", ".join(word for word in DOMAINS if word in {*domain})
+
+
+def _crosses(model: OpenDrive, junction: str) -> bool:
+    """Return whether the ways through a junction cross or turn."""
+    ends: list[float] = []
+    for road in model.roads:
+        if road.junction == junction:
+            ends += [reference_pose(road, s).h for s in (0.0, road.length)]
+            if _has_opposite_lanes(road):
+                return True
+    angles = np.array(ends)
+    return bool((np.abs(_wrapped(angles[:, np.newaxis] - angles)) > CROSSES).any())
+
+
+def _has_opposite_lanes(road: Road) -> bool:
+    ways = {road.direction(one.id) for part in road.sections for one in part.lanes if one.drivable}
+    return len(ways) > 1
+
+
+def _wrapped(angle: Float) -> Float:
+    wrapped: Float = (angle + math.pi) % (2.0 * math.pi) - math.pi
+    return wrapped

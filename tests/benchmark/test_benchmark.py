@@ -1,0 +1,193 @@
+"""A benchmark from start to finish, with planners that an installed package adds."""
+
+import csv
+import json
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from bridgegen.benchmark import BenchmarkCallbacks, benchmark_planners
+from bridgegen.benchmark.failures import failures_of
+from bridgegen.benchmark.plan import Cell
+from bridgegen.campaign.run import Run
+from bridgegen.errors import InputError, Interrupted, StorageError, UnknownNameError
+
+GRID = {
+    "scenarios": ["cut-in", "left-across-path"], "budget": 8, "seeds": 2, "keep": 1, "workers": 1,
+}  # fmt: skip
+DRIVERS = ["blind", "raises", "un-r157"]
+TABLES = ("drivers.csv", "outcomes.csv", "modes.csv")
+
+
+@pytest.fixture(scope="module")
+def package(add_planners):
+    add_planners(blind="BLIND", raises="RAISES", absent="ABSENT")
+
+
+@pytest.fixture(scope="module")
+def done(package, tmp_path_factory):
+    return benchmark_planners(DRIVERS, **GRID, out=tmp_path_factory.mktemp("benchmarks") / "done")
+
+
+def table(path: Path) -> list[dict[str, str]]:
+    with path.open(newline="", encoding="utf-8") as file:
+        return list(csv.DictReader(file))
+
+
+def test_it_says_what_its_runs_say(done):
+    """Modes, failures and careful drivers; outside its domain nobody is judged."""
+    out = done.plan.out
+    outcomes = {
+        (row["driver"], row["scenario"], row["perception"]): row for row in table(out / TABLES[1])
+    }
+    blind = outcomes["blind", "cut-in", "perfect"]
+    assert blind["state"] == "driven"
+    assert int(blind["evaluations"]) == 16
+    runs = [Run(out / "runs" / f"cut-in-blind-perfect-{seed}") for seed in range(2)]
+    own = [failures_of(run, run.rows()) for run in runs]
+    assert int(blind["failures"]) == sum(len(one.rows) for one in own) > 0
+    assert float(blind["first_failure"]) == np.median([one.rows[0] + 1 for one in own])
+    assert float(blind["severity"]) == max(max(one.severity) for one in own)
+    assert 0.0 < float(blind["avoided_by_un-r157"]) <= 1.0  # the regulation says so of cut-ins
+    assert int(blind["modes"]) >= int(blind["robust"]) >= 1
+    assert outcomes["blind", "left-across-path", "perfect"]["state"] == "not applicable"
+    why = outcomes["blind", "left-across-path", "sensed"]["why"]
+    assert why == "junction is outside its domain (motorway)"
+    assert ("un-r157", "cut-in", "sensed") not in outcomes  # it has no sensors
+    assert outcomes["un-r157", "cut-in", "perfect"]["modes"] == "0"
+    standing = {(row["driver"], row["perception"]): row for row in table(out / TABLES[0])}
+    assert standing["blind", "perfect"]["not_applicable"] == "1"
+    assert standing["blind", "perfect"]["modes"] == blind["modes"]
+
+
+def test_a_planner_that_fails_in_every_row_is_a_cell(done):
+    """The benchmark goes on; the reason is in the table and on the page."""
+    rows = [row for row in table(done.plan.out / TABLES[1]) if row["driver"] == "raises"]
+    driven = [row for row in rows if row["scenario"] == "cut-in"]
+    assert {row["state"] for row in driven} == {"failed"}
+    assert all("no idea" in row["why"] for row in driven)
+    assert "no idea" in done.page.read_text("utf-8")
+
+
+def test_each_failure_has_its_files_and_a_script(done):
+    """The script needs no BridgeGen: what the planner saw is beside it."""
+    out = done.plan.out
+    modes = [row for row in table(out / TABLES[2]) if row["driver"] == "blind"]
+    assert modes
+    for row in modes:
+        file, script = out / row["scenario_file"], out / row["script"]
+        assert file.is_file()
+        assert file.with_suffix(".xodr").is_file()
+        text = script.read_text("utf-8")
+        assert "bridgegen" not in text
+        ran = subprocess.run(
+            [sys.executable, script.name], cwd=script.parent, capture_output=True, text=True,
+            check=True,
+        )  # fmt: skip
+        name = re.search(r"'(.*\.npz)'", text)
+        with np.load(script.with_name(name[1])) as seen:
+            assert int(ran.stdout) == len(seen["time"]) > 100
+            assert np.allclose(np.diff(seen["time"]), np.diff(seen["time"])[0])
+            assert seen["length"] == 4.5
+        assert (out / row["playback"].partition("#")[0]).is_file()
+
+
+def test_every_link_of_the_page_leads_to_a_file(done):
+    text = done.page.read_text("utf-8")
+    links = {one.partition("#")[0] for one in re.findall(r'href="([^"]+)"', text)} - {""}
+    assert {"drivers.csv", "outcomes.csv", "modes.csv", "runs/"} <= links
+    assert all((done.plan.out / one).exists() for one in links)
+    assert not re.search(r'(src|href)="(https?:)?//', text)
+
+
+def test_interrupted_and_resumed_it_is_the_same(done, tmp_path):
+    """Nor do results depend on how many runs there are at a time."""
+    out = tmp_path / "other"
+    ended = []
+
+    def interrupt(name: str, failure: str | None) -> None:
+        ended.append(name)
+        if len(ended) == 3:
+            raise KeyboardInterrupt
+
+    with pytest.raises(Interrupted, match=r"bridgegen benchmark planners --ego blind"):
+        benchmark_planners(
+            DRIVERS, **GRID, out=out, callbacks=BenchmarkCallbacks(ended=interrupt)
+        )  # fmt: skip
+    assert not (out / "benchmark.html").exists()
+    benchmark_planners(DRIVERS, **{**GRID, "workers": 2}, out=out)
+    for name in TABLES:
+        assert (out / name).read_bytes() == (done.plan.out / name).read_bytes()
+
+
+def test_a_later_call_adds_runs_and_makes_none_again(done):
+    out = done.plan.out
+    before = {path: path.stat().st_mtime_ns for path in out.glob("runs/*/run.sqlite")}
+    ended = []
+    callbacks = BenchmarkCallbacks(ended=lambda name, failure: ended.append(name))
+    more = benchmark_planners(
+        ["blind", "route-follower"], **{**GRID, "scenarios": ["cut-in"]}, out=out,
+        callbacks=callbacks,
+    )  # fmt: skip
+    assert ended == [f"cut-in-route-follower-perfect-{seed}" for seed in range(2)]
+    assert all(path.stat().st_mtime_ns == then for path, then in before.items())
+    assert [one.name for one in more.plan.entrants] == ["blind", "route-follower"]
+    with pytest.raises(StorageError, match="budget was 8, is 13"):
+        benchmark_planners(["blind"], **{**GRID, "budget": 13}, out=out)
+
+
+def test_a_driver_that_cannot_be_made_is_said_before_it_starts(package, tmp_path):
+    (tmp_path / "bad.py").write_text("class Bad:\n    def reset(self, n, scene): ...\n")
+    spec = f"{tmp_path / 'bad.py'}:Bad"
+    found = benchmark_planners(
+        [spec, "un-r157"], scenarios=["cut-in"], budget=3, seeds=1, workers=1,
+        out=tmp_path / "out",
+    )  # fmt: skip
+    assert {one.state for one in found.outcomes if one.driver == spec} == {"failed"}
+    assert "must have the methods reset and act" in found.plan.entrants[0].problem
+    assert [cell for cell in found.plan.cells if cell.driver == spec] == []
+    assert isinstance(found.plan.cells[0], Cell)
+
+
+@pytest.mark.parametrize(
+    ("changes", "error", "message"),
+    [
+        ({"drivers": ["blnd"]}, UnknownNameError, "'blnd'; did you mean 'blind'"),
+        ({"drivers": ["absent"]}, InputError, "pip install 'no-such-planner>=1.0,<2'"),
+        ({"drivers": ["carla-agent"]}, InputError, "drives in carla alone"),
+        ({"drivers": ["blind", "blind"]}, InputError, "must have different names"),
+        ({"scenarios": ["cutin"]}, InputError, "did you mean 'cut-in'"),
+        ({"scenarios": ["cut-in", "cut-in"]}, InputError, "cut-in must be named once"),
+        ({"budget": 0}, InputError, "1 <= budget <= 10000000 must hold, got 0"),
+        ({"seeds": 0}, InputError, "1 <= seeds <= 1000 must hold, got 0"),
+        ({"workers": 0}, InputError, "1 <= workers must hold, got 0"),
+        ({"algorithm": "psoo"}, UnknownNameError, "did you mean 'pso'"),
+    ],
+)
+def test_bad_arguments_are_one_error(package, tmp_path, changes, error, message):
+    given = {"drivers": ["blind"], **GRID, "out": tmp_path / "out", **changes}
+    with pytest.raises(error, match=re.escape(message)):
+        benchmark_planners(**given)
+    assert not (tmp_path / "out").exists()
+
+
+def test_without_planners_ours_take_part(monkeypatch, tmp_path):
+    from bridgegen.benchmark.plan import entrants, ours
+
+    found = [one.name for one in entrants(None, ours())]
+    assert found[-len(ours()) :] == list(ours())
+
+
+def test_the_command_prints_the_table(package, cli, tmp_path):
+    code, out, err = cli(
+        "benchmark", "planners", "--ego", "un-r157", "--scenario", "cut-in", "--budget", 3,
+        "--seeds", 1, "--workers", 1, "--out", tmp_path / "out",
+    )  # fmt: skip
+    assert code == 0
+    assert re.search(r"un-r157 +perfect +0 +0 +never", out)
+    assert "1 runs of 3 evaluations: about" in err
+    assert json.loads((tmp_path / "out" / "benchmark.json").read_text())["budget"] == 3
