@@ -54,7 +54,10 @@ def road_map(
                 if curvature == 0.0:
                     x, y = s, 0.0 * s
                 else:
-                    x, y = np.sin(curvature * s) / curvature, (1 - np.cos(curvature * s)) / curvature
+                    x, y = (
+                        np.sin(curvature * s) / curvature,
+                        (1 - np.cos(curvature * s)) / curvature,
+                    )
                 c, q = np.cos(turn), np.sin(turn)
                 x, y = c * x - q * y, q * x + c * y
                 return np.stack([x - offset * np.sin(h), y + offset * np.cos(h)], axis=1)
@@ -137,7 +140,7 @@ class World:
 
     def observe(self) -> Observation:
         n, m = self.others.shape[:2]
-        x, y, h, v = self.others.transpose(2, 0, 1)
+        h, v = self.others[:, :, 2], self.others[:, :, 3]
         tracks = np.zeros((n, m, 13))
         tracks[:, :, 0] = 2.0
         tracks[:, :, 1:4] = self.others[:, :, :3]

@@ -4,12 +4,15 @@ A corridor is a chain of sections; each has the lanes of the ego's direction, fr
 A place in it is a station s along the centre of the route's lanes and an offset d to the left.
 """
 
+from bisect import bisect_right
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from bridgegen.arrays import Bool, Float, Int
 from bridgegen.ego.interface import Lane, RoadMap
+from bridgegen.ego.planners._corridor_kernels import places
 from bridgegen.errors import InputError
 
 DRIVABLE = frozenset(
@@ -48,12 +51,21 @@ class CorridorLane:
 
     def at(self, s: float) -> tuple[float, float, float]:
         """Return offset [m], width [m] and speed limit [m/s] at a station."""
-        last = max(int(np.searchsorted(self.station, s, side="right")) - 1, 0)
+        stations, offset, width, limit = self._columns
+        k = min(max(bisect_right(stations, s) - 1, 0), len(stations) - 1)
+        j = min(k + 1, len(stations) - 1)
+        span = stations[j] - stations[k]
+        u = min(max((s - stations[k]) / span, 0.0), 1.0) if span > 0.0 else 0.0
         return (
-            float(np.interp(s, self.station, self.offset)),
-            float(np.interp(s, self.station, self.width)),
-            float(self.speed_limit[last]),
+            offset[k] + u * (offset[j] - offset[k]),
+            width[k] + u * (width[j] - width[k]),
+            limit[k],
         )
+
+    @cached_property
+    def _columns(self) -> tuple[list[float], ...]:
+        arrays = (self.station, self.offset, self.width, self.speed_limit)
+        return tuple(one.tolist() for one in arrays)  # lists: a number of an array takes longer
 
 
 @dataclass(frozen=True)
@@ -125,19 +137,13 @@ class Corridor:
 
         Before the begin and beyond the end, the road goes straight on.
         """
-        relative = np.stack([x, y], axis=-1)[:, None, :] - self._points[None, :-1]
-        along = (relative * self._direction).sum(axis=2)
-        low, high = np.zeros_like(self._length), self._length.copy()
-        low[0], high[-1] = -np.inf, np.inf
-        foot = np.clip(along, low, high)
-        left = relative[..., 1] * self._direction[:, 0] - relative[..., 0] * self._direction[:, 1]
-        distance = left**2 + (along - foot) ** 2
-        nearest = np.argmin(distance, axis=1)
-        rows = np.arange(len(nearest))
+        found = np.empty((len(x), 3))
+        places(self._points, self._direction, self._length, x, y, found)
+        nearest = found[:, 0].astype(np.int64)
         direction = self._direction[nearest]
         return (
-            self._station[nearest] + foot[rows, nearest],
-            left[rows, nearest],
+            self._station[nearest] + found[:, 1],
+            found[:, 2],
             np.arctan2(direction[:, 1], direction[:, 0]),
         )
 
