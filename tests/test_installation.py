@@ -42,7 +42,14 @@ def test_its_extras_are_those_of_the_project_that_users_install():
     project = tomllib.loads(PROJECT.read_text("utf-8"))["project"]
     declared = project["optional-dependencies"]
     assert set(EXTRAS) == set(declared) - {"test", "docs", "browser"}
-    modules = {"jpype1": "jpype", "stable-baselines3": "stable_baselines3"}  # other names
+    modules = {  # other names
+        "comma-deps-acados": "acados",
+        "fiss-planner": "fiss_planner",
+        "highway-env": "highway_env",
+        "jpype1": "jpype",
+        "metadrive-simulator": "metadrive",
+        "stable-baselines3": "stable_baselines3",
+    }
     for extra, (needed, _) in EXTRAS.items():
         named = {re.match(r"[\w-]+", one)[0] for one in declared[extra]}
         assert set(needed) == {modules.get(one, one) for one in named}

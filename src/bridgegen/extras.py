@@ -23,6 +23,10 @@ EXTRAS = {
         ("torch", "stable_baselines3", "gymnasium"),
         "deep reinforcement learning: dqn, ddpg, ppo, ppo-adversary",
     ),
+    "planners": Extra(
+        ("acados", "fiss_planner", "highway_env", "libsumo", "metadrive"),
+        "planners of others under test: --ego NAME, see 'bridgegen list drivers'",
+    ),
     "ray": Extra(("ray",), "workers on more than one machine: --workers ray"),
     "pandas": Extra(("pandas",), "results as data frames in Python: run.frame()"),
     "parquet": Extra(("pyarrow",), "evaluations as Parquet files: bridgegen table"),

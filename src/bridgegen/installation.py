@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, requires, version
 from pathlib import Path
 
+from bridgegen.ego.listed import planner_findings
 from bridgegen.extras import EXTRAS, is_installed
 from bridgegen.workers.process import cores
 
@@ -50,6 +51,8 @@ def examine() -> Iterator[Finding]:
         else:
             advice = f"pip install 'bridgegen[{extra}]'"
             yield Finding(f"extra {extra}", f"not installed ({use})", advice)
+    for name, state, advice in planner_findings():
+        yield Finding(f"planner {name}", state, advice)
     yield _esmini()
     host = os.environ.get(CARLA)
     yield Finding("CARLA server", host or f"localhost, as {CARLA} is not set")

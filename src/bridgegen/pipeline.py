@@ -731,7 +731,7 @@ def _compile_ahead(carried: Carried, options: PipelineOptions, **made_with: Any)
     """Compile what a pipeline will need; a driver of the user's own is not made for it."""
     ego, _ = carried
     made_with["recorded"] = [n for n in made_with["recorded"] if not n.startswith(OF_BASELINE)]
-    if ego and egos.is_spec(ego.name):
+    if ego and (egos.is_spec(ego.name) or egos.is_planner(ego.name)):
         options = replace(options, ego=None, ideal=(), metrics=())
         made_with["recorded"] = None
     else:

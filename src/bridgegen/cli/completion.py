@@ -61,8 +61,9 @@ def _settings(ctx: typer.Context) -> Iterable[str]:
 
 def _drivers(_: typer.Context) -> Iterable[str]:
     from bridgegen.ego import DRIVERS
+    from bridgegen.ego.planners.registry import planners
 
-    return DRIVERS
+    return (*DRIVERS, *planners())
 
 
 def _others(_: typer.Context) -> Iterable[str]:

@@ -45,14 +45,14 @@ def list_algorithms(as_json: options.Json = False) -> None:
 
 @listing.command("drivers")
 def list_drivers(as_json: options.Json = False) -> None:
-    """Drivers of the ego, and of other participants."""
-    from bridgegen.ego import DRIVERS, GUESTS, OTHERS
-    from bridgegen.ego.drivers import join
+    """Drivers of the ego: ours, planners that others wrote; drivers of other participants.
+
+    Of planners: whether they are installed, or how to get them.
+    """
+    from bridgegen.ego.listed import HEAD, listed
     from bridgegen.screen.tables import print_table
 
-    rows = [(one.name, one.description, join(one.stages)) for one in (DRIVERS | GUESTS).values()]
-    rows += [(name, f"Of other participants: {what}", "") for name, what in OTHERS.items()]
-    print_table(("driver", "description", "can be ideal"), rows, as_json=as_json)
+    print_table(HEAD, listed(), as_json=as_json)
 
 
 @listing.command("simulators")

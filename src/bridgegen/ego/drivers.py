@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from enum import Enum
 from typing import Self
 
+from bridgegen.ego.planners.registry import planners, require
 from bridgegen.errors import InputError, UnknownNameError
 from bridgegen.physics import CAREFUL_BRAKING_G, CAREFUL_REACTION
 
@@ -19,7 +20,7 @@ class Origin(Enum):
     SHIPPED = "shipped"
     """With BridgeGen, compiled."""
     OWN = "own"
-    """From the user."""
+    """From the user, or a planner that others wrote."""
     STORYBOARD = "storyboard"
     """No driver: the storyboard moves the ego."""
     GUEST = "guest"
@@ -54,6 +55,8 @@ class Driver:
         time_limit: [s] that one call of a user's own driver may take.
         home: the only simulator that it drives in; empty: any.
         origin: where its code comes from.
+        spec: of a user's own driver and of a planner, what its process makes: ``module:Class``,
+            ``file.py:Class``, ``file.fmu``.
     """
 
     name: str
@@ -63,10 +66,11 @@ class Driver:
     time_limit: float = TIME_LIMIT
     home: str = ""
     origin: Origin = Origin.SHIPPED
+    spec: str = ""
 
     @property
     def is_own(self) -> bool:
-        """Whether it is the user's, in Python or as a co-simulation unit."""
+        """Whether it is the user's or a planner, in Python or as a co-simulation unit."""
         return self.origin is Origin.OWN
 
     @property
@@ -170,37 +174,49 @@ def get(name: str, ideal: Iterable[str] = (), time_limit: float | None = None) -
     """Return a driver by name, with some of its stages ideal.
 
     Args:
-        name: of one that ships, or a user's own: ``package.module:Class``, ``file.py:Class``
-            (or a compiled driver's function), ``file.fmu``. It is loaded only when it drives.
+        name: of one that ships, of a planner, or a user's own: ``package.module:Class``,
+            ``file.py:Class`` (or a compiled driver's function), ``file.fmu``. The latter are
+            loaded only when they drive.
         ideal: stages to idealise.
         time_limit: [s] that one call of a user's own driver may take.
 
     Raises:
         UnknownNameError: no such driver, or no such stage.
-        InputError: a stage that this driver lacks, or an invalid time limit.
+        InputError: a stage that this driver lacks, an invalid time limit, or a planner that is
+            not installed.
     """
-    if time_limit is not None and not (is_spec(name) and 0.0 < time_limit < math.inf):
+    known = DRIVERS | GUESTS
+    if time_limit is not None and not (name not in known and 0.0 < time_limit < math.inf):
         raise InputError(
             "a time limit [s] is for a driver of your own, and must be > 0 and finite, got "
             f"{time_limit:g} for '{name}'"
         )
-    if is_spec(name):
-        what = "A driver of the user's own."
-        sees = frozenset({"perception"})
-        limit = time_limit or TIME_LIMIT
-        own = Driver(name, what, stages=sees, time_limit=limit, origin=Origin.OWN)
-        return own.idealised(ideal)
-    try:
-        driver = DRIVERS[name] if name in DRIVERS else GUESTS[name]
-    except KeyError:
-        raise UnknownNameError("ego driver", name, DRIVERS) from None
-    return driver.idealised(ideal)
+    if name in known:
+        return known[name].idealised(ideal)
+    spec, what = name, "A driver of the user's own."
+    if is_planner(name):
+        planner = planners()[name]
+        require(planner)
+        spec, what = planner.spec, planner.description
+    elif not is_spec(name):
+        raise UnknownNameError("ego driver", name, [*DRIVERS, *planners()])
+    own = Driver(
+        name, what, stages=frozenset({"perception"}), time_limit=time_limit or TIME_LIMIT,
+        origin=Origin.OWN, spec=spec,
+    )  # fmt: skip
+    return own.idealised(ideal)
+
+
+def is_planner(name: str) -> bool:
+    """Return whether a name is that of a planner, installed or not."""
+    return name in planners()
 
 
 def is_spec(name: str) -> bool:
-    """Return whether a name is that of a user's own driver."""
+    """Return whether a name is that of a user's own driver, which is code."""
     where, _, cls = name.rpartition(":")
-    return name.endswith(".fmu") or bool(where and cls.isidentifier())
+    is_class = bool(where and cls.isidentifier())
+    return name.endswith(".fmu") or (is_class and not is_planner(name))
 
 
 def split(text: str) -> tuple[str, ...]:

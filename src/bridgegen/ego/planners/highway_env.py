@@ -38,7 +38,7 @@ from bridgegen.arrays import Bool, Float
 from bridgegen.ego.interface import Control, Observation, Scene
 from bridgegen.ego.planners._corridor import Corridor, CorridorLane
 from bridgegen.ego.planners._highway_env_script import SCRIPT
-from bridgegen.ego.planners._requirement import require
+from bridgegen.ego.planners.registry import require
 from bridgegen.ego.planners.planner import Planner
 
 PLANNER = Planner(

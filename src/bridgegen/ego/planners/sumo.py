@@ -39,7 +39,7 @@ from bridgegen.ego._route_follower_kernels import preview
 from bridgegen.ego._shift_kernels import aside_at, shift_length
 from bridgegen.ego.interface import Control, Observation, Scene
 from bridgegen.ego.planners._corridor import Corridor
-from bridgegen.ego.planners._requirement import require
+from bridgegen.ego.planners.registry import require
 from bridgegen.ego.planners._sumo_road import (
     PARKED,
     PARKING_SPACE,

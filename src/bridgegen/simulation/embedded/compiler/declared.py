@@ -1,6 +1,15 @@
 """Declarations in a file's properties: the time step, drivers, the key of the ego's noise."""
 
-from bridgegen.ego import DRIVERS, GUESTS, STORYBOARD, Driver, is_spec, split
+from bridgegen.ego import (
+    DRIVERS,
+    GUESTS,
+    STORYBOARD,
+    Driver,
+    get,
+    is_planner,
+    is_spec,
+    split,
+)
 from bridgegen.ego.drivers import ATTENTIVE, OTHERS, SCRIPTED
 from bridgegen.errors import InputError, UnsupportedError
 from bridgegen.openx.openscenario import model as osc
@@ -59,7 +68,7 @@ def driver(controllers: Controllers, place: str) -> Driver:
 
     Raises:
         UnsupportedError: it is unknown, or the user's own; or there are two.
-        InputError: stages that it has not.
+        InputError: stages that it has not, or a planner that is not installed.
     """
     _refuse_two(controllers, place)
     for controller in controllers.of(0):
@@ -71,15 +80,15 @@ def driver(controllers: Controllers, place: str) -> Driver:
                     f"{place}, line {controller.line}: the ego is driven by '{name}', "
                     f"which is code; to run it, name it: --ego {name}"
                 )
-            known = DRIVERS | GUESTS
-            if str(name) not in known:
+            if str(name) not in DRIVERS | GUESTS and not is_planner(str(name)):
                 raise UnsupportedError(
                     f"{place}, line {controller.line}: unknown ego driver '{name}'; "
                     f"known: {', '.join(DRIVERS)} (choose one with --ego)"
                 )
             stages = split(str(properties.get(IDEAL) or "")) if properties else ()
+            found = get(str(name))
             try:
-                return known[str(name)].idealised(stages)
+                return found.idealised(stages)
             except InputError as error:
                 raise InputError(
                     f"{place}, line {controller.line}: property {IDEAL}: {error}"
@@ -115,7 +124,7 @@ def other_driver(controllers: Controllers, place: str, entity: int, name: str) -
         if str(value) not in OTHERS:
             known = ", ".join(OTHERS)
             what = f"unknown driver '{value}' of '{name}'"
-            if str(value) in DRIVERS | GUESTS or is_spec(str(value)):
+            if str(value) in DRIVERS | GUESTS or is_spec(str(value)) or is_planner(str(value)):
                 what = f"the driver '{value}' is for the ego, not for '{name}'"
             raise UnsupportedError(f"{where}{what}; drivers of other participants: {known}")
         if found and str(value) not in found:

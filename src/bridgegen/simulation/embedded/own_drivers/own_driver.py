@@ -120,7 +120,7 @@ class OwnDriver:
                 seat.process.kill()
 
     def _seat(self) -> "Seat":
-        return Seat(DriverProcess(self._driver.name, self._driver.time_limit))
+        return Seat(DriverProcess(self._driver.spec, self._driver.time_limit))
 
 
 class Seat:

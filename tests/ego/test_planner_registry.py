@@ -1,0 +1,167 @@
+"""Planners by name: those with an adapter here, and those of installed packages."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from bridgegen import ego
+from bridgegen.campaign import Run, resume, run_search
+from bridgegen.ego.planners import registry
+from bridgegen.ego.planners.planner import DOMAINS, Planner
+from bridgegen.errors import InputError, UnknownNameError
+from bridgegen.simulate import simulate_file
+
+
+@pytest.fixture
+def package(tmp_path, monkeypatch):
+    """Install a package that adds planners, here and in processes that begin."""
+
+    def install(**points: str) -> None:
+        info = tmp_path / "site" / "planner_packages-1.0.dist-info"
+        info.mkdir(parents=True, exist_ok=True)
+        (info / "METADATA").write_text(
+            "Metadata-Version: 2.1\nName: planner-packages\nVersion: 1\n"
+        )
+        lines = [f"{name} = planner_packages:{value}" for name, value in points.items()]
+        (info / "entry_points.txt").write_text("\n".join(["[bridgegen.drivers]", *lines]))
+        monkeypatch.setattr(registry.planners(), "_loaded", {})
+
+    monkeypatch.setenv("PYTHONPATH", f"{tmp_path / 'site'}:{Path(__file__).parent}")
+    for folder in (tmp_path / "site", Path(__file__).parent):
+        monkeypatch.syspath_prepend(str(folder))
+    install(**{"house:cruises": "CRUISES", "absent": "ABSENT", "old": "OLD"})
+    return install
+
+
+def test_what_is_declared_here_is_complete():
+    for name, one in registry.planners().items():
+        assert isinstance(one, Planner)
+        assert one.name == name
+        assert one.domain
+        assert one.domain <= DOMAINS.keys()
+        assert all((one.description, one.licence, one.source))
+        assert one.spec.rpartition(":")[2].isidentifier()
+        assert not ego.is_spec(name)
+
+
+def test_reading_the_declarations_imports_no_planner():
+    """Nor does the command line read them before it must."""
+    code = (
+        "import sys; from bridgegen.ego.planners.registry import planners, missing\n"
+        "found = [missing(one) for one in planners().values()]\n"
+        "print(*sys.modules)"
+    )
+    names = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    foreign = {
+        "fiss_planner",
+        "highway_env",
+        "metadrive",
+        "libsumo",
+        "traci",
+        "acados",
+        "gymnasium",
+    }
+    assert not foreign & {*names.stdout.split()}
+    assert not {one for one in names.stdout.split() if one.startswith("commonroad")}
+    code = "import sys, bridgegen.cli; print(*sys.modules)"
+    names = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    ours = {one for one in names.stdout.split() if one.startswith("bridgegen.ego.planners.")}
+    assert ours <= {"bridgegen.ego.planners.planner", "bridgegen.ego.planners.registry"}
+    assert "packaging.requirements" not in names.stdout.split()
+
+
+def test_a_name_comes_before_a_class_of_that_spelling(package):
+    assert ego.is_spec("house:other")
+    assert not ego.is_spec("house:cruises")
+    driver = ego.get("house:cruises", ["perception"], 3.0)
+    assert (driver.name, driver.spec, driver.is_own) == ("house:cruises", "drivers:Cruises", True)
+    assert (driver.time_limit, driver.label) == (3.0, "house:cruises (ideal perception)")
+    assert ego.get("house:other").spec == "house:other"
+
+
+def test_the_nearest_name_is_named(package):
+    with pytest.raises(UnknownNameError, match="'house-cruises'; did you mean 'house:cruises'"):
+        ego.get("house-cruises")
+
+
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [
+        (
+            "absent",
+            "the planner 'absent' needs no-such-planner>=1.0,<2: no-such-planner is not installed; "
+            "get it by pip install 'no-such-planner>=1.0,<2'; It needs a checkout.",
+        ),
+        ("old", "the planner 'old' needs numpy<1.0: numpy must be <1.0, is "),
+    ],
+)
+def test_one_that_is_not_installed_says_how_to_get_it(package, name, message):
+    with pytest.raises(InputError) as error:
+        ego.get(name)
+    assert str(error.value).startswith(message)
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "message"),
+    [
+        ("lost", "LOST", "must state its domain by motorway, road, junction, vulnerable, got sea"),
+        ("one", "OTHER", "must have the same name, got 'another'"),
+        ("none", "NO_PLANNER", "must be a bridgegen Planner, got a int"),
+        ("gone", "NOTHING", "cannot be loaded: AttributeError"),
+    ],
+)
+def test_a_package_that_is_wrong_is_named(package, name, value, message):
+    package(**{name: value})
+    with pytest.raises(InputError, match=message):
+        ego.get(name)
+
+
+def test_a_run_keeps_the_name_and_resumes_by_it(package, tmp_path):
+    """Another process drives by the same planner; its files name it, too."""
+    run = run_search(
+        "lead-brakes", algorithm="random", budget=6, ego="house:cruises", keep=1, seed=1,
+        causes=False, out=tmp_path / "run",
+    )  # fmt: skip
+    assert run.settings.ego == "house:cruises"
+    assert "--ego house:cruises" in run.settings.command(tmp_path)
+    assert run.triage is not None
+    assert run.triage.ego == "house:cruises"
+    assert not run.failures
+    before = run.rows()
+    again = resume(tmp_path / "run")  # by its name: it is no code of a stranger
+    assert again.rows().digest() == before.digest()
+    assert Run(tmp_path / "run").scenarios
+    outcome = simulate_file(again.scenarios[0])
+    assert outcome.rollout.status[0] == 0
+
+
+def test_a_file_that_names_one_which_is_not_installed_is_refused(package, tmp_path):
+    run = run_search(
+        "lead-brakes", algorithm="random", budget=6, ego="house:cruises", keep=1, seed=1,
+        causes=False, out=tmp_path / "run",
+    )  # fmt: skip
+    file = run.scenarios[0]
+    file.write_text(file.read_text().replace("house:cruises", "absent"))
+    with pytest.raises(InputError, match="pip install"):
+        simulate_file(file)
+
+
+def test_the_list_says_which_are_installed(package, cli):
+    code, out, _ = cli("list", "drivers", "--json")
+    rows = {row["driver"]: row for row in json.loads(out)}
+    assert code == 0
+    assert rows["house:cruises"]["available"].startswith("installed: numpy 2")
+    assert rows["house:cruises"]["domain"] == "motorway, road"
+    assert rows["absent"]["available"] == (
+        "not installed (no-such-planner is not installed): "
+        "pip install 'no-such-planner>=1.0,<2'; It needs a checkout."
+    )
+    assert rows["reference"]["available"] == "ships"
+    code, out, _ = cli("doctor", "--json")
+    found = {row["subject"]: row for row in json.loads(out)}
+    assert code == 0
+    assert found["planner absent"]["advice"].startswith("pip install 'no-such")
+    assert found["planner house:cruises"]["advice"] == ""
