@@ -144,7 +144,7 @@ class Seen:
             from the left, speed [m/s], acceleration [m/s²], length [m].
         ahead: ``(L, 2)`` float64, of each lane that the ego's body is on: from the ego's front to
             the rear of the next vehicle [m], +inf if there is none; that one's speed [m/s].
-        stop: from the ego's front to the stop line of a light that is not green [m]; +inf: none.
+        stop: from the ego's front to the place that it is to stop at [m]; +inf: none.
         place: ``(2,)`` float64, station and offset of the ego's rear axle [m].
     """
 
@@ -155,8 +155,14 @@ class Seen:
     place: Float
 
 
-STOPS_AT = (1, 2, 3)
-"""States of a light at which one stops: red, red and yellow, yellow."""
+RED, RED_YELLOW, YELLOW = 1, 2, 3
+"""States of a light at which one stops, at yellow only if that can be done by `DECELERATION`."""
+
+BEFORE_LINE = 1.0
+"""m, how far before a stop line SUMO's vehicles stop."""
+
+DECELERATION = 4.5
+"""m/s², SUMO's ``decel`` of passenger cars."""
 
 
 class Eyes:
@@ -216,9 +222,14 @@ class Eyes:
                     and gap < ahead[n, 0]
                 ):
                     ahead[n] = gap, speeds[j]
+        return Seen(ego, others, ahead, self._stop(o, i), np.array([s[0], d[0]]))
+
+    def _stop(self, o: Observation, i: int) -> float:
+        """Return the distance to the place that the ego is to stop at [m]; +inf: none."""
+        distance, v = float(o.stop_distance[i]) - BEFORE_LINE, float(o.v[i])
+        can = v * v / (2.0 * DECELERATION) <= distance + v * self._scene.time_step
         light = int(o.light[i])
-        stop = float(o.stop_distance[i]) if light in STOPS_AT else np.inf
-        return Seen(ego, others, ahead, stop, np.array([s[0], d[0]]))
+        return distance if light in (RED, RED_YELLOW) or (light == YELLOW and can) else np.inf
 
 
 def _overlaps(lane: tuple[float, float, float], d: float, width: float) -> bool:

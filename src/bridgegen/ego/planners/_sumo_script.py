@@ -84,7 +84,7 @@ for t, (edge, position, speed, acceleration, most, nearest) in enumerate(data["e
             follow = vehicle.getFollowSpeed("ego", speed, gap - 2.5, of, 4.5)
             wanted = min(wanted, max(follow, least))
     stop = float(data["stop"][t])
-    if speed * speed / 9.0 <= stop < np.inf:
+    if stop < np.inf:
         wanted = min(wanted, max(vehicle.getStopSpeed("ego", speed, stop), least))
     print(repr((wanted - speed) / step), wish)
     goal = wish

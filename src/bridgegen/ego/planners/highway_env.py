@@ -38,8 +38,8 @@ from bridgegen.arrays import Bool, Float
 from bridgegen.ego.interface import Control, Observation, Scene
 from bridgegen.ego.planners._corridor import Corridor, CorridorLane
 from bridgegen.ego.planners._highway_env_script import SCRIPT
-from bridgegen.ego.planners.registry import require
 from bridgegen.ego.planners.planner import Planner
+from bridgegen.ego.planners.registry import require
 
 PLANNER = Planner(
     name="highway-env-idm-mobil",

@@ -5,8 +5,8 @@ all vehicles are put where they are, SUMO makes one step, and the ego's next spe
 the acceleration. If SUMO has put the ego on the lane beside, that lane is its goal: the course
 there is ours, a quintic with 1 m/s² of lateral acceleration (`bridgegen.ego._shift_kernels`) that
 pure pursuit follows. SUMO's vehicles change lane at once; so, while the body is still on the lane
-that it leaves, the model also follows the vehicle ahead there. At a light that is not green it is
-asked for its speed to stop.
+that it leaves, the model also follows the vehicle ahead there. At a red light, and at
+a yellow one if it can, it is asked for its speed to stop.
 
 All settings are SUMO's own, but random numbers are off (``sigma``, ``speedDev`` and EIDM's errors
 are 0), so that a row depends on that row alone. Another vehicle is on the lane that its centre is
@@ -39,8 +39,8 @@ from bridgegen.ego._route_follower_kernels import preview
 from bridgegen.ego._shift_kernels import aside_at, shift_length
 from bridgegen.ego.interface import Control, Observation, Scene
 from bridgegen.ego.planners._corridor import Corridor
-from bridgegen.ego.planners.registry import require
 from bridgegen.ego.planners._sumo_road import (
+    DECELERATION,
     PARKED,
     PARKING_SPACE,
     Arrays,
@@ -51,6 +51,7 @@ from bridgegen.ego.planners._sumo_road import (
 )
 from bridgegen.ego.planners._sumo_script import SCRIPT
 from bridgegen.ego.planners.planner import Planner
+from bridgegen.ego.planners.registry import require
 from bridgegen.errors import InputError
 from bridgegen.physics import GRAVITY
 
@@ -78,8 +79,8 @@ PLANNERS = tuple(
 MIN_GAP = 2.5
 """m, SUMO's ``minGap`` of all vehicles."""
 
-DECELERATION, EMERGENCY = 4.5, 9.0
-"""m/s², SUMO's ``decel`` and ``emergencyDecel`` of passenger cars."""
+EMERGENCY = 9.0
+"""m/s², SUMO's ``emergencyDecel`` of passenger cars."""
 
 
 class SumoDriver:
@@ -291,7 +292,7 @@ class Simulation:
             if lane != goal and np.isfinite(gap):
                 follow = vehicle.getFollowSpeed(ego, now, gap - MIN_GAP, of, DECELERATION)
                 speed = min(speed, max(follow, least))
-        if now * now / (2.0 * DECELERATION) <= seen.stop < np.inf:
+        if np.isfinite(seen.stop):
             speed = min(speed, max(vehicle.getStopSpeed(ego, now, seen.stop), least))
         return float(speed), wish
 
