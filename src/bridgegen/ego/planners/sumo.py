@@ -70,7 +70,7 @@ PLANNERS = tuple(
         spec=f"bridgegen.ego.planners.sumo:{model}Driver",
         requires=("libsumo==1.28.0",),
         licence="EPL-2.0",
-        source="https://sumo.dlr.de/docs/Definition_of_Vehicles%2C_Vehicle_Types%2C_and_Routes.html",
+        source="https://eclipse.dev/sumo",
         domain=frozenset({"motorway", "road"}),
     )
     for model, what in MODELS.items()
