@@ -96,6 +96,7 @@ def road_map(
         piece_kind=np.zeros(0, np.int8),
         piece_lane=np.zeros(0, np.int64),
         piece_light=np.zeros(0, np.int64),
+        piece_marking=np.zeros(0, np.int8),
     )
 
 

@@ -76,10 +76,20 @@ def test_the_vehicle_ahead_counts_on_each_lane_that_the_body_is_on():
     others = [[[150, 0, 0, 5], [130, -3.5, 0, 9]]]
     between = eyes.see(World([[100, -1.75, 0, 20]], others, [30.0]).observe(), 0)
     gaps = [[50 - LENGTH, 5], [30 - LENGTH, 9]]
-    np.testing.assert_allclose(between.ahead, gaps, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(between.ahead[:, :2], gaps, rtol=0, atol=1e-9)
     within = eyes.see(World([[100, 0, 0, 20]], others, [30.0]).observe(), 0)
-    assert within.ahead[0] == pytest.approx(gaps[0])
-    assert within.ahead[1, 0] == np.inf
+    assert within.ahead[0, :2] == pytest.approx(gaps[0])
+    assert (within.ahead[1, 0], within.ahead[0, 2]) == (np.inf, np.inf)
+
+
+def test_a_body_that_reaches_into_the_lane_is_ahead_on_it():
+    lanes = road_map((1,))
+    # 1.9 m wide: its side is 0.4 m (0.2 m) inside the lane of 3.5 m, its centre off the road.
+    for y, gap in [(-2.3, 50 - LENGTH), (-2.5, np.inf)]:
+        world = World([[100, 0, 0, 20]], [[[150, y, 0, 5]]], [30.0])
+        seen = Eyes(StraightRoad(Corridor(lanes)), scene(lanes)).see(world.observe(), 0)
+        assert seen.others[0, 0] == 0
+        assert seen.ahead[0, [0, 2]] == pytest.approx([gap, gap])
 
 
 def test_an_oncoming_vehicle_stands_and_a_crossing_one_has_its_speed_along_the_road():
@@ -260,6 +270,16 @@ def test_a_solid_marking_keeps_it_on_its_lane():
     seen, _ = drive(sumo.KraussDriver(), world, scene(lanes), 10.0)
     assert max(abs(one.y[0] + 3.5) for one in seen) < 0.05
     assert seen[-1].v[0] < 15.0
+
+
+@pytest.mark.planners
+@needs_planner
+def test_it_brakes_for_a_body_beside_the_road_that_reaches_into_its_lane():
+    for y, brakes in [(-2.3, True), (-4.0, False)]:
+        driver = sumo.KraussDriver()
+        driver.reset(1, scene(road_map((1,))))
+        world = World([[100, 0, 0, 20]], [[[130, y, 0, 2]]], [20.0])
+        assert (float(driver.act(world.observe()).acceleration[0]) < -2.0) == brakes
 
 
 @pytest.mark.planners

@@ -142,8 +142,9 @@ class Seen:
             the lane that it is nearest to, from the left.
         others: ``(M, 7)`` float64: 1 if it is on the road, edge of its front, position [m], lane
             from the left, speed [m/s], acceleration [m/s²], length [m].
-        ahead: ``(L, 2)`` float64, of each lane that the ego's body is on: from the ego's front to
-            the rear of the next vehicle [m], +inf if there is none; that one's speed [m/s].
+        ahead: ``(L, 4)`` float64, of each lane that the ego's body is on: from the ego's front to
+            the rear of the next body that is on it [m], +inf if there is none; that one's speed
+            [m/s]; the same of the next body whose centre is on another lane, or off the road.
         stop: from the ego's front to the place that it is to stop at [m]; +inf: none.
         place: ``(2,)`` float64, station and offset of the ego's rear axle [m].
     """
@@ -157,6 +158,9 @@ class Seen:
 
 RED, RED_YELLOW, YELLOW = 1, 2, 3
 """States of a light at which one stops, at yellow only if that can be done by `DECELERATION`."""
+
+REACH = 0.3
+"""m, how far a body must reach into a lane to be on it, too."""
 
 BEFORE_LINE = 1.0
 """m, how far before a stop line SUMO's vehicles stop."""
@@ -200,28 +204,23 @@ class Eyes:
             changes = np.where(known, (speeds - self._speeds) / scene.time_step, 0.0)
         self._speeds, self._seen = speeds, tracks[:, 0] >= 2.0
         others = np.zeros((len(tracks), 7))
-        ahead = np.full((road.next.shape[1], 2), np.inf)
-        ahead[:, 1] = 0.0
-        covered = [_overlaps(lane.at(front), d[0], scene.width) for lane in lanes]
+        ahead = np.tile([np.inf, 0.0], (road.next.shape[1], 2))
+        covered = [_reach(lane.at(front), d[0], scene.width) > 0.0 for lane in lanes]
         for j in np.flatnonzero(self._seen).tolist():
             place, aside = s[1 + j], d[1 + j]
-            length = max(float(tracks[j, 6]), 0.1)
-            nose = place + 0.5 * length
+            length, width = max(float(tracks[j, 6]), 0.1), float(tracks[j, 7])
+            nose, gap = place + 0.5 * length, place - 0.5 * length - front
             k, at = road.edge_at(nose)
             lane, is_on = road.lane_at(k, nose, aside)
-            if not is_on or nose < 0.0:
-                continue
-            others[j] = 1.0, k, at, lane, speeds[j], changes[j], length
-            gap = place - 0.5 * length - front
+            if is_on and nose >= 0.0:
+                others[j] = 1.0, k, at, lane, speeds[j], changes[j], length
             for n, one in enumerate(lanes):
-                offset, width, _ = one.at(place)
-                if (
-                    covered[n]
-                    and place > s[0]
-                    and abs(aside - offset) <= 0.5 * width
-                    and gap < ahead[n, 0]
-                ):
-                    ahead[n] = gap, speeds[j]
+                there = one.at(place)
+                if covered[n] and place > s[0] and _reach(there, aside, width) > REACH:
+                    if gap < ahead[n, 0]:
+                        ahead[n, :2] = gap, speeds[j]
+                    if gap < ahead[n, 2] and abs(aside - there[0]) > 0.5 * there[1]:
+                        ahead[n, 2:] = gap, speeds[j]
         return Seen(ego, others, ahead, self._stop(o, i), np.array([s[0], d[0]]))
 
     def _stop(self, o: Observation, i: int) -> float:
@@ -232,9 +231,9 @@ class Eyes:
         return distance if light in (RED, RED_YELLOW) or (light == YELLOW and can) else np.inf
 
 
-def _overlaps(lane: tuple[float, float, float], d: float, width: float) -> bool:
-    """Return whether a body of a width [m], at an offset d [m], is on a lane."""
-    return abs(d - lane[0]) < 0.5 * (lane[1] + width)
+def _reach(lane: tuple[float, float, float], d: float, width: float) -> float:
+    """Return how far a body of a width, at an offset d, reaches into a lane [m]."""
+    return 0.5 * (lane[1] + width) - abs(d - lane[0])
 
 
 Arrays = dict[str, npt.NDArray[Any]]

@@ -79,8 +79,9 @@ for t, (edge, position, speed, acceleration, most, nearest) in enumerate(data["e
     if vehicle.getRoadID("ego") == f"r0e{edge}":
         wish = int(lanes[edge]) - 1 - vehicle.getLaneIndex("ego")
     least = max(speed - 9.0 * step, 0.0)
-    for lane, (gap, of) in enumerate(data["ahead"][t].tolist()):
-        if lane != goal and gap < np.inf:
+    for lane, ahead in enumerate(data["ahead"][t].tolist()):
+        gap, of = ahead[2:] if lane == goal else ahead[:2]
+        if gap < np.inf:
             follow = vehicle.getFollowSpeed("ego", speed, gap - 2.5, of, 4.5)
             wanted = min(wanted, max(follow, least))
     stop = float(data["stop"][t])

@@ -4,13 +4,14 @@ Each row has a straight road of its own in one simulation of SUMO (`_sumo_road`)
 all vehicles are put where they are, SUMO makes one step, and the ego's next speed is read: it is
 the acceleration. If SUMO has put the ego on the lane beside, that lane is its goal: the course
 there is ours, a quintic with 1 m/s² of lateral acceleration (`bridgegen.ego._shift_kernels`) that
-pure pursuit follows. SUMO's vehicles change lane at once; so, while the body is still on the lane
-that it leaves, the model also follows the vehicle ahead there. At a red light, and at
-a yellow one if it can, it is asked for its speed to stop.
+pure pursuit follows. In SUMO a vehicle is on one lane, here that of its centre, or on two while it
+changes lane. So the model also follows what is ahead on the lane that the ego's body is leaving,
+and bodies that reach into the ego's lane from another one or from beside the road. At a red light,
+and at a yellow one if it can, it is asked for its speed to stop.
 
 All settings are SUMO's own, but random numbers are off (``sigma``, ``speedDev`` and EIDM's errors
-are 0), so that a row depends on that row alone. Another vehicle is on the lane that its centre is
-on. What crosses the road is a vehicle on it only while it is there; oncoming ones stand.
+are 0), so that a row depends on that row alone. What crosses the road is a vehicle on it only while
+it is there; oncoming ones stand.
 
 CACC needs a leader that is a CACC vehicle and sends its acceleration. No other participant is, so
 it falls back to SUMO's ACC behind each, with the headway of CACC's own type.
@@ -20,7 +21,7 @@ it falls back to SUMO's ACC behind each, with the headway of CACC's own type.
 - ``network``: the text of the ``.net.xml``; ``types``: of the vehicle types; ``route``: the ids of
   the edges, parted by spaces; ``time_step`` [s];
 - ``lanes`` ``(S,)`` and ``next`` ``(S, L)``: see `StraightRoad`;
-- ``ego`` ``(T, 6)``, ``others`` ``(T, M, 7)``, ``ahead`` ``(T, L, 2)``, ``stop`` ``(T,)``: see
+- ``ego`` ``(T, 6)``, ``others`` ``(T, M, 7)``, ``ahead`` ``(T, L, 4)``, ``stop`` ``(T,)``: see
   `Seen`.
 
 Source: Lopez et al., Microscopic Traffic Simulation using SUMO, ITSC 2018; Krauß, Microscopic
@@ -288,8 +289,9 @@ class Simulation:
         if vehicle.getRoadID(ego) == f"r{r}e{int(seen.ego[0])}":
             wish = n - 1 - vehicle.getLaneIndex(ego)
         least = max(now - EMERGENCY * self._scene.time_step, 0.0)
-        for lane, (gap, of) in enumerate(seen.ahead.tolist()):
-            if lane != goal and np.isfinite(gap):
+        for lane, ahead in enumerate(seen.ahead.tolist()):
+            gap, of = ahead[2:] if lane == goal else ahead[:2]
+            if np.isfinite(gap):
                 follow = vehicle.getFollowSpeed(ego, now, gap - MIN_GAP, of, DECELERATION)
                 speed = min(speed, max(follow, least))
         if np.isfinite(seen.stop):
