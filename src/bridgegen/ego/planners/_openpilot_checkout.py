@@ -79,8 +79,8 @@ def load() -> Openpilot:
         InputError: there is no checkout, it is of another version, a package is missing, or the
             solver cannot be built.
     """
-    checkout = _checkout()
-    with imported_from(checkout):
+    folder = checkout()
+    with imported_from(folder):
         try:
             mpc: Any = importlib.import_module(_MPC)
             planner: Any = importlib.import_module(f"{_LIB}.longitudinal_planner")
@@ -88,10 +88,10 @@ def load() -> Openpilot:
             radard: Any = importlib.import_module("openpilot.selfdrive.controls.radard")
         except (ImportError, AttributeError) as error:
             raise InputError(
-                f"openpilot cannot be imported from {checkout} ({error}); it must be a checkout of "
+                f"openpilot cannot be imported from {folder} ({error}); it must be a checkout of "
                 f"openpilot {VERSION}: {HOW_TO_GET}"
             ) from error
-        mpc.AcadosOcpSolverCython = _solver(mpc)
+        mpc.AcadosOcpSolverCython = solver(mpc)
     return Openpilot(
         planner.LongitudinalPlanner,
         radard,
@@ -100,7 +100,7 @@ def load() -> Openpilot:
     )
 
 
-def _checkout() -> Path:
+def checkout() -> Path:
     """Return the user's checkout.
 
     Raises:
@@ -191,7 +191,7 @@ class _NamesOnly(MetaPathFinder, Loader):
 # --- The solver -----------------------------------------------------------------------------------
 
 
-def _solver(mpc: Any) -> Any:
+def solver(mpc: Any) -> Any:
     """Return acados' class for the planner's optimal control problem, built if need be.
 
     Raises:
