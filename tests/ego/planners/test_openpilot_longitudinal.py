@@ -38,12 +38,21 @@ def told(*tracks, **said):
 # --- The lead -------------------------------------------------------------------------------------
 
 
-def test_the_lead_is_the_nearest_ahead_in_the_lane():
+def test_the_lead_is_the_nearest_ahead_in_the_way():
     points, leads = told(
         track(x=80.0), track(x=40.0, y=1.0), track(x=20.0, y=WIDTH), track(x=-20.0)
     )
     assert leads == [1, 1]
     assert points[1] == pytest.approx([1.0, 40.0 - 2.3 - FRONT, 1.0, 20.0])
+    assert told(track(y=1.9 + 0.01))[1] == [-1, -1]
+    assert told(track(y=1.9 - 0.01))[1] == [0, 0]
+
+
+def test_a_long_body_that_turns_in_is_in_the_way_before_its_centre_is():
+    bus = track(y=-4.0, h=0.4)
+    bus[6:8] = 12.0, 2.5
+    assert told(bus)[1][0] == 0
+    assert told(track(y=-4.0, h=0.4))[1][0] == -1
 
 
 def test_what_is_not_confirmed_is_no_lead_and_no_point():
@@ -54,9 +63,9 @@ def test_what_is_not_confirmed_is_no_lead_and_no_point():
 
 
 @pytest.mark.parametrize(
-    ("drift", "heading", "lead"), [(-1.0, 0.0, 0), (-0.5, 0.0, -1), (-1.0, math.pi, -1)]
+    ("drift", "heading", "lead"), [(-1.0, 0.0, 0), (-0.7, 0.0, -1), (-1.0, math.pi, -1)]
 )
-def test_the_second_lead_is_who_will_be_in_the_lane_in_two_seconds(drift, heading, lead):
+def test_the_second_lead_is_who_will_be_in_the_way_in_two_seconds(drift, heading, lead):
     assert told(track(y=WIDTH, vy=drift, h=heading))[1] == [-1, lead]
 
 

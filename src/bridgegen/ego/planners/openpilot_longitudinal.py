@@ -2,10 +2,10 @@
 
 The planner (``LongitudinalPlanner`` with its model predictive controller), the radar's tracks and
 the choice of the lead (``radard``) are openpilot's own, imported from the user's checkout. Ours is
-what its camera would give, and it is perfect: the lead is the nearest participant ahead whose
-centre is in the ego's lane; the second lead, that of two seconds from now (``LEAD_T_OFFSETS``), the
-nearest one of the ego's direction that will be there at its present velocity. Every confirmed or
-coasting track is a point of the radar. The set speed is the scenario's target speed, at most
+what its camera would give, and it is perfect: the lead is the nearest participant ahead whose body
+is over the strip that the ego's body sweeps along its route; the second lead, that of two seconds
+from now (``LEAD_T_OFFSETS``), the nearest one of the ego's direction that will be there at its
+present velocity. Every confirmed or coasting track is a point of the radar. The set speed is the scenario's target speed, at most
 openpilot's 145 km/h. The personality is "standard", experimental mode is off, the car's parameters
 are opendbc's defaults. Demands to stop are braking at 0.5 m/s² at least, as in openpilot's own
 plant (``selfdrive/test/longitudinal_maneuvers/plant.py``).
@@ -80,8 +80,6 @@ class OpenpilotLongitudinal:
         InputError: openpilot or its solver cannot be had, see `_openpilot_checkout.load`.
     """
 
-    wants = ("lanes",)
-
     def __init__(self) -> None:
         self._openpilot = load()
 
@@ -117,14 +115,13 @@ class OpenpilotLongitudinal:
 
 def inputs(observation: Observation, scene: Scene) -> Inputs:
     """Return what openpilot is told of N scenarios: what `export` writes, with N in place of T."""
-    o, lanes = observation, observation.lanes
-    assert lanes is not None  # it is wanted
-    tracks = o.tracks
+    o, tracks = observation, observation.tracks
     s, left, at = _along(o.route, tracks[:, :, 1], tracks[:, :, 2])
     road = np.take_along_axis(o.route[:, :, 2], at, axis=1)
-    half_width = 0.5 * np.take_along_axis(lanes.width, at, axis=1)
     cos, sin = np.cos(tracks[:, :, 3] - road), np.sin(tracks[:, :, 3] - road)
-    half = 0.5 * (np.abs(cos) * tracks[:, :, 6] + np.abs(sin) * tracks[:, :, 7])
+    length, width = tracks[:, :, 6], tracks[:, :, 7]
+    half = 0.5 * (np.abs(cos) * length + np.abs(sin) * width)
+    aside = 0.5 * (np.abs(sin) * length + np.abs(cos) * width + scene.width)
     front = scene.centre + 0.5 * scene.length
     speed = tracks[:, :, 4] * np.cos(road) + tracks[:, :, 5] * np.sin(road)
     drift = tracks[:, :, 5] * np.cos(road) - tracks[:, :, 4] * np.sin(road)
@@ -133,8 +130,8 @@ def inputs(observation: Observation, scene: Scene) -> Inputs:
     there = tracks[:, :, 0] >= SEEN
     distance = s - half - front
     ahead = there & (s > scene.centre)
-    now = ahead & (np.abs(left) < half_width)
-    soon = ahead & (np.abs(left + AHEAD * drift) < half_width) & (cos > math.cos(SAME_WAY))
+    now = ahead & (np.abs(left) < aside)
+    soon = ahead & (np.abs(left + AHEAD * drift) < aside) & (cos > math.cos(SAME_WAY))
     return {
         "v": o.v,
         "a": o.a,
