@@ -159,6 +159,12 @@ def test_a_checkout_that_lacks_files_is_refused_and_nothing_of_it_stays(monkeypa
     assert [one.name for one in (tmp_path / "openpilot").iterdir()] == ["__init__.py"]
 
 
+def test_what_make_says_is_passed_on(monkeypatch, tmp_path):
+    assert "ocp_cython" in checkout._compile(tmp_path)  # there is no such rule
+    monkeypatch.setenv("PATH", str(tmp_path))
+    assert checkout._compile(tmp_path) == "make cannot be run: No such file or directory"
+
+
 # --- openpilot ------------------------------------------------------------------------------------
 
 

@@ -250,7 +250,7 @@ def _link(acados: Any, tree: Path) -> None:
 
 
 def _build(mpc: Any, template: Any, tree: Path, code: Path) -> str:
-    """Generate the solver's code and compile it; return the last line that make prints."""
+    """Generate the solver's code and compile it; return the last lines that make prints."""
     import acados
 
     mpc.AcadosModel, mpc.AcadosOcp = template.AcadosModel, template.AcadosOcp
@@ -265,10 +265,19 @@ def _build(mpc: Any, template: Any, tree: Path, code: Path) -> str:
     finally:
         for name, value in before.items():
             os.environ.pop(name) if value is None else os.environ.update({name: value})
+    return _compile(code)
+
+
+def _compile(code: Path) -> str:
+    """Compile the generated code; return the last lines that make prints."""
+    # Where cython is, if the environment is not activated
     path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ.get('PATH', os.defpath)}"
-    made = subprocess.run(
-        ["make", "ocp_cython"],
-        cwd=code, env=os.environ | {"PATH": path}, text=True, check=False,
-        stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
-    )  # fmt: skip
-    return (made.stdout.strip().splitlines() or ["make printed nothing"])[-1][-300:]
+    try:
+        made = subprocess.run(
+            ["make", "ocp_cython"],
+            cwd=code, env=os.environ | {"PATH": path}, text=True, errors="replace", check=False,
+            stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
+        )  # fmt: skip
+    except OSError as error:
+        return f"make cannot be run: {error.strerror}"
+    return " / ".join(made.stdout.strip().splitlines()[-3:])[-500:]

@@ -5,10 +5,10 @@ the choice of the lead (``radard``) are openpilot's own, imported from the user'
 what its camera would give, and it is perfect: the lead is the nearest participant ahead whose body
 is over the strip that the ego's body sweeps along its route; the second lead, that of two seconds
 from now (``LEAD_T_OFFSETS``), the nearest one of the ego's direction that will be there at its
-present velocity. Every confirmed or coasting track is a point of the radar. The set speed is the scenario's target speed, at most
-openpilot's 145 km/h. The personality is "standard", experimental mode is off, the car's parameters
-are opendbc's defaults. Demands to stop are braking at 0.5 m/s² at least, as in openpilot's own
-plant (``selfdrive/test/longitudinal_maneuvers/plant.py``).
+present velocity. Every confirmed or coasting track is a point of the radar. The set speed is the
+scenario's target speed, at most openpilot's 145 km/h. The personality is "standard", experimental
+mode is off, the car's parameters are opendbc's defaults. Demands to stop are braking at 0.5 m/s² at
+least, as in openpilot's own plant (``selfdrive/test/longitudinal_maneuvers/plant.py``).
 
 The steering is the route follower's: pure pursuit of the route. openpilot's camera steers by a
 neural network, which needs pictures.
