@@ -9,6 +9,7 @@ import importlib.util
 import sys
 import traceback
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from types import ModuleType
@@ -18,8 +19,10 @@ import numpy as np
 
 from bridgegen.arrays import Float
 from bridgegen.ego.compiled import CompiledDriver
+from bridgegen.ego.driver_facts import DriverFacts, checked_wants
 from bridgegen.ego.drivers import TIME_LIMIT, is_spec
 from bridgegen.ego.interface import BatchDriver, Control, Observation, Scene
+from bridgegen.ego.views import MapSender, Viewer, Views
 from bridgegen.errors import InputError
 from bridgegen.isolated import Answer, CallError, IsolatedProcess, serve
 
@@ -44,12 +47,11 @@ class DriverProcess:
         time_limit: seconds that a call may take.
 
     Attributes:
-        memory: how many numbers a compiled driver keeps; None for one called in Python. Known
-            when the process has started.
+        facts: what is known of it when the process has started.
         answers_each_row: whether it has answered several rows at once in the right shape.
     """
 
-    memory: int | None
+    facts: DriverFacts
     answers_each_row: bool = False
 
     def __init__(self, spec: str, time_limit: float = TIME_LIMIT) -> None:
@@ -71,8 +73,9 @@ class DriverProcess:
         """
         if self._process.runs:
             return
+        self._maps = MapSender()
         try:
-            self.memory = self._process.start(START_SECONDS)
+            self.facts = self._process.start(START_SECONDS)
         except DriverError as error:
             raise InputError(f"the driver '{self.spec}' cannot be made: {error}") from None
 
@@ -84,17 +87,23 @@ class DriverProcess:
             InputError: it cannot be made.
         """
         self.start()
-        self._process.ask("reset", n, scene, seconds=self.time_limit)
+        sent = self._maps.send(scene.maps) if scene.maps else None
+        scene = replace(scene, maps=())
+        self._process.ask("reset", n, scene, sent, seconds=self.time_limit)
 
-    def act(self, observation: Observation) -> tuple[Float, Float]:
+    def act(self, observation: Observation, views: Views | None = None) -> tuple[Float, Float]:
         """Return its control, ``(N,)`` acceleration [m/s²] and curvature [1/m].
+
+        Args:
+            observation: without what the driver wants.
+            views: what it wants, for `Viewer.complete`.
 
         Raises:
             DriverError: it raised, timed out, died, or its answer is invalid: another shape, NaN or
                 an infinite value for a scenario that is running.
         """
         demanded: tuple[Float, Float] = self._process.ask(
-            "act", observation, seconds=self.time_limit
+            "act", observation, views or {}, seconds=self.time_limit
         )
         self.answers_each_row = self.answers_each_row or len(observation.x) > 1
         return demanded
@@ -208,8 +217,8 @@ def checked(control: Any, running: Any) -> tuple[Float, Float]:
     return np.where(running, arrays[0], 0.0), np.where(running, arrays[1], 0.0)
 
 
-def answering(spec: str) -> tuple[int | None, Answer]:
-    """Construct a driver; return its memory, if it is compiled, and its answering function."""
+def answering(spec: str) -> tuple[DriverFacts, Answer]:
+    """Construct a driver; return what is known of it, and its answering function."""
     driver = make(spec)
     if isinstance(driver, CompiledDriver):
         address = driver.address
@@ -217,15 +226,18 @@ def answering(spec: str) -> tuple[int | None, Answer]:
         def call(_: str, function: Callable[..., Any], *arguments: Any) -> Any:
             return function(address, *arguments)
 
-        return driver.memory, call
+        return DriverFacts(driver.memory, driver.wants), call
+    wants = checked_wants(getattr(driver, "wants", ()))
+    viewer = Viewer(wants)
 
     def answer(what: str, *rest: Any) -> Any:
         if what == "reset":
-            driver.reset(*rest)
+            driver.reset(rest[0], viewer.reset(*rest))
             return None
-        return checked(driver.act(*rest), rest[0].running)
+        observation = viewer.complete(*rest)
+        return checked(driver.act(observation), observation.running)
 
-    return None, answer
+    return DriverFacts(wants=wants), answer
 
 
 def _described(error: Exception) -> str:

@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from bridgegen.arrays import Float, Int
 from bridgegen.ego import Driver
+from bridgegen.ego.driver_facts import DriverFacts
 from bridgegen.errors import InputError
 from bridgegen.openx.opendrive.model import OpenDrive
 from bridgegen.openx.openscenario.model import OpenScenario
@@ -111,7 +112,7 @@ class EmbeddedSimulator:
 
     @property
     def _asks_python(self) -> bool:
-        return self.program.driver.is_own and self._own.memory is None
+        return self.program.driver.is_own and self._own.facts.memory is None
 
     @property
     def time_step(self) -> float:
@@ -175,14 +176,15 @@ class EmbeddedSimulator:
                 roads, rows, values, driver=driver, dry=dry, noise=noise,
                 until_collision=until_collision,
             ).run()  # fmt: skip
-        own, memory = self._own, self._own.memory
+        own, facts = self._own, self._own.facts
+        roads.provide(facts.wants)
         columns = {name: np.broadcast_to(value, len(rows)) for name, value in values.items()}
 
         def some(at: Int) -> "Batch":
             taken = {name: column[at] for name, column in columns.items()}
             key = None if noise is None else noise[at]
             return self.batch(
-                roads, rows[at], taken, driver=driver, dry=dry, own_memory=memory, noise=key,
+                roads, rows[at], taken, driver=driver, dry=dry, own=facts, noise=key,
                 until_collision=until_collision,
             )  # fmt: skip
 
@@ -214,10 +216,11 @@ class EmbeddedSimulator:
 
         program = self.program.changed(driver=driver)
         own = self._own if program.driver.is_own else None
+        if own:
+            roads.provide(own.facts.wants)
         batch = self.batch(
-            roads, np.array([row]), values, driver=driver, dry=dry,
-            own_memory=own.memory if own else None,
-        )  # fmt: skip
+            roads, np.array([row]), values, driver=driver, dry=dry, own=own.facts if own else None
+        )
         wheel = partial(own.wheel, program.changed(dry=dry)) if own else None
         return CoSimulation(
             batch, program.names, program.time_step, program.n_steps, program.actors, wheel
@@ -279,7 +282,7 @@ class EmbeddedSimulator:
         *,
         driver: Driver | None = None,
         dry: bool = False,
-        own_memory: int | None = None,
+        own: DriverFacts | None = None,
         noise: npt.NDArray[np.uint64] | None = None,
         until_collision: bool = False,
     ) -> "Batch":
@@ -291,11 +294,11 @@ class EmbeddedSimulator:
             values: by parameter.
             driver: another one.
             dry: the road.
-            own_memory: see `Batch`.
+            own: what a driver of the user's own needs; None without one.
             noise: likewise.
             until_collision: likewise.
         """
         from bridgegen.simulation.embedded.batch import Batch  # numba is slow to import
 
         program = self.program.changed(driver=driver, dry=dry)
-        return Batch(program, roads, rows, values, own_memory, noise, until_collision)
+        return Batch(program, roads, rows, values, own, noise, until_collision)

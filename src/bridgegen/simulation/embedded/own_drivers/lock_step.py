@@ -5,15 +5,26 @@ that it cannot drive. So a failure costs the row that it belongs to, whatever th
 """
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from bridgegen.arrays import Float, Int
 from bridgegen.ego._tracking_kernels import TRACK
+from bridgegen.ego.compiled import CONFLICT
 from bridgegen.ego.driver_process import DriverError, DriverProcess
-from bridgegen.ego.interface import ROUTE_POINTS, ROUTE_STEP, Observation, Scene
+from bridgegen.ego.interface import (
+    CONFLICT_WAYS,
+    NEAR_PIECES,
+    ROUTE_POINTS,
+    ROUTE_STEP,
+    Observation,
+    Scene,
+)
 from bridgegen.simulation.embedded.batch import Batch
+from bridgegen.simulation.embedded.drivers import LANES, MEMORY
 from bridgegen.simulation.embedded.program import Program
 from bridgegen.simulation.rollout import FAILURES, Rollout, joined
 
@@ -88,7 +99,19 @@ class Wheel:
         self._time_step, self._batch, self._driver = program.time_step, batch, driver
         self._route, self._tracks = np.zeros((n, ROUTE_POINTS, 4)), np.zeros((n, m, TRACK))
         self._stop, self._light = np.full(n, np.inf), np.zeros(n, dtype=np.int8)
+        driver.start()
+        self._wants = wants = driver.facts.wants
         self._scene = _scene(program)
+        if "map" in wants:
+            maps, map_of = batch.maps()
+            self._scene = replace(self._scene, maps=maps, map_of=map_of)
+            self._nearby, self._places = np.zeros((n, MEMORY)), np.full((n, 1 + NEAR_PIECES), -1)
+        self._views: dict[str, npt.NDArray[Any]] = {}
+        if "lanes" in wants:
+            self._views["lanes"] = np.zeros((n, LANES))
+        if "conflicts" in wants:
+            shape = (n, m, CONFLICT_WAYS, CONFLICT.itemsize // 8)
+            self._views["conflicts"] = np.full(shape, np.nan)
         driver.reset(n, self._scene)
 
     def demand(self, k: int) -> tuple[Float, Float]:
@@ -99,6 +122,7 @@ class Wheel:
         """
         batch, route, tracks = self._batch, self._route, self._tracks
         batch.observe(k, ROUTE_STEP, route, tracks, self._stop, self._light)
+        self._look(k)
         record, state = batch.record, batch.state
         x, y, h, v = (array[:, 0, k] for array in (record.x, record.y, record.h, record.v))
         observation = Observation(
@@ -112,7 +136,19 @@ class Wheel:
         )  # fmt: skip
         if len(x) == 1 and not self._driver.answers_each_row:
             self._try_two(observation)
-        return self._driver.act(observation)
+        return self._driver.act(observation, self._views)
+
+    def _look(self, k: int) -> None:
+        """Fill the views of instant k."""
+        batch, views = self._batch, self._views
+        if "lanes" in self._wants:
+            batch.see_lanes(views["lanes"])
+        if "map" in self._wants:
+            batch.see_map(k, self._nearby, self._places)
+            views["map"] = self._places.astype(np.int32)
+            views["lights"] = batch.state.lights
+        if "conflicts" in self._wants:
+            batch.see_conflicts(k, views["conflicts"])
 
     def _try_two(self, observation: Observation) -> None:
         """Show the only row twice: one answer for all rows has the right shape for one row.
@@ -120,8 +156,10 @@ class Wheel:
         Raises:
             DriverError: it failed.
         """
-        self._driver.reset(2, self._scene)
-        self._driver.act(observation.take(np.zeros(2, dtype=np.int64)))
+        both = replace(self._scene, map_of=np.repeat(self._scene.map_of, 2))
+        self._driver.reset(2, both)
+        twice = {word: np.repeat(view, 2, axis=0) for word, view in self._views.items()}
+        self._driver.act(observation.take(np.zeros(2, dtype=np.int64)), twice)
         self._driver.reset(1, self._scene)
 
 
