@@ -10,7 +10,6 @@ from bridgegen.ego.interface import (
     ROUTE_POINTS,
     ROUTE_STEP,
     Lane,
-    Lanes,
     Light,
     MapView,
     Observation,
@@ -47,7 +46,7 @@ def road_map(may_change=True, lights=()):
     none = np.zeros(0, dtype=np.int64)
     return RoadMap(
         lanes, (RIGHT,), (), tuple(lights), np.zeros((0, PIECE_POINTS, 3)), none,
-        none.astype(np.int8), none, none,
+        none.astype(np.int8), none, none, none.astype(np.int8),
     )  # fmt: skip
 
 
@@ -71,16 +70,12 @@ def observation(tracks, *, x=0.0, y=0.0, h=0.0, v=25.0, a=0.0, target=30.0, time
     """Return one row; ``state`` is that of the lights."""
     route = np.zeros((1, ROUTE_POINTS, 4))
     route[0, :, 0] = x + ROUTE_STEP * np.arange(ROUTE_POINTS)
-    one, along = np.ones(1), (1, ROUTE_POINTS)
-    lanes = Lanes(
-        np.full(along, 36.0), np.full(along, WIDTH), np.zeros(along, bool),
-        np.zeros((*along, 2, 4)), one * (LENGTH - x), np.array([[LENGTH, 0.0, 0.0]]),
-    )  # fmt: skip
+    one = np.ones(1)
     view = MapView(np.ones(1, np.int64), np.zeros((1, 0), np.int32), np.full((1, 1), state, "i1"))
     return Observation(
         time, np.ones(1, bool), one * x, one * y, one * h, one * v, one * a, one * target, one * y,
         route, np.array(tracks).reshape(1, -1, 13), one * np.inf, np.zeros(1, np.int8),
-        lanes, view,
+        map=view,
     )  # fmt: skip
 
 
@@ -93,7 +88,7 @@ def together(rows):
             values = [getattr(part, name) for part in parts]
             if isinstance(value, np.ndarray):
                 found[name] = np.concatenate(values)
-            elif isinstance(value, Lanes | MapView):
+            elif isinstance(value, MapView):
                 found[name] = joined(values)
         return replace(parts[0], **found)
 
