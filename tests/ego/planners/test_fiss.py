@@ -129,6 +129,13 @@ def test_it_passes_a_slow_lead_where_the_marking_allows_and_follows_elsewhere(ma
 
 @needs_planner
 @pytest.mark.planners
+def test_on_an_empty_road_at_its_speed_it_demands_next_to_nothing():
+    _, commands = drive(fiss.Fiss(), lambda _: [], 100, v=21.5, target=21.5)
+    assert np.abs(commands[50:]).max() < 0.01
+
+
+@needs_planner
+@pytest.mark.planners
 @pytest.mark.parametrize(("state", "stops"), [(1, True), (4, False)])
 def test_it_stops_before_a_red_light(state, stops):
     road = road_map(lights=[light(100.0)])

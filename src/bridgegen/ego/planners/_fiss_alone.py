@@ -38,7 +38,6 @@ for name, value in zip(
 config = fp.LocalPlannerConfig()
 config.planner.type = fp.PlannerType.FISS_PLUS
 config.planner.collision.ignore_rear_in_lane = True
-config.stitching.latency = 0.05
 planner = fp.LocalPlanner(config, vehicle)
 planner.set_map(road, [int(one) + 1 for one in told["route"]])
 controller = fp.make_controller("mpc", vehicle)
