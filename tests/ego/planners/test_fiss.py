@@ -68,8 +68,9 @@ def test_a_stop_line_is_where_its_light_says_and_active_at_red():
 
 
 def test_the_ego_is_told_by_the_centre_of_its_body():
-    told = fiss.inputs(observation([], x=3.0, y=1.0, h=math.pi / 2, v=7.0, a=0.5), scene(), FIRST)
-    assert told["ego"][0] == pytest.approx([3.0, 1.0 + CENTRE, math.pi / 2, 7.0, 0.5, 0.0])
+    told = fiss.inputs(observation([], x=3.0, y=1.0, h=math.pi / 6, v=7.0, a=0.5), scene(), FIRST)
+    x, y = 3.0 + CENTRE * math.sqrt(0.75), 1.0 + CENTRE * 0.5
+    assert told["ego"][0] == pytest.approx([x, y, math.pi / 6, 7.0, 0.5, 0.0])
 
 
 def test_the_curvature_is_that_of_the_path_driven():

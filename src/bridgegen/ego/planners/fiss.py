@@ -141,7 +141,7 @@ class Fiss:
                 row = self._rows[i] = _Row(
                     self._fiss, self._vehicle, self._roads[which], tables["route"].tolist()
                 )
-            active = stop_lines_active(o, i, tables)
+            active = stop_lines_active(o, int(i), tables)
             one = {name: values[i] for name, values in told.items()}
             acceleration[i], curvature[i] = row.drive(o.time, one, active)
         return Control(acceleration, curvature)
