@@ -1,4 +1,4 @@
-"""Where tracks will be if they keep their speed and follow their lane: a prediction for planners."""
+"""Where tracks will be if they keep their speed and follow their lane."""
 
 import numpy as np
 

@@ -5,10 +5,11 @@ and curvature (at first the route's, then the last plan's), and the house follow
 
 What it is given: the lanes that cars use as lanelets, with borders, neighbours and successors; the
 centre of the route's lanes as reference path; confirmed tracks, predicted at constant speed along
-their lane (`bridgegen.ego.planners._along_lanes`); the scenario's target speed as desired speed; the ego's body, its braking (its limit of acceleration
-both ways, at most 11.5 m/s²) and its full lock. Settings are the package's defaults, but for
-the horizon of 20 steps, which is that of the authors' configurations (the default of 60 takes some
-seconds a plan), and processes, which are off. It knows no lights, signs and right of way.
+their lane (`bridgegen.ego.planners._along_lanes`); the scenario's target speed as desired speed;
+the ego's body, its braking (its limit of acceleration both ways, at most 11.5 m/s²) and its full
+lock. Settings are the package's defaults, but for the horizon of 20 steps, which is that of the
+authors' configurations (the default of 60 takes some seconds a plan), and processes, which are
+off. It knows no lights, signs and right of way.
 
 Where it finds no trajectory it returns none, and its documentation names nothing to do then: the
 authors' example ends its run. Here the ego then brakes as hard as it can along the route, at its

@@ -1,4 +1,4 @@
-"""A hand-made road for the tests of planners: two lanes one way, straight or an arc, and one back."""
+"""A road for the tests of planners: two lanes one way, one back; straight, or an arc."""
 
 import numpy as np
 
@@ -24,7 +24,8 @@ def lane(name: str, offset: float, curvature: float, *, back: bool = False, **wh
     parts = [along(s, offset + side, curvature) for side in (0.0, WIDTH / 2, -WIDTH / 2)]
     centre, left, right = parts
     if back:
-        centre, left, right = centre[::-1] + [0.0, 0.0, np.pi], right[::-1], left[::-1]
+        turned = np.array([0.0, 0.0, np.pi])
+        centre, left, right = centre[::-1] + turned, right[::-1], left[::-1]
     given = {"left_lane": "", "right_lane": "", "left_is_same_way": True, "next": (), **what}
     return Lane(
         id=name, kind="driving", centre=centre, left=left[:, :2], right=right[:, :2],
