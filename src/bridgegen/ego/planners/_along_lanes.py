@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from bridgegen.arrays import Float, Int
+from bridgegen.arrays import Float
 from bridgegen.ego.interface import RoadMap
 
 NEAR, ALIGNED = 2.0, np.pi / 6.0
@@ -92,19 +92,23 @@ def _along(path: Float, x: float, y: float, h: float, s: Float) -> Float:
         return np.stack([x + s * np.cos(h), y + s * np.sin(h), np.full(len(s), h)], axis=1)
     at = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(path[:, :2], axis=0).T))])
     heading = np.unwrap(path[:, 2])
-    start, left = _beside(path, at, heading, x, y)
-    found = start + s
-    beyond = np.maximum(found - at[-1], 0.0)
-    px, py, ph = (np.interp(found, at, one) for one in (path[:, 0], path[:, 1], heading))
-    px, py = px + beyond * np.cos(ph), py + beyond * np.sin(ph)
-    turned = ph + (h - np.interp(start, at, heading))
-    return np.stack([px - left * np.sin(ph), py + left * np.cos(ph), turned], axis=1)
+    near = int(np.hypot(path[:, 0] - x, path[:, 1] - y).argmin())
+    forward = (x - path[near, 0]) * np.cos(path[near, 2]) + (y - path[near, 1]) * np.sin(
+        path[near, 2]
+    )
+    start = float(np.clip(at[near] + forward, 0.0, at[-1]))
 
+    def pose(found: Float) -> tuple[Float, Float, Float]:
+        beyond = np.maximum(found - at[-1], 0.0)
+        px, py, ph = (np.interp(found, at, one) for one in (path[:, 0], path[:, 1], heading))
+        return px + beyond * np.cos(ph), py + beyond * np.sin(ph), ph
 
-def _beside(path: Float, at: Float, heading: Float, x: float, y: float) -> tuple[float, float]:
-    """Return how far along a path a point near its begin is [m], and how far to its left [m]."""
-    k: Int = np.hypot(path[:, 0] - x, path[:, 1] - y).argmin()
-    dx, dy = x - path[k, 0], y - path[k, 1]
-    c, s = np.cos(heading[k]), np.sin(heading[k])
-    along = float(np.clip(at[k] + dx * c + dy * s, 0.0, at[-1]))
-    return along, float(dy * c - dx * s)
+    (x0,), (y0,), (h0,) = pose(np.array([start]))
+    ahead = (x - x0) * np.cos(h0) + (y - y0) * np.sin(h0)  # m, what is left of chords and tangents
+    left = (y - y0) * np.cos(h0) - (x - x0) * np.sin(h0)
+    px, py, ph = pose(start + s)
+    px, py = (
+        px + ahead * np.cos(ph) - left * np.sin(ph),
+        py + ahead * np.sin(ph) + left * np.cos(ph),
+    )
+    return np.stack([px, py, ph + (h - h0)], axis=1)
