@@ -77,14 +77,14 @@ def authors_function(monkeypatch, seen):
     return np.array(found)
 
 
-def drive(n: int = 3, calls: int = 9):
+def drive(n: int = 3, calls: int = 5):
     """Return the driver after some calls, and what it saw of the first row."""
     driver = MetadriveExpert()
     driver.reset(n, scene(n))
     tracks = np.array([[track(30.0 + 5.0 * k, 0.5 * k, v=6.0)] for k in range(n)])
     observations = [
         observation(
-            *[(0.6 * k, 0.2 * i, 12.0 - 0.1 * k) for i in range(n)], tracks=tracks, time=0.05 * k
+            *[(0.6 * k, 0.2 * i, 12.0 - 0.1 * k) for i in range(n)], tracks=tracks, time=0.1 * k
         )
         for k in range(calls)
     ]
@@ -103,12 +103,6 @@ class TestWithItsWeights:
         single = authors_function(monkeypatch, seen.astype(np.float32))
         assert ours == pytest.approx(single, abs=1e-4)  # as MetaDrive rounds
 
-    def test_it_decides_each_tenth_of_a_second(self):
-        _, controls = drive()
-        curvatures = np.array([one.curvature for one in controls])
-        assert (curvatures[0::2][:4] == curvatures[1::2]).all()
-        assert (curvatures[0] != curvatures[2]).any()
-
     def test_the_script_prints_what_our_driver_does(self, tmp_path):
         observations, controls = drive(n=1)
         path = tmp_path / "seen.npz"
@@ -121,10 +115,10 @@ class TestWithItsWeights:
             [float(word.strip(",")) for word in line.split()[3::2]]
             for line in done.stdout.splitlines()
         ]
-        alone = control(np.array(printed), np.array([one.v[0] for one in observations[::2]]))
-        assert len(printed) == 5
+        alone = control(np.array(printed), np.array([one.v[0] for one in observations]))
+        assert len(printed) == 5 == len(controls)
         for name in ("acceleration", "curvature"):
-            ours = np.array([getattr(one, name)[0] for one in controls[::2]])
+            ours = np.array([getattr(one, name)[0] for one in controls])
             assert getattr(alone, name) == pytest.approx(ours, abs=1e-9)
 
     def test_a_row_does_not_depend_on_the_batch(self):

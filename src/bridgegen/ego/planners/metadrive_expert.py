@@ -3,7 +3,8 @@
 Only the weights are read, with NumPy: MetaDrive itself, which needs panda3d, is not imported, and
 ``pip install --no-deps metadrive-simulator==0.4.3`` is enough. The network decides each 0.1 s, as
 there; its mean action is taken (MetaDrive's ``expert(vehicle, deterministic=True)``). It computes
-in float64 where MetaDrive rounds to float32, which is another 1e-6 of an action.
+in float64 where MetaDrive rounds to float32, which changes an action by some 1e-6. NumPy's threads
+only slow so small a network down: set ``OPENBLAS_NUM_THREADS=1``.
 
 Its actions are steering and throttle or brake, in [-1, 1]. They become a control by the parameters
 of MetaDrive's default vehicle (``pg_space.py``, ``vehicle_type.py``) and by the rules of Bullet's
@@ -74,7 +75,6 @@ class MetadriveExpert:
     """The expert as a driver.
 
     Attributes:
-        every: how many calls of ``act`` there are for one decision.
         seen: ``(N, 275)``, what the network was shown last.
 
     Raises:
@@ -82,7 +82,7 @@ class MetadriveExpert:
     """
 
     wants = ("lanes",)
-    every: int
+    period = its.DECISION
     seen: Float
 
     def __init__(self) -> None:
@@ -91,18 +91,14 @@ class MetadriveExpert:
     def reset(self, n: int, scene: Scene) -> None:
         """See `BatchDriver`."""
         self._scene = scene
-        self.every = max(round(its.DECISION / scene.time_step), 1)
-        self._k = 0
         self._action = np.zeros((n, 2))
         self._last_heading: Float | None = None
         self._turned, self._bend = np.zeros(n), np.zeros(n, dtype=np.int64)
 
     def act(self, observation: Observation) -> Control:
         """See `BatchDriver`."""
-        if self._k % self.every == 0:
-            self.seen = self._observe(observation)
-            self._action = np.clip(self._network(self.seen), -1.0, 1.0)
-        self._k += 1
+        self.seen = self._observe(observation)
+        self._action = np.clip(self._network(self.seen), -1.0, 1.0)
         return control(self._action, observation.v)
 
     def _observe(self, o: Observation) -> Float:
@@ -110,7 +106,7 @@ class MetadriveExpert:
         if self._last_heading is None:
             self._last_heading = o.h
         bend, _, _ = its.bends(o.route)
-        passed = np.abs(o.route[:, 1, 3]) * o.v * self.every * self._scene.time_step
+        passed = np.abs(o.route[:, 1, 3]) * o.v * self.period
         self._turned = np.where((bend != 0) & (bend == self._bend), self._turned + passed, 0.0)
         self._bend = bend
         seen = its.observed(o, self._scene.centre, self._turned, self._last_heading, self._action)
@@ -184,7 +180,7 @@ def export(observations: Sequence[Observation], scene: Scene) -> dict[str, npt.N
     """Return what the network was shown in one row, at each of its decisions.
 
     Args:
-        observations: of one row, from its first instant on, with `Lanes`.
+        observations: of one row, one for each call of ``act``, with `Lanes`.
         scene: of that row.
 
     Raises:
@@ -193,10 +189,9 @@ def export(observations: Sequence[Observation], scene: Scene) -> dict[str, npt.N
     driver = MetadriveExpert()
     driver.reset(1, scene)
     decisions = []
-    for k, observation in enumerate(observations):
+    for observation in observations:
         driver.act(observation)
-        if k % driver.every == 0:
-            decisions.append((observation.time, observation.v[0], driver.seen[0]))
+        decisions.append((observation.time, observation.v[0], driver.seen[0]))
     times, speeds, seen = zip(*decisions, strict=True)
     return {"time": np.array(times), "speed": np.array(speeds), "observation": np.array(seen)}
 
