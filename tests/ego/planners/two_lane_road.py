@@ -1,5 +1,8 @@
 """A road for the tests of planners: two lanes one way, one back; straight, or an arc."""
 
+from dataclasses import fields
+from typing import Any
+
 import numpy as np
 
 from bridgegen.ego.interface import Lane, Lanes, Observation, RoadMap, Scene
@@ -7,6 +10,12 @@ from bridgegen.ego.interface import Lane, Lanes, Observation, RoadMap, Scene
 WIDTH = 3.5
 LENGTH = 400.0
 BODY = {"length": 4.6, "width": 1.9, "centre": 1.4}
+
+
+def made(kind: type, **values: Any) -> Any:
+    """Return one of a class, of those of the values that it has."""
+    has = {one.name for one in fields(kind)}
+    return kind(**{name: value for name, value in values.items() if name in has})
 
 
 def along(s: np.ndarray, offset: float, curvature: float) -> np.ndarray:
@@ -39,7 +48,8 @@ def road_map(curvature: float = 0.0) -> RoadMap:
     """Return the road; the route is its right lane."""
     none = np.zeros((0, 11, 3))
     indices = np.zeros(0, dtype=np.int64)
-    return RoadMap(
+    return made(
+        RoadMap,
         lanes=(
             lane("1:0:-2", 0.0, curvature, left_lane="1:0:-1"),
             lane("1:0:-1", WIDTH, curvature, right_lane="1:0:-2", left_lane="1:0:1",
@@ -49,6 +59,7 @@ def road_map(curvature: float = 0.0) -> RoadMap:
         ),
         route=("1:0:-2",), crosswalks=(), lights=(), pieces=none, piece_points=indices,
         piece_kind=indices.astype(np.int8), piece_lane=indices, piece_light=indices,
+        piece_marking=indices.astype(np.int8),
     )  # fmt: skip
 
 
@@ -94,6 +105,7 @@ def observation(
         "speed_limit": np.full((n, 40), np.inf), "width": np.full((n, 40), WIDTH),
         "junction": np.zeros((n, 40), dtype=np.bool_), "beside": beside,
         "ends": LENGTH - station, "goal": np.zeros((n, 3)),
+        "stop_sign": np.full(n, np.inf), "crosswalk": np.full((n, 4), np.inf),
     }  # fmt: skip
     return Observation(
         time=time, running=np.ones(n, dtype=np.bool_),
@@ -101,5 +113,5 @@ def observation(
         v=speed, a=np.zeros(n) if a is None else a, target_speed=np.full(n, 15.0),
         offset=offset, route=route,
         tracks=np.zeros((n, 1, 13)) if tracks is None else tracks,
-        stop_distance=np.full(n, np.inf), light=np.zeros(n, dtype=np.int8), lanes=Lanes(**lanes),
+        stop_distance=np.full(n, np.inf), light=np.zeros(n, dtype=np.int8), lanes=made(Lanes, **lanes),
     )  # fmt: skip

@@ -137,7 +137,7 @@ def body_of(scene: Scene) -> Float:
 
 def others_of(tracks: Float, lanes: AlongLanes) -> Float:
     """Return of tracks ``(M, 13)`` what `Reactive` takes; NaN where not confirmed."""
-    poses = lanes.predict(tracks, np.arange(N_STEPS + 1) * STEP)
+    poses = lanes.predict(tracks, np.arange(N_STEPS + 1, dtype=np.float64) * STEP)
     sizes = np.repeat(tracks[:, None, 6:8], N_STEPS + 1, axis=1)
     others = np.concatenate([poses, sizes], axis=2)
     others[tracks[:, 0] < CONFIRMED] = np.nan
