@@ -113,5 +113,6 @@ def observation(
         v=speed, a=np.zeros(n) if a is None else a, target_speed=np.full(n, 15.0),
         offset=offset, route=route,
         tracks=np.zeros((n, 1, 13)) if tracks is None else tracks,
-        stop_distance=np.full(n, np.inf), light=np.zeros(n, dtype=np.int8), lanes=made(Lanes, **lanes),
+        stop_distance=np.full(n, np.inf), light=np.zeros(n, dtype=np.int8),
+        lanes=made(Lanes, **lanes),
     )  # fmt: skip
