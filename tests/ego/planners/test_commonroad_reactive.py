@@ -149,6 +149,7 @@ class TestWithItsPackages:
         whole.reset(3, scene(3))
         alone.reset(1, scene(1))
         o = observation(*rows, tracks=tracks)
+        o = replace(o, h=o.h + 0.08)  # so that its lateral state has a derivative, by time or way
         for _ in range(2):
             plan, one = whole.act(o), alone.act(o.take(slice(1, 2)))
             for name in ("x", "y", "h", "v"):
