@@ -1,8 +1,5 @@
 """A road for the tests of planners: two lanes one way, one back; straight, or an arc."""
 
-from dataclasses import fields
-from typing import Any
-
 import numpy as np
 
 from bridgegen.ego.interface import Lane, Lanes, Observation, RoadMap, Scene
@@ -10,12 +7,6 @@ from bridgegen.ego.interface import Lane, Lanes, Observation, RoadMap, Scene
 WIDTH = 3.5
 LENGTH = 400.0
 BODY = {"length": 4.6, "width": 1.9, "centre": 1.4}
-
-
-def made(kind: type, **values: Any) -> Any:
-    """Return one of a class, of those of the values that it has."""
-    has = {one.name for one in fields(kind)}
-    return kind(**{name: value for name, value in values.items() if name in has})
 
 
 def along(s: np.ndarray, offset: float, curvature: float) -> np.ndarray:
@@ -48,8 +39,7 @@ def road_map(curvature: float = 0.0) -> RoadMap:
     """Return the road; the route is its right lane."""
     none = np.zeros((0, 11, 3))
     indices = np.zeros(0, dtype=np.int64)
-    return made(
-        RoadMap,
+    return RoadMap(
         lanes=(
             lane("1:0:-2", 0.0, curvature, left_lane="1:0:-1"),
             lane("1:0:-1", WIDTH, curvature, right_lane="1:0:-2", left_lane="1:0:1",
@@ -114,5 +104,5 @@ def observation(
         offset=offset, route=route,
         tracks=np.zeros((n, 1, 13)) if tracks is None else tracks,
         stop_distance=np.full(n, np.inf), light=np.zeros(n, dtype=np.int8),
-        lanes=made(Lanes, **lanes),
+        lanes=Lanes(**lanes),
     )  # fmt: skip
