@@ -49,8 +49,7 @@ PLANNER = Planner(
     "for non-commercial use only",
     source="Werling et al. 2010, 2012; Würsching and Althoff, TU Munich, "
     "github.com/CommonRoad/commonroad-reactive-planner",
-    how_to_get="pip install commonroad-reactive-planner==2025.1, in an environment of its own "
-    "(Python 3.11)",
+    how_to_get="in an environment of its own, since it requires an old protobuf; Python 3.11",
     domain=frozenset({"motorway", "road", "junction"}),
 )
 
