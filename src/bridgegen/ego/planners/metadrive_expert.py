@@ -54,8 +54,8 @@ PLANNER = Planner(
     licence="Apache-2.0",
     source="Li et al. 2022, MetaDrive: Composing Diverse Driving Scenarios for Generalizable "
     "Reinforcement Learning, IEEE TPAMI; github.com/metadriverse/metadrive",
-    how_to_get="--no-deps is enough, for only its weights are read; on Python 3.12 and later it also "
-    "takes --ignore-requires-python",
+    how_to_get="--no-deps is enough, for only its weights are read; on Python 3.12 and later add "
+    "--ignore-requires-python",
     domain=frozenset({"motorway"}),
 )
 
