@@ -27,15 +27,15 @@ class MyLaneChanger:
             at = np.arange(len(v)), gaps.argmin(axis=1)
             found += [gaps[at], np.c_[self.speed, 0.0 * v][at]]
         front, lead, back, rear = found
-        rest = idm(rear, front + back + self.scene.length, lead, rear)
-        return idm(v, front, lead, wanted), idm(rear, back, v, rear), rest
+        rest = front + back + self.scene.length
+        return idm(v, front, lead, wanted), idm(rear, back, v, rear), idm(rear, rest, lead, rear)
 
     def act(self, o):
         rows, route, beside = np.arange(len(o.x)), o.route, o.lanes.beside
         d = o.tracks[:, :, None, 1:3] - route[:, None, :, :2]  # the others, along the route
         at = (d**2).sum(axis=-1).argmin(axis=-1)
         dx, dy = np.moveaxis(np.take_along_axis(d, at[:, :, None, None], 2)[:, :, 0], -1, 0)
-        c, s = np.cos(route[rows[:, None], at, 2]), np.sin(route[rows[:, None], at, 2])
+        c, s = (each(route[rows[:, None], at, 2]) for each in (np.cos, np.sin))
         self.ahead = 2.0 * at + dx * c + dy * s - self.scene.centre
         self.left = np.where(o.tracks[:, :, 0] >= 2, dy * c - dx * s, np.inf)
         self.gap = np.abs(self.ahead) - 0.5 * (o.tracks[:, :, 6] + self.scene.length)
@@ -43,14 +43,13 @@ class MyLaneChanger:
         bend = np.sqrt(2.0 / np.maximum(np.abs(route[:, :, 3]).max(axis=1), 1e-4))  # at 2 m/s²
         wanted = np.min((o.target_speed, o.lanes.speed_limit[:, 0], bend), axis=0)
         is_lane = (beside[..., 2] == 1) & (beside[..., 3] == 1)  # left, right; for 5 s at least
-        lasts = np.logical_and.accumulate(is_lane, 1)[rows, np.clip(2.5 * o.v, 5, 39).astype(int)]
+        last = rows, np.clip(2.5 * o.v, 5, 39).astype(int)
+        there = np.stack((rows >= 0, *np.logical_and.accumulate(is_lane, 1)[last].T))
         y = np.stack((np.zeros(len(rows)), beside[:, 0, 0, 0], beside[:, 0, 1, 0]))
         mine, behind, rest = np.array([self.follow(one, o.v, wanted) for one in y]).swapaxes(0, 1)
-        there = np.stack((lasts[:, 0] | True, *lasts.T))
         worth = mine + POLITENESS * (behind - rest) - BIAS * np.abs(SIDES)
-        pays = worth - worth[self.side, rows] + 99.0 * ~there[self.side, rows]
-        next_to = np.abs(self.side - SIDES) == 1
-        pays = np.where(there & next_to & (behind > -SAFE), pays, -np.inf)
+        may = there & (np.abs(self.side - SIDES) == 1) & (behind > -SAFE)
+        pays = np.where(may, worth - (worth - 99.0 * ~there)[self.side, rows], -np.inf)
         changes = (pays.max(axis=0) > THRESHOLD) & (np.abs(self.aim - y[self.side, rows]) < 0.2)
         self.side = np.where(changes, SIDES[pays.argmax(axis=0), 0], self.side)
         target, dt = y[self.side, rows], self.scene.time_step  # to the side at 1 m/s

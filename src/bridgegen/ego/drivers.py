@@ -4,8 +4,10 @@ import math
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from enum import Enum
+from pathlib import Path
 from typing import Self
 
+from bridgegen.ego.address import address_of, is_remote
 from bridgegen.errors import InputError, UnknownNameError
 from bridgegen.physics import CAREFUL_BRAKING_G, CAREFUL_REACTION
 
@@ -171,7 +173,8 @@ def get(name: str, ideal: Iterable[str] = (), time_limit: float | None = None) -
 
     Args:
         name: of one that ships, or a user's own: ``package.module:Class``, ``file.py:Class``
-            (or a compiled driver's function), ``file.fmu``. It is loaded only when it drives.
+            (or a compiled driver's function), ``file.fmu``; or where it runs, as
+            ``connect:HOST:PORT``, ``unix:PATH``, ``exec:COMMAND``. It is loaded when it drives.
         ideal: stages to idealise.
         time_limit: [s] that one call of a user's own driver may take.
 
@@ -184,6 +187,8 @@ def get(name: str, ideal: Iterable[str] = (), time_limit: float | None = None) -
             "a time limit [s] is for a driver of your own, and must be > 0 and finite, got "
             f"{time_limit:g} for '{name}'"
         )
+    if is_remote(name):
+        address_of(name)
     if is_spec(name):
         what = "A driver of the user's own."
         sees = frozenset({"perception"})
@@ -199,8 +204,18 @@ def get(name: str, ideal: Iterable[str] = (), time_limit: float | None = None) -
 
 def is_spec(name: str) -> bool:
     """Return whether a name is that of a user's own driver."""
+    if is_remote(name):
+        return True
     where, _, cls = name.rpartition(":")
     return name.endswith(".fmu") or bool(where and cls.isidentifier())
+
+
+def file_of(name: str) -> Path | None:
+    """Return the file that the name of a user's own driver holds; None if it holds none."""
+    if not is_spec(name) or is_remote(name):
+        return None
+    where = name if name.endswith(".fmu") else name.rpartition(":")[0]
+    return Path(where) if where.endswith((".py", ".fmu")) else None
 
 
 def split(text: str) -> tuple[str, ...]:

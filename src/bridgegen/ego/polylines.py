@@ -51,13 +51,12 @@ class _Tables:
     def __init__(self, maps: Sequence[RoadMap]) -> None:
         pieces = [one.pieces for one in maps]
         self.first: Int = np.cumsum([0, *map(len, pieces)])
-        whole = np.concatenate([*pieces, np.zeros((1, PIECE_POINTS, 3))])
-        self.xy = np.ascontiguousarray(whole[:, :, :2])
-        self.direction = np.stack((np.cos(whole[:, :, 2]), np.sin(whole[:, :, 2])), axis=-1)
-        counts = np.concatenate([*(one.piece_points for one in maps), [0]])
-        self.mask: Bool = np.arange(PIECE_POINTS) < counts[:, None]
+        self.pieces = np.concatenate([*pieces, np.zeros((1, PIECE_POINTS, 3))])
+        h = self.pieces[:, :, 2]
+        self.directions = np.stack((np.cos(h), np.sin(h)), axis=-1)
+        self.counts: Int = np.concatenate([*(one.piece_points for one in maps), [0]])
         self.light: Int = np.concatenate([*(one.piece_light for one in maps), [-1]])
-        self.attributes = np.zeros((len(whole), ATTRIBUTES), dtype=np.float32)
+        self.attributes = np.zeros((len(self.pieces), ATTRIBUTES), dtype=np.float32)
         for one, first in zip(maps, self.first, strict=False):
             _fill(one, self.attributes[first : first + len(one.pieces)])
 
@@ -90,6 +89,8 @@ def gather(scene: Scene, observation: Observation) -> Polylines:
     Raises:
         InputError: the driver does not want "map".
     """
+    from bridgegen.ego._polyline_kernels import gather_points  # numba is slow to import
+
     view = observation.map
     if view is None:
         raise InputError('gather needs a driver that has "map" in its wants')
@@ -97,18 +98,13 @@ def gather(scene: Scene, observation: Observation) -> Polylines:
         _last[:] = [(scene.maps, _Tables(scene.maps))]
     tables = _last[0][1]
     near = view.near
-    at = np.where(near >= 0, near + tables.first[scene.map_of][:, None], len(tables.xy) - 1)
-    cosine, sine = np.cos(observation.h)[:, None, None], np.sin(observation.h)[:, None, None]
-    mask = tables.mask[at]
-    points = np.empty((*at.shape, PIECE_POINTS, 4), dtype=np.float32)
-    there = tables.xy[at]
-    dx = there[..., 0] - observation.x[:, None, None]
-    dy = there[..., 1] - observation.y[:, None, None]
-    points[..., 0], points[..., 1] = dx * cosine + dy * sine, dy * cosine - dx * sine
-    way = tables.direction[at]
-    points[..., 2] = way[..., 0] * cosine + way[..., 1] * sine
-    points[..., 3] = way[..., 1] * cosine - way[..., 0] * sine
-    points *= mask[..., None]
+    at = np.where(near >= 0, near + tables.first[scene.map_of][:, None], len(tables.pieces) - 1)
+    points = np.zeros((*at.shape, PIECE_POINTS, 4), dtype=np.float32)
+    mask = np.zeros(points.shape[:3], dtype=np.bool_)
+    gather_points(
+        at, tables.counts, tables.pieces, tables.directions, observation.x, observation.y,
+        np.cos(observation.h), np.sin(observation.h), points, mask,
+    )  # fmt: skip
     attributes = tables.attributes[at]
     light = tables.light[at]
     if view.lights.shape[1]:

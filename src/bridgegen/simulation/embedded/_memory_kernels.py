@@ -88,6 +88,8 @@ class Plan(NamedTuple):
     has_pedals: int
     driver_code: int
     own_code: int
+    chassis: Float
+    moves_chassis: int
     ideal_perception: int
     ideal_prediction: int
     ideal_control: int
@@ -235,6 +237,8 @@ class State(NamedTuple):
         seen: ``(SEEN, E)`` what those drivers see; likewise,
         far: ``(E,)`` scratch of one driver.
         attention: ``(E, 3)``, a careful driver's state per body; see its kernel.
+        chassis: ``(MOTION,)`` how the ego's vehicle moves, if it has dynamics; see
+            ``_chassis_columns``.
         key: ``(1,)`` uint64, of the row's random numbers; see `bridgegen.ego.noise`.
         sensors: ``(E, MEMORY)``, between two frames; see ``ego._perception_kernels``.
         tracks: ``(E, TRACK)`` what the ego perceives; see ``ego._tracking_kernels``.
@@ -331,6 +335,7 @@ class State(NamedTuple):
     seen: Annotated[Float, "seen", "entities"]
     far: Annotated[Float, "entities"]
     attention: Annotated[Float, "entities", 3]
+    chassis: Annotated[Float, "motion"]
     key: Annotated[npt.NDArray[np.uint64], 1]
     sensors: Annotated[Float, "entities", "sensors"]
     tracks: Annotated[Float, "entities", "track"]

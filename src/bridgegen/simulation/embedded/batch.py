@@ -18,10 +18,10 @@ from bridgegen.ego._tracking_kernels import TRACK
 from bridgegen.ego._weather_columns import FRICTION, WEATHER
 from bridgegen.ego.compiled import CONFLICT
 from bridgegen.ego.detections import DETECTION
-from bridgegen.ego.driver_facts import DriverFacts
 from bridgegen.ego.drivers import STAGES, STORYBOARD
 from bridgegen.ego.interface import CONFLICT_WAYS, HISTORY, NEAR_PIECES, ROUTE_POINTS, RoadMap
 from bridgegen.ego.noise import noise_key
+from bridgegen.ego.traits import Traits
 from bridgegen.ego.views import frames
 from bridgegen.errors import InputError
 from bridgegen.simulation.embedded import _memory_kernels as memory
@@ -35,6 +35,7 @@ from bridgegen.simulation.embedded._codes import (
     PRESS,
 )
 from bridgegen.simulation.embedded.addresses import addressed
+from bridgegen.simulation.embedded.chassis._chassis_columns import MOTION
 from bridgegen.simulation.embedded.drivers import (
     ANSWER,
     DEMANDS,
@@ -84,7 +85,7 @@ class Batch:
         roads: Network,
         rows: Int,
         values: Mapping[str, npt.ArrayLike],
-        own: DriverFacts | None = None,
+        own: Traits | None = None,
         noise: npt.NDArray[np.uint64] | None = None,
         until_collision: bool = False,
     ) -> None:
@@ -367,6 +368,7 @@ def _plan(program: Program, until_collision: bool) -> memory.Plan:
         "until_collision": int(until_collision),
         "has_pedals": int((program.actions[:, DOES] == PRESS).any()),
         "driver_code": 0,
+        "moves_chassis": 0,
         "own_code": 0,
         "dt": program.time_step,
         **stages,
@@ -427,7 +429,7 @@ def _state(
     rows: Int,
     slots: Float,
     key: npt.NDArray[np.uint64],
-    own: DriverFacts | None,
+    own: Traits | None,
 ) -> memory.State:
     """Return the state of N rows before they start; ``start`` sets what else is not 0."""
     n, e = len(rows), len(program.names)
@@ -457,6 +459,7 @@ def _state(
         "seen": SEEN,
         "sensors": MEMORY,
         "track": TRACK,
+        "motion": MOTION if program.chassis.size else 0,
         "around": AROUND,
         "passages": 2 * e + hypotheses,
         "passage": PASSAGE,
