@@ -77,6 +77,7 @@ class CommonroadReactive:
 
     wants = ("map",)
     period = 0.3
+    max_rows = 2  # a plan that fails takes some 2 s, and the time limit of a call is 10 s
 
     def __init__(self) -> None:
         require(PLANNER)
