@@ -124,8 +124,8 @@ def test_what_a_driver_wants_must_be_known(name, message):
 def test_a_driver_says_what_it_wants(process):
     driver = DriverProcess(f"{DRIVERS.with_name('wanting_drivers.py')}:Lanes")
     driver.start()
-    assert driver.facts.wants == ("lanes",)
-    assert driver.facts.memory is None
+    assert driver.traits.wants == ("lanes",)
+    assert driver.traits.memory is None
     driver.close()
     plain = process("Cruises")
     plain.start()

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
-from bridgegen.ego.driver_facts import DriverFacts
 from bridgegen.ego.interface import Observation
+from bridgegen.ego.traits import Traits
 from bridgegen.ego.views import MapSender, Viewer
 from bridgegen.odd.reader import load
 from bridgegen.options import PipelineOptions
@@ -23,8 +23,8 @@ class Recorder:
     answers_each_row = True
 
     def __init__(self, wants: Iterable[str]) -> None:
-        self.facts = DriverFacts(wants=tuple(wants))
-        self._viewer, self._sender = Viewer(self.facts.wants), MapSender()
+        self.traits = Traits(wants=tuple(wants))
+        self._viewer, self._sender = Viewer(self.traits.wants), MapSender()
         self.seen: list[Observation] = []
 
     def start(self) -> None: ...
@@ -58,13 +58,13 @@ def watched(scenario: str, wants: Iterable[str], n: int = 4, seed: int = 4) -> R
     driver.pipeline, driver.X = pipeline, X
     networks, rows = pipeline._roads_of(X)
     values = {name: X[:, i] for i, name in enumerate(pipeline.space.names)}
-    networks.provide(driver.facts.wants)
+    networks.provide(driver.traits.wants)
     program = pipeline.simulator.program
     driver.networks, driver.network_of = networks, rows
 
     def setup(at):
         some = {name: np.broadcast_to(one, len(rows))[at] for name, one in values.items()}
-        return pipeline.simulator.batch(networks, rows[at], some, own=driver.facts)
+        return pipeline.simulator.batch(networks, rows[at], some, own=driver.traits)
 
     driver.rollout = drive_in_lock_step(program, setup, n, driver)
     return driver

@@ -25,7 +25,6 @@ from typing import Any
 
 import numpy as np
 
-from bridgegen.ego.driver_facts import checked_wants
 from bridgegen.ego.interface import (
     CONFLICT_WAYS,
     HISTORY,
@@ -33,6 +32,7 @@ from bridgegen.ego.interface import (
     PIECE_POINTS,
     ROUTE_POINTS,
 )
+from bridgegen.ego.traits import checked_wants
 from bridgegen.errors import InputError
 
 ANY = -1  # the size of an axis that depends on the scenario

@@ -239,15 +239,17 @@ class Conflicts:
 class Trajectory:
     """What a driver plans in N scenarios, instead of a `Control`; the house follows it.
 
-    A driver that plans may say how often, by a class attribute ``period`` [s]; it is then asked
-    so often, and its last plan is followed meanwhile.
+    A driver may say how often it is asked, by a class attribute ``period`` [s], 0.05 to 0.5: the
+    nearest whole number of time steps. Its last plan is followed, or its last control held,
+    meanwhile. `bridgegen.ego.trajectory.checked_plans` says what is refused.
 
     Attributes:
-        time: ``(K,)`` or ``(N, K)`` float64 [s] from now on, increasing; beyond the period.
+        time: ``(K,)`` or ``(N, K)`` float64 [s] from now on, increasing; the first one before the
+            next call, the last one not before it. K is 1000 at most.
         x: ``(N, K)`` float64 [m], the reference point, the rear axle's centre.
         y: ``(N, K)`` float64 [m].
         h: ``(N, K)`` float64 [rad], heading.
-        v: ``(N, K)`` float64 [m/s], forward speed.
+        v: ``(N, K)`` float64 [m/s], forward speed, >= 0.
     """
 
     time: npt.ArrayLike
@@ -277,7 +279,7 @@ class BatchDriver(Protocol):
         """Begin N scenarios; discard the state of earlier ones."""
 
     def act(self, observation: Observation) -> Control | Trajectory | Any:
-        """Return the control at one instant: a `Control`, or a pair (acceleration, curvature)."""
+        """Return a `Control`, a pair (acceleration, curvature), or a `Trajectory`."""
 
 
 # --- The road network, for drivers that want "map" ------------------------------------------------

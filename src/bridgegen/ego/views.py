@@ -25,7 +25,8 @@ from bridgegen.ego.interface import (
 )
 
 Views = Mapping[str, npt.NDArray[Any]]
-"""Arrays by the word of `WANTS`."""
+"""Arrays by the word of `WANTS`; and "missed", ``(S, N, M, 13)``: the tracks at the instants since
+the driver was last called."""
 
 MOST_PIECES = 200_000
 """Pieces of road maps that are kept for later batches, at most."""
@@ -76,6 +77,8 @@ class Viewer:
         if "conflicts" in views:
             parts["conflicts"] = Conflicts(views["conflicts"])
         if self._history is not None:
+            for tracks in views.get("missed", ()):
+                self._history.remember(tracks)
             parts["history"] = self._history.remember(observation.tracks)
         return replace(observation, **parts)
 

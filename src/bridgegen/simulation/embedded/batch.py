@@ -18,10 +18,10 @@ from bridgegen.ego._tracking_kernels import TRACK
 from bridgegen.ego._weather_columns import FRICTION, WEATHER
 from bridgegen.ego.compiled import CONFLICT
 from bridgegen.ego.detections import DETECTION
-from bridgegen.ego.driver_facts import DriverFacts
 from bridgegen.ego.drivers import STAGES, STORYBOARD
 from bridgegen.ego.interface import CONFLICT_WAYS, HISTORY, NEAR_PIECES, ROUTE_POINTS, RoadMap
 from bridgegen.ego.noise import noise_key
+from bridgegen.ego.traits import Traits
 from bridgegen.ego.views import frames
 from bridgegen.errors import InputError
 from bridgegen.simulation.embedded import _memory_kernels as memory
@@ -84,7 +84,7 @@ class Batch:
         roads: Network,
         rows: Int,
         values: Mapping[str, npt.ArrayLike],
-        own: DriverFacts | None = None,
+        own: Traits | None = None,
         noise: npt.NDArray[np.uint64] | None = None,
         until_collision: bool = False,
     ) -> None:
@@ -427,7 +427,7 @@ def _state(
     rows: Int,
     slots: Float,
     key: npt.NDArray[np.uint64],
-    own: DriverFacts | None,
+    own: Traits | None,
 ) -> memory.State:
     """Return the state of N rows before they start; ``start`` sets what else is not 0."""
     n, e = len(rows), len(program.names)
