@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from bridgegen.ego.driver_facts import DriverFacts, checked_period
 from bridgegen.ego.interface import ROUTE_POINTS, Observation, Trajectory
-from bridgegen.ego.traits import Traits, traits_of
 from bridgegen.ego.trajectory import checked_plans
 from bridgegen.errors import InputError
 
@@ -117,19 +117,13 @@ def test_rounding_is_no_fault():
 
 
 def test_a_period_is_a_whole_number_of_steps():
-    assert [Traits(period=one).steps(0.05) for one in (None, 0.05, 0.07, 0.08, 0.5)] == [
+    assert [DriverFacts(period=one).steps(0.05) for one in (None, 0.05, 0.07, 0.08, 0.5)] == [
         1, 1, 1, 2, 10
     ]  # fmt: skip
-    assert Traits(period=0.05).steps(0.2) == 1
+    assert DriverFacts(period=0.05).steps(0.2) == 1
 
 
 @pytest.mark.parametrize("period", [0.0, -1.0, 0.04, 0.6, float("nan"), "0.1", True, 10**400])
 def test_what_is_no_period(period):
     with pytest.raises(InputError, match=r"period \[s\] must be in 0.05..0.5, got"):
-        traits_of({"period": period})
-
-
-@pytest.mark.parametrize("wants", ["map", ["maps"], [1], 3, {"map"}])
-def test_what_nobody_can_want(wants):
-    with pytest.raises(InputError, match="wants must be a list of lanes"):
-        traits_of({"wants": wants})
+        checked_period(period)

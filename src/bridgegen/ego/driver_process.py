@@ -11,6 +11,7 @@ import time
 import traceback
 from collections import deque
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from types import ModuleType
@@ -20,10 +21,11 @@ import numpy as np
 
 from bridgegen.arrays import Float
 from bridgegen.ego.compiled import CompiledDriver
+from bridgegen.ego.driver_facts import DriverFacts, checked_period, checked_wants
 from bridgegen.ego.drivers import TIME_LIMIT, is_spec
 from bridgegen.ego.interface import BatchDriver, Control, Observation, Scene, Trajectory
-from bridgegen.ego.traits import NAMES, Traits, traits_of
 from bridgegen.ego.trajectory import Plans, checked_plans
+from bridgegen.ego.views import MapSender, Viewer, Views
 from bridgegen.errors import InputError
 from bridgegen.isolated import Answer, CallError, IsolatedProcess, serve
 
@@ -51,14 +53,14 @@ class DriverProcess:
         time_limit: seconds that a call may take.
 
     Attributes:
-        traits: what the driver says of itself. Known when the process has started.
+        facts: what is known of it when the process has started.
         answers_each_row: whether it has answered several rows at once in the right shape.
         answers: what it has answered so far: "control", "trajectory" or both.
         asked_at: the time of the last observation that it was shown [s].
         call_seconds: how long its last calls took [s], the way there and back included.
     """
 
-    traits: Traits
+    facts: DriverFacts
     answers_each_row: bool = False
 
     def __init__(self, spec: str, time_limit: float = TIME_LIMIT) -> None:
@@ -83,8 +85,9 @@ class DriverProcess:
         """
         if self._process.runs:
             return
+        self._maps = MapSender()
         try:
-            self.traits = self._process.start(START_SECONDS)
+            self.facts = self._process.start(START_SECONDS)
         except DriverError as error:
             raise InputError(f"the driver '{self.spec}' cannot be made: {error}") from None
 
@@ -96,10 +99,18 @@ class DriverProcess:
             InputError: it cannot be made.
         """
         self.start()
-        self._process.ask("reset", n, scene, seconds=self.time_limit)
+        sent = self._maps.send(scene.maps) if scene.maps else None
+        scene = replace(scene, maps=())
+        self._process.ask("reset", n, scene, sent, seconds=self.time_limit)
 
-    def act(self, observation: Observation) -> tuple[Float, Float] | Plans:
+    def act(
+        self, observation: Observation, views: Views | None = None
+    ) -> tuple[Float, Float] | Plans:
         """Return its control, ``(N,)`` acceleration [m/s²] and curvature [1/m], or its plans.
+
+        Args:
+            observation: without what the driver wants.
+            views: what it wants, for `Viewer.complete`.
 
         Raises:
             DriverError: it raised, timed out, died, or its answer is invalid: another shape, NaN or
@@ -108,7 +119,7 @@ class DriverProcess:
         """
         self.asked_at, start = observation.time, time.perf_counter()
         answer: tuple[Float, Float] | Plans = self._process.ask(
-            "act", observation, seconds=self.time_limit
+            "act", observation, views or {}, seconds=self.time_limit
         )
         self.call_seconds.append(time.perf_counter() - start)
         self.answers_each_row = self.answers_each_row or len(observation.x) > 1
@@ -235,8 +246,8 @@ def checked(answer: Any, seen: Observation, period: float) -> tuple[Float, Float
     return np.where(running, arrays[0], 0.0), np.where(running, arrays[1], 0.0)
 
 
-def answering(spec: str) -> tuple[Traits, Answer]:
-    """Construct a driver; return what it says of itself, and its answering function."""
+def answering(spec: str) -> tuple[DriverFacts, Answer]:
+    """Construct a driver; return what is known of it, and its answering function."""
     driver = make(spec)
     if isinstance(driver, CompiledDriver):
         address = driver.address
@@ -244,19 +255,21 @@ def answering(spec: str) -> tuple[Traits, Answer]:
         def call(_: str, function: Callable[..., Any], *arguments: Any) -> Any:
             return function(address, *arguments)
 
-        return Traits(memory=driver.memory), call
-    traits = traits_of({name: getattr(driver, name, None) for name in NAMES})
-    period = 0.0
+        return DriverFacts(driver.memory, driver.wants), call
+    wants = checked_wants(getattr(driver, "wants", ()))
+    viewer, interval = Viewer(wants), 0.0
+    facts = DriverFacts(wants=wants, period=checked_period(getattr(driver, "period", None)))
 
     def answer(what: str, *rest: Any) -> Any:
-        nonlocal period
+        nonlocal interval
         if what == "reset":
-            period = traits.steps(rest[1].time_step) * rest[1].time_step
-            driver.reset(*rest)
+            interval = facts.steps(rest[1].time_step) * rest[1].time_step
+            driver.reset(rest[0], viewer.reset(*rest))
             return None
-        return checked(driver.act(*rest), rest[0], period)
+        observation = viewer.complete(*rest)
+        return checked(driver.act(observation), observation, interval)
 
-    return traits, answer
+    return facts, answer
 
 
 def _described(error: Exception) -> str:

@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from bridgegen.arrays import Float, Int
 from bridgegen.ego import Driver
+from bridgegen.ego.driver_facts import DriverFacts
 from bridgegen.errors import InputError
 from bridgegen.openx.opendrive.model import OpenDrive
 from bridgegen.openx.openscenario.model import OpenScenario
@@ -112,7 +113,7 @@ class EmbeddedSimulator:
 
     @property
     def _asks_python(self) -> bool:
-        return self.program.driver.is_own and self._own.memory is None
+        return self.program.driver.is_own and self._own.facts.memory is None
 
     @property
     def time_step(self) -> float:
@@ -192,13 +193,14 @@ class EmbeddedSimulator:
         **how: Any,
     ) -> "Callable[[Int], Batch]":
         """Return what sets up some of the rows for the user's driver."""
-        memory = self._own.memory
+        facts = self._own.facts
+        roads.provide(facts.wants)
         columns = {name: np.broadcast_to(value, len(rows)) for name, value in values.items()}
 
         def some(at: Int) -> "Batch":
             taken = {name: column[at] for name, column in columns.items()}
             key = None if noise is None else noise[at]
-            return self.batch(roads, rows[at], taken, own_memory=memory, noise=key, **how)
+            return self.batch(roads, rows[at], taken, own=facts, noise=key, **how)
 
         return some
 
@@ -228,10 +230,11 @@ class EmbeddedSimulator:
 
         program = self.program.changed(driver=driver)
         own = self._own if program.driver.is_own else None
+        if own:
+            roads.provide(own.facts.wants)
         batch = self.batch(
-            roads, np.array([row]), values, driver=driver, dry=dry,
-            own_memory=own.memory if own else None,
-        )  # fmt: skip
+            roads, np.array([row]), values, driver=driver, dry=dry, own=own.facts if own else None
+        )
         wheel = partial(own.wheel, program.changed(dry=dry)) if own else None
         return CoSimulation(
             batch, program.names, program.time_step, program.n_steps, program.actors, wheel
@@ -305,7 +308,7 @@ class EmbeddedSimulator:
         *,
         driver: Driver | None = None,
         dry: bool = False,
-        own_memory: int | None = None,
+        own: DriverFacts | None = None,
         noise: npt.NDArray[np.uint64] | None = None,
         until_collision: bool = False,
     ) -> "Batch":
@@ -317,11 +320,11 @@ class EmbeddedSimulator:
             values: by parameter.
             driver: another one.
             dry: the road.
-            own_memory: see `Batch`.
+            own: what a driver of the user's own needs; None without one.
             noise: likewise.
             until_collision: likewise.
         """
         from bridgegen.simulation.embedded.batch import Batch  # numba is slow to import
 
         program = self.program.changed(driver=driver, dry=dry)
-        return Batch(program, roads, rows, values, own_memory, noise, until_collision)
+        return Batch(program, roads, rows, values, own, noise, until_collision)

@@ -5,16 +5,27 @@ that it cannot drive. So a failure costs the row that it belongs to, whatever th
 """
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from bridgegen.arrays import Bool, Float, Int
 from bridgegen.ego._tracking_kernels import TRACK
+from bridgegen.ego.compiled import CONFLICT
 from bridgegen.ego.driver_process import DriverError, DriverProcess
-from bridgegen.ego.interface import ROUTE_POINTS, ROUTE_STEP, Observation, Scene
+from bridgegen.ego.interface import (
+    CONFLICT_WAYS,
+    NEAR_PIECES,
+    ROUTE_POINTS,
+    ROUTE_STEP,
+    Observation,
+    Scene,
+)
 from bridgegen.ego.trajectory import Follower, Plans
 from bridgegen.simulation.embedded.batch import Batch
+from bridgegen.simulation.embedded.drivers import LANES, MEMORY
 from bridgegen.simulation.embedded.program import Program
 from bridgegen.simulation.rollout import FAILURES, Rollout, joined
 
@@ -105,10 +116,24 @@ class Wheel:
         self._time_step, self._batch, self._driver = program.time_step, batch, driver
         self._route, self._tracks = np.zeros((n, ROUTE_POINTS, 4)), np.zeros((n, m, TRACK))
         self._stop, self._light = np.full(n, np.inf), np.zeros(n, dtype=np.int8)
-        self._scene, self._note = _scene(program), note
-        driver.reset(n, self._scene)
-        self._every, self._asked = driver.traits.steps(program.time_step), 0
+        driver.start()
+        self._note = note
+        self._every, self._asked = driver.facts.steps(program.time_step), 0
         self._answer: tuple[Float, Float] | Follower
+        self._missed: list[Float] = []
+        self._wants = wants = driver.facts.wants
+        self._scene = _scene(program)
+        if "map" in wants:
+            maps, map_of = batch.maps()
+            self._scene = replace(self._scene, maps=maps, map_of=map_of)
+            self._nearby, self._places = np.zeros((n, MEMORY)), np.full((n, 1 + NEAR_PIECES), -1)
+        self._views: dict[str, npt.NDArray[Any]] = {}
+        if "lanes" in wants:
+            self._views["lanes"] = np.zeros((n, LANES))
+        if "conflicts" in wants:
+            shape = (n, m, CONFLICT_WAYS, CONFLICT.itemsize // 8)
+            self._views["conflicts"] = np.full(shape, np.nan)
+        driver.reset(n, self._scene)
 
     def demand(self, k: int) -> tuple[Float, Float]:
         """Return what it demands at instant k: ``(N,)`` [m/s²] and ``(N,)`` [1/m].
@@ -121,7 +146,10 @@ class Wheel:
         """
         batch, record = self._batch, self._batch.record
         batch.observe(k, ROUTE_STEP, self._route, self._tracks, self._stop, self._light)
-        if k % self._every == 0:
+        if k % self._every != 0:
+            if "history" in self._wants:
+                self._missed.append(self._tracks.copy())
+        else:
             answer, self._asked = self._ask(k), k
             if isinstance(answer, Plans):
                 self._answer = Follower(answer, self._time_step)
@@ -141,6 +169,7 @@ class Wheel:
         Raises:
             DriverError: it failed.
         """
+        self._look(k)
         batch, record, state = self._batch, self._batch.record, self._batch.state
         x, y, h, v = (array[:, 0, k] for array in (record.x, record.y, record.h, record.v))
         observation = Observation(
@@ -154,7 +183,22 @@ class Wheel:
         )  # fmt: skip
         if len(x) == 1 and not self._driver.answers_each_row:
             self._try_two(observation)
-        return self._driver.act(observation)
+        return self._driver.act(observation, self._views)
+
+    def _look(self, k: int) -> None:
+        """Fill the views of instant k."""
+        batch, views = self._batch, self._views
+        if self._missed:
+            views["missed"] = np.stack(self._missed, axis=1)
+            self._missed = []
+        if "lanes" in self._wants:
+            batch.see_lanes(views["lanes"])
+        if "map" in self._wants:
+            batch.see_map(k, self._nearby, self._places)
+            views["map"] = self._places.astype(np.int32)
+            views["lights"] = batch.state.lights
+        if "conflicts" in self._wants:
+            batch.see_conflicts(k, views["conflicts"])
 
     def _try_two(self, observation: Observation) -> None:
         """Show the only row twice: one answer for all rows has the right shape for one row.
@@ -162,8 +206,10 @@ class Wheel:
         Raises:
             DriverError: it failed.
         """
-        self._driver.reset(2, self._scene)
-        self._driver.act(observation.take(np.zeros(2, dtype=np.int64)))
+        both = replace(self._scene, map_of=np.repeat(self._scene.map_of, 2))
+        self._driver.reset(2, both)
+        twice = {word: np.repeat(view, 2, axis=0) for word, view in self._views.items()}
+        self._driver.act(observation.take(np.zeros(2, dtype=np.int64)), twice)
         self._driver.reset(1, self._scene)
 
 

@@ -17,6 +17,7 @@ import numpy as np
 from bridgegen.arrays import Bool, Float, Int
 from bridgegen.compiled import call_from_python
 from bridgegen.ego import Driver
+from bridgegen.ego.driver_facts import DriverFacts
 from bridgegen.ego.driver_process import START_SECONDS, DriverError, DriverProcess
 from bridgegen.ego.trajectory import Plans
 from bridgegen.simulation.embedded._memory_kernels import (
@@ -63,8 +64,8 @@ class OwnDriver:
         self._is_known = False
 
     @property
-    def memory(self) -> int | None:
-        """How many numbers a compiled driver keeps; None of one in Python.
+    def facts(self) -> DriverFacts:
+        """What is known of the driver.
 
         Raises:
             InputError: the driver cannot be made.
@@ -73,7 +74,7 @@ class OwnDriver:
             if not self._is_known:
                 self._first.process.start()
                 self._is_known = True
-        return self._first.process.traits.memory
+        return self._first.process.facts
 
     def drive(self, program: Program, setup: Callable[[Int], Batch], n: int) -> Rollout:
         """Roll out rows 0 … n − 1.
@@ -86,7 +87,7 @@ class OwnDriver:
         Raises:
             InputError: the driver cannot be made.
         """
-        if self.memory is None:
+        if self.facts.memory is None:
             with self._turn:  # it is one, and has all rows at once
                 return drive_in_lock_step(
                     program, setup, n, self._first.process, self._is_stopped.is_set
@@ -150,7 +151,7 @@ class OwnDriver:
             InputError: the driver cannot be made.
             DriverError: it failed as it began, or when it is asked.
         """
-        if self.memory is None:
+        if self.facts.memory is None:
             return Wheel(program, batch, self._first.process).demand
         return partial(_ask, self._first.process, batch)
 
@@ -258,8 +259,10 @@ def _ask(process: DriverProcess, batch: Batch, k: int) -> tuple[Float, Float]:
     batch.fill_inputs(k)
     state = batch.state
     answer, memory, raised = process.call(
-        _answer, state.inputs[0], state.ahead[0], state.others[0], state.mind[0]
-    )
+        _answer, state.inputs[0], state.ahead[0], state.others[0], state.mind[0],
+        state.lanes[0], batch.pieces, state.place[0], state.signals[0], state.conflicts[0],
+        state.tracked[0],
+    )  # fmt: skip
     if answer[RETURNED] == 0.0:
         raise DriverError("raised", raised)
     if problem := _not_finite(answer):
@@ -308,14 +311,16 @@ def _simulate(
 
 
 def _answer(
-    address: int, inputs: Float, ahead: Float, others: Float, memory: Float
+    address: int, inputs: Float, ahead: Float, others: Float, memory: Float, *wanted: Float
 ) -> tuple[Float, Float, str]:
     """Ask the driver; return its answer, what it keeps, and what it raised."""
     answer = np.zeros(ANSWER)
     raised: list[str] = []
     sys.unraisablehook = lambda error: raised.append(_described(error))
     try:
-        call_from_python(address, (inputs[EGO:], inputs[:EGO], ahead, others, memory, answer))
+        call_from_python(
+            address, (inputs[EGO:], inputs[:EGO], ahead, others, memory, answer, *wanted)
+        )
     finally:
         sys.unraisablehook = sys.__unraisablehook__
     return answer, memory, "".join(raised)
