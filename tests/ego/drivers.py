@@ -237,3 +237,20 @@ class NaNLater(Cruises):
         control = super().act(observation)
         bad = (observation.time >= 3.0) & (observation.target_speed > FailsFast.LIMIT)
         return Control(np.where(bad, np.nan, control.acceleration), control.curvature)
+
+
+class DecidesByHistory(Cruises):
+    """Decides every 0.2 s, by where the others were in the last second."""
+
+    wants = ("history",)
+
+    def act(self, observation):
+        if round(observation.time / 0.05) % 4 == 0:
+            seen = observation.history[:, :, :, 1].sum(axis=1)
+            weights = np.arange(1.0, 1.0 + seen.shape[1])
+            self.demanded = np.sin((seen * weights).sum(axis=1))
+        return Control(self.demanded, np.zeros(self.n))
+
+
+class IsAskedForHistory(DecidesByHistory):
+    period = 0.2

@@ -129,4 +129,4 @@ def test_a_driver_says_what_it_wants(process):
     driver.close()
     plain = process("Cruises")
     plain.start()
-    assert plain.facts.wants == ()
+    assert plain.traits.wants == ()

@@ -25,8 +25,8 @@ from bridgegen.ego.interface import (
 )
 
 Views = Mapping[str, npt.NDArray[Any]]
-"""Arrays by the word of `WANTS`; and "missed", ``(S, N, M, 13)``: the tracks at the instants since
-the driver was last called."""
+"""Arrays by the word of `WANTS`; "lights" with the map; and "missed" with a history, ``(N, F, M,
+13)``, the tracks of the instants since the last call, in which the driver was not asked."""
 
 MOST_PIECES = 200_000
 """Pieces of road maps that are kept for later batches, at most."""
@@ -77,7 +77,7 @@ class Viewer:
         if "conflicts" in views:
             parts["conflicts"] = Conflicts(views["conflicts"])
         if self._history is not None:
-            for tracks in views.get("missed", ()):
+            for tracks in np.moveaxis(views["missed"], 1, 0) if "missed" in views else ():
                 self._history.remember(tracks)
             parts["history"] = self._history.remember(observation.tracks)
         return replace(observation, **parts)

@@ -141,6 +141,17 @@ def test_the_sensors_look_at_every_instant_whatever_the_period():
     assert frames[0].sum() >= 8
 
 
+def test_a_history_has_the_instants_at_which_the_driver_is_not_asked():
+    """Asked every 0.2 s, it decides as one does that is asked always and decides as often."""
+    pipeline = made("DecidesByHistory", "cut-in")
+    X = rows(pipeline, 3)
+    each, held = pipeline.rollout(X), made("IsAskedForHistory", "cut-in").rollout(X)
+    assert (held.status == 0).all()
+    for field in FIELDS:
+        np.testing.assert_array_equal(getattr(held, field), getattr(each, field))
+    assert len(np.unique(held.a[:, 0, :80])) > 20
+
+
 def test_a_bad_plan_costs_the_row_that_it_belongs_to():
     pipeline = made("PlansThePastFast")
     X = rows(pipeline)

@@ -125,8 +125,12 @@ class Wheel:
         self._route, self._tracks = np.zeros((n, ROUTE_POINTS, 4)), np.zeros((n, m, TRACK))
         self._stop, self._light = np.full(n, np.inf), np.zeros(n, dtype=np.int8)
         driver.start()
+        self._note = note
+        self._every, self._asked = driver.traits.steps(program.time_step), 0
+        self._answer: tuple[Float, Float] | Follower
+        self._missed: list[Float] = []
         self._wants = wants = driver.traits.wants
-        self._scene, self._note = _scene(program), note
+        self._scene = _scene(program)
         if "map" in wants:
             maps, map_of = batch.maps()
             self._scene = replace(self._scene, maps=maps, map_of=map_of)
@@ -137,10 +141,7 @@ class Wheel:
         if "conflicts" in wants:
             shape = (n, m, CONFLICT_WAYS, CONFLICT.itemsize // 8)
             self._views["conflicts"] = np.full(shape, np.nan)
-        self._missed: list[Float] = []  # tracks at the instants since the last call
         driver.reset(n, self._scene)
-        self._every, self._asked = driver.traits.steps(program.time_step), 0
-        self._answer: tuple[Float, Float] | Follower
 
     def demand(self, k: int) -> tuple[Float, Float]:
         """Return what it demands at instant k: ``(N,)`` [m/s²] and ``(N,)`` [1/m].
@@ -195,6 +196,9 @@ class Wheel:
     def _look(self, k: int) -> None:
         """Fill the views of instant k."""
         batch, views = self._batch, self._views
+        if self._missed:
+            views["missed"] = np.stack(self._missed, axis=1)
+            self._missed = []
         if "lanes" in self._wants:
             batch.see_lanes(views["lanes"])
         if "map" in self._wants:
@@ -203,9 +207,6 @@ class Wheel:
             views["lights"] = batch.state.lights
         if "conflicts" in self._wants:
             batch.see_conflicts(k, views["conflicts"])
-        if "history" in self._wants and self._every > 1:
-            views["missed"] = np.array(self._missed).reshape(-1, *self._tracks.shape)
-            self._missed = []
 
     def _try_two(self, observation: Observation) -> None:
         """Show the only row twice: one answer for all rows has the right shape for one row.
@@ -215,10 +216,7 @@ class Wheel:
         """
         both = replace(self._scene, map_of=np.repeat(self._scene.map_of, 2))
         self._driver.reset(2, both)
-        twice = {
-            word: np.repeat(view, 2, axis=1 if word == "missed" else 0)
-            for word, view in self._views.items()
-        }
+        twice = {word: np.repeat(view, 2, axis=0) for word, view in self._views.items()}
         self._driver.act(observation.take(np.zeros(2, dtype=np.int64)), twice)
         self._driver.reset(1, self._scene)
 
