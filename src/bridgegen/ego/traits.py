@@ -1,17 +1,18 @@
 """What a driver of the user's says of itself, by attributes of its class or by a message."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
 from bridgegen.ego.interface import WANTS
-from bridgegen.errors import InputError
+from bridgegen.errors import InputError, UnknownNameError
 
 NAMES = ("wants", "period", "max_rows")
 """What a driver may say; each may be left out."""
 
-MAX_PERIOD = 10.0
-"""Greatest time [s] between two plans of a driver."""
+PERIODS = (0.05, 0.5)
+"""Least and greatest time [s] between two calls of a driver that states it."""
 
 
 @dataclass(frozen=True)
@@ -20,7 +21,7 @@ class Traits:
 
     Attributes:
         wants: what it asks for, of `bridgegen.ego.interface.WANTS`.
-        period: [s] between two of its plans; None if it is asked at every instant.
+        period: [s] between two calls of it; None if it is called at every instant.
         max_rows: how many scenarios it can drive at once; None for any number.
         memory: how many numbers a compiled driver keeps; None for one that is called.
     """
@@ -29,6 +30,12 @@ class Traits:
     period: float | None = None
     max_rows: int | None = None
     memory: int | None = None
+
+    def steps(self, time_step: float) -> int:
+        """Return how many time steps [s] there are from one call to the next: the nearest, >= 1."""
+        if self.period is None:
+            return 1
+        return max(1, math.floor(self.period / time_step + 0.5))
 
 
 def traits_of(said: Mapping[str, Any]) -> Traits:
@@ -41,16 +48,30 @@ def traits_of(said: Mapping[str, Any]) -> Traits:
         InputError: a value that cannot be.
     """
     wants, period, most = (said.get(name) for name in NAMES)
-    wants = () if wants is None else wants
-    if not isinstance(wants, list | tuple) or not all(
-        isinstance(one, str) and one in WANTS for one in wants
-    ):
-        raise InputError(f"wants must be a list of {', '.join(WANTS)}; got {_short(wants)}")
-    if period is not None and not (type(period) in (int, float) and 0.0 < period <= MAX_PERIOD):
-        raise InputError(f"period must be > 0 and at most {MAX_PERIOD:g} s, got {_short(period)}")
+    wants = checked_wants(() if wants is None else wants)
+    low, high = PERIODS
+    if period is not None and not (type(period) in (int, float) and low <= period <= high):
+        raise InputError(f"period [s] must be in {low:g}..{high:g}, got {_short(period)}")
     if most is not None and not (type(most) is int and most > 0):
         raise InputError(f"max_rows must be a whole number > 0, got {_short(most)}")
-    return Traits(tuple(wants), None if period is None else float(period), most)
+    return Traits(wants, None if period is None else float(period), most)
+
+
+def checked_wants(wants: Any) -> tuple[str, ...]:
+    """Return what a driver says that it wants.
+
+    Raises:
+        InputError: not words of `WANTS`, or one of them twice.
+    """
+    if not isinstance(wants, list | tuple):
+        raise InputError(f'wants must be a tuple of words, such as ("lanes",), got {_short(wants)}')
+    words = tuple(wants)
+    for word in words:
+        if not isinstance(word, str) or word not in WANTS:
+            raise UnknownNameError("word in wants", str(word)[:80], WANTS)
+        if words.count(word) > 1:
+            raise InputError(f"wants must name '{word}' once, got {_short(words)}")
+    return words
 
 
 def _short(value: Any) -> str:
