@@ -48,7 +48,7 @@ def road_map():
         lanes=(lane,), route=("1:0:-1",), crosswalks=(np.zeros((4, 2)),),
         lights=(Light("7", ("1:0:-1",), np.zeros((2, 2))),), pieces=np.zeros((1, 11, 3)),
         piece_points=np.full(1, 2), piece_kind=np.zeros(1, np.int8),
-        piece_lane=np.zeros(1, np.int64), piece_light=np.full(1, -1),
+        piece_lane=np.zeros(1, np.int64), piece_light=np.full(1, -1), piece_marking=np.zeros(1, np.int8),
     )  # fmt: skip
 
 
