@@ -118,17 +118,21 @@ def described(spec: str, pipeline: Pipeline) -> str:
         pipeline: that it has driven in.
     """
     own = pipeline.simulator.embedded.own_driver
-    facts = own.process.facts
-    if facts.memory is not None:
-        kept = f"{facts.memory} number{'' if facts.memory == 1 else 's'}"
+    traits = own.process.traits
+    if traits.memory is not None:
+        kept = f"{traits.memory} number{'' if traits.memory == 1 else 's'}"
         return f"a compiled function that keeps {kept}; answers controls"
-    kind = "a co-simulation unit" if spec.endswith(".fmu") else "a class in Python"
+    kind = "a class in Python"
+    if is_remote(spec):
+        kind = "a driver in another process"
+    elif spec.endswith(".fmu"):
+        kind = "a co-simulation unit"
     asked = "asked at every instant"
-    if facts.period is not None:
+    if traits.period is not None:
         step = pipeline.simulator.time_step
-        every = facts.steps(step)
+        every = traits.steps(step)
         asked = f"asked every {every * step:.4g} s ({every} time steps of {step:g} s)"
-    wants = f"wants {', '.join(facts.wants)}" if facts.wants else "wants nothing beyond the usual"
+    wants = f"wants {', '.join(traits.wants)}" if traits.wants else "wants nothing beyond the usual"
     answers = " and ".join({"control": "controls", "trajectory": "trajectories"}[one] for one in
                            sorted(own.process.answers)) or "nothing valid"  # fmt: skip
     return f"{kind}; {asked}; {wants}; answers {answers}"

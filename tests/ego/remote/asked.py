@@ -49,6 +49,7 @@ def road_map():
         lights=(Light("7", ("1:0:-1",), np.zeros((2, 2))),), pieces=np.zeros((1, 11, 3)),
         piece_points=np.full(1, 2), piece_kind=np.zeros(1, np.int8),
         piece_lane=np.zeros(1, np.int64), piece_light=np.full(1, -1),
+        piece_marking=np.zeros(1, np.int8),
     )  # fmt: skip
 
 
@@ -57,7 +58,7 @@ def with_all():
     view = MapView(np.zeros(N, np.int64), np.full((N, 4), -1, np.int32), np.ones((N, 1), np.int8))
     return scene(maps=(road_map(),), map_of=np.zeros(N, np.int64)), observation(
         map=view,
-        conflicts=Conflicts(np.full((N, 1, 2, 5), np.nan)),
+        conflicts=Conflicts(np.full((N, 1, 2, 6), np.nan)),
         history=np.zeros((N, 1, 11, 13)),
     )
 

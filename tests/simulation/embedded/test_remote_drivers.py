@@ -159,3 +159,15 @@ def wait_for(port):
             if one.connect_ex(("127.0.0.1", port)) == 0:
                 return
         time.sleep(0.01)
+
+
+@pytest.mark.parametrize("example", ["my_lane_changer.py:MyLaneChanger", "my_planner.py:MyPlanner"])
+def test_the_map_and_plans_pass_the_protocol_to_the_bit(example):
+    file, _, name = example.partition(":")
+    here = made(EXAMPLES / example, "cut-in")
+    there = made(command(name, EXAMPLES / file), "cut-in")
+    X = rows(here, 2)
+    one, two = here.rollout(X), there.rollout(X)
+    assert (one.status == 0).all()
+    for field in FIELDS:
+        np.testing.assert_array_equal(getattr(one, field), getattr(two, field))
