@@ -24,7 +24,7 @@ EXTRAS = {
         "deep reinforcement learning: dqn, ddpg, ppo, ppo-adversary",
     ),
     "planners": Extra(
-        ("acados", "fiss_planner", "highway_env", "libsumo", "metadrive"),
+        ("acados", "cython", "fiss_planner", "highway_env", "libsumo", "metadrive"),
         "planners of others under test: --ego NAME, see 'bridgegen list drivers'",
     ),
     "ray": Extra(("ray",), "workers on more than one machine: --workers ray"),

@@ -3,7 +3,10 @@
 import json
 import subprocess
 import sys
+import tomllib
+from pathlib import Path
 
+import numpy as np
 import pytest
 
 from bridgegen import ego
@@ -11,7 +14,13 @@ from bridgegen.campaign import Run, resume, run_search
 from bridgegen.ego.planners import registry
 from bridgegen.ego.planners.planner import DOMAINS, Planner
 from bridgegen.errors import InputError, UnknownNameError
+from bridgegen.odd.reader import load
+from bridgegen.options import PipelineOptions
+from bridgegen.pipeline import Pipeline
 from bridgegen.simulate import simulate_file
+
+
+ROOT = Path(__file__).parents[2]
 
 
 @pytest.fixture
@@ -149,3 +158,24 @@ def test_the_list_says_which_are_installed(package, cli):
     assert code == 0
     assert found["planner absent"]["advice"].startswith("pip install 'no-such")
     assert found["planner house:cruises"]["advice"] == ""
+
+
+@pytest.mark.planners
+@pytest.mark.parametrize(
+    "name", [name for name, one in registry.planners().items() if not registry.missing(one)]
+)
+def test_each_that_is_installed_drives_the_nominal_cut_in(name):
+    logical = load("cut-in")
+    pipeline = Pipeline(logical, logical.space(), PipelineOptions(ego=name, ideal=["perception"]))
+    rollout = pipeline.rollout(pipeline.space.row({})[np.newaxis])
+    assert rollout.status[0] == 0, rollout.messages
+    assert rollout.x[0, 0].max() - rollout.x[0, 0].min() > 50.0
+
+
+def test_the_extra_installs_what_the_adapters_need():
+    """But for what it cannot install beside the others; see docs/planners.md."""
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
+    extra = {one.partition(";")[0].strip() for one in project["optional-dependencies"]["planners"]}
+    for name, one in registry.planners().items():
+        if name != "commonroad-reactive":
+            assert {*one.requires} <= extra, name
