@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bridgegen.arrays import Float, Int
+from bridgegen.ego import is_remote
 from bridgegen.odd.reader import load
 from bridgegen.options import PipelineOptions
 from bridgegen.pipeline import Pipeline
