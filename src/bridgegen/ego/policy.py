@@ -18,9 +18,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from bridgegen.arrays import Float
+from bridgegen.arrays import Bool, Float, Int
 from bridgegen.ego.batches import SIZE as BLOCK
-from bridgegen.ego.batches import blocks, checked_size
+from bridgegen.ego.batches import blocks, checked_size, equal_places
 from bridgegen.ego.interface import Control, Observation, Scene
 
 if TYPE_CHECKING:
@@ -62,6 +62,7 @@ class PolicyDriver(ABC):
     def __init__(self) -> None:
         checked_size(self.block)
         self._policy = self.load()
+        self._places: Int | None = None
 
     def reset(self, n: int, scene: Scene) -> None:
         """See `BatchDriver`."""
@@ -71,17 +72,28 @@ class PolicyDriver(ABC):
 
     def act(self, observation: Observation) -> Control:
         """See `BatchDriver`."""
-        actions = np.empty((len(observation.x), 2))
-        for rows, (seen,) in blocks(vectors(observation), size=self.block):
-            answer, self._states[rows.start] = self._policy.predict(
-                seen,
-                state=self._states.get(rows.start),
-                episode_start=self._first,
-                deterministic=True,
-            )
-            actions[rows] = np.asarray(answer)[: rows.stop - rows.start]
+        seen = vectors(observation)
+        if self._places is None:
+            self._places = equal_places(self._twice, [seen], self.block)
+        actions = np.empty((len(seen), 2))
+        for rows, (block,) in blocks(seen, size=self.block, places=self._places):
+            state = self._states.get(rows.start)
+            answer, self._states[rows.start] = self._predict(block, state, self._first)
+            actions[rows] = answer[self._places[: rows.stop - rows.start]]
         self._first = np.zeros_like(self._first)
         return control(actions, self._scene)
+
+    def _predict(self, block: npt.NDArray[Any], state: Any, first: Bool) -> tuple[Float, Any]:
+        answer, after = self._policy.predict(
+            block, state=state, episode_start=first, deterministic=True
+        )
+        return np.asarray(answer), after
+
+    def _twice(self, blocks: list[npt.NDArray[Any]]) -> list[Float]:
+        """Return the answers to a block at an episode's first two instants."""
+        first = np.ones(self.block, dtype=bool)
+        answer, state = self._predict(blocks[0], None, first)
+        return [answer, self._predict(blocks[0], state, ~first)[0]]
 
 
 def control(action: Float, scene: Scene) -> Control:
