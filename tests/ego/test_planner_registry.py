@@ -19,7 +19,6 @@ from bridgegen.options import PipelineOptions
 from bridgegen.pipeline import Pipeline
 from bridgegen.simulate import simulate_file
 
-
 ROOT = Path(__file__).parents[2]
 
 
