@@ -22,10 +22,10 @@ from bridgegen.simulation.embedded import simulator
 WHOLE = replace(DRIVERS["reference"], stages=frozenset({"perception", "prediction", "control"}))
 
 
-def replays(driver):
+def replays(driver, vehicle="kinematic"):
     return [
         (one.cause.label, one.driver.name, *sorted(one.driver.ideal), "dry" if one.dry else "")
-        for one in counterfactuals(driver)
+        for one in counterfactuals(driver, vehicle)
     ]
 
 
@@ -37,6 +37,16 @@ def test_the_replays_of_a_driver_with_all_stages():
         ("control", "reference", "control", ""),
         ("control", "reference", "dry"),
     ]
+
+
+def test_a_vehicle_with_dynamics_is_made_kinematic_after_perception_and_before_planning():
+    still = counterfactuals(WHOLE, "single-track")
+    assert [one.cause.label for one in still] == [
+        "perception", "vehicle dynamics", "planning", "planning", "control", "control",
+    ]  # fmt: skip
+    assert [one.kinematic for one in still] == [False, True, False, False, False, False]
+    assert still[1].driver == WHOLE
+    assert replays(WHOLE, "kinematic") == replays(WHOLE)
 
 
 def test_what_is_ideal_already_is_not_put_right_but_stays_ideal():
@@ -66,7 +76,7 @@ def test_the_first_replay_that_helps_tells_and_only_the_unexplained_are_replayed
         asked.append(at.tolist())
         return table[at, order.index(replay)]
 
-    found = causes(WHOLE, critical, harmless)
+    found = causes(order, critical, harmless)
     for row, (hit, one) in enumerate(zip(critical, table, strict=True)):
         expected = Cause.NONE
         if hit:
@@ -78,7 +88,9 @@ def test_the_first_replay_that_helps_tells_and_only_the_unexplained_are_replayed
 
 
 def test_nobody_is_to_blame_where_nobody_drives():
-    found = causes(STORYBOARD, np.array([True]), lambda at, replay: np.array([True]))
+    found = causes(
+        counterfactuals(STORYBOARD), np.array([True]), lambda at, replay: np.array([True])
+    )
     assert found.tolist() == [Cause.NONE]
 
 
@@ -90,12 +102,14 @@ def test_labels_are_the_only_names():
 
 
 def test_a_cause_that_cannot_be_is_refused():
-    with pytest.raises(InputError, match="'route-follower' can have it, only planning, control"):
+    with pytest.raises(InputError, match="kinematic can have it, only planning, control"):
         require(Cause.PERCEPTION, DRIVERS["route-follower"])
     with pytest.raises(InputError, match="the ego has no driver"):
         require(Cause.UNAVOIDABLE, STORYBOARD)
+    with pytest.raises(InputError, match="'vehicle dynamics': no harm of the driver"):
+        require(Cause.VEHICLE_DYNAMICS, WHOLE)
     for one in CAUSES:
-        require(one, WHOLE)
+        require(one, WHOLE, "single-track")
 
 
 @pytest.mark.parametrize(
@@ -180,4 +194,4 @@ def test_the_reference_s_harm_has_every_cause():
         pipeline.choose_objective(BY_THRESHOLDS)
         rows = np.random.default_rng(11).random((120, pipeline.space.n_var))
         found |= set(pipeline.evaluate(pipeline.space.decode(rows)).cause.tolist())
-    assert found == set(Cause)
+    assert found == set(Cause) - {Cause.VEHICLE_DYNAMICS}

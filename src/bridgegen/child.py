@@ -1,4 +1,4 @@
-"""A child process and its messages: pickled, through its standard input and output.
+"""Child processes: of Python, with pickled messages through standard input and output; or any.
 
 It is not forked, so that it inherits neither threads nor the state of compiled code. It ends when
 this process ends, for whatever reason, and its descendants end with it: see
@@ -52,11 +52,9 @@ class Child:
         errors: IO[bytes] | None = None,
     ) -> None:
         path = {"PYTHONPATH": os.pathsep.join(["", *sys.path])}
-        supervisor = [sys.executable, "-I", "-S", str(SUPERVISOR)]
-        self._process = process = subprocess.Popen(
-            [*supervisor, sys.executable, *program], stdin=subprocess.PIPE, stdout=subprocess.PIPE,
-            stderr=errors, env=os.environ | (environment or {}) | path, start_new_session=True,
-        )  # fmt: skip
+        self._process = process = _start(
+            [sys.executable, *program], errors, os.environ | (environment or {}) | path
+        )
         ended, read = threading.Event(), threading.Event()
         for work in ((_forward, process, take, ended, read), (_wait, process, take, ended, read)):
             threading.Thread(target=work[0], args=work[1:], daemon=True).start()
@@ -88,6 +86,67 @@ class Child:
         self._end()
         status = self._process.returncode
         return -signal.SIGKILL if status is None else status
+
+
+class Program:
+    """A program with its descendants, and the pipes of its standard input and output.
+
+    It ends when this process ends, or when this object is deleted; it does not receive Ctrl-C.
+
+    Args:
+        words: the path of the program, and its arguments.
+    """
+
+    def __init__(self, words: Sequence[str]) -> None:
+        self._process = _start(words, None, None)
+        self._end = weakref.finalize(self, _end_program, self._process)
+
+    @property
+    def pipes(self) -> tuple[int, int]:
+        """File descriptors: of its standard output, to read; and of its standard input."""
+        assert self._process.stdin is not None
+        assert self._process.stdout is not None
+        return self._process.stdout.fileno(), self._process.stdin.fileno()
+
+    def kill(self) -> None:
+        """End it, from any thread; its pipes are still open."""
+        _terminate(self._process)
+
+    def end(self, seconds: float = 0.0) -> int:
+        """End it, unless it ends by itself within so many seconds; return its exit status.
+
+        A signal's status is its negative number; −SIGKILL also if the program cannot be ended.
+        """
+        with suppress(subprocess.TimeoutExpired):
+            self._process.wait(seconds)
+        self._end()
+        status = self._process.returncode
+        return -signal.SIGKILL if status is None else status
+
+
+def _start(
+    words: Sequence[str], errors: IO[bytes] | None, environment: Mapping[str, str] | None
+) -> subprocess.Popen[bytes]:
+    """Start a program below a supervisor."""
+    return subprocess.Popen(
+        [sys.executable, "-I", "-S", str(SUPERVISOR), *words], stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE, stderr=errors, env=environment, start_new_session=True,
+    )  # fmt: skip
+
+
+def _end_program(process: subprocess.Popen[bytes]) -> None:
+    _terminate(process)
+    try:
+        process.wait(END_SECONDS)
+    except subprocess.TimeoutExpired:  # the supervisor has been stopped, for example
+        with suppress(OSError):
+            os.killpg(process.pid, signal.SIGKILL)
+        with suppress(subprocess.TimeoutExpired):
+            process.wait(END_SECONDS)
+    for pipe in (process.stdin, process.stdout):
+        if pipe is not None:
+            with suppress(OSError):
+                pipe.close()
 
 
 def _terminate(process: subprocess.Popen[bytes]) -> None:

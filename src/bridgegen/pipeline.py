@@ -39,6 +39,7 @@ from bridgegen.simulation.choice import EMBEDDED, SimulatorChoice
 from bridgegen.simulation.rollout import NO_SCENARIO, WORKER_ENDED, Rollout
 from bridgegen.simulation.rollout import joined as joined_rollouts
 from bridgegen.simulation.simulator import Simulator
+from bridgegen.simulation.vehicles import KINEMATIC
 from bridgegen.variants import Variants, nominal_of
 from bridgegen.workers import CarriedDriver, Lost, Part, Recipe, Threads, Workers
 from bridgegen.workers.compile_ahead import compiled_ahead
@@ -132,8 +133,13 @@ class Pipeline:
         self.driver = self.simulator.embedded.program.driver
         if driver is None and self.driver != egos.STORYBOARD:  # write the file's choice, too
             self.source = _source(scenario, self.driver, road_map, space)
+        if self._is_far and self.vehicle != KINEMATIC:
+            raise InputError(
+                f"{scenario.place}: the vehicle '{self.vehicle}' is of the embedded simulator "
+                f"(--vehicle {KINEMATIC})"
+            )
         if self.cause is not None:
-            require(self.cause, self.driver)
+            require(self.cause, self.driver, self.vehicle)
         sees, embedded = simulator.detects, self.simulator.embedded
         held = measures.held_by(self.driver, detects=sees)
         named = f"the driver '{self.driver.name}'"
@@ -179,9 +185,16 @@ class Pipeline:
             )
         return one
 
+    @property
+    def vehicle(self) -> str:
+        """How the ego moves, one of `bridgegen.simulation.vehicles.VEHICLES`."""
+        return self.simulator.embedded.program.vehicle
+
     def _simulator_of(self, nominal: ConcreteScenario) -> Simulator[Any]:
         place = self.scenario.name
-        return self._simulates.simulator(nominal.storyboard, place, self._given_driver)
+        return self._simulates.simulator(
+            nominal.storyboard, place, self._given_driver, self._options.vehicle
+        )
 
     def _static_roads(self, nominal: ConcreteScenario) -> Any:
         """Return the compiled road network, None if rows have several."""
@@ -382,7 +395,7 @@ class Pipeline:
         quantities.evaluate(standing, [one for one in self.metrics if one not in apart])
         plausibility(standing)
         for fix in self.fixes:
-            self._nominal_batch(driver=fix.driver, dry=fix.dry).take_addresses()
+            self._nominal_batch(fix).take_addresses()
 
     def compile_ahead(self) -> None:
         """Compile what ``_compile_first`` leaves: instants and the conflict analysis."""
@@ -390,11 +403,11 @@ class Pipeline:
         batch.compile_instants()
         analyse(batch.standing())
 
-    def _nominal_batch(self, driver: egos.Driver | None = None, dry: bool = False) -> "Batch":
+    def _nominal_batch(self, fix: Counterfactual | None = None) -> "Batch":
         nominal = self.space.row({})[np.newaxis]
         columns = {name: nominal[:, i] for i, name in enumerate(self.space.names)}
         roads, rows = self._roads_of(nominal)
-        return self.simulator.embedded.batch(roads, rows, columns, driver=driver, dry=dry)
+        return self.simulator.embedded.batch(roads, rows, columns, **_changed(fix))
 
     def evaluate(self, X: Float) -> Evaluation:
         """Evaluate N rows; a row's result depends on that row alone.
@@ -438,7 +451,7 @@ class Pipeline:
         def harmless(at: Int, replay: Counterfactual) -> Bool:
             return self._harmless(self._run(roads, rows[at], X[at], replay), objective)
 
-        cause = causes(self.driver, found.critical, harmless)
+        cause = causes(self.fixes, found.critical, harmless)
         counts = found.critical if self.cause is None else cause == self.cause
         return replace(found, critical=counts, cause=cause)
 
@@ -457,7 +470,7 @@ class Pipeline:
     @cached_property
     def fixes(self) -> tuple[Counterfactual, ...]:
         """The changes that ``try_all`` takes by number: the counterfactuals of causes."""
-        return counterfactuals(self.driver)
+        return counterfactuals(self.driver, self.vehicle)
 
     @property
     def kinds(self) -> Mapping[str, str]:
@@ -515,7 +528,7 @@ class Pipeline:
             replay = self.fixes[number] if number >= 0 else None
             rollout = self.simulator.embedded.run(
                 roads, which[at], self._columns(X[at]), noise=self.noise_keys(keys[at]),
-                driver=replay.driver if replay else None, dry=replay is not None and replay.dry,
+                **_changed(replay),
             )  # fmt: skip
             order.append(at)
             parts.append(Trials.of(rollout, roads, which[at], harm, count))
@@ -658,6 +671,8 @@ class Pipeline:
         columns = {name: X[:, i] for i, name in enumerate(self.space.names)}
         if until_collision and self.simulator is self.simulator.embedded:
             return self.simulator.run(roads, rows, columns, until_collision=True)
+        if replay is not None and replay.kinematic:  # another vehicle has the embedded one alone
+            return self.simulator.embedded.run(roads, rows, columns, **_changed(replay))
         if replay is None:
             return self.simulator.run(roads, rows, columns)
         return self.simulator.run(roads, rows, columns, driver=replay.driver, dry=replay.dry)
@@ -712,6 +727,13 @@ class Pipeline:
     def _road_names(self) -> tuple[str, ...]:
         """The parameters that a row's road network, and the courses on it, depend on."""
         return tuple(dict.fromkeys((*self.source.static_names, *self.source.course_names)))
+
+
+def _changed(fix: Counterfactual | None) -> dict[str, Any]:
+    """Return what a replay changes, as arguments of the embedded simulator."""
+    if fix is None:
+        return {}
+    return {"driver": fix.driver, "dry": fix.dry, "kinematic": fix.kinematic}
 
 
 Carried = tuple[CarriedDriver | None, CarriedDriver | None]

@@ -70,6 +70,7 @@ def simulate_file(
     *,
     ego: str | None = None,
     ideal: Iterable[str] | None = None,
+    vehicle: str | None = None,
     others: str | None = None,
     empty_trigger: str = NEVER,
     time_limit: float | None = None,
@@ -87,6 +88,8 @@ def simulate_file(
         ego: the ego's driver; what the file's controller says by default.
         ideal: stages of the driver to be ideal; what the file's controller says by default, none
             with another ``ego``.
+        vehicle: how the ego moves, see `bridgegen.simulation.vehicles`; what the file says by
+            default, or kinematically.
         others: "attentive" or "scripted": who drives the other participants; what their
             controllers say by default.
         empty_trigger: when acts and events start whose StartTrigger is empty: "never", or "now".
@@ -104,7 +107,7 @@ def simulate_file(
             is not where it should be.
         FileFormatError: a file is missing, malformed or inconsistent.
         UnsupportedError: an element that the simulator cannot run, by name and line.
-        UnknownNameError: no such driver, stage, metric or reading of empty triggers.
+        UnknownNameError: no such driver, vehicle, stage, metric or reading of empty triggers.
     """
     path = Path(path)
     if path.suffix.lower() in (".yaml", ".yml"):
@@ -128,6 +131,7 @@ def simulate_file(
         str(path),
         driver=driver,
         ideal=ideal,
+        vehicle=vehicle,
         others=others,
         time_step=time_step,
         skipped=skipped,
@@ -137,6 +141,7 @@ def simulate_file(
     names = (*measures.existing(tuple(measures.METRICS), held), *quantities.MEASURED)
     asked = tuple(dict.fromkeys((*(metrics or names), *also)))
     names = quantities.require(asked, held, f"the driver '{embedded.driver}'")
+    changes = any(one is not None for one in (ego, ideal, vehicle, others))
     stated, unknown = stated_criteria(scenario)
     monitor = Monitor(
         joined(stated, criteria), embedded.program.names, held, embedded.duration,
@@ -153,7 +158,7 @@ def simulate_file(
         rollout=rollout,
         conflicts=analyse(rollout),
         criteria=monitor.results(rollout, 0),
-        cause=_stated_cause(scenario) if ego is None and ideal is None and others is None else None,
+        cause=None if changes else _stated_cause(scenario),
         notes=(*warnings, *(f"{path}: {one}" for one in unknown), *embedded.program.notes),
     )
 

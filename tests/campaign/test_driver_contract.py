@@ -1,3 +1,4 @@
+import re
 from pathlib import Path
 
 import pytest
@@ -12,45 +13,80 @@ NETWORKS = DRIVERS.with_name("network_drivers.py")
 EXAMPLES = Path(__file__).parents[2] / "docs" / "examples"
 
 
+def checked(name, file=DRIVERS, scenario="crossroads-s1"):
+    return list(check_driver(f"{file}:{name}", [scenario], time_limit=0.5))
+
+
 def broken(name, file=DRIVERS):
-    checks = list(check_driver(f"{file}:{name}", ["crossroads-s1"], time_limit=0.5))
-    found = {check.rule: check.problem for check in checks if check.problem}
-    timed = "every row is driven to its end" not in found
-    assert [check.rule for check in checks].count("speed") == timed
-    assert len(checks) == 5 + timed
-    return found
+    return {check.rule: check.problem for check in checked(name, file) if check.problem}
 
 
-@pytest.mark.parametrize("name", ["Cruises", "LooksAhead"])
+def in_short(checks):
+    return {check.rule: check.figure for check in checks if check.scenario == "in short"}
+
+
+@pytest.mark.parametrize("name", ["LooksAhead", "PlansAndControls"])
 def test_a_good_driver_keeps_everything(name):
-    assert broken(name) == {}
+    checks = checked(name)
+    assert not any(check.problem for check in checks)
+    assert in_short(checks) == {
+        "drives": "yes", "deterministic": "yes", "free of cross-talk": "yes"
+    }  # fmt: skip
+    asked = "at every instant" if name == "LooksAhead" else "every 0.2 s (4 time steps of 0.05 s)"
+    answers = "controls" if name == "LooksAhead" else "controls and trajectories"
+    assert checks[0].figure == (
+        f"a class in Python; asked {asked}; wants nothing beyond the usual; answers {answers}"
+    )
 
 
-def test_a_slow_driver_is_timed_in_a_small_batch(monkeypatch):
+def test_a_driver_is_timed_call_by_call_and_in_a_small_batch_if_it_is_slow(monkeypatch):
     monkeypatch.setattr(driver_contract, "SECONDS", 0.0)
-    *_, speed = driver_contract.check_driver(f"{DRIVERS}:Cruises", ["cut-in"])
-    assert speed.rule == "speed"
-    assert speed.figure.endswith("scenarios/s in a batch of 16")
+    figures = {check.rule: check.figure for check in checked("Cruises")}
+    assert figures["speed"].endswith("scenarios/s in a batch of 16")
+    times = re.fullmatch(
+        r"p50 (\S+) ms, p99 (\S+) ms with 1 scenario; p50 (\S+) ms, p99 (\S+) ms with 16",
+        figures["time per call"],
+    )
+    median, most, *_ = map(float, times.groups())
+    assert 0.0 < median <= most < 500.0
 
 
 def test_a_compiled_driver_keeps_everything_or_is_found_out():
     compiled = DRIVERS.with_name("compiled_drivers.py")
-    assert broken("looks_ahead", compiled) == {}
+    checks = checked("looks_ahead", compiled)
+    assert not any(check.problem for check in checks)
+    assert checks[0].figure == "a compiled function that keeps 0 numbers; answers controls"
     found = broken("nan_fast", compiled)
     assert list(found) == ["every row is driven to its end"]
     assert "acceleration must be finite, got nan" in found["every row is driven to its end"]
 
 
 def test_a_driver_that_mixes_its_scenarios_is_found_out():
-    found = broken("Mixes")
+    checks = checked("Mixes")
+    found = {check.rule: check.problem for check in checks if check.problem}
     assert {"a row alone moves as it does among others", "what it drove before is forgotten"} <= {
         *found
     }
-    assert "and then" in next(iter(found.values()))
+    assert in_short(checks) == {
+        "drives": "yes", "deterministic": "yes", "free of cross-talk": "no, see crossroads-s1"
+    }  # fmt: skip
+    assert re.match(
+        r"row \d+ differs first at 0 s: acceleration \[m/s²\] of 'ego' = \S+, and then ",
+        found["a row alone moves as it does among others"],
+    )
 
 
-def test_a_driver_that_remembers_is_found_out():
-    assert "the same row again gives the same motion" in broken("Remembers")
+@pytest.mark.parametrize("name", ["Remembers", "ReadsTheClock"])
+def test_a_driver_that_is_not_deterministic_is_found_out(name):
+    checks = checked(name)
+    found = {check.rule for check in checks if check.problem}
+    assert "the same row again gives the same motion" in found
+    assert in_short(checks)["deterministic"] == "no, see crossroads-s1"
+    assert in_short(checks)["free of cross-talk"] == "not known"
+
+
+def test_a_driver_that_is_another_one_in_another_process_is_found_out():
+    assert {*broken("IsBornByChance")} == {"so it does in a new process"}
 
 
 def test_a_driver_that_rounds_by_the_batch_is_told_what_to_do():
@@ -76,10 +112,33 @@ def test_a_network_in_a_fixed_batch_keeps_everything(file, name):
     assert broken(name, file) == {}
 
 
-def test_a_driver_that_fails_is_found_out():
-    found = broken("NaNFast")
-    assert list(found) == ["every row is driven to its end"]
-    assert "acceleration must be finite, got nan" in found["every row is driven to its end"]
+def test_a_driver_that_fails_is_found_out_and_when():
+    checks = checked("NaNLater")
+    assert [check.rule for check in checks if check.problem] == ["every row is driven to its end"]
+    problem = next(check.problem for check in checks if check.problem)
+    assert re.fullmatch(
+        r"\d+ of 16 rows failed, the first: row \d+ at 3 s: the driver answered what is no "
+        r"control: acceleration must be finite, got nan",
+        problem,
+    )
+    assert in_short(checks) == {
+        "drives": "no, see crossroads-s1", "deterministic": "yes", "free of cross-talk": "yes"
+    }  # fmt: skip
+
+
+def test_a_driver_that_drives_nothing_is_not_tried_further():
+    checks = checked("PlansThePast")
+    assert "16 of 16 rows failed, the first: row 0 at 0 s" in checks[1].problem
+    assert "a trajectory must not begin in the past, got a first time of -2 s" in checks[1].problem
+    assert in_short(checks)["deterministic"] == "not known"
+    assert len(checks) == 5
+
+
+@pytest.mark.parametrize("name", ["my_planner.py:MyPlanner", "my_driver.py:MyDriver"])
+def test_the_examples_keep_everything(name):
+    file, _, driver = name.partition(":")
+    checks = checked(driver, EXAMPLES / file, "cut-in")
+    assert not any(check.problem for check in checks)
 
 
 def test_the_command_says_it_and_ends_with_a_status():

@@ -17,6 +17,8 @@ PROJECT = Path("/srv/project")
         ("/srv/project/stack@7/driver.py:Stack", "stack/driver.py:Stack", "7"),
         ("/srv/project/stack-2_1.fmu", "stack.fmu", "2_1"),
         ("/srv/stack.py:Stack2", "../stack.py:Stack2", ""),
+        ("connect:localhost:5555", "connect:localhost:5555", ""),
+        ("exec:./stack-1.2 --net a.py:B", "exec:./stack-1.2 --net a.py:B", ""),
         ("reference", "reference", "BridgeGen 0.9"),
         ("un-r157", "un-r157", "BridgeGen 0.9"),  # r157 is no version
     ],

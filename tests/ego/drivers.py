@@ -2,10 +2,11 @@
 
 import os
 import time
+from dataclasses import replace
 
 import numpy as np
 
-from bridgegen.ego.interface import Control
+from bridgegen.ego.interface import Control, Trajectory
 
 
 class Cruises:
@@ -151,3 +152,105 @@ class Remembers(Cruises):
     def act(self, observation):
         demanded = np.clip(observation.target_speed / self.batches - observation.v, -3.0, 2.0)
         return Control(demanded, np.zeros(self.n))
+
+
+class Plans(Cruises):
+    """Plans to go straight on, at a speed that changes to what is asked for."""
+
+    period = 0.2
+
+    def plan(self, o):
+        time = np.linspace(0.0, 1.0, 11)
+        a = np.clip(o.target_speed - o.v, -3.0, 2.0)[:, None]
+        s = o.v[:, None] * time + 0.5 * a * time**2
+        h = np.repeat(o.h[:, None], len(time), axis=1)
+        x, y = o.x[:, None] + s * np.cos(h), o.y[:, None] + s * np.sin(h)
+        return Trajectory(time, x, y, h, np.maximum(o.v[:, None] + a * time, 0.0))
+
+    def act(self, observation):
+        return self.plan(observation)
+
+
+class PlansAtOnce(Plans):
+    period = None
+
+
+class HoldsControl(Cruises):
+    """Counts its calls: it demands 0.1 m/s² more at each."""
+
+    period = 0.2
+
+    def reset(self, n, scene):
+        super().reset(n, scene)
+        self.calls = 0
+
+    def act(self, observation):
+        self.calls += 1
+        return Control(np.full(self.n, 0.1 * self.calls), np.zeros(self.n))
+
+
+class PlansAndControls(Plans):
+    """Plans in every other call."""
+
+    def act(self, observation):
+        planned = round(observation.time / self.period) % 2 == 0
+        return self.plan(observation) if planned else Cruises.act(self, observation)
+
+
+class PlansThePastFast(Plans):
+    def act(self, observation):
+        made = self.plan(observation)
+        fast = (observation.target_speed > FailsFast.LIMIT) & (observation.time > 1.0)
+        return replace(made, time=made.time - np.where(fast, 2.0, 0.0)[:, None])
+
+
+class PeriodOfAnHour(Cruises):
+    period = 3600.0
+
+
+class PlansThePast(Plans):
+    def act(self, observation):
+        made = self.plan(observation)
+        return replace(made, time=made.time - 2.0)
+
+
+class ReadsTheClock(Cruises):
+    def act(self, observation):
+        control = super().act(observation)
+        noise = np.random.default_rng(time.time_ns()).random(self.n)
+        return Control(control.acceleration + noise, control.curvature)
+
+
+class IsBornByChance(Cruises):
+    def __init__(self):
+        self.bias = np.random.default_rng(time.time_ns()).random()
+
+    def act(self, observation):
+        control = super().act(observation)
+        return Control(control.acceleration - self.bias, control.curvature)
+
+
+class NaNLater(Cruises):
+    """Answers NaN at 3 s where the ego is asked to drive fast."""
+
+    def act(self, observation):
+        control = super().act(observation)
+        bad = (observation.time >= 3.0) & (observation.target_speed > FailsFast.LIMIT)
+        return Control(np.where(bad, np.nan, control.acceleration), control.curvature)
+
+
+class DecidesByHistory(Cruises):
+    """Decides every 0.2 s, by where the others were in the last second."""
+
+    wants = ("history",)
+
+    def act(self, observation):
+        if round(observation.time / 0.05) % 4 == 0:
+            seen = observation.history[:, :, :, 1].sum(axis=1)
+            weights = np.arange(1.0, 1.0 + seen.shape[1])
+            self.demanded = np.sin((seen * weights).sum(axis=1))
+        return Control(self.demanded, np.zeros(self.n))
+
+
+class IsAskedForHistory(DecidesByHistory):
+    period = 0.2

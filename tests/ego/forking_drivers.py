@@ -120,3 +120,11 @@ class ForksOn(Forks):
     def act(self, observation):
         sys.stdin.read()
         return super().act(observation)
+
+
+class ForksAndDiesAtOnce(Forks):
+    """Its process ends while the driver is made; what it has started does not."""
+
+    def __init__(self):
+        self.begin()
+        os._exit(7)

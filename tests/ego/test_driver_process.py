@@ -105,3 +105,28 @@ def test_what_is_no_name_of_a_driver(spec):
 def test_a_time_limit_is_a_time(limit):
     with pytest.raises(InputError, match="time limit"):
         DriverProcess("a:B", time_limit=limit)
+
+
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [
+        ("WantsWrong", "unknown word in wants 'mop'; did you mean 'map'"),
+        ("WantsAString", r"wants must be a tuple of words.*got 'lanes'"),
+    ],
+)
+def test_what_a_driver_wants_must_be_known(name, message):
+    driver = DriverProcess(f"{DRIVERS.with_name('wanting_drivers.py')}:{name}")
+    with pytest.raises(InputError, match=message):
+        driver.start()
+    driver.close()
+
+
+def test_a_driver_says_what_it_wants(process):
+    driver = DriverProcess(f"{DRIVERS.with_name('wanting_drivers.py')}:Lanes")
+    driver.start()
+    assert driver.traits.wants == ("lanes",)
+    assert driver.traits.memory is None
+    driver.close()
+    plain = process("Cruises")
+    plain.start()
+    assert plain.traits.wants == ()

@@ -527,19 +527,19 @@ def test_full_braking_is_for_what_nothing_else_avoids() -> None:
 
 
 def test_ideal_control_does_what_is_demanded_at_once() -> None:
-    assert actuate(np.zeros(SIZE), -7.0, 0.1, 0.05, 1) == (-7.0, 0.1)
+    assert actuate(np.zeros(SIZE), -7.0, 0.1, 0.05, 1, 1) == (-7.0, 0.1)
 
 
 @pytest.mark.parametrize("dt", [0.005, 0.01, 0.05])
 def test_brakes_build_up_late_and_with_limited_jerk_at_any_step(dt: float) -> None:
     state, applied = np.zeros(SIZE), []
     for _ in range(round(2.0 / dt)):
-        applied.append(actuate(state, -8.0, 0.0, dt, 0)[0])
+        applied.append(actuate(state, -8.0, 0.0, dt, 0, 1)[0])
     a = np.array(applied)
     assert (np.diff(a, prepend=0.0) / dt >= -EMERGENCY_JERK - 1e-9).all()
     half = (np.argmax(a < -4.0) + 1) * dt
     assert 0.2 < half < 0.45
     assert a[-1] == pytest.approx(-8.0, abs=0.01)
     gentle = np.zeros(SIZE)
-    a = np.array([actuate(gentle, -2.0, 0.0, dt, 0)[0] for _ in range(round(1.0 / dt))])
+    a = np.array([actuate(gentle, -2.0, 0.0, dt, 0, 1)[0] for _ in range(round(1.0 / dt))])
     assert (np.diff(a, prepend=0.0) / dt >= -JERK - 1e-9).all()

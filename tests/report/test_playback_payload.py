@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from bridgegen.participants import PARTICIPANTS
-from bridgegen.report.playback import Course, Sensed, Weather
+from bridgegen.report.playback import Course, Planned, Sensed, Weather
 from bridgegen.report.playback_payload import ROAD_SCALE, SCALE, playback_payload, road_payload
 from bridgegen.report.series import unpacked
 from bridgegen.weather import COLUMNS
@@ -119,3 +119,15 @@ def test_weather_that_would_begin_after_the_end_is_left_out(report):
     rounded = {"sun_azimuth": 3.142, "sun_elevation": 0.7854}
     around = {"sight": 9_000.0, "background": 3000.0}
     assert told == {"step": 0, "words": "day", **clear, **rounded, **around}
+
+
+def test_trajectories_come_back_to_half_a_centimetre(report):
+    p = report.kept[0]
+    points = np.random.default_rng(1).uniform(-900.0, 900.0, (3, 20, 2))
+    made = [Planned(k, 3.0, one) for k, one in zip((0, 4, p.n_steps), points, strict=True)]
+    assert sent(p)["plans"] == []
+    read = sent(replace(p, plans=tuple(made)))["plans"]
+    assert [(one["step"], one["seconds"]) for one in read] == [(0, 3.0), (4, 3.0)]  # not the last
+    for one, line in zip(read, points, strict=False):
+        came = np.cumsum(np.reshape(one["points"], (-1, 2)), axis=0) / ROAD_SCALE
+        assert np.abs(came - line).max() <= 0.5 / ROAD_SCALE + 1e-9

@@ -49,3 +49,10 @@ def test_a_unit_is_carried_whole(driver):
 @pytest.mark.parametrize("name", ["reference", "package.module:Class", "nowhere.py:Class"])
 def test_what_has_no_file_is_named_as_it_was(name):
     assert CarriedDriver.of(name).here() == name
+
+
+@pytest.mark.parametrize("name", ["exec:run {}:Mine", "exec:run x.fmu", "unix:{}", "connect:a:5"])
+def test_a_driver_in_another_process_carries_no_file(driver, name):
+    carried = CarriedDriver.of(name.format(driver))
+    assert carried.data is None
+    assert carried.here() == name.format(driver)

@@ -167,6 +167,7 @@ def run_search(given: SearchArguments) -> Run:
             seed=seed,
             ego=pipeline.driver.name,
             ideal=sorted(pipeline.driver.ideal),
+            vehicle=pipeline.vehicle,
             axes=[str(axis) for axis in space.axes],
             road_map=_absolute(roads.path) if roads else None,
             map_digest=hashlib.sha256(roads.data).hexdigest() if roads else None,

@@ -1,6 +1,7 @@
 """A run's scenario, search space, map and pipeline, built again from its settings."""
 
 import hashlib
+import shlex
 from dataclasses import replace
 from pathlib import Path
 
@@ -117,7 +118,7 @@ def _check_driver(
     if given is None and is_spec(recorded):
         raise InputError(
             f"{folder}: its driver {recorded} is code; to run it, name it: "
-            f"bridgegen {command} {folder} --{option} {recorded}"
+            f"bridgegen {command} {folder} --{option} {shlex.quote(recorded)}"
         )
     if given not in (None, recorded):
         raise InputError(

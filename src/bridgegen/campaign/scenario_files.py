@@ -1,5 +1,6 @@
 """One row of X as files that other tools run: ontology, OpenDRIVE map, OpenSCENARIO storyboard."""
 
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -24,12 +25,15 @@ from bridgegen.openx.openscenario.declarations import (
     NOISE_KEY,
     RESPONSIBLE,
     SEVERITY,
+    VEHICLE,
 )
 from bridgegen.openx.openscenario.from_owl.notes import FINDINGS
+from bridgegen.openx.openscenario.renaming import ego_of
 from bridgegen.openx.openscenario.values import format_double
 from bridgegen.openx.openscenario.write import to_xml as scenario_xml
 from bridgegen.pipeline import Pipeline
 from bridgegen.simulation.rollout import Rollout
+from bridgegen.simulation.vehicles import KINEMATIC
 
 
 def write_scenario(
@@ -79,6 +83,7 @@ def write_scenario(
             raise OntologyError(*(f"{name}.owl: {violation}" for violation in violations))
     xodr.write_bytes(concrete.road_data)
     storyboard = _with_header(concrete.storyboard, cause, conflict)
+    storyboard = with_vehicle(storyboard, pipeline.vehicle)
     xosc.write_bytes(scenario_xml(keyed(storyboard, noise) if noise else storyboard))
     if individuals is None:
         return [xodr, xosc]
@@ -113,15 +118,49 @@ def _with_header(
 def keyed(scenario: osc.OpenScenario, key: str) -> osc.OpenScenario:
     """Return a scenario that states the key of its driver's random numbers, unless it does."""
 
-    def with_key(one: osc.ObjectController) -> osc.ObjectController:
+    def changed(before: osc.Properties) -> osc.Properties:
+        if before.get(NOISE_KEY) is not None:
+            return before
+        return replace(before, properties=(*before.properties, osc.Property(NOISE_KEY, key)))
+
+    return _with_properties(scenario, changed)
+
+
+def with_vehicle(scenario: osc.OpenScenario, vehicle: str) -> osc.OpenScenario:
+    """Return a scenario that states how its ego moves, in place of what it states, if need be."""
+    ego = ego_of(scenario)
+
+    def changed(before: osc.Properties) -> osc.Properties:
+        others = tuple(one for one in before.properties if one.name != VEHICLE)
+        added = () if vehicle == KINEMATIC else (osc.Property(VEHICLE, vehicle),)
+        return replace(before, properties=(*others, *added))
+
+    return _with_properties(scenario, changed, only=ego)
+
+
+def _with_properties(
+    scenario: osc.OpenScenario,
+    changed: Callable[[osc.Properties], osc.Properties],
+    only: str | None = None,
+) -> osc.OpenScenario:
+    """Return a scenario with other properties of the controllers that name a driver.
+
+    Args:
+        scenario: it.
+        changed: a controller's new properties, by the ones that it has.
+        only: the name of the one entity whose controllers are changed; all by default.
+    """
+
+    def with_changed(one: osc.ObjectController) -> osc.ObjectController:
         before = one.controller.properties
-        if before is None or before.get(DRIVER) is None or before.get(NOISE_KEY) is not None:
+        if before is None or before.get(DRIVER) is None:
             return one
-        properties = replace(before, properties=(*before.properties, osc.Property(NOISE_KEY, key)))
-        return replace(one, controller=replace(one.controller, properties=properties))
+        return replace(one, controller=replace(one.controller, properties=changed(before)))
 
     objects = tuple(
-        replace(one, object_controllers=tuple(with_key(each) for each in one.object_controllers))
+        replace(one, object_controllers=tuple(with_changed(c) for c in one.object_controllers))
+        if only in (None, str(one.name))
+        else one
         for one in scenario.entities.scenario_objects
     )
     return replace(scenario, entities=replace(scenario.entities, scenario_objects=objects))

@@ -115,6 +115,12 @@ def _simulators(_: typer.Context) -> Iterable[str]:
     return list(SIMULATORS)
 
 
+def _vehicles(_: typer.Context) -> Iterable[str]:
+    from bridgegen.simulation.vehicles import VEHICLES
+
+    return list(VEHICLES)
+
+
 def _causes(_: typer.Context) -> Iterable[str]:
     from bridgegen.cause import CAUSES
 
@@ -138,6 +144,7 @@ NAMES: dict[str, Callable[[typer.Context], Iterable[str]]] = {
     "setting": _settings,
     "driver": _drivers,
     "others": _others,
+    "vehicle": _vehicles,
     "stage": _stages,
     "metric": _metrics,
     "objective": _objectives,

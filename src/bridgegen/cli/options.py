@@ -28,6 +28,7 @@ OwnBaseline = Annotated[
     ),
 ]
 Ideal = Annotated[str | None, declaration("ideal", shown="the file's")]
+Vehicle = Annotated[str | None, declaration("vehicle")]
 TimeLimit = Annotated[float | None, declaration("time_limit")]
 OnlyMetrics = Annotated[
     str | None,

@@ -55,6 +55,7 @@ def preventability(
             rich_help_panel=WHAT,
         ),
     ] = None,
+    vehicle: common.Vehicle = None,
     others: common.Others = None,
     workers: common.Workers = None,
     out: Annotated[
@@ -94,6 +95,7 @@ def preventability(
             grid=grid,
             models=read_names(models),
             fixed=read_fixed(fix, "--fix"),
+            vehicle=vehicle,
             others=others,
             workers=workers,
             out=out,

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Annotated, Any, get_args, get_origin
 import typer
 
 from bridgegen.disk import write_whole
+from bridgegen.ego import is_remote
 from bridgegen.errors import BridgeGenError, FileFormatError, InputError, StorageError
 from bridgegen.options import SearchOptions, file_forms, options_of
 from bridgegen.options.file_forms import FileForm
@@ -206,6 +207,8 @@ def _moved(key: Key, value: Any, move: Callable[[str], object]) -> Any:
     if key.name == _CRITERIA:
         return [str(move(one)) if one.lower().endswith(_YAML) else one for one in value]
     if not isinstance(value, str):
+        return value
+    if is_remote(value):
         return value
     if key.name in _CODE:
         path, colon, what = value.rpartition(":")

@@ -236,6 +236,7 @@ def simulate(
         ),
     ] = None,
     ideal: common.Ideal = None,
+    vehicle: common.Vehicle = None,
     others: common.Others = None,
     empty_trigger: common.EmptyTrigger = None,
     time_limit: common.TimeLimit = None,
@@ -277,6 +278,7 @@ def simulate(
         file,
         ego=ego,
         ideal=stages,
+        vehicle=vehicle,
         others=others,
         empty_trigger=empty_trigger or "never",
         time_limit=time_limit,
@@ -318,7 +320,11 @@ def simulate(
 @app.command("check-driver", rich_help_panel=SEARCH)
 def check_driver(
     driver: Annotated[
-        str, typer.Argument(help="module:Class, file.py:Class, file.py:function, file.fmu.")
+        str,
+        typer.Argument(
+            help="module:Class, file.py:Class, file.py:function, file.fmu, connect:HOST:PORT, "
+            "unix:PATH, 'exec:COMMAND'."
+        ),
     ],
     scenario: Annotated[
         list[str] | None,

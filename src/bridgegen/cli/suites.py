@@ -62,7 +62,7 @@ Out = Annotated[
 ]
 
 of_all_scenarios = with_options(
-    "ideal", "others", "time_limit", "criteria", "critical", "count", "empty_trigger"
+    "ideal", "vehicle", "others", "time_limit", "criteria", "critical", "count", "empty_trigger"
 )
 """Gives a command the options of how each scenario is run and judged."""
 

@@ -4,7 +4,7 @@ import re
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
-from bridgegen.ego import is_spec
+from bridgegen.ego import is_remote, is_spec
 
 _VERSION = re.compile(r"[-_@]v?([0-9]+(?:[._][0-9]+)*)$")
 _SUFFIXES = (".py", ".fmu")
@@ -50,6 +50,8 @@ def driver_of(text: str, project: Path, bridgegen: str) -> Driver:
         project: folder of the project.
         bridgegen: version of BridgeGen that made the result.
     """
+    if is_remote(text):
+        return Driver(text, "", text)
     if not is_spec(text):
         name, version = _split(text)
         return Driver(name, version or f"BridgeGen {bridgegen}", text)

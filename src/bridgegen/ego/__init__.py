@@ -1,5 +1,6 @@
 """Systems under test: the drivers that an ego can have, by name."""
 
+from bridgegen.ego.address import is_remote
 from bridgegen.ego.drivers import (
     DRIVERS,
     GUESTS,
@@ -7,6 +8,7 @@ from bridgegen.ego.drivers import (
     STAGES,
     STORYBOARD,
     Driver,
+    file_of,
     is_planner,
     is_spec,
     join,
@@ -21,8 +23,10 @@ __all__ = [
     "STAGES",
     "STORYBOARD",
     "Driver",
+    "file_of",
     "get",
     "is_planner",
+    "is_remote",
     "is_spec",
     "join",
     "split",

@@ -27,12 +27,17 @@ EMERGENCY_FROM = 4.0  # m/s², a demand to brake harder than ACC may (ISO 15622:
 
 
 @kernel
-def actuate(state, demanded, bend, dt, ideal):
-    """Return (acceleration [m/s²], curvature [1/m]) that act from now on for one step."""
+def actuate(state, demanded, bend, dt, ideal, lags):
+    """Return (acceleration [m/s²], curvature [1/m]) that act from now on for one step.
+
+    A vehicle with actuators of its own has the lags (``lags`` is false then).
+    """
     if ideal:
         return demanded, bend
     jerk = EMERGENCY_JERK if demanded < -EMERGENCY_FROM else JERK
     state[COMMAND] += min(max(demanded - state[COMMAND], -jerk * dt), jerk * dt)
+    if not lags:
+        return state[COMMAND], bend
     share = 1.0 - math.exp(-dt / LAG)
     state[BUILD_UP] += share * (state[COMMAND] - state[BUILD_UP])
     state[APPLIED] += share * (state[BUILD_UP] - state[APPLIED])

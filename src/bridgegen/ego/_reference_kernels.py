@@ -192,4 +192,5 @@ def drive(k, plan_, roads, state, record):
             roads.paths[0], roads.counts[0], roads.steps[0], s, shift_of(mind), record.x[0, k],
             record.y[0, k], record.h[0, k], preview(v),
         )  # fmt: skip
-    return control.actuate(mind, mind[PLANNED], curvature, plan_.dt, plan_.ideal_control)
+    lags = plan_.moves_chassis == 0
+    return control.actuate(mind, mind[PLANNED], curvature, plan_.dt, plan_.ideal_control, lags)

@@ -6,6 +6,12 @@
     def drive(scene, ego, route, tracks, memory):
         return acceleration, curvature
 
+One that wants more (see `bridgegen.ego.interface.WANTS`) gets further arguments, in its order:
+
+    @compiled_driver(wants=("lanes",))
+    def drive(scene, ego, route, tracks, memory, lanes):
+        room = lanes.beside[0, 0, 1]
+
 It is written in the Python that numba compiles, and called inside the rollout without overhead. It
 gets for one scenario what a class gets for many (`Observation`, `Scene`), in records with the
 fields of ``SCENE``, ``EGO``, ``ROUTE`` and ``TRACK``: ``ego.v``, ``route[3].x``, ``tracks[0].vx``.
@@ -13,13 +19,23 @@ fields of ``SCENE``, ``EGO``, ``ROUTE`` and ``TRACK``: ``ego.v``, ``route[3].x``
 
 import inspect
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from bridgegen.ego.interface import (
+    CONFLICT_WAYS,
+    HISTORY,
+    NEAR_PIECES,
+    PIECE_POINTS,
+    ROUTE_POINTS,
+)
+from bridgegen.ego.traits import checked_wants
 from bridgegen.errors import InputError
+
+ANY = -1  # the size of an axis that depends on the scenario
 
 
 def _record(*names: str) -> np.dtype[Any]:
@@ -46,6 +62,56 @@ TRACK = _record(
 )  # fmt: skip
 """One of the M other participants as the sensors track them, see `Observation.tracks`."""
 
+LANES = np.dtype(
+    [
+        ("speed_limit", np.float64, (ROUTE_POINTS,)),
+        ("width", np.float64, (ROUTE_POINTS,)),
+        ("junction", np.float64, (ROUTE_POINTS,)),
+        ("beside", np.float64, (ROUTE_POINTS, 2, 4)),
+        ("ends", np.float64),
+        ("goal", np.float64, (3,)),
+        ("stop_sign", np.float64),
+        ("crosswalk", np.float64, (4,)),
+    ]
+)
+"""The road along the route, see `bridgegen.ego.interface.Lanes`; one record."""
+
+PIECE = np.dtype(
+    [
+        ("points", np.float64, (PIECE_POINTS, 3)),
+        ("width", np.float64, (PIECE_POINTS,)),
+        *((name, np.float64) for name in (
+            "count", "kind", "lane", "light", "marking", "speed_limit", "on_route",
+        )),
+    ]
+)  # fmt: skip
+"""A piece of the map, see `bridgegen.ego.interface.RoadMap`; kind -1 where there is none.
+
+``width`` is the lane's [m] at the points of a centre line, 0 of other pieces.
+"""
+
+PLACE = np.dtype([("lane", np.int64), ("near", np.int64, (NEAR_PIECES,))])
+"""What of the map is near, see `bridgegen.ego.interface.MapView`; one record."""
+
+CONFLICT = _record("enter", "leave", "other_enter", "other_leave", "priority", "how")
+"""One way of a participant across the route, see `bridgegen.ego.interface.Conflicts`."""
+
+WANTED: dict[str, tuple[tuple[str, np.dtype[Any], tuple[int, ...]], ...]] = {
+    "lanes": (("lanes", LANES, ()),),
+    "map": (
+        ("pieces", PIECE, (ANY,)),
+        ("place", PLACE, ()),
+        ("lights", np.dtype(np.float64), (ANY,)),
+    ),
+    "conflicts": (("conflicts", CONFLICT, (ANY, CONFLICT_WAYS)),),
+    "history": (("history", TRACK, (ANY, HISTORY)),),
+}
+"""The further arguments by the word of `WANTS`: name, type and shape; () is one record.
+
+``pieces`` are those of the whole map, ``lights`` the states of its lights; ``conflicts`` and
+``history`` have a row for each of the M other participants.
+"""
+
 ARGUMENT_TYPES = (SCENE, EGO, ROUTE, TRACK, np.dtype(np.float64))
 """The record type of each argument; scene and ego are one record, the others arrays of them."""
 
@@ -55,11 +121,17 @@ class CompiledDriver:
 
     Attributes:
         memory: how many numbers it keeps between two instants.
+        wants: words of `WANTS`, in the order of its arguments.
     """
 
-    def __init__(self, function: Callable[..., tuple[float, float]], memory: int) -> None:
+    def __init__(
+        self,
+        function: Callable[..., tuple[float, float]],
+        memory: int,
+        wants: tuple[str, ...] = (),
+    ) -> None:
         self._function = function
-        self.memory = memory
+        self.memory, self.wants = memory, wants
         self._code: Any = None  # keeps the machine code where it is
 
     def __call__(self, *arguments: Any) -> tuple[float, float]:
@@ -77,13 +149,13 @@ class CompiledDriver:
             InputError: numba cannot compile it, with the reason and the line.
         """
         if self._code is None:
-            self._code = _compile(self._function)
+            self._code = _compile(self._function, self.wants)
         address: int = self._code.address
         return address
 
 
 def compiled_driver(
-    *, memory: int = 0
+    *, memory: int = 0, wants: Iterable[str] = ()
 ) -> Callable[[Callable[..., tuple[float, float]]], CompiledDriver]:
     """Make a driver from a function ``(scene, ego, route, tracks, memory)``.
 
@@ -94,30 +166,32 @@ def compiled_driver(
         memory: how many numbers it keeps: ``memory`` is ``(memory,)`` float64, zeros at the start
             of each scenario, later as the function left it. No other state persists: numba
             treats globals as constants.
+        wants: what else it gets, in the order of its further arguments, see `WANTED`.
 
     Raises:
-        InputError: not a whole number >= 0.
+        InputError: not a whole number >= 0, or what is wanted is unknown.
     """
     if not isinstance(memory, int) or memory < 0:
         raise InputError(f"memory must be a whole number >= 0, got {memory!r}")
-    return lambda function: CompiledDriver(function, memory)
+    words = checked_wants(wants)
+    return lambda function: CompiledDriver(function, memory, words)
 
 
-def _compile(function: Callable[..., Any]) -> Any:
+def _compile(function: Callable[..., Any], wants: Sequence[str]) -> Any:
     """Return the C callback of a function; see `CompiledDriver.address`."""
     import numba
 
     if numba.config.DISABLE_JIT:
         raise InputError("a compiled driver must be compiled, which NUMBA_DISABLE_JIT forbids")
-    if len(inspect.signature(function).parameters) != len(ARGUMENT_TYPES):
-        raise InputError(
-            f"{_place(function)}: {function.__name__} must take scene, ego, route, tracks, memory"
-        )
+    further = [argument for word in wants for argument in WANTED[word]]
+    names = ["scene", "ego", "route", "tracks", "memory", *(name for name, *_ in further)]
+    if len(inspect.signature(function).parameters) != len(names):
+        raise InputError(f"{_place(function)}: {function.__name__} must take {', '.join(names)}")
     code = numba.njit(nogil=True, error_model="numpy", boundscheck=True)(function)
-    kinds = [numba.from_dtype(kind) for kind in ARGUMENT_TYPES]
-    arrays = [numba.types.Array(kind, 1, "C", aligned=kind is kinds[-1]) for kind in kinds[2:]]
+    shapes = [(), (), *[(ANY,)] * 3, *(shape for *_, shape in further)]
+    types = [*ARGUMENT_TYPES, *(kind for _, kind, _ in further)]
     try:
-        code.compile((*kinds[:2], *arrays))
+        code.compile(tuple(map(_type_of, types, shapes)))
         returned = code.nopython_signatures[0].return_type
         numbers = getattr(returned, "types", ())
         real = (numba.types.Integer, numba.types.Float)
@@ -126,32 +200,86 @@ def _compile(function: Callable[..., Any]) -> Any:
                 f"{_place(function)}: {function.__name__} must return (acceleration, curvature), "
                 f"returns {returned}"
             )
-        return _callback(code)
+        return _callback(code, wants)
     except InputError:
         raise
     except Exception as error:  # numba's passes raise exceptions of any type
         raise InputError(_described(function, error)) from None
 
 
-def _callback(code: Any) -> Any:
+def _type_of(kind: np.dtype[Any], shape: tuple[int, ...]) -> Any:
+    """Return Numba's type of an argument."""
+    import numba
+
+    found = numba.from_dtype(kind)
+    if not shape:
+        return found
+    return numba.types.Array(found, len(shape), "C", aligned=not kind.names)
+
+
+def _callback(code: Any, wants: Sequence[str]) -> Any:
     import numba
     from numba import carray
 
     scene_type, ego_type, route_type, track_type, number = ARGUMENT_TYPES
+    ask = _with_wanted(code, wants)
 
-    def call(scene, _1, ego, _2, route, n, tracks, m, memory, size, answer, _3):  # type: ignore[no-untyped-def]
-        acceleration, curvature = code(
+    def call(  # type: ignore[no-untyped-def]
+        scene, _1, ego, _2, route, n, tracks, m, memory, size, answer, _3, lanes, _4,
+        pieces, n_pieces, place, _5, lights, n_lights, conflicts, n_conflicts, history, n_history,
+    ):  # fmt: skip
+        plain = (
             carray(scene, (1,), scene_type)[0],
             carray(ego, (1,), ego_type)[0],
             carray(route, (n,), route_type),
             carray(tracks, (m,), track_type),
             carray(memory, (size,), number),
         )
+        acceleration, curvature = ask(
+            (lanes, pieces, place, lights, conflicts, history),
+            (1, n_pieces, 1, n_lights, n_conflicts, n_history),
+            plain,
+        )
         out = carray(answer, (3,), number)
         out[0], out[1], out[2] = acceleration, curvature, 1.0
 
-    signature = numba.types.void(*[numba.types.voidptr, numba.types.intp] * 6)
+    signature = numba.types.void(*[numba.types.voidptr, numba.types.intp] * 12)
     return numba.cfunc(signature, nopython=True, error_model="numpy")(call)
+
+
+def _with_wanted(code: Any, wants: Sequence[str]) -> Any:
+    """Return a function of all pointers and sizes, and of a tuple of the plain arguments.
+
+    It calls the code with these and with what is wanted. (A function cannot return records.)
+    """
+    import numba
+    from numba import carray
+
+    def call(then: Any, at: int, kind: Any, shape: tuple[int, ...]) -> Any:
+        width = shape[-1] if shape else 0
+
+        @numba.njit
+        def with_record(pointers, sizes, given):  # type: ignore[no-untyped-def]
+            return then(pointers, sizes, (*given, carray(pointers[at], (1,), kind)[0]))
+
+        @numba.njit
+        def with_rows(pointers, sizes, given):  # type: ignore[no-untyped-def]
+            return then(pointers, sizes, (*given, carray(pointers[at], (sizes[at],), kind)))
+
+        @numba.njit
+        def with_table(pointers, sizes, given):  # type: ignore[no-untyped-def]
+            return then(pointers, sizes, (*given, carray(pointers[at], (sizes[at], width), kind)))
+
+        return (with_record, with_rows, with_table)[len(shape)]
+
+    @numba.njit
+    def found(pointers, sizes, given):  # type: ignore[no-untyped-def]
+        return code(*given)
+
+    names = [name for arguments in WANTED.values() for name, *_ in arguments]
+    for name, kind, shape in reversed([one for word in wants for one in WANTED[word]]):
+        found = call(found, names.index(name), kind, shape)
+    return found
 
 
 def _described(function: Callable[..., Any], error: Exception) -> str:

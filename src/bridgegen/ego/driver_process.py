@@ -7,8 +7,11 @@ process is ended, and another is started for the next batch.
 import importlib
 import importlib.util
 import sys
+import time
 import traceback
+from collections import deque
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from types import ModuleType
@@ -17,14 +20,22 @@ from typing import Any
 import numpy as np
 
 from bridgegen.arrays import Float
+from bridgegen.ego.address import is_remote
 from bridgegen.ego.compiled import CompiledDriver
 from bridgegen.ego.drivers import TIME_LIMIT, is_spec
-from bridgegen.ego.interface import BatchDriver, Control, Observation, Scene
+from bridgegen.ego.interface import BatchDriver, Control, Observation, Scene, Trajectory
+from bridgegen.ego.remote.process import RemoteProcess
+from bridgegen.ego.traits import NAMES, Traits, traits_of
+from bridgegen.ego.trajectory import Plans, checked_plans
+from bridgegen.ego.views import MapSender, Viewer, Views
 from bridgegen.errors import InputError
 from bridgegen.isolated import Answer, CallError, IsolatedProcess, serve
 
 START_SECONDS = 120.0
 """Time limit [s] to import and construct a driver, which may load a network."""
+
+TIMED_CALLS = 10_000
+"""Calls whose duration is kept."""
 
 
 class DriverError(CallError):
@@ -40,16 +51,19 @@ class DriverProcess:
 
     Args:
         spec: ``package.module:Class``, ``file.py:Class``, the same of a compiled driver's function,
-            or a co-simulation unit, ``file.fmu``.
+            a co-simulation unit, ``file.fmu``; or a driver in a process of the user's own, see
+            `bridgegen.ego.remote`.
         time_limit: seconds that a call may take.
 
     Attributes:
-        memory: how many numbers a compiled driver keeps; None for one called in Python. Known
-            when the process has started.
+        traits: what the driver says of itself. Known when the process has started.
         answers_each_row: whether it has answered several rows at once in the right shape.
+        answers: what it has answered so far: "control", "trajectory" or both.
+        asked_at: the time of the last observation that it was shown [s].
+        call_seconds: how long its last calls took [s], the way there and back included.
     """
 
-    memory: int | None
+    traits: Traits
     answers_each_row: bool = False
 
     def __init__(self, spec: str, time_limit: float = TIME_LIMIT) -> None:
@@ -57,11 +71,19 @@ class DriverProcess:
             raise InputError(f"a driver's time limit [s] must be > 0 and finite, got {time_limit}")
         if not is_spec(spec):
             raise InputError(
-                f"a driver is named package.module:Class, file.py:Class or file.fmu, got '{spec}'"
+                "a driver is named package.module:Class, file.py:Class, file.fmu, "
+                f"connect:HOST:PORT, unix:PATH or exec:COMMAND; got '{spec}'"
             )
         self.spec = spec
         self.time_limit = time_limit
-        self._process = IsolatedProcess("bridgegen.ego.driver_process", [spec], DriverError)
+        self.answers: set[str] = set()
+        self.asked_at = 0.0
+        self.call_seconds: deque[float] = deque(maxlen=TIMED_CALLS)
+        self._process: IsolatedProcess | RemoteProcess
+        if is_remote(spec):
+            self._process = RemoteProcess(spec, DriverError, answering_of)
+        else:
+            self._process = IsolatedProcess("bridgegen.ego.driver_process", [spec], DriverError)
 
     def start(self) -> None:
         """Start the process, if it is not running, and construct the driver in it.
@@ -71,8 +93,9 @@ class DriverProcess:
         """
         if self._process.runs:
             return
+        self._maps = MapSender()
         try:
-            self.memory = self._process.start(START_SECONDS)
+            self.traits = self._process.start(START_SECONDS)
         except DriverError as error:
             raise InputError(f"the driver '{self.spec}' cannot be made: {error}") from None
 
@@ -84,20 +107,32 @@ class DriverProcess:
             InputError: it cannot be made.
         """
         self.start()
-        self._process.ask("reset", n, scene, seconds=self.time_limit)
+        sent = self._maps.send(scene.maps) if scene.maps else None
+        scene = replace(scene, maps=())
+        self._process.ask("reset", n, scene, sent, seconds=self.time_limit)
 
-    def act(self, observation: Observation) -> tuple[Float, Float]:
-        """Return its control, ``(N,)`` acceleration [m/s²] and curvature [1/m].
+    def act(
+        self, observation: Observation, views: Views | None = None
+    ) -> tuple[Float, Float] | Plans:
+        """Return its control, ``(N,)`` acceleration [m/s²] and curvature [1/m], or its plans.
+
+        Args:
+            observation: without what the driver wants.
+            views: what it wants, for `Viewer.complete`.
 
         Raises:
             DriverError: it raised, timed out, died, or its answer is invalid: another shape, NaN or
-                an infinite value for a scenario that is running.
+                an infinite value for a scenario that is running, or a trajectory that
+                `checked_plans` refuses.
         """
-        demanded: tuple[Float, Float] = self._process.ask(
-            "act", observation, seconds=self.time_limit
+        self.asked_at, start = observation.time, time.perf_counter()
+        answer: tuple[Float, Float] | Plans = self._process.ask(
+            "act", observation, views or {}, seconds=self.time_limit
         )
+        self.call_seconds.append(time.perf_counter() - start)
         self.answers_each_row = self.answers_each_row or len(observation.x) > 1
-        return demanded
+        self.answers.add("trajectory" if isinstance(answer, Plans) else "control")
+        return answer
 
     def call(
         self,
@@ -183,18 +218,29 @@ def module_of(where: str) -> ModuleType:
     return module
 
 
-def checked(control: Any, running: Any) -> tuple[Float, Float]:
-    """Return a driver's answer as two arrays ``(N,)``; 0 where a scenario has ended.
+def checked(answer: Any, seen: Observation, period: float) -> tuple[Float, Float] | Plans:
+    """Return a driver's answer: plans, or two arrays ``(N,)``, 0 where a scenario has ended.
+
+    Args:
+        answer: of ``act``.
+        seen: what it was asked about.
+        period: the time until it is asked again [s].
 
     Raises:
-        DriverError: another shape, not numbers, or not finite.
+        DriverError: another shape, not numbers, not finite, or a trajectory that cannot be driven.
     """
-    pair = (control.acceleration, control.curvature) if isinstance(control, Control) else control
+    if isinstance(answer, Trajectory):
+        try:
+            return checked_plans(answer, seen, period)
+        except InputError as error:
+            raise DriverError("answered nonsense", str(error)) from None
+    running = seen.running
+    pair = (answer.acceleration, answer.curvature) if isinstance(answer, Control) else answer
     try:
         acceleration, curvature = pair
         arrays = [np.asarray(one, dtype=np.float64) for one in (acceleration, curvature)]
     except (TypeError, ValueError) as error:
-        text = f"act must return a Control or (acceleration, curvature): {error}"
+        text = f"act must return a Control, (acceleration, curvature) or a Trajectory: {error}"
         raise DriverError("answered nonsense", text) from None
     for what, array in zip(("acceleration", "curvature"), arrays, strict=True):
         if array.shape != running.shape:
@@ -208,8 +254,8 @@ def checked(control: Any, running: Any) -> tuple[Float, Float]:
     return np.where(running, arrays[0], 0.0), np.where(running, arrays[1], 0.0)
 
 
-def answering(spec: str) -> tuple[int | None, Answer]:
-    """Construct a driver; return its memory, if it is compiled, and its answering function."""
+def answering(spec: str) -> tuple[Traits, Answer]:
+    """Construct a driver; return what it says of itself, and its answering function."""
     driver = make(spec)
     if isinstance(driver, CompiledDriver):
         address = driver.address
@@ -217,15 +263,27 @@ def answering(spec: str) -> tuple[int | None, Answer]:
         def call(_: str, function: Callable[..., Any], *arguments: Any) -> Any:
             return function(address, *arguments)
 
-        return driver.memory, call
+        return Traits(memory=driver.memory, wants=driver.wants), call
+
+    return answering_of(driver)
+
+
+def answering_of(driver: BatchDriver) -> tuple[Traits, Answer]:
+    """Return what a driver says of itself, and the function that answers requests to it."""
+    traits = traits_of({name: getattr(driver, name, None) for name in NAMES})
+    viewer = Viewer(traits.wants)
+    period = 0.0
 
     def answer(what: str, *rest: Any) -> Any:
+        nonlocal period
         if what == "reset":
-            driver.reset(*rest)
+            period = traits.steps(rest[1].time_step) * rest[1].time_step
+            driver.reset(rest[0], viewer.reset(*rest))
             return None
-        return checked(driver.act(*rest), rest[0].running)
+        observation = viewer.complete(*rest)
+        return checked(driver.act(observation), observation, period)
 
-    return None, answer
+    return traits, answer
 
 
 def _described(error: Exception) -> str:

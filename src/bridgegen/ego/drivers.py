@@ -4,8 +4,10 @@ import math
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from enum import Enum
+from pathlib import Path
 from typing import Self
 
+from bridgegen.ego.address import address_of, is_remote
 from bridgegen.ego.planners.registry import planners, require
 from bridgegen.errors import InputError, UnknownNameError
 from bridgegen.physics import CAREFUL_BRAKING_G, CAREFUL_REACTION
@@ -175,8 +177,8 @@ def get(name: str, ideal: Iterable[str] = (), time_limit: float | None = None) -
 
     Args:
         name: of one that ships, of a planner, or a user's own: ``package.module:Class``,
-            ``file.py:Class`` (or a compiled driver's function), ``file.fmu``. The latter are
-            loaded only when they drive.
+            ``file.py:Class`` (or a compiled driver's function), ``file.fmu``; or where it runs,
+            as ``connect:HOST:PORT``, ``unix:PATH``, ``exec:COMMAND``. It is loaded when it drives.
         ideal: stages to idealise.
         time_limit: [s] that one call of a user's own driver may take.
 
@@ -193,6 +195,8 @@ def get(name: str, ideal: Iterable[str] = (), time_limit: float | None = None) -
         )
     if name in known:
         return known[name].idealised(ideal)
+    if is_remote(name):
+        address_of(name)
     spec, what = name, "A driver of the user's own."
     if is_planner(name):
         planner = planners()[name]
@@ -214,9 +218,19 @@ def is_planner(name: str) -> bool:
 
 def is_spec(name: str) -> bool:
     """Return whether a name is that of a user's own driver, which is code."""
+    if is_remote(name):
+        return True
     where, _, cls = name.rpartition(":")
     is_class = bool(where and cls.isidentifier())
     return name.endswith(".fmu") or (is_class and not is_planner(name))
+
+
+def file_of(name: str) -> Path | None:
+    """Return the file that the name of a user's own driver holds; None if it holds none."""
+    if not is_spec(name) or is_remote(name):
+        return None
+    where = name if name.endswith(".fmu") else name.rpartition(":")[0]
+    return Path(where) if where.endswith((".py", ".fmu")) else None
 
 
 def split(text: str) -> tuple[str, ...]:

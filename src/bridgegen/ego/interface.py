@@ -13,6 +13,8 @@ What costs time is given only to a driver that asks for it, by a class attribute
 
     class MyDriver:
         wants = ("lanes", "map")
+
+A driver that can drive so many scenarios at once at most says so likewise: ``max_rows = 1``.
 """
 
 from dataclasses import dataclass, field, fields, is_dataclass
@@ -32,6 +34,12 @@ ROUTE_STEP = 2.0
 HISTORY, HISTORY_STEP = 11, 0.1
 """H, how many instants a history has; seconds between two of them."""
 
+
+NEAR_PIECES = 128
+"""Q, how many of the nearest pieces of the map a `MapView` has at most."""
+
+CONFLICT_WAYS = 6
+"""W, how many ways of a participant `Conflicts` has at most."""
 
 WANTS = {
     "lanes": "speed limit, width and the lanes beside along the route; the way to its end",
@@ -164,6 +172,18 @@ class Lanes:
             marking between allows to change to it (1).
         ends: ``(N,)`` float64 [m], along the route to its end, where the scenario's goal is.
         goal: ``(N, 3)`` float64, x, y [m] and heading [rad] there.
+        stop_sign: ``(N,)`` float64 [m], from the front of the ego to the line of the next stop sign
+            on the route; +inf where there is none.
+        crosswalk: ``(N, 4)`` float64 [m] of the first crosswalk on the route that the ego has not
+            left: from its front to where the route enters it, from its rear to where the route
+            leaves it, and how far that reaches to the left of the route and (negative) to the
+            right; +inf where there is none.
+
+    Lanes beside are those that cars travel on, 2.2 m wide at least, as for the reference driver.
+    Beyond the route's end the values are those of its end. Where the ego is on a path other than
+    its first route (its storyboard gave it a new one), only ``ends`` and ``goal`` are known, those
+    of that path; elsewhere there is no limit, no lane beside, no stop sign, no crosswalk, and the
+    width is 0.
     """
 
     speed_limit: Float
@@ -172,6 +192,8 @@ class Lanes:
     beside: Float
     ends: Float
     goal: Float
+    stop_sign: Float
+    crosswalk: Float
 
 
 @dataclass(frozen=True)
@@ -200,10 +222,16 @@ class Conflicts:
     """Where ways that others may take meet the ego's route; a participant may have W ways.
 
     Attributes:
-        zones: ``(N, M, W, 5)`` float64: from the ego's front along the route to the zone's begin
+        zones: ``(N, M, W, 6)`` float64: from the ego's front along the route to the zone's begin
             and from its rear to its end [m] (negative once passed); the same of the other's box
-            along its way; and the priority: 1 they give way, 0 no rule, -1 the ego gives way.
-            NaN where there is no way, no meeting, or the participant is not tracked.
+            along its way; the priority: 1 they give way, 0 no rule, -1 the ego gives way; and how
+            they meet: 0 the ways cross, 1 they merge, 2 they run together and part again.
+            NaN where there is no way, no meeting, or the participant is not tracked. The zones that
+            the ego reaches first come first.
+
+    They are those of the reference driver: a zone begins where both bodies, 0.6 m apart, would
+    touch. A vehicle is expected on all ways that the map offers from where it is; one that is on
+    none of these, and who walks or rides a bicycle, straight ahead, too.
     """
 
     zones: Float
@@ -213,15 +241,17 @@ class Conflicts:
 class Trajectory:
     """What a driver plans in N scenarios, instead of a `Control`; the house follows it.
 
-    A driver that plans may say how often, by a class attribute ``period`` [s]; it is then asked
-    so often, and its last plan is followed meanwhile.
+    A driver may say how often it is asked, by a class attribute ``period`` [s], 0.05 to 0.5: the
+    nearest whole number of time steps. Its last plan is followed, or its last control held,
+    meanwhile. `bridgegen.ego.trajectory.checked_plans` says what is refused.
 
     Attributes:
-        time: ``(K,)`` or ``(N, K)`` float64 [s] from now on, increasing; beyond the period.
+        time: ``(K,)`` or ``(N, K)`` float64 [s] from now on, increasing; the first one before the
+            next call, the last one not before it. K is 1000 at most.
         x: ``(N, K)`` float64 [m], the reference point, the rear axle's centre.
         y: ``(N, K)`` float64 [m].
         h: ``(N, K)`` float64 [rad], heading.
-        v: ``(N, K)`` float64 [m/s], forward speed.
+        v: ``(N, K)`` float64 [m/s], forward speed, >= 0.
     """
 
     time: npt.ArrayLike
@@ -251,13 +281,17 @@ class BatchDriver(Protocol):
         """Begin N scenarios; discard the state of earlier ones."""
 
     def act(self, observation: Observation) -> Control | Trajectory | Any:
-        """Return the control at one instant: a `Control`, or a pair (acceleration, curvature)."""
+        """Return a `Control`, a pair (acceleration, curvature), or a `Trajectory`."""
 
 
 # --- The road network, for drivers that want "map" ------------------------------------------------
 
 CENTRE, BORDER, CROSSWALK, STOP_LINE = range(4)
 """What a piece of the map is."""
+
+UNMARKED, BROKEN, SOLID = range(3)
+"""How a border is marked: by nothing, by what one may cross (from either side), or by a line that
+one may not cross, from one side at least."""
 
 PIECE_POINTS = 11
 """V, how many points a piece has at most, 2 m apart at most."""
@@ -334,7 +368,12 @@ class RoadMap:
         piece_points: ``(K,)`` int64, how many points count; the last is repeated.
         piece_kind: ``(K,)`` int8: CENTRE, BORDER, CROSSWALK or STOP_LINE.
         piece_lane: ``(K,)`` int64, the index of the lane that it belongs to, or -1.
-        piece_light: ``(K,)`` int64, the index of the light that governs that lane, or -1.
+        piece_light: ``(K,)`` int64, the index of the light that governs that lane, or of which it
+            is the stop line; or -1.
+        piece_marking: ``(K,)`` int8: of a border UNMARKED, BROKEN or SOLID; else UNMARKED.
+
+    A border between two lanes of a road is one piece: that of the lane whose outer border it is,
+    seen from the road's centre; the centre's belongs to a lane beside it.
     """
 
     lanes: tuple[Lane, ...]
@@ -346,3 +385,4 @@ class RoadMap:
     piece_kind: npt.NDArray[np.int8]
     piece_lane: Int
     piece_light: Int
+    piece_marking: npt.NDArray[np.int8]

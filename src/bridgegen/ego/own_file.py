@@ -5,6 +5,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from bridgegen.ego import drivers
+from bridgegen.ego.address import is_remote
 from bridgegen.errors import InputError
 
 MAX_BYTES = 2**20
@@ -16,7 +17,7 @@ def get(name: str, ideal: Iterable[str] = (), time_limit: float | None = None) -
     Raises:
         InputError: a file without the class in it; names the classes and functions that it has.
     """
-    if name.endswith(".py"):
+    if name.endswith(".py") and not is_remote(name):
         raise InputError(
             f"a driver in a file is named FILE.py:CLASS, or FILE.py:FUNCTION if it is compiled, "
             f"got '{name}'; {_names_in(name)}"

@@ -131,16 +131,16 @@ def is_off_road(road: Road, lane_id: int, s: float, aside: float) -> bool:
     outer = {lane: float(t[0]) for lane, t in borders(road, index, np.array([s])).items()}
     if lane_id == 0 or lane_id not in outer:
         return False
-    t = 0.5 * (outer[lane_id] + outer[_inner(lane_id)]) + aside
+    t = 0.5 * (outer[lane_id] + outer[inner(lane_id)]) + aside
     edges = [
-        sorted((outer[lane.id], outer[_inner(lane.id)]))
+        sorted((outer[lane.id], outer[inner(lane.id)]))
         for lane in (*section.left, *section.right)
         if lane.type in OF_THE_ROAD
     ]
     return not any(low <= t <= high for low, high in edges)
 
 
-def _inner(lane_id: int) -> int:
+def inner(lane_id: int) -> int:
     """Return the lane that is next to one towards the road's centre."""
     return lane_id - (1 if lane_id > 0 else -1)
 

@@ -224,10 +224,10 @@ def road_along(model: OpenDrive, route: Route, step: float, count: int) -> Float
         s = piece.s + piece.rate * (stations[at] - piece.station)
         road = model.road(piece.road_id)
         number = section_index(road, 0.5 * (piece.s + piece.s_end))
-        lane_id = _lane_of(route.steps, piece.road_id, piece.s, piece.s_end)
+        lane_id = lane_of(route.steps, piece.road_id, piece.s, piece.s_end)
         section = road.sections[number]
         s = np.clip(s, section.s, section_end(road, number))
-        found[at, 0] = _limits(road, number, lane_id, s)
+        found[at, 0] = speed_limits(road, number, lane_id, s)
         if not road.is_connecting:
             found[at, 1], found[at, 2] = _beside(road, number, lane_id, s)
     return found
@@ -243,7 +243,7 @@ def stop_lines(model: OpenDrive, route: Route, lights: Sequence[str]) -> list[St
             if signal.id not in lights or not governs(road, signal, step.lane_id):
                 continue
             # Inside a junction it is for those who enter: one does not stop within.
-            s = step.s if road.is_connecting else _line_of(road, signal.s, step.lane_id)
+            s = step.s if road.is_connecting else line_of(road, signal.s, step.lane_id)
             if low <= s <= high:
                 a, b = route.station(road.id, s)
                 found.append(StopLine(signal.id, a + b * s))
@@ -257,7 +257,7 @@ def stop_signs(model: OpenDrive, route: Route) -> list[float]:
         road, lane = model.road(one.before.road_id), one.before.lane_id
         for signal in road.signals:
             if signal.type == STOP_SIGN and governs(road, signal, lane):
-                s = _line_of(road, signal.s, lane)
+                s = line_of(road, signal.s, lane)
                 a, b = route.station(road.id, s)
                 found.append(a + b * s)
     return sorted(found)
@@ -371,7 +371,8 @@ def _inner(model: OpenDrive, stretch: Stretch, s: float) -> float:
     return s
 
 
-def _lane_of(steps: Sequence[Step], road_id: str, s: float, s_end: float) -> int:
+def lane_of(steps: Sequence[Step], road_id: str, s: float, s_end: float) -> int:
+    """Return on which lane a route leads from one place of a road to another [m]."""
     middle = 0.5 * (s + s_end)
     for step in steps:
         low, high = min(step.s, step.s_end), max(step.s, step.s_end)
@@ -380,7 +381,7 @@ def _lane_of(steps: Sequence[Step], road_id: str, s: float, s_end: float) -> int
     raise AssertionError("a piece lies on one of its route's steps")
 
 
-def _limits(road: Road, number: int, lane_id: int, s: Float) -> Float:
+def speed_limits(road: Road, number: int, lane_id: int, s: Float) -> Float:
     """Return the speed limits [m/s] that hold on a lane."""
     limits = np.full(len(s), np.inf)
     for one in sorted(road.types, key=lambda each: each.s):
@@ -414,7 +415,7 @@ def _beside(road: Road, number: int, lane_id: int, s: Float) -> tuple[Float, Flo
     return found[0], found[1]
 
 
-def _line_of(road: Road, s: float, lane_id: int) -> float:
+def line_of(road: Road, s: float, lane_id: int) -> float:
     """Return where the stop line of a light at ``s`` is [m along the road]: there, if none is."""
     lines = [
         one.s

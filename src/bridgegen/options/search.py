@@ -25,6 +25,7 @@ from bridgegen.options.option import DRIVER as OF_DRIVER
 from bridgegen.options.option import OBJECTIVE, OUTPUT, SEARCH, option, options_of
 from bridgegen.options.option import SIMULATOR as OF_SIMULATOR
 from bridgegen.simulation.choice import EMBEDDED, SimulatorChoice, Value
+from bridgegen.simulation.vehicles import KINEMATIC
 
 MAX_BUDGET = 10**7
 MAX_SEED = 2**32 - 1
@@ -47,7 +48,8 @@ class PipelineOptions:
         metadata=option(
             TEXT,
             "Driver of the ego, see 'bridgegen list drivers'; or your own: module:Class, "
-            "file.py:Class (or a compiled driver's function), file.fmu.",
+            "file.py:Class (or a compiled driver's function), file.fmu; or where it runs: "
+            "connect:HOST:PORT, unix:PATH, 'exec:COMMAND'.",
             shown="the scenario's choice",
             group=OF_DRIVER,
             names="driver",
@@ -63,6 +65,18 @@ class PipelineOptions:
             before=(),
             group=OF_DRIVER,
             names="stage",
+        ),
+    )
+    vehicle: str | None = field(
+        default=None,
+        metadata=option(
+            TEXT,
+            "How the ego moves: kinematic, a bicycle within a friction circle; or single-track, "
+            "with tyres that slip, load transfer, and actuators that lag.",
+            shown="kinematic, or what the file says",
+            before=KINEMATIC,
+            group=OF_DRIVER,
+            names="vehicle",
         ),
     )
     worse_than: str | None = field(
@@ -117,8 +131,8 @@ class PipelineOptions:
         default=None,
         metadata=option(
             TEXT,
-            "Count only critical scenarios of this cause: perception, planning, control or "
-            "unavoidable.",
+            "Count only critical scenarios of this cause: perception, 'vehicle dynamics', "
+            "planning, control or unavoidable.",
             shown="any",
             before=None,
             group=OBJECTIVE,

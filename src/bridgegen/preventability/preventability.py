@@ -48,6 +48,7 @@ def map_preventability(
     grid: Mapping[str, GridAxis] | Sequence[str] | None = None,
     models: Sequence[str] = MODELS,
     fixed: Mapping[str, float | str] | None = None,
+    vehicle: str | None = None,
     others: str | None = None,
     workers: int | str | Workers | None = None,
     out: Path | str | None = None,
@@ -66,6 +67,7 @@ def map_preventability(
             pictures differ in; or texts ``NAME=LOW:HIGH:N``. By default that of the scenario.
         models: the drivers that decide whether a collision is preventable.
         fixed: other parameters to hold at a value; at their defaults otherwise.
+        vehicle: how the egos move, those of the models too; see `bridgegen.simulation.vehicles`.
         others: driver of the other participants: "attentive" or "scripted"; the scenario's choice
             by default.
         workers: a number of processes, ``"ray"``, ``"ray://HOST:PORT"``, or open workers; threads
@@ -101,15 +103,16 @@ def map_preventability(
         "fixed": space.fixed,
         "drivers": list(drivers),
         "models": list(judges),
+        **({"vehicle": vehicle} if vehicle else {}),
         "files of drivers": {name: digest_of(name) for name in names},
     }
-    command = _command(scenario, drivers, judges, cells, fixed or {}, others, folder)
+    command = _command(scenario, drivers, judges, cells, fixed or {}, vehicle, others, folder)
     store = ChunkStore(folder, settings, len(names), cells.cells)
     found = np.empty((len(names), cells.cells), np.int8)
     done = 0
     try:
         with open_workers(workers) as hands:
-            run = _Run(logical, cells, drivers, judges, hands, say)
+            run = _Run(logical, cells, drivers, judges, vehicle, hands, say)
             for i in range(store.count):
                 start, stop = store.bounds(i)
                 part = store.read(i)
@@ -136,10 +139,12 @@ class _Run:
         grid: Grid,
         drivers: Sequence[str],
         models: Sequence[str],
+        vehicle: str | None,
         workers: Workers,
         say: MapCallbacks,
     ) -> None:
         self._scenario, self._grid, self._workers, self._say = scenario, grid, workers, say
+        self._vehicle = vehicle
         self._drivers, self._names = drivers, simulated(drivers, models)
         # Those that are drivers, too, have driven everywhere already.
         self._models = sorted(models, key=lambda name: name not in drivers)
@@ -168,7 +173,7 @@ class _Run:
             return arithmetic.outcomes(name, self._scenario.name, self._grid.space, X)
         if name not in self._pipelines:
             self._say.compile()
-            options = PipelineOptions(ego=name)
+            options = PipelineOptions(ego=name, vehicle=self._vehicle)
             made = Pipeline(self._scenario, self._grid.space, options, workers=self._workers)
             made.warm_up()
             self._pipelines[name] = made
@@ -207,6 +212,7 @@ def _command(
     models: Sequence[str],
     grid: Grid,
     fixed: Mapping[str, float | str],
+    vehicle: str | None,
     others: str | None,
     folder: Path,
 ) -> str:
@@ -219,6 +225,8 @@ def _command(
         words += ["--models", ",".join(models)]
     for name, value in fixed.items():
         words += ["--fix", f"{name}={value}"]
+    if vehicle is not None:
+        words += ["--vehicle", vehicle]
     if others is not None:
         words += ["--others", others]
     return shlex.join([*words, "--out", str(folder)])

@@ -165,6 +165,21 @@ class Course:
 
 
 @dataclass(frozen=True)
+class Planned:
+    """A trajectory that the ego's driver planned.
+
+    Attributes:
+        step: the instant at which it planned it.
+        seconds: how far it looks ahead [s].
+        points: ``(n, 2)`` float64 [m], of the reference point, at equal intervals of that time.
+    """
+
+    step: int
+    seconds: float
+    points: Float
+
+
+@dataclass(frozen=True)
 class Conflict:
     """The decisive conflict of a scenario, and where it is in the motion.
 
@@ -232,6 +247,7 @@ class Playback:
         ttc: ``(T,)`` float64 [s], the ego's least time to collision; None: not known.
         sensed: what the ego's sensors made of the others; None where it perceives nothing.
         course: of the ego, as planned; None where unknown.
+        plans: the trajectories that its driver planned, ascending; empty where it plans none.
         weather: from the start on, and whenever it changes; empty: not known.
         street_lights: ``(n, 2)`` float64 [m].
         conflict: the decisive one; None if there is none, or it was not analysed.
@@ -263,6 +279,7 @@ class Playback:
     ttc: Float | None = None
     sensed: Sensed | None = None
     course: Course | None = None
+    plans: tuple[Planned, ...] = ()
     weather: tuple[Weather, ...] = ()
     street_lights: Float | None = None
     conflict: Conflict | None = None

@@ -14,7 +14,7 @@ from bridgegen.arrays import Float
 from bridgegen.metrics.d_min import first_closest
 from bridgegen.participants import drawing_of
 from bridgegen.report.findings_payload import conflict_payload
-from bridgegen.report.playback import Beside, Course, Lamp, Playback, Sensed, Weather
+from bridgegen.report.playback import Beside, Course, Lamp, Planned, Playback, Sensed, Weather
 from bridgegen.report.series import packed
 from bridgegen.weather import in_words
 
@@ -90,6 +90,7 @@ def playback_payload(p: Playback, road: int, picture: int | None) -> dict[str, A
         "contacts": begins.tolist(),
         "sensed": None if p.sensed is None else _sensed(p.sensed, p),
         "course": None if p.course is None else _course(p.course, p.n_steps),
+        "plans": [_planned(one) for one in p.plans if one.step < p.n_steps],
         "beside": [_beside(one, p.n_steps) for one in p.beside if one.entities],
         "weather": [_weather(one) for one in p.weather if one.step < p.n_steps],
         "street_lights": lights,
@@ -206,6 +207,14 @@ def _course(c: Course, n_steps: int) -> dict[str, Any]:
             [int(i), *np.round(shift[i], 2).tolist()] for i in np.flatnonzero(moved)
         ],
     }  # fmt: skip
+
+
+def _planned(one: Planned) -> dict[str, Any]:
+    return {
+        "step": one.step,
+        "seconds": round(one.seconds, 2),
+        "points": _line(one.points, ROAD_SCALE),
+    }
 
 
 def _shows(states: npt.NDArray[np.int8]) -> list[list[int]]:

@@ -19,7 +19,7 @@ from bridgegen.metrics.ttc import ttc_over_time
 from bridgegen.ontology.check import constraints_in_words
 from bridgegen.pipeline import Pipeline
 from bridgegen.report.painter import paint
-from bridgegen.report.playback import Beside, Conflict, Course, Playback, Weather
+from bridgegen.report.playback import Beside, Conflict, Course, Planned, Playback, Weather
 from bridgegen.report.scenery import Scenery, bodies, lamps, vehicle_lamps
 from bridgegen.report.sensing import sensed
 from bridgegen.simulation.rollout import STATUS_MESSAGES, Rollout
@@ -30,6 +30,9 @@ from bridgegen.weather import COLUMNS
 THIN = 0.01
 """How far a way's line may be off where its points lie nearly straight [m]."""
 
+
+PLAN_POINTS, PLANS_EVERY = 20, 0.2
+"""Points of a trajectory that are shown at most, and seconds between two of them at least."""
 
 APART = 0.05
 """How far apart an entity is with two drivers at least for the playback to show both [m]."""
@@ -253,6 +256,7 @@ def _played(
                 cause=one.cause,
                 sensed=detections[k] if detections else None,
                 course=_course(replay, k),
+                plans=_plans(replay, k),
                 weather=tuple(_weather(step, one) for step, one in replay.weathers[k]),
                 street_lights=road.street_lights,
                 conflict=_conflict(conflicts, k, count),
@@ -293,6 +297,23 @@ def _course(replay: Replay, row: int) -> Course | None:
         acceleration=meant.acceleration[row],
         shift=meant.shift[row],
     )
+
+
+def _plans(replay: Replay, row: int) -> tuple[Planned, ...]:
+    """Return the trajectories of a row's driver, with a few points of each."""
+    made = replay.intentions.plans if replay.intentions else ()
+    if not made:
+        return ()
+    every = max(1, round(PLANS_EVERY / replay.rollout.time_step))
+    found: list[Planned] = []
+    for step, states in sorted(made[row].items()):
+        if found and step - found[-1].step < every:
+            continue
+        time = states[:, 0]
+        at = np.linspace(0.0, time[-1], min(PLAN_POINTS, len(time)))
+        points = np.stack([np.interp(at, time, states[:, i]) for i in (1, 2)], axis=1)
+        found.append(Planned(step, float(time[-1]), points))
+    return tuple(found)
 
 
 def _thin(line: Float) -> Float:

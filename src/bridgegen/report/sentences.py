@@ -18,6 +18,7 @@ MOST_TITLES = 3
 AVOIDED = {
     Cause.PERCEPTION: "would not happen with ideal perception",
     Cause.PLANNING: "would not happen to a careful and competent driver",
+    Cause.VEHICLE_DYNAMICS: "would not happen to a kinematic vehicle",
     Cause.CONTROL: "would not happen with ideal control or on a dry road",
     Cause.UNAVOIDABLE: "would happen all the same",
 }

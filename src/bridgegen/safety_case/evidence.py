@@ -9,7 +9,7 @@ from pathlib import Path
 from bridgegen.campaign.exported import FOLDER
 from bridgegen.campaign.scenarios import is_file
 from bridgegen.confirmation.record import file_name
-from bridgegen.ego import is_spec
+from bridgegen.ego import file_of
 from bridgegen.errors import StorageError
 from bridgegen.safety_case.facts import Facts
 from bridgegen.safety_case.model import Evidence
@@ -76,10 +76,10 @@ class Files:
             )
             if path and Path(path).is_file()
         ]
-        code = settings.ego if settings.ego.endswith(".fmu") else settings.ego.rpartition(":")[0]
+        code = file_of(settings.ego)
         self.driver = ""
-        if is_spec(settings.ego) and Path(code).is_file():
-            self.driver = self._add(Path(code), "the driver, as it is at the export", "")
+        if code is not None and code.is_file():
+            self.driver = self._add(code, "the driver, as it is at the export", "")
 
     def _scenario(self, stem: str) -> Iterator[tuple[Path, str]]:
         """Yield the files of an exported scenario that exist, and what each shows."""

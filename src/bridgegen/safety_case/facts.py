@@ -11,7 +11,7 @@ from bridgegen.campaign.restored import searched
 from bridgegen.campaign.run import Run
 from bridgegen.confirmation.record import read_records
 from bridgegen.confirmation.schema import Record
-from bridgegen.ego import is_spec
+from bridgegen.ego import is_remote, is_spec
 from bridgegen.errors import InputError, StorageError
 from bridgegen.odd.coverage import Coverage, coverage
 from bridgegen.odd.scenario import SearchedScenario
@@ -53,9 +53,8 @@ class Facts:
     def ego(self) -> str:
         """The system under test, as people call it; of a user's file without its folder."""
         named = self.run.settings.ego
-        return (
-            self.triage.ego.replace(named, Path(named).name) if is_spec(named) else self.triage.ego
-        )
+        is_file = is_spec(named) and not is_remote(named)
+        return self.triage.ego.replace(named, Path(named).name) if is_file else self.triage.ego
 
     @property
     def fresh_harmful(self) -> int:

@@ -144,7 +144,7 @@ def print_checks(checks: "Iterable[Check]", *, as_json: bool) -> bool:
             continue
         if check.scenario != scenario:
             scenario = check.scenario
-            print(scenario)
+            print(scenario, flush=True)
         sign = "no " if check.problem else "   " if check.figure else "ok "
         print(f"  {sign} {check.rule}" + (f": {check.figure}" if check.figure else ""))
         if check.problem:

@@ -10,6 +10,7 @@ from bridgegen.simulation.carla.settings import MEANINGS as CARLA_SETTINGS
 from bridgegen.simulation.carla.settings import OPTIONS as CARLA_OPTIONS
 from bridgegen.simulation.carla.settings import Access as CarlaAccess
 from bridgegen.simulation.carla.settings import CarlaSettings
+from bridgegen.simulation.vehicles import KINEMATIC
 
 if TYPE_CHECKING:  # it is part of the command line, which starts fast
     from bridgegen.ego import Driver
@@ -177,7 +178,11 @@ class SimulatorChoice:
         return "--detector" in self.access
 
     def simulator(
-        self, storyboard: "OpenScenario", place: str, driver: "Driver | None" = None
+        self,
+        storyboard: "OpenScenario",
+        place: str,
+        driver: "Driver | None" = None,
+        vehicle: str | None = None,
     ) -> "Simulator[Any]":
         """Return the simulator, with a storyboard.
 
@@ -185,6 +190,7 @@ class SimulatorChoice:
             storyboard: the scenario file, validated.
             place: its name, for messages.
             driver: who drives the ego; what the file says by default.
+            vehicle: how the ego moves; what the file says by default.
 
         Raises:
             UnsupportedError: what it cannot run, by name and line, all of it at once.
@@ -192,7 +198,8 @@ class SimulatorChoice:
         """
         from bridgegen.simulation.embedded.simulator import EmbeddedSimulator
 
-        return self.around(EmbeddedSimulator(storyboard, place, driver=driver), storyboard)
+        embedded = EmbeddedSimulator(storyboard, place, driver=driver, vehicle=vehicle)
+        return self.around(embedded, storyboard)
 
     def around(self, embedded: "EmbeddedSimulator", storyboard: "OpenScenario") -> "Simulator[Any]":
         """Return the simulator, with the storyboard that the embedded one has.
@@ -202,13 +209,20 @@ class SimulatorChoice:
             storyboard: the scenario file that it was made of.
 
         Raises:
-            InputError: see ``simulator``; or the ego's driver lives in another simulator.
+            InputError: see ``simulator``; or the ego's driver or its vehicle lives in another
+                simulator.
         """
         driver = embedded.program.driver
         if driver.home not in ("", self.name):
             raise InputError(
                 f"{embedded.program.place}: the driver '{driver.name}' drives in the simulator "
                 f"{driver.home} alone (--simulator {driver.home}), got {self.name}"
+            )
+        vehicle = embedded.program.vehicle
+        if vehicle != KINEMATIC and self.name != EMBEDDED.name:
+            raise InputError(
+                f"{embedded.program.place}: the vehicle '{vehicle}' is of the embedded simulator; "
+                f"{self.name} moves the ego in its own way (--vehicle {KINEMATIC})"
             )
         return SIMULATORS[self.name].make(embedded, storyboard, self.settings, self.access)
 

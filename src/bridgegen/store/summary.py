@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from bridgegen.arrays import Bool, Float
-from bridgegen.cause import CAUSES
+from bridgegen.cause import CAUSES, Cause
 
 
 @dataclass(frozen=True)
@@ -54,6 +54,8 @@ def summarise(
 ) -> Summary:
     """Return a run's figures from ``(N,)`` columns in the order of evaluation."""
     counts = {one.label: int(np.count_nonzero(cause == one)) for one in CAUSES}
+    if not counts[Cause.VEHICLE_DYNAMICS.label]:  # of vehicles with dynamics alone
+        del counts[Cause.VEHICLE_DYNAMICS.label]
     n, hits = len(critical), np.flatnonzero(critical)
     d, v = (d_min[ok], v_d[ok]) if ok.any() else (np.array([np.nan]), np.array([np.nan]))
     return Summary(

@@ -170,8 +170,8 @@ def _classes(
         if not open_.any():
             break
         model = Pipeline(
-            scenario, pipeline.space, PipelineOptions(ego=name), simulator=simulator,
-            workers=Threads(1),
+            scenario, pipeline.space, PipelineOptions(ego=name, vehicle=pipeline.vehicle),
+            simulator=simulator, workers=Threads(1),
         )  # fmt: skip
         codes[open_] = outcomes(model, X[open_])
         open_ &= codes != Outcome.AVOIDED

@@ -1,6 +1,5 @@
 """An entry of a suite → its pipeline → the results of its rows."""
 
-import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -21,10 +20,11 @@ from bridgegen.pipeline import Pipeline
 from bridgegen.simulation.choice import SimulatorChoice
 from bridgegen.simulation.rollout import STATUS_MESSAGES
 from bridgegen.suite.clauses import judged
+from bridgegen.suite.driver_digest import driver_digest
 from bridgegen.suite.entries import Entry
 from bridgegen.suite.results import EntryResult, GridResult, RowResult, finite
 from bridgegen.suite.rows import Rows, is_sample, rows_of
-from bridgegen.workers import CarriedDriver, Threads
+from bridgegen.workers import Threads
 
 AT_ONCE = 512
 """Rows that are evaluated together; no result depends on it."""
@@ -63,12 +63,8 @@ class Job:
 
     @property
     def driver_digest(self) -> str:
-        """A digest of the file of a driver of the user's, without what it imports; else empty."""
-        try:
-            data = CarriedDriver.of(self.ego).data if self.ego else None
-        except InputError:
-            return ""
-        return "" if data is None else hashlib.sha256(data).hexdigest()
+        """A digest of the files of a driver of the user's; else empty."""
+        return driver_digest(self.ego) if self.ego else ""
 
     def is_of(self, result: EntryResult) -> bool:
         """Whether a result is that of the files as they are now."""

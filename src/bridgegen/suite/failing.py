@@ -1,5 +1,6 @@
 """Failures for a suite that grows: in runs, in results of suites, and in scenario files."""
 
+import shlex
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -118,7 +119,7 @@ def _of_run(
     if code and not egos:
         raise InputError(
             f"{folder}: its ego is driven by {settings.ego}, which is code; to run it, name it: "
-            f"--ego {settings.ego}"
+            f"--ego {shlex.quote(settings.ego)}"
         )
     if egos and settings.ego not in egos:
         given = ", ".join(egos)
@@ -126,7 +127,7 @@ def _of_run(
     ego = settings.ego if code else None
     options = CommonOptions(
         criteria=settings.criteria, count=run.triage.count,
-        ideal=settings.ideal if ego else (),
+        ideal=settings.ideal if ego else (), vehicle=settings.vehicle,
     )  # fmt: skip
     exported = {one.name: one.evaluation for one in exported_scenarios(folder)}
     moded = {name for mode in run.modes for name in mode.exports}

@@ -30,7 +30,7 @@ MOST_PLAYBACKS = 50
 
 _MODULE = "suite.js"
 
-_SIMULATE = ("ideal", "others", "time_limit", "criteria", "empty_trigger")
+_SIMULATE = ("ideal", "vehicle", "others", "time_limit", "criteria", "empty_trigger")
 """Options that ``bridgegen simulate`` has, too."""
 
 

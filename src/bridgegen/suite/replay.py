@@ -37,6 +37,7 @@ class _Settings(Strict):
     empty_trigger: str | None
     time_limit: float | None
     matrix: str | None = None
+    vehicle: str | None = None
     version: str
 
 
@@ -166,8 +167,9 @@ def job_of(suite: SuiteRun, result: EntryResult, simulator: SimulatorChoice | No
         )
     options = CommonOptions(
         criteria=settings.criteria, critical=settings.critical, objective=settings.objective,
-        count=settings.count, ideal=settings.ideal, others=settings.others,
-        empty_trigger=settings.empty_trigger, time_limit=settings.time_limit,
+        count=settings.count, ideal=settings.ideal, vehicle=settings.vehicle,
+        others=settings.others, empty_trigger=settings.empty_trigger,
+        time_limit=settings.time_limit,
     )  # fmt: skip
     entry = indexed(Entry(result.entry, result.scenario, result.distribution or None))
     chosen = SimulatorChoice(
@@ -190,7 +192,7 @@ def refuse_code(results: Sequence[EntryResult], named: Sequence[str], command: s
         raise InputError(
             *(
                 f"the ego is driven by {one}, which is code; to run it, name it: "
-                f"{command} --ego {one}"
+                f"{command} --ego {shlex.quote(one)}"
                 for one in sorted(code)
             )
         )

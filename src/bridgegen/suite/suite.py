@@ -72,8 +72,8 @@ class SuiteArguments:
     options: CommonOptions = field(
         default_factory=CommonOptions,
         metadata={
-            "help": "Options of all scenarios: criteria, critical, count, ideal, others, "
-            "time_limit, empty_trigger."
+            "help": "Options of all scenarios: criteria, critical, count, ideal, "
+            "vehicle, others, time_limit, empty_trigger."
         },
     )
     samples: int = field(
@@ -250,6 +250,7 @@ def _settings(given: SuiteArguments) -> dict[str, Any]:
         "objective": dict(options.objective) if options.objective else None,
         "count": options.count,
         "ideal": list(options.ideal),
+        "vehicle": options.vehicle,
         "others": options.others,
         "empty_trigger": options.empty_trigger,
         "time_limit": options.time_limit,

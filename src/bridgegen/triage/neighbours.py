@@ -155,4 +155,6 @@ def fix_name(fix: Counterfactual) -> str:
         return "perception is ideal"
     if fix.cause is Cause.PLANNING:
         return f"{fix.driver.name} drives"
+    if fix.cause is Cause.VEHICLE_DYNAMICS:
+        return "the vehicle is kinematic"
     return "the road is dry" if fix.dry else "control is ideal"

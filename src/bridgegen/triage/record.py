@@ -33,7 +33,9 @@ Drawn = Literal["random", "sobol", "fresh", ""]
 """Where rows come from whose share is an estimate: the run's own, drawn at random or from a Sobol
 sequence; fresh random ones; "" where there are none and nothing is estimated."""
 
-CauseLabel = Literal["perception", "planning", "control", "unavoidable", "sensitive", ""]
+CauseLabel = Literal[
+    "perception", "planning", "vehicle dynamics", "control", "unavoidable", "sensitive", ""
+]
 """Labels of `bridgegen.cause.Cause`; "sensitive": a small change of the parameters alone makes
 most of the harm vanish, so that no fix can be credited; "" where it is not known."""
 

@@ -25,7 +25,8 @@ from bridgegen.verdict.fail_if import (
 )
 from bridgegen.verdict.junit import Case, Suite, case_of, refuse_junit, write_junit
 
-_CAUSES = {one.label: "critical scenarios of this cause (quick: one replay)" for one in CAUSES}
+_CAUSES = {one.label.replace(" ", "_"): one.label for one in CAUSES}
+"""Figures, by the cause's label."""
 
 _TRIAGE = {
     "modes": "failure modes",
@@ -46,7 +47,7 @@ FIGURES = {
     "v_d_best": "the largest v_d [m/s]",
     "v_d_median": "the median of v_d [m/s]",
     "seconds": "duration of the search without compilation [s]",
-    **_CAUSES,
+    **dict.fromkeys(_CAUSES, "critical scenarios of this cause (quick: one replay)"),
     **_TRIAGE,
 }
 """The figures of a run that ``--fail-if`` accepts."""
@@ -145,7 +146,7 @@ def figures_of(run: Run) -> dict[str, float]:
         "d_min_median": s.d_min_median,
         "v_d_best": s.v_d_best,
         "v_d_median": s.v_d_median,
-        **{name: s.causes.get(name, 0) if sought else nan for name in _CAUSES},
+        **{n: s.causes.get(one, 0) if sought else nan for n, one in _CAUSES.items()},
         **_of_triage(run),
     }
     figures |= {one.criterion.quantity: one.violated for one in run.criteria}
@@ -251,7 +252,7 @@ def _contributes(facts: Facts, figures: Sequence[str]) -> bool:
             margin = facts.metrics[name].value if name in facts.metrics else None
             if margin is not None and margin < 0.0:
                 return True
-        elif name == cause if name in _CAUSES else name not in _OF_THE_RUN:
+        elif _CAUSES[name] == cause if name in _CAUSES else name not in _OF_THE_RUN:
             return True
     return False
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Self
 
-from bridgegen.ego import is_spec
+from bridgegen.ego import file_of
 from bridgegen.errors import InputError
 
 
@@ -33,7 +33,7 @@ class CarriedDriver:
         Raises:
             InputError: the file cannot be read.
         """
-        path = _file(name)
+        path = file_of(name)
         try:
             return cls(name, path.read_bytes() if path and path.is_file() else None)
         except OSError as error:
@@ -41,7 +41,7 @@ class CarriedDriver:
 
     def here(self) -> str:
         """Return its name here: unchanged if the same file exists, else that of a copy."""
-        path = _file(self.name)
+        path = file_of(self.name)
         if path is None or self.data is None or _holds(path, self.data):
             return self.name
         home = Path(tempfile.gettempdir()) / f"bridgegen-drivers-{os.getuid()}"
@@ -53,14 +53,6 @@ class CarriedDriver:
             part.write_bytes(self.data)
             part.replace(copy)
         return f"{copy}{self.name.removeprefix(str(path))}"
-
-
-def _file(name: str) -> Path | None:
-    """Return the file that a driver's name contains, or None."""
-    if not is_spec(name):
-        return None
-    where = name if name.endswith(".fmu") else name.rpartition(":")[0]
-    return Path(where) if where.endswith((".py", ".fmu")) else None
 
 
 def _holds(path: Path, data: bytes) -> bool:

@@ -166,3 +166,29 @@ def test_a_driver_that_hangs_can_be_stopped(file, name):
 def test_no_rows_at_all(cruising):
     pipeline, _ = cruising
     assert pipeline.rollout(rows(pipeline, 0)).shape[0] == 0
+
+
+@pytest.mark.parametrize(
+    ("name", "of_class", "scenario"),
+    [("lanes", "Lanes", "cut-in"), ("everything", "All", "red-light-runner")],
+)
+def test_it_gets_what_it_wants_as_a_class_does(name, of_class, scenario):
+    one = made(name, scenario, file="wanting_drivers.py")
+    other = made(of_class, scenario, file="wanting_drivers.py")
+    one, other = one.rollout(rows(one)), other.rollout(rows(other))
+    assert (one.status == 0).all()
+    assert np.ptp(one.v[:, 0]) > 5.0
+    for field in FIELDS:
+        np.testing.assert_allclose(
+            getattr(one, field), getattr(other, field), rtol=1e-9, atol=1e-9, err_msg=field
+        )
+
+
+def test_a_row_s_result_with_the_map_is_the_same_in_any_batch():
+    pipeline = made("All", "crossroads-s4", file="wanting_drivers.py")
+    X = rows(pipeline)
+    whole, order = pipeline.rollout(X), np.random.default_rng(1).permutation(N)
+    other, alone = pipeline.rollout(X[order]), pipeline.rollout(X[7:8])
+    for field in FIELDS:
+        np.testing.assert_array_equal(getattr(other, field), getattr(whole, field)[order])
+        np.testing.assert_array_equal(getattr(alone, field)[0], getattr(whole, field)[7])

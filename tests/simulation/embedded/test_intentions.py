@@ -1,6 +1,7 @@
 """Where the ego meant to go, asked afterwards, is where it was going."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -8,9 +9,11 @@ import pytest
 from bridgegen.odd.reader import load
 from bridgegen.options import PipelineOptions
 from bridgegen.pipeline import Pipeline
+from bridgegen.report.playbacks import _plans
 from bridgegen.simulation.embedded.batch import Batch
 from bridgegen.simulation.embedded.intentions import EVERY
 
+DRIVERS = Path(__file__).parents[2] / "ego" / "drivers.py"
 N = 6
 
 
@@ -82,6 +85,35 @@ def test_it_is_beside_its_way_by_its_offset(name, ego):
         assert gap == pytest.approx(np.abs(rollout.offset[row, 0, k[on]]), abs=0.3)
         assert (np.diff(meant.station[row, at[on]]) > -0.3).all()
         assert np.isnan(meant.acceleration[row]).all() == (ego != "reference")
+
+
+def test_the_trajectories_of_a_user_s_driver_are_those_that_it_made():
+    """Each begins where the ego is at that instant, and leads where the ego then is."""
+    _, _, replay = replayed("crossroads-s1", f"{DRIVERS}:Plans")
+    rollout, made = replay.rollout, replay.intentions.plans
+    assert len(made) == N
+    for row, plans in enumerate(made):
+        assert sorted(plans) == list(range(0, max(plans) + 1, 4))  # every 0.2 s
+        assert rollout.n_steps[row] - 5 <= max(plans) < rollout.n_steps[row]
+        for k, states in plans.items():
+            here = [getattr(rollout, name)[row, 0, k] for name in "xyhv"]
+            assert states[1, 1:5].tolist() == here
+            if k + 4 < rollout.n_steps[row]:
+                there = [getattr(rollout, name)[row, 0, k + 4] for name in "xy"]
+                assert states[3, 1:3] == pytest.approx(there, abs=0.05)
+    some = replay.take(np.array([4, 1])).intentions.plans
+    assert [one is made[row] for one, row in zip(some, (4, 1), strict=True)] == [True, True]
+    shown = _plans(replay, 2)
+    assert [one.step for one in shown] == sorted(made[2])
+    assert shown[0].points[[0, -1]].tolist() == made[2][0][[1, -1], 1:3].tolist()
+
+
+@pytest.mark.parametrize("name", ["Cruises", "PlansAtOnce"])
+def test_few_of_many_trajectories_are_shown_and_none_of_a_driver_that_plans_none(name):
+    _, _, replay = replayed("crossroads-s1", f"{DRIVERS}:{name}")
+    steps = [one.step for one in _plans(replay, 0)]
+    assert bool(steps) == (name == "PlansAtOnce")
+    assert set(np.diff(steps)) <= {4}
 
 
 def test_who_has_no_driver_means_nothing():

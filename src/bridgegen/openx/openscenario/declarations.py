@@ -48,6 +48,10 @@ DRIVER = "driver"
 IDEAL = "ideal"
 """Property of a controller: the stages of the driver that are ideal, separated by commas."""
 
+VEHICLE = "vehicle"
+"""Property of a controller: how the body moves that its driver drives, see
+`bridgegen.simulation.vehicles`."""
+
 NOISE_KEY = "noise_key"
 """Property of a controller: the key of its driver's random numbers, in decimal; where there is none
 it follows from the values of the file's parameters."""

@@ -9,7 +9,7 @@ import { addSection } from "./sections.js";
 
 export const CAUSE_HELP = [
   "", "gone with ideal perception", "gone with a careful and competent driver", "gone with ideal control or on a dry road",
-  "gone with none of these",
+  "gone with none of these", "gone with a kinematic vehicle",
 ];
 
 class Causes {

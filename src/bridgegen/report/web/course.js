@@ -1,5 +1,6 @@
 // Where the ego means to go: a band as wide as it is, as far as it would come within three seconds at the
-// acceleration that it plans now, with a mark for each of them and a bar where it would stand.
+// acceleration that it plans now, with a mark for each of them and a bar where it would stand. Of a driver that
+// plans trajectories: its last one, dashed, with a dot for each second from now.
 
 import { palette } from "./colours.js";
 import { isPlaced } from "./geometry.js";
@@ -53,7 +54,47 @@ export function intentionAt(kept, state) {
   };
 }
 
+// What is left of the trajectory that the driver follows now: points, and where it will be after 1, 2 … s; or null.
+export function plannedAt(kept, state) {
+  const plan = kept.plans?.[kept.planAt[state.index]];
+  if (!plan || !isPlaced(state.entities[0])) return null;
+  const { points, seconds } = plan, each = seconds / (points.length - 1);
+  const since = state.time - plan.step * kept.time_step;
+  if (since > seconds) return null;
+  const at = (t) => {
+    const i = Math.min(Math.floor(t / each), points.length - 2), f = t / each - i;
+    return points[i].map((from, axis) => from + f * (points[i + 1][axis] - from));
+  };
+  const dots = [];
+  for (let t = since + 1; t <= seconds + 1e-9; t += 1) dots.push(at(Math.min(t, seconds)));
+  return { points: [at(since), ...points.filter((_, i) => i * each > since)], dots };
+}
+
+function drawPlan(c, { points, dots }, scale) {
+  c.save();
+  c.lineJoin = "round";
+  for (const [colour, pixels] of [["rgba(8, 16, 26, 0.6)", 5], [palette.marking, 2.5]]) {
+    c.strokeStyle = c.fillStyle = colour;
+    c.lineWidth = pixels / scale;
+    c.setLineDash([8 / scale, 5 / scale]);
+    c.beginPath();
+    points.forEach((p, i) => c[i ? "lineTo" : "moveTo"](...p));
+    c.stroke();
+    for (const dot of dots) {
+      c.beginPath();
+      c.arc(...dot, (pixels + 2) / scale, 0, 2 * Math.PI);
+      c.fill();
+    }
+  }
+  c.restore();
+}
+
 export function drawCourse(c, kept, state, scale) {
+  const planned = plannedAt(kept, state);
+  if (planned) {
+    drawPlan(c, planned, scale);
+    return;
+  }
   const meant = intentionAt(kept, state);
   if (!meant) return;
   const { way, shift, front, end, stands, marks } = meant, half = kept.entities[0].width / 2;

@@ -11,7 +11,7 @@ import { minimals } from "./playbacks.js";
 import { addSection } from "./sections.js";
 
 const CAUSES_SAID = {
-  perception: "perception", planning: "planning", control: "control",
+  perception: "perception", planning: "planning", control: "control", "vehicle dynamics": "vehicle dynamics",
   unavoidable: "unavoidable: no fix removes the harm", sensitive: "sensitive: small changes of the parameters alone remove most of the harm",
 };
 

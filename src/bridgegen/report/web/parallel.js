@@ -48,7 +48,7 @@ class Parallel {
   rescale() {
     const chosen = this.names.map((name) => columns.get(name));
     this.axes = chosen.map((c) => ({ ...this.axis(c.name, c.unit, c.values, c.low, c.high), words: c.words, turn: c.turn }));
-    if (rows.cause) this.axes.push({ ...this.axis("cause", "", rows.cause, 0, 4), words: data.causes.labels });
+    if (rows.cause) this.axes.push({ ...this.axis("cause", "", rows.cause, 0, data.causes.labels.length - 1), words: data.causes.labels });
     this.axes.push({ ...this.axis("critical", "", rows.critical, 0, 1), words: ["no", "yes"] });
   }
 

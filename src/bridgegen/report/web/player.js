@@ -3,7 +3,7 @@
 import { addressOf } from "./address.js";
 import { $, copy, element } from "./common.js";
 import { ZONED, fillConflict } from "./conflict.js";
-import { intentionAt } from "./course.js";
+import { intentionAt, plannedAt } from "./course.js";
 import { Curves } from "./curves.js";
 import { data } from "./data.js";
 import { boxCentre, colourOf, isPlaced, playersOf, stateAt } from "./geometry.js";
@@ -101,13 +101,18 @@ export class Player {
 
   showLegend() {
     $("legend-players").replaceChildren(...this.players());
-    const has = { players: true, motion: true, conflict: ZONED.includes(this.kept.conflict?.conflict), sensed: this.kept.sensed, course: this.kept.course, weather: this.kept.weather.length, elsewhere: ghostsOf(this.kept).length };
+    const has = { players: true, motion: true, conflict: ZONED.includes(this.kept.conflict?.conflict), sensed: this.kept.sensed, course: this.kept.course || this.kept.plans?.length, weather: this.kept.weather.length, elsewhere: ghostsOf(this.kept).length };
     for (const item of $("legend").children) {
       const shown = this.scene.layers[item.dataset.layer], button = item.querySelector("button");
       item.hidden = !has[item.dataset.layer] || (!button && !shown);
       button?.setAttribute("aria-pressed", shown);
     }
-    if (this.kept.course) {
+    const plans = Boolean(this.kept.plans?.length);
+    if (plans) {
+      $("course-button").textContent = "Trajectory";
+      $("band-legend").hidden = true;
+    } else if (this.kept.course) {
+      $("plan-legend").hidden = true;
       const tells = this.kept.course.acceleration.some((a) => a !== null);
       $("course-button").textContent = tells ? "Planned path" : "Way ahead";
       $("course-means").textContent = `in 1, 2, 3 s${tells ? "" : " if it goes on like this"}; a thick bar: it stands`;
@@ -181,7 +186,7 @@ export class Player {
       scale: this.scene.view.scale, labels: this.scene.labels.boxes, crosses: this.scene.crosses,
       lights: this.kept.lamps.map((lamp) => lightAt(lamp, state.index)),
       detections: state.entities.map((_, e) => (e > 0 ? detectionAt(this.kept, e, state.index) : null)),
-      intention: intentionAt(this.kept, state), weather, elsewhere: this.scene.layers.elsewhere ? ghostsAt(this.kept, state) : [],
+      intention: intentionAt(this.kept, state), planned: plannedAt(this.kept, state), weather, elsewhere: this.scene.layers.elsewhere ? ghostsAt(this.kept, state) : [],
     };
   }
 

@@ -19,7 +19,7 @@ export function pointColours(by, critical) {
   const verdicts = elsewhere.find(({ column }) => column === by)?.values;
   const series = (name, text, items, k, colour) => ({ name, text, items, marker: { shape: SHAPES[k], colour } });
   if (by === "cause" && rows.cause) {
-    const colours = [palette.critical, palette["other-3"], palette.ego, palette["other-2"], palette["other-1"]];
+    const colours = [palette.critical, palette["other-3"], palette.ego, palette["other-2"], palette["other-1"], palette["other-4"]];
     const all = data.causes.labels.map((label, k) => series(`cause ${k}`, k ? label : "without a label", critical.filter((i) => rows.cause[i] === k), k, colours[k]));
     return all.filter(({ items }) => items.length);
   }

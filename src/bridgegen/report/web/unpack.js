@@ -36,6 +36,9 @@ export function unpack(kept) {
   kept.ttc = series.ttc ? one("ttc") : null;
   if (kept.sensed) kept.sensed = unpackSensed(kept.sensed, n);
   if (kept.course) kept.course = unpackCourse(kept.course, n);
+  const plans = kept.plans ?? [];
+  kept.planAt = holding(plans.map(({ step }) => step), n);
+  for (const plan of plans) plan.points = unpackLine(plan.points);
   return kept;
 }
 

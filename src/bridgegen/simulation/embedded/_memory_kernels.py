@@ -88,6 +88,8 @@ class Plan(NamedTuple):
     has_pedals: int
     driver_code: int
     own_code: int
+    chassis: Float
+    moves_chassis: int
     ideal_perception: int
     ideal_prediction: int
     ideal_control: int
@@ -101,7 +103,8 @@ class Roads(NamedTuple):
     of gravity [m/s²] what acts against the motion, and to the right, and the share [1] by which it
     presses less on the road; L is 0 on a network whose roads are level. ``bends`` ``(K, L)`` and
     ``drops`` ``(L,)`` are where the next bend of each path is, and the next lower speed limit; see
-    ``ego._speed_kernels``.
+    ``ego._speed_kernels``. ``lanes`` is ``lane_tables.lanes_along``, and ``pieces`` and
+    what follows them are `bridgegen.ego.map_grid.Grid`; without rows unless a driver wants them.
     """
 
     paths: Float
@@ -141,6 +144,12 @@ class Roads(NamedTuple):
     meetings: Float
     lines: Float
     signs: Float
+    lanes: Float
+    pieces: Float
+    middles: Float
+    grid_box: Float
+    grid_starts: Int
+    grid_order: Int
 
 
 class State(NamedTuple):
@@ -228,6 +237,8 @@ class State(NamedTuple):
         seen: ``(SEEN, E)`` what those drivers see; likewise,
         far: ``(E,)`` scratch of one driver.
         attention: ``(E, 3)``, a careful driver's state per body; see its kernel.
+        chassis: ``(MOTION,)`` how the ego's vehicle moves, if it has dynamics; see
+            ``_chassis_columns``.
         key: ``(1,)`` uint64, of the row's random numbers; see `bridgegen.ego.noise`.
         sensors: ``(E, MEMORY)``, between two frames; see ``ego._perception_kernels``.
         tracks: ``(E, TRACK)`` what the ego perceives; see ``ego._tracking_kernels``.
@@ -239,6 +250,13 @@ class State(NamedTuple):
         inputs: ``(·,)`` inputs of such a driver on ego and scene, see ``_own_driver_kernels``,
         ahead: ``(·, 4)`` its route,
         others: ``(·, TRACK)`` the tracks,
+        lanes: ``(·,)`` what it wants to know: the lanes, see ``_lane_view_kernels``,
+        place: ``(·,)`` int64, what of the map is near, see ``_map_view_kernels``,
+        nearby: ``(·,)`` what may soon be, likewise,
+        signals: ``(·,)`` the states of the lights,
+        conflicts: ``(·, W, CONFLICT)`` where others' ways meet its route,
+        past: ``(F, ·, TRACK)`` the tracks of the last F instants,
+        tracked: ``(·, H, TRACK)`` those of the last second,
         answer: ``(·,)`` and its output.
     """
 
@@ -317,6 +335,7 @@ class State(NamedTuple):
     seen: Annotated[Float, "seen", "entities"]
     far: Annotated[Float, "entities"]
     attention: Annotated[Float, "entities", 3]
+    chassis: Annotated[Float, "motion"]
     key: Annotated[npt.NDArray[np.uint64], 1]
     sensors: Annotated[Float, "entities", "sensors"]
     tracks: Annotated[Float, "entities", "track"]
@@ -327,6 +346,13 @@ class State(NamedTuple):
     inputs: Annotated[Float, "inputs"]
     ahead: Annotated[Float, "ahead", 4]
     others: Annotated[Float, "others", "track"]
+    lanes: Annotated[Float, "lanes"]
+    place: Annotated[Int, "place"]
+    nearby: Annotated[Float, "nearby"]
+    signals: Annotated[Float, "signals"]
+    conflicts: Annotated[Float, "conflicts", "conflict_ways", "conflict"]
+    past: Annotated[Float, "frames", "tracked", "track"]
+    tracked: Annotated[Float, "tracked", "instants_tracked", "track"]
     answer: Annotated[Float, "answer"]
 
 

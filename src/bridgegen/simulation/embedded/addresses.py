@@ -16,7 +16,7 @@ from bridgegen.simulation.embedded._codes import (
 )
 from bridgegen.simulation.embedded._memory_kernels import Plan, Record, Roads, State
 from bridgegen.simulation.embedded.conditions import look_closely
-from bridgegen.simulation.embedded.drivers import begin_waiting, heed
+from bridgegen.simulation.embedded.drivers import begin_waiting, heed, move_chassis
 from bridgegen.simulation.embedded.motion import (
     BEGINS,
     follow_course,
@@ -60,5 +60,8 @@ def addressed(plan: Plan, networks: Roads, states: State, records: Record) -> Pl
         starts_towed=at(start_towed) if len(plan.tows) else 0,
         looks_closely=at(look_closely, types.int64) if plan.looks_closely else 0,
         heeds=at(heed, types.int64) if plan.attends else 0,
+        moves_chassis=(
+            at(move_chassis, types.int64, types.float64, types.float64) if plan.chassis.size else 0
+        ),
         begins_waiting=at(begin_waiting, types.int64) if plan.attends else 0,
     )

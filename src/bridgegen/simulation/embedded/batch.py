@@ -16,10 +16,13 @@ from bridgegen.ego._reference_kernels import MIND
 from bridgegen.ego._surroundings_kernels import AROUND
 from bridgegen.ego._tracking_kernels import TRACK
 from bridgegen.ego._weather_columns import FRICTION, WEATHER
+from bridgegen.ego.compiled import CONFLICT
 from bridgegen.ego.detections import DETECTION
 from bridgegen.ego.drivers import STAGES, STORYBOARD
-from bridgegen.ego.interface import ROUTE_POINTS
+from bridgegen.ego.interface import CONFLICT_WAYS, HISTORY, NEAR_PIECES, ROUTE_POINTS, RoadMap
 from bridgegen.ego.noise import noise_key
+from bridgegen.ego.traits import Traits
+from bridgegen.ego.views import frames
 from bridgegen.errors import InputError
 from bridgegen.simulation.embedded import _memory_kernels as memory
 from bridgegen.simulation.embedded import _rollout_kernels as kernels
@@ -32,13 +35,18 @@ from bridgegen.simulation.embedded._codes import (
     PRESS,
 )
 from bridgegen.simulation.embedded.addresses import addressed
+from bridgegen.simulation.embedded.chassis._chassis_columns import MOTION
 from bridgegen.simulation.embedded.drivers import (
     ANSWER,
     DEMANDS,
+    LANES,
     N_INPUTS,
     code_of,
     fill_input_rows,
     observe_rows,
+    see_conflicts_of_rows,
+    see_lanes_of_rows,
+    see_map_of_rows,
 )
 from bridgegen.simulation.embedded.places.network import Network
 from bridgegen.simulation.embedded.program import Program
@@ -58,7 +66,7 @@ class Batch:
         roads: P road networks, made ready for it.
         rows: ``(N,)`` int64 in 0..P-1, the road network of each row.
         values: ``(N,)`` float64 per parameter; see `Simulator.run`.
-        own_memory: how many numbers a compiled driver of the user's own keeps; None without one.
+        own: what a driver of the user's own needs; None without one.
         noise: ``(N,)`` uint64, keys of the rows' random numbers; see `noise_keys`.
         until_collision: whether a row ends once the ego collides, see ``_collision_kernels``; not
             where there are trailers, whose boxes may overlap the one of what tows them.
@@ -77,7 +85,7 @@ class Batch:
         roads: Network,
         rows: Int,
         values: Mapping[str, npt.ArrayLike],
-        own_memory: int | None = None,
+        own: Traits | None = None,
         noise: npt.NDArray[np.uint64] | None = None,
         until_collision: bool = False,
     ) -> None:
@@ -88,11 +96,17 @@ class Batch:
         self._plan = _plan(program, until_collision and not len(program.tows))
         slots = program.fill(values, n)
         key = noise_keys(program, values, n) if noise is None else noise
-        state = _state(program, roads, rows, slots, key, own_memory)
+        state = _state(program, roads, rows, slots, key, own)
         self._block, self.state = _packed(state)
         self.record = _record(program, n)
         self._messages: dict[int, str] = {}
         self._has_addresses = False
+
+    @property
+    def pieces(self) -> Float:
+        """The pieces of the first row's map, ``(K, ·)`` as `PIECE` has them."""
+        pieces: Float = self._roads.tables.pieces[self._rows[0]]
+        return pieces
 
     @property
     def running(self) -> Bool:
@@ -218,6 +232,26 @@ class Batch:
             step, route, tracks, stop, light,
         )  # fmt: skip
 
+    def see_lanes(self, views: Float) -> None:
+        """Fill what running rows see of the lanes, ``(N, LANES)``; see ``_lane_view_kernels``."""
+        body, roads = self._program.bodies[0], self._roads.tables
+        see_lanes_of_rows(body, roads, self._rows, self.state, views)
+
+    def see_map(self, k: int, memories: Float, places: Int) -> None:
+        """Fill what is near of running rows ``(N, 1 + Q)``; see ``_map_view_kernels``."""
+        tables, rows = self._roads.tables, self._rows
+        see_map_of_rows(k, tables, rows, self.state, self.record, memories, places)
+
+    def see_conflicts(self, k: int, found: Float) -> None:
+        """Fill the conflicts of running rows ``(N, M, W, CONFLICT)``, after ``observe``."""
+        tables, rows = self._roads.tables, self._rows
+        see_conflicts_of_rows(k, self._plan, tables, rows, self.state, self.record, found)
+
+    def maps(self) -> tuple[tuple[RoadMap, ...], Int]:
+        """Return the road maps of the rows, and which of them each row has, ``(N,)``."""
+        used, of = np.unique(self._rows, return_inverse=True)
+        return tuple(self._roads.maps[p] for p in used.tolist()), of.reshape(-1)
+
     def impose(self, k: int, bodies: Int, states: Float) -> None:
         """Move bodies ``(B,)`` of the running rows to poses ``(N, B, 4)``; see `CoSimulation`."""
         drivers.impose_rows(
@@ -334,6 +368,7 @@ def _plan(program: Program, until_collision: bool) -> memory.Plan:
         "until_collision": int(until_collision),
         "has_pedals": int((program.actions[:, DOES] == PRESS).any()),
         "driver_code": 0,
+        "moves_chassis": 0,
         "own_code": 0,
         "dt": program.time_step,
         **stages,
@@ -394,14 +429,15 @@ def _state(
     rows: Int,
     slots: Float,
     key: npt.NDArray[np.uint64],
-    own_memory: int | None,
+    own: Traits | None,
 ) -> memory.State:
     """Return the state of N rows before they start; ``start`` sets what else is not 0."""
     n, e = len(rows), len(program.names)
     start = slots[:, np.maximum(program.start_slots, 0)]  # of no effect where there is no slot
     varied = slots[:, np.maximum(program.aside_slots, 0)]
     hypotheses = roads.scene.hypotheses.shape[1]
-    has_own = own_memory is not None
+    compiled = own if own and own.memory is not None else None  # else it has arrays of its own
+    wants = compiled.wants if compiled else ()
     sizes = {
         "entities": e,
         "slots": slots.shape[1],
@@ -423,14 +459,25 @@ def _state(
         "seen": SEEN,
         "sensors": MEMORY,
         "track": TRACK,
+        "motion": MOTION if program.chassis.size else 0,
         "around": AROUND,
         "passages": 2 * e + hypotheses,
         "passage": PASSAGE,
         "hypotheses": hypotheses,
-        "mind": MIND if own_memory is None else own_memory,
+        "mind": MIND if compiled is None else compiled.memory or 0,
         "inputs": N_INPUTS,
-        "ahead": ROUTE_POINTS if has_own else 0,
-        "others": e - 1 if has_own else 0,
+        "ahead": ROUTE_POINTS if compiled else 0,
+        "others": e - 1 if compiled else 0,
+        "lanes": LANES if "lanes" in wants else 0,
+        "place": 1 + NEAR_PIECES if "map" in wants else 0,
+        "nearby": drivers.MEMORY if "map" in wants else 0,
+        "signals": len(program.lights) if "map" in wants else 0,
+        "conflicts": e - 1 if "conflicts" in wants else 0,
+        "conflict_ways": CONFLICT_WAYS,
+        "conflict": CONFLICT.itemsize // 8,
+        "tracked": e - 1 if "history" in wants else 0,
+        "instants_tracked": HISTORY,
+        "frames": frames(program.time_step) if "history" in wants else 0,
         "answer": ANSWER,
     }
     given = {

@@ -34,6 +34,8 @@ class Intentions:
         acceleration: ``(N, P)`` float64 [m/s²], as planned; NaN where the driver does not report
         it.
         shift: ``(N, P, 4)`` float64, its course beside the way, see ``ego._shift_kernels``.
+        plans: of each row the trajectories that a user's driver planned: the instant, and its
+            states ``(K, 6)``, see ``ego._trajectory_kernels``; empty where it planned none.
     """
 
     steps: Int
@@ -41,11 +43,13 @@ class Intentions:
     station: Float
     acceleration: Float
     shift: Float
+    plans: tuple[Mapping[int, Float], ...] = ()
 
     def take(self, at: Int) -> "Intentions":
         """Return some of the rows."""
+        plans = tuple(self.plans[row] for row in at.tolist()) if self.plans else ()
         return Intentions(
-            self.steps, self.way[at], self.station[at], self.acceleration[at], self.shift[at]
+            self.steps, self.way[at], self.station[at], self.acceleration[at], self.shift[at], plans
         )
 
 
@@ -58,7 +62,7 @@ def intentions(
 ) -> Intentions:
     """Return what the egos of a rollout meant to do.
 
-    The reference driver is asked; of any other the way is known, and nothing else.
+    The reference driver is asked; of any other the way is known, and nothing else here.
 
     Args:
         program: the compiled storyboard.

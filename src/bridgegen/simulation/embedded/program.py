@@ -39,6 +39,7 @@ from bridgegen.simulation.embedded._codes import (
     SYSTEM,
     WHOM,
 )
+from bridgegen.simulation.vehicles import KINEMATIC
 
 UNSAID = -1  # the slot of what an environment leaves as it was
 
@@ -273,6 +274,8 @@ class Program:
         weathers: ``(W, 8)`` slots of what each environment states, -1 for what it leaves as it was,
             see ``environments.py``; row 0 is the start's.
         driver: who drives the ego.
+        vehicle: how its body moves, one of `bridgegen.simulation.vehicles.VEHICLES`.
+        chassis: ``(CHASSIS,)`` of a vehicle with dynamics, see ``_chassis_columns``; else empty.
         others: ``(E,)`` who drives each of the others, ``SCRIPTED`` or ``ATTENTIVE`` of
             `bridgegen.ego.drivers`; the ego's is not looked at.
         time_step: [s].
@@ -341,6 +344,8 @@ class Program:
     leaves: bool
     drives: Int
     driver: Driver
+    vehicle: str
+    chassis: Float
     others: Int
     time_step: float
     n_steps: int
@@ -377,9 +382,13 @@ class Program:
         turns = np.isin(kinds, (ANGLE, RELATIVE_ANGLE)) & (systems == ROAD_SYSTEM)
         return bool((np.isin(kinds, (OFFROAD, CLEARANCE)) | turns).any())
 
-    def changed(self, *, driver: Driver | None = None, dry: bool = False) -> "Program":
-        """Return the program with another driver, or with a road that is dry all the time."""
+    def changed(
+        self, *, driver: Driver | None = None, dry: bool = False, kinematic: bool = False
+    ) -> "Program":
+        """Return the program with another driver, a road dry all the time, a kinematic vehicle."""
         changed = self
+        if kinematic:
+            changed = replace(changed, vehicle=KINEMATIC, chassis=np.zeros(0))
         if driver is not None and self.driver != STORYBOARD:
             changed = replace(changed, driver=driver)
         if dry:

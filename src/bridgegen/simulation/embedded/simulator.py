@@ -1,7 +1,8 @@
 """The embedded simulator: N rows of parameters against one compiled storyboard."""
 
 import os
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import replace
 from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any
 
@@ -10,6 +11,7 @@ import numpy.typing as npt
 
 from bridgegen.arrays import Float, Int
 from bridgegen.ego import Driver
+from bridgegen.ego.traits import Traits
 from bridgegen.errors import InputError
 from bridgegen.openx.opendrive.model import OpenDrive
 from bridgegen.openx.openscenario.model import OpenScenario
@@ -46,6 +48,7 @@ class EmbeddedSimulator:
         ideal: idealised stages of the driver; its own by default.
         others: "attentive" or "scripted": the driver of all other participants; the file's by
             default.
+        vehicle: how the ego moves, see `bridgegen.simulation.vehicles`; the file's by default.
         time_step: [s]; the file's by default.
         skipped: gets a sentence for each unsupported element, which is then left out instead of
             rejected, with the event, action, entity or condition group that contains it.
@@ -66,6 +69,7 @@ class EmbeddedSimulator:
         driver: Driver | None = None,
         ideal: Iterable[str] | None = None,
         others: str | None = None,
+        vehicle: str | None = None,
         time_step: float | None = None,
         skipped: list[str] | None = None,
     ) -> None:
@@ -75,6 +79,7 @@ class EmbeddedSimulator:
             driver=driver,
             ideal=ideal,
             others=others,
+            vehicle=vehicle,
             time_step=time_step,
             skipped=skipped,
         )
@@ -111,7 +116,7 @@ class EmbeddedSimulator:
 
     @property
     def _asks_python(self) -> bool:
-        return self.program.driver.is_own and self._own.memory is None
+        return self.program.driver.is_own and self._own.traits.memory is None
 
     @property
     def time_step(self) -> float:
@@ -147,6 +152,7 @@ class EmbeddedSimulator:
         *,
         driver: Driver | None = None,
         dry: bool = False,
+        kinematic: bool = False,
         noise: npt.NDArray[np.uint64] | None = None,
         until_collision: bool = False,
     ) -> Rollout:
@@ -158,6 +164,7 @@ class EmbeddedSimulator:
             values: by parameter.
             driver: another one.
             dry: the road.
+            kinematic: whether the ego's vehicle is, whatever its own is.
             noise: ``(N,)`` keys of the rows' random numbers; see ``noise_keys``.
             until_collision: whether a row ends soon after the ego collides; see `Batch`.
 
@@ -172,21 +179,35 @@ class EmbeddedSimulator:
             )
         if not chosen.driver.is_own:
             return self.batch(
-                roads, rows, values, driver=driver, dry=dry, noise=noise,
+                roads, rows, values, driver=driver, dry=dry, kinematic=kinematic, noise=noise,
                 until_collision=until_collision,
             ).run()  # fmt: skip
-        own, memory = self._own, self._own.memory
+        some = self._some(
+            roads, rows, values, driver=driver, dry=dry, kinematic=kinematic, noise=noise,
+            until_collision=until_collision,
+        )  # fmt: skip
+        return self._own.drive(chosen.changed(dry=dry, kinematic=kinematic), some, len(rows))
+
+    def _some(
+        self,
+        roads: Network,
+        rows: Int,
+        values: Mapping[str, npt.ArrayLike],
+        *,
+        noise: npt.NDArray[np.uint64] | None = None,
+        **how: Any,
+    ) -> "Callable[[Int], Batch]":
+        """Return what sets up some of the rows for the user's driver."""
+        traits = self._own.traits
+        roads.provide(traits.wants)
         columns = {name: np.broadcast_to(value, len(rows)) for name, value in values.items()}
 
         def some(at: Int) -> "Batch":
             taken = {name: column[at] for name, column in columns.items()}
             key = None if noise is None else noise[at]
-            return self.batch(
-                roads, rows[at], taken, driver=driver, dry=dry, own_memory=memory, noise=key,
-                until_collision=until_collision,
-            )  # fmt: skip
+            return self.batch(roads, rows[at], taken, own=traits, noise=key, **how)
 
-        return own.drive(chosen.changed(dry=dry), some, len(rows))
+        return some
 
     def co_simulation(
         self,
@@ -214,10 +235,11 @@ class EmbeddedSimulator:
 
         program = self.program.changed(driver=driver)
         own = self._own if program.driver.is_own else None
+        if own:
+            roads.provide(own.traits.wants)
         batch = self.batch(
-            roads, np.array([row]), values, driver=driver, dry=dry,
-            own_memory=own.memory if own else None,
-        )  # fmt: skip
+            roads, np.array([row]), values, driver=driver, dry=dry, own=own.traits if own else None
+        )
         wheel = partial(own.wheel, program.changed(dry=dry)) if own else None
         return CoSimulation(
             batch, program.names, program.time_step, program.n_steps, program.actors, wheel
@@ -245,6 +267,11 @@ class EmbeddedSimulator:
         if self.program.driver.is_own:
             self._own.stop()
 
+    @property
+    def own_driver(self) -> "OwnDriver":
+        """The user's driver; only if the storyboard's is the user's own."""
+        return self._own
+
     @cached_property
     def _own(self) -> "OwnDriver":
         from bridgegen.simulation.embedded.own_drivers import (
@@ -268,8 +295,15 @@ class EmbeddedSimulator:
     def intentions(
         self, roads: Network, rows: Int, values: Mapping[str, npt.ArrayLike], rollout: Rollout
     ) -> Intentions:
-        """Return what the egos of a rollout meant to do; see `intentions.intentions`."""
-        return intentions(self.program, roads, rows, values, rollout)
+        """Return what the egos of a rollout meant to do; see `intentions.intentions`.
+
+        A user's driver that plans drives these rows once more, and its trajectories are kept.
+        """
+        found = intentions(self.program, roads, rows, values, rollout)
+        if not (self._asks_python and self._own.has_planned):
+            return found
+        some = self._some(roads, rows, values)
+        return replace(found, plans=self._own.plans(self.program, some, len(rows)))
 
     def batch(
         self,
@@ -279,7 +313,8 @@ class EmbeddedSimulator:
         *,
         driver: Driver | None = None,
         dry: bool = False,
-        own_memory: int | None = None,
+        kinematic: bool = False,
+        own: Traits | None = None,
         noise: npt.NDArray[np.uint64] | None = None,
         until_collision: bool = False,
     ) -> "Batch":
@@ -291,11 +326,12 @@ class EmbeddedSimulator:
             values: by parameter.
             driver: another one.
             dry: the road.
-            own_memory: see `Batch`.
+            kinematic: the vehicle.
+            own: what a driver of the user's own needs; None without one.
             noise: likewise.
             until_collision: likewise.
         """
         from bridgegen.simulation.embedded.batch import Batch  # numba is slow to import
 
-        program = self.program.changed(driver=driver, dry=dry)
-        return Batch(program, roads, rows, values, own_memory, noise, until_collision)
+        program = self.program.changed(driver=driver, dry=dry, kinematic=kinematic)
+        return Batch(program, roads, rows, values, own, noise, until_collision)

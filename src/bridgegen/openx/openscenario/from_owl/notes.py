@@ -20,7 +20,7 @@ about, which one, and what is said of it; what may be said several times is numb
 ``event.NAME.on_road.1``              a road that it is on
 ``event.NAME.time``                   when it happens [s]
 ``signals.NAME.offset``               of a controller: time of its first phase that has passed [s]
-``cause``                             of its harm: perception, planning, control or unavoidable
+``cause``                             of its harm, as `bridgegen.cause` names it
 ``conflict_type``                     of its decisive conflict
 ``responsible``                       for it: ego, other, shared or none
 ``severity``                          of it: probability of a MAIS3+ injury

@@ -25,6 +25,13 @@ def has_siren(body: Body) -> bool:
     return str(body.properties.get(SIREN)).lower() in ("on", "true", "1")
 
 
+def wheelbase(tables: Tables, body: osc.Vehicle) -> float:
+    """Return the distance between the axles [m]; 0 of a vehicle with one axle."""
+    rear, front = body.axles.rear, body.axles.front or body.axles.rear
+    ahead = tables.literal(front, "positionX", front.position_x)
+    return ahead - tables.literal(rear, "positionX", rear.position_x)
+
+
 def measures(tables: Tables, body: Body) -> tuple[float, ...]:
     """Return a row of ``Program.bodies``; missing limits are infinite."""
     if isinstance(body, osc.ExternalObjectReference):
@@ -40,14 +47,12 @@ def measures(tables: Tables, body: Body) -> tuple[float, ...]:
     if not isinstance(body, osc.Vehicle):
         return (*size, math.inf, math.inf, math.inf, math.inf, height)
     limits, axles = body.performance, body.axles
-    rear = tables.literal(axles.rear, "positionX", axles.rear.position_x)
-    front = axles.front or axles.rear
-    wheelbase = tables.literal(front, "positionX", front.position_x) - rear
+    front, distance = axles.front or axles.rear, wheelbase(tables, body)
     lock = tables.literal(front, "maxSteering", front.max_steering)
-    bend = math.tan(min(lock, _STEEPEST)) / max(wheelbase, 0.1)
-    if wheelbase <= 0.0 and body.vehicle_category in TRAILERS:
+    bend = math.tan(min(lock, _STEEPEST)) / max(distance, 0.1)
+    if distance <= 0.0 and body.vehicle_category in TRAILERS:
         bend = math.inf  # it has nothing to steer with, and goes where it is led
-    elif wheelbase <= 0.0:
+    elif distance <= 0.0:
         tables.unsupported(axles, "a Vehicle without a FrontAxle ahead of its RearAxle")
     return (
         *size,

@@ -4,10 +4,11 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from bridgegen.arrays import Int
+from bridgegen.arrays import Float, Int
 from bridgegen.ego import STORYBOARD, Driver
 from bridgegen.ego._kind_tables import IS_VEHICLE
 from bridgegen.ego.drivers import ATTENTIVE, SCRIPTED
+from bridgegen.ego.kinds import NAMES
 from bridgegen.errors import InputError, UnsupportedError
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.element import walk
@@ -20,9 +21,16 @@ from bridgegen.simulation.embedded._codes import (
     EVENT,
     PROBE,
 )
+from bridgegen.simulation.embedded.chassis.parameters import CLASSES, chassis_of
 from bridgegen.simulation.embedded.compiler import declared
 from bridgegen.simulation.embedded.compiler.actions import Actions
-from bridgegen.simulation.embedded.compiler.bodies import Body, has_siren, kind, measures
+from bridgegen.simulation.embedded.compiler.bodies import (
+    Body,
+    has_siren,
+    kind,
+    measures,
+    wheelbase,
+)
 from bridgegen.simulation.embedded.compiler.controllers import Controllers
 from bridgegen.simulation.embedded.compiler.global_actions import GlobalActions
 from bridgegen.simulation.embedded.compiler.nodes import nodes
@@ -38,6 +46,7 @@ from bridgegen.simulation.embedded.program import (
     PathSpec,
     Program,
 )
+from bridgegen.simulation.vehicles import KINEMATIC
 
 DEFAULT_DURATION = 60.0  # s, of a file whose stop trigger names no simulation time
 
@@ -49,6 +58,7 @@ def compile_storyboard(
     driver: Driver | None = None,
     ideal: Iterable[str] | None = None,
     others: str | None = None,
+    vehicle: str | None = None,
     time_step: float | None = None,
     skipped: list[str] | None = None,
 ) -> Program:
@@ -61,6 +71,7 @@ def compile_storyboard(
         ideal: its stages that are ideal, whatever the driver or the file says.
         others: "attentive" or "scripted": who drives all other participants, whatever the file
             says; attentive are those that can be.
+        vehicle: how the ego moves, whatever the file says; see `bridgegen.simulation.vehicles`.
         time_step: [s], whatever the file says.
         skipped: takes a sentence for each thing that the rollout cannot do, which is left out then
             instead of refused, with what it is part of; never the ego.
@@ -72,7 +83,7 @@ def compile_storyboard(
     while True:
         compiler = _Compiler(scenario, place)
         try:
-            return compiler.compile(driver, ideal, others, time_step)
+            return compiler.compile(driver, ideal, others, vehicle, time_step)
         except InputError as error:
             left = compiler.without_culprits(scenario)
             if skipped is None or left is scenario or not compiler.has_ego(left):
@@ -122,6 +133,7 @@ class _Compiler:
         driver: Driver | None,
         ideal: Iterable[str] | None,
         others: str | None,
+        vehicle: str | None,
         time_step: float | None,
     ) -> Program:
         if not self.tables.objects:
@@ -177,6 +189,7 @@ class _Compiler:
         first_time = -1 if time is None else self.tables.slot(time[0])
         waits = (table(self.triggers.probes, 11)[:, PROBE] == END_OF_ROAD).any()
         leaves = len(objects) > 1 and not waits and not declared.stands(self.scenario, self.place)
+        moves = declared.vehicle(self.controllers, self.place, vehicle, has_driver=has_driver)
         return Program(
             place=self.place,
             names=self.tables.names,
@@ -244,6 +257,8 @@ class _Compiler:
             leaves=leaves,
             drives=np.array(self.controllers.drives, dtype=np.int64),
             driver=chosen if ideal is None else chosen.idealised(ideal),
+            vehicle=moves,
+            chassis=self._chassis(moves, objects[0], bodies[0], tows),
             others=others_drivers,
             time_step=step,
             n_steps=n_steps,
@@ -258,6 +273,24 @@ class _Compiler:
         if not isinstance(path, AlongLanes) or path.aside == 0.0:
             return -1
         return self.tables.slot(path.aside)
+
+    def _chassis(self, vehicle: str, body: Body, measured: Float, tows: Int) -> Float:
+        """Return the ego's ``Program.chassis``.
+
+        Raises:
+            InputError: there is no model with dynamics of such a body.
+        """
+        if vehicle == KINEMATIC:
+            return np.zeros(0)
+        what, has_trailer = NAMES[kind(body)], bool((tows == 0).any())
+        if what not in CLASSES or has_trailer:
+            what = "vehicle with a trailer" if has_trailer else what
+            raise InputError(
+                f"{self.place}: the vehicle '{vehicle}' must be a {' or '.join(CLASSES)} without a "
+                f"trailer, the ego is a {what} (--vehicle {KINEMATIC})"
+            )
+        assert isinstance(body, osc.Vehicle)
+        return chassis_of(what, wheelbase(self.tables, body), measured)
 
     def _others(self, objects: Sequence[Body], others: str | None) -> Int:
         """Return who drives each participant but the ego, see ``Program.others``."""

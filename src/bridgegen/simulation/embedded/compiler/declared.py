@@ -1,4 +1,6 @@
-"""Declarations in a file's properties: the time step, drivers, the key of the ego's noise."""
+"""Declarations in a file's properties: time step, drivers, the ego's vehicle and its noise."""
+
+import shlex
 
 from bridgegen.ego import (
     DRIVERS,
@@ -11,7 +13,7 @@ from bridgegen.ego import (
     split,
 )
 from bridgegen.ego.drivers import ATTENTIVE, OTHERS, SCRIPTED
-from bridgegen.errors import InputError, UnsupportedError
+from bridgegen.errors import InputError, UnknownNameError, UnsupportedError
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.declarations import (
     DEFAULT_TIME_STEP,
@@ -21,8 +23,10 @@ from bridgegen.openx.openscenario.declarations import (
     ROAD_END,
     STAND,
     TIME_STEP,
+    VEHICLE,
 )
 from bridgegen.simulation.embedded.compiler.controllers import Controllers
+from bridgegen.simulation.vehicles import KINEMATIC, require
 
 LEAST_STEP, MOST_STEP = 1e-4, 1.0  # s
 
@@ -78,7 +82,7 @@ def driver(controllers: Controllers, place: str) -> Driver:
             if is_spec(str(name)):
                 raise UnsupportedError(
                     f"{place}, line {controller.line}: the ego is driven by '{name}', "
-                    f"which is code; to run it, name it: --ego {name}"
+                    f"which is code; to run it, name it: --ego {shlex.quote(str(name))}"
                 )
             if str(name) not in DRIVERS | GUESTS and not is_planner(str(name)):
                 raise UnsupportedError(
@@ -135,6 +139,35 @@ def other_driver(controllers: Controllers, place: str, entity: int, name: str) -
     if not found:
         return None
     return ATTENTIVE if "attentive" in found else SCRIPTED
+
+
+def vehicle(controllers: Controllers, place: str, asked: str | None, *, has_driver: bool) -> str:
+    """Return how the ego moves: as asked for, or as its controllers say, or kinematically.
+
+    Raises:
+        UnknownNameError: there is no such vehicle.
+        InputError: dynamics are asked for, and the ego has no driver; or a file names no vehicle.
+    """
+    if asked is not None:
+        require(asked)
+        if asked != KINEMATIC and not has_driver:
+            raise InputError(
+                f"{place}: the vehicle '{asked}' needs a driver, and the file's own actions move "
+                "the ego; name a driver (--ego)"
+            )
+        return asked
+    for controller in controllers.of(0) if has_driver else ():
+        properties = controller.properties
+        text = properties.get(VEHICLE) if properties else None
+        if text is not None:
+            try:
+                require(str(text))
+            except UnknownNameError as error:
+                raise InputError(
+                    f"{place}, line {controller.line}: property {VEHICLE}: {error}"
+                ) from None
+            return str(text)
+    return KINEMATIC
 
 
 def noise_key(controllers: Controllers, place: str) -> int | None:

@@ -1,5 +1,7 @@
 """What drives the ego and attentive participants, and how their demands move them."""
 
+from bridgegen.simulation.embedded.drivers._chassis_kernels import move_chassis
+from bridgegen.simulation.embedded.drivers._conflict_view_kernels import see_conflicts_of_rows
 from bridgegen.simulation.embedded.drivers._control_kernels import (
     begin_control,
     is_steered,
@@ -8,6 +10,8 @@ from bridgegen.simulation.embedded.drivers._control_kernels import (
 )
 from bridgegen.simulation.embedded.drivers._ego_kernels import demand, ego_is_through
 from bridgegen.simulation.embedded.drivers._imposed_kernels import egos_are_through, impose_rows
+from bridgegen.simulation.embedded.drivers._lane_view_kernels import LANES, see_lanes_of_rows
+from bridgegen.simulation.embedded.drivers._map_view_kernels import MEMORY, see_map_of_rows
 from bridgegen.simulation.embedded.drivers._observation_kernels import observe_rows
 from bridgegen.simulation.embedded.drivers._others_kernels import begin_waiting, heed, move_heeding
 from bridgegen.simulation.embedded.drivers._own_driver_kernels import (
@@ -28,6 +32,8 @@ __all__ = [
     "CURVATURE",
     "DEMANDS",
     "EGO",
+    "LANES",
+    "MEMORY",
     "N_INPUTS",
     "RETURNED",
     "ask",
@@ -41,8 +47,12 @@ __all__ = [
     "heed",
     "impose_rows",
     "is_steered",
+    "move_chassis",
     "move_heeding",
     "move_paced",
     "move_steered",
     "observe_rows",
+    "see_conflicts_of_rows",
+    "see_lanes_of_rows",
+    "see_map_of_rows",
 ]

@@ -3,10 +3,11 @@
 # mypy: allow-untyped-defs
 # Numba infers what kernels take; their wrappers are typed.
 
-from bridgegen.compiled import call_kernel_at, inlined_kernel, kernel
+from bridgegen.compiled import call_kernel_at, inlined_kernel, kernel, run_kernel_at
 from bridgegen.ego._path_kernels import project
 from bridgegen.ego._weather_columns import FRICTION
 from bridgegen.simulation.embedded._motion_kernels import bicycle, standing
+from bridgegen.simulation.embedded.chassis._chassis_columns import SPEED, H, X, Y
 from bridgegen.simulation.embedded.motion import ENDS, pass_end
 from bridgegen.simulation.embedded.places._slope_kernels import slope
 
@@ -36,11 +37,17 @@ def ego_is_through(plan, roads, state):
 def move_ego(k, demanded, curvature, plan, roads, state, record):
     """Move the ego on from instant k; return its new x, y [m] and heading [rad]."""
     v, dt, p = record.v[0, k], plan.dt, state.on[0]
-    uphill, aside, press = slope(0, roads, state)
-    x, y, h, after, given = bicycle(
-        record.x[0, k], record.y[0, k], record.h[0, k], v, demanded, curvature,
-        plan.bodies[0, 3:7], press * state.weather[FRICTION], uphill, aside, dt,
-    )  # fmt: skip
+    if plan.moves_chassis:
+        run_kernel_at(plan.moves_chassis, (k, demanded, curvature, plan, roads, state, record))
+        x, y = state.chassis[X], state.chassis[Y]
+        h, after = state.chassis[H], state.chassis[SPEED]
+        given = (after - v) / dt
+    else:
+        uphill, aside, press = slope(0, roads, state)
+        x, y, h, after, given = bicycle(
+            record.x[0, k], record.y[0, k], record.h[0, k], v, demanded, curvature,
+            plan.bodies[0, 3:7], press * state.weather[FRICTION], uphill, aside, dt,
+        )  # fmt: skip
     step = 0.5 * (v + after) * dt
     record.a[0, k] = given
     state.travelled[0] += step

@@ -14,6 +14,9 @@ from bridgegen.simulation.embedded._memory_kernels import (
     STATUS,
     STOPS,
 )
+from bridgegen.simulation.embedded.drivers._conflict_view_kernels import remember, see_conflicts
+from bridgegen.simulation.embedded.drivers._lane_view_kernels import see_lanes
+from bridgegen.simulation.embedded.drivers._map_view_kernels import see_map
 from bridgegen.simulation.embedded.drivers._observation_kernels import observe
 
 EGO, SCENE = 10, 9  # inputs on the ego, and after them on the scene
@@ -36,6 +39,16 @@ def fill_inputs(k, plan, roads, state, record):
     )
     for i in range(SCENE):
         inputs[EGO + i] = plan.scene[i]
+    if state.lanes.shape[0] > 0:
+        see_lanes(plan.bodies[0], roads, state, state.lanes)
+    if state.place.shape[0] > 0:
+        see_map(k, roads, record, state.nearby, state.place)
+        for i in range(state.signals.shape[0]):
+            state.signals[i] = state.lights[i]
+    if state.conflicts.shape[0] > 0:
+        see_conflicts(k, plan, roads, state, record, state.conflicts)
+    if state.past.shape[0] > 0:
+        remember(k, plan.dt, state.others, state.past, state.tracked)
 
 
 @kernel
@@ -49,8 +62,11 @@ def ask(k, plan, roads, state, record):
     answer[RETURNED] = 0.0
     call_at(
         plan.own_code,
-        (inputs[EGO:], inputs[:EGO], state.ahead, state.others, state.mind, answer),
-    )
+        (
+            inputs[EGO:], inputs[:EGO], state.ahead, state.others, state.mind, answer, state.lanes,
+            roads.pieces, state.place, state.signals, state.conflicts, state.tracked,
+        ),
+    )  # fmt: skip
     if answer[RETURNED] == 0.0:
         state.ending[STATUS], state.ending[STOPS] = RAISED, 1
         return 0.0, 0.0

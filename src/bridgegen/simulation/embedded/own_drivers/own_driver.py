@@ -14,10 +14,12 @@ from typing import Any
 
 import numpy as np
 
-from bridgegen.arrays import Float, Int
+from bridgegen.arrays import Bool, Float, Int
 from bridgegen.compiled import call_from_python
 from bridgegen.ego import Driver
 from bridgegen.ego.driver_process import START_SECONDS, DriverError, DriverProcess
+from bridgegen.ego.traits import Traits
+from bridgegen.ego.trajectory import Plans
 from bridgegen.simulation.embedded._memory_kernels import (
     N_STEPS,
     NO_CONTROL,
@@ -40,7 +42,7 @@ from bridgegen.simulation.embedded.drivers import (
     ask,
     code_of,
 )
-from bridgegen.simulation.embedded.own_drivers.lock_step import Wheel, drive_in_lock_step
+from bridgegen.simulation.embedded.own_drivers.lock_step import Note, Wheel, drive_in_lock_step
 from bridgegen.simulation.embedded.own_drivers.shared_arrays import Layout, SharedArrays, seen
 from bridgegen.simulation.embedded.program import Program
 from bridgegen.simulation.rollout import FAILURES, Rollout, joined
@@ -62,8 +64,8 @@ class OwnDriver:
         self._is_known = False
 
     @property
-    def memory(self) -> int | None:
-        """How many numbers a compiled driver keeps; None of one in Python.
+    def traits(self) -> Traits:
+        """What the driver says of itself.
 
         Raises:
             InputError: the driver cannot be made.
@@ -72,7 +74,7 @@ class OwnDriver:
             if not self._is_known:
                 self._first.process.start()
                 self._is_known = True
-        return self._first.process.memory
+        return self._first.process.traits
 
     def drive(self, program: Program, setup: Callable[[Int], Batch], n: int) -> Rollout:
         """Roll out rows 0 … n − 1.
@@ -85,7 +87,7 @@ class OwnDriver:
         Raises:
             InputError: the driver cannot be made.
         """
-        if self.memory is None:
+        if self.traits.memory is None:
             with self._turn:  # it is one, and has all rows at once
                 return drive_in_lock_step(
                     program, setup, n, self._first.process, self._is_stopped.is_set
@@ -101,6 +103,47 @@ class OwnDriver:
             with self._lock:
                 self._idle.append(seat)
 
+    @property
+    def process(self) -> DriverProcess:
+        """The process of one in Python; of a compiled one, the first."""
+        return self._first.process
+
+    def restart(self) -> None:
+        """End its processes; others begin when it drives next. Nothing may be driven meanwhile."""
+        with self._lock:
+            for seat in self._seats:
+                seat.close()
+
+    @property
+    def has_planned(self) -> bool:
+        """Whether it has answered a trajectory so far."""
+        return "trajectory" in self._first.process.answers
+
+    def plans(
+        self, program: Program, setup: Callable[[Int], Batch], n: int
+    ) -> tuple[dict[int, Float], ...]:
+        """Drive rows 0 … n − 1 again; return the trajectories of each by the instant of the call.
+
+        Args:
+            program: as of ``drive``, and so are those that follow.
+            setup: likewise.
+            n: likewise.
+        """
+        found: tuple[dict[int, Float], ...] = tuple({} for _ in range(n))
+
+        def note(rows: Int) -> Note:
+            def keep(k: int, plans: Plans, running: Bool) -> None:
+                for i in np.flatnonzero(running).tolist():
+                    found[rows[i]][k] = plans.states[i]
+
+            return keep
+
+        with self._turn:
+            drive_in_lock_step(
+                program, setup, n, self._first.process, self._is_stopped.is_set, note
+            )
+        return found
+
     def wheel(self, program: Program, batch: Batch) -> Callable[[int], tuple[Float, Float]]:
         """Return what asks the driver at an instant of a batch of one row that has started.
 
@@ -108,7 +151,7 @@ class OwnDriver:
             InputError: the driver cannot be made.
             DriverError: it failed as it began, or when it is asked.
         """
-        if self.memory is None:
+        if self.traits.memory is None:
             return Wheel(program, batch, self._first.process).demand
         return partial(_ask, self._first.process, batch)
 
@@ -162,6 +205,11 @@ class Seat:
             array[...] = view
         return messages
 
+    def close(self) -> None:
+        """End the process; the next one is sent the road networks again."""
+        self.process.close()
+        self._roads = None
+
     def _begin(self, plan: Plan, roads: Roads, state: State, record: Record) -> None:
         """Let the kernel be compiled here, if need be, and loaded there: no driver's time."""
         rows = np.zeros(0, dtype=np.int64)
@@ -211,8 +259,10 @@ def _ask(process: DriverProcess, batch: Batch, k: int) -> tuple[Float, Float]:
     batch.fill_inputs(k)
     state = batch.state
     answer, memory, raised = process.call(
-        _answer, state.inputs[0], state.ahead[0], state.others[0], state.mind[0]
-    )
+        _answer, state.inputs[0], state.ahead[0], state.others[0], state.mind[0],
+        state.lanes[0], batch.pieces, state.place[0], state.signals[0], state.conflicts[0],
+        state.tracked[0],
+    )  # fmt: skip
     if answer[RETURNED] == 0.0:
         raise DriverError("raised", raised)
     if problem := _not_finite(answer):
@@ -261,14 +311,16 @@ def _simulate(
 
 
 def _answer(
-    address: int, inputs: Float, ahead: Float, others: Float, memory: Float
+    address: int, inputs: Float, ahead: Float, others: Float, memory: Float, *wanted: Float
 ) -> tuple[Float, Float, str]:
     """Ask the driver; return its answer, what it keeps, and what it raised."""
     answer = np.zeros(ANSWER)
     raised: list[str] = []
     sys.unraisablehook = lambda error: raised.append(_described(error))
     try:
-        call_from_python(address, (inputs[EGO:], inputs[:EGO], ahead, others, memory, answer))
+        call_from_python(
+            address, (inputs[EGO:], inputs[:EGO], ahead, others, memory, answer, *wanted)
+        )
     finally:
         sys.unraisablehook = sys.__unraisablehook__
     return answer, memory, "".join(raised)

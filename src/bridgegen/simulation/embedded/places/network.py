@@ -7,6 +7,10 @@ from typing import Any
 import numpy as np
 
 from bridgegen.arrays import Float, Int
+from bridgegen.ego.interface import RoadMap
+from bridgegen.ego.lane_tables import LANE, lanes_along
+from bridgegen.ego.map_grid import grid_of, no_grid
+from bridgegen.ego.road_map import road_map
 from bridgegen.ego.scene import Scene, beside, stacked, stop_lines, survey
 from bridgegen.openx.opendrive.lane_graph import Cells, Ground
 from bridgegen.openx.opendrive.lanes import section_index
@@ -40,6 +44,7 @@ class Network:
         stop_lines: ``(P, L, 3)`` float64, where: x, y [m] and heading [rad], NaN in a road network
             where the route does not cross it.
         crosswalks: ``(P, C, 5)`` float64 of the ego's first route; see `Rollout.crosswalks`.
+        maps: P road maps, if a driver wants them.
     """
 
     def __init__(
@@ -66,6 +71,11 @@ class Network:
         pairs = zip(models, self._ways, strict=True)
         self.scene = stacked([_scene(program, model, ways) for model, ways in pairs])
         self._meetings = meetings(program, models, self._ways)
+        self._models = tuple(models)
+        self._provided: frozenset[str] = frozenset()
+        self._lanes = np.empty((len(models), 0, LANE))
+        self._grid = no_grid(len(models))
+        self.maps: tuple[RoadMap, ...] = ()
         self.stop_entities, self.stop_lights, self.stop_lines = _stop_lines(
             program, models, self._ways
         )
@@ -155,6 +165,26 @@ class Network:
         zones: Float = self.tables.zones[:, path]
         return zones
 
+    def provide(self, wants: Iterable[str]) -> None:
+        """Make the tables that a driver wants, once; see `bridgegen.ego.interface.WANTS`."""
+        with self._lock:
+            new = frozenset(wants) - self._provided
+            if not new:
+                return
+            if "lanes" in new:
+                pairs = zip(self._models, self._ways, strict=True)
+                self._lanes = padded([[_lanes_along(model, ways)] for model, ways in pairs], LANE)[
+                    :, 0
+                ]
+            if "map" in new:
+                self.maps = tuple(
+                    road_map(model, ways.routes[0], self._program.lights)
+                    for model, ways in zip(self._models, self._ways, strict=True)
+                )
+                self._grid = grid_of(self.maps)
+            self._provided |= new
+            self.tables = self._tables()
+
     def plan(self, wanted: Iterable[tuple[int, int, int]]) -> None:
         """Plan what rows have asked for.
 
@@ -219,6 +249,12 @@ class Network:
             cell_nodes=_stacked([each.nodes for each in cells]),
             **self.scene._asdict(),
             **self._meetings._asdict(),
+            lanes=self._lanes,
+            pieces=self._grid.pieces,
+            middles=self._grid.middles,
+            grid_box=self._grid.box,
+            grid_starts=self._grid.starts,
+            grid_order=self._grid.order,
         )
 
     def _find_zones(self, paths: Float, counts: Int, steps: Float) -> Float:
@@ -342,6 +378,12 @@ def _scene(program: Program, model: OpenDrive, ways: Ways) -> Scene:
     return survey(
         model, ways.routes, path.table, path.step, program.lights, starts, program.bodies, ranks
     )
+
+
+def _lanes_along(model: OpenDrive, ways: Ways) -> Float:
+    """Return the lanes along the ego's first path, see ``lane_tables``."""
+    path = ways.paths[0]
+    return lanes_along(model, ways.routes[0], path.table, path.step)
 
 
 def _numbers(rows: Sequence[Sequence[int]]) -> Int:

@@ -1,0 +1,106 @@
+"""A vehicle with dynamics: what its driver demands, through actuators, to where it goes."""
+
+# mypy: allow-untyped-defs
+# Numba infers what kernels take; their wrappers are typed.
+
+import math
+
+from bridgegen.compiled import kernel
+from bridgegen.ego._weather_columns import FRICTION
+from bridgegen.physics import GRAVITY
+from bridgegen.simulation.embedded.chassis._chassis_columns import (
+    BRAKE_LAG,
+    DRIVE_LAG,
+    FORCE,
+    LOCK,
+    SPEED,
+    STEER,
+    STEERING_LAG,
+    STEERING_RATE,
+    TO_FRONT,
+    TO_REAR,
+    VX,
+    VY,
+    YAW_RATE,
+    H,
+    X,
+    Y,
+)
+from bridgegen.simulation.embedded.chassis._single_track_kernels import advance, sub_steps
+from bridgegen.simulation.embedded.places._slope_kernels import slope
+
+TRIMMED = 0.8  # of friction, that a vehicle uses at most where its motion begins
+
+
+@kernel
+def lagged(value, target, left, lag, rate):
+    """Return a first-order lag's value, of which a share is left after a while, and rates bound it.
+
+    Args:
+        value: now.
+        target: what it goes to.
+        left: share of the distance that is left, e^(−t/lag).
+        lag: [s].
+        rate: at most, per second.
+    """
+    error = target - value
+    most = rate * lag
+    if abs(error) <= most:
+        return target - left * error
+    near = math.copysign(most, error)
+    whole = (error - near) / math.copysign(rate, error)  # s, at that rate until it is near
+    lasts = -lag * math.log(left)
+    if lasts <= whole:
+        return value + math.copysign(rate * lasts, error)
+    return target - near * math.exp((whole - lasts) / lag)
+
+
+@kernel
+def move_chassis(k, demanded, curvature, plan, roads, state, record):
+    """Move the ego's vehicle on from instant k, to ``state.chassis``.
+
+    The driver's demands become a steering angle, by the kinematic bicycle's inverse, and a force.
+    A vehicle that is not where it has come to begins there anew, on its wheels: at the start, after
+    a teleport, or where the storyboard has moved it.
+    """
+    chassis, motion, limits, dt = plan.chassis, state.chassis, plan.bodies[0], plan.dt
+    x, y, h, v = record.x[0, k], record.y[0, k], record.h[0, k], record.v[0, k]
+    uphill, aside, press = slope(0, roads, state)
+    friction = state.weather[FRICTION]
+    front, rear = chassis[TO_FRONT], chassis[TO_REAR]
+    wheelbase = front + rear
+    asked = min(max(math.atan(wheelbase * curvature), -chassis[LOCK]), chassis[LOCK])
+    came = motion[X] == x and motion[Y] == y and motion[H] == h and motion[SPEED] == v
+    if not came:
+        most = TRIMMED * press * friction / max(v * v, 1e-6)
+        bend = min(max(math.tan(asked) / wheelbase, -most), most)
+        motion[VX], motion[YAW_RATE] = v, v * bend
+        motion[VY], motion[STEER] = rear * motion[YAW_RATE], math.atan(wheelbase * bend)
+        motion[FORCE] = uphill
+    wanted = min(max(demanded + uphill, -limits[5]), limits[4])
+    wanted = min(wanted, (limits[3] - v) / dt + uphill)
+    vx, vy, turn = motion[VX], motion[VY], motion[YAW_RATE]
+    angle, force = motion[STEER], motion[FORCE]
+    steering, rate = chassis[STEERING_LAG], chassis[STEERING_RATE]
+    parts = sub_steps(math.sqrt(vx * vx + vy * vy), dt, chassis)
+    part = dt / parts
+    angle_left = math.exp(-0.5 * part / steering)
+    force_left = math.exp(-0.5 * part / chassis[BRAKE_LAG if wanted < force else DRIVE_LAG])
+    heads = math.cos(h), math.sin(h)
+    wheels = math.cos(angle), math.sin(angle)
+    place = x + rear * heads[0], y + rear * heads[1], h
+    for _ in range(parts):
+        middle = lagged(angle, asked, angle_left, steering, rate)
+        last = lagged(middle, asked, angle_left, steering, rate)
+        acts = wanted - force_left * (wanted - force)
+        force = wanted - force_left * (wanted - acts)
+        place, vx, vy, turn, heads, wheels = advance(
+            place, vx, vy, turn, heads, wheels, (middle - angle, last - middle), acts,
+            friction / GRAVITY, press, uphill, aside, part, chassis,
+        )  # fmt: skip
+        angle = last
+    motion[VX], motion[VY], motion[YAW_RATE] = vx, vy, turn
+    motion[STEER], motion[FORCE] = angle, force
+    motion[X], motion[Y] = place[0] - rear * heads[0], place[1] - rear * heads[1]
+    motion[H] = place[2]
+    motion[SPEED] = math.sqrt(vx * vx + (vy - rear * turn) ** 2)

@@ -1,0 +1,21 @@
+"""How the ego's body moves: the vehicles that ``--vehicle`` names."""
+
+from bridgegen.errors import UnknownNameError
+
+KINEMATIC, SINGLE_TRACK = "kinematic", "single-track"
+
+VEHICLES = {
+    KINEMATIC: "A bicycle that goes where it steers, within a friction circle.",
+    SINGLE_TRACK: "Tyres that slip, load transfer, and actuators that lag: of cars, trucks, buses.",
+}
+"""By name: a description."""
+
+
+def require(name: str) -> None:
+    """Check that there is a vehicle of that name.
+
+    Raises:
+        UnknownNameError: there is none.
+    """
+    if name not in VEHICLES:
+        raise UnknownNameError("vehicle", name, VEHICLES)

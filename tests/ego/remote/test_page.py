@@ -1,0 +1,24 @@
+"""The loop of docs/remote-drivers.md, which uses none of our code."""
+
+import re
+import shlex
+import sys
+from pathlib import Path
+
+from tests.ego.remote.asked import N, observation, scene
+
+from bridgegen.ego.driver_process import DriverProcess
+
+PAGE = Path(__file__).parents[3] / "docs" / "remote-drivers.md"
+
+
+def test_the_loop_of_the_page_drives(tmp_path):
+    (code,) = re.findall(r"```python\n(import struct.*?)```", PAGE.read_text("utf-8"), re.S)
+    (tmp_path / "loop.py").write_text(code, "utf-8")
+    driver = DriverProcess(f"exec:{shlex.join([sys.executable, str(tmp_path / 'loop.py')])}")
+    for _ in range(2):
+        driver.reset(N, scene())
+        acceleration, curvature = driver.act(observation())
+        assert acceleration.tolist() == [1.0, 1.0, 1.0]
+        assert curvature.tolist() == [0.0, 0.0, 0.0]
+    driver.close()

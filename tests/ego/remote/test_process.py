@@ -1,0 +1,324 @@
+"""BridgeGen's end: what it makes of servers and programs, good and bad."""
+
+import os
+import shlex
+import signal
+import socket
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from tests.ego.remote.asked import CONTROL, HELLO, READY, N, Server, observation, scene, with_all
+
+from bridgegen.ego import get
+from bridgegen.ego.driver_process import DriverError, DriverProcess
+from bridgegen.ego.remote import process as remote_process
+from bridgegen.ego.remote.messages import pack
+from bridgegen.errors import InputError
+
+HERE = Path(__file__).parent
+DRIVERS = HERE.parent / "drivers.py"
+SERVE = shlex.join([sys.executable, "-m", "bridgegen.ego.remote"])
+TRAJECTORY = {"time": np.ones(1), **dict.fromkeys("xyhv", np.zeros((N, 1)))}
+
+
+@pytest.fixture
+def driver():
+    made = []
+
+    def make(spec, **kwargs):
+        made.append(DriverProcess(spec, **kwargs))
+        return made[-1]
+
+    yield make
+    for one in made:
+        one.close()
+
+
+@pytest.fixture
+def server():
+    made = []
+
+    def make(*answers, **kwargs):
+        made.append(Server(*answers, **kwargs))
+        return made[-1]
+
+    yield make
+    for one in made:
+        one.close()
+
+
+@pytest.fixture
+def served():
+    """Servers of Python classes; their address when they listen."""
+    made = []
+
+    def make(name, address="127.0.0.1:0"):
+        one = subprocess.Popen(
+            [sys.executable, "-m", "bridgegen.ego.remote", name, address],
+            stderr=subprocess.PIPE, text=True,
+        )  # fmt: skip
+        made.append(one)
+        line = one.stderr.readline()
+        assert line.startswith("serving on ")
+        where = line.split()[-1]
+        return one, where if where.startswith("unix:") else f"connect:{where}"
+
+    yield make
+    for one in made:
+        one.kill()
+        one.wait()
+        one.stderr.close()
+
+
+def command(name, file=DRIVERS):
+    return f"exec:{SERVE} {shlex.quote(f'{file}:{name}')}"
+
+
+@pytest.mark.parametrize("address", ["127.0.0.1:0", "[::1]:0", "unix"])
+def test_a_server_is_asked_again_and_again(served, driver, tmp_path, address):
+    where = f"unix:{tmp_path / 'socket'}" if address == "unix" else address
+    if ":" in address and "[" in address and not socket.has_ipv6:
+        pytest.skip("no IPv6")
+    _, spec = served(f"{DRIVERS}:Cruises", where)
+    for _ in range(2):
+        one = driver(spec)
+        one.reset(N, scene())
+        for _ in range(3):
+            acceleration, curvature = one.act(observation())
+            assert acceleration.tolist() == [1.0, 1.0, 1.0]
+            assert curvature.tolist() == [0.0, 0.0, 0.0]
+        one.close()
+
+
+def test_a_unix_socket_that_an_earlier_server_left_is_taken(served, driver, tmp_path):
+    address = f"unix:{tmp_path / 'socket'}"
+    first, spec = served(f"{DRIVERS}:Cruises", address)
+    first.kill()
+    first.wait()
+    assert (tmp_path / "socket").exists()
+    served(f"{DRIVERS}:Cruises", address)
+    driver(spec).reset(N, scene())
+
+
+def test_two_connections_are_two_drivers(served, driver):
+    _, spec = served(f"{DRIVERS}:Remembers")
+    for one in (driver(spec), driver(spec)):
+        one.reset(N, scene())  # of a first batch; a second one is driven at half the speed
+        assert one.act(observation())[0].tolist() == [1.0, 1.0, 1.0]
+
+
+@pytest.mark.parametrize(
+    ("name", "kind", "message"),
+    [
+        ("Prints", "", ""),
+        ("Raises", "raised", r"^ValueError: no idea \(drivers.py:\d+\)$"),
+        ("Hangs", "timed out", "no answer within 0.5 s"),
+        ("Dies", "died", "its process ended with status 3"),
+        ("AnswersNaN", "answered nonsense", "acceleration must be finite, got nan"),
+        ("AnswersOneNumber", "answered nonsense", r"must have the shape \(3,\), got \(\)"),
+        ("AnswersNothing", "answered nonsense", "must return a Control"),
+    ],
+)
+def test_a_program_fails_as_a_class_does(driver, name, kind, message):
+    one = driver(command(name), time_limit=0.5)
+    one.start()
+    for _ in range(2):
+        one.reset(N, scene())
+        if not kind:
+            assert one.act(observation())[0].tolist() == [1.0, 1.0, 1.0]
+            continue
+        with pytest.raises(DriverError, match=message) as error:
+            one.act(observation())
+        assert error.value.kind == kind
+
+
+@pytest.mark.parametrize(
+    ("answer", "kind", "message"),
+    [
+        (CONTROL[:20], "timed out", "no answer within 0.3 s"),
+        (b"", "timed out", "no answer within 0.3 s"),
+        (None, "died", "it closed the connection"),
+        (b"HTTP/1.1 400 Bad Request\r\n", "answered nonsense", "must be at most 64 MiB long, got"),
+        (b"\x00\x00\x00\x40", "answered nonsense", "at most 64 MiB long, got 1024.0 MiB"),
+        (b"\x01\x00\x00\x00\xc1", "answered nonsense", "the message is no msgpack"),
+        (CONTROL + b"!", "answered nonsense", "more than one message"),
+        (READY, "answered nonsense", "must be of type 'control' or 'trajectory', got 'ready'"),
+        (
+            pack({"type": "control", "acceleration": 1.0, "curvature": 2.0}),
+            "answered nonsense",
+            "'acceleration' of the answer must be an array, got 1.0",
+        ),
+        (
+            pack({"type": "control", "acceleration": np.ones(2), "curvature": np.zeros(3)}),
+            "answered nonsense",
+            r"acceleration must have the shape \(3,\), got \(2,\)",
+        ),
+        (
+            pack({"type": "control", "acceleration": np.full(N, np.inf), "curvature": np.ones(N)}),
+            "answered nonsense",
+            "acceleration must be finite, got inf",
+        ),
+        (
+            pack({"type": "control", "acceleration": np.ones(N), "curvature": [{}] * 2000}),
+            "answered nonsense",
+            "too many parts",
+        ),
+        (
+            pack({"type": "error", "message": "out of \x1b[31m\nideas"}),
+            "raised",
+            "^out of .31m ideas$",
+        ),
+        (pack({"type": "error", "message": "x" * 10**6}), "raised", "^x{500}$"),
+    ],
+)
+def test_a_bad_answer_costs_one_clear_error(server, driver, answer, kind, message):
+    """And the server can be asked again."""
+    one = driver(server(HELLO, READY, answer).spec, time_limit=0.3)
+    for _ in range(2):
+        one.reset(N, scene())
+        with pytest.raises(DriverError, match=message) as error:
+            one.act(observation())
+        assert error.value.kind == kind
+        assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("hello", "message"),
+    [
+        ({"protocol": 2}, "speaks version 2 of the protocol, BridgeGen .* speaks 1"),
+        ({"protocol": True}, "speaks version True of the protocol"),
+        ({"type": "ready"}, "must be of type 'hello', got 'ready'"),
+        ({"type": "error", "message": "no weights"}, "does not answer: no weights"),
+        ({"wants": ["maps"]}, "unknown word in wants 'maps'"),
+        ({"wants": [{}]}, "unknown word in wants"),
+        ({"period": float("nan")}, "period .*must be"),
+        ({"max_rows": 0}, "max_rows must be a whole number > 0, got 0"),
+    ],
+)
+def test_a_server_that_greets_otherwise_is_an_error_of_the_users(server, driver, hello, message):
+    spec = server(pack({"type": "hello", "protocol": 1, "name": "a test", **hello})).spec
+    with pytest.raises(InputError, match=message) as error:
+        driver(spec).start()
+    assert len(error.value.problems) == 1
+    assert spec in str(error.value)
+
+
+def test_a_greeting_says_what_the_driver_wants(driver):
+    one = driver(command("Plans", HERE / "remote_drivers.py"))
+    one.start()
+    assert (one.traits.wants, one.traits.period) == (("lanes", "map", "conflicts", "history"), 0.2)
+
+
+def test_a_driver_is_given_what_a_class_is_given(driver):
+    given, seen = with_all()
+    one = driver(command("Reports", HERE / "remote_drivers.py"))
+    one.reset(N, given)
+    message = r"\('bv',\) int64 1:0:-1 None \(3, 4\) \[2.0, 0.0\] int8 \[True, True\]"
+    with pytest.raises(DriverError, match=message):
+        one.act(seen)
+
+
+def free_port():
+    with socket.socket() as one:
+        one.bind(("127.0.0.1", 0))
+        return one.getsockname()[1]
+
+
+@pytest.mark.parametrize(
+    ("spec", "message"),
+    [
+        ("connect:127.0.0.1:{port}", r"nobody listens on port \d+ of 127.0.0.1$"),
+        ("connect:no-such-host.invalid:80", "port 80 of no-such-host.invalid cannot be reached"),
+        ("unix:no/such/socket", "the unix socket no/such/socket cannot be reached: No such file"),
+        ("exec:no-such-program --fast", "there is no program 'no-such-program'"),
+        ("exec:true", "does not start: its process ended with status 0"),
+        (
+            "exec:echo hello",
+            "at most 64 MiB .*; print to the standard error|standard output is for",
+        ),
+        (command("CannotBeMade"), r"does not start: OSError: no weights \(drivers.py:\d+\)"),
+        (command("Cruises", "no_such.py"), "does not start: FileNotFoundError"),
+    ],
+)
+def test_what_does_not_start_is_an_error_of_the_users(driver, spec, message):
+    with pytest.raises(InputError, match=message):
+        driver(spec.format(port=free_port())).start()
+
+
+@pytest.mark.parametrize(
+    ("spec", "message"),
+    [
+        ("connect:localhost", "connect:HOST:PORT"),
+        ("connect::5555", "connect:HOST:PORT"),
+        ("connect:::1:5555", "an address of IPv6"),
+        ("connect:localhost:0", "port from 1 to 65535"),
+        ("connect:localhost:65536", "port from 1 to 65535"),
+        ("connect:localhost:٣", "port from 1 to 65535"),
+        ("unix:", "1 to 103 bytes, got 0"),
+        ("unix:" + "é" * 60, "1 to 103 bytes, got 120"),
+        ("exec:", "must be followed by a command"),
+        ("exec:''", "must be followed by a command"),
+        ("exec:echo 'a", "cannot be read: No closing quotation"),
+    ],
+)
+def test_what_is_no_address(spec, message):
+    with pytest.raises(InputError, match=message):
+        get(spec)
+
+
+def test_a_server_that_was_there_is_waited_for(server, driver, monkeypatch):
+    monkeypatch.setattr(remote_process, "AGAIN_SECONDS", 0.5)
+    found = server(HELLO, READY, None)
+    one = driver(found.spec)
+    one.reset(N, scene())
+    with pytest.raises(DriverError, match="closed the connection"):
+        one.act(observation())
+    found.close()
+    start = time.monotonic()
+    with pytest.raises(InputError, match="nobody listens"):
+        one.reset(N, scene())
+    assert time.monotonic() - start > 0.4
+    other = server(HELLO, READY, CONTROL, address=found.address)
+    one.reset(N, scene())
+    assert one.act(observation())[0].tolist() == [1.0] * N
+    assert len(other.connections) == 1
+
+
+def test_a_server_that_is_killed_ends_the_connection(served, driver):
+    process, spec = served(f"{DRIVERS}:Hangs")
+    one = driver(spec)
+    one.reset(N, scene())
+    os.kill(process.pid, signal.SIGKILL)
+    with pytest.raises(DriverError, match="it closed the connection") as error:
+        one.act(observation())
+    assert error.value.kind == "died"
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
+def test_no_process_of_a_program_is_left(driver, tmp_path):
+    script = tmp_path / "wraps.sh"
+    script.write_text(f"sleep 300 & echo $! > {tmp_path}/pid; exec {SERVE} {DRIVERS}:Cruises\n")
+    one = driver(f"exec:sh {script}")
+    one.reset(N, scene())
+    number = (tmp_path / "pid").read_text().strip()
+    assert Path(f"/proc/{number}").exists()
+    one.close()
+    stat = Path(f"/proc/{number}/stat")
+    assert not stat.exists() or stat.read_text().rpartition(")")[2].split()[0] == "Z"
+
+
+def test_a_trajectory_comes_as_one(server, driver, monkeypatch):
+    found = []
+    monkeypatch.setattr(
+        "bridgegen.ego.driver_process.checked", lambda answer, *_: found.append(answer) or answer
+    )
+    one = driver(server(HELLO, READY, pack({"type": "trajectory", **TRAJECTORY})).spec)
+    one.reset(N, scene())
+    one.act(observation())
+    assert [getattr(found[0], name).tolist() for name in TRAJECTORY] == [
+        part.tolist() for part in TRAJECTORY.values()
+    ]

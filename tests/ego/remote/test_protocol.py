@@ -1,0 +1,109 @@
+"""The schema of the protocol: every message of both ends obeys it."""
+
+import importlib.util
+import json
+import re
+from pathlib import Path
+
+import jsonschema
+import msgpack
+import numpy as np
+import pytest
+from tests.ego.drivers import Cruises, Raises
+from tests.ego.remote.asked import N, observation, scene, with_all
+from tests.ego.remote.remote_drivers import Plans
+
+from bridgegen.ego.remote import messages, server
+from bridgegen.ego.remote.messages import pack, unpack
+
+DOCS = Path(__file__).parents[3] / "docs"
+FILE = Path(messages.__file__).with_name("protocol.json")
+SCHEMA = json.loads(FILE.read_text("utf-8"))
+
+
+def test_the_schema_is_up_to_date():
+    """Otherwise: python docs/make_protocol.py."""
+    spec = importlib.util.spec_from_file_location("make_protocol", DOCS / "make_protocol.py")
+    script = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(script)
+    assert FILE.read_text("utf-8") == script.text()
+
+
+def validate(message, part):
+    """Hold a message, as msgpack reads it, against a part of the schema; arrays, too."""
+    schema = {"$ref": f"#/$defs/{part}", "$defs": SCHEMA["$defs"]}
+    jsonschema.Draft202012Validator.check_schema(SCHEMA)
+    jsonschema.Draft202012Validator(schema).validate(message)
+    arrays = []
+    compare(message, SCHEMA["$defs"][part], {"N": N}, arrays)
+    return arrays
+
+
+def compare(value, schema, sizes, arrays):
+    """Hold the arrays in a value against what the schema says of type and shape."""
+    if "anyOf" in schema:
+        if value is not None:
+            compare(value, schema["anyOf"][0], sizes, arrays)
+        return
+    name = schema.get("$ref", "").rpartition("/")[2]
+    if name == "array":
+        assert value["dtype"] == schema["dtype"] or schema["dtype"] == "any but bool"
+        assert len(value["data"]) == np.dtype(value["dtype"]).itemsize * np.prod(value["shape"])
+        shapes = [re.findall(r"\w+", one) for one in schema["shape"].split(" or ")]
+        letters = next(one for one in shapes if len(one) == len(value["shape"]))
+        for letter, size in zip(letters, value["shape"], strict=True):
+            known = int(letter) if letter.isdecimal() else sizes.get(letter, size)
+            is_left_out = size == 0 and "empty" in schema.get("description", "")
+            assert size == known or is_left_out, (schema, letter)
+        arrays.append(schema)
+    elif name:
+        compare(value, SCHEMA["$defs"][name], sizes, arrays)
+    elif "items" in schema and value is not None:
+        for one in value:
+            compare(one, schema["items"], sizes, arrays)
+    else:
+        assert set(value) <= set(schema["properties"]) if "properties" in schema else True
+        for key, inner in schema.get("properties", {}).items():
+            if key in value:
+                compare(value[key], inner, sizes, arrays)
+
+
+def reply(driver, message):
+    """What the driver's end answers to a message."""
+    return msgpack.unpackb(pack(server._answer(driver, unpack(message)))[4:])
+
+
+@pytest.mark.parametrize("make", [Cruises, Plans])
+def test_an_exchange_obeys_the_schema(make):
+    driver = make()
+    given, seen = with_all() if make is Plans else (scene(), observation())
+    exchange = (
+        ("hello", {"protocol": 1, "software": "BridgeGen"}, "hello"),
+        ("reset", {"n": N, "scene": given}, "ready"),
+        ("act", {"observation": seen}, "trajectory" if make is Plans else "control"),
+    )
+    for request, parts, answer in exchange:
+        message = pack({"type": request, **parts})[4:]
+        asked = validate(msgpack.unpackb(message), f"request_{request}")
+        answered = validate(reply(driver, message), f"answer_{answer}")
+    assert len(asked) == (17 if make is Plans else 12)
+    assert len(answered) == (5 if make is Plans else 2)
+
+
+def test_errors_obey_the_schema(tmp_path):
+    class Pipe(list):
+        def write(self, data):
+            self.append(bytes(data))
+
+        def flush(self):
+            pass
+
+    path, out = tmp_path / "in", Pipe()
+    questions = [{"type": "hello"}, {"type": "act", "observation": observation()}, {"type": "no"}]
+    path.write_bytes(b"".join(map(pack, questions)) + b"\x01\x00\x00\x00\xc1")
+    with path.open("rb") as file:
+        server._converse(Raises, file, out)
+    found = [msgpack.unpackb(one[4:]) for one in out]
+    for one in found[1:]:
+        validate(one, "answer_error")
+    assert [one.get("kind") for one in found] == [None, "raised", *["answered nonsense"] * 2]

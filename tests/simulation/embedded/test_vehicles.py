@@ -1,0 +1,143 @@
+"""The ego's vehicle: in whole scenarios, in files, and where there is none."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import bridgegen as bg
+from bridgegen.campaign.scenario_files import with_vehicle, write_scenario
+from bridgegen.cause import Cause
+from bridgegen.errors import InputError, UnknownNameError
+from bridgegen.odd.reader import load
+from bridgegen.openx.openscenario.read import read
+from bridgegen.options import PipelineOptions
+from bridgegen.pipeline import Pipeline
+from bridgegen.simulate import simulate_file
+from bridgegen.simulation.choice import SimulatorChoice
+from bridgegen.simulation.embedded import simulator as embedded
+from bridgegen.simulation.embedded.drivers._chassis_kernels import lagged
+from bridgegen.simulation.embedded.simulator import EmbeddedSimulator
+
+FIELDS = ("x", "y", "h", "v", "a", "offset", "n_steps", "status")
+N = 12
+
+
+def made(scenario="stopped-after-curve", ego="route-follower", vehicle="single-track", **options):
+    logical = load(scenario)
+    given = PipelineOptions(ego=ego, vehicle=vehicle, **options)
+    pipeline = Pipeline(logical, logical.space(), given)
+    pipeline.choose_objective()
+    return pipeline
+
+
+def rows(pipeline, n=N):
+    return pipeline.space.decode(np.random.default_rng(5).random((n, pipeline.space.n_var)))
+
+
+def same(one, other, at=slice(None)):
+    return all(np.array_equal(getattr(one, n), getattr(other, n)[at]) for n in FIELDS)
+
+
+def test_a_row_s_result_is_the_same_in_any_batch(monkeypatch):
+    pipeline = made()
+    X = rows(pipeline)
+    whole = pipeline.rollout(X)
+    assert (whole.status == 0).all()
+    assert same(pipeline.rollout(X[7:8]), whole, slice(7, 8))
+    monkeypatch.setattr(embedded, "CHUNK", 5)
+    order = np.random.default_rng(1).permutation(N)
+    assert same(pipeline.rollout(X[order]), whole, order)
+
+
+def test_the_default_is_kinematic_to_the_bit_and_single_track_is_not():
+    pipeline = made(vehicle=None)
+    X = rows(pipeline)
+    default = pipeline.rollout(X)
+    assert pipeline.vehicle == "kinematic"
+    assert same(made(vehicle="kinematic").rollout(X), default)
+    assert not same(made().rollout(X), default)
+
+
+def test_in_a_fast_bend_it_goes_wide_and_stays_below_friction():
+    pipeline = made()
+    X = rows(pipeline, 60)
+    wide = np.abs(pipeline.rollout(X).offset[:, 0]).max(axis=1)
+    tight = np.abs(made(vehicle="kinematic").rollout(X).offset[:, 0]).max(axis=1)
+    assert (wide >= tight).mean() > 0.9
+    asked = (
+        X[:, pipeline.space.index("ego_speed")] ** 2 * X[:, pipeline.space.index("bend_curvature")]
+    )
+    share = asked / pipeline.rollout(X).friction
+    assert wide[share > 0.9].min() > wide[share < 0.3].max()
+
+
+def test_a_replay_with_a_kinematic_vehicle_is_the_kinematic_rollout():
+    pipeline = made(causes=True)
+    (fix,) = (one for one in pipeline.fixes if one.cause is Cause.VEHICLE_DYNAMICS)
+    X = rows(pipeline)
+    roads, at = pipeline._roads_of(X)
+    assert same(pipeline._run(roads, at, X, fix), made(vehicle="kinematic").rollout(X))
+
+
+def test_the_cause_is_vehicle_dynamics_where_the_kinematic_vehicle_copes():
+    dynamic, kinematic = (
+        made("lead-brakes", "careful-fsm", one, causes=True) for one in ("single-track", None)
+    )
+    X = rows(dynamic, 200)
+    found, other = dynamic.evaluate(X), kinematic.evaluate(X)
+    late = found.critical & ~other.critical
+    assert late.any()  # its brakes build up late
+    assert (found.cause[late] == Cause.VEHICLE_DYNAMICS).all()
+    assert not (found.cause[~late] == Cause.VEHICLE_DYNAMICS).any()
+
+
+def test_an_exported_file_states_it_and_does_the_same(tmp_path):
+    pipeline = made()
+    x = rows(pipeline)[3]
+    *_, path = write_scenario(pipeline, x, tmp_path, "one")
+    here = pipeline.rollout(x[np.newaxis])
+    assert same(simulate_file(path).rollout, here)
+    assert same(simulate_file(path, vehicle="single-track").rollout, here)
+    kinematic = made(vehicle="kinematic")
+    assert same(simulate_file(path, vehicle="kinematic").rollout, kinematic.rollout(x[np.newaxis]))
+    text = path.read_text()
+    assert '"vehicle" value="single-track"' in text
+    path.write_text(text.replace('"vehicle" value="single-track"', '"vehicle" value="tank"'))
+    with pytest.raises(InputError, match=r"one.xosc, line \d+: property vehicle: .*'tank'"):
+        simulate_file(path)
+    assert "single-track" not in str(with_vehicle(read(text.encode(), "one.xosc"), "kinematic"))
+
+
+def test_a_run_records_it_and_resumes_with_it(tmp_path):
+    given = {"ego": "route-follower", "budget": 20, "algorithm": "random", "keep": 1}
+    run = bg.run_search(
+        "stopped-after-curve", vehicle="single-track", out=tmp_path / "whole", **given
+    )
+    assert run.settings.vehicle == "single-track"
+    assert bg.resume(tmp_path / "whole").settings.vehicle == "single-track"
+    other = bg.run_search("stopped-after-curve", out=tmp_path / "other", **given)
+    assert other.settings.vehicle == "kinematic"
+    assert other.summary.v_d_median != run.summary.v_d_median
+
+
+def test_where_it_cannot_be():
+    with pytest.raises(UnknownNameError, match="vehicle 'tank'; known: kinematic, single-track"):
+        made(vehicle="tank")
+    file = made().concrete(rows(made())[0]).storyboard
+    simulator = SimulatorChoice("esmini")
+    with pytest.raises(InputError, match="'single-track' is of the embedded simulator; esmini"):
+        simulator.around(EmbeddedSimulator(file, "here", vehicle="single-track"), file)
+
+
+@given(st.floats(-3.0, 3.0), st.floats(-3.0, 3.0), st.floats(0.1, 5.0), st.floats(0.01, 2.0))
+def test_an_actuator_is_a_first_order_lag_with_a_bounded_rate(value, target, rate, seconds):
+    lag, n = 0.1, 20_000
+    expected = value
+    for _ in range(n):
+        wanted = (target - expected) / lag
+        expected += min(max(wanted, -rate), rate) * seconds / n
+    found = lagged(value, target, math.exp(-seconds / lag), lag, rate)
+    assert found == pytest.approx(expected, abs=2e-3 * max(1.0, abs(target - value)))
