@@ -45,9 +45,9 @@ def list_algorithms(as_json: options.Json = False) -> None:
 
 @listing.command("drivers")
 def list_drivers(as_json: options.Json = False) -> None:
-    """Drivers of the ego: ours, planners that others wrote; drivers of other participants.
+    """Drivers of the ego, planners among them; of others.
 
-    Of planners: whether they are installed, or how to get them.
+    Of planners that others wrote: whether they are installed, or how to get them.
     """
     from bridgegen.ego.listed import HEAD, listed
     from bridgegen.screen.tables import print_table
