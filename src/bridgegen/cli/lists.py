@@ -50,9 +50,9 @@ def list_drivers(as_json: options.Json = False) -> None:
     Of planners that others wrote: whether they are installed, or how to get them.
     """
     from bridgegen.ego.listed import HEAD, listed
-    from bridgegen.screen.tables import print_table
+    from bridgegen.screen.tables import print_entries
 
-    print_table(HEAD, listed(), as_json=as_json)
+    print_entries(HEAD, listed(), as_json=as_json)
 
 
 @listing.command("simulators")

@@ -6,6 +6,7 @@ from dataclasses import asdict
 from typing import TYPE_CHECKING
 
 from rich.console import Console
+from rich.padding import Padding
 from rich.table import Table
 
 if TYPE_CHECKING:
@@ -27,6 +28,26 @@ def print_table(head: Sequence[str], rows: Sequence[Sequence[object]], *, as_jso
 
 def _shown(value: object) -> str:
     return f"{value:.6g}" if isinstance(value, float) else str(value)
+
+
+def print_entries(head: Sequence[str], rows: Sequence[Sequence[str]], *, as_json: bool) -> None:
+    """Print rows as paragraphs, each under its first text; or as a JSON list of objects.
+
+    Args:
+        head: what the texts are.
+        rows: texts; empty ones are left out.
+        as_json: as JSON, with all texts.
+    """
+    if as_json:
+        print_table(head, rows, as_json=True)
+        return
+    console = Console(markup=False, emoji=False, highlight=False)
+    for name, *texts in rows:
+        console.print(name, style="bold")
+        for what, text in zip(head[1:], texts, strict=True):
+            if text:
+                said = text if what == "description" else f"{what}: {text}"
+                console.print(Padding(said, (0, 0, 0, 4)))
 
 
 def print_parameters(lines: "Sequence[ParameterLine]", *, as_json: bool) -> None:

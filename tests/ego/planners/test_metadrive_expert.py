@@ -42,12 +42,12 @@ def test_a_package_that_lacks_is_one_sentence(monkeypatch):
     def none(name):
         raise metadata.PackageNotFoundError(name)
 
-    monkeypatch.setattr("bridgegen.ego.planners._requirement.version", none)
+    monkeypatch.setattr("bridgegen.ego.planners.registry.version", none)
     with pytest.raises(InputError, match=r"metadrive-simulator==0\.4\.3.*pip install") as error:
         MetadriveExpert()
     assert "\n" not in str(error.value)
-    monkeypatch.setattr("bridgegen.ego.planners._requirement.version", lambda name: "0.3.0")
-    with pytest.raises(InputError, match=r"has 0\.3\.0"):
+    monkeypatch.setattr("bridgegen.ego.planners.registry.version", lambda name: "0.3.0")
+    with pytest.raises(InputError, match=r"is 0\.3\.0"):
         MetadriveExpert()
 
 

@@ -32,8 +32,8 @@ from bridgegen.ego.interface import ROUTE_STEP, Lane, Observation, RoadMap, Scen
 from bridgegen.ego.planners import _commonroad_alone
 from bridgegen.ego.planners._along_lanes import AlongLanes
 from bridgegen.ego.planners._commonroad_alone import N_STEPS, STEP, Arrays, Reactive
-from bridgegen.ego.planners._requirement import require
 from bridgegen.ego.planners.planner import Planner
+from bridgegen.ego.planners.registry import require
 
 PLANNER = Planner(
     name="commonroad-reactive",

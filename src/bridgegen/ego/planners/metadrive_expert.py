@@ -38,8 +38,8 @@ from bridgegen.arrays import Float
 from bridgegen.ego.batches import FixedBatch
 from bridgegen.ego.interface import Control, Observation, Scene
 from bridgegen.ego.planners import _metadrive_observation as its
-from bridgegen.ego.planners._requirement import require
 from bridgegen.ego.planners.planner import Planner
+from bridgegen.ego.planners.registry import require
 from bridgegen.errors import InputError
 
 PACKAGE, VERSION = "metadrive-simulator", "0.4.3"
