@@ -16,7 +16,7 @@ from bridgegen.openx.source import build_static
         ("cut-in", {"motorway"}),
         ("motorway-merge", {"motorway"}),  # ways join at an acute angle
         ("lead-brakes", {"road"}),  # a lane the other way
-        ("wrong-way-driver", {"road"}),  # on a motorway, but somebody comes towards the ego
+        ("wrong-way-driver", {"motorway", "oncoming"}),
         ("left-across-path", {"junction"}),
         ("roundabout-entry", {"junction"}),
         ("cyclist-right-turn", {"junction", "vulnerable"}),
@@ -28,16 +28,19 @@ def test_it_is_read_from_the_map_and_the_actors(scenario, needs):
 
 
 def test_each_needs_one_place_and_its_actors():
-    """An actor alone adds "vulnerable"; somebody who comes towards the ego makes a road of it."""
-    model = opendrive_from_owl(build_static({}, load("cut-in").roads))
+    """A cyclist adds "vulnerable"; somebody who comes towards the ego, "oncoming"."""
+    logical = load("cut-in")
+    space = logical.space()
+    model = opendrive_from_owl(build_static(space.values(space.row({})), logical.roads))
     ahead = [model.roads[0].id]
     along, against = np.zeros(2), np.array([0.0, np.pi])
     assert needed(model, ahead, along, ["car"]) == {"motorway"}
     assert needed(model, ahead, along, ["car", "bicycle"]) == {"motorway", "vulnerable"}
-    assert needed(model, ahead, against, ["car"]) == {"road"}
-    assert needed(model, ahead, against - 7.0, ["cone"]) == {"road"}  # whatever the direction
+    assert needed(model, ahead, against, ["car"]) == {"motorway", "oncoming"}
+    turned = against - 7.0  # whatever the direction
+    assert needed(model, ahead, turned, ["cone"]) == {"motorway", "oncoming"}
 
 
 def test_words_are_in_the_order_of_their_definition():
     assert in_words({"vulnerable", "road"}) == "road, vulnerable"
-    assert in_words(DOMAINS) == "motorway, road, junction, vulnerable"
+    assert in_words(DOMAINS) == "motorway, road, junction, oncoming, vulnerable"

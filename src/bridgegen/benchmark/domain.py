@@ -30,8 +30,8 @@ def domain_of(scenario: str) -> frozenset[str]:
     """Return which of `DOMAINS` a logical scenario needs, at its nominal values.
 
     One of "junction" (the ego's route leads through one in which ways cross or turn), "road" (there
-    are opposite lanes, or somebody drives against the ego's direction) and "motorway"; and
-    "vulnerable" if a pedestrian or a cyclist takes part.
+    are opposite lanes) and "motorway"; "oncoming" if on the latter somebody drives against the
+    ego's direction; and "vulnerable" if a pedestrian or a cyclist takes part.
 
     Args:
         scenario: name of the catalogue, or path of a file.
@@ -66,16 +66,16 @@ def needed(
     own = [roads[one] for one in ahead]
     known = [PARTICIPANTS[kind] for kind in kinds if kind in PARTICIPANTS]
     beside = any(one.seen_as.conduct in VULNERABLE for one in known)
-    turned = np.abs(_wrapped(headings[1:] - headings[0]))
+    needs = {"vulnerable"} if beside else set()
     if any(
         _crosses(model, junction) for junction in {one.junction for one in own if one.is_connecting}
     ):
-        place = "junction"
-    elif any(_has_opposite_lanes(one) for one in own) or (turned > AGAINST).any():
-        place = "road"
-    else:
-        place = "motorway"
-    return frozenset({place, *(["vulnerable"] if beside else [])})
+        return frozenset(needs | {"junction"})
+    if any(_has_opposite_lanes(one) for one in own):
+        return frozenset(needs | {"road"})
+    if (np.abs(_wrapped(headings[1:] - headings[0])) > AGAINST).any():
+        needs.add("oncoming")
+    return frozenset(needs | {"motorway"})
 
 
 def in_words(domain: Iterable[str]) -> str:

@@ -50,7 +50,7 @@ PLANNER = Planner(
     source="Werling et al. 2010, 2012; Würsching and Althoff, TU Munich, "
     "github.com/CommonRoad/commonroad-reactive-planner",
     how_to_get="in an environment of its own, since it requires an old protobuf; Python 3.11",
-    domain=frozenset({"motorway", "road", "junction"}),
+    domain=frozenset({"motorway", "road", "junction", "oncoming"}),
 )
 
 DRIVABLE = frozenset(

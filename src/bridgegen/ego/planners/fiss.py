@@ -54,7 +54,7 @@ PLANNER = Planner(
     source="https://doi.org/10.1109/IROS55552.2023.10341498",
     # Its README: highways, lane changes by the markings, unprotected turns, red lights; its
     # adapter for CARLA takes walkers.
-    domain=frozenset({"motorway", "road", "junction", "vulnerable"}),
+    domain=frozenset({"motorway", "road", "junction", "oncoming", "vulnerable"}),
 )
 
 PLAN_EVERY, CONTROL_STEP = 2, 0.05

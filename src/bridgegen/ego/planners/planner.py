@@ -32,6 +32,7 @@ DOMAINS = {
     "motorway": "carriageways of one direction, without crossing traffic",
     "road": "roads with oncoming traffic, without junctions on the way",
     "junction": "junctions, where others cross or turn",
+    "oncoming": "a vehicle that drives the wrong way towards the ego",
     "vulnerable": "pedestrians and cyclists on the way or beside it",
 }
 """Parts of an operational design domain, as planners state them."""
