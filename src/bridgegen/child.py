@@ -28,6 +28,9 @@ SUPERVISOR = Path(__file__).with_name("supervisor.py")
 END_SECONDS = 10.0
 """A process that has been asked to end is killed after so long [s]."""
 
+ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
+"""Environment of a process whose libraries use one thread."""
+
 DRAIN_SECONDS = 2.0
 """Maximum time between the end of a process and the end of its pipe [s]."""
 

@@ -6,7 +6,7 @@ crash, the next call needs a new process.
 
 import pickle
 import queue
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from typing import Any
 
@@ -35,6 +35,7 @@ class IsolatedProcess:
         module: is run as a program.
         arguments: of the program.
         error: is raised if a call is not answered.
+        environment: variables that are added to this process's environment.
     """
 
     def __init__(
@@ -42,8 +43,10 @@ class IsolatedProcess:
         module: str,
         arguments: Sequence[str] = (),
         error: type[CallError] = CallError,
+        environment: Mapping[str, str] | None = None,
     ) -> None:
         self._program, self._error = ["-m", module, *arguments], error
+        self._environment = environment
         self._child: Child | None = None
         self._answers: queue.SimpleQueue[Any] = queue.SimpleQueue()
 
@@ -62,7 +65,7 @@ class IsolatedProcess:
             CallError: it cannot be started.
         """
         self._answers = queue.SimpleQueue()
-        self._child = Child(self._program, self._answers.put)
+        self._child = Child(self._program, self._answers.put, environment=self._environment)
         try:
             return self._answer(seconds)
         except CallError:

@@ -254,3 +254,13 @@ class DecidesByHistory(Cruises):
 
 class IsAskedForHistory(DecidesByHistory):
     period = 0.2
+
+
+class TellsThreads:
+    """Its acceleration is how many threads its libraries take."""
+
+    def reset(self, n, scene):
+        self.n = n
+
+    def act(self, observation):
+        return [float(os.environ["OPENBLAS_NUM_THREADS"])] * self.n, [0.0] * self.n

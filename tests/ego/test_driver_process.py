@@ -48,6 +48,18 @@ def test_a_driver_answers_again_and_again(process, name):
         assert curvature.tolist() == [0.0, 0.0, 0.0]
 
 
+@pytest.mark.parametrize(("set_to", "taken"), [(None, 1.0), ("3", 3.0)])
+def test_libraries_take_one_thread_unless_the_user_says_otherwise(
+    process, monkeypatch, set_to, taken
+):
+    monkeypatch.delenv("OPENBLAS_NUM_THREADS", raising=False)
+    if set_to:
+        monkeypatch.setenv("OPENBLAS_NUM_THREADS", set_to)
+    driver = process("TellsThreads")
+    driver.reset(N, scene())
+    assert driver.act(observation())[0].tolist() == [taken] * N
+
+
 @pytest.mark.parametrize(
     ("name", "kind", "message"),
     [

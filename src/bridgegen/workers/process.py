@@ -6,10 +6,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from typing import IO, Any
 
-from bridgegen.child import Child
-
-ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
-"""Environment of a process whose libraries use one thread."""
+from bridgegen.child import ONE_THREAD, Child
 
 Said = queue.SimpleQueue[tuple["Process", tuple[Any, ...]]]
 """Messages of processes: ("started",), ("answer", result), ("raised", exception), ("died",) when

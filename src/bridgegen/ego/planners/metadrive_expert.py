@@ -3,8 +3,7 @@
 Only the weights are read, with NumPy: MetaDrive itself, which needs panda3d, is not imported, and
 ``pip install --no-deps metadrive-simulator==0.4.3`` is enough. The network decides each 0.1 s, as
 there; its mean action is taken (MetaDrive's ``expert(vehicle, deterministic=True)``). It computes
-in float64 where MetaDrive rounds to float32, which changes an action by some 1e-6. NumPy's threads
-only slow so small a network down: set ``OPENBLAS_NUM_THREADS=1``.
+in float64 where MetaDrive rounds to float32, which changes an action by some 1e-6.
 
 Its actions are steering and throttle or brake, in [-1, 1]. They become a control by the parameters
 of MetaDrive's default vehicle (``pg_space.py``, ``vehicle_type.py``) and by the rules of Bullet's
