@@ -170,6 +170,7 @@ def _outcome(
         return Outcome(name, scenario, column, "failed", entrant.problem)
     cells = [plan.cell(scenario, entrant, column, seed) for seed in range(plan.seeds)]
     why = next((gaps[cell] for cell in cells if cell in gaps), "")
+    why = why.replace(f"{plan.out}/", "")  # a folder may be moved, and says the same
     good = [cell for cell in cells if cell not in gaps]
     if not good:
         return Outcome(name, scenario, column, "failed", why)
