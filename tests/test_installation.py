@@ -32,6 +32,7 @@ def test_the_command_prints_what_is_installed(cli, monkeypatch, tmp_path):
     assert rows["bridgegen"]["value"] == version("bridgegen")
     assert rows["numba"]["value"] == version("numba")
     assert rows["esmini"]["advice"].startswith("name libesminiLib.so")
+    monkeypatch.setenv("COLUMNS", "300")  # nothing is folded
     code, out, _ = cli("doctor")
     assert code == 0
     assert all(subject in out for subject in rows)

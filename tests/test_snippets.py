@@ -230,9 +230,9 @@ def test_every_snippet_runs(name, page):
 
 def test_few_snippets_cannot_be_run():
     found = [block for name in PAGES for block in blocks(name) if block.mark == "not run"]
-    why = ("esmini", "CARLA", "extra parquet")
+    why = ("esmini", "CARLA", "extra parquet", "server", "planner", "350 MB")
     assert all(any(one in block.value for one in why) for block in found)
-    assert len(found) <= 12
+    assert len(found) <= 17
 
 
 def test_marks_are_those_that_are_known():

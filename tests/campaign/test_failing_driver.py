@@ -31,7 +31,7 @@ def search(folder, ego, budget):
     [
         ("Raises", "the driver raised an error: ValueError: no idea (drivers.py:"),
         ("AnswersNaN", "acceleration must be finite, got nan"),
-        ("AnswersNothing", "act must return a Control or (acceleration, curvature)"),
+        ("AnswersNothing", "act must return a Control, (acceleration, curvature) or a Trajectory"),
         ("AnswersOneNumber", "acceleration must have the shape (2,), got ()"),
         ("AnswersOneForAll", "acceleration must have the shape (2,), got (1,)"),
         ("AnswersAColumn", "acceleration must have the shape (2,), got (2, 1)"),

@@ -34,7 +34,7 @@ BLIND = made("blind", "Blind", spec="planner_packages:Blind", domain=frozenset({
 class Blind:
     """Holds its speed along its route."""
 
-    wants = ()
+    period = 0.5  # called rarely, it takes less time
 
     def reset(self, n, scene):
         self.n = n

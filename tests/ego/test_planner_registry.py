@@ -99,7 +99,11 @@ def test_one_that_is_not_installed_says_how_to_get_it(package, name, message):
 @pytest.mark.parametrize(
     ("name", "value", "message"),
     [
-        ("lost", "LOST", "must state its domain by motorway, road, junction, vulnerable, got sea"),
+        (
+            "lost",
+            "LOST",
+            "must state its domain by motorway, road, junction, oncoming, vulnerable, got sea",
+        ),
         ("one", "OTHER", "must have the same name, got 'another'"),
         ("none", "NO_PLANNER", "must be a bridgegen Planner, got a int"),
         ("gone", "NOTHING", "cannot be loaded: AttributeError"),

@@ -9,13 +9,17 @@ from dataclasses import astuple, dataclass
 
 import numpy as np
 
-from bridgegen.cause import CAUSES, Cause
+from bridgegen import cause
+from bridgegen.cause import Cause
 from bridgegen.comparison.statistics import quartiles
 from bridgegen_reproduction.numbers import number, share, spread
 from bridgegen_reproduction.paper import METHODS, RS, TITLES
 from bridgegen_reproduction.protocol import IDEAL, PERCEIVING, Protocol
 from bridgegen_reproduction.runs import Runs, of
 from bridgegen_reproduction.table import Table
+
+CAUSES = tuple(one for one in cause.CAUSES if one is not Cause.VEHICLE_DYNAMICS)
+"""The causes that there can be: the paper's vehicle is kinematic."""
 
 
 @dataclass(frozen=True)
@@ -68,7 +72,7 @@ def causes_of(protocol: Protocol, runs: Runs) -> tuple[Causes, ...]:
 def table_causes(found: Sequence[Causes]) -> Table:
     """Return how many critical scenarios vanish with ideal perception, and what the rest is."""
     rows, data = [], []
-    names = [cause.label for cause in CAUSES]
+    names = [one.label for one in CAUSES]
     for one in found:
         title = f"S{one.scenario[-1]}"
         middle = quartiles(np.array(one.r_critic))

@@ -7,7 +7,6 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from bridgegen.cause import CAUSES
 from bridgegen.comparison.comparison import ComparisonCallbacks, compare
 from bridgegen.comparison.plan import RUNS, Cell
 from bridgegen.comparison.result import Comparison
@@ -19,7 +18,7 @@ from bridgegen_reproduction import paper
 from bridgegen_reproduction.claims import judge, of_fronts
 from bridgegen_reproduction.document import FIGURES, TABLES, Document, Picture, markdown
 from bridgegen_reproduction.page import html
-from bridgegen_reproduction.perception import causes_of, paired_of
+from bridgegen_reproduction.perception import CAUSES, causes_of, paired_of
 from bridgegen_reproduction.pictures import pictures
 from bridgegen_reproduction.protocol import PARTS, PRINTED, Part, Protocol, make_protocol
 from bridgegen_reproduction.results import of_run, results_of

@@ -51,5 +51,5 @@ def planner_findings() -> Iterator[tuple[str, str, str]]:
     """Yield each planner's name, whether it is installed, and how to get it where it is not."""
     for one in planners().values():
         problem = missing(one)
-        state = f"not installed ({problem})" if problem else available(one)
+        state = "not installed" if problem else available(one)
         yield one.name, state, how_to_get(one) if problem else ""

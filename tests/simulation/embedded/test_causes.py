@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from bridgegen import metrics
-from bridgegen.cause import Cause, Counterfactual, causes
+from bridgegen.cause import Cause, Counterfactual, causes, counterfactuals
 from bridgegen.ego import DRIVERS
 from bridgegen.objective import CLASSIFYING, Objective
 
@@ -39,7 +39,8 @@ def cause(text: str, driver: str) -> Cause:
         return CRITICAL(metrics.evaluate(rollout, CLASSIFYING), CLASSIFYING)
 
     assert critical().tolist() == [True]
-    return Cause(causes(DRIVERS[driver], critical(), lambda at, replay: ~critical(replay))[0])
+    replays = counterfactuals(DRIVERS[driver])
+    return Cause(causes(replays, critical(), lambda at, replay: ~critical(replay))[0])
 
 
 def test_a_driver_that_does_not_look_plans_badly():

@@ -3,10 +3,9 @@
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from bridgegen.cause import CAUSES
 from bridgegen.comparison.drawing import Theme
 from bridgegen_reproduction.figures.look import SIZE, legend, panels, title_of
-from bridgegen_reproduction.perception import Causes
+from bridgegen_reproduction.perception import CAUSES, Causes
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
