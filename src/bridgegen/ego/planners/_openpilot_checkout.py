@@ -32,11 +32,11 @@ VERSION = "0.11"
 """The series of openpilot that is supported; tested: 0.11.2 of 20 June 2026."""
 
 TESTED = "ad5151b38b540e08a01c87029c3ddb0979ba4fdf"
-"""The commit of it."""
+"""The commit of it, as a fork has it: see its date, where this one is not found."""
 
 HOW_TO_GET = (
-    f"GIT_LFS_SKIP_SMUDGE=1 git clone https://github.com/commaai/openpilot && "
-    f"git -C openpilot checkout {TESTED[:10]}, and set {VARIABLE} to that folder; gcc, make and "
+    "GIT_LFS_SKIP_SMUDGE=1 git clone https://github.com/commaai/openpilot, check out a commit of "
+    f"version {VERSION} (tested: {TESTED[:10]}), and set {VARIABLE} to that folder; gcc, make and "
     "Python's headers build its solver once"
 )
 
