@@ -35,7 +35,7 @@ import numpy.typing as npt
 
 from bridgegen.arrays import Float
 from bridgegen.ego.interface import ROUTE_POINTS, ROUTE_STEP, Control, Observation, Scene
-from bridgegen.ego.planners._openpilot_checkout import HOW_TO_GET, STEP, Openpilot, load
+from bridgegen.ego.planners._openpilot_checkout import HOW_TO_GET, STEP, VARIABLE, Openpilot, load
 from bridgegen.ego.planners.planner import Planner
 from bridgegen.errors import InputError
 
@@ -50,6 +50,7 @@ PLANNER = Planner(
     how_to_get=HOW_TO_GET,
     # docs/LIMITATIONS.md: not for traffic lights, pedestrians, cyclists
     domain=frozenset({"motorway", "road"}),
+    variables=(VARIABLE,),
 )
 
 AHEAD = 2.0

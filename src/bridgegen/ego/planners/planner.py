@@ -16,6 +16,7 @@ class Planner:
         source: its publication or page.
         how_to_get: one sentence, where pip alone is not enough; else empty.
         domain: where it means to drive: words of `DOMAINS`; elsewhere it is not judged.
+        variables: environment variables that must be set, to the folder of a checkout for example.
     """
 
     name: str
@@ -26,6 +27,7 @@ class Planner:
     source: str
     how_to_get: str = ""
     domain: frozenset[str] = frozenset()
+    variables: tuple[str, ...] = ()
 
 
 DOMAINS = {

@@ -3,6 +3,7 @@
 An adapter's file imports its planner only when it drives, so that reading what it says is cheap.
 """
 
+import os
 import shlex
 from functools import cache
 from importlib import import_module
@@ -51,6 +52,7 @@ def missing(planner: Planner) -> str:
             continue
         if not wanted.specifier.contains(found, prereleases=True):
             problems.append(f"{wanted.name} must be {wanted.specifier}, is {found}")
+    problems += [f"{one} is not set" for one in planner.variables if not os.environ.get(one)]
     return "; ".join(problems)
 
 
