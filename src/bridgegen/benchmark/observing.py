@@ -11,6 +11,7 @@ from typing import IO, Any
 
 from bridgegen.ego.driver_process import make
 from bridgegen.ego.interface import BatchDriver, Observation, Scene
+from bridgegen.ego.traits import NAMES
 from bridgegen.errors import InputError
 
 _FILE = "observer.py"
@@ -62,7 +63,7 @@ def observing(spec: str, seen: str) -> type:
             pickle.dump(what, self._file)
             self._file.flush()
 
-    for name in ("wants", "period"):
+    for name in NAMES:
         if hasattr(inner, name):
             setattr(Observer, name, getattr(inner, name))
     return Observer
