@@ -3,7 +3,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bridgegen.triage.triage import FRESH, SAMPLED, harmful_rows, triage
+from bridgegen.triage.effort import FULL, NONE, SHORT
+from bridgegen.triage.triage import harmful_rows, triage
 from bridgegen.triage.words import headline, mode_in_words
 
 
@@ -60,7 +61,7 @@ def test_each_mode_is_exported_robust_rows_first_then_the_most_harmful(made):
 def test_a_stated_sample_of_the_others_is_tested_too(made):
     _, _, found = made
     sampled = [one.evaluation for one in found.record.neighbourhoods if one.sampled]
-    assert len(sampled) == found.record.sampled == SAMPLED
+    assert len(sampled) == found.record.sampled == FULL.sampled
     assert not {*sampled} & {*found.exports}
     assert all(one.fixes for one in found.record.neighbourhoods)
 
@@ -78,9 +79,9 @@ def test_shares_of_random_rows_are_the_run_s(made):
 def test_an_optimiser_s_rows_tell_no_share_fresh_ones_do(made):
     pipeline, rows, _ = made
     found = triage(pipeline, rows, algorithm="pso", seed=0, keep=6).record
-    assert (found.bound.space.drawn, found.bound.space.rows) == ("fresh", FRESH)
+    assert (found.bound.space.drawn, found.bound.space.rows) == ("fresh", FULL.fresh)
     fresh = found.fresh
-    assert len(fresh.harm) == len(fresh.mode) == FRESH
+    assert len(fresh.harm) == len(fresh.mode) == FULL.fresh
     assert sum(one >= 0.3 for one in fresh.harm) == found.bound.space.harmful
     for mode in found.modes:
         assert fresh.mode.count(mode.number) == mode.space.harmful
@@ -151,11 +152,41 @@ def test_without_causes_robustness_is_known_all_the_same(made, monkeypatch):
     assert all(not one.fixes for one in found.neighbourhoods)
 
 
-def test_many_harmful_rows_are_placed_by_the_nearest(made, monkeypatch):
+def test_many_harmful_rows_are_placed_by_the_nearest(made):
     pipeline, rows, found = made
-    monkeypatch.setattr("bridgegen.triage.triage.MOST_PLACED", 10)
-    few = triage(pipeline, rows, algorithm="random", seed=0, keep=6)
+    effort = replace(FULL, placed=10)
+    few = triage(pipeline, rows, algorithm="random", seed=0, keep=6, effort=effort)
     assert few.record == found.record  # there is one place
+
+
+def counted(pipeline, monkeypatch, effort):
+    rows = pipeline.rows(600)
+    simulated, try_all = [], pipeline.try_all
+    monkeypatch.setattr(
+        pipeline,
+        "try_all",
+        lambda X, *rest, **named: [simulated.append(len(X)), try_all(X, *rest, **named)][1],
+    )
+    record = triage(pipeline, rows, algorithm="pso", seed=0, keep=2, effort=effort).record
+    monkeypatch.undo()
+    return record, sum(simulated)
+
+
+def test_a_short_triage_finds_the_same_modes_by_fewer_simulations(made, monkeypatch):
+    full, of_full = counted(made[0], monkeypatch, FULL)
+    short, of_short = counted(made[0], monkeypatch, SHORT)
+    assert of_short < 0.5 * of_full
+    assert {one.rule for one in short.modes} == {one.rule for one in full.modes}
+    assert all(one.robustness is not None and one.minimal for one in short.modes)
+    assert (short.sampled, short.fresh, short.untested) == (0, None, "")
+
+
+def test_no_triage_finds_modes_and_simulates_nothing(made, monkeypatch):
+    none, simulated = counted(made[0], monkeypatch, NONE)
+    assert simulated == 0
+    assert [one.rule for one in none.modes] == ["cut in", "rear distance"]
+    assert all(one.robustness is None and one.minimal is None for one in none.modes)
+    assert none.untested == "neighbours were not simulated (--triage none)"
 
 
 def test_no_room_to_export_still_shows_the_modes(made):

@@ -16,6 +16,8 @@ from bridgegen.benchmark.plan import (
     QUICK_KEEP,
     QUICK_SCENARIOS,
     QUICK_SEEDS,
+    QUICK_TRIAGE,
+    TRIAGE,
     Cell,
     Plan,
     catalogue,
@@ -41,6 +43,7 @@ from bridgegen.comparison.workers import run_all
 from bridgegen.errors import InputError, Interrupted
 from bridgegen.search.algorithm import Problem, resolve
 from bridgegen.store.sqlite import Lock
+from bridgegen.triage.effort import effort
 from bridgegen.workers.process import cores
 
 LOCK = "benchmark.lock"
@@ -93,6 +96,7 @@ def benchmark_planners(
     seeds: int | None = None,
     algorithm: str = "pso",
     keep: int | None = None,
+    triage: str | None = None,
     quick: bool = False,
     workers: int | None = None,
     out: Path | str | None = None,
@@ -112,8 +116,10 @@ def benchmark_planners(
         seeds: runs of each driver, scenario and column; 3 by default.
         algorithm: that searches.
         keep: scenarios that each run exports; 3 by default.
-        quick: whether other defaults hold: four scenarios, two of our drivers, 60 evaluations, one
-            seed, one scenario exported.
+        triage: how much of the findings is simulated again: "full", "short" or "none"; "short" by
+            default.
+        quick: whether other defaults hold: four scenarios, two of our drivers, 40 evaluations, one
+            seed, one scenario exported, no triage.
         workers: number of runs at a time; one for each core by default. No result depends on it.
         out: folder; ``benchmarks/planners`` by default, or ``benchmarks/planners-quick``.
         callbacks: called as it progresses.
@@ -127,12 +133,14 @@ def benchmark_planners(
     budget = budget if budget is not None else QUICK_BUDGET if quick else 1000
     seeds = seeds if seeds is not None else QUICK_SEEDS if quick else 3
     keep = keep if keep is not None else QUICK_KEEP if quick else KEEP
+    triage = triage if triage is not None else QUICK_TRIAGE if quick else TRIAGE
     at_once = cores() if workers is None else workers
     problems = number_problems(seeds, budget, keep)
     if at_once < 1:
         problems.append(f"1 <= workers must hold, got {workers}")
     if problems:
         raise InputError(*problems)
+    effort(triage)
     resolve(toolkit.get(algorithm), Problem.unnamed(1), 0, {})
     taking_part = entrants(drivers, QUICK_DRIVERS if quick else ours())
     searched = [str(one) for one in scenarios or (QUICK_SCENARIOS if quick else catalogue())]
@@ -142,7 +150,7 @@ def benchmark_planners(
     needs = {name: domain_of(name) for name in dict.fromkeys(searched)}
     plan = make_plan(
         searched, taking_part, needs, seeds=seeds, budget=budget, algorithm=algorithm, keep=keep,
-        out=folder,
+        triage=triage, out=folder,
     )  # fmt: skip
     claim(plan.out, FILE, plan.identity(), "benchmark", {})
     lock = Lock(plan.out / LOCK)

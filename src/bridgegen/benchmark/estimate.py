@@ -19,9 +19,9 @@ FEW, MANY = 4, 32
 SLOW = 10.0
 """Seconds beyond which the larger batch is not driven: the smaller one says enough."""
 
-TESTED = 2000
-"""Rows that the tests of a run's failures simulate again, about: neighbours, causes, minimal
-scenarios. Measured: 260 to 3,800 a run."""
+TESTED = {"full": 2000, "short": 800, "none": 0}
+"""Rows that a triage simulates again, about: neighbours, causes, minimal scenarios. Measured: 260
+to 3,800 a run if full, 0 to 1,200 if short."""
 
 BESIDE = 8.0
 """Seconds that a run takes besides: to begin, export and report. Measured on one core."""
@@ -75,7 +75,7 @@ def seconds_of(plan: Plan, speeds: dict[str, Speed], at_once: int) -> float:
     """
     total = 0.0
     for one in speeds.values():
-        tested = one.runs / plan.seeds * TESTED
+        tested = one.runs / plan.seeds * TESTED[plan.triage]
         total += one.seconds * (one.runs * plan.budget + tested) + one.runs * BESIDE
     return total / at_once
 

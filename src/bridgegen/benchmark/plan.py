@@ -33,7 +33,9 @@ QUICK_SCENARIOS = ("cut-in", "lead-brakes", "left-across-path", "pedestrian-behi
 """One of each part of the domain."""
 
 QUICK_DRIVERS = ("reference", "un-r157")
-QUICK_BUDGET, QUICK_SEEDS, QUICK_KEEP = 60, 1, 1
+QUICK_BUDGET, QUICK_SEEDS, QUICK_KEEP = 40, 1, 1
+TRIAGE, QUICK_TRIAGE = "short", "none"
+"""How much of the findings is simulated again, of `bridgegen.triage.effort.EFFORTS`."""
 
 
 @dataclass(frozen=True)
@@ -99,6 +101,7 @@ class Plan:
         budget: evaluations of each run.
         algorithm: that searches.
         keep: scenarios that a run exports.
+        triage: how much of the findings is simulated again.
     """
 
     out: Path
@@ -110,6 +113,7 @@ class Plan:
     budget: int
     algorithm: str
     keep: int
+    triage: str
 
     @property
     def cells(self) -> tuple[Cell, ...]:
@@ -146,6 +150,7 @@ class Plan:
             budget=self.budget,
             seed=cell.seed,
             keep=self.keep,
+            triage=self.triage,
         )
 
     def command(self) -> str:
@@ -157,6 +162,7 @@ class Plan:
             words += ["--scenario", given]
         words += ["--budget", str(self.budget), "--seeds", str(self.seeds)]
         words += ["--algorithm", self.algorithm, "--keep", str(self.keep)]
+        words += ["--triage", self.triage]
         return shlex.join([*words, "--out", str(self.out)])
 
     def identity(self) -> dict[str, Any]:
@@ -166,6 +172,7 @@ class Plan:
             "budget": self.budget,
             "algorithm": self.algorithm,
             "keep": self.keep,
+            "triage": self.triage,
         }
         same |= {f"scenario {name}": mark for name, mark in self.fingerprints.items()}
         for one in self.entrants:
@@ -218,6 +225,7 @@ def make_plan(
     budget: int,
     algorithm: str,
     keep: int,
+    triage: str,
     out: Path,
 ) -> Plan:
     """Return a plan.
@@ -230,6 +238,7 @@ def make_plan(
         budget: likewise.
         algorithm: likewise.
         keep: likewise.
+        triage: likewise.
         out: likewise.
 
     Raises:
@@ -252,6 +261,7 @@ def make_plan(
         budget=budget,
         algorithm=algorithm,
         keep=keep,
+        triage=triage,
     )
 
 

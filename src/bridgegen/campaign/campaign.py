@@ -32,6 +32,7 @@ from bridgegen.report.data import WHOLE
 from bridgegen.search.algorithm import Problem, resolve
 from bridgegen.simulation.choice import SimulatorChoice
 from bridgegen.store import Recorded, Store, refuse_used
+from bridgegen.triage.effort import effort
 from bridgegen.triage.record import write_record
 from bridgegen.triage.triage import triage
 from bridgegen.workers import Choice, Workers, open_workers
@@ -108,6 +109,7 @@ def run_search(given: SearchArguments) -> Run:
     seed = catalogue.seed if given.seed is None else given.seed
     if problems := range_problems(replace(given, budget=budget, seed=seed)):
         raise InputError(*problems)
+    effort(given.triage)
     method = toolkit.get(given.algorithm)
     columns = columns_of(method, given.objectives)
     spec = chosen_objective(catalogue.objective, given, columns)
@@ -304,7 +306,7 @@ def _finish(
     if pipeline.objective.harm in pipeline.metrics:  # runs of earlier versions did not record it
         triaged = triage(
             pipeline, rows, algorithm=settings.algorithm, seed=settings.seed, keep=settings.keep,
-            chosen=best.tolist() if rule == "criteria" else None,
+            chosen=best.tolist() if rule == "criteria" else None, effort=effort(settings.triage),
         )  # fmt: skip
         record = triaged.record
         if rule != "criteria":

@@ -52,7 +52,7 @@ def planners(
         bool,
         typer.Option(
             "--quick",
-            help="Four scenarios, two of our drivers, 60 evaluations, one seed: minutes.",
+            help="Four scenarios, 40 evaluations, one seed, no triage: minutes.",
             rich_help_panel=SEARCH,
         ),
     ] = False,
@@ -60,6 +60,15 @@ def planners(
         int | None,
         typer.Option(
             help="Scenarios that each run exports.", show_default="3", rich_help_panel=OUTPUT
+        ),
+    ] = None,
+    triage: Annotated[
+        str | None,
+        typer.Option(
+            help="How much of the findings is simulated again: full, short or none.",
+            show_default="short",
+            rich_help_panel=OUTPUT,
+            autocompletion=completing("triage"),
         ),
     ] = None,
     workers: Annotated[
@@ -95,6 +104,7 @@ def planners(
             seeds=seeds,
             algorithm=algorithm,
             keep=keep,
+            triage=triage,
             quick=quick,
             workers=workers,
             out=out,

@@ -127,6 +127,12 @@ def _causes(_: typer.Context) -> Iterable[str]:
     return [one.label for one in CAUSES]
 
 
+def _triages(_: typer.Context) -> Iterable[str]:
+    from bridgegen.triage.effort import EFFORTS
+
+    return EFFORTS
+
+
 def _flavours(_: typer.Context) -> Iterable[str]:
     from bridgegen.campaign.export import FLAVOURS
 
@@ -153,6 +159,7 @@ NAMES: dict[str, Callable[[typer.Context], Iterable[str]]] = {
     "axis": _axes,
     "simulator": _simulators,
     "cause": _causes,
+    "triage": _triages,
     "weights": _fixed("fixed", "entropy"),
     "scale": _fixed("raw", "standardised"),
     "objectives": _fixed("one", "many"),

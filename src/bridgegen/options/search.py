@@ -363,6 +363,18 @@ class SearchOptions(CommonOptions):
             group=OUTPUT,
         ),
     )
+    triage: str = field(
+        default="full",
+        metadata=option(
+            TEXT,
+            "How much of the findings is simulated again, to test robustness and causes and to "
+            "find minimal scenarios: full; short, about a third of it; or none.",
+            hint="For slow drivers.",
+            before="full",
+            group=OUTPUT,
+            names="triage",
+        ),
+    )
     simulator: SimulatorChoice = field(
         default=EMBEDDED,
         metadata=option(

@@ -21,6 +21,7 @@ from bridgegen.arrays import Bool, Float, Int
 from bridgegen.evaluation import Trials
 from bridgegen.odd.space import SearchSpace
 from bridgegen.pipeline import Pipeline
+from bridgegen.triage.effort import FULL, Effort
 from bridgegen.triage.modes import Key, keys_of
 from bridgegen.triage.moves import around, nearest, ranges, searched
 from bridgegen.triage.neighbours import NEIGHBOURS, RADIUS, ROBUST
@@ -80,9 +81,11 @@ class Minimiser:
     Args:
         pipeline: the run's, one that ``tries``.
         seed: of the run.
+        effort: of the triage.
     """
 
-    def __init__(self, pipeline: Pipeline, seed: int) -> None:
+    def __init__(self, pipeline: Pipeline, seed: int, effort: Effort = FULL) -> None:
+        self._effort = effort
         self._pipeline, self._space, self._seed = pipeline, pipeline.space, seed
         self._bases: Float = np.empty((0, len(pipeline.space.names)))
 
@@ -102,6 +105,8 @@ class Minimiser:
         modes = [m for m in range(len(X)) if alive[m][0]]
         self._descend(ladders, ways, here, modes, SHARES, MOST_ROUNDS, self._holds)
         frail = self._move_back(ladders, ways, here, modes)
+        if not self._effort.descends_robustly:
+            frail = []
         start = [np.zeros((int(m in frail), space.n_var), dtype=np.int64) for m in range(len(X))]
         robust = self._holds_robustly(ladders, ways, start)
         frail = [m for m in frail if robust[m][0]]
@@ -179,15 +184,14 @@ class Minimiser:
                 [np.where(bound, np.maximum(here[m] - b, 0), here[m]) for b in BACK]
             )
         fine = self._holds(ladders, ways, tried)
-        shares = self._robustness([(m, at) for m in modes for at in tried[m]], ladders)
-        frail = []
-        for k, m in enumerate(modes):
-            of = np.array([share for share, _, _ in shares[k * len(BACK) : (k + 1) * len(BACK)]])
-            of[~fine[m]] = -1.0
-            robust = np.flatnonzero(of >= ROBUST)
-            here[m] = tried[m][int(robust[0]) if len(robust) else int(np.argmax(of))]
-            if not len(robust):
-                frail.append(m)
+        frail, best = list(modes), dict.fromkeys(modes, -1.0)
+        for k in range(len(BACK)):  # one after the other: most modes are robust soon
+            asked = [m for m in frail if fine[m][k]]
+            shares = self._robustness([(m, tried[m][k]) for m in asked], ladders)
+            for m, (share, _, _) in zip(asked, shares, strict=True):
+                if fine[m][k] and share > best[m]:
+                    best[m], here[m] = share, tried[m][k]
+            frail = [m for m in frail if best[m] < ROBUST]
         return frail
 
     def _limits(

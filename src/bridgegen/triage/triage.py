@@ -17,6 +17,7 @@ from bridgegen.pipeline import Pipeline
 from bridgegen.store import Recorded, Rows
 from bridgegen.triage.bound import UNBIASED, bound, estimate, least_margins
 from bridgegen.triage.distinct import distinct
+from bridgegen.triage.effort import FULL, Effort
 from bridgegen.triage.minimal import Minimiser
 from bridgegen.triage.modes import Group, Key, by_harm, group, keys_of, rekeyed, title, where
 from bridgegen.triage.moves import searched
@@ -32,22 +33,6 @@ from bridgegen.triage.record import (
     Neighbourhood,
     Triage,
 )
-
-SAMPLED = 8
-"""Number of random harmful rows, besides the exported ones, whose neighbours are tested."""
-
-PER_MODE = 3
-"""Number of distinct worst rows of a mode among which a robust one is sought."""
-
-FRESH = 256
-"""Number of random rows that estimate shares of the space if an algorithm chose the run's."""
-
-MOST_PLACED = 4096
-"""Number of worst harmful rows that are simulated again to find their place on the route. Other
-rows get the place of the nearest of these with an otherwise equal key."""
-
-MOST_TESTED, MOST_MINIMAL = 20, 10
-"""Maximum number of modes with a tested cause, and with a minimal scenario."""
 
 _SAMPLE, _FRESH = 18, 19  # streams of random numbers, apart from others of the same seed
 
@@ -73,10 +58,11 @@ def triage(
     seed: int,
     keep: int,
     chosen: Sequence[int] | None = None,
+    effort: Effort = FULL,
 ) -> Triaged:
     """Group a run's harmful rows into failure modes, and test the robustness of each finding.
 
-    The result depends on the seed only, to the last bit.
+    The result depends on the seed and the effort only, to the last bit.
 
     Args:
         pipeline: of the run.
@@ -86,8 +72,9 @@ def triage(
         keep: how many scenarios to export.
         chosen: positions of the rows to export, best first, where something else than harm chooses
             them; the harmful ones among them are tested.
+        effort: how much is tested.
     """
-    return _Triage(pipeline, rows, algorithm, seed, keep, chosen).run()
+    return _Triage(pipeline, rows, algorithm, seed, keep, chosen, effort).run()
 
 
 def harmful_rows(
@@ -123,7 +110,9 @@ class _Triage:
         seed: int,
         keep: int,
         chosen: Sequence[int] | None,
+        effort: Effort,
     ) -> None:
+        self._effort, self._tests = effort, pipeline.tries and effort.tests
         self._pipeline, self._rows, self._space = pipeline, rows, pipeline.space
         self._algorithm, self._seed, self._keep = algorithm, seed, keep
         self._chosen = chosen
@@ -143,9 +132,9 @@ class _Triage:
 
     def run(self) -> Triaged:
         """Run the stages."""
-        rows, tries = self._rows, self._pipeline.tries
+        rows, tests = self._rows, self._tests
         U, harm = self._U, self._harm[self._at]
-        place = self._places(U) if tries else [""] * len(self._at)
+        place = self._places(U) if tests else [""] * len(self._at)
         quick = [Cause(one).label for one in rows.cause[self._at].tolist()]
         kinds = self._pipeline.kinds
         keys = keys_of(rows.findings.take(self._at), kinds, place, quick)
@@ -153,18 +142,18 @@ class _Triage:
         self._unrecorded = len(every[MOST_MODES:])
         groups = every[:MOST_MODES]
         shown = [int(one.rows[0]) for one in groups]
-        if tries:
+        if tests:
             shown = self._test_robustness(groups, U, harm)
         exports = self._choose(shown, U, harm)
-        tested = list(dict.fromkeys([*exports, *shown[:MOST_TESTED]]))
-        sample = self._sample(tested) if tries else []
-        if tries:
+        tested = list(dict.fromkeys([*exports, *shown[: self._effort.tested]]))
+        sample = self._sample(tested) if tests else []
+        if tests:
             self._test(tested, sampled=False)
             self._test(sample, sampled=True)
         groups, shown = self._by_tested_cause(groups, shown, U, harm)
         order = sorted(range(len(groups)), key=lambda k: self._rank(shown[k], harm))
         groups, shown = [groups[k] for k in order], [shown[k] for k in order]
-        minimal = self._minimal(groups, shown) if tries else [None] * len(groups)
+        minimal = self._minimal(groups, shown) if tests else [None] * len(groups)
         record = self._record(groups, shown, exports, tested, sample, minimal)
         return Triaged(record, tuple(self._at[exports].tolist()))
 
@@ -173,7 +162,7 @@ class _Triage:
     def _places(self, U: Float) -> list[str]:
         """Return where on its route each harmful row fails."""
         order = by_harm(self._harm[self._at], U)
-        first, rest = order[:MOST_PLACED], order[MOST_PLACED:]
+        first, rest = np.split(order, [self._effort.placed])
         place = np.full(len(order), "", dtype=object)
         place[first] = self._pipeline.try_all(self._rows.X[self._at[first]]).place
         if len(rest):
@@ -193,9 +182,9 @@ class _Triage:
 
     def _test_robustness(self, groups: Sequence[Group], U: Float, harm: Float) -> list[int]:
         """Simulate neighbours of the worst rows; return the row that represents each mode."""
-        worst = [distinct(U, one.rows, PER_MODE) for one in groups]
+        worst = [distinct(U, one.rows, self._effort.per_mode) for one in groups]
         every = by_harm(harm, U)
-        several = distinct(U, every, max(2 * self._keep, 1))
+        several = distinct(U, every, self._effort.spare * max(self._keep, 1))
         self._simulate(dict.fromkeys(i for some in (*worst, several) for i in some), fixes=False)
         return [min(some, key=lambda i: (self._is_knife_edge(i), some.index(i))) for some in worst]
 
@@ -214,9 +203,7 @@ class _Triage:
         if len(first) + len(more) < self._keep:  # rows of unknown robustness
             kept = [*first, *more]
             more += distinct(U, every[critical[every]], self._keep, kept)
-            self._simulate(
-                [i for i in more if self._pipeline.tries and i not in self._found], fixes=False
-            )
+            self._simulate([i for i in more if self._tests and i not in self._found], fixes=False)
         return sorted([*first, *more], key=lambda i: self._rank(i, harm))
 
     def _sample(self, tested: Sequence[int]) -> list[int]:
@@ -224,7 +211,7 @@ class _Triage:
         rest = np.setdiff1d(np.arange(len(self._at)), tested)
         rest = rest[np.argsort(self._rows.id[self._at[rest]])]
         random = np.random.Generator(np.random.PCG64([self._seed, _SAMPLE]))
-        drawn = random.permutation(len(rest))[:SAMPLED]
+        drawn = random.permutation(len(rest))[: self._effort.sampled]
         return rest[np.sort(drawn)].tolist()  # type: ignore[no-any-return]
 
     def _test(self, at: Sequence[int], *, sampled: bool) -> None:
@@ -275,11 +262,11 @@ class _Triage:
         first: dict[Any, int] = {}
         for k, one in enumerate(groups if not self._space.decisions else ()):
             first.setdefault((one.key.way, one.part), k)
-        at = list(first.values())[:MOST_MINIMAL]
+        at = list(first.values())[: self._effort.minimal]
         if at:
             X = self._rows.X[self._at[np.array([shown[k] for k in at], dtype=np.int64)]]
             ways, names = [groups[k].key.way for k in at], [f"minimal-{k + 1:02d}" for k in at]
-            results = Minimiser(self._pipeline, self._seed).find(X, ways, names)
+            results = Minimiser(self._pipeline, self._seed, self._effort).find(X, ways, names)
             for k, minimal in zip(at, results, strict=True):
                 found[k] = minimal
         return found
@@ -292,24 +279,26 @@ class _Triage:
             drawn: Drawn = "sobol" if self._algorithm == "sobol" else "random"
             each = [estimate(drawn, len(one.rows), fit) for one in groups]
             return estimate(drawn, len(self._at), fit), each, None
-        if not self._pipeline.tries or self._pipeline.cause is not None or not self._space.n_var:
+        n = self._effort.fresh
+        is_possible = self._tests and self._pipeline.cause is None
+        if not (n and is_possible and self._space.n_var):
             return estimate("", 0, 0), [estimate("", 0, 0) for _ in groups], None
         random = np.random.Generator(np.random.PCG64([self._seed, _FRESH]))
-        U = random.random((FRESH, self._space.n_var))
+        U = random.random((n, self._space.n_var))
         results = self._pipeline.try_all(self._space.decode(U) + 0.0)
-        keys = keys_of(results.findings, self._pipeline.kinds, results.place.tolist(), [""] * FRESH)
-        mode = [0] * FRESH
+        keys = keys_of(results.findings, self._pipeline.kinds, results.place.tolist(), [""] * n)
+        mode = [0] * n
         own = self._U
         for i in np.flatnonzero(results.harmful).tolist():
             same = [k for k, one in enumerate(groups) if one.key.way == keys[i]]
             if same:  # of several that differ in cause, the one with the nearest row
                 gaps = [float(((own[groups[k].rows] - U[i]) ** 2).sum(axis=1).min()) for k in same]
                 mode[i] = same[int(np.argmin(gaps))] + 1
-        n = int(results.ok.sum())
+        ok = int(results.ok.sum())
         harm = zip(results.harm.tolist(), results.ok.tolist(), strict=True)
-        fresh = FreshRows(harm=tuple(one if ok else None for one, ok in harm), mode=tuple(mode))
-        each = [estimate("fresh", mode.count(k), n) for k in range(1, len(groups) + 1)]
-        return estimate("fresh", int(results.harmful.sum()), n), each, fresh
+        fresh = FreshRows(harm=tuple(one if has else None for one, has in harm), mode=tuple(mode))
+        each = [estimate("fresh", mode.count(k), ok) for k in range(1, len(groups) + 1)]
+        return estimate("fresh", int(results.harmful.sum()), ok), each, fresh
 
     def _record(
         self,
@@ -350,11 +339,13 @@ class _Triage:
         untested, baseline = "", pipeline.baseline.driver.label if pipeline.baseline else ""
         if not pipeline.tries:
             untested = "neighbours are simulated in the embedded simulator only"
+        elif not self._tests:
+            untested = "neighbours were not simulated (--triage none)"
         return Triage(
             scenario=pipeline.scenario.name, ego=pipeline.driver.label,
             baseline=baseline, count=pipeline.objective.count,
             results=rows.digest(), seed=self._seed,
-            neighbours=NEIGHBOURS if pipeline.tries else 0, radius=RADIUS, sampled=len(sample),
+            neighbours=NEIGHBOURS if self._tests else 0, radius=RADIUS, sampled=len(sample),
             bound=bound(
                 evaluations=len(ok), failed=int((~ok).sum()),
                 implausible=int((ok & implausible).sum()), harmful=len(self._at), space=space,
