@@ -75,11 +75,11 @@ def test_the_vehicle_ahead_counts_on_each_lane_that_the_body_is_on():
     eyes = Eyes(StraightRoad(Corridor(lanes)), scene(lanes, n_others=2))
     others = [[[150, 0, 0, 5], [130, -3.5, 0, 9]]]
     between = eyes.see(World([[100, -1.75, 0, 20]], others, [30.0]).observe(), 0)
-    gaps = [[50 - LENGTH, 5], [30 - LENGTH, 9]]
-    np.testing.assert_allclose(between.ahead[:, :2], gaps, rtol=0, atol=1e-9)
+    gaps = [[50 - LENGTH, 5, 0], [30 - LENGTH, 9, 1]]
+    np.testing.assert_allclose(between.ahead[:, :3], gaps, rtol=0, atol=1e-9)
     within = eyes.see(World([[100, 0, 0, 20]], others, [30.0]).observe(), 0)
-    assert within.ahead[0, :2] == pytest.approx(gaps[0])
-    assert (within.ahead[1, 0], within.ahead[0, 2]) == (np.inf, np.inf)
+    assert within.ahead[0, :3] == pytest.approx(gaps[0])
+    assert (within.ahead[1, 0], within.ahead[0, 3]) == (np.inf, np.inf)
 
 
 def test_a_body_that_reaches_into_the_lane_is_ahead_on_it():
@@ -89,7 +89,7 @@ def test_a_body_that_reaches_into_the_lane_is_ahead_on_it():
         world = World([[100, 0, 0, 20]], [[[150, y, 0, 5]]], [30.0])
         seen = Eyes(StraightRoad(Corridor(lanes)), scene(lanes)).see(world.observe(), 0)
         assert seen.others[0, 0] == 0
-        assert seen.ahead[0, [0, 2]] == pytest.approx([gap, gap])
+        assert seen.ahead[0, [0, 3]] == pytest.approx([gap, gap])
 
 
 def test_an_oncoming_vehicle_stands_and_a_crossing_one_has_its_speed_along_the_road():
@@ -280,6 +280,20 @@ def test_it_brakes_for_a_body_beside_the_road_that_reaches_into_its_lane():
         driver.reset(1, scene(road_map((1,))))
         world = World([[100, 0, 0, 20]], [[[130, y, 0, 2]]], [20.0])
         assert (float(driver.act(world.observe()).acceleration[0]) < -2.0) == brakes
+
+
+@pytest.mark.planners
+@needs_planner
+@pytest.mark.parametrize("model", ["ACC", "CACC"])
+def test_it_follows_a_body_that_reaches_into_its_lane_as_one_on_it(model):
+    demanded = []
+    for y in (0.0, -2.3):
+        driver = DRIVERS[model]()
+        driver.reset(1, scene(road_map((1,))))
+        world = World([[100, 0, 0, 20]], [[[124 + LENGTH, y, 0, 18]]], [30.0])
+        demanded.append(float(driver.act(world.observe()).acceleration[0]))
+    assert demanded[0] < -0.5
+    assert demanded[1] == pytest.approx(demanded[0], abs=1e-9)
 
 
 @pytest.mark.planners

@@ -142,9 +142,10 @@ class Seen:
             the lane that it is nearest to, from the left.
         others: ``(M, 7)`` float64: 1 if it is on the road, edge of its front, position [m], lane
             from the left, speed [m/s], acceleration [m/s²], length [m].
-        ahead: ``(L, 4)`` float64, of each lane that the ego's body is on: from the ego's front to
+        ahead: ``(L, 6)`` float64, of each lane that the ego's body is on: from the ego's front to
             the rear of the next body that is on it [m], +inf if there is none; that one's speed
-            [m/s]; the same of the next body whose centre is on another lane, or off the road.
+            [m/s] and number; the same of the next body whose centre is on another lane, or off the
+            road.
         stop: from the ego's front to the place that it is to stop at [m]; +inf: none.
         place: ``(2,)`` float64, station and offset of the ego's rear axle [m].
     """
@@ -204,7 +205,7 @@ class Eyes:
             changes = np.where(known, (speeds - self._speeds) / scene.time_step, 0.0)
         self._speeds, self._seen = speeds, tracks[:, 0] >= 2.0
         others = np.zeros((len(tracks), 7))
-        ahead = np.tile([np.inf, 0.0], (road.next.shape[1], 2))
+        ahead = np.tile([np.inf, 0.0, -1.0], (road.next.shape[1], 2))
         covered = [_reach(lane.at(front), d[0], scene.width) > 0.0 for lane in lanes]
         for j in np.flatnonzero(self._seen).tolist():
             place, aside = s[1 + j], d[1 + j]
@@ -218,9 +219,9 @@ class Eyes:
                 there = one.at(place)
                 if covered[n] and place > s[0] and _reach(there, aside, width) > REACH:
                     if gap < ahead[n, 0]:
-                        ahead[n, :2] = gap, speeds[j]
-                    if gap < ahead[n, 2] and abs(aside - there[0]) > 0.5 * there[1]:
-                        ahead[n, 2:] = gap, speeds[j]
+                        ahead[n, :3] = gap, speeds[j], j
+                    if gap < ahead[n, 3] and abs(aside - there[0]) > 0.5 * there[1]:
+                        ahead[n, 3:] = gap, speeds[j], j
         return Seen(ego, others, ahead, self._stop(o, i), np.array([s[0], d[0]]))
 
     def _stop(self, o: Observation, i: int) -> float:

@@ -21,7 +21,7 @@ it falls back to SUMO's ACC behind each, with the headway of CACC's own type.
 - ``network``: the text of the ``.net.xml``; ``types``: of the vehicle types; ``route``: the ids of
   the edges, parted by spaces; ``time_step`` [s];
 - ``lanes`` ``(S,)`` and ``next`` ``(S, L)``: see `StraightRoad`;
-- ``ego`` ``(T, 6)``, ``others`` ``(T, M, 7)``, ``ahead`` ``(T, L, 4)``, ``stop`` ``(T,)``: see
+- ``ego`` ``(T, 6)``, ``others`` ``(T, M, 7)``, ``ahead`` ``(T, L, 6)``, ``stop`` ``(T,)``: see
   `Seen`.
 
 Source: Lopez et al., Microscopic Traffic Simulation using SUMO, ITSC 2018; Krauß, Microscopic
@@ -290,9 +290,11 @@ class Simulation:
             wish = n - 1 - vehicle.getLaneIndex(ego)
         least = max(now - EMERGENCY * self._scene.time_step, 0.0)
         for lane, ahead in enumerate(seen.ahead.tolist()):
-            gap, of = ahead[2:] if lane == goal else ahead[:2]
+            gap, of, j = ahead[3:] if lane == goal else ahead[:3]
             if np.isfinite(gap):
-                follow = vehicle.getFollowSpeed(ego, now, gap - MIN_GAP, of, DECELERATION)
+                # CACC follows nobody whose name it is not told: it would keep its speed.
+                other = f"r{r}o{int(j)}"
+                follow = vehicle.getFollowSpeed(ego, now, gap - MIN_GAP, of, DECELERATION, other)
                 speed = min(speed, max(follow, least))
         if np.isfinite(seen.stop):
             speed = min(speed, max(vehicle.getStopSpeed(ego, now, seen.stop), least))
