@@ -162,6 +162,14 @@ class Corridor:
         x, y = self._points[k] + along * direction
         return float(x - d * direction[1]), float(y + d * direction[0])
 
+    def poses(self, s: Float) -> Float:
+        """Return x, y [m] and heading [rad] of the route at each station ``(Q,)``, ``(Q, 3)``."""
+        last = len(self._length) - 1
+        k = np.clip(np.searchsorted(self._station, s, side="right") - 1, 0, last)
+        direction = self._direction[k]
+        place = self._points[k] + (s - self._station[k])[:, None] * direction
+        return np.column_stack([place, np.arctan2(direction[:, 1], direction[:, 0])])
+
     def section_at(self, s: Float) -> Int:
         """Return the index of the section at each station ``(Q,)``."""
         return np.clip(
