@@ -326,3 +326,14 @@ def test_a_row_does_not_depend_on_its_batch():
 def test_a_time_step_that_sumo_has_not_is_refused():
     with pytest.raises(InputError, match=r"whole number of milliseconds, got 0\.0333"):
         sumo.ACCDriver().reset(1, replace(scene(road_map((1,))), time_step=1 / 30))
+
+
+@pytest.mark.planners
+@needs_planner
+def test_the_planner_is_imported_before_the_first_call():
+    code = (
+        "import sys; from bridgegen.ego.planners import sumo as adapter; "
+        "adapter.KraussDriver(); print('libsumo' in sys.modules)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.split() == ["True"]

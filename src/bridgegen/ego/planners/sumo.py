@@ -31,6 +31,7 @@ EIDM; Milanés, Shladover, Transp. Res. C 48 (2014) 285, ACC and CACC; Erdmann, 
 
 import tempfile
 from collections.abc import Sequence
+from importlib import import_module
 from pathlib import Path
 
 import numpy as np
@@ -100,6 +101,7 @@ class SumoDriver:
     def __init__(self) -> None:
         planner = next(one for one in PLANNERS if one.name == f"sumo:{self.model}")
         require(planner)
+        import_module("libsumo")  # seconds that no call's limit has
 
     def reset(self, n: int, scene: Scene) -> None:
         """See `BatchDriver`.
