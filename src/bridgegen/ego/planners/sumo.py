@@ -13,8 +13,10 @@ All settings are SUMO's own, but random numbers are off (``sigma``, ``speedDev``
 are 0), so that a row depends on that row alone. What crosses the road is a vehicle on it only while
 it is there; oncoming ones stand.
 
-CACC needs a leader that is a CACC vehicle and sends its acceleration. No other participant is, so
-it falls back to SUMO's ACC behind each, with the headway of CACC's own type.
+CACC needs a leader that is a CACC vehicle and sends its acceleration; no other participant is one.
+So it keeps its desired speed above a time gap of 2 s, follows by ACC's law (headway 1 s) below
+1.5 s, and goes on as before between them; only 2 m/s above Krauss' safe speed it brakes for safety.
+SUMO scales its accelerations as for steps of 0.1 s: at 0.05 s they are halved.
 
 `export` makes these arrays of one row, over T instants, M others, S edges, L lanes at most:
 
@@ -61,7 +63,8 @@ MODELS = {
     "Krauss": "SUMO's default model (Krauß 1998)",
     "EIDM": "SUMO's extended IDM",
     "ACC": "SUMO's adaptive cruise control (Milanés, Shladover 2014)",
-    "CACC": "SUMO's cooperative ACC; without a CACC vehicle ahead it drives as ACC",
+    "CACC": "SUMO's cooperative ACC; as nobody ahead is a CACC vehicle, cruise control from a time "
+    "gap of 1.5 to 2 s on, its ACC below",
 }
 """The car-following models."""
 
