@@ -13,6 +13,7 @@ from tests.ego.planners.roads import CENTRE, DT, LENGTH, World, drive, road_map,
 from bridgegen.ego.planners import sumo
 from bridgegen.ego.planners._corridor import Corridor
 from bridgegen.ego.planners._sumo_road import Eyes, StraightRoad, network_text
+from bridgegen.ego.planners._sumo_simulation import MIN_GAP, types_text
 from bridgegen.errors import InputError
 
 FRONT = 0.5 * LENGTH  # from the body's centre
@@ -171,7 +172,7 @@ def test_krauss_is_the_published_formula():
         world = World([[100, 0, 0, v]], [[[100 + gap + LENGTH, 0, 0, leader]]], [30.0])
         driver = sumo.KraussDriver()
         driver.reset(1, scene(road_map((1,))))
-        expected = (krauss(v, gap - sumo.MIN_GAP, leader) - v) / DT
+        expected = (krauss(v, gap - MIN_GAP, leader) - v) / DT
         assert expected > -4.5  # harder braking is SUMO's own rule
         found = driver.act(world.observe())
         assert float(found.acceleration[0]) == pytest.approx(expected, abs=1e-9)
@@ -227,7 +228,7 @@ def test_a_vehicle_that_is_placed_drives_as_one_that_sumo_moves(model, tmp_path)
     of = scene(lanes)
     (tmp_path / "free.py").write_text(FREE)
     (tmp_path / "road.net.xml").write_text(network_text([StraightRoad(Corridor(lanes))]))
-    (tmp_path / "types.add.xml").write_text(sumo.types_text(of.length, of.width))
+    (tmp_path / "types.add.xml").write_text(types_text(of.length, of.width))
     text = subprocess.run(
         [sys.executable, "free.py", "road.net.xml", "types.add.xml", model, "15.0"],
         cwd=tmp_path,
