@@ -20,7 +20,7 @@ ELSEWHERE = "the vehicle 'single-track' is of the embedded simulator; esmini mov
 
 @pytest.fixture
 def bend(tmp_path):
-    """A file of a fast bend, whose ego is a single track, and a limit that only that exceeds [m]."""
+    """A file of a bend, whose ego is a single track, and a limit that only that exceeds [m]."""
     logical, wide = load("stopped-after-curve"), {}
     for name in ("kinematic", "single-track"):
         options = PipelineOptions(ego="route-follower", vehicle=name)

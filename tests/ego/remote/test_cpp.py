@@ -9,10 +9,9 @@ from pathlib import Path
 import msgpack
 import numpy as np
 import pytest
+from tests.ego.remote.asked import N, observation, scene
 
 from bridgegen.ego.remote.messages import MAX_FRAME, pack, unpack
-
-from tests.ego.remote.asked import N, observation, scene
 
 CPP = Path(__file__).parents[3] / "docs" / "examples" / "cpp"
 PROBE = """
