@@ -151,6 +151,8 @@ def test_the_list_says_which_are_installed(package, cli):
     assert code == 0
     assert rows["house:cruises"]["available"].startswith("installed: numpy 2")
     assert rows["house:cruises"]["domain"] == "motorway, road"
+    assert rows["un-r157"]["domain"] == "motorway"
+    assert rows["reference"]["domain"] == ""
     assert rows["absent"]["available"] == (
         "not installed (no-such-planner is not installed): "
         "pip install 'no-such-planner>=1.0,<2'; It needs a checkout."

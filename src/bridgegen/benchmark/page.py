@@ -102,7 +102,7 @@ def _matrix(plan: Plan, found: Sequence[Outcome]) -> str:
     known = {(one.driver, one.scenario, one.column): one for one in found}
     head = "".join(
         f'<th scope="col"><a href="#{_anchor(one.name)}">{escape(_short(one.name))}</a>'
-        f"<br><small>{escape(in_words(one.domain)) if one.planner else ''}</small></th>"
+        f"<br><small>{escape(_stated(one))}</small></th>"
         for one in plan.entrants
     )
     body = []
@@ -118,7 +118,7 @@ def _matrix(plan: Plan, found: Sequence[Outcome]) -> str:
     return (
         '<p class="muted">Failure modes for which the driver is responsible: with perfect '
         "perception | with perception; shaded: a robust one among them. “n/a”: outside the domain "
-        "that the planner states, so neither a pass nor a failure.</p>"
+        "that the driver states, so neither a pass nor a failure.</p>"
         '<div class="wide"><table class="matrix"><thead><tr><th scope="col">scenario</th>'
         f'<th scope="col">it needs</th>{head}</tr></thead><tbody>{"".join(body)}</tbody></table>'
         "</div>"
@@ -223,12 +223,17 @@ def _way(way: Way) -> str:
     )
 
 
+def _stated(entrant: Entrant) -> str:
+    """Return a driver's domain in words; nothing where that is everywhere."""
+    return "" if entrant.domain == DOMAINS.keys() else in_words(entrant.domain)
+
+
 def _method(plan: Plan) -> str:
     terms = "".join(f"<dt>{escape(w)}</dt><dd>{escape(text)}</dd>" for w, text in DOMAINS.items())
     texts = (
         "Each driver has its own settings. With perfect perception it is told the true state of "
         f"all others; {COLUMNS[SENSED]}, what BridgeGen’s camera and LiDAR track, misses included.",
-        "A planner is judged within the domain that it states. What a scenario needs is read from "
+        "A driver is judged within the domain that it states. What a scenario needs is read from "
         "its map and actors: a junction on the ego’s route in which ways cross or turn; opposite "
         "lanes or traffic against the ego’s direction; pedestrians and cyclists.",
         "A failure is a collision or near miss with plausible traffic for which the ego, or the "

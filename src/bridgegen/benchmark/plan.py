@@ -47,6 +47,7 @@ class Entrant:
         slug: of its runs' names.
         planner: what is known of it, if others wrote it.
         perceives: whether it has two columns; else it is told the truth.
+        domain: where it means to drive; one that does not say so, everywhere.
         problem: why it cannot be made; empty if it can.
     """
 
@@ -54,13 +55,8 @@ class Entrant:
     slug: str
     planner: Planner | None
     perceives: bool
+    domain: frozenset[str]
     problem: str = ""
-
-    @property
-    def domain(self) -> frozenset[str]:
-        """Where it means to drive; a driver that does not say so, everywhere."""
-        stated = self.planner.domain if self.planner else frozenset()
-        return stated or frozenset(DOMAINS)
 
     @property
     def columns(self) -> tuple[str, ...]:
@@ -213,7 +209,8 @@ def _entrant(driver: Driver) -> Entrant:
     file, colon, cls = name.rpartition(":")
     label = f"{Path(file).stem}-{cls}" if colon and egos.is_spec(name) else Path(name).name
     slug = re.sub(r"[^\w.-]+", "-", label)
-    return Entrant(name, slug, planner, "perception" in driver.stages)
+    domain = driver.domain or frozenset(DOMAINS)
+    return Entrant(name, slug, planner, "perception" in driver.stages, domain)
 
 
 def make_plan(

@@ -59,6 +59,8 @@ class Driver:
         origin: where its code comes from.
         spec: of a user's own driver and of a planner, what its process makes: ``module:Class``,
             ``file.py:Class``, ``file.fmu``.
+        domain: where it means to drive: words of `bridgegen.ego.planners.planner.DOMAINS`; empty:
+            it does not say.
     """
 
     name: str
@@ -69,6 +71,7 @@ class Driver:
     home: str = ""
     origin: Origin = Origin.SHIPPED
     spec: str = ""
+    domain: frozenset[str] = frozenset()
 
     @property
     def is_own(self) -> bool:
@@ -120,6 +123,7 @@ UN_R157 = Driver(
     "The competent and careful human driver of UN Regulation 157, exact in its three disturbances "
     f"(cut-in, cut-out, deceleration): brakes after {CAREFUL_REACTION:g} s, by up to "
     f"{CAREFUL_BRAKING_G:g} g; follows otherwise.",
+    domain=frozenset({"motorway"}),  # the regulation's: no crossing traffic, nobody on foot
 )
 CAREFUL = Driver(
     "careful",
@@ -130,6 +134,7 @@ FSM = Driver(
     "fsm",
     "The fuzzy safety model: brakes in anticipation, up to 6 m/s², by how unsafe its distances "
     "are; in UN R157's disturbances as in the Commission's code.",
+    domain=frozenset({"motorway"}),
 )
 CAREFUL_FSM = Driver(
     "careful-fsm",
@@ -197,16 +202,16 @@ def get(name: str, ideal: Iterable[str] = (), time_limit: float | None = None) -
         return known[name].idealised(ideal)
     if is_remote(name):
         address_of(name)
-    spec, what = name, "A driver of the user's own."
+    spec, what, domain = name, "A driver of the user's own.", frozenset[str]()
     if is_planner(name):
         planner = planners()[name]
         require(planner)
-        spec, what = planner.spec, planner.description
+        spec, what, domain = planner.spec, planner.description, planner.domain
     elif not is_spec(name):
         raise UnknownNameError("ego driver", name, [*DRIVERS, *planners()])
     own = Driver(
         name, what, stages=frozenset({"perception"}), time_limit=time_limit or TIME_LIMIT,
-        origin=Origin.OWN, spec=spec,
+        origin=Origin.OWN, spec=spec, domain=domain,
     )  # fmt: skip
     return own.idealised(ideal)
 

@@ -11,9 +11,10 @@ HEAD = ("driver", "description", "can be ideal", "available", "licence", "domain
 
 def listed() -> list[tuple[str, ...]]:
     """Return a row of `HEAD` for each driver; texts that say nothing are empty."""
-    blank = ("", "", "")
+    blank = ("", "", "")  # licence, domain, source
     rows: list[tuple[str, ...]] = [
-        (one.name, one.description, join(one.stages), "ships", *blank) for one in DRIVERS.values()
+        (one.name, one.description, join(one.stages), "ships", "", in_order(one.domain), "")
+        for one in DRIVERS.values()
     ]
     rows += [
         (one.name, one.description, join(one.stages), f"in {one.home}", *blank)
@@ -21,8 +22,8 @@ def listed() -> list[tuple[str, ...]]:
     ]
     rows += [
         (
-            one.name, one.description, "perception", available(one), one.licence, domain(one),
-            one.source,
+            one.name, one.description, "perception", available(one), one.licence,
+            in_order(one.domain), one.source,
         )
         for one in planners().values()
     ]  # fmt: skip
@@ -42,9 +43,9 @@ def available(planner: Planner) -> str:
     return f"{state}; {planner.how_to_get}" if planner.how_to_get else state
 
 
-def domain(planner: Planner) -> str:
-    """Return where a planner means to drive, in the order of `DOMAINS`."""
-    return ", ".join(word for word in DOMAINS if word in planner.domain)
+def in_order(domain: frozenset[str]) -> str:
+    """Return where a driver means to drive, in the order of `DOMAINS`."""
+    return ", ".join(word for word in DOMAINS if word in domain)
 
 
 def planner_findings() -> Iterator[tuple[str, str, str]]:
