@@ -109,7 +109,7 @@ def test_without_a_baseline_its_quantities_are_not_to_be_had():
 def test_a_run_says_where_the_driver_is_worse_and_its_files_show_it(tmp_path):
     run = bg.run_search(
         NAME, ego="route-follower", worse_than="careful", objective={"harm": None}, budget=60,
-        keep=2, algorithm="random", out=tmp_path / "run", workers=2,
+        keep=2, algorithm="random", triage="short", out=tmp_path / "run", workers=2,
     )  # fmt: skip
     assert run.summary.critical == run.triage.bound.harmful > 0
     assert run.triage.baseline == "careful"
@@ -125,7 +125,7 @@ def test_a_run_says_where_the_driver_is_worse_and_its_files_show_it(tmp_path):
         assert with_ego >= NEAR_MISS > with_other
     again = bg.run_search(
         NAME, ego="route-follower", worse_than="careful", objective={"harm": None}, budget=60,
-        keep=2, algorithm="random", out=tmp_path / "again", workers=1,
+        keep=2, algorithm="random", triage="short", out=tmp_path / "again", workers=1,
     )  # fmt: skip
     assert again.triage.model_dump() == run.triage.model_dump()
     assert bg.resume(run.folder, deliver=False).summary == run.summary
@@ -147,7 +147,7 @@ def test_a_driver_of_one_s_own_is_named_again_to_resume(tmp_path):
     spec = f"{DRIVERS}:Cruises"
     run = bg.run_search(
         NAME, ego="route-follower", worse_than=spec, budget=10, keep=0, algorithm="random",
-        out=tmp_path / "run",
+        triage="short", out=tmp_path / "run",
     )  # fmt: skip
     with pytest.raises(InputError, match=r"name it: bridgegen resume .* --worse-than"):
         bg.resume(run.folder, deliver=False)

@@ -15,7 +15,7 @@ import bridgegen as bg
 @pytest.fixture(scope="session")
 def finished(tmp_path_factory) -> "bg.Run":
     folder = tmp_path_factory.mktemp("runs") / "s4"
-    return bg.run_search("crossroads-s4", budget=120, keep=2, out=folder)
+    return bg.run_search("crossroads-s4", budget=120, keep=2, triage="short", out=folder)
 
 
 @pytest.fixture
@@ -280,7 +280,7 @@ def test_coverage_counts_what_the_store_holds(cli, finished):
 
 def test_coverage_of_a_changed_scenario_is_refused(cli, tmp_path, s4_file):
     folder = tmp_path / "run"
-    bg.run_search(s4_file, algorithm="random", budget=10, keep=0, out=folder)
+    bg.run_search(s4_file, algorithm="random", budget=10, keep=0, triage="short", out=folder)
     assert cli("coverage", folder)[0] == 0
     s4_file.write_text(s4_file.read_text("utf-8").replace("title: ", "title: Not "), "utf-8")
     refused(cli("coverage", folder), "is not what it was")

@@ -187,7 +187,9 @@ def test_several_runs_are_resumed_and_the_same_to_the_bit(cli, tmp_path, monkeyp
     code, out, err = cli("search", "two.yaml")
     assert code == 0, err
     assert [line.split()[0] for line in out.splitlines()[-2:]] == ["first", "second"]
-    alone = bg.run_search("crossroads-s4", budget=60, keep=1, seed=1, out=tmp_path / "alone")
+    alone = bg.run_search(
+        "crossroads-s4", budget=60, keep=1, seed=1, triage="short", out=tmp_path / "alone"
+    )
     assert same_rows(tmp_path / "runs/two/second", alone.folder)
     (tmp_path / "runs/two/second/report.html").unlink()
     code, out, err = cli("search", "two.yaml")

@@ -85,7 +85,14 @@ def run(tmp_path_factory):
     """A run with critical scenarios, and the records of all that may be done with it."""
     folder = tmp_path_factory.mktemp("damaged") / "run"
     bg.run_search(
-        "crossroads-s4", ego="route-follower", budget=60, seed=1, keep=1, out=folder, causes=False
+        "crossroads-s4",
+        ego="route-follower",
+        budget=60,
+        seed=1,
+        keep=1,
+        triage="short",
+        out=folder,
+        causes=False,
     )
     (folder / "regions.json").write_text(json.dumps(REGIONS), "utf-8")
     (folder / "not-exported.json").write_text(json.dumps(REFUSED), "utf-8")

@@ -61,7 +61,11 @@ def recorded(path: Path) -> Path:
 @pytest.fixture(scope="module")
 def run(tmp_path_factory) -> bg.Run:
     return bg.run_search(
-        "crossroads-s3", budget=100, keep=3, out=tmp_path_factory.mktemp("runs") / "s3"
+        "crossroads-s3",
+        budget=100,
+        keep=3,
+        triage="short",
+        out=tmp_path_factory.mktemp("runs") / "s3",
     )
 
 
@@ -306,7 +310,7 @@ def test_refusals(run, catalogue, tmp_path):
 
 
 def test_a_run_that_kept_nothing(tmp_path):
-    run = bg.run_search("crossroads-s4", budget=5, keep=0, out=tmp_path / "run")
+    run = bg.run_search("crossroads-s4", budget=5, keep=0, triage="short", out=tmp_path / "run")
     with pytest.raises(InputError, match="no scenario was exported"):
         export(run.folder, "recorded")
 

@@ -250,7 +250,13 @@ def test_a_run_on_a_town_names_the_town(catalogue, tmp_path):
     town = tmp_path / "Town05.xodr"  # what it is called is what counts
     town.write_bytes(catalogue["crossroads-s4"][1].with_suffix(".xodr").read_bytes())
     run = bg.run_search(
-        "crossroads-s4", algorithm="random", budget=60, keep=1, road_map=town, out=tmp_path / "run"
+        "crossroads-s4",
+        algorithm="random",
+        budget=60,
+        keep=1,
+        road_map=town,
+        triage="short",
+        out=tmp_path / "run",
     )
     paths = export(run.folder, "carla")
     assert [one.name for one in paths] == ["0001.xosc", "bridgegen_control.py"]

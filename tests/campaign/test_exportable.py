@@ -74,7 +74,13 @@ def test_the_corners_of_the_ranges_are_tried():
 
 def test_an_adversary_s_scenario_is_tried_too(tmp_path):
     run = bg.run_search(
-        "crossroads-s1", adversary="bv", algorithm="random", budget=4, keep=0, out=tmp_path / "run"
+        "crossroads-s1",
+        adversary="bv",
+        algorithm="random",
+        budget=4,
+        keep=0,
+        triage="short",
+        out=tmp_path / "run",
     )
     assert run.summary.evaluations == 4
 
@@ -88,7 +94,7 @@ def test_what_cannot_be_exported_is_left_out_and_named(tmp_path, monkeypatch, ca
         return write(pipeline, x, folder, name, *cause, **given)
 
     monkeypatch.setattr(critical, "write_scenario", refuse)
-    run = bg.run_search("crossroads-s3", budget=60, keep=3, out=tmp_path / "run")
+    run = bg.run_search("crossroads-s3", budget=60, keep=3, triage="short", out=tmp_path / "run")
     assert [path.stem for path in run.scenarios] == ["0001", "0003"]
     (left,) = run.not_exported
     assert left.name == "0002"

@@ -19,7 +19,8 @@ def test_an_exported_scenario_is_simulated_once(tmp_path, monkeypatch):
 
     monkeypatch.setattr(Pipeline, "rollout", counted)
     run = bg.run_search(
-        "crossroads-s3", budget=60, keep=3, ego="route-follower", out=tmp_path / "run",
+        "crossroads-s3", budget=60, keep=3, ego="route-follower", triage="short",
+        out=tmp_path / "run",
         callbacks=SearchCallbacks(stage=stages.append),
     )  # fmt: skip
     X = run.rows().X
@@ -37,7 +38,12 @@ def test_a_search_opens_its_store_once(tmp_path, monkeypatch):
 
     monkeypatch.setattr(Store, "_connected", classmethod(count))
     run = bg.run_search(
-        "crossroads-s3", budget=60, keep=3, ego="route-follower", out=tmp_path / "run"
+        "crossroads-s3",
+        budget=60,
+        keep=3,
+        ego="route-follower",
+        triage="short",
+        out=tmp_path / "run",
     )
     assert run.summary.evaluations == 60
     assert run.failures == {}

@@ -24,7 +24,7 @@ MARGIN = "criterion:R-12"
 
 def search(out: Path, scenario: str = "cut-in", **more) -> bg.Run:
     given = {"budget": BUDGET, "keep": 4, "causes": False, "criteria": [GAP, TTC, CRASH]}
-    return bg.run_search(scenario, **{**given, **more}, out=out)
+    return bg.run_search(scenario, **{**given, **more}, triage="short", out=out)
 
 
 @pytest.fixture(scope="module")

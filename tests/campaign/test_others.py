@@ -22,7 +22,13 @@ def settings_of(folder):
 def run(tmp_path_factory):
     folder = tmp_path_factory.mktemp("others") / "run"
     return bg.run_search(
-        "crossroads-s2", others="attentive", budget=200, keep=3, out=folder, causes=False
+        "crossroads-s2",
+        others="attentive",
+        budget=200,
+        keep=3,
+        triage="short",
+        out=folder,
+        causes=False,
     )
 
 
@@ -78,7 +84,7 @@ def test_what_drives_is_overridden_for_a_file(run, cli):
 
 def test_an_unknown_driver_of_the_others_is_one_clear_error(run, tmp_path):
     with pytest.raises(UnknownNameError, match="driver of other participants 'attentif'"):
-        bg.run_search("crossroads-s4", others="attentif", out=tmp_path / "run")
+        bg.run_search("crossroads-s4", others="attentif", triage="short", out=tmp_path / "run")
     source = min((run.folder / "critical").glob("*.xosc"))
     with pytest.raises(UnknownNameError, match="driver of other participants 'attentif'"):
         bg.simulate_file(source, others="attentif")

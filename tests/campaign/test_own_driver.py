@@ -17,7 +17,14 @@ def search(tmp_path, name, budget=30, file=DRIVERS, **kwargs):
     ego = f"{file}:{name}"
     out = tmp_path / name
     return campaign.run_search(
-        "crossroads-s1", algorithm="random", budget=budget, ego=ego, out=out, keep=2, **kwargs
+        "crossroads-s1",
+        algorithm="random",
+        budget=budget,
+        ego=ego,
+        triage="short",
+        out=out,
+        keep=2,
+        **kwargs,
     )
 
 
@@ -63,6 +70,8 @@ def test_a_driver_that_cannot_be_made_is_told_before_the_search(tmp_path, file, 
 
 def test_a_time_limit_is_for_drivers_of_ones_own(tmp_path):
     with pytest.raises(InputError, match="time limit"):
-        campaign.run_search("crossroads-s1", ego="reference", time_limit=1.0, out=tmp_path / "r")
+        campaign.run_search(
+            "crossroads-s1", ego="reference", time_limit=1.0, triage="short", out=tmp_path / "r"
+        )
     with pytest.raises(InputError, match="time limit"):
         search(tmp_path, "Cruises", time_limit=0.0)

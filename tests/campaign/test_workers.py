@@ -34,7 +34,7 @@ def rows_of(folder: Path):
 
 @pytest.fixture(scope="module")
 def undisturbed(tmp_path_factory):
-    return bg.run_search(**SEARCH, out=tmp_path_factory.mktemp("threads") / "run")
+    return bg.run_search(**SEARCH, triage="short", out=tmp_path_factory.mktemp("threads") / "run")
 
 
 @pytest.mark.parametrize("count", [1, 2, 3])
@@ -49,7 +49,11 @@ def test_processes_find_what_threads_find_whoever_is_killed(
             killed.append(pool.pids[-1])
 
     run = bg.run_search(
-        **SEARCH, out=tmp_path / "run", workers=pool, callbacks=SearchCallbacks(batch=kill)
+        **SEARCH,
+        triage="short",
+        out=tmp_path / "run",
+        workers=pool,
+        callbacks=SearchCallbacks(batch=kill),
     )
     pool.close()
     assert len(set(killed)) == 2
@@ -87,8 +91,8 @@ def test_a_row_that_takes_its_process_with_it_fails_alone(monkeypatch):
 def test_a_driver_of_ones_own_is_made_in_each_process(tmp_path, same_rows):
     search = {"scenario": "crossroads-s1", "algorithm": "random", "budget": 16, "keep": 0}
     ego = f"{DRIVERS}:FailsFast"
-    one = bg.run_search(**search, ego=ego, out=tmp_path / "one")
-    two = bg.run_search(**search, ego=ego, out=tmp_path / "two", workers=2)
+    one = bg.run_search(**search, ego=ego, triage="short", out=tmp_path / "one")
+    two = bg.run_search(**search, ego=ego, triage="short", out=tmp_path / "two", workers=2)
     assert one.summary.failed == two.summary.failed > 0
     assert same_rows(one.folder, two.folder)
     assert one.failures == two.failures
@@ -96,7 +100,7 @@ def test_a_driver_of_ones_own_is_made_in_each_process(tmp_path, same_rows):
 
 def test_a_wrong_name_is_told_as_ever(tmp_path):
     with pytest.raises(UnknownNameError, match="unknown metric 'd_mim'"):
-        bg.run_search(**SEARCH, metrics=["d_mim"], out=tmp_path / "run", workers=2)
+        bg.run_search(**SEARCH, metrics=["d_mim"], triage="short", out=tmp_path / "run", workers=2)
 
 
 def start(folder: Path, *more: str) -> subprocess.Popen[str]:

@@ -94,7 +94,8 @@ def xosc(tmp_path_factory):
     import bridgegen as bg
 
     folder = tmp_path_factory.mktemp("run")
-    run = bg.run_search("pedestrian-behind-parked", budget=30, keep=1, out=folder / "run",
+    run = bg.run_search("pedestrian-behind-parked", budget=30, keep=1, triage="short",
+                        out=folder / "run",
                         algorithm="random", ego="route-follower")  # fmt: skip
     return run.scenarios[0]
 

@@ -22,7 +22,16 @@ def project(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("dashboard") / "project"
     for ego, options in (("route-follower", {"criteria": [R_12]}), ("reference", {})):
         out = folder / "runs" / ego
-        bg.run_search("cut-in", ego=ego, algorithm="random", budget=40, keep=1, out=out, **options)
+        bg.run_search(
+            "cut-in",
+            ego=ego,
+            algorithm="random",
+            budget=40,
+            keep=1,
+            triage="short",
+            out=out,
+            **options,
+        )
     run_suite(
         ["cut-in", "left-across-path"],
         egos=["route-follower", "reference"],

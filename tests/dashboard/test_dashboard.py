@@ -214,7 +214,14 @@ def test_a_changed_scenario_is_named_and_not_counted(copy, tmp_path):
     text = (Path(bg.__file__).parent / "catalogue" / "cut-in.yaml").read_text("utf-8")
     file = tmp_path / "mine.yaml"
     file.write_text(text, "utf-8")
-    bg.run_search(file, ego="reference", algorithm="random", budget=2, out=copy / "runs" / "mine")
+    bg.run_search(
+        file,
+        ego="reference",
+        algorithm="random",
+        budget=2,
+        triage="short",
+        out=copy / "runs" / "mine",
+    )
     file.write_text(text.replace("high: ", "high: 1", 1), "utf-8")
     found = bg.build_dashboard(copy)
     assert any("has changed" in one.why and "mine.yaml" in one.place

@@ -16,7 +16,7 @@ from bridgegen.verdict.of_run import FIGURES, PassFailCriteria, figures_of
 @pytest.fixture(scope="module")
 def run(tmp_path_factory) -> "bg.Run":
     folder = tmp_path_factory.mktemp("verdict") / "s4"
-    return bg.run_search("crossroads-s4", budget=120, keep=2, out=folder)
+    return bg.run_search("crossroads-s4", budget=120, keep=2, triage="short", out=folder)
 
 
 def test_every_figure_of_the_summary_can_be_named():
@@ -94,7 +94,7 @@ def test_what_nobody_knows_is_no_pass(tmp_path):
     with pytest.raises(InputError, match="no map <&"):
         bg.run_search(
             "crossroads-s4", ego=f"{driver}:Broken", budget=3, algorithm="random", causes=False,
-            out=tmp_path / "run",
+            triage="short", out=tmp_path / "run",
         )  # fmt: skip
     run = bg.Run(tmp_path / "run")
     outcomes = PassFailCriteria.read(["critical > 0", "failed > 3"], tmp_path / "j.xml").judge(run)

@@ -19,7 +19,7 @@ BUDGET, KEEP = 120, 2
 def finished(tmp_path_factory) -> Path:
     """A run that has ended, with two scenarios handed over and a report."""
     folder = tmp_path_factory.mktemp("view") / "s4"
-    bg.run_search("crossroads-s4", budget=BUDGET, seed=1, keep=KEEP, out=folder)
+    bg.run_search("crossroads-s4", budget=BUDGET, seed=1, keep=KEEP, triage="short", out=folder)
     return folder
 
 

@@ -231,7 +231,8 @@ def test_runs_are_filtered_sorted_and_two_of_them_play_side_by_side(browser, run
 
 def test_a_run_that_violates_a_criterion_is_not_listed_as_without_failure(tmp_path):
     bg.run_search(
-        "cut-in", budget=60, algorithm="random", keep=0, causes=False, out=tmp_path / "runs" / "a",
+        "cut-in", budget=60, algorithm="random", keep=0, causes=False, triage="short",
+        out=tmp_path / "runs" / "a",
         criteria=["R-12: always(gap to bv > 2 m)", "R-14: n_collision == 0"],
     )  # fmt: skip
     run = listed(FolderView(tmp_path / "runs").page())["a"]

@@ -214,7 +214,7 @@ def rows_of(folder: Path):
 
 @pytest.fixture(scope="module")
 def undisturbed(tmp_path_factory):
-    return bg.run_search(**SEARCH, out=tmp_path_factory.mktemp("threads") / "run")
+    return bg.run_search(**SEARCH, triage="short", out=tmp_path_factory.mktemp("threads") / "run")
 
 
 def test_a_killed_worker_and_a_killed_node_in_mid_run_change_nothing(
@@ -230,7 +230,11 @@ def test_a_killed_worker_and_a_killed_node_in_mid_run_change_nothing(
             threading.Timer(0.02, lambda: (nodes.obey("kill node"), done.set())).start()
 
     run = bg.run_search(
-        **SEARCH, out=tmp_path / "run", workers=cluster, callbacks=SearchCallbacks(batch=disturb)
+        **SEARCH,
+        triage="short",
+        out=tmp_path / "run",
+        workers=cluster,
+        callbacks=SearchCallbacks(batch=disturb),
     )
     assert done.wait(60.0)
     assert same_rows(run.folder, undisturbed.folder)
@@ -256,8 +260,10 @@ def test_a_driver_of_ones_own_is_carried_to_where_it_is_not(
     monkeypatch.chdir(tmp_path)  # actors are elsewhere: a relative path leads nowhere for them
     Path("mine.py").write_text(DRIVERS.read_text("utf-8"), "utf-8")
     search = {"scenario": "crossroads-s1", "algorithm": "random", "budget": 16, "keep": 0}
-    here = bg.run_search(**search, ego="mine.py:FailsFast", out="here")
-    there = bg.run_search(**search, ego="mine.py:FailsFast", out="there", workers=cluster)
+    here = bg.run_search(**search, ego="mine.py:FailsFast", triage="short", out="here")
+    there = bg.run_search(
+        **search, ego="mine.py:FailsFast", triage="short", out="there", workers=cluster
+    )
     assert same_rows(here.folder, there.folder)
     assert here.failures == there.failures != {}
 
@@ -276,7 +282,7 @@ def test_a_cluster_that_is_lost_is_told_and_the_run_can_be_gone_on_with(
         WorkersError, match=f"is lost: .*GCS.*; [48]0 .* 'bridgegen resume {place}'"
     ):
         bg.run_search(
-            **SEARCH, out=place, workers="ray",
+            **SEARCH, triage="short", out=place, workers="ray",
             callbacks=SearchCallbacks(batch=lambda progress: (lose(progress), time.sleep(4.0))),
         )  # fmt: skip
     resumed = bg.resume(place)

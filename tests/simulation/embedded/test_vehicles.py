@@ -122,11 +122,15 @@ def test_an_exported_file_states_it_and_does_the_same(tmp_path):
 def test_a_run_records_it_and_resumes_with_it(tmp_path):
     given = {"ego": "route-follower", "budget": 20, "algorithm": "random", "keep": 1}
     run = bg.run_search(
-        "stopped-after-curve", vehicle="single-track", out=tmp_path / "whole", **given
+        "stopped-after-curve",
+        vehicle="single-track",
+        triage="short",
+        out=tmp_path / "whole",
+        **given,
     )
     assert run.settings.vehicle == "single-track"
     assert bg.resume(tmp_path / "whole").settings.vehicle == "single-track"
-    other = bg.run_search("stopped-after-curve", out=tmp_path / "other", **given)
+    other = bg.run_search("stopped-after-curve", triage="short", out=tmp_path / "other", **given)
     assert other.settings.vehicle == "kinematic"
     assert other.summary.v_d_median != run.summary.v_d_median
 
