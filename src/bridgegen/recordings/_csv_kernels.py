@@ -136,9 +136,7 @@ def read_lines(
                 c = data[stop]
                 if quotes and c == QUOTE:
                     inside = not inside
-                elif not inside and (
-                    c == separator or (separator == SPACE and c == TAB)
-                ):
+                elif not inside and (c == separator or (separator == SPACE and c == TAB)):
                     break
                 stop += 1
             if inside:

@@ -37,10 +37,12 @@ class Cleaned:
         traffic: complete but for lanes, at one time step, all participants at the same instants
             (multiples of the time step).
         quality: what was found and done.
+        kinds: of the recorded participants, of which one may have become several tracks, or none.
     """
 
     traffic: RecordedTraffic
     quality: Quality
+    kinds: Int
 
 
 @dataclass
@@ -97,9 +99,7 @@ def clean(traffic: RecordedTraffic, time_step: float = TIME_STEP) -> Cleaned:
     if not pieces:
         raise InputError(f"{traffic.facts.source}: no track is long enough: two states at least")
     of = np.array(owner)
-    columns = {
-        key: np.concatenate([piece.columns.pop(key) for piece in pieces]) for key in COLUMNS
-    }
+    columns = {key: np.concatenate([piece.columns.pop(key) for piece in pieces]) for key in COLUMNS}
     source = traffic.facts.source
     return Cleaned(
         RecordedTraffic(
@@ -110,6 +110,7 @@ def clean(traffic: RecordedTraffic, time_step: float = TIME_STEP) -> Cleaned:
             **columns,
         ),
         quality,
+        kind,
     )  # fmt: skip
 
 

@@ -128,9 +128,7 @@ class _Reading:
         hashes = np.empty((most, len(self.texts)), dtype=np.int64)
         spans = np.empty((most, len(self.texts), 2), dtype=np.int64)
         found = np.zeros(4, dtype=np.int64)
-        read_lines(
-            data, self.separator, len(self.head), self.slot, values, hashes, spans, found
-        )
+        read_lines(data, self.separator, len(self.head), self.slot, values, hashes, spans, found)
         rows, lines, code, field = found.tolist()
         if code:
             raise FileFormatError(self._problem(chunk, lines, code, field))
@@ -183,9 +181,7 @@ class _Reading:
         return f"{place}: {self.head[field]} must be a number, got '{shown}'"
 
 
-def whole_numbers(
-    path: Path, name: str, values: Float, head: int = 1
-) -> npt.NDArray[np.int64]:
+def whole_numbers(path: Path, name: str, values: Float, head: int = 1) -> npt.NDArray[np.int64]:
     """Return a column of ids or frames as integers.
 
     Raises:

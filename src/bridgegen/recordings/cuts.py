@@ -43,7 +43,11 @@ def suspects(time: Float, x: Float, y: Float, first: Int) -> Int:
         return np.zeros(0, dtype=np.int64)
     steps = np.maximum(np.diff(time), 1e-9)
     change = np.hypot(np.diff(np.diff(x) / steps), np.diff(np.diff(y) / steps))
-    odd = np.flatnonzero(change * np.maximum(steps[1:], steps[:-1]) > 0.5 * JUMP) + 1
+    change *= np.maximum(steps[1:], steps[:-1])
+    ends = first[1:-1]  # a change is about the state after it, and needs its two neighbours
+    for beside in (ends - 2, ends - 1):
+        change[beside[(beside >= 0) & (beside < len(change))]] = 0.0
+    odd = np.flatnonzero(change > 0.5 * JUMP) + 1
     return np.unique(np.searchsorted(first, odd, side="right") - 1)
 
 
@@ -77,9 +81,7 @@ def jumps(time: Float, x: Float, y: Float) -> Jumps:
 def _returns(time: Float, x: Float, y: Float, velocity: Float, i: int) -> bool:
     """Whether state i + 2 goes on where state i was going."""
     span = time[i + 2] - time[i]
-    error = np.hypot(
-        x[i + 2] - x[i] - velocity[0] * span, y[i + 2] - y[i] - velocity[1] * span
-    )
+    error = np.hypot(x[i + 2] - x[i] - velocity[0] * span, y[i + 2] - y[i] - velocity[1] * span)
     return bool(error <= JUMP + 0.5 * STRONGEST * span**2)
 
 
@@ -87,4 +89,4 @@ def gaps(time: Float, time_step: float) -> tuple[Int, Bool]:
     """Return the states after which there is a gap, and whether it is bridged."""
     steps = np.diff(time)
     at = np.flatnonzero(steps > GAP * time_step)
-    return at, steps[at] <= bridged_up_to(time_step) * (1.0 + 1e-6)
+    return at, steps[at] <= bridged_up_to(time_step) + 0.1 * time_step

@@ -8,6 +8,7 @@ Vehicle numbers are used again, so a vehicle is told by its number and its numbe
 Source: US DOT FHWA, Next Generation Simulation (NGSIM) Vehicle Trajectories, metadata.
 """
 
+import itertools
 from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
@@ -89,7 +90,7 @@ def _recording(path: Path, place: str, values: dict[str, Float], lines: Int) -> 
     classes = per_participant(ids, values["v_Class"])
     bounds = np.searchsorted(ids, np.arange(len(keys) + 1))
     heading = np.empty(len(ids))
-    for begin, end in zip(bounds[:-1], bounds[1:], strict=True):
+    for begin, end in itertools.pairwise(bounds):
         at = slice(begin, end)
         heading[at] = smooth_headings(time[at], x[at], y[at], WINDOW)
     behind = 0.5 * FOOT * np.nan_to_num(sizes["v_length"])[ids]

@@ -4,6 +4,7 @@ Lengths and angles are SI; positions are those of the bodies' centres in a right
 east (or as the recording's frame says), heading counter-clockwise from x.
 """
 
+import itertools
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from types import MappingProxyType
@@ -237,7 +238,7 @@ def per_participant(ids: Int, values: Float) -> Float:
     order = np.argsort(ids, kind="stable")
     bounds = np.searchsorted(ids[order], np.arange(int(ids.max()) + 2))
     found = []
-    for begin, end in zip(bounds[:-1], bounds[1:], strict=True):
+    for begin, end in itertools.pairwise(bounds):
         known = values[order[begin:end]]
         known = known[np.isfinite(known)]
         found.append(float(np.median(known)) if len(known) else np.nan)

@@ -87,9 +87,7 @@ def _states(place: str, one: Any) -> list[list[float]]:
     if not len(position) == len(heading) == len(velocity) == len(valid):
         raise FileFormatError(f"{place}: position, heading, velocity and valid differ in length")
     found = []
-    for step, (p, h, v, counts) in enumerate(
-        zip(position, heading, velocity, valid, strict=True)
-    ):
+    for step, (p, h, v, counts) in enumerate(zip(position, heading, velocity, valid, strict=True)):
         if not counts:
             continue
         try:
