@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
+from bridgegen.arrays import Int
 from bridgegen.ego.kinds import BICYCLE, BUS, CAR, MOTORCYCLE, OTHER, PEDESTRIAN
 from bridgegen.errors import FileFormatError
 from bridgegen.extras import require
@@ -19,6 +20,7 @@ from bridgegen.recordings.table import (
     UNKNOWN_KIND,
     Facts,
     RecordedTraffic,
+    Where,
     build,
     numbered,
 )
@@ -77,10 +79,14 @@ def _read(path: Path) -> Iterator[RecordedTraffic]:
                 "time": of["timestep"] * TIME_STEP, "x": of["position_x"], "y": of["position_y"],
                 "heading": of["heading"], "vx": of["velocity_x"], "vy": of["velocity_y"],
             },
-            lambda i, rows=rows: f"{path}, row {rows[i] + 1}",
+            _rows_of(path, rows),
             names=tracks.tolist(),
             kind=[KINDS.get(texts["object_type"][rows[i]], UNKNOWN_KIND) for i in at.tolist()],
         )  # fmt: skip
+
+
+def _rows_of(path: Path, rows: Int) -> Where:
+    return lambda i: f"{path}, row {rows[i] + 1}"
 
 
 FORMAT = Format(

@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from bridgegen.arrays import Bool, Float, Int
 from bridgegen.ego.kinds import BICYCLE, CAR, MOTORCYCLE, PEDESTRIAN, TRUCK
-from bridgegen.errors import InputError
+from bridgegen.errors import FileFormatError, InputError
 from bridgegen.recordings import cuts, plausibility, smoothing
 from bridgegen.recordings.bodies import usual_box
 from bridgegen.recordings.motion import headings, velocities
@@ -97,7 +97,7 @@ def clean(traffic: RecordedTraffic, time_step: float = TIME_STEP) -> Cleaned:
             names.append(traffic.names[p] if number == 1 else f"{traffic.names[p]}#{number}")
     at_jumps.report()
     if not pieces:
-        raise InputError(f"{traffic.facts.source}: no track is long enough: two states at least")
+        raise FileFormatError(f"{traffic.facts.source}: no track has two states at least")
     of = np.array(owner)
     columns = {key: np.concatenate([piece.columns.pop(key) for piece in pieces]) for key in COLUMNS}
     source = traffic.facts.source
@@ -217,7 +217,7 @@ def _complete(
         quality.note(Rule.ACCELERATION, p, int(missing.sum()), name)
         along = vx * np.cos(heading) + vy * np.sin(heading)
         acceleration = np.where(missing, np.gradient(along, time), acceleration)
-    at = np.arange(low, high + 1) * time_step
+    at = time_step * np.arange(low, high + 1, dtype=np.float64)
     if len(at) == n and np.abs(at - time).max() <= SAME:
         done = {"x": columns["x"], "y": columns["y"], "vx": vx, "vy": vy, "heading": heading,
                 "acceleration": acceleration}  # fmt: skip

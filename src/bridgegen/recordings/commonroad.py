@@ -1,7 +1,9 @@
 """CommonRoad scenarios (XML, versions 2020a and 2018b): dynamic and static obstacles.
 
-Source: CommonRoad, XML format documentation, both versions. An interval stands for its middle; an obstacle
-whose prediction is an occupancy set has no trajectory, and is left out with a note.
+An interval stands for its middle. An obstacle whose prediction is an occupancy set has no
+trajectory, and is left out with a note.
+
+Source: CommonRoad, XML format documentation, both versions.
 """
 
 import math
@@ -170,5 +172,6 @@ def _box(path: Path, element: etree._Element) -> tuple[float, float]:
 
 
 FORMAT = Format(
-    name="CommonRoad", title="CommonRoad 2020a and 2018b (.xml)", recognises=_recognises, read=_read,
+    name="CommonRoad", title="CommonRoad 2020a and 2018b (.xml)",
+    recognises=_recognises, read=_read,
 )  # fmt: skip

@@ -13,7 +13,8 @@ def velocities(time: Float, x: Float, y: Float) -> tuple[Float, Float]:
     """Return a track's velocities [m/s]: second-order differences, ``(n,)`` each."""
     if len(time) < 2:
         return np.zeros(len(time)), np.zeros(len(time))
-    return np.gradient(x, time), np.gradient(y, time)
+    order = 2 if len(time) > 2 else 1  # at the ends
+    return np.gradient(x, time, edge_order=order), np.gradient(y, time, edge_order=order)
 
 
 def headings(vx: Float, vy: Float) -> tuple[Float, bool]:

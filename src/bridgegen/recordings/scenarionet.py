@@ -38,7 +38,9 @@ def _read(path: Path) -> Iterator[RecordedTraffic]:
     ids: list[int] = []
     parts: list[npt.NDArray[np.float64]] = []
     places: list[tuple[str, int]] = []
-    names, kinds, boxes = [], [], []
+    names: list[str] = []
+    kinds: list[int] = []
+    boxes: list[tuple[float, float]] = []
     for name, track in tracks.items():
         place = f"{path}, track '{str(name)[:40]}'"
         states, box = _track(place, track, times)
@@ -80,9 +82,9 @@ def _track(
     n = len(valid)
     position, velocity = (_column(place, state, name) for name in ("position", "velocity"))
     heading = _column(place, state, "heading").reshape(-1)
-    for name, array, width in (("position", position, 2), ("velocity", velocity, 2)):
-        if array.ndim != 2 or len(array) != n or array.shape[1] < width:
-            raise FileFormatError(f"{place}: {name} must be of shape ({n}, {width} or more)")
+    for name, array in (("position", position), ("velocity", velocity)):
+        if array.ndim != 2 or len(array) != n or array.shape[1] < 2:
+            raise FileFormatError(f"{place}: {name} must be of shape ({n}, 2 or more)")
     if len(heading) != n or n > len(times) or valid.ndim != 1:
         raise FileFormatError(f"{place}: must have a heading for each of {n} instants")
     steps = np.flatnonzero(valid)

@@ -30,7 +30,7 @@ def scatter(x: Float, y: Float) -> float:
     if len(x) < LEAST_STATES:
         return 0.0
     sizes = [float(np.median(np.abs(np.diff(values, 3)))) for values in (x, y)]
-    return 1.4826 * max(sizes) / np.sqrt(20.0)
+    return float(1.4826 * max(sizes) / np.sqrt(20.0))
 
 
 def window(time_step: float) -> int:

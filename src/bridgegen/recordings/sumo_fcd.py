@@ -10,6 +10,7 @@ Source: SUMO user documentation, FCDOutput.
 import math
 from collections.abc import Iterator
 from pathlib import Path
+from typing import BinaryIO
 
 import numpy as np
 from lxml import etree
@@ -54,29 +55,13 @@ class _Found:
 
 def _read(path: Path) -> Iterator[RecordedTraffic]:
     found = _Found()
-    if path.stat().st_size > MOST_BYTES:
-        raise FileFormatError(f"{path}: may have at most {MOST_BYTES} bytes")
-    time = math.nan
     try:
-        stream = etree.iterparse(
-            str(path), events=("start", "end"), resolve_entities=False, no_network=True,
-            load_dtd=False, huge_tree=False, remove_comments=True, remove_pis=True,
-        )  # fmt: skip
-        for event, element in stream:
-            if event == "start":
-                if element.getparent() is None and element.getroottree().docinfo.doctype:
-                    raise FileFormatError(f"{path}: a DOCTYPE is refused")
-                if element.tag == "timestep":
-                    time = _number(path, element, "time")
-                continue
-            if element.tag in ("vehicle", "person"):
-                _add(path, found, element, time)
-            if element.tag == "timestep":
-                element.clear()
-                while element.getprevious() is not None:
-                    parent = element.getparent()
-                    assert parent is not None
-                    del parent[0]
+        if path.stat().st_size > MOST_BYTES:
+            raise FileFormatError(f"{path}: may have at most {MOST_BYTES} bytes")
+        with path.open("rb") as file:
+            _stream(path, file, found)
+    except OSError as error:
+        raise FileFormatError(f"{path}: cannot be read: {error.strerror}") from None
     except etree.XMLSyntaxError as error:
         raise FileFormatError(f"{path}: not well-formed XML: {error}") from None
     if not found.ids:
@@ -106,6 +91,30 @@ def _read(path: Path) -> Iterator[RecordedTraffic]:
         lambda i: f"{path}, line {found.lines[i]}",
         names=list(found.participants), kind=found.kinds,
     )  # fmt: skip
+
+
+def _stream(path: Path, file: BinaryIO, found: _Found) -> None:
+    """Read all states; each time step's elements are freed once it is read."""
+    time = math.nan
+    events = etree.iterparse(
+        file, events=("start", "end"), resolve_entities=False, no_network=True, load_dtd=False,
+        huge_tree=False, remove_comments=True, remove_pis=True,
+    )  # fmt: skip
+    for event, element in events:
+        if event == "start":
+            parent = element.getparent()
+            if parent is None and element.getroottree().docinfo.doctype:
+                raise FileFormatError(f"{path}: a DOCTYPE is refused")
+            if element.tag == "timestep":
+                time = _number(path, element, "time")
+            continue
+        if element.tag in ("vehicle", "person"):
+            _add(path, found, element, time)
+        if element.tag == "timestep":
+            element.clear()
+            parent = element.getparent()
+            while parent is not None and element.getprevious() is not None:
+                del parent[0]
 
 
 def _add(path: Path, found: _Found, element: etree._Element, time: float) -> None:

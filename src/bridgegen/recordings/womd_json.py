@@ -41,7 +41,9 @@ def _read(path: Path) -> Iterator[RecordedTraffic]:
     ids: list[int] = []
     rows: list[list[float]] = []
     places: list[tuple[int, int]] = []
-    names, kinds, boxes = [], [], []
+    names: list[str] = []
+    kinds: list[int] = []
+    boxes: list[list[float]] = []
     for number, one in enumerate(objects):
         states = _states(f"{path}, objects[{number}]", one)
         if not states:

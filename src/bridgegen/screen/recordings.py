@@ -46,8 +46,8 @@ def print_mined(mined: "Mined", *, as_json: bool) -> None:
     print()
     found = [row for row in _quality(mined) if row[1]]
     if found:
-        head = ("quality", "recordings", "participants", "count", "first")
-        print_table(head, found, as_json=False)
+        of_rules = ("quality", "recordings", "participants", "count", "first")
+        print_table(of_rules, found, as_json=False)
     else:
         print("quality: nothing to clean")
     print(f"\n{'page':<8}{mined.out / 'recordings.html'}")
