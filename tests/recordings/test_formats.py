@@ -8,8 +8,8 @@ import pytest
 
 from bridgegen.ego.kinds import CAR, TRUCK
 from bridgegen.errors import FileFormatError
-from bridgegen.recordings.formats import FORMATS, files_of, read, recognise
 from bridgegen.recordings.format import read_head
+from bridgegen.recordings.formats import FORMATS, files_of, read, recognise
 
 from . import writers as w
 

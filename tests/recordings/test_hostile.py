@@ -79,6 +79,17 @@ def test_arrays_come_back_as_numpy_would_read_them(tmp_path_factory, shape, orde
     assert scalar == 1.5
 
 
+def _cleaned(path):
+    """Return the recordings of a file and the error that ends it, if there is one."""
+    found = []
+    try:
+        for traffic in read(path):
+            found.append(clean(traffic).traffic)
+    except FileFormatError as error:
+        return found, str(error)
+    return found, None
+
+
 @pytest.mark.parametrize("write", WRITERS)
 @settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(data=st.data())
@@ -97,13 +108,11 @@ def test_a_damaged_file_is_read_or_refused(write, tmp_path_factory, data):
         else:
             whole[at:at] = whole[at : at + 200]
     path.write_bytes(bytes(whole) or b"x")
-    try:
-        for traffic in read(path):
-            found = clean(traffic).traffic
-            for name in ("time", "x", "y", "heading", "vx", "vy", "acceleration", "length"):
-                assert np.isfinite(getattr(found, name)).all(), name
-    except FileFormatError as error:
-        assert str(path.parent) in str(error)
+    found, error = _cleaned(path)
+    assert error is None or str(path.parent) in error
+    for one in found:
+        for name in ("time", "x", "y", "heading", "vx", "vy", "acceleration", "length"):
+            assert np.isfinite(getattr(one, name)).all(), name
 
 
 @settings(max_examples=100, deadline=None)
@@ -113,10 +122,10 @@ def test_a_damaged_file_is_read_or_refused(write, tmp_path_factory, data):
 def test_garbage_is_refused(tmp_path_factory, data, head):
     path = tmp_path_factory.getbasetemp() / "garbage"
     path.write_bytes(head + data)
-    with pytest.raises(FileFormatError, match="garbage"):
-        for traffic in read(path):
-            clean(traffic)
-    assert path.read_bytes() == head + data
+    found, error = _cleaned(path)
+    assert not found
+    assert error is not None
+    assert "garbage" in error
 
 
 def _edit(path, change):
@@ -142,14 +151,14 @@ def test_an_instant_that_comes_twice_is_an_error_with_its_row(tmp_path):
 def test_missing_metadata_are_named(tmp_path):
     path = w.write_highd(tmp_path)
     (tmp_path / "01_tracksMeta.csv").unlink()
-    with pytest.raises(FileFormatError, match="01_tracksMeta.csv"):
+    with pytest.raises(FileFormatError, match=r"01_tracksMeta\.csv"):
         list(read(path))
 
 
 def test_tracks_without_metadata_are_named(tmp_path):
     path = w.write_ind(tmp_path)
     _edit(tmp_path / "07_tracksMeta.csv", lambda lines: lines[:-1])
-    with pytest.raises(FileFormatError, match="says nothing of 1 tracks .*: 7"):
+    with pytest.raises(FileFormatError, match=r"says nothing of 1 tracks .*: 7"):
         list(read(path))
 
 
