@@ -1,5 +1,6 @@
 """All readers make the same table of the same traffic."""
 
+import pickle
 import re
 from typing import NamedTuple
 
@@ -104,6 +105,21 @@ def test_highd_that_drives_leftwards_and_stands_points_left(tmp_path):
     (found,) = read(path)
     assert found.heading == pytest.approx(np.full(5, np.pi))
     assert (found.x[0], found.y[0]) == (12.0, -4.0)
+
+
+def test_traffic_lights_of_scenarionet_change_when_they_are_recorded_to(tmp_path):
+    path = w.write_scenarionet(tmp_path)
+    whole = pickle.loads(path.read_bytes())
+    words = ["LANE_STATE_STOP"] * 10 + ["LANE_STATE_GO"] * 5 + ["odd"] * (w.N - 10)
+    whole["dynamic_map_states"] = {
+        184: {"type": "TRAFFIC_LIGHT", "state": {"object_state": words}, "lane": 184}
+    }
+    path.write_bytes(pickle.dumps(whole))
+    (found,) = read(path)
+    ((name, changes),) = found.facts.lights.items()
+    assert name == "184"
+    assert [word for _, word in changes] == ["red", "green", "unknown"]
+    assert [time for time, _ in changes] == pytest.approx([0.0, 1.0, 1.5])
 
 
 def test_a_folder_gives_its_recordings_and_names_the_rest(tmp_path):

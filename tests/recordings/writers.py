@@ -121,7 +121,8 @@ def write_smarts(folder: Path) -> Path:
         base.execute("CREATE TABLE Vehicle (id INTEGER PRIMARY KEY, type INTEGER, length REAL,"
                      " width REAL, height REAL, is_ego_vehicle INTEGER)")  # fmt: skip
         base.execute("CREATE TABLE Trajectory (vehicle_id INTEGER, sim_time REAL,"
-                     " position_x REAL, position_y REAL, heading_rad REAL, speed REAL, lane_id INTEGER)")  # fmt: skip
+                     " position_x REAL, position_y REAL, heading_rad REAL, speed REAL,"
+                     " lane_id INTEGER)")  # fmt: skip
         for name, size, kind in zip(NAMES, SIZES, CLASSES, strict=True):
             code = {"car": 2, "truck": 3}[kind]
             base.execute("INSERT INTO Vehicle VALUES (?, ?, ?, ?, NULL, 0)", (name, code, *size))

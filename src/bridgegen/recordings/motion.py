@@ -1,5 +1,7 @@
 """Directions and velocities from positions."""
 
+from typing import Literal
+
 import numpy as np
 
 from bridgegen.arrays import Float
@@ -13,7 +15,7 @@ def velocities(time: Float, x: Float, y: Float) -> tuple[Float, Float]:
     """Return a track's velocities [m/s]: second-order differences, ``(n,)`` each."""
     if len(time) < 2:
         return np.zeros(len(time)), np.zeros(len(time))
-    order = 2 if len(time) > 2 else 1  # at the ends
+    order: Literal[1, 2] = 2 if len(time) > 2 else 1  # at the ends
     return np.gradient(x, time, edge_order=order), np.gradient(y, time, edge_order=order)
 
 

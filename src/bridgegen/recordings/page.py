@@ -158,11 +158,12 @@ def _section(one: Summary, time_step: float) -> str:
     about = [
         f"file: {facts.source}",
         f"frame: {facts.frame}",
-        f"map: {facts.map or 'none named'} (not read yet)" if facts.map else "map: none named",
+        f"map: {facts.map} (not used yet)" if facts.map else "map: none named",
         f"{one.states:,} states read, every {facts.time_step:.4g} s; {one.tracks:,} tracks after "
         f"cleaning, every {time_step:g} s",
         f"{one.read_hours:.4g} h and {one.read_kilometres:.4g} km before cleaning, "
         f"{one.hours:.4g} h and {one.kilometres:.4g} km after",
+        f"traffic lights: {len(facts.lights) or 'none recorded'}",
         *facts.notes,
     ]
     findings = [

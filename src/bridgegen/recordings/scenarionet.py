@@ -6,6 +6,7 @@ Source: metadriverse/scenarionet and metadrive/scenario/scenario_description.py.
 import math
 from collections.abc import Iterator
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -21,6 +22,13 @@ KINDS = {
     "VEHICLE": CAR, "PEDESTRIAN": PEDESTRIAN, "CYCLIST": BICYCLE, "MOTORCYCLIST": MOTORCYCLE,
     "TRAFFIC_CONE": OTHER, "TRAFFIC_BARRIER": OTHER, "TRAFFIC_OBJECT": OTHER,
 }  # fmt: skip
+LIGHTS = {
+    "LANE_STATE_STOP": "red", "LANE_STATE_ARROW_STOP": "red", "LANE_STATE_CAUTION": "yellow",
+    "LANE_STATE_ARROW_CAUTION": "yellow", "LANE_STATE_GO": "green",
+    "LANE_STATE_ARROW_GO": "green", "LANE_STATE_FLASHING_STOP": "flashing red",
+    "LANE_STATE_FLASHING_CAUTION": "flashing yellow",
+}  # fmt: skip
+"""Any other state is unknown."""
 _PROTOCOLS = (b"\x80\x02", b"\x80\x03", b"\x80\x04", b"\x80\x05")
 
 
@@ -62,6 +70,7 @@ def _read(path: Path) -> Iterator[RecordedTraffic]:
         time_step=median_step(table[:, 0], first),
         frame=f"the scenario's ({data_set})" if data_set else "the scenario's",
         map="map features of the file" if whole.get("map_features") else "",
+        lights=MappingProxyType(_lights(path, whole.get("dynamic_map_states"), times)),
     )  # fmt: skip
     yield build(
         facts, numbers,
@@ -69,6 +78,32 @@ def _read(path: Path) -> Iterator[RecordedTraffic]:
         lambda i: f"{places[i][0]}, step {places[i][1]}",
         names=names, kind=kinds, length=size[:, 0], width=size[:, 1],
     )  # fmt: skip
+
+
+def _lights(
+    path: Path, states: Any, times: npt.NDArray[np.float64]
+) -> dict[str, tuple[tuple[float, str], ...]]:
+    """Return when each traffic light changes [s], and to what."""
+    if states is None:
+        return {}
+    if not isinstance(states, dict):
+        raise FileFormatError(f"{path}: dynamic_map_states must be a dictionary")
+    found = {}
+    for name, light in states.items():
+        inner = light.get("state") if isinstance(light, dict) else None
+        words = inner.get("object_state") if isinstance(inner, dict) else None
+        if not isinstance(words, list) or len(words) > len(times):
+            raise FileFormatError(
+                f"{path}, light '{str(name)[:40]}': object_state must be a list, one of an instant"
+            )
+        seen = [LIGHTS.get(str(word), "unknown") for word in words]
+        changes = [
+            (float(time), word)
+            for k, (time, word) in enumerate(zip(times, seen, strict=False))
+            if k == 0 or word != seen[k - 1]
+        ]
+        found[str(name)[:200]] = tuple(changes)
+    return found
 
 
 def _track(
