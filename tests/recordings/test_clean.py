@@ -6,6 +6,7 @@ import pytest
 from bridgegen.ego.kinds import BICYCLE, CAR, MOTORCYCLE, PEDESTRIAN, TRUCK
 from bridgegen.errors import FileFormatError, InputError
 from bridgegen.recordings.clean import clean
+from bridgegen.recordings.cuts import suspects
 from bridgegen.recordings.quality import Rule
 from bridgegen.recordings.table import Facts, build
 
@@ -116,6 +117,14 @@ def test_a_jump_cuts_and_its_two_parts_keep_what_was_recorded():
     assert applied(found)[Rule.JUMP] == (1, 1)
     assert found.traffic.names == ("0", "0#2", "1")
     assert set(found.traffic.y[found.traffic.participant < 2]) == {0.0, 30.0}
+
+
+def test_only_tracks_that_may_jump_are_searched_for_jumps():
+    jumps = drive(y=40.0)
+    jumps["x"][30:] += 30.0
+    two = {name: values[:2] for name, values in drive(y=800.0).items()}
+    found = traffic(drive(), drive(y=90.0, v=-20.0), two, two, jumps, drive(y=500.0))
+    assert suspects(found.time, found.x, found.y, found.first).tolist() == [4]
 
 
 def test_swapped_ids_are_told_from_jumps():

@@ -127,7 +127,8 @@ def _facts(mined: Mined) -> Iterator[str]:
     yield f"{sum(one.kilometres for one in mined.recordings):.4g} km"
     yield f"cleaned at {mined.time_step:g} s"
     if mined.skipped:
-        yield f"{len(mined.skipped)} files skipped"
+        count = len(mined.skipped)
+        yield "1 file skipped" if count == 1 else f"{count} files skipped"
 
 
 def _table(mined: Mined) -> str:
