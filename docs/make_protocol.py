@@ -63,6 +63,10 @@ def schema() -> dict[str, Any]:
                 "minimum": 1,
                 "description": "how many scenarios it can drive at once; null: any number",
             },
+            keeps_maps={
+                "type": ["boolean", "null"],
+                "description": "whether it keeps road maps: resets then have 'maps'",
+            },
         ),
         "ready": _message("ready"),
         "control": _message(
@@ -97,9 +101,32 @@ def schema() -> dict[str, Any]:
             "reset",
             n={"type": "integer", "minimum": 1, "description": "N, how many scenarios follow"},
             scene={"$ref": "#/$defs/Scene"},
+            maps={
+                "type": "object",
+                "description": "if the driver keeps them: the scene's maps; its own are none",
+                "properties": {
+                    "kept": {
+                        "type": "integer",
+                        "minimum": 0,
+                        "description": "how many it keeps, the first ones",
+                    },
+                    "new": {
+                        "type": "array",
+                        "items": {"$ref": "#/$defs/RoadMap"},
+                        "description": "those that follow them",
+                    },
+                    "numbers": {
+                        "type": "array",
+                        "items": {"type": "integer", "minimum": 0},
+                        "description": "which of all these the scene has, in its order, from 0 on",
+                    },
+                },
+                "required": ["kept", "new", "numbers"],
+            },
         ),
         "act": _message("act", observation={"$ref": "#/$defs/Observation"}),
     }
+    requests["reset"]["required"] = ["type", "n", "scene"]
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "title": "BridgeGen's protocol for drivers in other processes",

@@ -45,7 +45,7 @@ DOCS = ROOT / "docs"
 PAGES = sorted(path.stem for path in DOCS.glob("*.md"))
 BUDGET = "80"
 SHORT = {
-    "search": {"--budget": BUDGET, "--keep": "1"},
+    "search": {"--budget": BUDGET, "--keep": "1", "--triage": "short"},
     "compare": {"--seeds": "2", "--budget": "40", "--workers": "1"},
     "regions": {"--samples": "20"},
     "check-driver": {"--scenario": "cut-in"},

@@ -56,9 +56,9 @@ def variants():
 
 @pytest.mark.parametrize("arguments", list(variants()))
 def test_a_handed_over_file_gives_the_store_s_metrics_to_the_last_bit(tmp_path, arguments):
-    run = bg.run_search(**arguments, budget=200, keep=3, out=tmp_path / "run")
+    run = bg.run_search(**arguments, budget=100, keep=3, triage="none", out=tmp_path / "run")
     rows = rows_of(run.folder)
-    assert len(rows) == run.summary.evaluations == 200
+    assert len(rows) == run.summary.evaluations == 100
     assert run.finished
     assert run.scenarios
     assert run.report.stat().st_size > 10_000
@@ -110,11 +110,19 @@ def test_metrics_that_are_asked_for_are_recorded_and_in_the_command(tmp_path):
 
 def test_a_search_that_does_not_deliver_is_delivered_by_resuming(tmp_path):
     run = bg.run_search(
-        "crossroads-s4", budget=80, keep=2, out=tmp_path / "run", deliver=False, workers=1
+        "crossroads-s4",
+        budget=80,
+        keep=2,
+        triage="short",
+        out=tmp_path / "run",
+        deliver=False,
+        workers=1,
     )
     assert run.finished
     assert (run.scenarios, run.report.exists()) == ((), False)
-    whole = bg.run_search("crossroads-s4", budget=80, keep=2, out=tmp_path / "whole", workers=2)
+    whole = bg.run_search(
+        "crossroads-s4", budget=80, keep=2, triage="short", out=tmp_path / "whole", workers=2
+    )
     assert same(rows_of(run.folder), rows_of(whole.folder))
     again = bg.resume(run.folder, workers=1)
     assert len(again.scenarios) == 2
@@ -254,7 +262,9 @@ def test_the_recorded_command_makes_the_same_run(tmp_path, monkeypatch):
 
 def test_one_seed_one_result_and_another_seed_another(tmp_path):
     runs = [
-        bg.run_search("crossroads-s1", budget=80, seed=seed, out=tmp_path / str(i), keep=0)
+        bg.run_search(
+            "crossroads-s1", budget=80, seed=seed, out=tmp_path / str(i), keep=0, triage="none"
+        )
         for i, seed in enumerate((1, 1, 2))
     ]
     a, b, c = (rows_of(run.folder) for run in runs)
@@ -263,7 +273,9 @@ def test_one_seed_one_result_and_another_seed_another(tmp_path):
 
 
 def start(folder: Path, budget: int) -> subprocess.Popen[str]:
-    command = f"search crossroads-s4 --budget {budget} --seed 3 --keep 2 --out {folder}"
+    command = (
+        f"search crossroads-s4 --budget {budget} --seed 3 --keep 2 --triage short --out {folder}"
+    )
     code = "from bridgegen.cli import main; main()"
     return subprocess.Popen(
         [sys.executable, "-c", code, *command.split()],
@@ -286,14 +298,14 @@ def wait_for_rows(folder: Path, process: subprocess.Popen[str], count: int) -> N
 
 def test_killed_and_resumed_is_as_if_undisturbed(tmp_path):
     undisturbed = bg.run_search(
-        "crossroads-s4", budget=4000, seed=3, keep=2, out=tmp_path / "whole"
+        "crossroads-s4", budget=2000, seed=3, keep=2, triage="short", out=tmp_path / "whole"
     )
-    process = start(tmp_path / "killed", 4000)
+    process = start(tmp_path / "killed", 2000)
     wait_for_rows(tmp_path / "killed", process, 200)
     os.killpg(process.pid, signal.SIGKILL)
     process.communicate()
     before = rows_of(tmp_path / "killed")
-    assert 200 <= len(before) < 4000
+    assert 200 <= len(before) < 2000
     resumed = bg.resume(tmp_path / "killed")
     rows = rows_of(resumed.folder)
     assert same(rows, rows_of(undisturbed.folder))
@@ -315,7 +327,7 @@ def test_ctrl_c_keeps_what_is_done_and_says_how_to_go_on(tmp_path):
 
 
 def test_a_finished_run_gets_its_files_again(tmp_path):
-    run = bg.run_search("crossroads-s4", budget=120, out=tmp_path / "run", keep=1)
+    run = bg.run_search("crossroads-s4", budget=120, triage="none", out=tmp_path / "run", keep=1)
     run.report.unlink()
     again = bg.resume(run.folder)
     assert again.report.exists()
@@ -367,7 +379,8 @@ def test_an_imported_map_is_searched_like_the_map(tmp_path, scenario, junction):
     road_map = tmp_path / "Town05.xodr"
     road_map.write_bytes(TOWN05.read_bytes())
     owl, _ = import_file(road_map)
-    settings = {"algorithm": "random", "budget": 60, "keep": 1, "junction": junction}
+    settings = {"algorithm": "random", "budget": 60, "keep": 1, "triage": "none"}
+    settings["junction"] = junction
     one = bg.run_search(scenario, road_map=road_map, out=tmp_path / "one", **settings)
     other = bg.run_search(scenario, road_map=owl, out=tmp_path / "other", **settings)
     assert same(rows_of(one.folder), rows_of(other.folder))

@@ -15,7 +15,9 @@ from bridgegen.store import Store
 
 @pytest.mark.parametrize("name", names())
 def test_a_smoke_search(tmp_path, name):
-    run = bg.run_search(name, algorithm="random", budget=40, keep=1, out=tmp_path / "run")
+    run = bg.run_search(
+        name, algorithm="random", budget=40, keep=1, triage="short", out=tmp_path / "run"
+    )
     with Store.open(run.folder) as store:
         rows = store.read()
     assert len(rows) == 40

@@ -52,6 +52,12 @@ def simulated(path: Path) -> FileResult:
     return bg.simulate_file(path)
 
 
+@cache
+def recorded(path: Path) -> Path:
+    """The recording of a file of the catalogue."""
+    return export(path, "recorded", out=path.parent / "recorded")[0]
+
+
 @pytest.fixture(scope="module")
 def run(tmp_path_factory) -> bg.Run:
     return bg.run_search(
@@ -94,8 +100,8 @@ def test_the_same_motion_bit_for_bit(catalogue, tmp_path, name, flavour):
 
 
 @every
-def test_recorded_files_play_what_was_recorded(catalogue, tmp_path, name):
-    path, _ = export(catalogue[name], "recorded", out=tmp_path)
+def test_recorded_files_play_what_was_recorded(catalogue, name):
+    path = recorded(catalogue[name])
     assert validate_file(path) == []
     before, after = simulated(catalogue[name]), bg.simulate_file(path)
     n = before.rollout.n_steps[0]
@@ -117,8 +123,8 @@ def test_recorded_files_play_what_was_recorded(catalogue, tmp_path, name):
 
 
 @every
-def test_recorded_files_say_nothing_but_when_who_is_where(catalogue, tmp_path, name):
-    path, _ = export(catalogue[name], "recorded", out=tmp_path)
+def test_recorded_files_say_nothing_but_when_who_is_where(catalogue, name):
+    path = recorded(catalogue[name])
     scenario, source = read(path), read(catalogue[name])
     assert scenario.parameter_declarations is None
     assert not any(one.object_controllers for one in scenario.entities.scenario_objects)
@@ -137,7 +143,7 @@ def test_recorded_files_say_nothing_but_when_who_is_where(catalogue, tmp_path, n
 
 
 def test_recording_a_recording_changes_nothing(catalogue, tmp_path):
-    first, _ = export(catalogue["crossroads-s3"], "recorded", out=tmp_path / "a")
+    first = recorded(catalogue["crossroads-s3"])
     second, _ = export(first, "recorded", out=tmp_path / "b")
     a, b = bg.simulate_file(first), bg.simulate_file(second)
     assert np.array_equal(a.rollout.x, b.rollout.x)

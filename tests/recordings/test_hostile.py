@@ -53,7 +53,8 @@ def test_a_pickle_runs_nothing(tmp_path, protocol):
 
 @pytest.mark.parametrize(
     "value",
-    [Calls(np.ndarray, (10**12,)), Calls(np.ndarray, (10,)), Calls(np.dtype, "O"), Calls(np.dtype, "V99999"),
+    [Calls(np.ndarray, (10**12,)), Calls(np.ndarray, (10,)),
+     Calls(np.dtype, "O"), Calls(np.dtype, "V99999"),
      np.array(["a"], dtype=object), Calls(eval, "1"), Calls(getattr, "", "join"),
      Calls(dict, [(1, 2)])],
 )  # fmt: skip

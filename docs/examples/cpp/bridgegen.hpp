@@ -4,12 +4,18 @@
 
 #pragma once
 
+#include <algorithm>
 #include <arpa/inet.h>
+#include <array>
+#include <cerrno>
 #include <csignal>
 #include <cstdint>
+#include <cstdio>
 #include <cstring>
+#include <fcntl.h>
 #include <functional>
 #include <memory>
+#include <netinet/in.h>
 #include <netinet/tcp.h>
 #include <stdexcept>
 #include <string>
@@ -19,10 +25,16 @@
 #include <utility>
 #include <vector>
 
+#if defined(__BYTE_ORDER__) && __BYTE_ORDER__ != __ORDER_LITTLE_ENDIAN__
+#error "lengths and arrays are little-endian, and this machine is not"
+#endif
+
 namespace bridgegen {
 
 constexpr std::uint64_t kProtocol = 1;
 constexpr std::size_t kMaxFrame = 64u << 20;
+constexpr std::size_t kMaxItems = 5'000'000;  // of all lists and maps of a message
+constexpr std::size_t kMaxRows = kMaxFrame / 32;
 constexpr int kMaxDepth = 16;
 
 struct Array;
@@ -56,14 +68,15 @@ struct Value {
   Array array() const;
 };
 
-/// An array in C order; its elements are read as doubles, whatever their type.
+/// An array in C order; its elements are in the message's buffer, and are read as doubles, whatever
+/// their type.
 struct Array {
   std::vector<std::size_t> shape;
   std::string_view dtype, data;
 
   double operator()(std::size_t i) const {
     if (dtype == "float64") return element<double>(i);
-    if (dtype == "float32") return element<float>(i);
+    if (dtype == "float32") return static_cast<double>(element<float>(i));
     if (dtype == "int64") return static_cast<double>(element<std::int64_t>(i));
     if (dtype == "int32") return element<std::int32_t>(i);
     if (dtype == "int8") return element<std::int8_t>(i);
@@ -71,13 +84,15 @@ struct Array {
     throw std::runtime_error("an array of an unknown type");
   }
   double operator()(std::size_t i, std::size_t j, std::size_t k) const {
-    return (*this)((i * shape.at(1) + j) * shape.at(2) + k);
+    if (shape.size() != 3 || i >= shape[0] || j >= shape[1] || k >= shape[2])
+      throw std::runtime_error("an array has no element of these indices");
+    return (*this)((i * shape[1] + j) * shape[2] + k);
   }
 
  private:
   template <class T>
   T element(std::size_t i) const {
-    if ((i + 1) * sizeof(T) > data.size()) throw std::runtime_error("an array is too short");
+    if (i >= data.size() / sizeof(T)) throw std::runtime_error("an array is too short");
     T value;
     std::memcpy(&value, data.data() + i * sizeof(T), sizeof(T));
     return value;
@@ -85,10 +100,22 @@ struct Array {
 };
 
 inline Array Value::array() const {
+  constexpr std::array<std::pair<std::string_view, std::size_t>, 6> sizes{
+      {{"float64", 8}, {"float32", 4}, {"int64", 8}, {"int32", 4}, {"int8", 1}, {"bool", 1}}};
   Array found;
-  for (const Value& size : (*this)["shape"].list) found.shape.push_back(size.size());
   found.dtype = (*this)["dtype"].text;
   found.data = (*this)["data"].text;
+  const auto known = std::find_if(sizes.begin(), sizes.end(),
+                                  [&](const auto& one) { return one.first == found.dtype; });
+  if (known == sizes.end()) throw std::runtime_error("an array of an unknown type");
+  std::size_t bytes = known->second;
+  for (const Value& n : (*this)["shape"].list) {
+    found.shape.push_back(n.size());
+    if (found.shape.back() > kMaxFrame || bytes > kMaxFrame)
+      throw std::runtime_error("an array is too large");
+    bytes *= found.shape.back();
+  }
+  if (bytes != found.data.size()) throw std::runtime_error("an array has not the size of its shape");
   return found;
 }
 
@@ -110,7 +137,14 @@ class Reader {
  public:
   explicit Reader(std::string_view data) : data_(data) {}
 
-  Value read(int depth = 0) {
+  Value message() {
+    Value found = read(0);
+    if (!data_.empty()) throw std::runtime_error("more follows the message's end");
+    return found;
+  }
+
+ private:
+  Value read(int depth) {
     using Kind = Value::Kind;
     const unsigned tag = static_cast<unsigned char>(take(1)[0]);
     if (tag < 0x80) return whole(tag);
@@ -124,8 +158,11 @@ class Reader {
       case 0xc4: case 0xc5: case 0xc6: return bytes(Kind::kBytes, big(1u << (tag - 0xc4)));
       case 0xca: { const auto bits = static_cast<std::uint32_t>(big(4)); return real<float>(bits); }
       case 0xcb: return real<double>(big(8));
-      case 0xcc: case 0xcd: case 0xce: case 0xcf:
-        return whole(static_cast<std::int64_t>(big(1u << (tag - 0xcc))));
+      case 0xcc: case 0xcd: case 0xce: case 0xcf: {
+        const std::uint64_t found = big(1u << (tag - 0xcc));
+        if (found > INT64_MAX) throw std::runtime_error("a whole number is too large");
+        return whole(static_cast<std::int64_t>(found));
+      }
       case 0xd0: return whole(static_cast<std::int8_t>(big(1)));
       case 0xd1: return whole(static_cast<std::int16_t>(big(2)));
       case 0xd2: return whole(static_cast<std::int32_t>(big(4)));
@@ -137,7 +174,6 @@ class Reader {
     }
   }
 
- private:
   std::string_view take(std::size_t n) {
     if (n > data_.size()) throw std::runtime_error("the message ends too early");
     const std::string_view found = data_.substr(0, n);
@@ -161,7 +197,7 @@ class Reader {
     std::memcpy(&value, &bits, sizeof(value));
     Value found;
     found.kind = Value::Kind::kReal;
-    found.real = value;
+    found.real = static_cast<double>(value);
     return found;
   }
   Value bytes(Value::Kind kind, std::size_t n) {
@@ -171,19 +207,25 @@ class Reader {
     return found;
   }
   Value items(Value::Kind kind, std::size_t n, int depth) {
-    if (depth >= kMaxDepth) throw std::runtime_error("the message is nested too deeply");
+    if (depth >= kMaxDepth || n > left_)
+      throw std::runtime_error("the message has too many parts, or is nested too deeply");
+    left_ -= n;
     Value found;
     found.kind = kind;
     for (std::size_t i = 0; i < n; ++i) {
-      const std::string_view key = kind == Value::Kind::kMap ? read(depth + 1).text : "";
-      Value value = read(depth + 1);
-      if (kind == Value::Kind::kMap) found.map.emplace_back(key, std::move(value));
-      else found.list.push_back(std::move(value));
+      if (kind == Value::Kind::kList) {
+        found.list.push_back(read(depth + 1));
+        continue;
+      }
+      const Value key = read(depth + 1);
+      if (key.kind != Value::Kind::kText) throw std::runtime_error("a key must be a text");
+      found.map.emplace_back(key.text, read(depth + 1));
     }
     return found;
   }
 
   std::string_view data_;
+  std::size_t left_ = kMaxItems;
 };
 
 inline void put_big(std::string& out, int tag, std::uint64_t value, int n) {
@@ -204,8 +246,10 @@ inline void put(std::string& out, const std::vector<double>& values) {
   out.append(reinterpret_cast<const char*>(values.data()), values.size() * sizeof(double));
 }
 inline std::string error(std::string_view message) {
-  std::string out = "\x82";
-  put(out, "type"), put(out, "error"), put(out, "message"), put(out, message);
+  std::string out = "\x82", text(message.substr(0, 500));
+  for (char& one : text)  // a text in the message must be UTF-8
+    if (static_cast<unsigned char>(one) >= 0x80) one = '?';
+  put(out, "type"), put(out, "error"), put(out, "message"), put(out, text);
   return out;
 }
 
@@ -222,6 +266,7 @@ inline std::string answer(Driver& driver, const Value& message, std::size_t& n) 
     for (const std::string& one : wants) put(out, one);
   } else if (type == "reset") {
     n = message["n"].size();
+    if (n > kMaxRows) throw std::runtime_error("too many scenarios at once");
     driver.reset(n, message["scene"]);
     out += '\x81';
     put(out, "type"), put(out, "ready");
@@ -240,6 +285,7 @@ inline std::string answer(Driver& driver, const Value& message, std::size_t& n) 
 inline bool read_all(int file, char* to, std::size_t n) {
   while (n > 0) {
     const ssize_t got = ::read(file, to, n);
+    if (got < 0 && errno == EINTR) continue;
     if (got <= 0) return false;
     to += got, n -= static_cast<std::size_t>(got);
   }
@@ -248,6 +294,7 @@ inline bool read_all(int file, char* to, std::size_t n) {
 inline bool write_all(int file, const char* from, std::size_t n) {
   while (n > 0) {
     const ssize_t put = ::write(file, from, n);
+    if (put < 0 && errno == EINTR) continue;
     if (put <= 0) return false;
     from += put, n -= static_cast<std::size_t>(put);
   }
@@ -256,6 +303,7 @@ inline bool write_all(int file, const char* from, std::size_t n) {
 
 /// Answers messages until the other end closes the stream.
 inline void converse(Driver& driver, int in, int out) {
+  std::signal(SIGPIPE, SIG_IGN);  // a closed stream ends the loop, not the process
   std::string data;
   std::size_t n = 0;
   for (std::uint32_t length; read_all(in, reinterpret_cast<char*>(&length), 4);) {
@@ -264,9 +312,11 @@ inline void converse(Driver& driver, int in, int out) {
     if (!read_all(in, data.data(), length)) return;
     std::string frame(4, '\0');
     try {
-      frame += answer(driver, Reader(data).read(), n);
+      frame += answer(driver, Reader(data).message(), n);
     } catch (const std::exception& raised) {
       frame += error(raised.what());
+    } catch (...) {
+      frame += error("the driver threw something that is no std::exception");
     }
     const auto size = static_cast<std::uint32_t>(frame.size() - 4);
     std::memcpy(frame.data(), &size, 4);
@@ -278,32 +328,60 @@ inline void converse(Driver& driver, int in, int out) {
 
 /// Serves a driver over standard input and output; what it prints goes to the standard error.
 inline int serve(Driver& driver) {
-  const int in = ::dup(0), out = ::dup(1);
+  const int in = ::dup(0), out = ::dup(1), nothing = ::open("/dev/null", O_RDONLY);
+  if (in < 0 || out < 0 || nothing < 0) throw std::runtime_error("the streams cannot be copied");
+  ::dup2(nothing, 0);
   ::dup2(2, 1);
   detail::converse(driver, in, out);
   return 0;
 }
 
+namespace detail {
+
+/// Serves one connection in a process of its own; returns its exit status.
+inline int attend(const std::function<std::unique_ptr<Driver>()>& make, int connection) {
+  std::signal(SIGCHLD, SIG_DFL);
+  const int on = 1;
+  ::setsockopt(connection, IPPROTO_TCP, TCP_NODELAY, &on, sizeof(on));
+  int status = 0;
+  try {
+    converse(*make(), connection, connection);
+  } catch (const std::exception& raised) {
+    std::fprintf(stderr, "the driver cannot be made: %s\n", raised.what());
+    status = 1;
+  }
+  std::fflush(nullptr);
+  return status;
+}
+
+}  // namespace detail
+
 /// Serves drivers on a port of this machine, each connection in a process of its own.
 inline int serve(const std::function<std::unique_ptr<Driver>()>& make, std::uint16_t port) {
   const int listener = ::socket(AF_INET, SOCK_STREAM, 0), on = 1;
+  if (listener < 0) throw std::runtime_error("there is no socket to be had");
   sockaddr_in address{};
   address.sin_family = AF_INET;
   address.sin_port = htons(port);
   address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
   ::setsockopt(listener, SOL_SOCKET, SO_REUSEADDR, &on, sizeof(on));
-  if (::bind(listener, reinterpret_cast<sockaddr*>(&address), sizeof(address)) != 0 ||
-      ::listen(listener, 16) != 0)
+  if (::bind(listener, reinterpret_cast<const sockaddr*>(&address), sizeof(address)) != 0 ||
+      ::listen(listener, 16) != 0) {
+    ::close(listener);
     throw std::runtime_error("the port cannot be listened on");
+  }
   std::signal(SIGCHLD, SIG_IGN);
   while (true) {
     const int connection = ::accept(listener, nullptr, nullptr);
-    if (connection < 0) continue;
+    if (connection < 0) {
+      if (errno == EINTR || errno == ECONNABORTED) continue;
+      ::close(listener);
+      throw std::runtime_error("connections cannot be accepted any more");
+    }
+    std::fflush(nullptr);  // or the other process would print it again
     if (::fork() == 0) {
       ::close(listener);
-      ::setsockopt(connection, IPPROTO_TCP, TCP_NODELAY, &on, sizeof(on));
-      detail::converse(*make(), connection, connection);
-      ::_exit(0);
+      ::_exit(detail::attend(make, connection));
     }
     ::close(connection);
   }

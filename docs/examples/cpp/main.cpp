@@ -46,15 +46,19 @@ class MyDriver : public bridgegen::Driver {
 };
 
 int main(int argc, char** argv) {
-  if (argc == 2) {
-    try {
-      return bridgegen::serve([] { return std::make_unique<MyDriver>(); },
-                              static_cast<std::uint16_t>(std::atoi(argv[1])));
-    } catch (const std::exception& error) {
-      std::fprintf(stderr, "%s: %s\n", argv[1], error.what());
-      return 1;
+  try {
+    if (argc == 1) {
+      MyDriver driver;
+      return bridgegen::serve(driver);
     }
+    char* end = nullptr;
+    const long port = std::strtol(argv[1], &end, 10);
+    if (argc > 2 || *end != '\0' || port < 1 || port > 65535)
+      throw std::invalid_argument("the argument must be a port, 1 to 65535");
+    return bridgegen::serve([] { return std::make_unique<MyDriver>(); },
+                            static_cast<std::uint16_t>(port));
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "%s: %s\n", argv[0], error.what());
+    return 1;
   }
-  MyDriver driver;
-  return bridgegen::serve(driver);
 }

@@ -22,6 +22,7 @@ from bridgegen.preventability.chunks import ChunkStore
 from bridgegen.preventability.classes import Codes, Outcome, outcomes
 from bridgegen.preventability.grid import Grid, GridAxis, grid_of
 from bridgegen.preventability.result import PreventabilityMap, simulated
+from bridgegen.simulation import vehicles
 from bridgegen.workers import CarriedDriver, Lost, Workers, open_workers
 
 MODELS = ("un-r157", "fsm")
@@ -86,6 +87,8 @@ def map_preventability(
     for name in (*drivers, *judges):
         if name not in arithmetic.NAMES:
             egos.get(name)
+    if vehicle is not None:
+        vehicles.require(vehicle)
     logical = driven_by(load(scenario), others)
     if any(name in arithmetic.NAMES for name in (*drivers, *judges)):
         arithmetic.require(logical.name)

@@ -19,6 +19,7 @@ from bridgegen.odd.clauses import read_clause
 from bridgegen.odd.criteria import read_criterion
 from bridgegen.options import CommonOptions, called_with
 from bridgegen.records import parse_json
+from bridgegen.simulation import vehicles
 from bridgegen.simulation.choice import EMBEDDED, SimulatorChoice
 from bridgegen.store.sqlite import Lock
 from bridgegen.suite.entries import RESULTS as FILE
@@ -211,6 +212,14 @@ def _check(given: SuiteArguments) -> None:
     problems = []
     for name in given.egos:
         egos.get(name, (), given.options.time_limit)
+    vehicle = given.options.vehicle
+    if vehicle is not None:
+        vehicles.require(vehicle)
+        if vehicle != vehicles.KINEMATIC and given.simulator.name != EMBEDDED.name:
+            problems.append(
+                f"the vehicle '{vehicle}' is of the embedded simulator; {given.simulator.name} "
+                f"moves the ego in its own way (--vehicle {vehicles.KINEMATIC})"
+            )
     if given.samples < 0:
         problems.append(f"samples must be at least 0, got {given.samples}")
     if given.workers is not None and given.workers < 1:

@@ -1,5 +1,7 @@
 """Lanes along a route: where a place is on them, whatever the road's shape and place."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from tests.ego.planners.roads import LANE_WIDTH, road_map
@@ -62,3 +64,32 @@ def test_the_road_goes_straight_on_beyond_its_ends():
 def test_a_route_off_the_lanes_is_refused():
     with pytest.raises(InputError, match="needs a route on them, got none"):
         Corridor(road_map((2,), keep=[]))
+
+
+def test_lanes_beside_in_a_junction_are_roads_of_their_own():
+    road = road_map((2, 2, 2), length=60.0, route=1)
+    alone = {"left_lane": "", "right_lane": "", "junction": "9"}
+    alone |= {"left_is_same_way": False, "right_is_same_way": False}
+    apart = [replace(one, **alone) if ":1:" in one.id else one for one in road.lanes]
+    sections = Corridor(replace(road, lanes=tuple(apart))).sections
+    assert [[lane.next for lane in one.lanes] for one in sections] == [[0, 1], [0, 1], [-1, -1]]
+    assert sections[1].lanes[0].offset == pytest.approx(np.full(31, 3.5))
+    # One that turns away is none of the road's lanes.
+    away = apart[2].centre.copy()
+    away[:, 1] += np.linspace(0.0, 5.0, len(away))
+    apart[2] = replace(apart[2], centre=away)
+    sections = Corridor(replace(road, lanes=tuple(apart))).sections
+    assert [len(one.lanes) for one in sections] == [2, 1, 2]
+
+
+def test_a_place_on_a_lane_is_numpys_to_the_bit():
+    rng = np.random.default_rng(3)
+    lane = Corridor(road_map((2,), length=90.0, curvature=0.004)).sections[0].lanes[1]
+    station = lane.station
+    for s in (*rng.uniform(-20.0, 120.0, 500), *station[:5], station[-1]):
+        k = min(max(int(np.searchsorted(station, s, side="right")) - 1, 0), len(station) - 1)
+        j = min(k + 1, len(station) - 1)
+        span = station[j] - station[k]
+        u = np.clip((s - station[k]) / span, 0.0, 1.0) if span > 0.0 else 0.0
+        there = [one[k] + u * (one[j] - one[k]) for one in (lane.offset, lane.width)]
+        assert lane.at(float(s))[:2] == tuple(there)

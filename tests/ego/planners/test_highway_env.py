@@ -225,3 +225,14 @@ def test_a_row_does_not_depend_on_its_batch():
             3.0,
         )[1]
         np.testing.assert_array_equal(together[:, i], alone[:, 0])
+
+
+@pytest.mark.planners
+@pytest.mark.skipif(not installed(), reason="needs highway-env")
+def test_the_planner_is_imported_before_the_first_call():
+    code = (
+        "import sys; from bridgegen.ego.planners import highway_env as adapter; "
+        "adapter.HighwayEnvDriver(); print('highway_env.vehicle.behavior' in sys.modules)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.split() == ["True"]

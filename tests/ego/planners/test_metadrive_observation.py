@@ -115,10 +115,24 @@ def test_the_checkpoint_is_where_the_bend_begins():
     seen = its.observed(o, CENTRE, np.zeros(1), o.h, STILL)[0]
     # 20 m ahead of the rear axle, in the middle between the two lanes, to the left.
     assert seen[9] == pytest.approx(((20.0 - CENTRE) / 50.0 + 1.0) / 2, abs=1e-6)
-    assert seen[10] == pytest.approx((-WIDTH / 2 / 50.0 + 1.0) / 2, abs=1e-6)
+    assert seen[10] == pytest.approx((WIDTH / 2 / 50.0 + 1.0) / 2, abs=1e-6)
     assert (seen[11:14] == [0.0, 0.5, 0.5]).all()
     assert seen[16] > 0.2
     assert seen[17] == 0.0
+
+
+def test_checkpoints_are_on_the_side_where_metadrive_shows_them():
+    # Recorded from metadrive-simulator 0.4.3: two lanes of 3.5 m, the ego on the left one at
+    # y = 3.5 m; the straight ends at x = 94.49 m, the bend to the right at (142.45, -85.87).
+    o = straight(58.52632, 3.44365, -0.013592, 11.4)
+    route = np.zeros((1, 40, 4))
+    route[0, :, 0], route[0, :, 1] = 94.4906 + 2.0 * (np.arange(40) - 18), 3.5
+    route[0, 18:, 3] = -0.02
+    route[0, 39, :2] = 142.4461, -85.8724 + WIDTH / 2
+    seen = its.observed(replace(o, route=route), CENTRE, np.zeros(1), o.h, STILL)[0]
+    assert seen[[9, 10, 14, 15]] == pytest.approx(
+        [0.859836, 0.487953, 0.847292, 0.140297], abs=1e-3
+    )
 
 
 def test_others_are_vehicles_the_nearest_first():

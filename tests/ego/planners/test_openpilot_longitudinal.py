@@ -12,7 +12,9 @@ from tests.ego.planners.observed import (
     CENTRE,
     WIDTH,
     drive,
+    lane,
     observation,
+    road_map,
     scene,
     together,
     track,
@@ -31,7 +33,8 @@ FRONT = CENTRE + BODY_LENGTH / 2
 
 
 def told(*tracks, **said):
-    found = openpilot.inputs(observation(tracks, **said), scene(m=len(tracks)))
+    of = scene(m=len(tracks))
+    found = openpilot.inputs(observation(tracks, **said), of, openpilot.roads_of(of))
     return found["points"][0], found["leads"][0].tolist()
 
 
@@ -91,7 +94,7 @@ def on_a_circle(radius, ahead):
 
 
 def test_in_a_bend_distance_and_speed_are_those_along_the_road():
-    found = openpilot.inputs(on_a_circle(60.0, 50.0), scene())
+    found = openpilot.inputs(on_a_circle(60.0, 50.0), scene(), [None])
     assert found["leads"][0].tolist() == [0, 0]
     _, distance, left, speed = found["points"][0, 0]
     assert distance == pytest.approx(50.0 - 2.3 - FRONT, abs=0.01)
@@ -99,9 +102,27 @@ def test_in_a_bend_distance_and_speed_are_those_along_the_road():
     assert left == pytest.approx(60.0 * (1.0 - np.cos(50.0 / 60.0)))
 
 
+def test_in_a_bend_it_sees_farther_than_the_observations_route():
+    # The circle's arc, 60 degrees of it, as a lane of the map; the route ends after 78 m.
+    radius, angle = 150.0, np.linspace(0.0, np.pi / 3, 80)
+    centre, left, right = (
+        np.stack([r * np.sin(angle), radius - r * np.cos(angle), angle], axis=1)
+        for r in (radius, radius - 1.75, radius + 1.75)
+    )
+    sides = {"left": left[:, :2], "right": right[:, :2], "speed_limit": np.full(80, np.inf)}
+    bend = replace(lane("2:0:-1", 0.0), centre=centre, **sides)
+    road = replace(road_map(), lanes=(bend,), route=("2:0:-1",))
+    of = scene(road=road)
+    for ahead in (70.0, 120.0, 150.0):
+        found = openpilot.inputs(on_a_circle(radius, ahead), of, openpilot.roads_of(of))
+        assert found["leads"][0].tolist() == [0, 0]
+        assert found["points"][0, 0, 1] == pytest.approx(ahead - 2.3 - FRONT, abs=0.05)
+        assert found["points"][0, 0, 3] == pytest.approx(12.0, rel=1e-3)
+
+
 def test_it_steers_along_a_circle_by_its_curvature():
     # A chord of a circle, pursued from the circle, is the circle; the route has corners.
-    found = openpilot.inputs(on_a_circle(60.0, 50.0), scene())
+    found = openpilot.inputs(on_a_circle(60.0, 50.0), scene(), [None])
     assert found["curvature"][0] == pytest.approx(1.0 / 60.0, rel=0.01)
 
 
@@ -115,7 +136,7 @@ def test_where_north_is_does_not_matter():
         array[..., x + 1] = s * vector[..., 0] + c * vector[..., 1]
     turned.route[..., 2] += 2.0
     turned.tracks[..., 3] += 2.0
-    before, after = (openpilot.inputs(one, scene()) for one in (seen, turned))
+    before, after = (openpilot.inputs(one, scene(), [None]) for one in (seen, turned))
     for name, values in before.items():
         np.testing.assert_allclose(after[name], values, atol=1e-9, err_msg=name)
 

@@ -13,6 +13,7 @@ from tests.ego.planners.roads import CENTRE, DT, LENGTH, World, drive, road_map,
 from bridgegen.ego.planners import sumo
 from bridgegen.ego.planners._corridor import Corridor
 from bridgegen.ego.planners._sumo_road import Eyes, StraightRoad, network_text
+from bridgegen.ego.planners._sumo_simulation import MIN_GAP, types_text
 from bridgegen.errors import InputError
 
 FRONT = 0.5 * LENGTH  # from the body's centre
@@ -75,11 +76,11 @@ def test_the_vehicle_ahead_counts_on_each_lane_that_the_body_is_on():
     eyes = Eyes(StraightRoad(Corridor(lanes)), scene(lanes, n_others=2))
     others = [[[150, 0, 0, 5], [130, -3.5, 0, 9]]]
     between = eyes.see(World([[100, -1.75, 0, 20]], others, [30.0]).observe(), 0)
-    gaps = [[50 - LENGTH, 5], [30 - LENGTH, 9]]
-    np.testing.assert_allclose(between.ahead[:, :2], gaps, rtol=0, atol=1e-9)
+    gaps = [[50 - LENGTH, 5, 0], [30 - LENGTH, 9, 1]]
+    np.testing.assert_allclose(between.ahead[:, :3], gaps, rtol=0, atol=1e-9)
     within = eyes.see(World([[100, 0, 0, 20]], others, [30.0]).observe(), 0)
-    assert within.ahead[0, :2] == pytest.approx(gaps[0])
-    assert (within.ahead[1, 0], within.ahead[0, 2]) == (np.inf, np.inf)
+    assert within.ahead[0, :3] == pytest.approx(gaps[0])
+    assert (within.ahead[1, 0], within.ahead[0, 3]) == (np.inf, np.inf)
 
 
 def test_a_body_that_reaches_into_the_lane_is_ahead_on_it():
@@ -89,7 +90,7 @@ def test_a_body_that_reaches_into_the_lane_is_ahead_on_it():
         world = World([[100, 0, 0, 20]], [[[150, y, 0, 5]]], [30.0])
         seen = Eyes(StraightRoad(Corridor(lanes)), scene(lanes)).see(world.observe(), 0)
         assert seen.others[0, 0] == 0
-        assert seen.ahead[0, [0, 2]] == pytest.approx([gap, gap])
+        assert seen.ahead[0, [0, 3]] == pytest.approx([gap, gap])
 
 
 def test_an_oncoming_vehicle_stands_and_a_crossing_one_has_its_speed_along_the_road():
@@ -171,7 +172,7 @@ def test_krauss_is_the_published_formula():
         world = World([[100, 0, 0, v]], [[[100 + gap + LENGTH, 0, 0, leader]]], [30.0])
         driver = sumo.KraussDriver()
         driver.reset(1, scene(road_map((1,))))
-        expected = (krauss(v, gap - sumo.MIN_GAP, leader) - v) / DT
+        expected = (krauss(v, gap - MIN_GAP, leader) - v) / DT
         assert expected > -4.5  # harder braking is SUMO's own rule
         found = driver.act(world.observe())
         assert float(found.acceleration[0]) == pytest.approx(expected, abs=1e-9)
@@ -227,7 +228,7 @@ def test_a_vehicle_that_is_placed_drives_as_one_that_sumo_moves(model, tmp_path)
     of = scene(lanes)
     (tmp_path / "free.py").write_text(FREE)
     (tmp_path / "road.net.xml").write_text(network_text([StraightRoad(Corridor(lanes))]))
-    (tmp_path / "types.add.xml").write_text(sumo.types_text(of.length, of.width))
+    (tmp_path / "types.add.xml").write_text(types_text(of.length, of.width))
     text = subprocess.run(
         [sys.executable, "free.py", "road.net.xml", "types.add.xml", model, "15.0"],
         cwd=tmp_path,
@@ -284,6 +285,20 @@ def test_it_brakes_for_a_body_beside_the_road_that_reaches_into_its_lane():
 
 @pytest.mark.planners
 @needs_planner
+@pytest.mark.parametrize("model", ["ACC", "CACC"])
+def test_it_follows_a_body_that_reaches_into_its_lane_as_one_on_it(model):
+    demanded = []
+    for y in (0.0, -2.3):
+        driver = DRIVERS[model]()
+        driver.reset(1, scene(road_map((1,))))
+        world = World([[100, 0, 0, 20]], [[[124 + LENGTH, y, 0, 18]]], [30.0])
+        demanded.append(float(driver.act(world.observe()).acceleration[0]))
+    assert demanded[0] < -0.5
+    assert demanded[1] == pytest.approx(demanded[0], abs=1e-9)
+
+
+@pytest.mark.planners
+@needs_planner
 def test_it_stops_at_a_red_light():
     world = World([[100, 0, 0, 14]], [[[0, 300, 0, 0]]], [14.0])
     world.light[:], world.stop[:] = 1, 60.0
@@ -312,3 +327,14 @@ def test_a_row_does_not_depend_on_its_batch():
 def test_a_time_step_that_sumo_has_not_is_refused():
     with pytest.raises(InputError, match=r"whole number of milliseconds, got 0\.0333"):
         sumo.ACCDriver().reset(1, replace(scene(road_map((1,))), time_step=1 / 30))
+
+
+@pytest.mark.planners
+@needs_planner
+def test_the_planner_is_imported_before_the_first_call():
+    code = (
+        "import sys; from bridgegen.ego.planners import sumo as adapter; "
+        "adapter.KraussDriver(); print('libsumo' in sys.modules)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.split() == ["True"]

@@ -162,3 +162,10 @@ def test_the_driver_s_end_needs_numpy_alone_and_an_older_python(module):
     roots = {name.partition(".")[0] for name in names}
     assert roots - sys.stdlib_module_names <= {"numpy", "bridgegen", "messages"}
     assert {name for name in names if name.startswith("bridgegen")} <= {"bridgegen.ego.remote"}
+
+
+@pytest.mark.parametrize("shape", [[0, 2**26, 2**26, 2**26], [2**26, 2**26, 0], [0, 2**24]])
+def test_a_huge_shape_without_elements_is_refused(shape):
+    empty = {"dtype": "float64", "shape": shape, "data": b""}
+    with pytest.raises(ProtocolError, match="too large"):
+        unpack(msgpack.packb({"type": "control", "acceleration": empty}))

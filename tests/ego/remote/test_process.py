@@ -1,5 +1,6 @@
 """BridgeGen's end: what it makes of servers and programs, good and bad."""
 
+import errno
 import os
 import shlex
 import signal
@@ -14,9 +15,12 @@ import pytest
 from tests.ego.remote.asked import CONTROL, HELLO, READY, N, Server, observation, scene, with_all
 
 from bridgegen.ego import get
+from bridgegen.ego.address import address_of
 from bridgegen.ego.driver_process import DriverError, DriverProcess
 from bridgegen.ego.remote import process as remote_process
+from bridgegen.ego.remote import serve
 from bridgegen.ego.remote.messages import pack
+from bridgegen.ego.remote.wire import ClosedError, connected
 from bridgegen.errors import InputError
 
 HERE = Path(__file__).parent
@@ -322,3 +326,26 @@ def test_a_trajectory_comes_as_one(server, driver, monkeypatch):
     assert [getattr(found[0], name).tolist() for name in TRAJECTORY] == [
         part.tolist() for part in TRAJECTORY.values()
     ]
+
+
+def test_a_file_in_the_place_of_a_unix_socket_is_kept(tmp_path):
+    path = tmp_path / "notes.txt"
+    path.write_text("mine")
+    with pytest.raises(OSError, match=r"notes\.txt: is there already, and is no socket"):
+        serve(object, f"unix:{path}")
+    assert path.read_text() == "mine"
+
+
+def test_a_network_that_is_down_closes_the_connection(monkeypatch):
+    server = Server(HELLO, READY)
+    wire = connected(address_of(server.spec))
+
+    def read(*_):
+        raise OSError(errno.EHOSTUNREACH, "No route to host")
+
+    monkeypatch.setattr(os, "read", read)
+    with pytest.raises(ClosedError, match="No route to host"):
+        wire.ask(HELLO, 5.0)
+    monkeypatch.undo()
+    wire.close()
+    server.close()

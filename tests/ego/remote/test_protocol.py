@@ -3,6 +3,7 @@
 import importlib.util
 import json
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import jsonschema
@@ -10,11 +11,14 @@ import msgpack
 import numpy as np
 import pytest
 from tests.ego.drivers import Cruises, Raises
-from tests.ego.remote.asked import N, observation, scene, with_all
+from tests.ego.remote.asked import N, observation, road_map, scene, with_all
 from tests.ego.remote.remote_drivers import Plans
 
+from bridgegen.ego import views
+from bridgegen.ego.driver_process import DriverError
 from bridgegen.ego.remote import messages, server
 from bridgegen.ego.remote.messages import pack, unpack
+from bridgegen.ego.remote.process import RemoteDriver
 
 DOCS = Path(__file__).parents[3] / "docs"
 FILE = Path(messages.__file__).with_name("protocol.json")
@@ -70,7 +74,7 @@ def compare(value, schema, sizes, arrays):
 
 def reply(driver, message):
     """What the driver's end answers to a message."""
-    return msgpack.unpackb(pack(server._answer(driver, unpack(message)))[4:])
+    return msgpack.unpackb(pack(server._answer(driver, unpack(message), []))[4:])
 
 
 @pytest.mark.parametrize("make", [Cruises, Plans])
@@ -107,3 +111,54 @@ def test_errors_obey_the_schema(tmp_path):
     for one in found[1:]:
         validate(one, "answer_error")
     assert [one.get("kind") for one in found] == [None, "raised", *["answered nonsense"] * 2]
+
+
+class Noted:
+    """A wire to a server's end in this process; it notes the length of each request."""
+
+    has_more = False
+
+    def __init__(self, driver):
+        self.driver, self.maps, self.sent = driver, [], []
+
+    def ask(self, frame, seconds):
+        message = msgpack.unpackb(frame[4:])
+        validate(message, f"request_{message['type']}")
+        self.sent.append(len(frame))
+        return pack(server._answer(self.driver, unpack(frame[4:]), self.maps))[4:]
+
+    def close(self):
+        pass
+
+
+class Keeps:
+    """Notes the maps of its scenes."""
+
+    def __init__(self):
+        self.seen = []
+
+    def reset(self, n, scene):
+        self.seen.append([one.route[0] for one in scene.maps])
+
+
+def test_a_map_is_sent_once_to_a_driver_that_keeps_them(monkeypatch):
+    one, two, three = (replace(road_map(), route=(name,)) for name in "123")
+    wanted = [(one, two), (two,), (), (three, one), (two, two)]
+    sent = {}
+    for keeps in (True, False):
+        driver = Keeps()
+        wire = Noted(driver)
+        remote = RemoteDriver(wire, {"keeps_maps": keeps}, DriverError)
+        for maps in wanted:
+            remote.reset(N, scene(maps=maps, map_of=np.zeros(N, np.int64)))
+        assert driver.seen == [[x.route[0] for x in maps] for maps in wanted]
+        sent[keeps] = wire.sent
+    bare = min(sent[False])
+    assert sent[True][1] < bare + 100 < sent[False][1]
+    assert sent[True][4] < bare + 100
+    monkeypatch.setattr(views, "MOST_PIECES", 1)  # then it begins anew
+    remote = RemoteDriver(Noted(Keeps()), {"keeps_maps": True}, DriverError)
+    for maps in wanted:
+        remote.reset(N, scene(maps=maps, map_of=np.zeros(N, np.int64)))
+    assert remote._wire.driver.seen == [[x.route[0] for x in maps] for maps in wanted]
+    assert len(remote._wire.maps) == 1

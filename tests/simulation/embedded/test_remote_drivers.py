@@ -115,7 +115,7 @@ def in_cpp(tmp_path_factory):
     if compiler is None:
         pytest.skip("there is no g++")
     program = tmp_path_factory.mktemp("cpp") / "my_driver"
-    warnings = ["-Wall", "-Wextra", "-Wpedantic", "-Werror"]
+    warnings = ["-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Wshadow", "-Werror"]
     source = EXAMPLES / "cpp" / "main.cpp"
     subprocess.run([compiler, "-std=c++17", "-O1", *warnings, "-o", program, source], check=True)
     return program

@@ -4,9 +4,11 @@ A corridor is a chain of sections; each has the lanes of the ego's direction, fr
 A place in it is a station s along the centre of the route's lanes and an offset d to the left.
 """
 
+import math
 from bisect import bisect_right
 from dataclasses import dataclass
 from functools import cached_property
+from operator import itemgetter
 
 import numpy as np
 
@@ -23,6 +25,9 @@ DRIVABLE = frozenset(
 BEFORE, BEYOND = 150.0, 300.0
 """Metres of road that a corridor has before the route's begin and beyond its end, where the way
 is the only one."""
+
+PARALLEL, PARALLEL_ANGLE = 1.0, np.radians(5.0)
+"""m and rad, by which the ends of lanes of a junction that run beside each other may differ."""
 
 
 @dataclass(frozen=True)
@@ -52,13 +57,14 @@ class CorridorLane:
     def at(self, s: float) -> tuple[float, float, float]:
         """Return offset [m], width [m] and speed limit [m/s] at a station."""
         stations, offset, width, limit = self._columns
-        k = min(max(bisect_right(stations, s) - 1, 0), len(stations) - 1)
-        j = min(k + 1, len(stations) - 1)
-        span = stations[j] - stations[k]
-        u = min(max((s - stations[k]) / span, 0.0), 1.0) if span > 0.0 else 0.0
+        k = bisect_right(stations, s) - 1
+        if k < 0 or k == len(stations) - 1:
+            k = max(k, 0)
+            return offset[k], width[k], limit[k]
+        u = (s - stations[k]) / (stations[k + 1] - stations[k])
         return (
-            offset[k] + u * (offset[j] - offset[k]),
-            width[k] + u * (width[j] - width[k]),
+            offset[k] + u * (offset[k + 1] - offset[k]),
+            width[k] + u * (width[k + 1] - width[k]),
             limit[k],
         )
 
@@ -115,7 +121,7 @@ class Corridor:
             np.cumsum(distinct) - 1, np.arange(len(self._station)), self._station
         )
         ends = np.cumsum([len(one) for one in pieces])
-        rows = [_beside(lane, lanes) for lane in chain]
+        rows = _rows(chain, lanes)
         sections = []
         for k, row in enumerate(rows):
             first, last = ends[k] - len(pieces[k]), ends[k] - 1
@@ -156,6 +162,14 @@ class Corridor:
         x, y = self._points[k] + along * direction
         return float(x - d * direction[1]), float(y + d * direction[0])
 
+    def poses(self, s: Float) -> Float:
+        """Return x, y [m] and heading [rad] of the route at each station ``(Q,)``, ``(Q, 3)``."""
+        last = len(self._length) - 1
+        k = np.clip(np.searchsorted(self._station, s, side="right") - 1, 0, last)
+        direction = self._direction[k]
+        place = self._points[k] + (s - self._station[k])[:, None] * direction
+        return np.column_stack([place, np.arctan2(direction[:, 1], direction[:, 0])])
+
     def section_at(self, s: Float) -> Int:
         """Return the index of the section at each station ``(Q,)``."""
         return np.clip(
@@ -164,10 +178,13 @@ class Corridor:
 
     def lane_at(self, section: int, s: float, d: float) -> tuple[int, bool]:
         """Return the nearest lane of a section, and whether the place is on it."""
-        there = [lane.at(s) for lane in self.sections[section].lanes]
-        aside = [abs(d - offset) for offset, _, _ in there]
-        nearest = int(np.argmin(aside))
-        return nearest, aside[nearest] <= 0.5 * there[nearest][1]
+        nearest, least, width = 0, math.inf, 0.0
+        for i, lane in enumerate(self.sections[section].lanes):
+            offset, wide, _ = lane.at(s)
+            aside = abs(d - offset)
+            if aside < least:
+                nearest, least, width = i, aside, wide
+        return nearest, least <= 0.5 * width
 
     def _lane(self, lane: Lane, following: list[str], begin: float, end: float) -> CorridorLane:
         station, offset, _ = self.places(lane.centre[:, 0], lane.centre[:, 1])
@@ -203,6 +220,41 @@ def _extended(route: list[Lane], lanes: dict[str, Lane]) -> list[Lane]:
             chain.insert(len(chain) if ahead else 0, lane)
             length += float(np.hypot(*np.diff(lane.centre[:, :2], axis=0).T).sum())
     return chain
+
+
+def _rows(chain: list[Lane], lanes: dict[str, Lane]) -> list[list[Lane]]:
+    """Return the lanes of each section, from left to right.
+
+    In a junction each lane may be a road of its own: those that go on from the lanes before it,
+    parallel to the route, belong to it.
+    """
+    rows = [_beside(lane, lanes) for lane in chain]
+    for k in range(1, len(chain)):
+        if not chain[k].junction:
+            continue
+        known = {one.id for one in rows[k]}
+        ways = [lanes[name] for one in rows[k - 1] for name in one.next if name in lanes]
+        others = [one for one in ways if one.id not in known and one.kind in DRIVABLE]
+        sides = [(_side(chain[k], one), one) for one in others]
+        sides.sort(key=itemgetter(0), reverse=True)
+        rows[k] = [
+            *(one for left, one in sides if left > 0.0),
+            *rows[k],
+            *(one for left, one in sides if left < 0.0),
+        ]
+    return rows
+
+
+def _side(lane: Lane, other: Lane) -> float:
+    """Return how far to the left of a lane another one is that runs parallel to it [m]; else 0."""
+    lefts = []
+    for end in (0, -1):
+        (x, y, h), (u, w, g) = lane.centre[end, :3], other.centre[end, :3]
+        ahead = (u - x) * np.cos(h) + (w - y) * np.sin(h)
+        if abs(ahead) > PARALLEL or np.cos(g - h) < np.cos(PARALLEL_ANGLE):
+            return 0.0
+        lefts.append(float((w - y) * np.cos(h) - (u - x) * np.sin(h)))
+    return lefts[0] if abs(lefts[1] - lefts[0]) <= PARALLEL else 0.0
 
 
 def _beside(lane: Lane, lanes: dict[str, Lane]) -> list[Lane]:

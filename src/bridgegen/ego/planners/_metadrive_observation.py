@@ -13,7 +13,7 @@ turns round), ``navigation_module/node_network_navigation.py`` (checkpoints).
 | 5, 6 | the last action: steering, throttle |
 | 7 | angle turned in the last 0.1 s / 0.1 |
 | 8 | offset to the right of the lane's centre / 4.5 m, 0.5 in the centre |
-| 9 … 13 | the end of this section of the road: ahead, to the right (50 m); its bend |
+| 9 … 13 | the end of this section of the road: ahead, to the left (50 m); its bend |
 | 14 … 18 | the same of the next section |
 | 19 … 34 | four vehicles, the nearest first: ahead, left (50 m), speed ahead, left (80 km/h) |
 | 35 … 274 | the beams, counter-clockwise from straight ahead: distance / 50 m |
@@ -172,7 +172,7 @@ def _sections(o: Observation, lanes: Lanes, x: Float, y: Float, turned: Float) -
         dy = py + middle * np.cos(ph) - y
         scale = REACH / np.maximum(np.hypot(dx, dy), REACH)
         out[:, at] = (scale * (dx * c + dy * s) / REACH + 1.0) / 2
-        out[:, at + 1] = (scale * (dx * s - dy * c) / REACH + 1.0) / 2  # to the right
+        out[:, at + 1] = (scale * (dy * c - dx * s) / REACH + 1.0) / 2  # to the left
         n_points = end - begin
         bend = curvature[rows, end - 1] - curvature[rows, begin - 1]  # 1/m, their sum
         is_bent = (np.abs(o.route[rows, begin, 3]) >= STRAIGHT) & (n_points > 0)

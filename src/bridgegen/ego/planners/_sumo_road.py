@@ -5,6 +5,8 @@ one that goes on straight beyond its end, where vehicles that are not on the roa
 numbers lanes from the right, corridors from the left.
 """
 
+import math
+from bisect import bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -45,7 +47,9 @@ class StraightRoad:
         spans = [one.end - one.start for one in corridor.sections]
         self.lengths: Float = np.array([*(max(one, SHORTEST) for one in spans), TAIL])
         self.lanes: Int = np.array([len(one.lanes) for one in sections])
-        self._starts = np.array([*(one.start for one in corridor.sections), corridor.length])
+        # Lists: a number of an array takes longer.
+        self._starts = [*(one.start for one in corridor.sections), corridor.length]
+        self._ends: list[float] = self.lengths.tolist()
         self.next: Int = np.full((len(sections), int(self.lanes.max())), -1, dtype=np.int64)
         for k, section in enumerate(sections[:-1]):
             for i, lane in enumerate(section.lanes):
@@ -54,8 +58,8 @@ class StraightRoad:
 
     def edge_at(self, s: float) -> tuple[int, float]:
         """Return the edge at a station, and the position on it [m]."""
-        k = max(int(np.searchsorted(self._starts, s, side="right")) - 1, 0)
-        return k, float(np.clip(s - self._starts[k], 0.0, self.lengths[k]))
+        k = max(bisect_right(self._starts, s) - 1, 0)
+        return k, min(max(s - self._starts[k], 0.0), self._ends[k])
 
     def section(self, edge: int) -> Section:
         """Return the section of an edge; the tail has the lanes of the last one."""
@@ -142,9 +146,10 @@ class Seen:
             the lane that it is nearest to, from the left.
         others: ``(M, 7)`` float64: 1 if it is on the road, edge of its front, position [m], lane
             from the left, speed [m/s], acceleration [m/s²], length [m].
-        ahead: ``(L, 4)`` float64, of each lane that the ego's body is on: from the ego's front to
+        ahead: ``(L, 6)`` float64, of each lane that the ego's body is on: from the ego's front to
             the rear of the next body that is on it [m], +inf if there is none; that one's speed
-            [m/s]; the same of the next body whose centre is on another lane, or off the road.
+            [m/s] and number; the same of the next body whose centre is on another lane, or off the
+            road.
         stop: from the ego's front to the place that it is to stop at [m]; +inf: none.
         place: ``(2,)`` float64, station and offset of the ego's rear axle [m].
     """
@@ -184,44 +189,62 @@ class Eyes:
 
     def see(self, o: Observation, i: int) -> Seen:
         """Return what of row i is on the road."""
-        scene, road = self._scene, self._road
-        tracks = o.tracks[i]
-        xs = np.concatenate([[o.x[i]], tracks[:, 1]])
-        ys = np.concatenate([[o.y[i]], tracks[:, 2]])
-        s, d, h = road.corridor.places(xs, ys)
-        front = s[0] + scene.centre + 0.5 * scene.length
+        scene, road, tracks = self._scene, self._road, o.tracks[i]
+        s, d, h = road.corridor.places(
+            np.append(o.x[i], tracks[:, 1]), np.append(o.y[i], tracks[:, 2])
+        )
+        station, aside = float(s[0]), float(d[0])
+        front = station + scene.centre + 0.5 * scene.length
         edge, position = road.edge_at(front)
-        on, _ = road.lane_at(edge, front, d[0])
+        on, _ = road.lane_at(edge, front, aside)
         lanes = road.section(edge).lanes
-        limit = lanes[on].at(front)[2]
-        most = max(min(float(o.target_speed[i]), limit), 0.01)
-        ego = np.array([edge, position, max(o.v[i], 0.0), o.a[i], most, on])
+        most = max(min(float(o.target_speed[i]), lanes[on].at(front)[2]), 0.01)
         along = tracks[:, 4] * np.cos(h[1:]) + tracks[:, 5] * np.sin(h[1:])
-        speeds = np.where(tracks[:, 0] >= 2.0, np.maximum(along, 0.0), 0.0)
+        there = tracks[:, 0] >= 2.0
+        speeds = np.where(there, np.maximum(along, 0.0), 0.0)
         changes = np.zeros_like(speeds)
-        known = (tracks[:, 0] >= 2.0) & self._seen
         if self._speeds is not None:
+            known = there & self._seen
             changes = np.where(known, (speeds - self._speeds) / scene.time_step, 0.0)
-        self._speeds, self._seen = speeds, tracks[:, 0] >= 2.0
-        others = np.zeros((len(tracks), 7))
-        ahead = np.tile([np.inf, 0.0], (road.next.shape[1], 2))
-        covered = [_reach(lane.at(front), d[0], scene.width) > 0.0 for lane in lanes]
-        for j in np.flatnonzero(self._seen).tolist():
-            place, aside = s[1 + j], d[1 + j]
-            length, width = max(float(tracks[j, 6]), 0.1), float(tracks[j, 7])
+        self._speeds, self._seen = speeds, there
+        # From here on numbers of Python: a number of an array takes several times as long.
+        others = [[0.0] * 7 for _ in tracks]
+        ahead = [[math.inf, 0.0, -1.0] * 2 for _ in range(road.next.shape[1])]
+        covered = [
+            (ahead[n], lane)
+            for n, lane in enumerate(lanes)
+            if _reach(lane.at(front), aside, scene.width) > 0.0
+        ]
+        bodies = np.column_stack([s[1:], d[1:], speeds, changes, tracks[:, 6:8]]).tolist()
+        for j in np.flatnonzero(there).tolist():
+            place, offset, speed, change, length, width = bodies[j]
+            length = max(length, 0.1)
             nose, gap = place + 0.5 * length, place - 0.5 * length - front
             k, at = road.edge_at(nose)
-            lane, is_on = road.lane_at(k, nose, aside)
+            lane, is_on = road.lane_at(k, nose, offset)
             if is_on and nose >= 0.0:
-                others[j] = 1.0, k, at, lane, speeds[j], changes[j], length
-            for n, one in enumerate(lanes):
-                there = one.at(place)
-                if covered[n] and place > s[0] and _reach(there, aside, width) > REACH:
-                    if gap < ahead[n, 0]:
-                        ahead[n, :2] = gap, speeds[j]
-                    if gap < ahead[n, 2] and abs(aside - there[0]) > 0.5 * there[1]:
-                        ahead[n, 2:] = gap, speeds[j]
-        return Seen(ego, others, ahead, self._stop(o, i), np.array([s[0], d[0]]))
+                others[j] = [1.0, k, at, lane, speed, change, length]
+            if place <= station:
+                continue
+            for found, one in covered:
+                if gap >= found[3] and gap >= found[0]:
+                    continue
+                here = one.at(place)
+                if _reach(here, offset, width) <= REACH:
+                    continue
+                if gap < found[0]:
+                    found[:3] = gap, speed, j
+                if gap < found[3] and abs(offset - here[0]) > 0.5 * here[1]:
+                    found[3:] = gap, speed, j
+        ego = np.array([edge, position, max(o.v[i], 0.0), o.a[i], most, on])
+        place_of_axle = np.array([station, aside])
+        return Seen(
+            ego,
+            np.array(others, dtype=np.float64).reshape(-1, 7),
+            np.array(ahead),
+            self._stop(o, i),
+            place_of_axle,
+        )
 
     def _stop(self, o: Observation, i: int) -> float:
         """Return the distance to the place that the ego is to stop at [m]; +inf: none."""

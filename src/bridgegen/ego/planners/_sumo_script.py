@@ -80,9 +80,9 @@ for t, (edge, position, speed, acceleration, most, nearest) in enumerate(data["e
         wish = int(lanes[edge]) - 1 - vehicle.getLaneIndex("ego")
     least = max(speed - 9.0 * step, 0.0)
     for lane, ahead in enumerate(data["ahead"][t].tolist()):
-        gap, of = ahead[2:] if lane == goal else ahead[:2]
+        gap, of, j = ahead[3:] if lane == goal else ahead[:3]
         if gap < np.inf:
-            follow = vehicle.getFollowSpeed("ego", speed, gap - 2.5, of, 4.5)
+            follow = vehicle.getFollowSpeed("ego", speed, gap - 2.5, of, 4.5, f"o{int(j)}")
             wanted = min(wanted, max(follow, least))
     stop = float(data["stop"][t])
     if stop < np.inf:

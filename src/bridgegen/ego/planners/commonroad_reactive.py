@@ -21,6 +21,7 @@ row for each plan, as `Reactive` takes them; NaN where there is no other.
 """
 
 from collections.abc import Sequence
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -81,6 +82,7 @@ class CommonroadReactive:
 
     def __init__(self) -> None:
         require(PLANNER)
+        import_module("commonroad_rp.reactive_planner")  # seconds that no call's limit has
         self.planned: dict[int, tuple[Float, Float]] = {}
 
     def reset(self, n: int, scene: Scene) -> None:

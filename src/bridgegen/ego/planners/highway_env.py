@@ -29,6 +29,7 @@ Kesting, Treiber, Helbing, Transp. Res. Rec. 1999 (2007) 86.
 """
 
 from collections.abc import Sequence
+from importlib import import_module
 from typing import Any
 
 import numpy as np
@@ -77,6 +78,7 @@ class HighwayEnvDriver:
 
     def __init__(self) -> None:
         require(PLANNER)
+        import_module("highway_env.vehicle.behavior")  # seconds that no call's limit has
 
     def reset(self, n: int, scene: Scene) -> None:
         """See `BatchDriver`."""

@@ -3,12 +3,13 @@
 The planner (``LongitudinalPlanner`` with its model predictive controller), the radar's tracks and
 the choice of the lead (``radard``) are openpilot's own, imported from the user's checkout. Ours is
 what its camera would give, and it is perfect: the lead is the nearest participant ahead whose body
-is over the strip that the ego's body sweeps along its route; the second lead, that of two seconds
-from now (``LEAD_T_OFFSETS``), the nearest one of the ego's direction that will be there at its
-present velocity. Every confirmed or coasting track is a point of the radar. The set speed is the
-scenario's target speed, at most openpilot's 145 km/h. The personality is "standard", experimental
-mode is off, the car's parameters are opendbc's defaults. Demands to stop are braking at 0.5 m/s² at
-least, as in openpilot's own plant (``selfdrive/test/longitudinal_maneuvers/plant.py``).
+is over the strip that the ego's body sweeps along its route, 300 m of it, then straight on; the
+second lead, that of two seconds from now (``LEAD_T_OFFSETS``), the nearest one of the ego's
+direction that will be there at its present velocity. Every confirmed or coasting track is a point
+of the radar. The set speed is the scenario's target speed, at most openpilot's 145 km/h. The
+personality is "standard", experimental mode is off, the car's parameters are opendbc's defaults.
+Demands to stop are braking at 0.5 m/s² at least, as in openpilot's own plant
+(``selfdrive/test/longitudinal_maneuvers/plant.py``).
 
 The steering is the route follower's: pure pursuit of the route. openpilot's camera steers by a
 neural network, which needs pictures.
@@ -35,6 +36,7 @@ import numpy.typing as npt
 
 from bridgegen.arrays import Float
 from bridgegen.ego.interface import ROUTE_POINTS, ROUTE_STEP, Control, Observation, Scene
+from bridgegen.ego.planners._corridor import Corridor
 from bridgegen.ego.planners._openpilot_checkout import HOW_TO_GET, STEP, VARIABLE, Openpilot, load
 from bridgegen.ego.planners.planner import Planner
 from bridgegen.errors import InputError
@@ -55,6 +57,12 @@ PLANNER = Planner(
 
 AHEAD = 2.0
 """Seconds from now to the second lead; openpilot's ``LEAD_T_OFFSETS[1]``."""
+
+BEYOND = 110
+"""How many points the way has beyond those of the observation's route: along the map's lanes."""
+
+ON_THE_ROAD = 0.5
+"""The route's last point is on the map's way if it is nearer than so many metres."""
 
 SAME_WAY = math.pi / 4
 """A second lead's heading differs from the road's by less [rad]."""
@@ -81,6 +89,8 @@ class OpenpilotLongitudinal:
         InputError: openpilot or its solver cannot be had, see `_openpilot_checkout.load`.
     """
 
+    wants = ("map",)
+
     def __init__(self) -> None:
         self._openpilot = load()
 
@@ -95,12 +105,12 @@ class OpenpilotLongitudinal:
                 f"the time step [s] must be {STEP:g} for openpilot, which plans at 20 Hz, got "
                 f"{scene.time_step:g}"
             )
-        self._scene = scene
+        self._scene, self._roads = scene, roads_of(scene)
         self._rows: list[_Row | None] = [None] * n
 
     def act(self, observation: Observation) -> Control:
         """See `BatchDriver`."""
-        told = inputs(observation, self._scene)
+        told = inputs(observation, self._scene, self._roads)
         acceleration = np.zeros(len(observation.x))
         for i in np.flatnonzero(observation.running):
             one = {name: values[i] for name, values in told.items()}
@@ -114,11 +124,29 @@ class OpenpilotLongitudinal:
 # --- What it is told ------------------------------------------------------------------------------
 
 
-def inputs(observation: Observation, scene: Scene) -> Inputs:
-    """Return what openpilot is told of N scenarios: what `export` writes, with N in place of T."""
+def roads_of(scene: Scene) -> list[Corridor | None]:
+    """Return the road along the ego's route on each map; None where that is on no lane."""
+    found: list[Corridor | None] = []
+    for one in scene.maps:
+        try:
+            found.append(Corridor(one))
+        except InputError:
+            found.append(None)
+    return found
+
+
+def inputs(observation: Observation, scene: Scene, roads: Sequence[Corridor | None]) -> Inputs:
+    """Return what openpilot is told of N scenarios: what `export` writes, with N in place of T.
+
+    Args:
+        observation: of them.
+        scene: of them.
+        roads: what `roads_of` returns of the scene.
+    """
     o, tracks = observation, observation.tracks
-    s, left, at = _along(o.route, tracks[:, :, 1], tracks[:, :, 2])
-    road = np.take_along_axis(o.route[:, :, 2], at, axis=1)
+    way = _way(o.route, scene, roads)
+    s, left, at = _along(way, tracks[:, :, 1], tracks[:, :, 2])
+    road = np.take_along_axis(way[:, :, 2], at, axis=1)
     cos, sin = np.cos(tracks[:, :, 3] - road), np.sin(tracks[:, :, 3] - road)
     length, width = tracks[:, :, 6], tracks[:, :, 7]
     half = 0.5 * (np.abs(cos) * length + np.abs(sin) * width)
@@ -143,11 +171,29 @@ def inputs(observation: Observation, scene: Scene) -> Inputs:
     }
 
 
+def _way(route: Float, scene: Scene, roads: Sequence[Corridor | None]) -> Float:
+    """Return the routes as far as a camera sees, x, y, heading ``(N, P + BEYOND, 3)``.
+
+    Beyond their last points they follow the map; straight on, where they have left its way.
+    """
+    on = ROUTE_STEP * np.arange(1, BEYOND + 1)
+    x, y, h = (route[:, -1, k, None] for k in range(3))
+    beyond = np.stack([x + on * np.cos(h), y + on * np.sin(h), h + 0.0 * on], axis=2)
+    for i in range(len(route)):
+        road = roads[scene.map_of[i]]
+        if road is None:
+            continue
+        (s,), (d,), (along,) = road.places(route[i, -1:, 0], route[i, -1:, 1])
+        if abs(d) <= ON_THE_ROAD and math.cos(along - route[i, -1, 2]) > math.cos(SAME_WAY):
+            beyond[i] = road.poses(s + on)
+    return np.concatenate([route[:, :, :3], beyond], axis=1)
+
+
 def _along(route: Float, x: Float, y: Float) -> tuple[Float, Float, npt.NDArray[np.intp]]:
     """Return where points are along the routes: station, offset [m], nearest point's index.
 
     Args:
-        route: ``(N, P, 4)``, see `Observation`; straight on beyond both ends.
+        route: ``(N, P, 3)``, x, y, heading every `ROUTE_STEP`; straight on beyond both ends.
         x: ``(N, M)`` [m].
         y: ``(N, M)`` [m].
     """
@@ -272,7 +318,8 @@ def export(observations: Sequence[Observation], scene: Scene) -> Inputs:
     Returns:
         Arrays by name, see the module.
     """
-    told = [inputs(one, scene) for one in observations]
+    roads = roads_of(scene)
+    told = [inputs(one, scene, roads) for one in observations]
     return {name: np.concatenate([one[name] for one in told]) for name in told[0]}
 
 

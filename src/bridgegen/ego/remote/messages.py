@@ -320,11 +320,13 @@ def _head(part: Message) -> _Head:
         raise ProtocolError("the shape of an array must be a list of sizes")
     if type(data) is not bytes:
         raise ProtocolError("the data of an array must be bytes")
-    size = _KINDS[dtype][0].itemsize
+    size = extent = _KINDS[dtype][0].itemsize
     for n in shape:
-        size *= n
+        size, extent = size * n, extent * max(n, 1)
     if len(data) != size:
         raise ProtocolError(
             f"an array of {dtype} of shape {tuple(shape)} must have {size} bytes, got {len(data)}"
         )
+    if extent > MAX_FRAME:  # NumPy refuses huge shapes, of no elements, too
+        raise ProtocolError(f"an array of shape {tuple(shape)} is too large")
     return _Head(b"", dtype, tuple(shape), size)

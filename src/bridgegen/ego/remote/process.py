@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 from importlib.metadata import version
 from typing import Any
@@ -19,6 +20,7 @@ from bridgegen.ego.remote.messages import (
 )
 from bridgegen.ego.remote.wire import ClosedError, Wire, connected
 from bridgegen.ego.traits import NAMES, Traits
+from bridgegen.ego.views import MapSender
 from bridgegen.errors import InputError
 from bridgegen.isolated import Answer, CallError
 
@@ -48,6 +50,7 @@ class RemoteDriver:
         self.wants, self.period, self.max_rows = (said.get(name) for name in NAMES)
         self.seconds = 0.0
         self._wire, self._error = wire, error
+        self._maps = MapSender() if said.get("keeps_maps") is True else None
 
     def reset(self, n: int, scene: Scene) -> None:
         """See `BatchDriver`.
@@ -55,7 +58,12 @@ class RemoteDriver:
         Raises:
             CallError: it was not answered.
         """
-        self._ask({"type": "reset", "n": n, "scene": scene}, partial(_expect, "ready"))
+        message: Message = {"type": "reset", "n": n, "scene": scene}
+        if self._maps is not None and scene.maps:
+            sent = self._maps.send(scene.maps)
+            message["scene"] = replace(scene, maps=())
+            message["maps"] = {"kept": sent.kept, "new": sent.new, "numbers": sent.numbers}
+        self._ask(message, partial(_expect, "ready"))
 
     def act(self, observation: Observation) -> Control | Trajectory:
         """See `BatchDriver`.

@@ -13,6 +13,7 @@ import importlib
 import importlib.util
 import os
 import socket
+import stat
 import sys
 import threading
 import traceback
@@ -75,6 +76,8 @@ def _listening(address: str) -> socket.socket:
                 probe.connect(path)
                 raise OSError(f"{path}: another server listens there")
             if os.path.exists(path):
+                if not stat.S_ISSOCK(os.stat(path).st_mode):
+                    raise OSError(f"{path}: is there already, and is no socket")
                 os.unlink(path)
         listener = socket.socket(socket.AF_UNIX)
         listener.bind(path)
@@ -90,15 +93,17 @@ def _listening(address: str) -> socket.socket:
 
 def _attend(make: Callable[[], Any], connection: socket.socket) -> None:
     """Converse over a connection."""
-    with connection, suppress(OSError):
+    with suppress(OSError), connection:
         if connection.family != socket.AF_UNIX:
             connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-        _converse(make, connection.makefile("rb"), connection.makefile("wb"))
+        with connection.makefile("rb") as reads, connection.makefile("wb") as writes:
+            _converse(make, reads, writes)
 
 
 def _converse(make: Callable[[], Any], reads: BinaryIO, writes: BinaryIO) -> None:
     """Answer messages until there are no more, or until what comes is no message."""
     driver, is_sound = None, True
+    maps: list[Any] = []
     while is_sound and len(head := reads.read(4)) == 4:
         try:
             is_sound = False
@@ -106,7 +111,7 @@ def _converse(make: Callable[[], Any], reads: BinaryIO, writes: BinaryIO) -> Non
             is_sound = True
             if message["type"] == "hello":
                 driver = make()
-            answer = messages.pack(_answer(driver, message))
+            answer = messages.pack(_answer(driver, message, maps))
         except messages.ProtocolError as error:
             answer = messages.pack(
                 {"type": "error", "kind": messages.NONSENSE, "message": str(error)}
@@ -119,7 +124,8 @@ def _converse(make: Callable[[], Any], reads: BinaryIO, writes: BinaryIO) -> Non
         writes.flush()
 
 
-def _answer(driver: Any, message: messages.Message) -> messages.Message:
+def _answer(driver: Any, message: messages.Message, maps: list[Any]) -> messages.Message:
+    """Return the answer to a message; road maps are kept for later ones."""
     kind = message["type"]
     if kind == "hello":
         return {
@@ -129,9 +135,14 @@ def _answer(driver: Any, message: messages.Message) -> messages.Message:
             "wants": list(getattr(driver, "wants", ())),
             "period": getattr(driver, "period", None),
             "max_rows": getattr(driver, "max_rows", None),
+            "keeps_maps": True,
         }
     if kind == "reset":
-        driver.reset(message["n"], _record("Scene", message["scene"]))
+        scene = message["scene"]
+        if (sent := message.get("maps")) is not None:
+            maps[sent["kept"] :] = _part("maps", sent["new"])
+            scene["maps"] = tuple(maps[i] for i in sent["numbers"])
+        driver.reset(message["n"], _record("Scene", scene))
         return {"type": "ready"}
     if kind == "act":
         return _control(driver.act(_record("Observation", message["observation"])))

@@ -85,7 +85,9 @@ class Wire:
                 except BlockingIOError:
                     _wait(self._writable, deadline)
             return self._frame(deadline)
-        except (BrokenPipeError, ConnectionError) as error:
+        except TimeoutError:
+            raise
+        except OSError as error:  # the network is down, for example
             raise ClosedError(str(error)) from None
 
     @property

@@ -103,6 +103,13 @@ def test_full_brakes_stop_within_v_squared_over_2_mu_g(name, mu):
     assert place[0] == pytest.approx(25.0**2 / (2.0 * mu * GRAVITY), rel=0.005)
 
 
+@pytest.mark.parametrize("speed", [-0.5, -2.0, -12.0])
+def test_brakes_stop_a_car_that_rolls_backwards(speed):
+    *_, (place, vx, vy, turn, _) = drive(CARS["car"], speed, 0.0, -5.0, 4.0)
+    assert (vx, vy, turn) == (0.0, 0.0, 0.0)
+    assert place[0] == pytest.approx(-(speed**2) / (2.0 * 5.0), rel=0.005)
+
+
 def test_brakes_hold_it_on_a_slope_and_it_starts_uphill():
     for uphill in (0.8, -0.8):
         *_, (place, vx, _, _, _) = drive(CARS["car"], 0.0, 0.0, -1.0, 3.0, uphill=uphill)

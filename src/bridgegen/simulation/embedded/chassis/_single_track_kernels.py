@@ -149,19 +149,22 @@ def advance(
         chassis: the vehicle, see ``_chassis_columns``.
     """
     speed = math.sqrt(vx * vx + vy * vy)
-    share = min(max((speed - ROLLING) / (SLIPPING - ROLLING), 0.0), 1.0)
-    weight = share * share * (3.0 - 2.0 * share)
+    fast = min(max((speed - ROLLING) / (SLIPPING - ROLLING), 0.0), 1.0)
+    weight = fast * fast * (3.0 - 2.0 * fast)
     c0, s0 = wheels
     c1, s1 = turned(c0, s0, steered[0])
     c2, s2 = turned(c1, s1, steered[1])
     if vx == 0.0 and vy == 0.0 and forces <= -abs(uphill):  # the brakes hold it
         return place, 0.0, 0.0, 0.0, heads, (c2, s2)
-    loads = axle_loads(forces, press, mu, chassis)
-    ahead = _share(forces, loads[0], loads[0] + loads[1], chassis) * forces
-    behind = forces - ahead
-    if forces < 0.0 and weight == 1.0:  # brakes act against the motion, of a spinning car, too
-        rolls = min(max(vx / TURNS, -1.0), 1.0)
-        ahead, behind = ahead * rolls, behind * rolls
+    acts = forces
+    if forces < 0.0 and (
+        weight == 1.0 or vx < 0.0
+    ):  # brakes act against the motion, backwards, too
+        acts *= min(max(vx / TURNS, -1.0), 1.0) if weight == 1.0 else -1.0
+    loads = axle_loads(acts, press, mu, chassis)
+    share = _share(forces, loads[0], loads[0] + loads[1], chassis)
+    ahead = share * acts
+    behind = acts - ahead
     of_front = of_rear = 0.0
     if weight > 0.0:
         of_front, of_rear = _slip_angles(vx, vy, turn, c0, s0, chassis)
@@ -195,8 +198,9 @@ def advance(
     ends = vx + sixth * (a1 + 2.0 * (a2 + a3) + a4)
     x, y, h = place
     ch, sh = heads
-    if ends < 0.0 and weight < 1.0 and vx >= 0.0:  # it has come to a stand
-        stops = 0.5 * vx * dt * vx / (vx - ends) if vx > 0.0 else 0.0
+    turns_round = ends < 0.0 if vx >= 0.0 else ends > 0.0 and forces < 0.0
+    if turns_round and weight < 1.0:  # it has come to a stand
+        stops = 0.5 * vx * dt * vx / (vx - ends) if vx != 0.0 else 0.0
         return (x + stops * ch, y + stops * sh, h), 0.0, 0.0, 0.0, heads, (c2, s2)
     across = vy + sixth * (b1 + 2.0 * (b2 + b3) + b4)
     spins = turn + sixth * (r1 + 2.0 * (r2 + r3) + r4)

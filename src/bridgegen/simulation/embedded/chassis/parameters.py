@@ -101,7 +101,12 @@ class VehicleClass:
 CLASSES = {
     # Heights: 0.36 to 0.40 of a car's, Heydinger et al., SAE 1999-01-1336. Inertia: 0.94 and 1.00
     # of CommonRoad's two cars. Stiffness: for an understeer gradient of 1.6 °/g.
-    "car": VehicleClass(front_load=0.58, height=0.38, inertia=0.97, k_front=12.0, k_rear=18.0),
+    # Steering: 550 °/s of a wheel at 16 : 1. CommonRoad's 0.4 rad/s and Apollo's 400 °/s of a car
+    # are limits for planners; that car's drive-by-wire kit takes 1,000 °/s (Dataspeed), and sine
+    # with dwell of UN R140 is 1,190 °/s (0.7 Hz, 270°).
+    "car": VehicleClass(
+        front_load=0.58, height=0.38, inertia=0.97, k_front=12.0, k_rear=18.0, steering_rate=0.6
+    ),
     # Stiffness of truck tyres: about 0.1 per degree of slip and load, Fancher et al., A Factbook of
     # the Mechanical Properties of the Components for Single-Unit and Articulated Heavy Trucks,
     # UMTRI-86-12, 1986. Air brakes: 75 % of the pressure within 0.6 s, UN R13, annex 6. Inertia:
