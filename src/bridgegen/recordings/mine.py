@@ -1,0 +1,149 @@
+"""``bridgegen mine``: read recordings, clean them, and account for what was recorded."""
+
+from collections import Counter
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from bridgegen.arrays import Float
+from bridgegen.errors import FileFormatError, InputError, StorageError
+from bridgegen.recordings.clean import TIME_STEP, Cleaned, clean
+from bridgegen.recordings.formats import files_of, read
+from bridgegen.recordings.quality import Finding
+from bridgegen.recordings.table import Facts, RecordedTraffic, kind_in_words
+
+PATHS_SHOWN = 300
+POINTS_SHOWN = 40
+"""Of a path in the picture."""
+
+
+@dataclass(frozen=True)
+class Summary:
+    """What one recording holds.
+
+    Attributes:
+        facts: as it was read; its time step is the recording's own.
+        participants: number by kind, most frequent first.
+        states: number of states read.
+        duration: from the first instant to the last [s].
+        hours: driven or walked, of all participants, after cleaning.
+        kilometres: the same.
+        read_hours: before cleaning.
+        read_kilometres: before cleaning, jumps included.
+        tracks: after cuts.
+        findings: of cleaning, all rules.
+        paths: for the picture: kind and points ``(n, 2)`` [m] of at most `PATHS_SHOWN` tracks.
+    """
+
+    facts: Facts
+    participants: dict[str, int]
+    states: int
+    duration: float
+    hours: float
+    kilometres: float
+    read_hours: float
+    read_kilometres: float
+    tracks: int
+    findings: tuple[Finding, ...]
+    paths: tuple[tuple[int, Float], ...]
+
+
+@dataclass(frozen=True)
+class Mined:
+    """What was recorded, and what was left out.
+
+    Attributes:
+        recordings: in the order of the files.
+        skipped: with ``lenient``: files left out, or what of them could not be read, and why.
+        others: files of folders that are no recordings.
+        time_step: after cleaning [s].
+        out: the folder.
+    """
+
+    recordings: tuple[Summary, ...]
+    skipped: tuple[tuple[Path, tuple[str, ...]], ...]
+    others: tuple[Path, ...]
+    time_step: float
+    out: Path
+
+
+def mine(
+    paths: Sequence[Path],
+    *,
+    out: Path,
+    lenient: bool = False,
+    time_step: float = TIME_STEP,
+    progress: Callable[[int, int], None] = lambda done, total: None,
+) -> Mined:
+    """Read and clean recordings, and write what was recorded.
+
+    Args:
+        paths: files, or folders of files.
+        out: a folder, new or of an earlier call; gets recordings.html, recordings.csv, quality.csv.
+        lenient: leave out what cannot be read, and list it.
+        time_step: to resample at [s].
+        progress: is told how many of how many files are done.
+
+    Raises:
+        FileFormatError: a file that is no recording, or breaks its format's rules.
+        InputError: no recordings, or a time step out of range.
+        StorageError: the folder holds other files of these names, or cannot be written.
+    """
+    from bridgegen.recordings.page import refuse_foreign, write_all
+
+    refuse_foreign(out)
+    files, others = _files(paths)
+    found: list[Summary] = []
+    skipped: list[tuple[Path, tuple[str, ...]]] = []
+    for number, file in enumerate(files):
+        progress(number, len(files))
+        try:
+            for traffic in read(file):
+                found.append(summarise(traffic, clean(traffic, time_step)))
+        except FileFormatError as error:
+            if not lenient:
+                raise
+            skipped.append((file, error.problems))
+    progress(len(files), len(files))
+    if not found:
+        problems = [text for _, texts in skipped for text in texts]
+        raise FileFormatError(*problems, "no recording could be read")
+    mined = Mined(tuple(found), tuple(skipped), tuple(others), time_step, out)
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise StorageError(f"{out}: cannot be made: {error.strerror}") from None
+    write_all(mined)
+    return mined
+
+
+def _files(paths: Sequence[Path]) -> tuple[list[Path], list[Path]]:
+    files, others = [], []
+    for path in paths:
+        recordings, beside = files_of(path)
+        files += recordings
+        others += beside
+    twice = [path for path, count in Counter(path.resolve() for path in files).items() if count > 1]
+    if twice:
+        raise InputError(f"{twice[0]}: is named twice; its traffic would count twice")
+    return files, others
+
+
+def summarise(traffic: RecordedTraffic, cleaned: Cleaned) -> Summary:
+    """Return what a recording holds."""
+    after = cleaned.traffic
+    kinds = Counter(kind_in_words(kind) for kind in cleaned.kinds.tolist())
+    shown = np.linspace(0, len(after.names) - 1, min(PATHS_SHOWN, len(after.names))).astype(int)
+    paths = []
+    for p in np.unique(shown).tolist():
+        first, last = int(after.first[p]), int(after.first[p + 1]) - 1
+        at = np.unique(np.linspace(first, last, POINTS_SHOWN).astype(int))
+        paths.append((int(after.kind[p]), np.column_stack([after.x[at], after.y[at]])))
+    return Summary(
+        facts=traffic.facts, participants=dict(kinds.most_common()), states=len(traffic.time),
+        duration=float(np.ptp(traffic.time)), hours=after.hours, kilometres=after.kilometres,
+        read_hours=traffic.hours, read_kilometres=traffic.kilometres, tracks=len(after.names),
+        findings=cleaned.quality.findings, paths=tuple(paths),
+    )  # fmt: skip

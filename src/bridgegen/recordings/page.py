@@ -1,0 +1,221 @@
+"""What was recorded, as a page without scripts and as tables."""
+
+import csv
+import io
+import re
+from collections.abc import Iterable, Iterator
+from html import escape
+from importlib.metadata import version
+from importlib.resources import files
+from pathlib import Path
+
+import numpy as np
+
+from bridgegen.disk import refuse_other, write_whole
+from bridgegen.ego.kinds import BICYCLE, MOTORCYCLE, NAMES, PEDESTRIAN
+from bridgegen.errors import StorageError
+from bridgegen.recordings.mine import PATHS_SHOWN, Mined, Summary
+
+GENERATOR = "BridgeGen recordings"
+PAGE, TABLE, QUALITY = "recordings.html", "recordings.csv", "quality.csv"
+TABLE_HEAD = (
+    "recording", "format", "file", "frame", "map", "time_step_s", "duration_s", "participants",
+    *(f"n_{name}" for name in NAMES), "tracks", "states", "hours", "km", "hours_read", "km_read",
+    "lights",
+)  # fmt: skip
+QUALITY_HEAD = ("recording", "file", "rule", "participants", "count", "examples")
+HEIGHT, WIDTH = 260, 900
+TWO_WHEELED = (BICYCLE, MOTORCYCLE)
+
+
+def refuse_foreign(out: Path) -> None:
+    """Refuse a folder in which other files have the names of ours.
+
+    Raises:
+        StorageError: it has, or is none.
+    """
+    if out.exists() and not out.is_dir():
+        raise StorageError(f"{out}: exists already, and is no folder")
+    refuse_other(out / PAGE, GENERATOR, "page of recordings")
+    for name, head in ((TABLE, TABLE_HEAD), (QUALITY, QUALITY_HEAD)):
+        try:
+            with (out / name).open("rb") as file:
+                ours = file.readline(4096).decode("utf-8", "replace").strip() == ",".join(head)
+        except FileNotFoundError:
+            continue
+        except OSError as error:
+            raise StorageError(f"{out / name}: cannot be read: {error.strerror}") from None
+        if not ours:
+            raise StorageError(
+                f"{out / name}: exists already, is not a table of recordings, and is not "
+                "overwritten"
+            )
+
+
+def write_all(mined: Mined) -> None:
+    """Write the page and both tables.
+
+    Raises:
+        StorageError: they cannot be written.
+    """
+    rows = [_row(one) for one in mined.recordings]
+    write_whole(mined.out / TABLE, _csv(TABLE_HEAD, rows))
+    write_whole(mined.out / QUALITY, _csv(QUALITY_HEAD, _quality_rows(mined)))
+    fill = {
+        "title": "What was recorded",
+        "css": _own("page.css"),
+        "facts": "".join(f"<li>{escape(one)}</li>" for one in _facts(mined)),
+        "table": _table(mined),
+        "recordings": "\n".join(_section(one, mined.time_step) for one in mined.recordings),
+        "left_out": _left_out(mined),
+        "version": escape(version("bridgegen")),
+    }
+    parts = re.split(r"\{\{(\w+)\}\}", _own("page.html"))
+    text = "".join(fill[part] if i % 2 else part for i, part in enumerate(parts))
+    write_whole(mined.out / PAGE, [text.encode("utf-8", "replace")])
+
+
+def _row(one: Summary) -> list[object]:
+    facts = one.facts
+    return [
+        facts.name, facts.format, facts.source, facts.frame, facts.map, f"{facts.time_step:.6g}",
+        f"{one.duration:.6g}", sum(one.participants.values()),
+        *(one.participants.get(name, 0) for name in NAMES), one.tracks, one.states,
+        f"{one.hours:.6g}", f"{one.kilometres:.6g}", f"{one.read_hours:.6g}",
+        f"{one.read_kilometres:.6g}", len(facts.lights),
+    ]  # fmt: skip
+
+
+def _quality_rows(mined: Mined) -> Iterator[list[object]]:
+    for one in mined.recordings:
+        for each in one.findings:
+            yield [
+                one.facts.name, one.facts.source, each.rule.value, each.participants, each.count,
+                "; ".join(each.examples),
+            ]  # fmt: skip
+
+
+def _csv(head: Iterable[str], rows: Iterable[Iterable[object]]) -> Iterator[bytes]:
+    text = io.StringIO()
+    writer = csv.writer(text)
+    writer.writerow(head)
+    for row in rows:
+        writer.writerow([_cell(value) for value in row])
+    yield text.getvalue().encode("utf-8", "replace")
+
+
+def _cell(value: object) -> object:
+    """Return a value that a spreadsheet does not take for a formula."""
+    if isinstance(value, str) and value[:1] in ("=", "+", "-", "@") and not _is_number(value):
+        return "'" + value
+    return value
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
+
+
+def _facts(mined: Mined) -> Iterator[str]:
+    n = len(mined.recordings)
+    yield "1 recording" if n == 1 else f"{n:,} recordings"
+    yield f"{sum(sum(one.participants.values()) for one in mined.recordings):,} participants"
+    yield f"{sum(one.hours for one in mined.recordings):.4g} h"
+    yield f"{sum(one.kilometres for one in mined.recordings):.4g} km"
+    yield f"cleaned at {mined.time_step:g} s"
+    if mined.skipped:
+        count = len(mined.skipped)
+        yield "1 file skipped" if count == 1 else f"{count} files skipped"
+
+
+def _table(mined: Mined) -> str:
+    kinds = [name for name in NAMES if any(name in one.participants for one in mined.recordings)]
+    head = ["recording", "format", "time step", "duration", *kinds, "h", "km"]
+    rows = [
+        [
+            one.facts.name, one.facts.format, f"{one.facts.time_step:.4g} s",
+            f"{one.duration:.4g} s", *(f"{one.participants.get(kind, 0):,}" for kind in kinds),
+            f"{one.hours:.4g}", f"{one.kilometres:.4g}",
+        ]
+        for one in mined.recordings
+    ]  # fmt: skip
+    return _html_table(head, rows)
+
+
+def _html_table(head: list[str], rows: list[list[str]]) -> str:
+    top = "".join(f"<th>{escape(name)}</th>" for name in head)
+    body = "".join(
+        f"<tr><th>{escape(row[0])}</th>{''.join(f'<td>{escape(one)}</td>' for one in row[1:])}</tr>"
+        for row in rows
+    )
+    return f"<table><thead><tr>{top}</tr></thead><tbody>{body}</tbody></table>"
+
+
+def _section(one: Summary, time_step: float) -> str:
+    facts = one.facts
+    about = [
+        f"file: {facts.source}",
+        f"frame: {facts.frame}",
+        f"map: {facts.map} (not used yet)" if facts.map else "map: none named",
+        f"{one.states:,} states read, every {facts.time_step:.4g} s; {one.tracks:,} tracks after "
+        f"cleaning, every {time_step:g} s",
+        f"{one.read_hours:.4g} h and {one.read_kilometres:.4g} km before cleaning, "
+        f"{one.hours:.4g} h and {one.kilometres:.4g} km after",
+        f"traffic lights: {len(facts.lights) or 'none recorded'}",
+        *facts.notes,
+    ]
+    findings = [
+        [each.rule.value, f"{each.participants:,}", f"{each.count:,}", "; ".join(each.examples)]
+        for each in one.findings
+    ]
+    head = ["quality", "participants", "count", "first places"]
+    lines = "".join(f"<li>{escape(text)}</li>" for text in about)
+    return (
+        f"<section><h2>{escape(facts.name)}</h2><div class='card'><ul>{lines}</ul></div>"
+        f"<div class='card'>{_picture(one)}<p class='muted'>{_caption(one)}</p></div>"
+        f"<div class='card'><div class='wide'>{_html_table(head, findings)}</div></div></section>"
+    )
+
+
+def _caption(one: Summary) -> str:
+    shown = "all" if len(one.paths) == one.tracks else f"{len(one.paths):,} of {one.tracks:,}"
+    return f"Paths of {shown} tracks, x to the right, y up. <span class='walks'>On foot</span>, \
+<span class='cycles'>two-wheeled</span>, all others dark."
+
+
+def _picture(one: Summary) -> str:
+    points = np.concatenate([path for _, path in one.paths])
+    low, high = points.min(axis=0), points.max(axis=0)
+    span = np.maximum(high - low, 1.0)
+    scale = min((WIDTH - 20) / span[0], (HEIGHT - 40) / span[1])
+    height = span[1] * scale + 40
+    length = 10.0 ** np.floor(np.log10(0.4 * (WIDTH - 20) / scale))
+    lines = []
+    for kind, path in one.paths[:PATHS_SHOWN]:
+        xy = (path - low) * scale
+        text = " ".join(f"{10 + x:.1f},{height - 30 - y:.1f}" for x, y in xy.tolist())
+        name = "walks" if kind == PEDESTRIAN else "cycles" if kind in TWO_WHEELED else "drives"
+        lines.append(f'<polyline class="{name}" points="{text}"/>')
+    bar = (
+        f'<path class="bar" d="M10 {height - 8:.1f}h{length * scale:.1f}"/>'
+        f'<text x="{16 + length * scale:.1f}" y="{height - 4:.1f}">{length:g} m</text>'
+    )
+    return (
+        f'<svg viewBox="0 0 {WIDTH} {height:.0f}" role="img" aria-label="Paths of the recording">'
+        f"{''.join(lines)}{bar}</svg>"
+    )
+
+
+def _left_out(mined: Mined) -> str:
+    if not mined.skipped and not mined.others:
+        return "<p>No file was left out.</p>"
+    lines = [f"<li>{escape(text)}</li>" for _, texts in mined.skipped for text in texts]
+    lines += [f"<li>{escape(str(path))}: no recording</li>" for path in mined.others]
+    return f"<ul>{''.join(lines)}</ul>"
+
+
+def _own(name: str) -> str:
+    return files("bridgegen.recordings").joinpath(name).read_text("utf-8")

@@ -1,0 +1,148 @@
+"""ScenarioNet's scenarios (pickle), read by a restricted reader; see `pickles`.
+
+Source: metadriverse/scenarionet and metadrive/scenario/scenario_description.py.
+"""
+
+import math
+from collections.abc import Iterator
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from bridgegen.ego.kinds import BICYCLE, CAR, MOTORCYCLE, OTHER, PEDESTRIAN
+from bridgegen.errors import FileFormatError
+from bridgegen.recordings.format import Format, Head
+from bridgegen.recordings.pickles import PickledArray, read_pickle
+from bridgegen.recordings.table import UNKNOWN_KIND, Facts, RecordedTraffic, build, median_step
+
+KINDS = {
+    "VEHICLE": CAR, "PEDESTRIAN": PEDESTRIAN, "CYCLIST": BICYCLE, "MOTORCYCLIST": MOTORCYCLE,
+    "TRAFFIC_CONE": OTHER, "TRAFFIC_BARRIER": OTHER, "TRAFFIC_OBJECT": OTHER,
+}  # fmt: skip
+LIGHTS = {
+    "LANE_STATE_STOP": "red", "LANE_STATE_ARROW_STOP": "red", "LANE_STATE_CAUTION": "yellow",
+    "LANE_STATE_ARROW_CAUTION": "yellow", "LANE_STATE_GO": "green",
+    "LANE_STATE_ARROW_GO": "green", "LANE_STATE_FLASHING_STOP": "flashing red",
+    "LANE_STATE_FLASHING_CAUTION": "flashing yellow",
+}  # fmt: skip
+"""Any other state is unknown."""
+_PROTOCOLS = (b"\x80\x02", b"\x80\x03", b"\x80\x04", b"\x80\x05")
+
+
+def _recognises(head: Head) -> bool:
+    return head.data.startswith(_PROTOCOLS)
+
+
+def _read(path: Path) -> Iterator[RecordedTraffic]:
+    whole = read_pickle(path)
+    tracks = whole.get("tracks") if isinstance(whole, dict) else None
+    if not isinstance(tracks, dict) or not isinstance(whole.get("metadata"), dict):
+        raise FileFormatError(f"{path}: is no scenario of ScenarioNet: has no tracks and metadata")
+    metadata = whole["metadata"]
+    times = _column(f"{path}, metadata", metadata, "ts" if "ts" in metadata else "timestep")
+    ids: list[int] = []
+    parts: list[npt.NDArray[np.float64]] = []
+    places: list[tuple[str, int]] = []
+    names: list[str] = []
+    kinds: list[int] = []
+    boxes: list[tuple[float, float]] = []
+    for name, track in tracks.items():
+        place = f"{path}, track '{str(name)[:40]}'"
+        states, box = _track(place, track, times)
+        if not len(states):
+            continue
+        ids += [len(names)] * len(states)
+        parts.append(states[:, 1:])
+        places += [(place, int(step)) for step in states[:, 0]]
+        names.append(str(name)[:200])
+        kinds.append(KINDS.get(str(track.get("type")), UNKNOWN_KIND))
+        boxes.append(box)
+    if not parts:
+        raise FileFormatError(f"{path}: holds no states")
+    table, size, numbers = np.concatenate(parts), np.array(boxes), np.array(ids)
+    first = np.searchsorted(numbers, np.arange(len(names) + 1))
+    data_set = str(metadata.get("dataset", ""))[:40]
+    facts = Facts(
+        name=str(whole.get("id", path.stem))[:200], format=FORMAT.name, source=str(path),
+        time_step=median_step(table[:, 0], first),
+        frame=f"the scenario's ({data_set})" if data_set else "the scenario's",
+        map="map features of the file" if whole.get("map_features") else "",
+        lights=MappingProxyType(_lights(path, whole.get("dynamic_map_states"), times)),
+    )  # fmt: skip
+    yield build(
+        facts, numbers,
+        dict(zip(("time", "x", "y", "heading", "vx", "vy"), table.T, strict=True)),
+        lambda i: f"{places[i][0]}, step {places[i][1]}",
+        names=names, kind=kinds, length=size[:, 0], width=size[:, 1],
+    )  # fmt: skip
+
+
+def _lights(
+    path: Path, states: Any, times: npt.NDArray[np.float64]
+) -> dict[str, tuple[tuple[float, str], ...]]:
+    """Return when each traffic light changes [s], and to what."""
+    if states is None:
+        return {}
+    if not isinstance(states, dict):
+        raise FileFormatError(f"{path}: dynamic_map_states must be a dictionary")
+    found = {}
+    for name, light in states.items():
+        inner = light.get("state") if isinstance(light, dict) else None
+        words = inner.get("object_state") if isinstance(inner, dict) else None
+        if not isinstance(words, list) or len(words) > len(times):
+            raise FileFormatError(
+                f"{path}, light '{str(name)[:40]}': object_state must be a list, one of an instant"
+            )
+        seen = [LIGHTS.get(str(word), "unknown") for word in words]
+        changes = [
+            (float(time), word)
+            for k, (time, word) in enumerate(zip(times, seen, strict=False))
+            if k == 0 or word != seen[k - 1]
+        ]
+        found[str(name)[:200]] = tuple(changes)
+    return found
+
+
+def _track(
+    place: str, track: Any, times: npt.NDArray[np.float64]
+) -> tuple[npt.NDArray[np.float64], tuple[float, float]]:
+    """Return a track's valid states (step, time, x, y, heading, vx, vy) and its box [m]."""
+    state = track.get("state") if isinstance(track, dict) else None
+    if not isinstance(state, dict):
+        raise FileFormatError(f"{place}: must have a state")
+    valid = _column(place, state, "valid").astype(np.bool_)
+    n = len(valid)
+    position, velocity = (_column(place, state, name) for name in ("position", "velocity"))
+    heading = _column(place, state, "heading").reshape(-1)
+    for name, array in (("position", position), ("velocity", velocity)):
+        if array.ndim != 2 or len(array) != n or array.shape[1] < 2:
+            raise FileFormatError(f"{place}: {name} must be of shape ({n}, 2 or more)")
+    if len(heading) != n or n > len(times) or valid.ndim != 1:
+        raise FileFormatError(f"{place}: must have a heading for each of {n} instants")
+    steps = np.flatnonzero(valid)
+    columns = (steps, times[:n], position[:, 0], position[:, 1], heading, *velocity.T[:2])
+    rows = [column if column is steps else column[steps] for column in columns]
+    length, width = (
+        float(np.median(_column(place, state, name).reshape(-1)[steps]))
+        if name in state and len(steps) and np.size(_column(place, state, name)) == n
+        else math.nan
+        for name in ("length", "width")
+    )
+    return np.column_stack(rows).astype(np.float64), (length, width)
+
+
+def _column(place: str, holder: Any, name: str) -> npt.NDArray[np.float64]:
+    value = holder.get(name)
+    try:
+        array = value.array() if isinstance(value, PickledArray) else np.array(value)
+        return array.astype(np.float64)
+    except (ValueError, TypeError) as error:
+        raise FileFormatError(f"{place}: {name} must be an array of numbers: {error}") from None
+
+
+FORMAT = Format(
+    name="ScenarioNet", title="ScenarioNet (.pkl)", recognises=_recognises, read=_read,
+)  # fmt: skip

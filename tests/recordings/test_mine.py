@@ -1,0 +1,92 @@
+"""``bridgegen mine``: what was recorded, as a table, a page and CSV; nothing silently."""
+
+import csv
+import json
+
+import pytest
+
+from bridgegen.errors import FileFormatError, InputError, StorageError
+from bridgegen.recordings.mine import mine
+from bridgegen.recordings.quality import Rule
+
+from . import writers as w
+
+
+def rows(path):
+    with path.open(newline="", encoding="utf-8") as file:
+        return list(csv.DictReader(file))
+
+
+def test_hours_and_kilometres_are_those_of_all_participants(tmp_path):
+    out = tmp_path / "mined"
+    (found,) = mine([w.write_ind(tmp_path)], out=out).recordings
+    assert found.hours == pytest.approx(3 * 4.0 / 3600, rel=1e-9)
+    lane_change = 22.0 * 4.0  # and 3.5 m to the side, within 0.1 m
+    assert found.kilometres == pytest.approx((80.0 + 56.0 + lane_change) / 1000, abs=2e-4)
+    assert found.participants == {"car": 2, "truck": 1}
+    (row,) = rows(out / "recordings.csv")
+    assert (row["n_car"], row["n_truck"], row["n_bus"]) == ("2", "1", "0")
+    assert float(row["hours"]) == pytest.approx(found.hours, rel=1e-5)
+    assert [one["rule"] for one in rows(out / "quality.csv")] == [rule.value for rule in Rule]
+
+
+def test_a_bad_file_ends_it_and_is_listed_if_that_is_asked_for(tmp_path):
+    good, bad = w.write_ind(tmp_path), tmp_path / "bad.csv"
+    bad.write_text("time,entity,x,y,h,speed\n0,a,1,2,3,x\n")
+    with pytest.raises(FileFormatError, match=r"bad.csv, line 2"):
+        mine([good, bad], out=tmp_path / "mined")
+    assert not (tmp_path / "mined").exists()
+    found = mine([good, bad], out=tmp_path / "mined", lenient=True)
+    assert [path for path, _ in found.skipped] == [bad]
+    assert "bad.csv, line 2: speed must be a number" in (
+        tmp_path / "mined" / "recordings.html"
+    ).read_text(encoding="utf-8")
+    with pytest.raises(FileFormatError, match="no recording could be read"):
+        mine([bad], out=tmp_path / "mined", lenient=True)
+
+
+def test_a_file_counts_once(tmp_path):
+    path = w.write_ind(tmp_path)
+    with pytest.raises(InputError, match="named twice"):
+        mine([path, tmp_path], out=tmp_path / "mined")
+
+
+def test_files_of_others_are_not_overwritten(tmp_path):
+    path, out = w.write_ind(tmp_path), tmp_path / "mined"
+    out.mkdir()
+    (out / "recordings.csv").write_text("mine\n")
+    with pytest.raises(StorageError, match="not overwritten"):
+        mine([path], out=out)
+    (out / "recordings.csv").unlink()
+    mine([path], out=out)
+    mine([path], out=out)
+
+
+def test_names_of_strangers_are_text_on_the_page_and_in_tables(tmp_path):
+    path = w.write_womd(tmp_path)
+    whole = json.loads(path.read_text())
+    whole["name"] = "=cmd()<script>alert(1)</script>"
+    path.write_text(json.dumps(whole))
+    mine([path], out=tmp_path / "mined")
+    page = (tmp_path / "mined" / "recordings.html").read_text(encoding="utf-8")
+    assert "<script" not in page
+    assert "&lt;script&gt;" in page
+    assert rows(tmp_path / "mined" / "recordings.csv")[0]["recording"].startswith("'=cmd()")
+
+
+def test_the_command_prints_what_was_recorded(cli, tmp_path):
+    path, out = w.write_highd(tmp_path), tmp_path / "mined"
+    code, text, _ = cli("mine", path, "--out", out)
+    assert code == 0
+    assert "2 car, 1 truck" in " ".join(text.split())
+    assert "resampled" in text
+    code, text, _ = cli("mine", path, "--json", "--out", out)
+    (one,) = json.loads(text)["recordings"]
+    assert (one["participants"], one["format"]) == ({"car": 2, "truck": 1}, "levelX")
+
+
+def test_the_command_says_what_is_wrong_without_a_traceback(cli, tmp_path):
+    code, _, err = cli("mine", tmp_path / "none.csv", "--out", tmp_path / "mined")
+    assert code == 2
+    assert "none.csv" in err
+    assert "Traceback" not in err
