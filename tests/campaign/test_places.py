@@ -225,7 +225,7 @@ def test_what_is_said_to_fit_of_a_road_can_be_simulated(name: str) -> None:
     found, _, _ = places_of(TOWN05, scenario)
     fits = [one.id for one in found if one.rotations]
     assert fits
-    for place in fits[:4]:
+    for place in (fits[0], fits[-1]):
         roads = searchable(scenario, load_map(TOWN05, place, scenario))
         there = on_map(scenario, roads)
         pipeline = Pipeline(there, there.space(), road_map=roads)
