@@ -203,6 +203,18 @@ def test_a_damaged_value_is_one_error(run, name, data):
     assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < 300_000  # KiB
 
 
+def test_an_error_does_not_quote_a_long_text(run):
+    path = run / "confirmation-esmini.json"
+    whole = path.read_bytes()
+    try:
+        path.write_text(damaged(json.loads(whole), ("simulator",), VALUES["long text"]), "utf-8")
+        with pytest.raises(BridgeGenError) as caught:
+            READERS[path.name](path)
+    finally:
+        path.write_bytes(whole)
+    assert len(str(caught.value)) < 1000
+
+
 @pytest.mark.parametrize("name", [name for name in READERS if name != "settings.json"])
 @pytest.mark.parametrize("text", ["", "null", "[]", "7", '"x"', "{", "[" * 10**5, "\0"])
 def test_what_is_no_record_is_one_error(run, name, text):

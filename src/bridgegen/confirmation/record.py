@@ -46,7 +46,7 @@ def read_record(path: Path) -> Record | None:
     """
     record = read_model(path, Record, _not_ours)
     if record is not None and file_name(record.simulator) != path.name:
-        raise _not_ours(path, f"simulator is {record.simulator!r}")
+        raise _not_ours(path, f"simulator is {record.simulator[:40]!r}")
     return record
 
 
