@@ -49,7 +49,7 @@ class Format:
         title: what it is, for messages and documentation.
         recognises: whether a file is of it, by its content.
         read: the recordings in a file, one after the other.
-        companion: whether a file only belongs to recordings of it, and is none itself.
+        companion: whether a file only belongs to recordings of it, and is not itself a recording.
     """
 
     name: str

@@ -122,7 +122,7 @@ class Simulation:
         for lane, ahead in enumerate(seen.ahead.tolist()):
             gap, of, j = ahead[3:] if lane == goal else ahead[:3]
             if np.isfinite(gap):
-                # CACC follows nobody whose name it is not told: it would keep its speed.
+                # Without its name, CACC ignores the leader and keeps its speed.
                 other = f"r{r}o{int(j)}"
                 follow = vehicle.getFollowSpeed(ego, now, gap - MIN_GAP, of, DECELERATION, other)
                 speed = min(speed, max(follow, least))
