@@ -185,7 +185,7 @@ def whole_numbers(path: Path, name: str, values: Float, head: int = 1) -> npt.ND
     """Return a column of ids or frames as integers.
 
     Raises:
-        FileFormatError: a field is not a number.
+        FileFormatError: a value is not a whole number.
     """
     bad = np.flatnonzero(~((values == np.rint(values)) & (np.abs(values) < 2**53)))
     if len(bad):
