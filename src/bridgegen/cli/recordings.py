@@ -18,6 +18,10 @@ def mine(
     out: Annotated[
         Path, typer.Option(help="Folder for the page and the tables, new or an earlier one.")
     ] = Path("mined"),
+    road_map: Annotated[
+        Path | None,
+        typer.Option("--map", help="OpenDRIVE map of the place, in their coordinates."),
+    ] = None,
     lenient: Annotated[
         bool,
         typer.Option("--lenient", help="Skip files that cannot be read, and list them."),
@@ -25,18 +29,24 @@ def mine(
     dt: Annotated[float, typer.Option(help="Resample at this time step [s].")] = 0.05,
     as_json: common.Json = False,
 ) -> None:
-    """Read and clean recorded traffic; account for it.
+    """Read and clean recorded traffic, place it on lanes, account for it.
 
     Says what was recorded: hours, kilometres, participants by kind, and all that cleaning found.
+    Lanes are those of the map, or of the recording, or inferred from its paths.
     The format is told by the content: tables of states, esmini's log, levelX, NGSIM, SMARTS,
     CommonRoad, INTERACTION, SUMO FCD, Waymo motion as JSON, Argoverse 2, ScenarioNet.
     Events and scenarios are not found in it yet.
     """
-    from bridgegen.recordings.mine import mine as mine_recordings
+    from bridgegen.mining.mine import mine as mine_recordings
     from bridgegen.screen.recordings import RecordingsScreen, print_mined
 
     with RecordingsScreen() as screen:
         mined = mine_recordings(
-            recordings, out=out, lenient=lenient, time_step=dt, progress=screen.progress
+            recordings,
+            out=out,
+            road_map=road_map,
+            lenient=lenient,
+            time_step=dt,
+            progress=screen.progress,
         )
     print_mined(mined, as_json=as_json)

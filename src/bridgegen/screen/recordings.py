@@ -1,7 +1,9 @@
 """Recordings as they are read, and what they hold."""
 
 import json
+import math
 import sys
+from dataclasses import asdict
 from typing import TYPE_CHECKING
 
 from bridgegen.screen.live import Live
@@ -10,7 +12,8 @@ from bridgegen.screen.tables import print_table
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from bridgegen.recordings.mine import Mined, Summary
+    from bridgegen.mining.lanes.account import LanesFound
+    from bridgegen.mining.mine import Mined, Summary
 
 
 class RecordingsScreen(Live):
@@ -28,6 +31,8 @@ def print_mined(mined: "Mined", *, as_json: bool) -> None:
             print(f"bridgegen: warning: skipped: {text}", file=sys.stderr)
     if mined.others:
         print(f"bridgegen: note: {len(mined.others)} files are no recordings", file=sys.stderr)
+    for text in mined.warnings:
+        print(f"bridgegen: warning: {text}", file=sys.stderr)
     if as_json:
         print(json.dumps({
             "recordings": [_facts(one) for one in mined.recordings],
@@ -35,12 +40,12 @@ def print_mined(mined: "Mined", *, as_json: bool) -> None:
             "others": [str(path) for path in mined.others],
         }, indent=2))  # fmt: skip
         return
-    head = ("recording", "format", "participants", "h", "km", "step [s]", "frame")
+    head = ("recording", "format", "participants", "h", "km", "step [s]", "lanes", "frame")
     print_table(head, [
         (one.facts.name, one.facts.format,
          ", ".join(f"{count:,} {kind}" for kind, count in one.participants.items()),
          float(f"{one.hours:.4g}"), float(f"{one.kilometres:.4g}"),
-         float(f"{one.facts.time_step:.4g}"), one.facts.frame)
+         float(f"{one.facts.time_step:.4g}"), _lanes(one.lanes), one.facts.frame)
         for one in mined.recordings
     ], as_json=False)  # fmt: skip
     print()
@@ -51,7 +56,17 @@ def print_mined(mined: "Mined", *, as_json: bool) -> None:
     else:
         print("quality: nothing to clean")
     print(f"\n{'page':<8}{mined.out / 'recordings.html'}")
-    print(f"{'tables':<8}{mined.out / 'recordings.csv'}, {mined.out / 'quality.csv'}")
+    print(
+        f"{'tables':<8}{mined.out / 'recordings.csv'}, {mined.out / 'lanes.csv'}, "
+        f"{mined.out / 'quality.csv'}"
+    )
+
+
+def _lanes(found: "LanesFound") -> str:
+    """Return what the lanes are of, and how many of the vehicles' states are on them."""
+    share = found.vehicle_share
+    is_known = found.source != "none" and not math.isnan(share)
+    return f"{found.source}, {share:.1%}" if is_known else found.source
 
 
 def _quality(mined: "Mined") -> "Iterator[tuple[str, int, int, int, str]]":
@@ -75,6 +90,13 @@ def _facts(one: "Summary") -> dict[str, object]:
         "participants": one.participants, "states": one.states, "tracks": one.tracks,
         "hours": one.hours, "km": one.kilometres, "hours_read": one.read_hours,
         "km_read": one.read_kilometres, "notes": facts.notes,
+        "lanes": {
+            "source": one.lanes.source, "km_on": one.lanes.km_on, "km_off": one.lanes.km_off,
+            "vehicle_share":
+                None if math.isnan(one.lanes.vehicle_share) else one.lanes.vehicle_share,
+            "carriageways": [asdict(each) for each in one.lanes.carriageways],
+            "notes": one.lanes.notes,
+        },
         "quality": [
             {"rule": each.rule.value, "participants": each.participants, "count": each.count,
              "examples": each.examples}

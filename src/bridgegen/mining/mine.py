@@ -1,4 +1,4 @@
-"""``bridgegen mine``: read recordings, clean them, and account for what was recorded."""
+"""``bridgegen mine``: read recordings, clean them, say where they are, account for them."""
 
 from collections import Counter
 from collections.abc import Callable, Sequence
@@ -9,6 +9,8 @@ import numpy as np
 
 from bridgegen.arrays import Float
 from bridgegen.errors import FileFormatError, InputError, StorageError
+from bridgegen.mining.lanes.account import LanesFound, account_of
+from bridgegen.mining.lanes.find import Located, locate, read_map
 from bridgegen.recordings.clean import TIME_STEP, Cleaned, clean
 from bridgegen.recordings.formats import files_of, read
 from bridgegen.recordings.quality import Finding
@@ -17,6 +19,8 @@ from bridgegen.recordings.table import Facts, RecordedTraffic, kind_in_words
 PATHS_SHOWN = 300
 POINTS_SHOWN = 40
 """Of a path in the picture."""
+MARGIN = 10.0
+"""Around the paths in the picture [m]."""
 
 
 @dataclass(frozen=True)
@@ -35,6 +39,7 @@ class Summary:
         tracks: after cuts.
         findings: of cleaning, all rules.
         paths: for the picture: kind and points ``(n, 2)`` [m] of at most `PATHS_SHOWN` tracks.
+        lanes: on which it was.
     """
 
     facts: Facts
@@ -48,6 +53,7 @@ class Summary:
     tracks: int
     findings: tuple[Finding, ...]
     paths: tuple[tuple[int, Float], ...]
+    lanes: LanesFound
 
 
 @dataclass(frozen=True)
@@ -60,6 +66,7 @@ class Mined:
         others: files of folders that are no recordings.
         time_step: after cleaning [s].
         out: the folder.
+        warnings: of reading the map.
     """
 
     recordings: tuple[Summary, ...]
@@ -67,33 +74,39 @@ class Mined:
     others: tuple[Path, ...]
     time_step: float
     out: Path
+    warnings: tuple[str, ...] = ()
 
 
 def mine(
     paths: Sequence[Path],
     *,
     out: Path,
+    road_map: Path | None = None,
     lenient: bool = False,
     time_step: float = TIME_STEP,
     progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> Mined:
-    """Read and clean recordings, and write what was recorded.
+    """Read and clean recordings, place them on lanes, and write what was recorded.
 
     Args:
         paths: files, or folders of files.
-        out: a folder, new or of an earlier call; gets recordings.html, recordings.csv, quality.csv.
+        out: a folder, new or of an earlier call; gets recordings.html, recordings.csv, lanes.csv,
+            quality.csv.
+        road_map: the OpenDRIVE map of all of them; without one the lanes are those that come with
+            the recording, or inferred from its paths.
         lenient: leave out what cannot be read, and list it.
         time_step: to resample at [s].
         progress: is told how many of how many files are done.
 
     Raises:
         FileFormatError: a file that is no recording, or breaks its format's rules.
-        InputError: no recordings, or a time step out of range.
+        InputError: no recordings, a time step out of range, or a map of another place.
         StorageError: the folder holds other files of these names, or cannot be written.
     """
-    from bridgegen.recordings.page import refuse_foreign, write_all
+    from bridgegen.mining.page import refuse_foreign, write_all
 
     refuse_foreign(out)
+    on_map = read_map(road_map) if road_map is not None else None
     files, others = _files(paths)
     found: list[Summary] = []
     skipped: list[tuple[Path, tuple[str, ...]]] = []
@@ -101,7 +114,8 @@ def mine(
         progress(number, len(files))
         try:
             for traffic in read(file):
-                found.append(summarise(traffic, clean(traffic, time_step)))
+                cleaned = clean(traffic, time_step)
+                found.append(summarise(traffic, cleaned, locate(cleaned.traffic, on_map)))
         except FileFormatError as error:
             if not lenient:
                 raise
@@ -110,7 +124,8 @@ def mine(
     if not found:
         problems = [text for _, texts in skipped for text in texts]
         raise FileFormatError(*problems, "no recording could be read")
-    mined = Mined(tuple(found), tuple(skipped), tuple(others), time_step, out)
+    warnings = on_map.warnings if on_map is not None else ()
+    mined = Mined(tuple(found), tuple(skipped), tuple(others), time_step, out, warnings)
     try:
         out.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -131,8 +146,8 @@ def _files(paths: Sequence[Path]) -> tuple[list[Path], list[Path]]:
     return files, others
 
 
-def summarise(traffic: RecordedTraffic, cleaned: Cleaned) -> Summary:
-    """Return what a recording holds."""
+def summarise(traffic: RecordedTraffic, cleaned: Cleaned, located: Located) -> Summary:
+    """Return what a recording holds, and where."""
     after = cleaned.traffic
     kinds = Counter(kind_in_words(kind) for kind in cleaned.kinds.tolist())
     shown = np.linspace(0, len(after.names) - 1, min(PATHS_SHOWN, len(after.names))).astype(int)
@@ -141,9 +156,11 @@ def summarise(traffic: RecordedTraffic, cleaned: Cleaned) -> Summary:
         first, last = int(after.first[p]), int(after.first[p + 1]) - 1
         at = np.unique(np.linspace(first, last, POINTS_SHOWN).astype(int))
         paths.append((int(after.kind[p]), np.column_stack([after.x[at], after.y[at]])))
+    points = np.concatenate([path for _, path in paths])
+    lanes = account_of(located, points.min(axis=0) - MARGIN, points.max(axis=0) + MARGIN)
     return Summary(
         facts=traffic.facts, participants=dict(kinds.most_common()), states=len(traffic.time),
         duration=float(np.ptp(traffic.time)), hours=after.hours, kilometres=after.kilometres,
         read_hours=traffic.hours, read_kilometres=traffic.kilometres, tracks=len(after.names),
-        findings=cleaned.quality.findings, paths=tuple(paths),
+        findings=cleaned.quality.findings, paths=tuple(paths), lanes=lanes,
     )  # fmt: skip

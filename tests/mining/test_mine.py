@@ -4,12 +4,11 @@ import csv
 import json
 
 import pytest
+from tests.recordings import writers as w
 
 from bridgegen.errors import FileFormatError, InputError, StorageError
-from bridgegen.recordings.mine import mine
+from bridgegen.mining.mine import mine
 from bridgegen.recordings.quality import Rule
-
-from . import writers as w
 
 
 def rows(path):
