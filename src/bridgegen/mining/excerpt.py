@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bridgegen.arrays import Int
+from bridgegen.arrays import Float, Int
 from bridgegen.recordings.bodies import centre_ahead
 from bridgegen.recordings.table import RecordedTraffic
 from bridgegen.simulation.rollout import Rollout
@@ -30,6 +30,28 @@ def clock_of(traffic: RecordedTraffic) -> Clock:
     """Return the instants of a cleaned recording."""
     instant = np.rint(traffic.time / traffic.facts.time_step).astype(np.int64)
     return Clock(instant, instant[traffic.first[:-1]], instant[traffic.first[1:] - 1])
+
+
+def path_speeds(
+    traffic: RecordedTraffic, clock: Clock, who: Sequence[int], begin: int, end: int
+) -> Float:
+    """Return how fast the rear axles of some participants go, ``(E, T)`` [m/s], ≥ 0.
+
+    That is their velocity, and what turning adds: of a body that drives as its wheels roll its
+    forward speed, of one that slides sideways more. Where one is absent, it is 0.
+    """
+    found = np.zeros((len(who), end - begin + 1))
+    for e, p in enumerate(who):
+        first, last = max(begin, int(clock.begin[p])), min(end, int(clock.end[p]))
+        at = np.arange(first, last + 1) - clock.begin[p] + traffic.first[p]
+        h = np.unwrap(traffic.heading[at])
+        turning = np.gradient(h, traffic.facts.time_step) if len(at) > 1 else np.zeros(len(at))
+        ahead = centre_ahead(int(traffic.kind[p]), float(traffic.length[p]))
+        cosine, sine = np.cos(h), np.sin(h)
+        along = traffic.vx[at] * cosine + traffic.vy[at] * sine
+        across = traffic.vy[at] * cosine - traffic.vx[at] * sine - ahead * turning
+        found[e, first - begin : last - begin + 1] = np.hypot(along, across)
+    return found
 
 
 def excerpt(

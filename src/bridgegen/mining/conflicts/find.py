@@ -25,6 +25,8 @@ EGOS = (CAR, TRUCK, BUS, MOTORCYCLE)
 """Kinds that may be the ego."""
 MOVES = 1.0
 """What has never been farther than this [m] from where it began does not move: it is parked."""
+LONG_ENOUGH = 1.0
+"""What is recorded for less [s] is a fragment, and in no conflict."""
 HORIZON = 4.0
 """[s]; the analysis predicts as far."""
 FARTHEST = 150.0
@@ -98,6 +100,7 @@ def candidates(traffic: RecordedTraffic, clock: Clock) -> dict[int, list[int]]:
     first = np.searchsorted(instant[order], np.arange(low, int(instant.max()) + 2))
     reach = 0.5 * np.hypot(traffic.length, traffic.width) + 0.5 * MARGIN
     moves = np.array([_extent(traffic, states) > MOVES for states in traffic.states()])
+    is_whole = (clock.end - clock.begin) * traffic.facts.time_step >= LONG_ENOUGH
     keys = np.empty(1 << 20, np.int64)
     arguments = (
         order, first.astype(np.int64), participant, traffic.x, traffic.y, traffic.vx, traffic.vy,
@@ -112,7 +115,7 @@ def candidates(traffic: RecordedTraffic, clock: Clock) -> dict[int, list[int]]:
     is_ego = np.isin(traffic.kind, EGOS) & moves
     for p, q in zip(*(part.tolist() for part in np.divmod(pairs, len(moves))), strict=True):
         for ego, other in ((p, q), (q, p)):
-            if is_ego[ego]:
+            if is_ego[ego] and is_whole[ego] and is_whole[other]:
                 found[ego].append(other)
     return dict(sorted(found.items()))
 
