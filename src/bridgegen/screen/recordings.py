@@ -31,7 +31,9 @@ def print_mined(mined: "Mined", *, as_json: bool) -> None:
             print(f"bridgegen: warning: skipped: {text}", file=sys.stderr)
     if mined.others:
         print(f"bridgegen: note: {len(mined.others)} files are no recordings", file=sys.stderr)
-    for text in mined.warnings:
+    notes = [note for one in mined.recordings if one.lanes.source == "map"
+             for note in one.lanes.notes]  # fmt: skip
+    for text in (*mined.warnings, *notes):
         print(f"bridgegen: warning: {text}", file=sys.stderr)
     if as_json:
         print(json.dumps({

@@ -23,10 +23,10 @@ from bridgegen.recordings.table import RecordedTraffic, wrap
 
 PIECE = 5.0
 """Length of the pieces of paths, and between two points of a reference line [m]."""
-CELL = 4.0  # m
+CELL = PIECE
 SECTORS = 24
 CROSSING = math.radians(40.0)
-"""Paths within 6 m that differ by more than this, and less than its supplement, cross."""
+"""Paths within 8 m that differ by more than this, and less than its supplement, cross."""
 REACH = 20.0
 """To either side of a reference line [m]."""
 MOST_PIECES = 200_000
