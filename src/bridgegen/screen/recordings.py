@@ -69,13 +69,13 @@ def print_mined(mined: "Mined", *, as_json: bool) -> None:
 
 
 def _lane_row(one: "Summary") -> tuple[str, str, int, str, str, str]:
-    """Return a recording's name and its lanes: by carriageway, from the right, how far off."""
+    """Return a recording's lanes: their number by carriageway, the fit of the one used most."""
     found, share = one.lanes, one.lanes.vehicle_share
     shown = found.carriageways[:CARRIAGEWAYS_SHOWN]
     more = ", …" if len(found.carriageways) > len(shown) else ""
     return (
         one.facts.name,
-        found.source,
+        "none: give --map" if found.source == "none" else found.source,
         len(found.carriageways),
         ", ".join(str(each.lanes) for each in shown) + more,
         "–" if math.isnan(share) else f"{share:.1%}",

@@ -113,6 +113,19 @@ def test_lanelets_of_another_place_are_not_used(tmp_path):
     assert "are not used" in found.lanes.notes[0]
 
 
+def test_lanes_as_wide_as_a_country_are_refused(tmp_path):
+    (traffic,) = read(highd(tmp_path, lower="2.0;6.0;1e8"))
+    with pytest.raises(FileFormatError, match=r"too wide or too long; the widest has 1e\+08 m"):
+        locate(clean(traffic).traffic)
+
+
+def test_lanelets_beyond_the_earth_are_refused(tmp_path):
+    path = with_lanelets(tmp_path)
+    path.write_text(path.read_text().replace("<x>120.0</x>", "<x>1e200</x>"))
+    with pytest.raises(FileFormatError, match=r"line \d+: x and y \[m\] of a lanelet"):
+        list(read(path))
+
+
 def test_a_ring_of_lanelets_has_an_end():
     angle = np.linspace(0.0, np.pi / 2, 20)
     lanelets = []
