@@ -181,10 +181,11 @@ def _html_table(head: list[str], rows: list[list[str]]) -> str:
 
 def _section(one: Summary, time_step: float) -> str:
     facts = one.facts
+    used = " (not read)" if one.lanes.source in ("inferred", "none") else ""
     about = [
         f"file: {facts.source}",
         f"frame: {facts.frame}",
-        f"map: {facts.map}" if facts.map else "map: none named",
+        f"map: {facts.map}{used}" if facts.map else "map: none named",
         f"{one.states:,} states read, every {facts.time_step:.4g} s; {one.tracks:,} tracks after "
         f"cleaning, every {time_step:g} s",
         f"{one.read_hours:.4g} h and {one.read_kilometres:.4g} km before cleaning, "
@@ -200,7 +201,8 @@ def _section(one: Summary, time_step: float) -> str:
     lines = "".join(f"<li>{escape(text)}</li>" for text in about)
     return (
         f"<section><h2>{escape(facts.name)}</h2><div class='card'><ul>{lines}</ul></div>"
-        f"<div class='card'>{_picture(one)}<p class='muted'>{_caption(one)}</p></div>{_lanes(one.lanes)}"
+        f"<div class='card'>{_picture(one)}<p class='muted'>{_caption(one)}</p></div>"
+        f"{_lanes(one.lanes)}"
         f"<div class='card'><div class='wide'>{_html_table(head, findings)}</div></div></section>"
     )
 

@@ -18,7 +18,7 @@ from bridgegen.errors import FileFormatError
 from bridgegen.openx.xml import parse_xml
 from bridgegen.recordings.format import Format, Head
 from bridgegen.recordings.lanelets import Lanelet
-from bridgegen.recordings.table import UNKNOWN_KIND, Facts, RecordedTraffic, build
+from bridgegen.recordings.table import FARTHEST, UNKNOWN_KIND, Facts, RecordedTraffic, build
 
 KINDS = {
     "car": CAR, "taxi": CAR, "parkedVehicle": CAR, "priorityVehicle": CAR, "truck": TRUCK,
@@ -105,6 +105,10 @@ def _lanelet(path: Path, element: etree._Element) -> Lanelet:
     if min(len(left), len(right)) < 2:
         raise FileFormatError(
             f"{path}, line {_line(element)}: a lanelet must have two points at least on each bound"
+        )
+    if not max(np.abs(left).max(), np.abs(right).max()) <= FARTHEST:
+        raise FileFormatError(
+            f"{path}, line {_line(element)}: x and y [m] of a lanelet must be within ±{FARTHEST:g}"
         )
     beside = {
         f"{side}{one.get('drivingDir')}": one.get("ref") or ""

@@ -17,7 +17,7 @@ from bridgegen.arrays import Float, Int
 from bridgegen.ego.kinds import BICYCLE, BUS, CAR, MOTORCYCLE, PEDESTRIAN, TRUCK
 from bridgegen.errors import FileFormatError
 from bridgegen.recordings.columns import Columns, read_columns, whole_numbers
-from bridgegen.recordings.format import HEAD_BYTES, Format, Head
+from bridgegen.recordings.format import Format, Head, read_head
 from bridgegen.recordings.lanelets import Lanelet
 from bridgegen.recordings.motion import STANDING
 from bridgegen.recordings.table import (
@@ -128,9 +128,7 @@ def _lanes(path: Path, ends: tuple[float, float]) -> tuple[Lanelet, ...]:
     Its lanes are numbered from the top of the image, the strips beside the carriageways included:
     with four upper markings, the upper lanes are 2, 3 and 4, and the lower ones begin with 6.
     """
-    if not {"upperLaneMarkings", "lowerLaneMarkings"} <= set(
-        Head(path, path.read_bytes()[:HEAD_BYTES]).columns
-    ):
+    if not read_head(path).has("upperLaneMarkings", "lowerLaneMarkings"):
         return ()
     texts = read_columns(path, (), ("upperLaneMarkings", "lowerLaneMarkings")).texts
     found: list[Lanelet] = []

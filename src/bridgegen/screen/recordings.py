@@ -12,8 +12,9 @@ from bridgegen.screen.tables import print_table
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from bridgegen.mining.lanes.account import LanesFound
     from bridgegen.mining.mine import Mined, Summary
+
+CARRIAGEWAYS_SHOWN = 4
 
 
 class RecordingsScreen(Live):
@@ -31,7 +32,9 @@ def print_mined(mined: "Mined", *, as_json: bool) -> None:
             print(f"bridgegen: warning: skipped: {text}", file=sys.stderr)
     if mined.others:
         print(f"bridgegen: note: {len(mined.others)} files are no recordings", file=sys.stderr)
-    for text in mined.warnings:
+    notes = [note for one in mined.recordings if one.lanes.source == "map"
+             for note in one.lanes.notes]  # fmt: skip
+    for text in (*mined.warnings, *notes):
         print(f"bridgegen: warning: {text}", file=sys.stderr)
     if as_json:
         print(json.dumps({
@@ -40,14 +43,17 @@ def print_mined(mined: "Mined", *, as_json: bool) -> None:
             "others": [str(path) for path in mined.others],
         }, indent=2))  # fmt: skip
         return
-    head = ("recording", "format", "participants", "h", "km", "step [s]", "lanes", "frame")
+    head = ("recording", "format", "participants", "h", "km", "step [s]", "frame")
     print_table(head, [
         (one.facts.name, one.facts.format,
          ", ".join(f"{count:,} {kind}" for kind, count in one.participants.items()),
          float(f"{one.hours:.4g}"), float(f"{one.kilometres:.4g}"),
-         float(f"{one.facts.time_step:.4g}"), _lanes(one.lanes), one.facts.frame)
+         float(f"{one.facts.time_step:.4g}"), one.facts.frame)
         for one in mined.recordings
     ], as_json=False)  # fmt: skip
+    print()
+    of_lanes = ("lanes of", "source", "carriageways", "lanes", "vehicles on", "RMS [m]")
+    print_table(of_lanes, [_lane_row(one) for one in mined.recordings], as_json=False)
     print()
     found = [row for row in _quality(mined) if row[1]]
     if found:
@@ -62,11 +68,19 @@ def print_mined(mined: "Mined", *, as_json: bool) -> None:
     )
 
 
-def _lanes(found: "LanesFound") -> str:
-    """Return what the lanes are of, and how many of the vehicles' states are on them."""
-    share = found.vehicle_share
-    is_known = found.source != "none" and not math.isnan(share)
-    return f"{found.source}, {share:.1%}" if is_known else found.source
+def _lane_row(one: "Summary") -> tuple[str, str, int, str, str, str]:
+    """Return a recording's lanes: their number by carriageway, the fit of the one used most."""
+    found, share = one.lanes, one.lanes.vehicle_share
+    shown = found.carriageways[:CARRIAGEWAYS_SHOWN]
+    more = ", …" if len(found.carriageways) > len(shown) else ""
+    return (
+        one.facts.name,
+        "none: give --map" if found.source == "none" else found.source,
+        len(found.carriageways),
+        ", ".join(str(each.lanes) for each in shown) + more,
+        "–" if math.isnan(share) else f"{share:.1%}",
+        f"{shown[0].rms:.2f}" if shown else "–",
+    )
 
 
 def _quality(mined: "Mined") -> "Iterator[tuple[str, int, int, int, str]]":

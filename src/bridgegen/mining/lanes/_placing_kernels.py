@@ -13,7 +13,7 @@ ASIDE, AGAINST = math.radians(50.0), math.radians(130.0)
 """Differences of heading between which a vehicle crosses a lane and is not on it."""
 OVERHANG = 0.5  # m, beyond the ends of a lane
 TURN = 0.3  # rad, a difference of heading that weighs as much as half a lane's width
-COST_AGAINST, COST_BACK, COST_OTHER = 8.0, 5.0, 20.0
+COST_AGAINST, COST_BACK, COST_OTHER, COST_BEYOND = 8.0, 5.0, 20.0, 2.0
 ROUNDING = 1e-9
 
 
@@ -75,9 +75,9 @@ def place_track(
 ) -> None:
     """Place one track: of all sequences of lanes that hold its states, the one of least cost.
 
-    ``points``: ``(V, 5)`` x, y, heading, width, station; ``segments``: ``(G, 3)`` first point, lane,
-    and 1, 2 or 3 where it is the lane's first, last, or only one; ``grid``: x and y of its corner,
-    edge of a cell and number of cells along y; ``out``: ``(4, S)`` offset, heading on the lane,
+    ``points``: ``(V, 5)`` x, y, heading, width, station; ``segments``: ``(G, 3)`` first point,
+    lane, and 1, 2 or 3 where it is the lane's first, last, or only one; ``grid``: x and y of its
+    corner, edge of a square and number of rows; ``out``: ``(4, S)`` offset, heading on the lane,
     speed along, speed across.
     """
     n = end - begin
@@ -131,6 +131,8 @@ def place_track(
                 continue
             aside = _wrapped(heading[begin + i] - h)
             emission = (d / half) ** 2
+            if not -ROUNDING <= u <= 1.0 + ROUNDING:
+                emission += COST_BEYOND
             if not any_heading:
                 if ASIDE < abs(aside) < AGAINST:
                     continue

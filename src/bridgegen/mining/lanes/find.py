@@ -20,6 +20,8 @@ from bridgegen.recordings.table import RecordedTraffic, wrap
 
 LEAST_SHARE = 0.5
 """Of the vehicles' states that must be on the lanes of a map, or of lanelets, to belong to them."""
+USUAL_SHARE = 0.9
+"""With less there is a warning."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,14 +96,21 @@ def _on(traffic: RecordedTraffic, lanes: RecordedLanes) -> Located:
 def _on_map(traffic: RecordedTraffic, road_map: MapLanes) -> Located:
     found = _on(traffic, road_map.lanes)
     share = found.fit.vehicle_share
-    if not share < LEAST_SHARE:
-        return found
-    if road_map.offset is not None:
+    if share < LEAST_SHARE and road_map.offset is not None:
         moved = _on(traffic, _projected(road_map.lanes, road_map.offset))
-        if not moved.fit.vehicle_share < LEAST_SHARE:
-            return moved
+        found = moved if moved.fit.vehicle_share > share else found
+    best = found.fit.vehicle_share
+    if LEAST_SHARE <= best < USUAL_SHARE:
+        note = (
+            f"{traffic.facts.source}: only {best:.0%} of the vehicles' states are on the map's "
+            "lanes: is it the map of the place?"
+        )
+        lanes = replace(found.lanes, notes=(*found.lanes.notes, note))
+        return Located(lanes, found.placed, found.fit)
+    if not best < LEAST_SHARE:
+        return found
     raise InputError(
-        f"{traffic.facts.source}: {share:.0%} of the vehicles' states are on lanes of the map "
+        f"{traffic.facts.source}: {best:.0%} of the vehicles' states are on lanes of the map "
         f"{road_map.path}, and {LEAST_SHARE:.0%} must be; the recording spans "
         f"{_span(traffic.x, traffic.y)}, the map {_span(road_map.lanes.x, road_map.lanes.y)}: give "
         "the map of the place, in the recording's coordinates"

@@ -5,11 +5,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from bridgegen.arrays import Float, Int
+from bridgegen.errors import FileFormatError
 from bridgegen.mining.lanes.model import RecordedLanes
 
 EDGE = 4.0
 """Of a square [m]."""
-MOST_ENTRIES = 200_000_000
+MOST_ENTRIES = 50_000_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,6 +38,9 @@ def grid_of(lanes: RecordedLanes, margin: float) -> Grid:
     Args:
         lanes: of the recording.
         margin: by how much a lane counts as wider and longer than it is [m].
+
+    Raises:
+        FileFormatError: the lanes cover too large an area.
     """
     counts = np.diff(lanes.first)
     lane = np.repeat(np.arange(len(lanes)), counts)
@@ -60,6 +64,12 @@ def grid_of(lanes: RecordedLanes, margin: float) -> Grid:
     spans = np.floor((high - corner) / EDGE).astype(np.int64) - begin + 1
     rows = int((begin[:, 1] + spans[:, 1]).max())
     cells = spans.prod(axis=1)
+    if cells.sum() > MOST_ENTRIES:
+        raise FileFormatError(
+            f"lanes ({lanes.source}) must be within {MOST_ENTRIES:,} squares of {EDGE:g} m, got "
+            f"{cells.sum():,}: they are too wide or too long; the widest has "
+            f"{lanes.width.max():g} m"
+        )
     which = np.repeat(np.arange(len(point)), cells)
     at = np.arange(len(which)) - np.repeat(np.cumsum(cells) - cells, cells)
     column = begin[which, 0] + at // spans[which, 1]

@@ -1,7 +1,8 @@
 """Lanes of the paths themselves, for carriageways without a map.
 
-The distances of a carriageway's paths from its reference line pile up in the middles of lanes. Lanes
-are claimed only where those piles are apart, as wide as lanes are, and hold most of the traffic.
+The distances of a carriageway's paths from its reference line pile up in the middles of lanes.
+Lanes are claimed only where those piles are apart, as wide as lanes are, and hold most of the
+traffic.
 """
 
 import itertools
@@ -29,11 +30,13 @@ SPREAD = 0.35  # m, of the kernel density of distances
 BIN = 0.05  # m
 VALLEY = 0.7
 """Density between two lanes at most, as a share of the lesser one's highest."""
-LEAST_IN_LANE = 3  # vehicles
+LEAST_IN_LANE, LEAST_ON_AVERAGE = 3, 6
+"""Vehicles in a lane."""
 SHORTEST = 50.0  # m, a lane
 STRETCH, GAP = 20.0, 3  # m; stretches in a row without a vehicle that do not end a lane
-MOST_RMS = 0.75
-"""Of distances from the middles of lanes [m]: paths without lanes have 1.0 in lanes of 3.5 m."""
+MOST_RMS, MOST_IN_LANE = 0.19, 0.22
+"""Of distances from the middles of lanes, in widths, of all lanes and of each: 0.29 if paths are
+spread evenly."""
 LEAST_SHARE = 0.85
 """Of the paths' length that is on the lanes."""
 SKEW = np.radians(30.0)
@@ -97,26 +100,34 @@ def _lanes(pieces: Pieces, line: Float, s: Float, t: Float) -> _Found | str:
     middles = _piles(t, vehicle)
     if not len(middles):
         return f"no lane with {LEAST_IN_LANE} vehicles"
+    if len(np.unique(vehicle)) < LEAST_ON_AVERAGE * len(middles):
+        return f"less than {LEAST_ON_AVERAGE} vehicles per lane"
     borders = _borders(middles)
     inside = (t[:, None] > borders[:, 0]) & (t[:, None] <= borders[:, 1])
     share = float(inside.any(axis=1).mean())
     if share < LEAST_SHARE:
         return f"only {share:.0%} of the paths keep to lanes"
-    lane = inside.argmax(axis=1)
-    offset = (t - borders.mean(axis=1)[lane])[inside.any(axis=1)]
-    rms = float(np.sqrt((offset**2).mean()))
-    if rms > MOST_RMS:
-        return f"the paths are {rms:.2f} m (RMS) off the middles of lanes"
+    lane, on = inside.argmax(axis=1), inside.any(axis=1)
+    offset = (t - borders.mean(axis=1)[lane]) / np.diff(borders, axis=1)[lane, 0]
+    squares = np.bincount(lane[on], offset[on] ** 2) / np.maximum(np.bincount(lane[on]), 1)
+    rms = float(np.sqrt((offset[on] ** 2).mean()))
+    worst = float(np.sqrt(squares.max()))
+    if rms > MOST_RMS or worst > MOST_IN_LANE:
+        return f"the paths are {rms:.2f} lane widths (RMS) off the middles, in a lane {worst:.2f}"
     extents, which = [], []
     for k in range(len(borders)):
         here = inside[:, k]
         for begin, end in _extents(s[here], vehicle[here], station[-1]):
-            a, b = np.searchsorted(station, (begin, end))
-            extents.append((int(a), int(min(b, len(line) - 1)) + 1))
+            extents.append((
+                int(np.searchsorted(station, begin, side="right")) - 1,
+                min(int(np.searchsorted(station, end)), len(line) - 1) + 1,
+            ))  # fmt: skip
             which.append(k)
     if not extents:
         return f"no lane of {SHORTEST:g} m"
-    return _Found(line, borders, extents, np.array(which))
+    middle = 0.5 * (borders.min() + borders.max())
+    line = line + middle * np.column_stack([-np.sin(course), np.cos(course)])
+    return _Found(line, borders - middle, extents, np.array(which))
 
 
 def _piles(t: Float, vehicle: Int) -> Float:
@@ -162,7 +173,7 @@ def _extents(s: Float, vehicle: Int, length: float) -> list[tuple[float, float]]
         if not len(run):
             continue
         here = (stretch >= run[0]) & (stretch <= run[-1])
-        ends = length * int(run[0]) / count, length * (int(run[-1]) + 1) / count
+        ends = float(s[here].min()), float(s[here].max())
         if ends[1] - ends[0] >= SHORTEST and len(np.unique(vehicle[here])) >= LEAST_IN_LANE:
             found.append(ends)
     return found

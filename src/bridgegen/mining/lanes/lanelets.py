@@ -6,6 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from bridgegen.arrays import Float
+from bridgegen.errors import FileFormatError
 from bridgegen.mining.lanes.model import NONE, STEP, Kind, RecordedLanes, Strip, along, assemble
 from bridgegen.recordings.lanelets import Lanelet
 
@@ -17,8 +18,18 @@ SHORTEST = 1e-3  # m
 
 
 def lanes_of_lanelets(lanelets: Sequence[Lanelet]) -> RecordedLanes:
-    """Return the lanes of a recording's lanelets; references to others are passed over."""
+    """Return the lanes of a recording's lanelets; references to others are passed over.
+
+    Raises:
+        FileFormatError: they are too long.
+    """
     used = [one for one in lanelets if _is_lane(one)]
+    length_in_all = sum(along(one.left)[-1] for one in used)
+    if length_in_all > MOST_POINTS * STEP:
+        raise FileFormatError(
+            f"lanelets may have {MOST_POINTS * STEP / 1000:,.0f} km in all, got "
+            f"{length_in_all / 1000:,.0f}"
+        )
     number = {one.name: index for index, one in enumerate(used)}
     kinds = [_kind(one) for one in used]
     group = _groups(used, number)
@@ -50,8 +61,8 @@ def _kind(one: Lanelet) -> Kind:
 
 
 def _is_lane(one: Lanelet) -> bool:
-    length = min(along(side)[-1] for side in (one.left, one.right))
-    return not PASSED_OVER.intersection(one.kinds) and SHORTEST < length < MOST_POINTS * STEP
+    shorter = min(along(side)[-1] for side in (one.left, one.right))
+    return not PASSED_OVER.intersection(one.kinds) and shorter > SHORTEST
 
 
 def _groups(used: Sequence[Lanelet], number: dict[str, int]) -> list[int]:
@@ -82,7 +93,7 @@ def _middle_length(members: list[Lanelet], number: dict[str, int]) -> float:
 
 def _bounds(one: Lanelet) -> tuple[Float, Float, Float]:
     """Return shares of the way along a lanelet, and its bounds there."""
-    length = max(along(one.left)[-1], along(one.right)[-1])
+    length = along(one.left)[-1]
     share = np.linspace(0.0, 1.0, math.ceil(length / STEP) + 1)
     return share, _at(one.left, share), _at(one.right, share)
 

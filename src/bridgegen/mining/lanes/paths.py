@@ -23,19 +23,19 @@ from bridgegen.recordings.table import RecordedTraffic, wrap
 
 PIECE = 5.0
 """Length of the pieces of paths, and between two points of a reference line [m]."""
-CELL = 4.0  # m
+CELL = PIECE
 SECTORS = 24
 CROSSING = math.radians(40.0)
-"""Paths within 6 m that differ by more than this, and less than its supplement, cross."""
+"""Paths within 8 m that differ by more than this, and less than its supplement, cross."""
 REACH = 20.0
 """To either side of a reference line [m]."""
 MOST_PIECES = 200_000
-LEAST_VEHICLES = 5
+LEAST_VEHICLES = 10
 
 
 @dataclass(frozen=True, eq=False)
 class Pieces:
-    """Points on paths every `PIECE` metres: ``(n,)`` participant, x, y, heading; in their order."""
+    """Points on paths, `PIECE` apart at most, in their order; ``(n,)`` each."""
 
     participant: Int
     x: Float
@@ -62,7 +62,7 @@ def pieces_of(traffic: RecordedTraffic) -> Pieces:
         states = slice(int(traffic.first[p]), int(traffic.first[p + 1]))
         points = np.column_stack([traffic.x[states], traffic.y[states]])
         station = along(points)
-        at = np.arange(0.0, station[-1], PIECE)
+        at = np.linspace(0.0, station[-1], math.ceil(station[-1] / PIECE) + 1)
         if len(at) < 3:
             continue
         keep_at = np.append(True, np.diff(station) > 0.0)

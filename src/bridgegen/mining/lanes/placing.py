@@ -1,9 +1,9 @@
-"""Where every state of a recording is: on which lane, how far along it, how far beside its middle.
+"""Where every state of a recording is: on which lane, how far along and beside its middle.
 
-Of all sequences of lanes that hold a track's states, the one is taken that is nearest to the middles
-of the lanes and to their directions, and that does not jump between lanes that do not follow one
-another or lie side by side (Viterbi's algorithm); so that on a crossing, where lanes overlap, the
-whole path decides.
+Of all sequences of lanes that hold a track's states, the one is taken that is nearest to the
+middles of the lanes and to their directions, and that does not jump between lanes that neither
+follow one another nor lie side by side (Viterbi's algorithm). So where lanes overlap, as on a
+crossing, the whole path decides.
 """
 
 from dataclasses import dataclass

@@ -31,7 +31,8 @@ def lanes_of_map(model: OpenDrive, place: str) -> RecordedLanes:
     Raises:
         InputError: it has no driving lane, or is too large.
     """
-    if sum(road.length * len(road.sections[0].lanes) for road in model.roads) > MOST_POINTS * STEP:
+    most = (road.length * max(len(one.lanes) for one in road.sections) for road in model.roads)
+    if sum(most) > MOST_POINTS * STEP:
         raise InputError(f"{place}: a map may have {MOST_POINTS * STEP / 1000:,.0f} km of lanes")
     graph = LaneGraph(model)
     known: dict[Node, int] = {}
