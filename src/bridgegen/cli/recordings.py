@@ -7,6 +7,7 @@ import typer
 
 from bridgegen.cli import options as common
 from bridgegen.cli.app import app
+from bridgegen.cli.completion import completing
 from bridgegen.cli.groups import FILES
 
 
@@ -27,15 +28,26 @@ def mine(
         typer.Option("--lenient", help="Skip files that cannot be read, and list them."),
     ] = False,
     dt: Annotated[float, typer.Option(help="Resample at this time step [s].")] = 0.05,
+    keep: Annotated[
+        int, typer.Option(help="Number of the most critical events to write as scenarios.")
+    ] = 10,
+    ego: Annotated[
+        str | None,
+        typer.Option(
+            help="Driver that takes the ego's place in them, see 'bridgegen list drivers'.",
+            autocompletion=completing("driver"),
+        ),
+    ] = None,
     as_json: common.Json = False,
 ) -> None:
-    """Read and clean recorded traffic, place it on lanes, account for it.
+    """Read and clean recorded traffic; find its lanes and near misses.
 
     Says what was recorded: hours, kilometres, participants by kind, and all that cleaning found.
-    Lanes are those of the map, or of the recording, or inferred from its paths.
+    Lanes are those of the map, or of the recording, or inferred from its paths. Near misses are
+    found as in a search; the most critical ones become OpenSCENARIO files that replay them.
     The format is told by the content: tables of states, esmini's log, levelX, NGSIM, SMARTS,
     CommonRoad, INTERACTION, SUMO FCD, Waymo motion as JSON, Argoverse 2, ScenarioNet.
-    Events and scenarios are not found in it yet.
+    Logical scenarios are not made of it yet.
     """
     from bridgegen.mining.mine import mine as mine_recordings
     from bridgegen.screen.recordings import RecordingsScreen, print_mined
@@ -47,6 +59,8 @@ def mine(
             road_map=road_map,
             lenient=lenient,
             time_step=dt,
+            keep=keep,
+            ego=ego,
             progress=screen.progress,
         )
     print_mined(mined, as_json=as_json)

@@ -6,6 +6,11 @@ import sys
 from dataclasses import asdict
 from typing import TYPE_CHECKING
 
+from bridgegen.mining.conflicts.section import (
+    conflicts_as_json,
+    recordings_in_words,
+    screen_rows,
+)
 from bridgegen.screen.live import Live
 from bridgegen.screen.tables import print_table
 
@@ -38,7 +43,15 @@ def print_mined(mined: "Mined", *, as_json: bool) -> None:
         print(f"bridgegen: warning: {text}", file=sys.stderr)
     if as_json:
         print(json.dumps({
-            "recordings": [_facts(one) for one in mined.recordings],
+            "recordings": [_facts(one, mined.time_step) for one in mined.recordings],
+            "scenarios": [
+                {"file": str(one.scenario), "recording": one.event.recording,
+                 "ego": one.event.names[0], "other": one.event.names[1],
+                 "position_off": None if one.problem else one.off,
+                 "speed_off": None if one.problem else one.too_fast,
+                 "problem": one.problem or None, "ontology_lacks": one.lacks}
+                for one in mined.replays
+            ],
             "skipped": [str(path) for path, _ in mined.skipped],
             "others": [str(path) for path in mined.others],
         }, indent=2))  # fmt: skip
@@ -61,10 +74,18 @@ def print_mined(mined: "Mined", *, as_json: bool) -> None:
         print_table(of_rules, found, as_json=False)
     else:
         print("quality: nothing to clean")
+    print()
+    for name, text in recordings_in_words(mined):
+        print(f"{name}: {text}")
+    if mined.replays:
+        print()
+        of_events = ("scenario", "recording", "ego and other", "type", "TTC [s]",
+                     "needed [m/s²]", "responsible")  # fmt: skip
+        print_table(of_events, list(screen_rows(mined)), as_json=False)
     print(f"\n{'page':<8}{mined.out / 'recordings.html'}")
     print(
         f"{'tables':<8}{mined.out / 'recordings.csv'}, {mined.out / 'lanes.csv'}, "
-        f"{mined.out / 'quality.csv'}"
+        f"{mined.out / 'quality.csv'}, {mined.out / 'conflicts.csv'}"
     )
 
 
@@ -96,7 +117,7 @@ def _quality(mined: "Mined") -> "Iterator[tuple[str, int, int, int, str]]":
         )
 
 
-def _facts(one: "Summary") -> dict[str, object]:
+def _facts(one: "Summary", time_step: float) -> dict[str, object]:
     facts = one.facts
     return {
         "name": facts.name, "format": facts.format, "file": facts.source, "frame": facts.frame,
@@ -111,6 +132,7 @@ def _facts(one: "Summary") -> dict[str, object]:
             "carriageways": [asdict(each) for each in one.lanes.carriageways],
             "notes": one.lanes.notes,
         },
+        "conflicts": conflicts_as_json(one, time_step),
         "quality": [
             {"rule": each.rule.value, "participants": each.participants, "count": each.count,
              "examples": each.examples}
