@@ -12,6 +12,8 @@ from bridgegen.simulation.rollout import Rollout
 
 LONG_ENOUGH = 1.0
 """What is recorded for less [s] is a fragment."""
+REVERSES = 0.3
+"""Backwards at less than this [m/s] is noise of a body that stands."""
 
 
 @dataclass(frozen=True)
@@ -92,9 +94,10 @@ def excerpt(
         ahead = centre_ahead(int(traffic.kind[p]), float(traffic.length[p]))
         box[e] = traffic.length[p], traffic.width[p], ahead
         cosine, sine = np.cos(h), np.sin(h)
+        v = traffic.vx[at] * cosine + traffic.vy[at] * sine
         states[:, 0, e] = (
             traffic.x[at] - ahead * cosine, traffic.y[at] - ahead * sine, h,
-            traffic.vx[at] * cosine + traffic.vy[at] * sine, traffic.acceleration[at],
+            np.where((v < 0.0) & (v > -REVERSES), 0.0, v), traffic.acceleration[at],
             np.zeros(count),
         )  # fmt: skip
     x, y, h, v, a, offset = states
