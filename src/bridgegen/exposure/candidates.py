@@ -5,14 +5,14 @@ Forms are compared by Akaike's criterion, 2k - 2 log L. A kernel density has no 
 were not seen (Stone, Journal of the Royal Statistical Society B 39 (1977) 44-47).
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import scipy
 
-from bridgegen.arrays import Float
+from bridgegen.arrays import Bool, Float
 from bridgegen.errors import InputError
 from bridgegen.exposure.families import FAMILIES, Family, Pareto
 from bridgegen.exposure.kernels import estimate, left_out_log_densities, usual_bandwidth
@@ -103,7 +103,9 @@ def candidates(values: Float, low: float, high: float) -> list[Candidate]:
     return sorted(found, key=lambda one: one.criterion)
 
 
-def fit(values: Float, recipe: Recipe, low: float, high: float) -> Candidate | None:
+def fit(
+    values: Float, recipe: Recipe, low: float, high: float, near: Section | None = None
+) -> Candidate | None:
     """Fit one form; None where it cannot be fitted.
 
     Args:
@@ -111,11 +113,13 @@ def fit(values: Float, recipe: Recipe, low: float, high: float) -> Candidate | N
         recipe: what to fit.
         low: of the range.
         high: of the range, above low.
+        near: the same form fitted to similar values: where to begin, and that a coarser optimum
+            will do, to a thousandth.
     """
     start = low if recipe.lower is None else recipe.lower
     end = high if recipe.upper is None else recipe.upper
     inside = values[(start <= values) & (values <= end)]
-    body = _fit_body(inside, recipe, start, end)
+    body = _fit_body(inside, recipe, start, end, near)
     if body is None:
         return None
     section, criterion = body
@@ -128,8 +132,8 @@ def fit(values: Float, recipe: Recipe, low: float, high: float) -> Candidate | N
     ):
         if getattr(recipe, key.removesuffix("_tail")) is None:
             continue
-        tail = _fit_family(excess, Pareto, 0.0, width)
-        if tail is None or not len(excess):
+        tail = _fit_family(excess, Pareto, 0.0, width, near[key] if near else None)
+        if tail is None:
             return None
         (_, shape, scale), log_likelihood = tail
         share = len(excess) / len(values)
@@ -159,7 +163,7 @@ def _tails(values: Float, low: float, high: float) -> Iterator[tuple[float | Non
 
 
 def _fit_body(
-    values: Float, recipe: Recipe, low: float, high: float
+    values: Float, recipe: Recipe, low: float, high: float, near: Section | None
 ) -> tuple[Section, float] | None:
     """Return the section of a form without tails, and its criterion."""
     if not low < high or len(values) < 2:
@@ -180,7 +184,7 @@ def _fit_body(
         }  # fmt: skip
         return section, -2.0 * float(left_out.sum())
     family = FAMILIES[recipe.body]
-    found = _fit_family(values, family, low, high)
+    found = _fit_family(values, family, low, high, near)
     if found is None:
         return None
     numbers, log_likelihood = found
@@ -190,21 +194,26 @@ def _fit_body(
 
 
 def _fit_family(
-    values: Float, family: type[Family], low: float, high: float
+    values: Float, family: type[Family], low: float, high: float, near: Section | None
 ) -> tuple[tuple[float, ...], float] | None:
     """Return the numbers of greatest likelihood within a range, and its logarithm."""
-    if len(values) < 2:
+    if len(values) < 2 or (family.name in _POSITIVE and not values.min() > 0.0):
         return None
-    numbers = _NUMBERS[family.name](values, low, high)
-    if numbers is None:
-        return None
-    start, least, most, to_numbers = numbers
+    guess, least, most = _LIMITS[family.name](values, low, high)
+    if near is not None:
+        guess = [near[key] for key in _KEYS[family.name]]
+    logs = np.array([key in family.positive for key in _KEYS[family.name]])
     ends = (low, high) if family.name == "beta" else ()
+    threshold = (0.0,) if family is Pareto else ()
+    lowest, highest, first = (_logged(one, logs) for one in (least, most, guess))
+
+    def numbers_at(point: Float) -> tuple[float, ...]:
+        return (*threshold, *np.where(logs, np.exp(np.where(logs, point, 0.0)), point).tolist())
 
     def loss(point: Float) -> float:
-        if np.any(point < least) or np.any(point > most):
+        if not (np.all(lowest <= point) and np.all(point <= highest)):
             return np.inf
-        given = (*to_numbers(point), *ends)
+        given = (*numbers_at(point), *ends)
         below, above = family.below(low, *given), family.above(low, *given)
         if below > 0.5:
             mass = above - family.above(high, *given)
@@ -216,91 +225,76 @@ def _fit_family(
         return -total if np.isfinite(total) else np.inf
 
     with np.errstate(all="ignore"):
-        first = np.clip(start, least, most)
+        first = np.clip(first, lowest, highest)
         if not np.isfinite(loss(first)):
             return None
+        precise = 1e-5 if near is None else 1e-3
+        step = np.where(logs, 0.05, 0.05 * np.maximum(np.abs(first), 1.0))
+        corners = np.vstack([first, first + np.diag(np.where(first + step <= highest, step, -step))])
         found = scipy.optimize.minimize(
             loss, first, method="Nelder-Mead",
-            options={"xatol": 1e-5, "fatol": 1e-5, "maxiter": 600, "maxfev": 900},
+            options={"xatol": precise, "fatol": precise, "maxiter": 600, "maxfev": 900,
+                     "initial_simplex": corners},
         )  # fmt: skip
-    return tuple(float(one) for one in to_numbers(found.x)), -float(found.fun)
+    return numbers_at(found.x), -float(found.fun)
 
 
-Start = tuple[Float, Float, Float, Callable[[Float], tuple[float, ...]]]
+def _logged(numbers: Sequence[float], logs: Bool) -> Float:
+    given = np.array(numbers, dtype=np.float64)
+    return np.where(logs, np.log(np.where(logs, given, 1.0)), given)
 
 
-def _positive(point: Float) -> tuple[float, ...]:
-    return tuple(np.exp(point).tolist())
+Limits = tuple[Sequence[float], Sequence[float], Sequence[float]]
 
 
-def _start_normal(values: Float, low: float, high: float) -> Start:
+def _normal(values: Float, low: float, high: float) -> Limits:
+    """Return where to begin, and the least and the greatest numbers that are tried."""
     width = high - low
-    start = np.array([values.mean(), np.log(max(float(values.std()), 1e-6 * width))])
-    limits = np.array([10.0 * width, 0.0])
-    least = np.array([low, np.log(1e-6 * width)]) - limits
-    most = np.array([high, np.log(20.0 * width)]) + limits
-    return start, least, most, lambda point: (float(point[0]), float(np.exp(point[1])))
+    start = (float(values.mean()), max(float(values.std()), 1e-5 * width))
+    return start, (low - 10.0 * width, 1e-6 * width), (high + 10.0 * width, 20.0 * width)
 
 
-def _start_lognormal(values: Float, low: float, high: float) -> Start | None:
-    if not values.min() > 0.0:
-        return None
+def _lognormal(values: Float, low: float, high: float) -> Limits:
     logs = np.log(values)
-    start = np.array([logs.mean(), np.log(max(float(logs.std()), 1e-6))])
-    limits = np.array([20.0, 0.0])
-    return (
-        start, np.array([start[0], np.log(1e-6)]) - limits,
-        np.array([start[0], np.log(20.0)]) + limits, _positive,
-    )  # fmt: skip
+    median = float(np.exp(logs.mean()))
+    start = (median, max(float(logs.std()), 1e-5))
+    return start, (1e-8 * median, 1e-6), (1e8 * median, 20.0)
 
 
-def _start_exponential(values: Float, low: float, high: float) -> Start:
-    width = high - low
-    return (
-        np.array([np.log(max(float(values.mean()), 1e-6 * width))]),
-        np.array([np.log(1e-6 * width)]), np.array([np.log(1e3 * high)]), _positive,
-    )  # fmt: skip
+def _exponential(values: Float, low: float, high: float) -> Limits:
+    return (float(values.mean()),), (1e-6 * high,), (1e3 * high,)
 
 
-def _start_gamma(values: Float, low: float, high: float) -> Start:
-    mean, variance = float(values.mean()), max(float(values.var()), 1e-12)
-    start = np.log([mean**2 / variance, variance / mean])
-    return start, np.log([1e-2, 1e-9 * high]), np.log([1e5, 1e3 * high]), _positive
+def _gamma(values: Float, low: float, high: float) -> Limits:
+    mean, variance = float(values.mean()), max(float(values.var()), 1e-9 * high**2)
+    return (mean**2 / variance, variance / mean), (1e-2, 1e-9 * high), (1e5, 1e3 * high)
 
 
-def _start_weibull(values: Float, low: float, high: float) -> Start:
-    mean, deviation = float(values.mean()), max(float(values.std()), 1e-9)
+def _weibull(values: Float, low: float, high: float) -> Limits:
+    mean, deviation = float(values.mean()), max(float(values.std()), 1e-5 * high)
     shape = (mean / deviation) ** 1.086  # Justus et al., Journal of Applied Meteorology 17 (1978)
-    start = np.log([shape, mean / scipy.special.gamma(1.0 + 1.0 / shape)])
-    return start, np.log([5e-2, 1e-9 * high]), np.log([1e3, 1e3 * high]), _positive
+    scale = mean / float(scipy.special.gamma(1.0 + 1.0 / shape))
+    return (shape, scale), (5e-2, 1e-9 * high), (1e3, 1e3 * high)
 
 
-def _start_beta(values: Float, low: float, high: float) -> Start:
+def _beta(values: Float, low: float, high: float) -> Limits:
     part = (values - low) / (high - low)
     mean, variance = float(part.mean()), max(float(part.var()), 1e-12)
     common = max(mean * (1.0 - mean) / variance - 1.0, 0.2)
-    start = np.log([mean * common, (1.0 - mean) * common])
-    return start, np.log([5e-2, 5e-2]), np.log([1e5, 1e5]), _positive
+    return (mean * common, (1.0 - mean) * common), (5e-2, 5e-2), (1e5, 1e5)
 
 
-def _start_pareto(values: Float, low: float, high: float) -> Start:
+def _pareto(values: Float, low: float, high: float) -> Limits:
     mean = max(float(values.mean()), 1e-9 * high)
-    return (
-        np.array([0.05, np.log(mean)]), np.array([-0.9, np.log(1e-4 * mean)]),
-        np.array([2.0, np.log(1e3 * mean)]),
-        lambda point: (0.0, float(point[0]), float(np.exp(point[1]))),
-    )  # fmt: skip
+    return (0.05, mean), (-0.9, 1e-4 * mean), (2.0, 1e3 * mean)
 
 
-_NUMBERS: dict[str, Callable[[Float, float, float], Start | None]] = {
-    "normal": _start_normal,
-    "lognormal": _start_lognormal,
-    "exponential": _start_exponential,
-    "gamma": _start_gamma,
-    "weibull": _start_weibull,
-    "beta": _start_beta,
-    "pareto": _start_pareto,
-}
+_LIMITS: dict[str, Callable[[Float, float, float], Limits]] = {
+    "normal": _normal, "lognormal": _lognormal, "exponential": _exponential, "gamma": _gamma,
+    "weibull": _weibull, "beta": _beta, "pareto": _pareto,
+}  # fmt: skip
+_KEYS = {name: FAMILIES[name].keys for name in _LIMITS} | {"pareto": ("shape", "scale")}
+"""By family: the numbers that are fitted."""
 
 
 def _rounded(value: float, digits: int = _DIGITS) -> float:

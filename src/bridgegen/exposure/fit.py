@@ -311,7 +311,7 @@ def _fit_parameter(
     shares = (np.arange(n) + 0.5) / n
     ordered = np.sort(values)
     distances, sorted_samples = [], []
-    refit = partial(fit, recipe=best.recipe, low=low, high=high)
+    refit = partial(fit, recipe=best.recipe, low=low, high=high, near=best.section)
     for k in range(len(draws)):
         uniform = _generator(seed, 1 + number, k).random(n)
         sample = np.sort(_at_share(marginal, uniform))
@@ -337,7 +337,7 @@ def _refits(best: Candidate, parameter: Parameter, samples: Any) -> list[Form]:
     """Return the form fitted to other values; where that fails, as it was."""
     made = []
     for sample in samples:
-        again = fit(sample, best.recipe, parameter.low, parameter.high)
+        again = fit(sample, best.recipe, parameter.low, parameter.high, best.section)
         made.append(_form((again or best).section, parameter))
     return made
 
