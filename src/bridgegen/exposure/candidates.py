@@ -179,16 +179,16 @@ def _fit_body(
         left_out = left_out_log_densities(values, density, recipe.bandwidth)
         corners = zip(density.at, density.heights, strict=True)
         rounded = {_rounded(x, 9): _rounded(height) for x, height in corners}
-        section = {
+        polygon: Section = {
             "distribution": "polygon", "at": list(rounded), "density": list(rounded.values()),
         }  # fmt: skip
-        return section, -2.0 * float(left_out.sum())
+        return polygon, -2.0 * float(left_out.sum())
     family = FAMILIES[recipe.body]
     found = _fit_family(values, family, low, high, near)
     if found is None:
         return None
     numbers, log_likelihood = found
-    section = {"distribution": recipe.body}
+    section: Section = {"distribution": recipe.body}
     section |= {key: _rounded(one) for key, one in zip(family.keys, numbers, strict=True)}
     return section, 2.0 * len(numbers) - 2.0 * log_likelihood
 
@@ -230,7 +230,9 @@ def _fit_family(
             return None
         precise = 1e-5 if near is None else 1e-3
         step = np.where(logs, 0.05, 0.05 * np.maximum(np.abs(first), 1.0))
-        corners = np.vstack([first, first + np.diag(np.where(first + step <= highest, step, -step))])
+        corners = np.vstack(
+            [first, first + np.diag(np.where(first + step <= highest, step, -step))]
+        )
         found = scipy.optimize.minimize(
             loss, first, method="Nelder-Mead",
             options={"xatol": precise, "fatol": precise, "maxiter": 600, "maxfev": 900,

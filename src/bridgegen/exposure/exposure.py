@@ -207,7 +207,7 @@ class Exposure:
             ValueError: wrong shape.
         """
         rows = as_float("X", X, (None, len(self.space.names)), finite=False)
-        good = np.isfinite(rows).all(axis=1)
+        good: Bool = np.asarray(np.isfinite(rows).all(axis=1))
         for _, bad in self.broken(rows):
             good &= ~bad
         return good
@@ -329,13 +329,13 @@ class Exposure:
     def _limits(self, name: str, table: Mapping[str, Float | float]) -> tuple[Float, Float]:
         """Return the interval that bounds leave to a parameter; NaN limits nothing."""
         one = self.space.parameters[name]
-        lo, hi = np.float64(one.low), np.float64(one.high)
+        lo, hi = np.asarray(one.low), np.asarray(one.high)
         for bound in self.space.bounds[name]:
             if bound.lo is not None:
-                lo = np.fmax(lo, bound.lo.evaluate(table))
+                lo = np.asarray(np.fmax(lo, bound.lo.evaluate(table)))
             if bound.hi is not None:
-                hi = np.fmin(hi, bound.hi.evaluate(table))
-        return np.asarray(lo), np.asarray(hi)
+                hi = np.asarray(np.fmin(hi, bound.hi.evaluate(table)))
+        return lo, hi
 
     def broken(self, rows: Float) -> Iterator[tuple[str, Bool]]:
         """Yield each rule with the rows that break it, to the tolerance of all constraints.

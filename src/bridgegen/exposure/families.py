@@ -263,9 +263,7 @@ class Weibull(Family):
         shape, scale = numbers
         ratio = np.maximum(x, 0.0) / scale
         density = _log(shape / scale) + scipy.special.xlogy(shape - 1.0, ratio)
-        return np.where(
-            np.asarray(x) >= 0.0, density - Weibull._hazard(x, *numbers), -np.inf
-        )
+        return np.where(np.asarray(x) >= 0.0, density - Weibull._hazard(x, *numbers), -np.inf)
 
 
 class Beta(Family):

@@ -21,14 +21,13 @@ import scipy
 
 from bridgegen.arrays import Float, as_float
 from bridgegen.errors import InputError
-from bridgegen.exposure.candidates import Candidate, Recipe, candidates, fit
+from bridgegen.exposure.candidates import Candidate, candidates, fit
 from bridgegen.exposure.dependence import GaussianCopula
 from bridgegen.exposure.exposure import Exposure
 from bridgegen.exposure.forms import Naming, build_marginal
 from bridgegen.exposure.marginals import Conditional, Form, Marginal
-from bridgegen.exposure.rates import Encounters
 from bridgegen.exposure.reader import build_exposure
-from bridgegen.exposure.tables import read_header, read_table
+from bridgegen.exposure.tables import cell_reader, read_header, read_table
 from bridgegen.exposure.text import exposure_text
 from bridgegen.odd.exposure_schema import MarginalSection
 from bridgegen.odd.parameters import Parameter, nearest
@@ -158,6 +157,12 @@ def fit_exposure(
     if seed < 0:
         raise InputError(f"seed must be at least 0, got {seed}")
     columns, origin = _columns(scenario, events, ignore)
+    rest = [name for name in scenario.space().variables if name not in columns]
+    if rest and others is None:
+        raise InputError(
+            f"others must say what the searched parameters are that have no column, uniform or "
+            f"default: {', '.join(rest)}"
+        )
     rows = len(next(iter(columns.values())))
     inside, outside = _inside(scenario, columns)
     used = int(inside.sum())
@@ -251,7 +256,7 @@ def _columns(
     if problems:
         raise InputError(*problems)
     if path is not None:
-        readers = {name: parameters[name].read for name in wanted}
+        readers = {name: cell_reader(parameters[name]) for name in wanted}
         columns = read_table(path, readers).columns
         digest = hashlib.sha256(path.read_bytes()).hexdigest()[:12]
         return columns, f"{path.name} (SHA-256 {digest}…)"

@@ -22,7 +22,7 @@ from bridgegen.exposure.marginals import (
     Spliced,
     Truncated,
 )
-from bridgegen.exposure.tables import read_table
+from bridgegen.exposure.tables import cell_reader, read_table
 from bridgegen.odd.distributions import Discrete, Histogram, Uniform
 from bridgegen.odd.exposure_schema import FormSection, MarginalSection, TailSection
 from bridgegen.odd.expression import Expression, parse
@@ -158,8 +158,9 @@ class _Builder:
         heights = self.given.density or []
         self.ascending("at", at)
         if len(heights) != len(at):
-            raise InputError(f"as many numbers in density as in at must be given, got {len(heights)}"
-                             f" and {len(at)}")  # fmt: skip
+            raise InputError(
+                f"density must have as many numbers as at, got {len(heights)} and {len(at)}"
+            )
         if not all(0.0 <= one < np.inf for one in heights):
             raise InputError("density must be at least 0 and finite everywhere")
         with np.errstate(over="ignore"):
@@ -173,7 +174,7 @@ class _Builder:
         if folder is None or Path(name).is_absolute() or ".." in Path(name).parts:
             raise InputError(f"the table of a kde lies beside the file that names it, got '{name}'")
         column = self.given.column or self.parameter.name
-        values = read_table(folder / name, {column: self.parameter.read}).columns[column]
+        values = read_table(folder / name, {column: cell_reader(self.parameter)}).columns[column]
         low, high = self.range()
         inside = values[(low <= values) & (values <= high)]
         if len(np.unique(inside)) < 2:
@@ -252,9 +253,7 @@ class _Builder:
                 f"the threshold of a tail must be between {low:g} and {high:g}, got {threshold:g}"
             )
         if sign > 0.0:
-            return threshold, Truncated(
-                Pareto, (threshold, given.shape, scale), threshold, high
-            )
+            return threshold, Truncated(Pareto, (threshold, given.shape, scale), threshold, high)
         beyond = Truncated(Pareto, (0.0, given.shape, scale), 0.0, threshold - low)
         return threshold, Mirrored(beyond, threshold)
 

@@ -29,7 +29,8 @@ def usual_bandwidth(values: Float) -> float:
     """
     quarters = np.quantile(values, [0.25, 0.75])
     spreads = [float(np.std(values, ddof=1)), float(quarters[1] - quarters[0]) / 1.34]
-    return 0.9 * min(one for one in spreads if one > 0.0) * len(values) ** -0.2
+    spread = min(one for one in spreads if one > 0.0)
+    return 0.9 * spread / math.pow(len(values), 0.2)
 
 
 def estimate(values: Float, bandwidth: float, low: float, high: float) -> Polygon:
@@ -55,8 +56,10 @@ def estimate(values: Float, bandwidth: float, low: float, high: float) -> Polygo
     at = np.clip((values - low) / step, 0.0, count)
     left = np.minimum(at.astype(np.int64), count - 1)
     right = at - left
-    mass = np.bincount(left, 1.0 - right, count + 1) + np.bincount(left + 1, right, count + 1)
-    mass[[0, -1]] *= 2.0  # its mirror image lies at the same point
+    mass: Float = np.bincount(left, 1.0 - right, count + 1) + np.bincount(
+        left + 1, right, count + 1
+    )
+    mass[[0, -1]] = 2.0 * mass[[0, -1]]  # its mirror image lies at the same point
     reach = math.ceil(_REACH * bandwidth / step)
     kernel = np.exp(-0.5 * (np.arange(-reach, reach + 1) * step / bandwidth) ** 2)
     smooth = np.convolve(np.pad(mass, reach, mode="reflect" if reach <= count else "edge"), kernel)

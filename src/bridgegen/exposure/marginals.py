@@ -185,7 +185,8 @@ class Truncated:
                 self.family.value_below(np.clip(below, 0.0, 1.0), *self._all),
                 self.family.value_above(np.clip(above, 0.0, 1.0), *self._all),
             )
-        return np.clip(x, self.low, self.high)
+        clipped: Float = np.clip(x, self.low, self.high)
+        return clipped
 
     def tails(self, value: Float) -> tuple[Float, Float]:
         """See `Marginal`."""
@@ -203,8 +204,13 @@ class Truncated:
 
 
 def _parts(
-    below: Value, above: Value, below_low: Value, above_low: Value,
-    below_high: Value, above_high: Value, mass: Value,
+    below: Value,
+    above: Value,
+    below_low: Value,
+    above_low: Value,
+    below_high: Value,
+    above_high: Value,
+    mass: Value,
 ) -> tuple[Float, Float]:
     """Return both tails of a value of what is left of a distribution between two ends."""
     lower = np.where(below <= above, below - below_low, above_low - above) / mass
@@ -505,7 +511,8 @@ class Mixture:
             lower, higher = self.tails(middle)
             left = np.where(upper, higher > tail, lower < tail)  # the value is to the right
             below, above = np.where(left, middle, below), np.where(left, above, middle)
-        return above
+        result: Float = above
+        return result
 
     def tails(self, value: Float) -> tuple[Float, Float]:
         """See `Marginal`."""

@@ -80,9 +80,7 @@ def is_exposure(document: Document) -> bool:
     return isinstance(document.data, dict) and "exposure_of" in document.data
 
 
-def build_exposure(
-    document: Document, scenario: SearchedScenario, folder: Path | None
-) -> Exposure:
+def build_exposure(document: Document, scenario: SearchedScenario, folder: Path | None) -> Exposure:
     """Return an exposure.
 
     Args:

@@ -2,14 +2,16 @@
 
 import csv
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TextIO
 
 import numpy as np
 
 from bridgegen.arrays import Float
 from bridgegen.errors import FileFormatError, InputError
+from bridgegen.odd.parameters import Parameter
 
 MAX_BYTES, MAX_ROWS, MAX_COLUMNS = 2**28, 10**6, 1000
 _MOST_PROBLEMS = 10
@@ -26,6 +28,20 @@ class Table:
 
     columns: dict[str, Float]
     lines: Float
+
+
+def cell_reader(parameter: Parameter) -> Callable[[str], float]:
+    """Return what turns a cell into a value of a parameter: a number, with or without a unit."""
+
+    def read(text: str) -> float:
+        if parameter.kind.names:
+            return parameter.read(text)
+        try:
+            return parameter.read(float(text))
+        except ValueError:
+            return parameter.read(text)
+
+    return read
 
 
 def read_header(path: Path) -> tuple[str, ...]:
@@ -89,7 +105,7 @@ def read_table(path: Path, readers: Mapping[str, Callable[[str], float]]) -> Tab
     return Table(columns, np.array(lines, dtype=np.float64))
 
 
-def _opened(path: Path):  # type: ignore[no-untyped-def]
+def _opened(path: Path) -> TextIO:
     try:
         if not path.is_file():
             raise FileFormatError(f"no such file: {path}")
@@ -100,7 +116,7 @@ def _opened(path: Path):  # type: ignore[no-untyped-def]
         raise FileFormatError(f"cannot be read: {error.strerror} ({path})") from None
 
 
-def _header(reader, path: Path) -> tuple[str, ...]:  # type: ignore[no-untyped-def]
+def _header(reader: Iterator[list[str]], path: Path) -> tuple[str, ...]:
     try:
         header = tuple(name.strip() for name in next(reader, []))
     except (csv.Error, UnicodeDecodeError) as error:

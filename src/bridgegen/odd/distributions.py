@@ -195,9 +195,7 @@ class Normal:
         below, above = self._ends
         standard = (value - self.mean) / self.deviation
         height = _exp(-0.5 * standard * standard) / (self.deviation * math.sqrt(2.0 * math.pi))
-        return np.where(
-            (self.low <= value) & (value <= self.high), height / (above - below), 0.0
-        )
+        return np.where((self.low <= value) & (value <= self.high), height / (above - below), 0.0)
 
 
 @dataclass(frozen=True)

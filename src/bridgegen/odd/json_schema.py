@@ -19,6 +19,7 @@ from bridgegen.odd.parameters import UNITS
 from bridgegen.odd.reader import names
 from bridgegen.odd.roads import KNOBS, Template
 from bridgegen.odd.schema import FragmentFile, ScenarioFile
+from bridgegen.odd.shape import ShapedSection
 from bridgegen.odd.story import CONDITIONS
 from bridgegen.odd.story_schema import ACTIONS
 
@@ -26,7 +27,11 @@ FILE = "bridgegen.schema.json"
 """What `bridgegen new` calls it."""
 
 Kind = Literal["scenario", "fragment", "exposure"]
-_MODELS = {"scenario": ScenarioFile, "fragment": FragmentFile, "exposure": ExposureFile}
+_MODELS: dict[Kind, type[ShapedSection]] = {
+    "scenario": ScenarioFile,
+    "fragment": FragmentFile,
+    "exposure": ExposureFile,
+}
 _ID = "urn:bridgegen:"
 _HEAD = 1000
 _NULL = {"type": "null"}
