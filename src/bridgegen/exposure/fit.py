@@ -1,4 +1,4 @@
-"""An exposure fitted to recorded events: forms chosen, tested, and fitted again to resampled events.
+"""An exposure fitted to recorded events: forms chosen, tested, fitted again to resampled events.
 
 Goodness of fit: Kolmogorov's distance, its p value by parametric bootstrap, because the table of
 the plain test does not hold for numbers that were fitted (Stute, Gonzáles Manteiga and Presedo

@@ -16,7 +16,7 @@ from bridgegen.exposure.fit import Fit, ParameterFit
 from bridgegen.exposure.rates import Rate
 
 GENERATOR = "BridgeGen fit"
-_WIDTH, _HEIGHT, _LEFT, _BOTTOM, _TOP = 560, 300, 14, 40, 12
+_WIDTH, _HEIGHT, _LEFT, _BOTTOM, _TOP = 560, 373, 14, 40, 12
 _SQUARE, _EDGE = 340, 58
 _DOTS = 200
 """Of a quantile plot: more would hide each other."""
@@ -108,7 +108,10 @@ def _remarks(fit: Fit) -> str:
 
 
 def _table(fit: Fit) -> str:
-    head = "".join(f"<th>{one}</th>" for one in ("parameter", "form", "D", "p", "next best"))
+    head = "".join(
+        f"<th{' class=words' if one == 'form' else ''}>{one}</th>"
+        for one in ("parameter", "form", "D", "p", "next best")
+    )
     rows = []
     for one in fit.parameters.values():
         beyond = one.ranking[1:2]
@@ -257,7 +260,10 @@ def _ticks(low: float, high: float) -> list[float]:
     step = 10.0 ** np.floor(np.log10((high - low) / 5.0))
     step *= next(one for one in (1.0, 2.0, 5.0, 10.0) if (high - low) / (step * one) <= 7.0)
     first = np.ceil(low / step - 1e-9)
-    return [float(f"{k * step:.10g}") for k in np.arange(first, np.floor(high / step + 1e-9) + 1.0)]
+    return [
+        float(f"{k * step:.10g}") + 0.0
+        for k in np.arange(first, np.floor(high / step + 1e-9) + 1.0)
+    ]
 
 
 def _points(pairs: "Iterable[tuple[float, float]]") -> str:
