@@ -33,12 +33,13 @@ class GaussianCopula:
     rows: tuple[tuple[float, ...], ...]
 
     def __post_init__(self) -> None:
-        matrix = self.matrix
-        if matrix.shape != (len(self.names), len(self.names)):
+        if len(self.rows) != len(self.names) or {len(row) for row in self.rows} - {len(self.rows)}:
             raise InputError(
-                f"a correlation matrix of {len(self.names)} parameters must be square of that "
-                f"size, got {matrix.shape}"
+                f"a correlation matrix of {len(self.names)} parameters must be square of that size"
             )
+        if not self.names:
+            return
+        matrix = self.matrix
         if not (np.array_equal(matrix, matrix.T) and np.all(np.diag(matrix) == 1.0)):
             raise InputError("a correlation matrix must be symmetric, with 1 on its diagonal")
         values, vectors = np.linalg.eigh(matrix)
@@ -58,7 +59,7 @@ class GaussianCopula:
     @property
     def matrix(self) -> Float:
         """The correlation matrix ``(d, d)``."""
-        return np.array(self.rows, dtype=np.float64).reshape(len(self.rows), -1)
+        return np.array(self.rows, dtype=np.float64).reshape(len(self.rows), len(self.names))
 
     @cached_property
     def _root(self) -> list[list[float]]:

@@ -56,10 +56,10 @@ def estimate(values: Float, bandwidth: float, low: float, high: float) -> Polygo
     at = np.clip((values - low) / step, 0.0, count)
     left = np.minimum(at.astype(np.int64), count - 1)
     right = at - left
-    mass: Float = np.bincount(left, 1.0 - right, count + 1) + np.bincount(
-        left + 1, right, count + 1
-    )
-    mass[[0, -1]] = 2.0 * mass[[0, -1]]  # its mirror image lies at the same point
+    mass = np.zeros(count + 1)
+    np.add.at(mass, left, 1.0 - right)
+    np.add.at(mass, left + 1, right)
+    mass[[0, -1]] *= 2.0  # its mirror image lies at the same point
     reach = math.ceil(_REACH * bandwidth / step)
     kernel = np.exp(-0.5 * (np.arange(-reach, reach + 1) * step / bandwidth) ** 2)
     smooth = np.convolve(np.pad(mass, reach, mode="reflect" if reach <= count else "edge"), kernel)

@@ -73,7 +73,7 @@ class Encounters:
         if not 0 <= self.count <= MOST:
             problems.append(f"count must be 0 to {MOST:g}, got {self.count}")
         if self.hours is None and self.km is None:
-            problems.append("encounters need hours [h] or km [km] in which they were counted")
+            problems.append("hours [h] or km [km] in which they were counted must be given")
         for name, unit, amount in (("hours", "h", self.hours), ("km", "km", self.km)):
             if amount is not None and not 0.0 < amount < math.inf:
                 problems.append(f"{name} [{unit}] must be above 0 and finite, got {amount:g}")

@@ -53,7 +53,7 @@ def read_exposure(source: str | Path, scenario: SearchedScenario | None = None) 
     if given is None:
         raise ScenarioError(*problems)
     if scenario is None:
-        scenario = _named(given.exposure_of, folder, document.at(("exposure_of",)))
+        scenario = _named(given.exposure_of, Path(source) if folder else None, document)
     elif given.exposure_of.rpartition("/")[2] != scenario.name:
         raise ScenarioError(
             f"the exposure must be that of {scenario.name}, got one of {given.exposure_of} "
@@ -125,10 +125,12 @@ def _document(source: str | Path) -> tuple[Document, Path | None]:
     return read_plain_yaml(data, f"{text}.yaml"), None
 
 
-def _named(name: str, folder: Path | None, place: str) -> LogicalScenario:
-    beside = folder / f"{name}.yaml" if folder is not None and "/" not in name else None
-    if beside is not None and beside.is_file():
+def _named(name: str, path: Path | None, document: Document) -> LogicalScenario:
+    """Return the scenario that an exposure's file names, which lies beside it or ships."""
+    beside = path.with_name(f"{name}.yaml") if path is not None and "/" not in name else None
+    if beside is not None and beside != path and beside.is_file():
         return load(beside)
+    place = document.at(("exposure_of",))
     if name not in (known := (*names(), *pack_names())):
         raise ScenarioError(
             f"exposure_of must be a scenario of the catalogue, of a pack, or NAME.yaml beside the "
@@ -187,6 +189,8 @@ def _copula(
         place = document.at(("dependence", "correlation", number))
         pair = frozenset(one.between)
         unknown = [name for name in one.between if name not in names_]
+        if unknown and unknown[0] in given.parameters:
+            continue  # its distribution is wrong, which is said already
         if unknown:
             hint = nearest(unknown[0], names_)
             rule = f"must be between distributed parameters, got '{unknown[0]}'{hint}"
