@@ -45,7 +45,7 @@ def planted(tmp_path_factory, scenario):
 
 @pytest.fixture(scope="module")
 def events(planted):
-    X = planted.from_normal(np.random.default_rng(4).standard_normal((1500, 3)))
+    X = planted.from_normal(np.random.default_rng(4).standard_normal((400, 3)))
     return {name: X[:, planted.space.index(name)] for name in NAMES}
 
 
@@ -56,15 +56,15 @@ def fit(scenario, events):
     )
 
 
-def test_a_fit_finds_what_was_planted(fit):
-    forms = {name: one.form for name, one in fit.parameters.items()}
-    assert forms == {"ego_speed": "normal", "speed_difference": "gamma", "gap": "lognormal"}
-    speed, gap = (fit.parameters[name].section for name in ("ego_speed", "gap"))
-    assert (speed["mean"], speed["deviation"]) == pytest.approx((26.0, 4.0), rel=0.08)
-    assert (gap["median"], gap["log_deviation"]) == pytest.approx((45.0, 0.35), rel=0.08)
+def test_a_fit_finds_what_was_planted(fit, planted):
+    """Within what 400 events tell: 0.068 is the band of their distribution function (95 %)."""
+    for name, one in fit.parameters.items():
+        truth = planted.marginals[name]
+        x = np.linspace(truth.low, truth.high, 301)
+        assert np.abs(one.marginal.tails(x)[0] - truth.tails(x)[0]).max() < 0.05
     i, j, k = (fit.correlated.index(name) for name in NAMES)
-    assert fit.correlation[i, k] == pytest.approx(0.6, abs=0.06)
-    assert fit.correlation[i, j] == pytest.approx(-0.3, abs=0.06)
+    assert fit.correlation[i, k] == pytest.approx(0.6, abs=0.12)
+    assert fit.correlation[i, j] == pytest.approx(-0.3, abs=0.12)
     low, high = fit.correlation_band
     assert low[i, k] < 0.6 < high[i, k]
     for one in fit.parameters.values():
@@ -86,20 +86,24 @@ def test_the_file_is_the_exposure(fit, scenario, tmp_path):
     assert again.source.startswith("Fitted by BridgeGen")
 
 
-def test_the_same_seed_gives_the_same_bits(fit, scenario, events):
-    again = fit_exposure(
-        scenario, events, hours=50.0, km=4000.0, others="default", replicates=20, seed=3
+def test_the_same_seed_gives_the_same_bits(scenario, events):
+    few = {name: events[name][:60] for name in ("ego_speed", "gap")}
+    one, same, other = (
+        fit_exposure(scenario, few, others="default", replicates=20, seed=seed)
+        for seed in (3, 3, 4)
     )
-    assert again.text == fit.text
-    for name, one in fit.parameters.items():
-        assert again.parameters[name].p == one.p
-        assert np.array_equal(again.parameters[name].band, one.band)
+    assert same.text == one.text
+    for name, each in one.parameters.items():
+        assert same.parameters[name].p == each.p
+        assert np.array_equal(same.parameters[name].band, each.band)
+        assert not np.array_equal(other.parameters[name].band, each.band)
 
 
 def test_replicates_are_exposures_that_differ_as_the_data_allow(fit):
     assert len(fit.replicates) == 20
-    means = [one.marginals["ego_speed"].numbers[0] for one in fit.replicates]
-    assert 0.02 < np.std(means) < 0.5  # σ/√n is 0.1, somewhat more as it is cut off
+    half, above = np.array([0.5]), np.array([False])
+    middles = [float(one.marginals["ego_speed"].value(half, above)[0]) for one in fit.replicates]
+    assert 0.05 < np.std(middles) < 0.6  # of a median, 1.25 σ/√n = 0.25 at most
     assert fit.replicates[0].sample(5, 0).X.shape == fit.exposure.sample(5, 0).X.shape
 
 
@@ -159,11 +163,12 @@ def test_a_column_that_cannot_be_fitted_is_refused(scenario, events, change, rul
 
 
 def test_searched_parameters_without_a_column_must_be_spoken_of(scenario, events):
-    with pytest.raises(InputError, match=r"others must say .*: cut_in_distance, change_time"):
+    with pytest.raises(InputError, match=r"others must say .*, cut_in_distance, change_time$"):
         fit_exposure(scenario, {name: values[:60] for name, values in events.items()})
 
 
-def _csv(path, events, count=80, also=""):
+def _csv(path, events, count=60, also=""):
+    events = {name: events[name] for name in ("ego_speed", "gap")}
     head = ",".join(events) + (",id" if also else "")
     columns = [values[:count] for values in events.values()]
     rows = [",".join(f"{x:.6f}" for x in row) + also for row in zip(*columns, strict=True)]
@@ -193,23 +198,23 @@ def test_the_command_writes_exposure_page_and_distribution(tmp_path, events, mon
     words += ["--ignore", "id"]
     status, out, err = _run(monkeypatch, capsys, *words, "--xosc", tmp_path / "d.xosc")
     assert status == 0
-    assert "80 of 80 events fitted" in out
+    assert "60 of 60 events fitted" in out
     assert "OpenSCENARIO has no correlations" in err
     page = (tmp_path / "e.html").read_text("utf-8")
-    assert page.count("<svg") == 6
+    assert page.count("<svg") == 4
     assert "script" not in page
     assert "nan" not in page.lower().replace("deviation", "")
     status, out, _ = _run(monkeypatch, capsys, "validate", tmp_path / "e.yaml")
     assert (status, "valid" in out) == (0, True)
     status, out, _ = _run(monkeypatch, capsys, *words, "--json")  # an earlier fit is replaced
-    assert (status, json.loads(out)["used"]) == (0, 80)
+    assert (status, json.loads(out)["used"]) == (0, 60)
     (tmp_path / "e.yaml").write_text("exposure_of: mine\n", "utf-8")
     status, _, err = _run(monkeypatch, capsys, *words)
     assert (status, "is not overwritten" in err) == (2, True)
 
 
 def test_the_distribution_is_read_as_the_fit(tmp_path, events, monkeypatch, capsys):
-    table = _csv(tmp_path / "events.csv", events, count=300)
+    table = _csv(tmp_path / "events.csv", events, count=200)
     _run(
         monkeypatch, capsys, "fit", "cut-in", table, "--others", "default", "--replicates", "20",
         "--out", tmp_path / "e.yaml", "--xosc", tmp_path / "d.xosc",

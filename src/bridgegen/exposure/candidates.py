@@ -2,9 +2,12 @@
 
 Forms are compared by Akaike's criterion, 2k - 2 log L. A kernel density has no k; its criterion is
 -2 times its leave-one-out log likelihood, which estimates the same: the log density of values that
-were not seen (Stone, Journal of the Royal Statistical Society B 39 (1977) 44-47).
+were not seen (Stone, Journal of the Royal Statistical Society B 39 (1977) 44-47). Of forms that
+differ by less than `SUPPORT` the data do not say which is right: the one with the fewest numbers is
+taken (Burnham and Anderson, Model Selection and Multimodel Inference, 2nd ed. (2002), section 2.6).
 """
 
+import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -19,6 +22,9 @@ from bridgegen.exposure.kernels import estimate, left_out_log_densities, usual_b
 
 LEAST_EXCEEDANCES = 50
 """Values beyond the threshold of a tail: the standard error of its shape is 1/√50 = 0.14 then."""
+
+SUPPORT = 4.0
+"""A form whose criterion is worse by this has considerably less support."""
 
 TAIL_SHARE = 0.1
 """Of the values, those that are a tail of their own."""
@@ -66,15 +72,23 @@ class Candidate:
         recipe: which.
         section: it as an exposure's file has it.
         criterion: less is better.
+        numbers: how many were fitted; inf of a kernel density.
     """
 
     recipe: Recipe
     section: Section
     criterion: float
 
+    @property
+    def numbers(self) -> float:
+        """See above."""
+        body = {"uniform": 0, "kde": math.inf}.get(self.recipe.body)
+        tails = sum(one is not None for one in (self.recipe.lower, self.recipe.upper))
+        return 3 * tails + (len(_KEYS[self.recipe.body]) if body is None else body)
+
 
 def candidates(values: Float, low: float, high: float) -> list[Candidate]:
-    """Return the forms that fit values, best first.
+    """Return the forms that fit values: the one that is taken, then the others, best first.
 
     Args:
         values: ``(n,)`` in [low, high], not all the same.
@@ -100,7 +114,11 @@ def candidates(values: Float, low: float, high: float) -> list[Candidate]:
             found += bodies
         elif bodies:
             found.append(min(bodies, key=lambda one: one.criterion))
-    return sorted(found, key=lambda one: one.criterion)
+    least = min(one.criterion for one in found)
+    found.sort(key=lambda one: one.criterion)
+    alike = [one for one in found if one.criterion <= least + SUPPORT]
+    taken = min(alike, key=lambda one: one.numbers)
+    return [taken, *(one for one in found if one is not taken)]
 
 
 def fit(

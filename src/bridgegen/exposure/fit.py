@@ -57,7 +57,7 @@ class ParameterFit:
         section: the form as a file has it.
         marginal: the form.
         form: it in words.
-        ranking: the forms that were tried with their criterion, best first.
+        ranking: the form that was taken, then the others, best first, each with its criterion.
         distance: Kolmogorov's, of data and form; NaN for single values.
         p: the probability of a larger distance if the form were true; NaN likewise.
         at: ``(GRID,)`` values; those that it takes, for single values.

@@ -115,7 +115,7 @@ def _table(fit: Fit) -> str:
     rows = []
     for one in fit.parameters.values():
         beyond = one.ranking[1:2]
-        second = f"{beyond[0][0]} (AIC +{beyond[0][1] - one.ranking[0][1]:.1f})" if beyond else "–"
+        second = f"{beyond[0][0]} (AIC {beyond[0][1] - one.ranking[0][1]:+.1f})" if beyond else "–"
         tested = ("–", "–") if np.isnan(one.p) else (f"{one.distance:.3f}", f"{one.p:.3f}")
         cells = [*tested, escape(second)]
         rows.append(
