@@ -62,6 +62,10 @@ SECTIONS = {
 }
 
 
+def tail(threshold, share):
+    return {"threshold": threshold, "share": share, "scale": 1, "shape": 0}
+
+
 def made(section):
     return build_marginal(MarginalSection.model_validate(section), GAP, NAMING, "here")
 
@@ -190,15 +194,15 @@ def test_a_kernel_density_is_that_of_scipy_reflected():
         ({"distribution": "normal", "mean": "2*", "deviation": 1}, "cannot read the formula"),
         ({"distribution": "kde", "file": "../x.csv", "bandwidth": 1}, "lies beside the file"),
         (
-            {**SECTIONS["normal far out"], "upper_tail": {"threshold": 90, "share": 0.1, "scale": 1, "shape": 0}},
+            {**SECTIONS["normal far out"], "upper_tail": tail(90, 0.1)},
             "threshold of a tail must be between 5 and 80",
         ),
         (
-            {**SECTIONS["uniform"], "upper_tail": {"threshold": 60, "share": 0.1, "scale": 1, "shape": 0}},
+            {**SECTIONS["uniform"], "upper_tail": tail(60, 0.1)},
             "no key 'upper_tail'",
         ),
         (
-            {**SECTIONS["weibull"], "upper_tail": {"threshold": 60, "share": 1.1, "scale": 1, "shape": 0}},
+            {**SECTIONS["weibull"], "upper_tail": tail(60, 1.1)},
             "shares of tails must be above 0, and below 1",
         ),
     ],
@@ -218,7 +222,7 @@ def test_a_formula_gives_each_row_its_own_distribution():
     for k, speed in enumerate(speeds):
         alone = Truncated(FAMILIES["normal"], (2.0 * speed, 0.1 * speed), 5.0, 80.0)
         assert given_.tails(x)[0][k] == alone.tails(x[k : k + 1])[0][0]
-    with pytest.raises(InputError, match="deviation must be above 0, got -0.5"):
+    with pytest.raises(InputError, match=r"deviation must be above 0, got -0\.5"):
         one.given({"ego_speed": np.array([10.0, -5.0])})
 
 
