@@ -37,9 +37,12 @@ participants:
     speed: ego_speed
   bv: {type: car, start: {lane: 1, distance: bv_at}, speed: bv_speed}
 parameters:
-  ego_speed: {axis: participants, unit: m/s, low: 10, high: 20, default: 15, description: Fast., source: Ours.}
-  bv_speed: {axis: participants, unit: m/s, low: 10, high: 20, default: 12, description: Slow., source: Ours.}
-  bv_at: {axis: participants, unit: m, low: 70, high: 170, default: 100, description: Ahead., source: Ours.}
+  ego_speed:
+    {axis: participants, unit: m/s, low: 10, high: 20, default: 15, description: Fast., source: A}
+  bv_speed:
+    {axis: participants, unit: m/s, low: 10, high: 20, default: 12, description: Slow., source: A}
+  bv_at:
+    {axis: participants, unit: m, low: 70, high: 170, default: 100, description: Ahead., source: A}
 bounds:
   - {target: bv_speed, hi: ego_speed, why: It is slower., source: Ours.}
 objective: harm
@@ -203,13 +206,17 @@ def test_a_correlation_of_a_row_with_defaults(folder):
     assert one.feasible_share.estimate == 1.0
 
 
+def one_of(name: str, form: str) -> str:
+    return f"others: default\nparameters:\n  {name}: {form}"
+
+
 WRONG = [
-    ("others: default\nparameters:\n  ego_spede: {distribution: uniform}", "unknown parameter 'ego_spede'; did", 6),
-    ("others: default\nparameters:\n  ego_speed: {distribution: uniform, lowest: 3}", "unknown key 'lowest'", 6),
-    ("others: default\nparameters:\n  ego_speed: {distribution: gauss}", "must be 'uniform', 'normal'", 6),
-    ("others: default\nparameters:\n  ego_speed: {distribution: uniform, low: 3}", "low must be in the range", 6),
+    (one_of("ego_spede", "{distribution: uniform}"), "unknown parameter 'ego_spede'; did", 6),
+    (one_of("ego_speed", "{distribution: uniform, lowest: 3}"), "unknown key 'lowest'", 6),
+    (one_of("ego_speed", "{distribution: gauss}"), "must be 'uniform', 'normal'", 6),
+    (one_of("ego_speed", "{distribution: uniform, low: 3}"), "low must be in the range", 6),
     ("parameters:\n  ego_speed: {distribution: uniform}", "others must say", 2),
-    ("others: default\nparameters:\n  ego_speed: {distribution: uniform, source: ''}", "must not be empty", 6),
+    (one_of("ego_speed", "{distribution: uniform, source: ''}"), "must not be empty", 6),
     (
         "others: uniform\ndependence:\n  correlation:\n    - {between: [ego_speed, bv], value: 0}",
         "must be between distributed parameters, got 'bv'", 7,

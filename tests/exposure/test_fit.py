@@ -132,7 +132,7 @@ def test_a_heavy_tail_is_found_where_there_are_exceedances():
 
 def test_too_few_rows_say_how_many_are_needed(scenario, events):
     few = {name: values[: LEAST_ROWS - 1] for name, values in events.items()}
-    with pytest.raises(InputError, match="a fit needs 47 events .* got 46 of 46"):
+    with pytest.raises(InputError, match=r"a fit needs 47 events .* got 46 of 46"):
         fit_exposure(scenario, few, others="default")
 
 
