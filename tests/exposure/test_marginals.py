@@ -165,7 +165,7 @@ def test_a_tail_has_its_share_beyond_its_threshold():
 
 
 def test_a_kernel_density_is_that_of_scipy_reflected():
-    values = np.random.default_rng(5).gamma(2.0, 8.0, 300)
+    values = np.random.default_rng(5).gamma(1.0, 12.0, 300)  # many of them near 0
     values = values[values < 60.0]
     h = usual_bandwidth(values)
     ours = estimate(values, h, 0.0, 60.0)
@@ -173,7 +173,7 @@ def test_a_kernel_density_is_that_of_scipy_reflected():
     images = [values, -values, 120.0 - values]
     exact = sum(stats.norm.pdf((x[:, None] - one) / h).sum(axis=1) for one in images)
     exact /= len(values) * h
-    assert np.allclose(np.exp(ours.log_density(x)), exact, rtol=5e-3, atol=1e-6)
+    assert np.allclose(np.exp(ours.log_density(x)), exact, rtol=5e-3, atol=1e-5)
 
 
 @pytest.mark.parametrize(

@@ -219,8 +219,10 @@ class Exposure:
             X: ``(N, len(space.names))``, within the ranges of the marginals.
 
         Returns:
-            Z ``(N, dimensions)``. `from_normal` gives X back up to rounding; of a parameter with
-            single values, Z is the middle of those that give the value.
+            Z ``(N, dimensions)``. `from_normal` gives X back up to rounding, and this gives Z back
+            to 1e-10 where normal scores are within 4; beyond, as well as doubles tell a value from
+            the end of its range. Of a parameter with single values, Z is the middle of those that
+            give the value.
 
         Raises:
             ValueError: wrong shape, NaN or inf.

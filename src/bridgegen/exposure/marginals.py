@@ -366,10 +366,7 @@ class Spliced:
         for k, (one, share) in enumerate(self.pieces):
             mine = at == k
             part = (tail[mine] - np.where(upper[mine], above[k], below[k])) / share
-            far = part > 0.5
-            result[mine] = one.value(
-                np.clip(np.where(far, 1.0 - part, part), 0.0, 1.0), upper[mine] ^ far
-            )
+            result[mine] = one.value(np.clip(part, 0.0, 1.0), upper[mine])
         return result
 
     def tails(self, value: Float) -> tuple[Float, Float]:
