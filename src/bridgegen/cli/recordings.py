@@ -40,7 +40,7 @@ def mine(
     ] = None,
     as_json: common.Json = False,
 ) -> None:
-    """Read and clean recorded traffic; find its lanes and near misses.
+    """Find near misses in recorded traffic, cleaned.
 
     Says what was recorded: hours, kilometres, participants by kind, and all that cleaning found.
     Lanes are those of the map, or of the recording, or inferred from its paths. Near misses are
