@@ -1,6 +1,7 @@
 """Recorded events as files: played again, they are what was recorded."""
 
 import itertools
+from dataclasses import replace
 from xml.etree import ElementTree
 
 import numpy as np
