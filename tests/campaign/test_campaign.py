@@ -522,6 +522,8 @@ def test_an_exported_file_that_is_deleted_while_the_report_is_made_costs_no_eval
             shutil.rmtree(folder / "critical")
 
     with pytest.raises(StorageError, match="the evaluations are kept, 'bridgegen resume"):
-        bg.run_search("crossroads-s4", budget=120, keep=1, ego="route-follower", causes=False,
-                      triage="none", out=folder, callbacks=SearchCallbacks(stage=on_stage))  # fmt: skip
+        bg.run_search(
+            "crossroads-s4", budget=120, keep=1, ego="route-follower", causes=False,
+            triage="none", out=folder, callbacks=SearchCallbacks(stage=on_stage),
+        )  # fmt: skip
     assert bg.resume(folder).scenarios
