@@ -148,6 +148,7 @@ def add_planners(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
         def install(**points: str) -> None:
             lines = [f"{name} = planner_packages:{value}" for name, value in points.items()]
             (info / "entry_points.txt").write_text("\n".join(["[bridgegen.drivers]", *lines]))
+            os.utime(site)  # as if installed now
             patched.setattr(registry.planners(), "_loaded", {})
 
         yield install

@@ -183,7 +183,8 @@ def test_a_scenario_as_built_keeps_all_rules(individuals, scenario):
 
 
 def test_what_conforms_to_one_scenario_is_held_against_another(individuals, scenario, values):
-    slower = replace(scenario.parameters["bv_speed"], high=values["bv_speed"] - 0.1)
+    low = values["bv_speed"] - 0.1
+    slower = replace(scenario.parameters["bv_speed"], high=low, default=low)
     narrow = replace(scenario, parameters={**scenario.parameters, "bv_speed": slower})
     for _ in range(2):
         assert check(individuals, load(scenario.name)) == []
