@@ -112,6 +112,19 @@ def moved(rollout, turn, dx, dy):
     )
 
 
+def test_noise_of_a_body_that_has_stopped_does_not_turn_it_round(meeting, track, course):
+    """It brakes to a stop before one that stands, and then its speed wavers around 0."""
+    v = course((0.0, 15.0), (1.0, 15.0), (2.875, 0.0), (6.0, 0.0))
+    ahead = track(v=v)
+    standing = track(x=ahead["x"][-1] + 4.4, v=0.0)
+    known = analyse(meeting(ahead, standing))
+    assert known.kind[0, 1] == NEAR_MISS
+    noisy = ahead | {"v": np.where(v == 0.0, -0.01, v)}
+    found = analyse(meeting(noisy, standing))
+    assert found.kind[0, 1] == NEAR_MISS
+    assert found.ttc[0, 1] == known.ttc[0, 1]
+
+
 @given(SEEDS, st.floats(-3, 3), st.floats(-100, 100), st.floats(-100, 100))
 @settings(max_examples=25)
 def test_it_does_not_matter_where_north_is(seed, turn, dx, dy):

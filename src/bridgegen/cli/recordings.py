@@ -7,6 +7,7 @@ import typer
 
 from bridgegen.cli import options as common
 from bridgegen.cli.app import app
+from bridgegen.cli.completion import completing
 from bridgegen.cli.groups import FILES
 
 
@@ -18,25 +19,48 @@ def mine(
     out: Annotated[
         Path, typer.Option(help="Folder for the page and the tables, new or an earlier one.")
     ] = Path("mined"),
+    road_map: Annotated[
+        Path | None,
+        typer.Option("--map", help="OpenDRIVE map of the place, in their coordinates."),
+    ] = None,
     lenient: Annotated[
         bool,
         typer.Option("--lenient", help="Skip files that cannot be read, and list them."),
     ] = False,
     dt: Annotated[float, typer.Option(help="Resample at this time step [s].")] = 0.05,
+    keep: Annotated[
+        int, typer.Option(help="Number of the most critical events to write as scenarios.")
+    ] = 10,
+    ego: Annotated[
+        str | None,
+        typer.Option(
+            help="Driver that takes the ego's place in them, see 'bridgegen list drivers'.",
+            autocompletion=completing("driver"),
+        ),
+    ] = None,
     as_json: common.Json = False,
 ) -> None:
-    """Read and clean recorded traffic; account for it.
+    """Find near misses in recorded traffic, cleaned.
 
     Says what was recorded: hours, kilometres, participants by kind, and all that cleaning found.
+    Lanes are those of the map, or of the recording, or inferred from its paths. Near misses are
+    found as in a search; the most critical ones become OpenSCENARIO files that replay them.
     The format is told by the content: tables of states, esmini's log, levelX, NGSIM, SMARTS,
     CommonRoad, INTERACTION, SUMO FCD, Waymo motion as JSON, Argoverse 2, ScenarioNet.
-    Events and scenarios are not found in it yet.
+    Logical scenarios are not made of it yet.
     """
-    from bridgegen.recordings.mine import mine as mine_recordings
+    from bridgegen.mining.mine import mine as mine_recordings
     from bridgegen.screen.recordings import RecordingsScreen, print_mined
 
     with RecordingsScreen() as screen:
         mined = mine_recordings(
-            recordings, out=out, lenient=lenient, time_step=dt, progress=screen.progress
+            recordings,
+            out=out,
+            road_map=road_map,
+            lenient=lenient,
+            time_step=dt,
+            keep=keep,
+            ego=ego,
+            progress=screen.progress,
         )
     print_mined(mined, as_json=as_json)

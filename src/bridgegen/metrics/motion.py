@@ -8,6 +8,9 @@ from bridgegen.arrays import Bool, Float, Int, as_float
 from bridgegen.metrics.metric import distance, recorded, shared, steps
 from bridgegen.simulation.rollout import Rollout
 
+STANDS = 0.05
+"""A body that is slower than this [m/s] stands, and does not turn round by the sign of noise."""
+
 
 @dataclass(frozen=True)
 class Motion:
@@ -20,7 +23,7 @@ class Motion:
             its heading, the opposite one where it reverses. Its box is the same either way.
         v: ``(N, E, T)`` float64 [m/s], ≥ 0, in that direction.
         a: ``(N, E, T)`` float64 [m/s²], likewise.
-        reverses: ``(N, E, T)`` bool; None where no body ever does.
+        reverses: ``(N, E, T)`` bool, at more than `STANDS`; None where no speed is < 0.
         distance: ``(N, E, T)`` float64 [m], from the ego's box; +inf where absent.
         n_steps: ``(N,)`` int64.
     """
@@ -52,9 +55,25 @@ def _motion(rollout: Rollout) -> Motion:
     _motion_kernels.place(box, x, y, cosine, sine, n_steps, centre_x, centre_y)
     a, reverses = recorded(rollout, "a"), None
     if v.size and v.min() < 0.0:
-        reverses = v < 0.0
+        reverses = _reverses(v)
         cosine, sine, v, a = (np.where(reverses, -one, one) for one in (cosine, sine, v, a))
+        v = np.maximum(v, 0.0)
     half = 0.5 * box[:, :2]
     return Motion(
         half, centre_x, centre_y, cosine, sine, v, a, reverses, distance(rollout), n_steps
     )
+
+
+def _reverses(v: Float) -> Bool:
+    """Return when bodies drive backwards, ``(N, E, T)``: while one stands, as it did before.
+
+    One that has not driven yet stands as it will drive; where it never drives, its sign decides.
+    """
+    drives = np.abs(v) > STANDS
+    instants = np.arange(v.shape[-1])
+    last = np.maximum.accumulate(np.where(drives, instants, -1), axis=-1)
+    first = np.argmax(drives, axis=-1, keepdims=True)
+    ever = np.asarray(drives.any(axis=-1, keepdims=True))
+    decides = np.where(ever, np.where(last < 0, first, last), instants)
+    backwards: Bool = np.take_along_axis(v, decides, axis=-1) < 0.0
+    return backwards

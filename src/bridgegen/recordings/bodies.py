@@ -1,19 +1,29 @@
-"""The usual box of each kind, for recordings that do not say."""
+"""The usual body of each kind, for what recordings do not say."""
 
 from bridgegen.ego.kinds import NAMES
-from bridgegen.participants import PARTICIPANTS
+from bridgegen.participants import PARTICIPANTS, ParticipantKind
 
-_BOXES = {
-    name: next(
-        (one.body.length, one.body.width)
-        for one in PARTICIPANTS.values()
-        if one.seen_as.name == name
-    )
-    for name in NAMES
+_USUAL = {
+    name: next(one for one in PARTICIPANTS.values() if one.seen_as.name == name) for name in NAMES
 }
-"""Of the first participant of each class, which is the one that gave the class its name."""
+"""The first participant of each class, which is the one that gave the class its name."""
+
+
+def usual(kind: int) -> ParticipantKind:
+    """Return the participant that a kind of `bridgegen.ego.kinds` usually is."""
+    return _USUAL[NAMES[kind]]
 
 
 def usual_box(kind: int) -> tuple[float, float]:
     """Return length and width [m] of a kind of `bridgegen.ego.kinds`."""
-    return _BOXES[NAMES[kind]]
+    body = usual(kind).body
+    return body.length, body.width
+
+
+def centre_ahead(kind: int, length: float) -> float:
+    """Return how far a body's centre is ahead of its rear axle [m]; 0 for what has no axles.
+
+    It is the same share of the length as of the usual body.
+    """
+    body = usual(kind).body
+    return body.center_ahead / body.length * length

@@ -228,8 +228,9 @@ def _complete(
         done = {
             "x": smoothing.hermite(within, time, columns["x"], vx),
             "y": smoothing.hermite(within, time, columns["y"], vy),
+            "heading": smoothing.hermite(within, time, heading, np.gradient(heading, time)),
             **{key: np.interp(within, time, values) for key, values in (
-                ("vx", vx), ("vy", vy), ("heading", heading), ("acceleration", acceleration),
+                ("vx", vx), ("vy", vy), ("acceleration", acceleration),
             )},
         }  # fmt: skip
         lane = track.lane[np.searchsorted(time, within + SAME, side="right") - 1]
@@ -237,26 +238,38 @@ def _complete(
 
 
 def _smoothed(traffic: RecordedTraffic, p: int, track: _Track, quality: Quality) -> _Track:
-    """Return a track without noise in its positions; its own where there is next to none."""
+    """Return a track without noise in its positions, to which its velocities belong.
+
+    A track that is so already is returned as it is.
+    """
     columns, step = track.columns, traffic.facts.time_step
-    if smoothing.scatter(columns["x"], columns["y"]) <= smoothing.NOISE:
-        return track
     if step > smoothing.COARSEST:
         return track  # what looks like noise is motion
     name = traffic.names[p]
+    misfit = smoothing.misfit(*(columns[key] for key in ("time", "x", "y", "vx", "vy")))
+    if misfit > smoothing.MISFIT:
+        quality.note(Rule.MISFIT, p, len(track), f"{name}, {misfit:.2g} m/s off")
+        if len(track) < smoothing.LEAST_STATES:
+            unknown = np.full(len(track), np.nan)
+            return _Track(
+                columns | dict.fromkeys(("vx", "vy", "acceleration"), unknown), track.lane
+            )
+    elif smoothing.scatter(columns["x"], columns["y"]) <= smoothing.NOISE:
+        return track
     count = round((columns["time"][-1] - columns["time"][0]) / step) + 1
     time = np.linspace(columns["time"][0], columns["time"][-1], count)
     step = float(time[1] - time[0])
     at = {key: np.interp(time, columns["time"], columns[key]) for key in ("x", "y")}
     quality.note(Rule.SMOOTHED, p, len(track), name)
     x, y = (smoothing.smooth(at[key], step, 0) for key in ("x", "y"))
-    vx, vy = (smoothing.smooth(at[key], step, 1) for key in ("x", "y"))
+    vx, vy = (smoothing.slopes(time, values) for values in (x, y))
     ax, ay = (smoothing.smooth(at[key], step, 2) for key in ("x", "y"))
     nearest = np.searchsorted(columns["time"], time + SAME, side="right") - 1
     given = columns["heading"]
     heading = np.full(count, np.nan)
     if np.isfinite(given).all():
-        heading = np.interp(time, columns["time"], np.unwrap(given))
+        turned = np.interp(time, columns["time"], np.unwrap(given))
+        heading = smoothing.smooth(turned, step, 0)
     speed = np.hypot(vx, vy)
     along = np.divide(ax * vx + ay * vy, speed, out=np.zeros(count), where=speed > 0.1)
     return _Track(

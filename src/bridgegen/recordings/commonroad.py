@@ -1,7 +1,7 @@
 """CommonRoad scenarios (XML, versions 2020a and 2018b): dynamic and static obstacles.
 
 An interval stands for its middle. An obstacle whose prediction is an occupancy set has no
-trajectory, and is left out with a note.
+trajectory, and is left out with a note. Lanelets come with the recording.
 
 Source: CommonRoad, XML format documentation, both versions.
 """
@@ -17,7 +17,8 @@ from bridgegen.ego.kinds import BICYCLE, BUS, CAR, MOTORCYCLE, OTHER, PEDESTRIAN
 from bridgegen.errors import FileFormatError
 from bridgegen.openx.xml import parse_xml
 from bridgegen.recordings.format import Format, Head
-from bridgegen.recordings.table import UNKNOWN_KIND, Facts, RecordedTraffic, build
+from bridgegen.recordings.lanelets import Lanelet
+from bridgegen.recordings.table import FARTHEST, UNKNOWN_KIND, Facts, RecordedTraffic, build
 
 KINDS = {
     "car": CAR, "taxi": CAR, "parkedVehicle": CAR, "priorityVehicle": CAR, "truck": TRUCK,
@@ -76,7 +77,7 @@ def _read(path: Path) -> Iterator[RecordedTraffic]:
         name=root.get("benchmarkID") or path.stem, format=FORMAT.name, source=str(path),
         time_step=step, frame="the scenario's",
         map="lanelets of the file" if root.find("lanelet") is not None else "",
-        notes=tuple(notes),
+        notes=tuple(notes), lanelets=tuple(_lanelet(path, one) for one in root.iterfind("lanelet")),
     )  # fmt: skip
     heading, speed = table[:, 3], table[:, 4]
     yield build(
@@ -90,6 +91,36 @@ def _read(path: Path) -> Iterator[RecordedTraffic]:
         names=[element.get("id") or "" for element, _ in found],
         kind=[KINDS.get(element.findtext("type") or "", UNKNOWN_KIND) for element, _ in found],
         length=[length for length, _ in boxes], width=[width for _, width in boxes],
+    )  # fmt: skip
+
+
+def _lanelet(path: Path, element: etree._Element) -> Lanelet:
+    left, right = (
+        np.array([
+            [_number(path, point, point.findtext(axis), axis) for axis in ("x", "y")]
+            for point in element.iterfind(f"{side}/point")
+        ]).reshape(-1, 2)
+        for side in ("leftBound", "rightBound")
+    )  # fmt: skip
+    if min(len(left), len(right)) < 2:
+        raise FileFormatError(
+            f"{path}, line {_line(element)}: a lanelet must have two points at least on each bound"
+        )
+    if not max(np.abs(left).max(), np.abs(right).max()) <= FARTHEST:
+        raise FileFormatError(
+            f"{path}, line {_line(element)}: x and y [m] of a lanelet must be within ±{FARTHEST:g}"
+        )
+    beside = {
+        f"{side}{one.get('drivingDir')}": one.get("ref") or ""
+        for side in ("Left", "Right")
+        for one in element.iterfind(f"adjacent{side}")
+    }
+    return Lanelet(
+        name=element.get("id") or "", left=left, right=right,
+        left_same=beside.get("Leftsame", ""), right_same=beside.get("Rightsame", ""),
+        left_opposite=beside.get("Leftopposite", ""),
+        successors=tuple(one.get("ref") or "" for one in element.iterfind("successor")),
+        kinds=tuple((one.text or "").strip() for one in element.iterfind("laneletType")),
     )  # fmt: skip
 
 

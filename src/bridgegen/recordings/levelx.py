@@ -17,7 +17,8 @@ from bridgegen.arrays import Float, Int
 from bridgegen.ego.kinds import BICYCLE, BUS, CAR, MOTORCYCLE, PEDESTRIAN, TRUCK
 from bridgegen.errors import FileFormatError
 from bridgegen.recordings.columns import Columns, read_columns, whole_numbers
-from bridgegen.recordings.format import Format, Head
+from bridgegen.recordings.format import Format, Head, read_head
+from bridgegen.recordings.lanelets import Lanelet
 from bridgegen.recordings.motion import STANDING
 from bridgegen.recordings.table import (
     UNKNOWN_KIND,
@@ -73,12 +74,19 @@ def _read(path: Path) -> Iterator[RecordedTraffic]:
     yield (_read_highd if is_highd else _read_others)(path, stem, rate, about)
 
 
-def _facts(path: Path, rate: float, about: dict[str, Float], frame: str, *notes: str) -> Facts:
+def _facts(
+    path: Path,
+    rate: float,
+    about: dict[str, Float],
+    frame: str,
+    *notes: str,
+    lanelets: tuple[Lanelet, ...] = (),
+) -> Facts:
     place = about.get("locationId")
     where = "" if place is None or not np.isfinite(place[0]) else f", location {place[0]:g}"
     return Facts(
         name=path.name.removesuffix("_tracks.csv"), format=FORMAT.name, source=str(path),
-        time_step=1.0 / rate, frame=frame + where, notes=notes,
+        time_step=1.0 / rate, frame=frame + where, notes=notes, lanelets=lanelets,
     )  # fmt: skip
 
 
@@ -106,10 +114,47 @@ def _read_highd(path: Path, stem: str, rate: float, about: dict[str, Float]) -> 
     if "laneId" in data:
         columns["lane"] = whole_numbers(path, "laneId", data["laneId"])
     frame = "the road's, x along it, y up (the image's y turned)"
+    ends = (float(columns["x"].min()), float(columns["x"].max()))
+    lanelets = _lanes(path.with_name(stem + RECORDING_META), ends)
     return build(
-        _facts(path, rate, about, frame), ids, columns, line_of_table(str(path)),
+        _facts(path, rate, about, frame, lanelets=lanelets), ids, columns, line_of_table(str(path)),
         names=[str(one) for one in tracks], kind=_kinds(meta, rows), length=length, width=width,
     )  # fmt: skip
+
+
+def _lanes(path: Path, ends: tuple[float, float]) -> tuple[Lanelet, ...]:
+    """Return the lanes between highD's markings, from end to end, named as in the tracks.
+
+    Its lanes are numbered from the top of the image, the strips beside the carriageways included:
+    with four upper markings, the upper lanes are 2, 3 and 4, and the lower ones begin with 6.
+    """
+    if not read_head(path).has("upperLaneMarkings", "lowerLaneMarkings"):
+        return ()
+    texts = read_columns(path, (), ("upperLaneMarkings", "lowerLaneMarkings")).texts
+    found: list[Lanelet] = []
+    number = 2
+    for name, is_leftwards in (("upperLaneMarkings", True), ("lowerLaneMarkings", False)):
+        text = texts[name][0][0]
+        try:
+            y = -np.array([float(one) for one in text.split(";")])
+        except ValueError:
+            y = np.full(1, np.nan)
+        if not (np.isfinite(y).all() and (np.diff(y) < 0.0).all()):
+            raise FileFormatError(
+                f"{path}, line 2: {name} [m] must be ascending numbers separated by ;, "
+                f"got '{text[:40]}'"
+            )
+        x = ends[::-1] if is_leftwards else ends
+        last = number + len(y) - 2
+        for k in range(len(y) - 1):
+            upper, lower = (np.column_stack([x, np.full(2, one)]) for one in (y[k], y[k + 1]))
+            left, right = (lower, upper) if is_leftwards else (upper, lower)
+            above = str(number + k - 1) if k else ""
+            below = str(number + k + 1) if number + k < last else ""
+            beside = (below, above) if is_leftwards else (above, below)
+            found.append(Lanelet(str(number + k), left, right, *beside, is_marked=True))
+        number = last + 2
+    return tuple(found)
 
 
 def _read_others(path: Path, stem: str, rate: float, about: dict[str, Float]) -> RecordedTraffic:

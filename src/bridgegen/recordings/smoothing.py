@@ -8,12 +8,18 @@ Source: Savitzky and Golay, Analytical Chemistry 36 (1964) 1627.
 """
 
 import numpy as np
+from scipy.interpolate import CubicSpline
 from scipy.signal import savgol_filter
 
 from bridgegen.arrays import Float
 
 NOISE = 0.02
 """Positions that scatter by more than this [m] are smoothed."""
+MISFIT = 0.1
+"""Velocities that differ by more than this [m/s] from how fast the positions change are not
+theirs."""
+LAG = 0.4
+"""Time over which positions change [s]."""
 WINDOW = 1.0
 """Of the filter [s]."""
 DEGREE = 3
@@ -33,6 +39,23 @@ def scatter(x: Float, y: Float) -> float:
     return float(1.4826 * max(sizes) / np.sqrt(20.0))
 
 
+def misfit(time: Float, x: Float, y: Float, vx: Float, vy: Float) -> float:
+    """Return by how much velocities are not those of the positions, at the worst [m/s].
+
+    Distances over `LAG` are compared, which the rounding of positions hardly changes. Where a
+    velocity is not known, it is 0.
+    """
+    step = (time[-1] - time[0]) / (len(time) - 1)
+    lag = min(max(1, round(LAG / step)), len(time) - 1)
+    span = np.diff(time)
+    off = np.zeros(len(time) - lag)
+    for place, speed in ((x, vx), (y, vy)):
+        driven = np.append(0.0, np.cumsum(0.5 * (speed[1:] + speed[:-1]) * span))
+        off = np.hypot(off, place[lag:] - place[:-lag] - (driven[lag:] - driven[:-lag]))
+    worst = (off / (time[lag:] - time[:-lag])).max()
+    return float(worst) if np.isfinite(worst) else 0.0
+
+
 def window(time_step: float) -> int:
     """Return the states in the filter's window, an odd number."""
     return 2 * round(0.5 * WINDOW / time_step) + 1
@@ -45,6 +68,14 @@ def smooth(values: Float, time_step: float, derivative: int) -> Float:
         savgol_filter(values, size, min(DEGREE, size - 1), deriv=derivative, delta=time_step),
         dtype=np.float64,
     )
+
+
+def slopes(time: Float, values: Float) -> Float:
+    """Return the slopes of the smooth curve through values (cubic spline), at their instants.
+
+    With them `hermite` gives that curve, so that velocities are exactly those of the positions.
+    """
+    return np.asarray(CubicSpline(time, values)(time, 1), dtype=np.float64)
 
 
 def hermite(at: Float, time: Float, values: Float, slopes: Float) -> Float:

@@ -16,6 +16,7 @@ import numpy.typing as npt
 from bridgegen.arrays import Float, Int
 from bridgegen.ego.kinds import NAMES
 from bridgegen.errors import FileFormatError
+from bridgegen.recordings.lanelets import Lanelet
 
 MOST_STATES = 40_000_000
 MOST_PARTICIPANTS = 1_000_000
@@ -42,6 +43,7 @@ class Facts:
         map: the map that it names; "" for none.
         lights: per traffic light, by id: the instants [s] and from then on its state.
         notes: what was assumed in reading.
+        lanelets: the lanes that come with it, in its coordinates.
     """
 
     name: str
@@ -54,6 +56,7 @@ class Facts:
         default_factory=lambda: MappingProxyType({})
     )
     notes: tuple[str, ...] = ()
+    lanelets: tuple[Lanelet, ...] = ()
 
 
 @dataclass(frozen=True)

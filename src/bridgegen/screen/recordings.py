@@ -1,16 +1,25 @@
 """Recordings as they are read, and what they hold."""
 
 import json
+import math
 import sys
+from dataclasses import asdict
 from typing import TYPE_CHECKING
 
+from bridgegen.mining.conflicts.section import (
+    conflicts_as_json,
+    recordings_in_words,
+    screen_rows,
+)
 from bridgegen.screen.live import Live
 from bridgegen.screen.tables import print_table
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from bridgegen.recordings.mine import Mined, Summary
+    from bridgegen.mining.mine import Mined, Summary
+
+CARRIAGEWAYS_SHOWN = 4
 
 
 class RecordingsScreen(Live):
@@ -28,9 +37,21 @@ def print_mined(mined: "Mined", *, as_json: bool) -> None:
             print(f"bridgegen: warning: skipped: {text}", file=sys.stderr)
     if mined.others:
         print(f"bridgegen: note: {len(mined.others)} files are no recordings", file=sys.stderr)
+    notes = [note for one in mined.recordings if one.lanes.source == "map"
+             for note in one.lanes.notes]  # fmt: skip
+    for text in (*mined.warnings, *notes):
+        print(f"bridgegen: warning: {text}", file=sys.stderr)
     if as_json:
         print(json.dumps({
-            "recordings": [_facts(one) for one in mined.recordings],
+            "recordings": [_facts(one, mined.time_step) for one in mined.recordings],
+            "scenarios": [
+                {"file": str(one.scenario), "recording": one.event.recording,
+                 "ego": one.event.names[0], "other": one.event.names[1],
+                 "position_off": None if one.problem else one.off,
+                 "speed_off": None if one.problem else one.too_fast,
+                 "problem": one.problem or None, "ontology_lacks": one.lacks}
+                for one in mined.replays
+            ],
             "skipped": [str(path) for path, _ in mined.skipped],
             "others": [str(path) for path in mined.others],
         }, indent=2))  # fmt: skip
@@ -44,14 +65,43 @@ def print_mined(mined: "Mined", *, as_json: bool) -> None:
         for one in mined.recordings
     ], as_json=False)  # fmt: skip
     print()
+    of_lanes = ("lanes of", "source", "carriageways", "lanes", "vehicles on", "RMS [m]")
+    print_table(of_lanes, [_lane_row(one) for one in mined.recordings], as_json=False)
+    print()
     found = [row for row in _quality(mined) if row[1]]
     if found:
         of_rules = ("quality", "recordings", "participants", "count", "first")
         print_table(of_rules, found, as_json=False)
     else:
         print("quality: nothing to clean")
+    print()
+    for name, text in recordings_in_words(mined):
+        print(f"{name}: {text}")
+    if mined.replays:
+        print()
+        of_events = ("scenario", "recording", "ego and other", "type", "TTC [s]",
+                     "needed [m/s²]", "responsible")  # fmt: skip
+        print_table(of_events, list(screen_rows(mined)), as_json=False)
     print(f"\n{'page':<8}{mined.out / 'recordings.html'}")
-    print(f"{'tables':<8}{mined.out / 'recordings.csv'}, {mined.out / 'quality.csv'}")
+    print(
+        f"{'tables':<8}{mined.out / 'recordings.csv'}, {mined.out / 'lanes.csv'}, "
+        f"{mined.out / 'quality.csv'}, {mined.out / 'conflicts.csv'}"
+    )
+
+
+def _lane_row(one: "Summary") -> tuple[str, str, int, str, str, str]:
+    """Return a recording's lanes: their number by carriageway, the fit of the one used most."""
+    found, share = one.lanes, one.lanes.vehicle_share
+    shown = found.carriageways[:CARRIAGEWAYS_SHOWN]
+    more = ", …" if len(found.carriageways) > len(shown) else ""
+    return (
+        one.facts.name,
+        "none: give --map" if found.source == "none" else found.source,
+        len(found.carriageways),
+        ", ".join(str(each.lanes) for each in shown) + more,
+        "–" if math.isnan(share) else f"{share:.1%}",
+        f"{shown[0].rms:.2f}" if shown else "–",
+    )
 
 
 def _quality(mined: "Mined") -> "Iterator[tuple[str, int, int, int, str]]":
@@ -67,7 +117,7 @@ def _quality(mined: "Mined") -> "Iterator[tuple[str, int, int, int, str]]":
         )
 
 
-def _facts(one: "Summary") -> dict[str, object]:
+def _facts(one: "Summary", time_step: float) -> dict[str, object]:
     facts = one.facts
     return {
         "name": facts.name, "format": facts.format, "file": facts.source, "frame": facts.frame,
@@ -75,6 +125,14 @@ def _facts(one: "Summary") -> dict[str, object]:
         "participants": one.participants, "states": one.states, "tracks": one.tracks,
         "hours": one.hours, "km": one.kilometres, "hours_read": one.read_hours,
         "km_read": one.read_kilometres, "notes": facts.notes,
+        "lanes": {
+            "source": one.lanes.source, "km_on": one.lanes.km_on, "km_off": one.lanes.km_off,
+            "vehicle_share":
+                None if math.isnan(one.lanes.vehicle_share) else one.lanes.vehicle_share,
+            "carriageways": [asdict(each) for each in one.lanes.carriageways],
+            "notes": one.lanes.notes,
+        },
+        "conflicts": conflicts_as_json(one, time_step),
         "quality": [
             {"rule": each.rule.value, "participants": each.participants, "count": each.count,
              "examples": each.examples}

@@ -1,14 +1,17 @@
 """OWL2OpenSCENARIO, its entities: bodies and drivers."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from functools import partial
 
 from bridgegen.errors import OntologyError, UnsupportedError
 from bridgegen.ontology.graph import Individuals
 from bridgegen.ontology.vocabulary import Subject
 from bridgegen.openx.openscenario import model as osc
-from bridgegen.openx.openscenario.declarations import DRIVER, IDEAL, KIND, SIREN
+from bridgegen.openx.openscenario.bodies import EntityBody, entity_body
+from bridgegen.openx.openscenario.declarations import DRIVER, IDEAL, SIREN
 from bridgegen.openx.openscenario.values import format_double
-from bridgegen.participants import PARTICIPANTS, ParticipantKind
+from bridgegen.participants import PARTICIPANTS, Body, ParticipantKind
 
 MAX_SPEED = "max_speed"
 """Property of a pedestrian: the greatest speed [m/s]; the standard has it for vehicles."""
@@ -17,10 +20,6 @@ LIFTED = {"has_reason_to_exceed": "exceeds_limit", "has_siren": SIREN}
 """Properties of individuals of vehicles, and what they are called in files."""
 
 _ESMINI_CONTROLLER = "ExternalController"
-# An axle as on a mid-size saloon; the ontology has no more of it than the wheelbase.
-_MAX_STEERING = 0.6  # [rad]
-_WHEEL_DIAMETER = 0.65  # [m]
-_BODY_OVER_TRACK = 0.3  # [m], how much wider the body is than the track
 
 
 class Cast:
@@ -73,97 +72,44 @@ def scenario_object(individuals: Individuals, name: str, node: Subject) -> osc.S
     return osc.ScenarioObject(name, _body(individuals, node), controllers)
 
 
-def _body(individuals: Individuals, node: Subject) -> osc.Vehicle | osc.Pedestrian | osc.MiscObject:
+def _body(individuals: Individuals, node: Subject) -> EntityBody:
     for kind in PARTICIPANTS.values():
         if individuals.is_a(node, kind.owl_class):
-            return _MAKE[kind.written.element](individuals, node, kind)
+            return _body_of_kind(individuals, node, kind)
     known = ", ".join(kind.owl_class for kind in PARTICIPANTS.values())
     raise UnsupportedError(f"{individuals.describe(node)} must be one of {known} to be written")
 
 
-def _stated(kind: ParticipantKind) -> tuple[osc.Property, ...]:
-    """Return the property that names a kind that the category alone does not identify."""
-    return () if kind.written.is_exact else (osc.Property(KIND, kind.name),)
-
-
-def _lifted(individuals: Individuals, node: Subject) -> tuple[osc.Property, ...]:
-    """Return the properties that say which rules of the traffic are not for a vehicle."""
-    found = ((name, individuals.optional_text(node, key)) for key, name in LIFTED.items())
-    return tuple(osc.Property(name, text) for name, text in found if text is not None)
-
-
-def _pedestrian(individuals: Individuals, node: Subject, kind: ParticipantKind) -> osc.Pedestrian:
-    fastest = individuals.optional_number(node, "has_max_speed")
-    said = () if fastest is None else (osc.Property(MAX_SPEED, format_double(fastest)),)
-    name = kind.written.name or kind.written.category
+def _body_of_kind(individuals: Individuals, node: Subject, kind: ParticipantKind) -> EntityBody:
+    number = partial(individuals.number, node)
+    body = Body(
+        number("has_box_length"), number("has_box_width"), number("has_box_height"),
+        number("has_center_ahead"),
+    )  # fmt: skip
+    mass = individuals.optional_number(node, "has_mass")
     model = individuals.optional_text(node, "has_model")
-    return osc.Pedestrian(
-        name=model or name,
-        pedestrian_category=osc.PedestrianCategory(kind.written.category),
-        mass=individuals.number(node, "has_mass"),
-        bounding_box=_box(individuals, node),
-        properties=osc.Properties((*said, *_stated(kind))),
-        model3d=name,
-    )
+    if kind.written.element == "Vehicle":
+        body = replace(
+            body, wheelbase=number("has_wheelbase"), max_speed=number("has_max_speed"),
+            max_acceleration=number("has_max_acceleration"),
+            max_deceleration=number("has_max_deceleration"),
+        )  # fmt: skip
+        lifted = tuple(_lifted(individuals, node))
+        return entity_body(kind, body, mass=mass, model=model, properties=lifted)
+    mass = number("has_mass")
+    if kind.written.element == "Pedestrian":
+        fastest = individuals.optional_number(node, "has_max_speed")
+        said = () if fastest is None else (osc.Property(MAX_SPEED, format_double(fastest)),)
+        return entity_body(kind, body, mass=mass, model=model, properties=said)
+    return entity_body(kind, body, mass=mass)
 
 
-def _object(individuals: Individuals, node: Subject, kind: ParticipantKind) -> osc.MiscObject:
-    return osc.MiscObject(
-        name=kind.written.name or kind.written.category,
-        misc_object_category=osc.MiscObjectCategory(kind.written.category),
-        mass=individuals.number(node, "has_mass"),
-        bounding_box=_box(individuals, node),
-        properties=osc.Properties(_stated(kind)),
-    )
-
-
-def _box(individuals: Individuals, node: Subject) -> osc.BoundingBox:
-    length, width, height = (
-        individuals.number(node, f"has_box_{name}") for name in ("length", "width", "height")
-    )
-    ahead = individuals.number(node, "has_center_ahead")
-    return osc.BoundingBox(
-        osc.Center(ahead, 0.0, height / 2), osc.Dimensions(width, length, height)
-    )
-
-
-def _vehicle(individuals: Individuals, node: Subject, kind: ParticipantKind) -> osc.Vehicle:
-    width, written = individuals.number(node, "has_box_width"), kind.written
-    return osc.Vehicle(
-        name=individuals.optional_text(node, "has_model") or written.name or written.category,
-        vehicle_category=osc.VehicleCategory(written.category),
-        bounding_box=_box(individuals, node),
-        performance=osc.Performance(
-            individuals.number(node, "has_max_speed"),
-            individuals.number(node, "has_max_acceleration"),
-            individuals.number(node, "has_max_deceleration"),
-        ),
-        axles=osc.Axles(
-            _axle(_MAX_STEERING, width, individuals.number(node, "has_wheelbase")),
-            _axle(0.0, width, 0.0),
-        ),
-        properties=osc.Properties((*_stated(kind), *_lifted(individuals, node))),
-        role=None if written.role is None else osc.Role(written.role),
-        mass=individuals.optional_number(node, "has_mass"),
-    )
-
-
-_MAKE: Mapping[
-    str,
-    Callable[
-        [Individuals, Subject, ParticipantKind], osc.Vehicle | osc.Pedestrian | osc.MiscObject
-    ],
-] = {"Vehicle": _vehicle, "Pedestrian": _pedestrian, "MiscObject": _object}
-
-
-def _axle(max_steering: float, body_width: float, x: float) -> osc.Axle:
-    return osc.Axle(
-        max_steering=max_steering,
-        wheel_diameter=_WHEEL_DIAMETER,
-        track_width=max(round(body_width - _BODY_OVER_TRACK, 3), 0.1),
-        position_x=x,
-        position_z=_WHEEL_DIAMETER / 2,
-    )
+def _lifted(individuals: Individuals, node: Subject) -> Iterator[osc.Property]:
+    """Yield the properties that say which rules of the traffic are not for a vehicle."""
+    for key, name in LIFTED.items():
+        text = individuals.optional_text(node, key)
+        if text is not None:
+            yield osc.Property(name, text)
 
 
 def _controller(individuals: Individuals, node: Subject) -> osc.ObjectController:

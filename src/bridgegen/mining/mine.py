@@ -1,4 +1,4 @@
-"""``bridgegen mine``: read recordings, clean them, and account for what was recorded."""
+"""``bridgegen mine``: read recordings, clean and place them, find near misses, account for all."""
 
 from collections import Counter
 from collections.abc import Callable, Sequence
@@ -7,8 +7,14 @@ from pathlib import Path
 
 import numpy as np
 
+from bridgegen import ego as egos
 from bridgegen.arrays import Float
 from bridgegen.errors import FileFormatError, InputError, StorageError
+from bridgegen.mining.conflicts.find import RecordedConflict, conflicts_of, order
+from bridgegen.mining.excerpt import clock_of
+from bridgegen.mining.lanes.account import LanesFound, account_of
+from bridgegen.mining.lanes.find import Located, locate, read_map
+from bridgegen.mining.replays.write import Prepared, Replay, prepare, write
 from bridgegen.recordings.clean import TIME_STEP, Cleaned, clean
 from bridgegen.recordings.formats import files_of, read
 from bridgegen.recordings.quality import Finding
@@ -17,6 +23,12 @@ from bridgegen.recordings.table import Facts, RecordedTraffic, kind_in_words
 PATHS_SHOWN = 300
 POINTS_SHOWN = 40
 """Of a path in the picture."""
+MARGIN = 10.0
+"""Around the paths in the picture [m]."""
+KEEP = 10
+"""Events that are written as scenarios."""
+CRITICAL, SUFFIXES = "critical", (".xosc", ".xodr", ".owl")
+"""The folder of these, as of a run, and what its files end in."""
 
 
 @dataclass(frozen=True)
@@ -35,6 +47,9 @@ class Summary:
         tracks: after cuts.
         findings: of cleaning, all rules.
         paths: for the picture: kind and points ``(n, 2)`` [m] of at most `PATHS_SHOWN` tracks.
+        lanes: on which it was.
+        conflicts: near misses, then contacts, the most harmful first.
+        names: of the participants in them, by number.
     """
 
     facts: Facts
@@ -48,6 +63,9 @@ class Summary:
     tracks: int
     findings: tuple[Finding, ...]
     paths: tuple[tuple[int, Float], ...]
+    lanes: LanesFound
+    conflicts: tuple[RecordedConflict, ...]
+    names: dict[int, str]
 
 
 @dataclass(frozen=True)
@@ -60,6 +78,8 @@ class Mined:
         others: files of folders that are no recordings.
         time_step: after cleaning [s].
         out: the folder.
+        warnings: of reading the map.
+        replays: the most critical events, as files.
     """
 
     recordings: tuple[Summary, ...]
@@ -67,41 +87,62 @@ class Mined:
     others: tuple[Path, ...]
     time_step: float
     out: Path
+    warnings: tuple[str, ...] = ()
+    replays: tuple[Replay, ...] = ()
 
 
 def mine(
     paths: Sequence[Path],
     *,
     out: Path,
+    road_map: Path | None = None,
     lenient: bool = False,
     time_step: float = TIME_STEP,
+    keep: int = KEEP,
+    ego: str | None = None,
     progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> Mined:
-    """Read and clean recordings, and write what was recorded.
+    """Read and clean recordings, place them on lanes, find near misses, and write all that.
 
     Args:
         paths: files, or folders of files.
-        out: a folder, new or of an earlier call; gets recordings.html, recordings.csv, quality.csv.
+        out: a folder, new or of an earlier call; gets recordings.html, recordings.csv, lanes.csv,
+            quality.csv, conflicts.csv, and in the folder ``critical`` the events as scenarios.
+        road_map: the OpenDRIVE map of all of them; without one the lanes are those that come with
+            the recording, or inferred from its paths.
         lenient: leave out what cannot be read, and list it.
         time_step: to resample at [s].
+        keep: how many of the most critical events are written as scenarios.
+        ego: driver that takes the ego's place in these; by default it does what was recorded.
         progress: is told how many of how many files are done.
 
     Raises:
         FileFormatError: a file that is no recording, or breaks its format's rules.
-        InputError: no recordings, or a time step out of range.
+        InputError: no recordings, a time step or a number out of range, or a map of another place.
+        UnknownNameError: no such driver.
         StorageError: the folder holds other files of these names, or cannot be written.
     """
-    from bridgegen.recordings.page import refuse_foreign, write_all
+    from bridgegen.mining.page import refuse_foreign, write_all
 
+    if keep < 0:
+        raise InputError(f"0 <= keep must hold, got {keep}")
+    if ego is not None:
+        egos.get(ego)
     refuse_foreign(out)
+    on_map = read_map(road_map) if road_map is not None else None
     files, others = _files(paths)
     found: list[Summary] = []
     skipped: list[tuple[Path, tuple[str, ...]]] = []
+    kept: list[Prepared] = []
     for number, file in enumerate(files):
         progress(number, len(files))
         try:
             for traffic in read(file):
-                found.append(summarise(traffic, clean(traffic, time_step)))
+                cleaned = clean(traffic, time_step)
+                located = locate(cleaned.traffic, on_map)
+                conflicts = conflicts_of(cleaned.traffic)
+                found.append(summarise(traffic, cleaned, located, conflicts))
+                kept = _most_critical(kept, cleaned.traffic, conflicts, keep)
         except FileFormatError as error:
             if not lenient:
                 raise
@@ -110,13 +151,35 @@ def mine(
     if not found:
         problems = [text for _, texts in skipped for text in texts]
         raise FileFormatError(*problems, "no recording could be read")
-    mined = Mined(tuple(found), tuple(skipped), tuple(others), time_step, out)
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise StorageError(f"{out}: cannot be made: {error.strerror}") from None
+    replays = _written(kept, out / CRITICAL, ego)
+    warnings = on_map.warnings if on_map is not None else ()
+    mined = Mined(tuple(found), tuple(skipped), tuple(others), time_step, out, warnings, replays)
     write_all(mined)
     return mined
+
+
+def _most_critical(
+    kept: list[Prepared],
+    traffic: RecordedTraffic,
+    conflicts: tuple[RecordedConflict, ...],
+    keep: int,
+) -> list[Prepared]:
+    """Return the most critical events of earlier recordings and of one more."""
+    clock = clock_of(traffic)
+    more = [prepare(traffic, clock, one) for one in conflicts[:keep]]
+    return sorted([*kept, *more], key=lambda one: order(one.event))[:keep]
+
+
+def _written(kept: list[Prepared], folder: Path, ego: str | None) -> tuple[Replay, ...]:
+    """Write events in the place of those of an earlier call."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        for old in folder.glob("[0-9][0-9][0-9][0-9].*"):
+            if old.suffix in SUFFIXES:
+                old.unlink()
+    except OSError as error:
+        raise StorageError(f"{folder}: cannot be made: {error.strerror}") from None
+    return tuple(write(one, folder / f"{k:04}", ego) for k, one in enumerate(kept, 1))
 
 
 def _files(paths: Sequence[Path]) -> tuple[list[Path], list[Path]]:
@@ -131,8 +194,13 @@ def _files(paths: Sequence[Path]) -> tuple[list[Path], list[Path]]:
     return files, others
 
 
-def summarise(traffic: RecordedTraffic, cleaned: Cleaned) -> Summary:
-    """Return what a recording holds."""
+def summarise(
+    traffic: RecordedTraffic,
+    cleaned: Cleaned,
+    located: Located,
+    conflicts: tuple[RecordedConflict, ...],
+) -> Summary:
+    """Return what a recording holds, and where."""
     after = cleaned.traffic
     kinds = Counter(kind_in_words(kind) for kind in cleaned.kinds.tolist())
     shown = np.linspace(0, len(after.names) - 1, min(PATHS_SHOWN, len(after.names))).astype(int)
@@ -141,9 +209,13 @@ def summarise(traffic: RecordedTraffic, cleaned: Cleaned) -> Summary:
         first, last = int(after.first[p]), int(after.first[p + 1]) - 1
         at = np.unique(np.linspace(first, last, POINTS_SHOWN).astype(int))
         paths.append((int(after.kind[p]), np.column_stack([after.x[at], after.y[at]])))
+    points = np.concatenate([path for _, path in paths])
+    lanes = account_of(located, points.min(axis=0) - MARGIN, points.max(axis=0) + MARGIN)
     return Summary(
         facts=traffic.facts, participants=dict(kinds.most_common()), states=len(traffic.time),
         duration=float(np.ptp(traffic.time)), hours=after.hours, kilometres=after.kilometres,
         read_hours=traffic.hours, read_kilometres=traffic.kilometres, tracks=len(after.names),
-        findings=cleaned.quality.findings, paths=tuple(paths),
+        findings=cleaned.quality.findings, paths=tuple(paths), lanes=lanes,
+        conflicts=conflicts,
+        names={p: after.names[p] for one in conflicts for p in (one.ego, one.other)},
     )  # fmt: skip

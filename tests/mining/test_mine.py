@@ -2,14 +2,17 @@
 
 import csv
 import json
+from dataclasses import replace
 
 import pytest
+from tests.mining.lanes.test_lanelets import with_lanelets as write_two_lanes
+from tests.openx.opendrive.kinds import model
+from tests.recordings import writers as w
 
 from bridgegen.errors import FileFormatError, InputError, StorageError
-from bridgegen.recordings.mine import mine
+from bridgegen.mining.mine import mine
+from bridgegen.openx.opendrive.write import to_xml
 from bridgegen.recordings.quality import Rule
-
-from . import writers as w
 
 
 def rows(path):
@@ -89,4 +92,42 @@ def test_the_command_says_what_is_wrong_without_a_traceback(cli, tmp_path):
     code, _, err = cli("mine", tmp_path / "none.csv", "--out", tmp_path / "mined")
     assert code == 2
     assert "none.csv" in err
+    assert "Traceback" not in err
+
+
+def test_lanes_are_in_the_tables_on_the_page_and_in_the_picture(cli, tmp_path):
+    path, out = write_two_lanes(tmp_path), tmp_path / "mined"
+    code, text, _ = cli("mine", path, "--out", out)
+    assert code == 0
+    assert "lanelets 1 2 100.0%" in " ".join(text.split())
+    (row,) = rows(out / "lanes.csv")
+    assert (row["source"], row["carriageway"], row["lanes"]) == ("lanelets", "1", "2")
+    assert float(row["width_m"]) == pytest.approx(3.5)
+    assert rows(out / "recordings.csv")[0]["vehicles_on_lanes"] == "1"
+    page = (out / "recordings.html").read_text(encoding="utf-8")
+    assert page.count('<polyline class="lane"') == 8  # two borders each
+    code, text, _ = cli("mine", path, "--json", "--out", out)
+    found = json.loads(text)["recordings"][0]["lanes"]
+    assert found["carriageways"][0]["states"] == int(row["states"])
+
+
+def test_lanes_of_a_map_and_a_map_of_another_place(cli, tmp_path):
+    path, out = w.write_ind(tmp_path), tmp_path / "mined"
+    map_of = {}
+    for name, shift in (("here", 0.0), ("elsewhere", 900.0)):
+        roads = model("straight")
+        (road,) = roads.roads
+        start = replace(road.plan_view[0], x=-20.0, y=-6.0 + shift, hdg=0.0)
+        map_of[name] = tmp_path / f"{name}.xodr"
+        moved = replace(roads, roads=(replace(road, plan_view=(start, *road.plan_view[1:])),))
+        map_of[name].write_bytes(to_xml(moved))
+    code, _, err = cli("mine", path, "--map", map_of["here"], "--out", out)
+    assert (code, err) == (0, "")
+    assert {row["source"] for row in rows(out / "lanes.csv")} == {"map"}
+    code, _, err = cli("mine", path, "--map", map_of["elsewhere"], "--out", out)
+    assert code == 2
+    assert "0% of the vehicles' states are on lanes of the map" in " ".join(err.split())
+    code, _, err = cli("mine", path, "--map", tmp_path / "none.xodr", "--out", out)
+    assert code != 0
+    assert "none.xodr" in err
     assert "Traceback" not in err

@@ -1,0 +1,1 @@
+"""What is made of recorded traffic: what was recorded, and where on lanes it was."""

@@ -1,0 +1,156 @@
+"""The conflicts of recorded traffic: whoever can be the ego is it, in turn.
+
+Each is found by the analysis that a search uses (`bridgegen.conflict.analysis`). A pair has one
+conflict at most: the more harmful of the two views, and of equal ones that of the participant which
+must brake harder. Bodies that touch are far more often boxes or positions that are wrong than
+accidents, so a contact is only noted, and the other conflicts of its ego are looked for without it.
+"""
+
+from collections import defaultdict
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from bridgegen.conflict.analysis import CONTACT, NEAR_MISS, analyse
+from bridgegen.conflict.findings import KINDS
+from bridgegen.conflict.plausibility import plausibility
+from bridgegen.conflict.summary import ConflictSummary, of_pair
+from bridgegen.ego.kinds import BUS, CAR, MOTORCYCLE, TRUCK
+from bridgegen.mining.conflicts._candidate_kernels import mark_pairs
+from bridgegen.mining.excerpt import Clock, clock_of, excerpt
+from bridgegen.recordings.table import RecordedTraffic
+
+EGOS = (CAR, TRUCK, BUS, MOTORCYCLE)
+"""Kinds that may be the ego."""
+MOVES = 1.0
+"""What has never been farther than this [m] from where it began does not move: it is parked."""
+HORIZON = 4.0
+"""[s]; the analysis predicts as far."""
+FARTHEST = 150.0
+"""Between two participants [m] that may meet within the horizon: 2 · 67 km/h, or 135 km/h."""
+MARGIN = 0.5
+"""By which bodies may miss each other by constant velocity [m] and yet be looked at."""
+AROUND = 2.0
+"""Before and after a conflict [s], in which its motion has to be plausible."""
+
+
+@dataclass(frozen=True)
+class RecordedConflict:
+    """A near miss, or bodies that touch.
+
+    Attributes:
+        ego: participant.
+        other: participant.
+        instant: of a contact, or the most urgent of a near miss, by the recording's clock.
+        found: what happened, with its type and who is responsible; its harm is whoever's.
+        doubt: why the motion around it could not happen; "" if it could.
+    """
+
+    ego: int
+    other: int
+    instant: int
+    found: ConflictSummary
+    doubt: str
+
+    @property
+    def is_contact(self) -> bool:
+        """Whether bodies touch."""
+        return self.found.conflict == KINDS[CONTACT]
+
+    @property
+    def urgency(self) -> tuple[float, float]:
+        """Harm and the deceleration that the ego needed [m/s²]."""
+        return self.found.harm, self.found.needed_deceleration
+
+
+def conflicts_of(
+    traffic: RecordedTraffic, progress: Callable[[int, int], None] = lambda done, total: None
+) -> tuple[RecordedConflict, ...]:
+    """Return the near misses of a cleaned recording and the contacts, the most harmful first.
+
+    Args:
+        traffic: cleaned.
+        progress: is told how many of how many egos are done.
+    """
+    clock = clock_of(traffic)
+    best: dict[tuple[int, int], RecordedConflict] = {}
+    partners = candidates(traffic, clock)
+    for number, (ego, others) in enumerate(partners.items()):
+        progress(number, len(partners))
+        for one in _of_ego(traffic, clock, ego, others):
+            pair = (min(one.ego, one.other), max(one.ego, one.other))
+            if pair not in best or one.urgency > best[pair].urgency:
+                best[pair] = one
+    progress(len(partners), len(partners))
+    return tuple(sorted(best.values(), key=order))
+
+
+def order(one: RecordedConflict) -> tuple[bool, bool, float, int, int]:
+    """Return what sorts conflicts: near misses, then doubtful ones, then contacts; by harm."""
+    return one.is_contact, one.doubt != "", -one.found.harm, one.ego, one.other
+
+
+def candidates(traffic: RecordedTraffic, clock: Clock) -> dict[int, list[int]]:
+    """Return, by ego, with whom it might come into conflict; fragments of tracks with nobody."""
+    instant, participant = clock.instant, traffic.participant
+    order = np.lexsort((traffic.x, instant))
+    low = int(instant.min())
+    first = np.searchsorted(instant[order], np.arange(low, int(instant.max()) + 2))
+    reach = 0.5 * np.hypot(traffic.length, traffic.width) + 0.5 * MARGIN
+    moves = np.array([_extent(traffic, states) > MOVES for states in traffic.states()])
+    keys = np.empty(1 << 20, np.int64)
+    arguments = (
+        order, first.astype(np.int64), participant, traffic.x, traffic.y, traffic.vx, traffic.vy,
+        reach, moves, HORIZON, FARTHEST,
+    )  # fmt: skip
+    count = mark_pairs(*arguments, keys)
+    if count > len(keys):
+        keys = np.empty(count, np.int64)
+        mark_pairs(*arguments, keys)
+    pairs = np.unique(keys[:count])
+    found: dict[int, list[int]] = defaultdict(list)
+    is_ego = np.isin(traffic.kind, EGOS) & moves
+    for p, q in zip(*(part.tolist() for part in np.divmod(pairs, len(moves))), strict=True):
+        for ego, other in ((p, q), (q, p)):
+            if is_ego[ego] and clock.is_whole[ego] and clock.is_whole[other]:
+                found[ego].append(other)
+    return dict(sorted(found.items()))
+
+
+def _extent(traffic: RecordedTraffic, states: slice) -> float:
+    x, y = traffic.x[states], traffic.y[states]
+    return float(np.hypot(x - x[0], y - y[0]).max())
+
+
+def _of_ego(
+    traffic: RecordedTraffic, clock: Clock, ego: int, others: list[int]
+) -> Iterator[RecordedConflict]:
+    """Yield the conflicts of an ego; those after a contact as if the other had not been there."""
+    begin, end = int(clock.begin[ego]), int(clock.end[ego])
+    left = list(others)
+    while left:
+        found = analyse(excerpt(traffic, clock, ego, left, begin, end))
+        kind = found.kind[0]
+        worst = CONTACT if (kind == CONTACT).any() else NEAR_MISS
+        by_clock = replace(found, instant=found.instant + begin, decided=found.decided + begin)
+        for e in np.flatnonzero(kind == worst).tolist():
+            other, instant = left[e - 1], int(by_clock.instant[0, e])
+            yield RecordedConflict(
+                ego, other, instant, of_pair(by_clock, 0, e, "any"),
+                _doubt(traffic, clock, ego, other, instant),
+            )  # fmt: skip
+        if worst == NEAR_MISS:
+            return
+        left = [other for e, other in enumerate(left, 1) if kind[e] != CONTACT]
+
+
+def _doubt(traffic: RecordedTraffic, clock: Clock, ego: int, other: int, instant: int) -> str:
+    """Return why the motion of two could not happen around an instant; "" if it could."""
+    around = round(AROUND / traffic.facts.time_step)
+    begin = max(instant - around, int(clock.begin[ego]), int(clock.begin[other]))
+    end = min(instant + around, int(clock.end[ego]), int(clock.end[other]))
+    if end <= begin:
+        return ""
+    judged = plausibility(excerpt(traffic, clock, ego, [other], begin, end))
+    return judged.labels[0]

@@ -1,0 +1,1 @@
+"""Where recorded traffic is on lanes: `find.locate` is the way in."""

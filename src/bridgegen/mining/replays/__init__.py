@@ -1,0 +1,1 @@
+"""Recorded events as scenarios: `write.write_replays` is the way in."""

@@ -1,0 +1,116 @@
+"""A participant's body as OpenSCENARIO says it."""
+
+from collections.abc import Callable, Mapping, Sequence
+
+from bridgegen.openx.openscenario import model as osc
+from bridgegen.openx.openscenario.declarations import KIND
+from bridgegen.participants import Body, ParticipantKind
+
+EntityBody = osc.Vehicle | osc.Pedestrian | osc.MiscObject
+
+# An axle as on a mid-size saloon; bodies have no more of it than the wheelbase.
+_MAX_STEERING = 0.6  # [rad]
+_WHEEL_DIAMETER = 0.65  # [m]
+_BODY_OVER_TRACK = 0.3  # [m], how much wider the body is than the track
+
+
+def entity_body(
+    kind: ParticipantKind,
+    body: Body,
+    *,
+    mass: float | None,
+    model: str | None = None,
+    properties: Sequence[osc.Property] = (),
+) -> EntityBody:
+    """Return the body of an entity.
+
+    Args:
+        kind: what it is; where its category does not say so, a property does.
+        body: its size, and what it can do.
+        mass: [kg]; None where it is not known, of a vehicle only.
+        model: name of the model; the kind's by default.
+        properties: further ones.
+    """
+    return _MAKE[kind.written.element](kind, body, mass, model, tuple(properties))
+
+
+def _vehicle(
+    kind: ParticipantKind, body: Body, mass: float | None, model: str | None,
+    properties: tuple[osc.Property, ...],
+) -> osc.Vehicle:  # fmt: skip
+    written = kind.written
+    return osc.Vehicle(
+        name=model or written.name or written.category,
+        vehicle_category=osc.VehicleCategory(written.category),
+        bounding_box=_box(body),
+        performance=osc.Performance(body.max_speed, body.max_acceleration, body.max_deceleration),
+        axles=osc.Axles(
+            _axle(_MAX_STEERING, body.width, body.wheelbase), _axle(0.0, body.width, 0.0)
+        ),
+        properties=osc.Properties((*_stated(kind), *properties)),
+        role=None if written.role is None else osc.Role(written.role),
+        mass=mass,
+    )
+
+
+def _pedestrian(
+    kind: ParticipantKind, body: Body, mass: float | None, model: str | None,
+    properties: tuple[osc.Property, ...],
+) -> osc.Pedestrian:  # fmt: skip
+    name = kind.written.name or kind.written.category
+    return osc.Pedestrian(
+        name=model or name,
+        pedestrian_category=osc.PedestrianCategory(kind.written.category),
+        mass=_known(mass),
+        bounding_box=_box(body),
+        properties=osc.Properties((*properties, *_stated(kind))),
+        model3d=name,
+    )
+
+
+def _object(
+    kind: ParticipantKind, body: Body, mass: float | None, model: str | None,
+    properties: tuple[osc.Property, ...],
+) -> osc.MiscObject:  # fmt: skip
+    return osc.MiscObject(
+        name=model or kind.written.name or kind.written.category,
+        misc_object_category=osc.MiscObjectCategory(kind.written.category),
+        mass=_known(mass),
+        bounding_box=_box(body),
+        properties=osc.Properties((*properties, *_stated(kind))),
+    )
+
+
+_MAKE: Mapping[
+    str,
+    Callable[
+        [ParticipantKind, Body, float | None, str | None, tuple[osc.Property, ...]], EntityBody
+    ],
+] = {"Vehicle": _vehicle, "Pedestrian": _pedestrian, "MiscObject": _object}
+
+
+def _known(mass: float | None) -> float:
+    assert mass is not None  # OpenSCENARIO asks for it
+    return mass
+
+
+def _stated(kind: ParticipantKind) -> tuple[osc.Property, ...]:
+    """Return the property that names a kind that the category alone does not identify."""
+    return () if kind.written.is_exact else (osc.Property(KIND, kind.name),)
+
+
+def _box(body: Body) -> osc.BoundingBox:
+    return osc.BoundingBox(
+        osc.Center(body.center_ahead, 0.0, body.height / 2),
+        osc.Dimensions(body.width, body.length, body.height),
+    )
+
+
+def _axle(max_steering: float, body_width: float, x: float) -> osc.Axle:
+    return osc.Axle(
+        max_steering=max_steering,
+        wheel_diameter=_WHEEL_DIAMETER,
+        track_width=max(round(body_width - _BODY_OVER_TRACK, 3), 0.1),
+        position_x=x,
+        position_z=_WHEEL_DIAMETER / 2,
+    )
