@@ -1,6 +1,7 @@
 """Recorded events as files: played again, they are what was recorded."""
 
 import itertools
+from dataclasses import replace
 from xml.etree import ElementTree
 
 import numpy as np
@@ -54,25 +55,21 @@ def test_it_is_simulated_as_it_was_recorded(prepared, replay):
     assert near.ttc[0, partner] == pytest.approx(prepared.event.found.ttc, abs=0.05)
 
 
-def test_its_files_are_valid_and_found_again_by_the_ontology(cli, replay):
+def test_its_files_are_valid(cli, replay):
     code, _, err = cli("validate", replay.scenario)
     assert (code, err) == (0, "")
     assert replay.scenario.with_suffix(".owl").exists()
-    code, _, err = cli("ask", replay.scenario.with_suffix(".owl"), "participants")
-    assert code in (0, 2)
-    assert "Traceback" not in err
 
 
-def test_it_says_so_where_it_is_not(prepared, tmp_path, monkeypatch):
+def test_it_says_so_where_it_is_not(prepared, tmp_path):
     """The proof compares with the recording, not with itself."""
-    shifted = prepared.states.x.copy()
-    shifted[1, 40:] += 0.3
-    monkeypatch.setattr(type(prepared.states), "x", shifted, raising=False)
-    object.__setattr__(prepared.states, "x", shifted)
-    try:
-        assert write(prepared, tmp_path / "0001").off == pytest.approx(0.3, abs=1e-6)
-    finally:
-        shifted[1, 40:] -= 0.3
+    x, v = prepared.states.x.copy(), prepared.states.v.copy()
+    x[1, 40:] += 0.3
+    v[0, 7] += 0.7
+    other = replace(prepared, states=replace(prepared.states, x=x, v=v))
+    made = write(other, tmp_path / "0001")
+    assert made.off == pytest.approx(0.3, abs=1e-6)
+    assert made.too_fast == pytest.approx(0.7, abs=0.1)
 
 
 def test_a_driver_takes_the_ego_s_place_where_and_as_fast_as_it_was(prepared, tmp_path):
