@@ -21,6 +21,10 @@ settings.register_profile("default", deadline=None, max_examples=60)
 settings.register_profile("ci", deadline=None, max_examples=60, derandomize=True)
 settings.load_profile("ci" if os.environ.get("CI") else "default")
 
+# Rewriting the assertions of all test modules takes each process 40 s, unless it may be kept.
+sys.dont_write_bytecode = False
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+
 # A shell's background job ignores Ctrl-C, and what it starts inherits that: some tests send it.
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
@@ -144,6 +148,7 @@ def add_planners(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
         def install(**points: str) -> None:
             lines = [f"{name} = planner_packages:{value}" for name, value in points.items()]
             (info / "entry_points.txt").write_text("\n".join(["[bridgegen.drivers]", *lines]))
+            os.utime(site)  # as if installed now
             patched.setattr(registry.planners(), "_loaded", {})
 
         yield install

@@ -9,17 +9,19 @@ import pytest
 CALL = "from bridgegen.cli import main; import sys; sys.argv[0] = 'bridgegen'; main()"
 
 
-def completed(line: str) -> list[str]:
+def asked(line: str) -> dict[str, str]:
+    """Return the variables with which bash asks what completes the end of a line."""
+    words = str(len(line.split(" ")) - 1)
+    return {"_BRIDGEGEN_COMPLETE": "complete_bash", "COMP_WORDS": line, "COMP_CWORD": words}
+
+
+def answered(line, cli, monkeypatch) -> list[str]:
     """Return what bash is offered at the end of a line."""
-    words = line.split(" ")
-    asked = {"COMP_WORDS": line, "COMP_CWORD": str(len(words) - 1)}
-    result = subprocess.run(
-        [sys.executable, "-c", CALL],
-        env={**os.environ, "_BRIDGEGEN_COMPLETE": "complete_bash", **asked},
-        capture_output=True, text=True, check=True,
-    )  # fmt: skip
-    assert result.stderr == ""
-    return result.stdout.split()
+    for name, value in asked(line).items():
+        monkeypatch.setenv(name, value)
+    code, out, err = cli()
+    assert (code, err) == (0, "")
+    return out.split()
 
 
 @pytest.mark.parametrize(
@@ -48,8 +50,18 @@ def completed(line: str) -> list[str]:
         ("bridgegen suite add runs/a --to", ["--to"]),
     ],
 )
-def test_what_is_completed(line, expected):
-    assert completed(line) == expected
+def test_what_is_completed(line, expected, cli, monkeypatch):
+    assert answered(line, cli, monkeypatch) == expected
+
+
+def test_a_process_of_its_own_completes_and_warns_of_nothing():
+    line = "bridgegen search crossroads-s4 --fix fog_de"
+    result = subprocess.run(
+        [sys.executable, "-c", CALL],
+        env={**os.environ, **asked(line)}, capture_output=True, text=True, check=True,
+    )  # fmt: skip
+    assert result.stderr == ""
+    assert result.stdout.split() == ["fog_density="]
 
 
 @pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])

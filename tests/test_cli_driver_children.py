@@ -20,6 +20,7 @@ SECONDS = 240.0  # a guard against a command that hangs
 
 def search(folder: Path, name: str) -> subprocess.CompletedProcess[str]:
     words = ["search", "stopped-after-curve", "--budget", "2", "--keep", "0", "--no-causes"]
+    words += ["--triage", "none"]
     return subprocess.run(
         [*CALL, *words, "--ego", f"{DRIVERS}:{name}", "--out", "r"],
         capture_output=True, text=True, cwd=folder, env={**os.environ}, timeout=SECONDS,

@@ -71,7 +71,9 @@ def test_the_language_is_described(make):
 def test_the_examples_run(tmp_path):
     import bridgegen as bg
 
-    run = bg.run_search(DOCS / "examples" / "oil-spill.yaml", budget=80, out=tmp_path / "run")
+    run = bg.run_search(
+        DOCS / "examples" / "oil-spill.yaml", budget=80, triage="none", out=tmp_path / "run"
+    )
     assert run.scenarios
     text = run.scenarios[0].with_suffix(".xosc").read_text("utf-8")
     assert 'frictionScaleFactor="$oil_friction"' in text

@@ -72,7 +72,9 @@ import sys
 sys.modules["pandas"] = None
 import bridgegen as bg
 from bridgegen.errors import InputError
-run = bg.run_search("crossroads-s4", algorithm="random", budget=20, out={str(tmp_path / "run")!r})
+run = bg.run_search(
+    "crossroads-s4", algorithm="random", budget=20, triage="none", out={str(tmp_path / "run")!r}
+)
 run.plot()
 assert "crossroads-s4" in run._repr_html_()
 assert len(run.rows().X) == 20

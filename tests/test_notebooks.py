@@ -2,6 +2,7 @@
 
 import ast
 import json
+import re
 from pathlib import Path
 
 import pytest
@@ -26,7 +27,8 @@ def test_a_notebook_runs(name, tmp_path, monkeypatch):
     for number, cell in enumerate(one for one in cells(name) if one["cell_type"] == "code"):
         assert cell["outputs"] == []
         assert cell["execution_count"] is None
-        body = ast.parse("".join(cell["source"]), f"{name}, code cell {number + 1}")
+        source = re.sub(r"budget=\d+", "budget=60", "".join(cell["source"]))
+        body = ast.parse(source, f"{name}, code cell {number + 1}")
         last = body.body.pop() if isinstance(body.body[-1], ast.Expr) else None
         exec(compile(body, name, "exec"), names)
         if last is not None:

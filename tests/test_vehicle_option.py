@@ -105,7 +105,7 @@ def test_a_run_file_names_it_and_the_command_line_overrides_it(tmp_path, cli):
     path = tmp_path / "run.yaml"
     path.write_text(
         "run: {scenario: cut-in, ego: route-follower, vehicle: single-track, budget: 8, keep: 0, "
-        "algorithm: random, out: out}"
+        "triage: none, algorithm: random, out: out}"
     )
     assert cli("search", path)[0] == 0
     assert bg.resume(tmp_path / "out").settings.vehicle == "single-track"

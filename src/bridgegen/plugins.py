@@ -1,13 +1,17 @@
 """What installed packages add to BridgeGen, by entry points: algorithms, metrics, simulators."""
 
+import os
+import sys
 from collections.abc import Callable, Collection, Iterator, MutableMapping
+from contextlib import suppress
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from bridgegen.errors import InputError, UnknownNameError
 
 if TYPE_CHECKING:
-    from importlib.metadata import EntryPoint
+    from importlib.metadata import EntryPoint, EntryPoints
 
 Kind = TypeVar("Kind")
 
@@ -62,14 +66,31 @@ class PlugIns:
         return f"{self.kind} '{name}' ({values}, entry point of '{self.group}')"
 
     def _points(self) -> dict[str, list["EntryPoint"]]:
-        from importlib.metadata import entry_points
+        import importlib.metadata
 
-        found: dict[str, list[EntryPoint]] = {}
-        for point in entry_points(group=self.group):
-            # A package installed twice (a wheel beside an editable copy) lists the same twice.
-            if all(point.value != other.value for other in found.setdefault(point.name, [])):
-                found[point.name].append(point)
-        return found
+        return _declared(importlib.metadata.entry_points, self.group, _module_folders())
+
+
+def _module_folders() -> tuple[tuple[str, int], ...]:
+    """Return the folders of modules, and when packages were last added or removed there [ns]."""
+    found = []
+    for folder in sys.path:
+        with suppress(OSError):
+            found.append((folder, os.stat(folder or os.curdir).st_mtime_ns))
+    return tuple(found)
+
+
+@lru_cache(maxsize=64)
+def _declared(
+    entry_points: Callable[..., "EntryPoints"], group: str, folders: tuple[tuple[str, int], ...]
+) -> dict[str, list["EntryPoint"]]:
+    """Return the entry points of a group by name; reading those of all packages takes 20 ms."""
+    found: dict[str, list[EntryPoint]] = {}
+    for point in entry_points(group=group):
+        # A package installed twice (a wheel beside an editable copy) lists the same twice.
+        if all(point.value != other.value for other in found.setdefault(point.name, [])):
+            found[point.name].append(point)
+    return found
 
 
 class Registry(MutableMapping[str, Kind]):

@@ -112,17 +112,17 @@ def test_interrupted_and_resumed_it_is_the_same(done, tmp_path):
 
     def interrupt(name: str, failure: str | None) -> None:
         ended.append(name)
-        if len(ended) == 2:
+        if len(ended) == 1:
             raise KeyboardInterrupt
 
+    drive = ["blind", "un-r157"]
     with pytest.raises(Interrupted, match=r"bridgegen benchmark planners --ego blind"):
-        benchmark_planners(
-            DRIVERS, **GRID, out=out, callbacks=BenchmarkCallbacks(ended=interrupt)
-        )  # fmt: skip
+        benchmark_planners(drive, **GRID, out=out, callbacks=BenchmarkCallbacks(ended=interrupt))
     assert not (out / "benchmark.html").exists()
-    benchmark_planners(DRIVERS, **{**GRID, "workers": 2}, out=out)
+    benchmark_planners(drive, **{**GRID, "workers": 2}, out=out)
     for name in TABLES:
-        assert (out / name).read_bytes() == (done.plan.out / name).read_bytes()
+        of_all = [row for row in table(done.plan.out / name) if row["driver"] in drive]
+        assert table(out / name) == of_all != []
 
 
 def test_a_later_call_adds_runs_and_makes_none_again(done):

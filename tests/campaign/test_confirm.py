@@ -354,7 +354,7 @@ def test_a_run_of_another_simulator_is_confirmed_in_ours(tmp_path, double):
     place = tmp_path / "run"
     bg.run_search(
         "crossroads-s2", algorithm="random", budget=30, seed=2, ego="route-follower", keep=2,
-        causes=False, simulator=elsewhere(), out=place,
+        causes=False, triage="none", simulator=elsewhere(), out=place,
     )  # fmt: skip
     with pytest.raises(InputError, match="was searched in the simulator double"):
         bg.confirm(place, "double")
@@ -370,7 +370,7 @@ def test_harm_counts_by_the_thresholds_whatever_its_cause(tmp_path, double):
     place = tmp_path / "run"
     bg.run_search(
         "crossroads-s2", algorithm="random", budget=60, seed=2, ego="route-follower", keep=2,
-        cause="planning", out=place,
+        cause="planning", triage="none", out=place,
     )  # fmt: skip
     found = confirm(place, elsewhere())
     assert (found.summary.scenarios, found.summary.confirmed) == (2, 2)
@@ -382,7 +382,7 @@ def test_a_run_with_several_objectives_has_a_difference_for_each(tmp_path, doubl
     place = tmp_path / "run"
     bg.run_search(
         "crossroads-s2", algorithm="random", objectives="many", budget=60, seed=2, keep=2,
-        ego="route-follower", causes=False, out=place,
+        ego="route-follower", causes=False, triage="none", out=place,
     )  # fmt: skip
     found = confirm(place, elsewhere())
     assert found.record.objectives == ("d_min", "v_d")

@@ -13,6 +13,12 @@ NETWORKS = DRIVERS.with_name("network_drivers.py")
 EXAMPLES = Path(__file__).parents[2] / "docs" / "examples"
 
 
+@pytest.fixture(autouse=True)
+def a_short_batch(monkeypatch):
+    """A driver's speed is measured for a tenth of a second."""
+    monkeypatch.setattr(driver_contract, "SECONDS", 0.1)
+
+
 def checked(name, file=DRIVERS, scenario="crossroads-s1"):
     return list(check_driver(f"{file}:{name}", [scenario], time_limit=0.5))
 

@@ -10,7 +10,7 @@ import bridgegen as bg
 @pytest.fixture(scope="module")
 def run(tmp_path_factory):
     folder = tmp_path_factory.mktemp("runs") / "s4"
-    return bg.run_search("crossroads-s4", budget=150, keep=2, seed=0, out=folder)
+    return bg.run_search("crossroads-s4", budget=150, keep=2, seed=0, triage="short", out=folder)
 
 
 def test_the_figure_shows_all_evaluations_and_the_worst_scenario(run):
@@ -39,7 +39,7 @@ def test_what_a_notebook_shows(run):
 def test_nothing_critical(tmp_path):
     run = bg.run_search(
         "crossroads-s1", ego="reference", budget=20, algorithm="random", objective={"harm": None},
-        out=tmp_path / "r",
+        triage="none", out=tmp_path / "r",
     )  # fmt: skip
     assert len(run.plot().axes) == 1
     assert "srcdoc" not in run._repr_html_()

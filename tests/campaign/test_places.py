@@ -3,6 +3,7 @@
 import json
 import re
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -11,7 +12,7 @@ import pytest
 
 import bridgegen as bg
 from bridgegen.campaign import Run
-from bridgegen.campaign.places import places_of
+from bridgegen.campaign.places import PlaceFit, places_of
 from bridgegen.campaign.restored import searched
 from bridgegen.campaign.validate import validate_file
 from bridgegen.errors import BridgeGenError, InputError, StorageError, UnsupportedError
@@ -20,6 +21,7 @@ from bridgegen.odd.reader import load
 from bridgegen.ontology.individuals import build_static
 from bridgegen.openx.on_map import on_map, searchable
 from bridgegen.openx.opendrive.from_owl import opendrive_from_owl
+from bridgegen.openx.opendrive.model import OpenDrive
 from bridgegen.openx.opendrive.rings import rings
 from bridgegen.openx.opendrive.road_map import load_map
 from bridgegen.openx.opendrive.write import to_xml
@@ -27,6 +29,13 @@ from bridgegen.pipeline import Pipeline
 from bridgegen.report.map_picture import write_map_picture
 
 TOWN05 = Path(__file__).parents[3] / "shared" / "data" / "Town05.xodr"
+
+
+@cache
+def places_of_town05(name: str | None = None) -> tuple[list[PlaceFit], OpenDrive, list[str]]:
+    """Return the places of Town05; with a scenario's name, whether it fits them."""
+    return places_of(TOWN05, load(name) if name else None)
+
 
 needs_town05 = pytest.mark.skipif(not TOWN05.exists(), reason="needs Town05.xodr")
 
@@ -60,7 +69,7 @@ def test_lanes_that_are_missing_are_named(crossroads: Path) -> None:
 @needs_town05
 def test_what_is_said_to_fit_can_be_simulated() -> None:
     scenario = load("crossroads-s4")
-    found, model, _ = places_of(TOWN05, scenario)
+    found, model, _ = places_of_town05("crossroads-s4")
     assert [one.id for one in found] == [junction.id for junction in model.junctions]
     fits = {one.id: one for one in found if one.rotations}
     assert "965" in fits
@@ -78,7 +87,7 @@ def test_what_is_said_to_fit_can_be_simulated() -> None:
 
 @needs_town05
 def test_three_legs_are_not_four() -> None:
-    found, _, _ = places_of(TOWN05, load("left-across-path"))
+    found, _, _ = places_of_town05("left-across-path")
     (three,) = [one for one in found if one.id == "224"]
     assert (three.rotations, three.lacks) == (0, "3 legs; the scenario has 4")
     assert sorted(three.legs) == ["19", "20", "48"]
@@ -86,7 +95,7 @@ def test_three_legs_are_not_four() -> None:
 
 @needs_town05
 def test_the_picture_marks_each_junction(tmp_path: Path) -> None:
-    found, model, _ = places_of(TOWN05)
+    found, model, _ = places_of_town05()
     path = tmp_path / "town.svg"
     write_map_picture(path, model, {"965"})
     root = ElementTree.parse(path).getroot()
@@ -222,7 +231,7 @@ def test_on_a_map_of_its_own_a_scenario_is_what_it_is_at_home(name: str, tmp_pat
 @pytest.mark.parametrize("name", ROADS)
 def test_what_is_said_to_fit_of_a_road_can_be_simulated(name: str) -> None:
     scenario = load(name)
-    found, _, _ = places_of(TOWN05, scenario)
+    found, _, _ = places_of_town05(name)
     fits = [one.id for one in found if one.rotations]
     assert fits
     for place in (fits[0], fits[-1]):
@@ -243,7 +252,9 @@ def test_the_best_stretch_and_all_of_them(tmp_path: Path) -> None:
     """A row of a search of all roads is, to the last bit, that of a search of its road."""
     scenario = load("lead-brakes")
     best = searchable(scenario, load_map(TOWN05, "best", scenario))
-    assert best.site.place_id in {one.id for one in places_of(TOWN05, scenario)[0] if one.rotations}
+    assert best.site.place_id in {
+        one.id for one in places_of_town05("lead-brakes")[0] if one.rotations
+    }
     roads = searchable(scenario, load_map(TOWN05, "all", scenario))
     *left_out, more = roads.warnings
     assert [" is left out: " in one for one in left_out] == [True] * 3

@@ -52,23 +52,8 @@ print(*sorted(named))
 Run = Callable[..., list[str]]
 
 
-@pytest.fixture
-def package(tmp_path) -> Path:
-    """A copy of the package with four modules more."""
-    here = Path(bridgegen.__file__).parent
-    shutil.copytree(here, tmp_path / "bridgegen", ignore=shutil.ignore_patterns("__pycache__"))
-    modules = {"_low_kernels": LOW, "_high_kernels": HIGH, "_other_kernels": OTHER}
-    for name, text in (modules | {"_constants": "FACTOR = 2.0\n"}).items():
-        (tmp_path / "bridgegen" / f"{name}.py").write_text(text)
-    return tmp_path / "bridgegen"
-
-
-@pytest.fixture
-def compiled_by(package) -> Run:
-    """Runs code in a process, and returns the kernels that it compiled, in alphabetical order.
-
-    Further arguments are variables of its environment.
-    """
+def runner(package: Path) -> Run:
+    """Return what runs code of a package in a process; see `compiled_by`."""
 
     def run(code: str, **more: str) -> list[str]:
         environment = {
@@ -85,3 +70,50 @@ def compiled_by(package) -> Run:
         return done.stdout.split()
 
     return run
+
+
+@pytest.fixture(scope="session")
+def made(tmp_path_factory) -> Path:
+    """A copy of the package with four modules more, which no test changes."""
+    here, place = Path(bridgegen.__file__).parent, tmp_path_factory.mktemp("made") / "bridgegen"
+    shutil.copytree(here, place, ignore=shutil.ignore_patterns("__pycache__"))
+    modules = {"_low_kernels": LOW, "_high_kernels": HIGH, "_other_kernels": OTHER}
+    for name, text in (modules | {"_constants": "FACTOR = 2.0\n"}).items():
+        (place / f"{name}.py").write_text(text)
+    return place
+
+
+@pytest.fixture
+def package(made, tmp_path) -> Path:
+    """A copy of the package with four modules more."""
+    shutil.copytree(made, tmp_path / "bridgegen")
+    return tmp_path / "bridgegen"
+
+
+@pytest.fixture
+def compiled_by(package) -> Run:
+    """Runs code in a process, and returns the kernels that it compiled, in alphabetical order.
+
+    Further arguments are variables of its environment.
+    """
+    return runner(package)
+
+
+@pytest.fixture(scope="session")
+def compile_once(made, tmp_path_factory) -> Callable[..., Path]:
+    """Runs code in a process that lacks its kernels, once; returns the cache that it leaves.
+
+    Arguments are those of `compiled_by`.
+    """
+    caches: dict[tuple[str, ...], Path] = {}
+
+    def cache_of(code: str, **more: str) -> Path:
+        key = (code, *more.values())
+        if key not in caches:
+            package = tmp_path_factory.mktemp("compiled") / "bridgegen"
+            shutil.copytree(made, package)
+            assert runner(package)(code, **more) == ["high", "low"]
+            caches[key] = package.parent / "cache"
+        return caches[key]
+
+    return cache_of

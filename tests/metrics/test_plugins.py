@@ -65,3 +65,13 @@ def test_a_package_that_is_wrong_is_named(installed, driven, name, value, messag
 def test_ours_keep_their_names(installed):
     installed(ttc="TOP")
     assert metrics.get("ttc").unit == "s"
+
+
+def test_a_package_that_is_installed_meanwhile_is_found(tmp_path, monkeypatch):
+    monkeypatch.syspath_prepend(tmp_path)
+    assert "late" not in metrics.METRICS
+    info = tmp_path / "late-1.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: late\nVersion: 1\n")
+    (info / "entry_points.txt").write_text("[bridgegen.metrics]\nlate = late:METRIC\n")
+    assert "late" in metrics.METRICS

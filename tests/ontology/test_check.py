@@ -182,6 +182,15 @@ def test_a_scenario_as_built_keeps_all_rules(individuals, scenario):
     assert check(from_bytes(to_bytes(individuals)), scenario) == []
 
 
+def test_what_conforms_to_one_scenario_is_held_against_another(individuals, scenario, values):
+    low = values["bv_speed"] - 0.1
+    slower = replace(scenario.parameters["bv_speed"], high=low, default=low)
+    narrow = replace(scenario, parameters={**scenario.parameters, "bv_speed": slower})
+    for _ in range(2):
+        assert check(individuals, load(scenario.name)) == []
+        assert {one.parameter for one in check(individuals, narrow)} == {"bv_speed"}
+
+
 def test_weather_is_checked_without_its_bindings(individuals, scenario):
     unbound = without(individuals, predicate="#has_parameter")
     broken = changed(unbound, "weather_cloud", "has_cloudiness", ox.Literal(0.0))

@@ -6,9 +6,10 @@ import pytest
 import bridgegen as bg
 from bridgegen.cause import Cause
 from bridgegen.errors import InputError
+from bridgegen.extras import is_installed
 from bridgegen.search import Problem, Results, get
 
-pytest.importorskip("stable_baselines3")
+pytestmark = pytest.mark.skipif(not is_installed("rl"), reason="the extra rl is not installed")
 
 
 class Chase:

@@ -14,7 +14,7 @@ from bridgegen.openx.opendrive.read import read
 from bridgegen.openx.opendrive.rings import Ring, rings
 from bridgegen.openx.opendrive.road_map import RoadMap, map_of
 from bridgegen.openx.opendrive.site import road_ends
-from bridgegen.openx.opendrive.site_fit import kind_of_place, sites_at
+from bridgegen.openx.opendrive.site_fit import candidates, kind_of_place, sites_at
 from bridgegen.openx.opendrive.site_lacks import missing
 from bridgegen.openx.opendrive.stretches import stretches
 from bridgegen.openx.xml import read_bytes
@@ -80,7 +80,13 @@ def places_of(
     if wanted in (None, "road"):
         found += [_stretch(site) for site in stretches(model, path.name)]
     if scenario is not None:
-        found = [_fitted(one, scenario, model, data, path) for one in found]
+        known = {}
+        if wanted in ("merge", "road"):
+            every = candidates(scenario, model, path.name)
+            known = {sites[0].place_id: sites for sites in every}
+        for i, one in enumerate(found):
+            rotations, placed, lacks = _fit(one, scenario, model, data, path, known.get(one.id))
+            found[i] = replace(one, rotations=rotations, placed=placed, lacks=lacks)
     return found, model, warnings
 
 
@@ -118,22 +124,29 @@ def _stretch(site: Site) -> PlaceFit:
     return PlaceFit(site.place_id, "road", roads, f"{lanes}, {leg.length:.0f} m")
 
 
-def _fitted(
-    place: PlaceFit, scenario: LogicalScenario, model: OpenDrive, data: bytes, path: Path
-) -> PlaceFit:
-    rotations, placed, lacks = _fit(place, scenario, model, data, path)
-    return replace(place, rotations=rotations, placed=placed, lacks=lacks)
-
-
 def _fit(
-    place: PlaceFit, scenario: LogicalScenario, model: OpenDrive, data: bytes, path: Path
+    place: PlaceFit,
+    scenario: LogicalScenario,
+    model: OpenDrive,
+    data: bytes,
+    path: Path,
+    sites: list[Site] | None,
 ) -> tuple[int, str, str]:
-    """Return how many rotations fit, where the legs of the best one lie, or what is missing."""
+    """Return how many rotations fit, where the legs of the best one lie, or what is missing.
+
+    Args:
+        place: one of the map's.
+        scenario: what shall take place there.
+        model: the map.
+        data: its file's content.
+        path: its file.
+        sites: the place in its rotations; None if they are still to be found.
+    """
     wanted = len(scenario.roads.legs)
     if place.kind in ("junction", "roundabout") and len(place.legs) != wanted:
         return 0, "", f"{len(place.legs)} legs; the scenario has {wanted}"
     try:
-        sites = sites_at(scenario, model, place.id, path.name)
+        sites = sites or sites_at(scenario, model, place.id, path.name)
     except UnsupportedError as error:
         return 0, "", error.problems[0]
     fitting = [site for site in sites if not missing(scenario, model, site)]

@@ -5,7 +5,7 @@ pyshacl is imported at the first check, as that takes half a second.
 """
 
 import logging
-from collections.abc import Iterator, Set
+from collections.abc import Iterator, Sequence, Set
 from contextlib import contextmanager
 from functools import cache
 from typing import TYPE_CHECKING, Any
@@ -25,7 +25,7 @@ __all__ = ["Violation", "check", "constraints_in_words"]
 
 _SH = "http://www.w3.org/ns/shacl#"
 _KEPT = 8
-"""Compiled scenarios that are remembered."""
+"""Compiled scenarios that are remembered, and for each, individuals that conform to it."""
 
 
 def check(individuals: Individuals, scenario: "LogicalScenario | None" = None) -> list[Violation]:
@@ -36,7 +36,9 @@ def check(individuals: Individuals, scenario: "LogicalScenario | None" = None) -
         scenario: the logical scenario whose ranges, bounds and formulas they must keep; without
             it, the ranges that the individuals declare themselves.
     """
-    compiled = _compiled(scenario)
+    compiled, quads = _compiled(scenario), frozenset(individuals.quads)
+    if quads in compiled.conforming:
+        return []
     store = ox.Store()
     store.extend(individuals.quads)
     store.extend(_hierarchy())
@@ -45,6 +47,8 @@ def check(individuals: Individuals, scenario: "LogicalScenario | None" = None) -
         for finding in compiled.validate(store, _terms(individuals))
         for one in violations_of(individuals, scenario, compiled.rules, finding)
     }
+    if not found:
+        _keep(compiled.conforming, quads, True)
     return sorted(found.values(), key=lambda one: (one.individual, one.message))
 
 
@@ -74,20 +78,21 @@ def _terms(individuals: Individuals) -> frozenset[str]:
 class _Compiled:
     """The shapes of one scenario, as pyshacl has read them."""
 
-    def __init__(self, scenario: "LogicalScenario | None") -> None:
+    def __init__(self, text: str, rules: Sequence[Rule]) -> None:
         import rdflib
         from pyshacl.graph_abstraction import to_rdf
         from pyshacl.shapes_graph import ShapesGraph
 
-        self.rules: dict[str, Rule] = {rule.key: rule for rule in rules(scenario)}
+        self.rules: dict[str, Rule] = {rule.key: rule for rule in rules}
         graph = rdflib.Graph()
-        for quad in ox.parse(turtle(scenario), format=ox.RdfFormat.TURTLE):
+        for quad in ox.parse(text, format=ox.RdfFormat.TURTLE):
             graph.add((to_rdf(quad.subject), to_rdf(quad.predicate), to_rdf(quad.object)))
         self.shapes: Any = ShapesGraph(graph)
         self.needs = {
             str(shape.node): self._needs(local_name(str(shape.node)))
             for shape in self.shapes.shapes  # builds them, once
         }
+        self.conforming: dict[frozenset[ox.Quad], bool] = {}
 
     def _needs(self, key: str) -> frozenset[str]:
         """Return the terms without which a shape finds nothing to check."""
@@ -129,17 +134,27 @@ class _Compiled:
             )
 
 
-_cache: dict[int, tuple["LogicalScenario | None", _Compiled]] = {}
+_of_scenario: dict[int, tuple["LogicalScenario | None", _Compiled]] = {}
+_of_text: dict[str, _Compiled] = {}
 
 
 def _compiled(scenario: "LogicalScenario | None") -> _Compiled:
-    """Return the shapes of a scenario, compiled at its first check."""
-    kept = _cache.get(id(scenario))  # a scenario has no hash; being kept here, its id stays its own
+    """Return the shapes of a scenario, compiled at the first check of one with these shapes."""
+    kept = _of_scenario.get(id(scenario))  # has no hash; being kept here, its id stays its own
     if kept is None:
-        while len(_cache) >= _KEPT:
-            _cache.pop(next(iter(_cache)))
-        kept = _cache[id(scenario)] = (scenario, _Compiled(scenario))
+        text = turtle(scenario)
+        compiled = _of_text.get(text) or _Compiled(text, rules(scenario))
+        _keep(_of_text, text, compiled)
+        kept = (scenario, compiled)
+        _keep(_of_scenario, id(scenario), kept)
     return kept[1]
+
+
+def _keep(kept: dict[Any, Any], key: Any, value: Any) -> None:
+    """Keep a value, and forget the first of those that are too many."""
+    while len(kept) >= _KEPT and key not in kept:
+        kept.pop(next(iter(kept)))
+    kept[key] = value
 
 
 @contextmanager
