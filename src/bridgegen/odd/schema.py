@@ -11,6 +11,7 @@ from pydantic import Field, ValidationInfo, field_validator
 from bridgegen.odd.clauses import ClauseSection
 from bridgegen.odd.criteria import CriterionSection
 from bridgegen.odd.matrix import GridSection
+from bridgegen.odd.recorded import RecordedSection
 from bridgegen.odd.roads_schema import RoadsSection
 from bridgegen.odd.shape import (
     AxisName,
@@ -207,6 +208,8 @@ class ScenarioFile(ShapedSection):
     """Values to test instead of a sample of the ranges: what 'bridgegen suite' runs."""
     clauses: list[ClauseSection] = []
     """Clauses of a regulation or protocol, which a suite judges."""
+    recorded: RecordedSection | None = None
+    """Which recorded events are this scenario, and its parameters in them: 'bridgegen mine'."""
     objective: Annotated[ObjectiveSection | Literal["harm"], OrWord(ObjectiveSection, "harm")] = (
         "harm"
     )
