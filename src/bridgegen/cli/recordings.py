@@ -27,15 +27,20 @@ def mine(
         typer.Option("--lenient", help="Skip files that cannot be read, and list them."),
     ] = False,
     dt: Annotated[float, typer.Option(help="Resample at this time step [s].")] = 0.05,
+    scenario: Annotated[
+        list[Path] | None,
+        typer.Option(help="A scenario file whose events to look for, too. May be repeated."),
+    ] = None,
     as_json: common.Json = False,
 ) -> None:
-    """Read and clean recorded traffic, place it on lanes, account for it.
+    """Read and clean recorded traffic, place it on lanes, find events.
 
     Says what was recorded: hours, kilometres, participants by kind, and all that cleaning found.
     Lanes are those of the map, or of the recording, or inferred from its paths.
     The format is told by the content: tables of states, esmini's log, levelX, NGSIM, SMARTS,
     CommonRoad, INTERACTION, SUMO FCD, Waymo motion as JSON, Argoverse 2, ScenarioNet.
-    Events and scenarios are not found in it yet.
+    Finds events (cut-in, cut-out, lead-brakes, approach, following, lane-change)
+    and the parameters of the scenarios that declare theirs.
     """
     from bridgegen.mining.mine import mine as mine_recordings
     from bridgegen.screen.recordings import RecordingsScreen, print_mined
@@ -47,6 +52,7 @@ def mine(
             road_map=road_map,
             lenient=lenient,
             time_step=dt,
+            scenarios=scenario or (),
             progress=screen.progress,
         )
     print_mined(mined, as_json=as_json)

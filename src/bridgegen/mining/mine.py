@@ -9,6 +9,12 @@ import numpy as np
 
 from bridgegen.arrays import Float
 from bridgegen.errors import FileFormatError, InputError, StorageError
+from bridgegen.mining.events.find import FoundEvents, find_events
+from bridgegen.mining.events.of_scenarios import (
+    ScenarioEvents,
+    recorded_scenarios,
+    scenario_events,
+)
 from bridgegen.mining.lanes.account import LanesFound, account_of
 from bridgegen.mining.lanes.find import Located, locate, read_map
 from bridgegen.recordings.clean import TIME_STEP, Cleaned, clean
@@ -40,6 +46,7 @@ class Summary:
         findings: of cleaning, all rules.
         paths: for the picture: kind and points ``(n, 2)`` [m] of at most `PATHS_SHOWN` tracks.
         lanes: on which it was.
+        events: in it.
     """
 
     facts: Facts
@@ -54,6 +61,7 @@ class Summary:
     findings: tuple[Finding, ...]
     paths: tuple[tuple[int, Float], ...]
     lanes: LanesFound
+    events: FoundEvents
 
 
 @dataclass(frozen=True)
@@ -67,6 +75,7 @@ class Mined:
         time_step: after cleaning [s].
         out: the folder.
         warnings: of reading the map.
+        scenarios: the events that are a scenario, per scenario.
     """
 
     recordings: tuple[Summary, ...]
@@ -75,6 +84,7 @@ class Mined:
     time_step: float
     out: Path
     warnings: tuple[str, ...] = ()
+    scenarios: tuple[ScenarioEvents, ...] = ()
 
 
 def mine(
@@ -84,6 +94,7 @@ def mine(
     road_map: Path | None = None,
     lenient: bool = False,
     time_step: float = TIME_STEP,
+    scenarios: Sequence[Path] = (),
     progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> Mined:
     """Read and clean recordings, place them on lanes, and write what was recorded.
@@ -91,21 +102,24 @@ def mine(
     Args:
         paths: files, or folders of files.
         out: a folder, new or of an earlier call; gets recordings.html, recordings.csv, lanes.csv,
-            quality.csv.
+            quality.csv, events.csv, and a folder events.
         road_map: the OpenDRIVE map of all of them; without one the lanes are those that come with
             the recording, or inferred from its paths.
         lenient: leave out what cannot be read, and list it.
         time_step: to resample at [s].
+        scenarios: files of scenarios that declare their events, besides those that ship.
         progress: is told how many of how many files are done.
 
     Raises:
         FileFormatError: a file that is no recording, or breaks its format's rules.
-        InputError: no recordings, a time step out of range, or a map of another place.
+        InputError: no recordings, a time step out of range, a map of another place, or a scenario
+            that declares no events.
         StorageError: the folder holds other files of these names, or cannot be written.
     """
     from bridgegen.mining.page import refuse_foreign, write_all
 
     refuse_foreign(out)
+    sought = recorded_scenarios(scenarios)
     on_map = read_map(road_map) if road_map is not None else None
     files, others = _files(paths)
     found: list[Summary] = []
@@ -125,7 +139,11 @@ def mine(
         problems = [text for _, texts in skipped for text in texts]
         raise FileFormatError(*problems, "no recording could be read")
     warnings = on_map.warnings if on_map is not None else ()
-    mined = Mined(tuple(found), tuple(skipped), tuple(others), time_step, out, warnings)
+    events = [one.events for one in found]
+    mined = Mined(
+        tuple(found), tuple(skipped), tuple(others), time_step, out, warnings,
+        tuple(scenario_events(one, one.recorded, events) for one in sought if one.recorded),
+    )  # fmt: skip
     try:
         out.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -163,4 +181,5 @@ def summarise(traffic: RecordedTraffic, cleaned: Cleaned, located: Located) -> S
         duration=float(np.ptp(traffic.time)), hours=after.hours, kilometres=after.kilometres,
         read_hours=traffic.hours, read_kilometres=traffic.kilometres, tracks=len(after.names),
         findings=cleaned.quality.findings, paths=tuple(paths), lanes=lanes,
+        events=find_events(after, located),
     )  # fmt: skip

@@ -44,8 +44,12 @@ class EventKind:
 
 
 def _kind(
-    name: str, roles: tuple[str, ...], rule: str, source: str, rows: tuple[tuple[str, str, str], ...]
-) -> EventKind:  # fmt: skip
+    name: str,
+    roles: tuple[str, ...],
+    rule: str,
+    source: str,
+    rows: tuple[tuple[str, str, str], ...],
+) -> EventKind:
     return EventKind(name, roles, rule, source, {row[0]: EventQuantity(*row) for row in rows})
 
 

@@ -153,7 +153,7 @@ class Scene:
         return found
 
     def led_time(self, ego: Int, lead: Int, instant: Float) -> Float:
-        """Return how long the ego has had a leader [s], ``(N,)``; NaN where it is not its leader."""
+        """Return how long the ego has had a leader [s], ``(N,)``; NaN where it has another."""
         state = self.state(ego, np.floor(instant))
         is_led = (state != NONE) & (self.leader[state] == lead) & (lead >= 0)
         since = self.clock.instant[self.led_since[state]]
