@@ -8,6 +8,7 @@ from bridgegen.mining.events.event import ABSENT, NOT_WHOLE, OVERLAP, Events, ev
 from bridgegen.mining.events.scene import Scene
 from bridgegen.mining.events.steps import MARGIN, fit_steps
 from bridgegen.mining.lanes.model import NONE
+from bridgegen.recordings.bodies import usual
 
 ONSET = 1.0
 """Deceleration over 2 s from which it may brake [m/s²]."""
@@ -51,6 +52,9 @@ def find(scene: Scene, changes: LaneChanges) -> Events:
     gap = scene.gap(ego, lead, begin)
     speed = scene.at(scene.speed, ego, begin)
     least, stays = _together(scene, ego, lead, begin, end)
+    hardest = np.array(
+        [usual(kind).seen_as.limits.deceleration for kind in scene.traffic.kind.tolist()]
+    )
     cut = CUT / step
     whole = (fit.begin >= low - cut) & (fit.begin + fit.duration <= high + cut)
     return events_of(
@@ -72,6 +76,7 @@ def find(scene: Scene, changes: LaneChanges) -> Events:
             OVERLAP: least <= 0.0,
             NOT_WHOLE: ~whole[picked] | np.isnan(gap),
             "it is not the ego's leader throughout": ~stays,
+            "it brakes harder than its kind can": rate[picked] > hardest[lead],
         },
     )  # fmt: skip
 
