@@ -55,5 +55,5 @@ def test_what_is_wrong_is_said_with_its_line(written, block, message):
     with pytest.raises(ScenarioError) as error:
         written(f"recorded: {block}")
     assert message in str(error.value)
-    assert "lead-brakes.yaml:" in str(error.value)
+    assert "lead-brakes.yaml, line " in str(error.value)
     assert len(error.value.problems) == 1

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from tests.mining.lanes.planted import BOX, on_road, recorded
 
+from bridgegen.ego.kinds import CAR
 from bridgegen.mining.events.event import EGO_CHANGES, OVERLAP
 from bridgegen.mining.events.find import DETECTORS, find_events
 from bridgegen.mining.events.of_scenarios import encounters_of, scenario_events
@@ -13,6 +14,7 @@ from bridgegen.mining.lanes.model import Strip, assemble
 from bridgegen.mining.lanes.placing import place
 from bridgegen.odd.event_kinds import EVENT_KINDS
 from bridgegen.odd.reader import load
+from bridgegen.recordings.bodies import centre_ahead
 from bridgegen.recordings.clean import clean
 
 WIDTH = 3.6
@@ -46,10 +48,13 @@ def ramp(first, last, begin, rate):
 
 
 def found(*paths, turn=0.0):
-    """Events by kind of vehicles with stations and offsets."""
+    """Events by kind of vehicles with stations, and offsets of their rear axles."""
     tracks = []
     for s, t in paths:
-        x, y, _ = on_road(s, np.broadcast_to(t, T.shape), turn=turn)
+        t = np.broadcast_to(t, T.shape)
+        course = np.arctan2(np.gradient(t), np.maximum(np.gradient(s), 1e-9))
+        ahead = centre_ahead(CAR, LENGTH) * np.sin(course)
+        x, y, _ = on_road(s, t + np.where(np.gradient(t) == 0.0, 0.0, ahead), turn=turn)
         tracks.append({"time": T, "x": x, "y": y})
     traffic = clean(recorded(tracks), 0.05).traffic
     lanes = two_lanes(turn)
@@ -68,11 +73,13 @@ def test_a_cut_in(turn):
     assert cut_in.begin[0] == pytest.approx(4.0, abs=0.1)
     wanted = {
         "ego_speed": 25.0, "other_speed": 20.0, "relative_speed": 5.0, "gap": 20.0 - LENGTH,
-        "crossing_gap": 10.0 - LENGTH, "lateral_distance": WIDTH, "change_time": 4.0,
+        "lateral_distance": WIDTH, "change_time": 4.0,
         "lateral_speed": 0.9, "side": 1.0, "lane_width": WIDTH, "lead_time": 4.0,
     }  # fmt: skip
     for name, value in wanted.items():
         assert cut_in.quantities[name][0] == pytest.approx(value, rel=0.02, abs=0.05), name
+    # The centre, ahead of the rear axle, crosses the line a little before half of the time.
+    assert 10.0 - LENGTH <= cut_in.quantities["crossing_gap"][0] <= 10.5 - LENGTH
 
 
 def test_bodies_that_overlap_are_counted_and_no_event():
@@ -173,7 +180,7 @@ def test_events_are_set_against_ranges_and_constraints():
     )
     outside = {one.parameter: (one.below, one.above) for one in met.outside}
     assert outside == {"ego_speed": (0, 1)}
-    close, _ = found((25.0 * T, RIGHT), (31.0 + 20.0 * T, change(4.0, 4.0, LEFT, RIGHT)))
+    close, _ = found((25.0 * T, RIGHT), (19.7 + 22.5 * T, change(4.0, 4.0, LEFT, RIGHT)))
     met = scenario_events(scenario, scenario.recorded, [close])
     assert [rule.split(" ")[0] for rule, _ in met.broken] == ["cut_in_distance"]
 
