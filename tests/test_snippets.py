@@ -32,6 +32,7 @@ from bridgegen.campaign.exported import NOT_EXPORTED
 from bridgegen.cli import main
 from bridgegen.cli.run_files import keys_of, read_runs
 from bridgegen.cli.runs import search
+from bridgegen.exposure import read_exposure
 from bridgegen.odd.json_schema import schema
 from bridgegen.odd.plain_yaml import read_plain_yaml
 from bridgegen.odd.reader import load
@@ -154,6 +155,10 @@ class Page:
         if re.match("runs?:", block.text):
             path.write_text(block.text, "utf-8")
             read_runs(path, keys_of(search))
+            return
+        if block.text.startswith("exposure_of:"):
+            path.write_text(block.text, "utf-8")
+            read_exposure(path)
             return
         if "scenario:" not in block.text:  # parts of one: they take the place of the starter's
             whole = yaml.safe_load(start_scenario("made").read_text("utf-8"))

@@ -12,6 +12,8 @@ if TYPE_CHECKING:
     from bridgegen.campaign.confirm import confirm
     from bridgegen.comparison import Comparison, compare
     from bridgegen.dashboard import Dashboard, build_dashboard
+    from bridgegen.exposure import Exposure, exposure_of, read_exposure
+    from bridgegen.exposure.fit import Fit, fit_exposure
     from bridgegen.odd.reader import load
     from bridgegen.preventability import PreventabilityMap, map_preventability
     from bridgegen.safety_case import SafetyCase, export_safety_case
@@ -21,6 +23,8 @@ if TYPE_CHECKING:
 __all__ = [
     "Comparison",
     "Dashboard",
+    "Exposure",
+    "Fit",
     "PreventabilityMap",
     "Run",
     "SafetyCase",
@@ -29,8 +33,11 @@ __all__ = [
     "compare",
     "confirm",
     "export_safety_case",
+    "exposure_of",
+    "fit_exposure",
     "load",
     "map_preventability",
+    "read_exposure",
     "resume",
     "run_search",
     "simulate_file",
@@ -43,6 +50,11 @@ _HOMES = {
     "build_dashboard": "bridgegen.dashboard",
     "confirm": "bridgegen.campaign.confirm",
     "Run": "bridgegen.campaign",
+    "Exposure": "bridgegen.exposure",
+    "Fit": "bridgegen.exposure.fit",
+    "exposure_of": "bridgegen.exposure",
+    "fit_exposure": "bridgegen.exposure.fit",
+    "read_exposure": "bridgegen.exposure",
     "load": "bridgegen.odd.reader",
     "map_preventability": "bridgegen.preventability",
     "PreventabilityMap": "bridgegen.preventability",

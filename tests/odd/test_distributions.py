@@ -143,3 +143,21 @@ def test_shares_within_a_range_are_those_of_its_values(name, ends, off):
     assert ((low - bits <= value) & (value <= high + bits))[between].all()
     outside = (shares < first) | (shares > last)
     assert not ((low + bits < value) & (value < high - bits))[outside].any()
+
+
+@pytest.mark.parametrize("name", CONTINUOUS)
+def test_a_density_is_the_slope_of_the_share(name):
+    ours, theirs = CONTINUOUS[name]
+    inner = np.linspace(ours.low, ours.high, 23)[1:-1]
+    mass = theirs.cdf(ours.high) - theirs.cdf(ours.low)
+    assert ours.density(inner) == pytest.approx(theirs.pdf(inner) / mass, rel=1e-9)
+    outside = np.array([ours.low - 1e-3, ours.high + 1e-3])
+    assert ours.density(outside).tolist() == [0.0, 0.0]
+
+
+def test_a_density_of_single_values_and_of_bins():
+    single = Discrete.of([3.0, 1.0, 3.0], [1.0, 2.0, 1.0])
+    assert single.density(np.array([1.0, 2.0, 3.0, 4.0])).tolist() == [0.5, 0.0, 0.5, 0.0]
+    bins = Histogram.of([(0.0, 2.0), (3.0, 4.0)], [1.0, 3.0])
+    x = np.array([-1.0, 1.0, 2.5, 3.5, 4.5])
+    assert bins.density(x).tolist() == [0.0, 0.125, 0.0, 0.75, 0.0]

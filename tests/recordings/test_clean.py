@@ -220,3 +220,36 @@ def test_a_recording_does_not_depend_on_what_else_is_recorded():
     alone = clean(traffic(one)).traffic
     beside = clean(traffic(drive(y=50.0), one, drive(y=90.0))).traffic
     assert (beside.x[beside.participant == 1] == alone.x).all()
+
+
+def test_velocities_that_are_not_those_of_the_positions_are_taken_from_them():
+    """A recording whose speeds lag 0.5 s behind where it is; rounding to 1 cm is no such thing."""
+    one = drive(n=80, v=20.0, a=-2.0)
+    late = one | {"vx": 20.0 - 2.0 * (one["time"] - 0.5), "vy": np.zeros(80),
+                  "heading": np.zeros(80)}  # fmt: skip
+    found = clean(traffic(late), 0.05)
+    assert applied(found)[Rule.MISFIT] == (1, 80)
+    after = found.traffic
+    driven = np.diff(after.x) / 0.05
+    assert driven == pytest.approx(0.5 * (after.vx[1:] + after.vx[:-1]), abs=1e-3)
+    assert after.vx == pytest.approx(20.0 - 2.0 * after.time, abs=1e-3)
+    rounded = drive(n=200, v=20.0, step=0.04)
+    rounded |= {"x": np.round(rounded["x"], 2), "vx": np.full(200, 20.0), "vy": np.zeros(200),
+                "heading": np.zeros(200), "acceleration": np.zeros(200)}  # fmt: skip
+    assert applied(clean(traffic(rounded, step=0.04), 0.04)) == {}
+
+
+def test_few_states_with_other_velocities_have_those_of_their_positions():
+    few = drive(n=5, v=10.0) | {"vx": np.full(5, 12.0), "vy": np.zeros(5)}
+    found = clean(traffic(few, drive() | {"vx": np.full(50, 20.0), "vy": np.zeros(50)}), 0.1)
+    assert found.traffic.vx[:5] == pytest.approx(10.0)
+    assert applied(found)[Rule.MISFIT] == (1, 5)
+
+
+def test_headings_are_smoothed_with_their_positions():
+    """A heading that jumps takes the rear axle along; it turns over half a second instead."""
+    one = drive(n=60, v=5.0)
+    heading = np.where(one["time"] < 3.0, 0.0, 0.3)
+    noisy = one | {"heading": heading, "vx": np.full(60, 5.6), "vy": np.zeros(60)}
+    found = clean(traffic(noisy), 0.05).traffic
+    assert np.abs(np.diff(found.heading)).max() < 0.05

@@ -20,7 +20,7 @@ def validate_file(
     An ``.owl`` of a scenario of the catalogue is checked against that scenario's constraints. An
     ``.xosc`` is checked with the map that it names, one with a distribution with its scenario. A
     ``.yaml`` is read; it is built, checked and simulated at its defaults and at the corners of its
-    ranges, with its effects.
+    ranges, with its effects; its exposure is checked, or a file with one.
 
     Args:
         path: the file.
@@ -55,8 +55,12 @@ def name_note(path: Path) -> str | None:
     """Return what is odd about a valid scenario file's name; None where nothing is."""
     if path.suffix.lower() not in (".yaml", ".yml"):
         return None
+    from bridgegen.exposure.reader import is_exposure
     from bridgegen.odd.reader import load as load_scenario
+    from bridgegen.odd.reader import read_document
 
+    if is_exposure(read_document(path)):
+        return None
     name = load_scenario(path).name
     if name == path.stem:
         return None
@@ -125,10 +129,16 @@ def _storyboard(path: Path, warnings: list[str] | None) -> list[str]:
 
 def _logical(path: Path) -> list[str]:
     from bridgegen.campaign.exportable import CHECKED_BY_VALIDATE, require_exportable
+    from bridgegen.exposure.reader import exposure_of, is_exposure, read_exposure
     from bridgegen.odd.reader import load as load_scenario
+    from bridgegen.odd.reader import read_document
     from bridgegen.pipeline import Pipeline
 
+    if is_exposure(read_document(path)):
+        read_exposure(path)
+        return []
     scenario = load_scenario(path)
+    exposure_of(scenario)
     pipeline = Pipeline(scenario, scenario.space())  # builds and compiles it at the defaults
     require_exportable(pipeline, CHECKED_BY_VALIDATE)
     return []

@@ -175,7 +175,8 @@ def schema(
     kind: Annotated[
         str | None,
         typer.Argument(
-            help="Of which files: scenario, fragment, run or safety-case.", show_default="scenario"
+            help="Of which files: scenario, fragment, exposure, run or safety-case.",
+            show_default="scenario",
         ),
     ] = None,
     of: Annotated[str | None, typer.Option(help="The same.", show_default=False)] = None,

@@ -7,6 +7,7 @@ import typer
 
 from bridgegen.cli import options as common
 from bridgegen.cli.app import app
+from bridgegen.cli.completion import completing
 from bridgegen.cli.groups import FILES
 
 
@@ -31,16 +32,28 @@ def mine(
         list[Path] | None,
         typer.Option(help="A scenario file whose events to look for, too. May be repeated."),
     ] = None,
+    keep: Annotated[
+        int, typer.Option(help="Number of the most critical events to write as scenarios.")
+    ] = 10,
+    ego: Annotated[
+        str | None,
+        typer.Option(
+            help="Driver that takes the ego's place in them, see 'bridgegen list drivers'.",
+            autocompletion=completing("driver"),
+        ),
+    ] = None,
     as_json: common.Json = False,
 ) -> None:
-    """Read and clean recorded traffic, place it on lanes, find events.
+    """Find events and near misses in recorded traffic, cleaned.
 
     Says what was recorded: hours, kilometres, participants by kind, and all that cleaning found.
-    Lanes are those of the map, or of the recording, or inferred from its paths.
+    Lanes are those of the map, or of the recording, or inferred from its paths. Near misses are
+    found as in a search; the most critical ones become OpenSCENARIO files that replay them.
     The format is told by the content: tables of states, esmini's log, levelX, NGSIM, SMARTS,
     CommonRoad, INTERACTION, SUMO FCD, Waymo motion as JSON, Argoverse 2, ScenarioNet.
     Finds events (cut-in, cut-out, lead-brakes, approach, following, lane-change)
     and the parameters of the scenarios that declare theirs.
+    Logical scenarios are not made of it yet.
     """
     from bridgegen.mining.mine import mine as mine_recordings
     from bridgegen.screen.recordings import RecordingsScreen, print_mined
@@ -53,6 +66,8 @@ def mine(
             lenient=lenient,
             time_step=dt,
             scenarios=scenario or (),
+            keep=keep,
+            ego=ego,
             progress=screen.progress,
         )
     print_mined(mined, as_json=as_json)

@@ -5,10 +5,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bridgegen.arrays import Float, Int
+from bridgegen.arrays import Bool, Float, Int
 from bridgegen.recordings.bodies import centre_ahead
 from bridgegen.recordings.table import RecordedTraffic
 from bridgegen.simulation.rollout import Rollout
+
+LONG_ENOUGH = 1.0
+"""What is recorded for less [s] is a fragment."""
+REVERSES = 0.3
+"""Backwards at less than this [m/s] is noise of a body that stands."""
 
 
 @dataclass(frozen=True)
@@ -19,17 +24,22 @@ class Clock:
         instant: ``(S,)`` int64, of each state; instant k is at k · time_step.
         begin: ``(P,)`` int64, first instant of each participant.
         end: ``(P,)`` int64, last one.
+        is_whole: ``(P,)`` bool: there for `LONG_ENOUGH`; else it is a fragment, whose motion is not
+            known well.
     """
 
     instant: Int
     begin: Int
     end: Int
+    is_whole: Bool
 
 
 def clock_of(traffic: RecordedTraffic) -> Clock:
     """Return the instants of a cleaned recording."""
     instant = np.rint(traffic.time / traffic.facts.time_step).astype(np.int64)
-    return Clock(instant, instant[traffic.first[:-1]], instant[traffic.first[1:] - 1])
+    begin, end = instant[traffic.first[:-1]], instant[traffic.first[1:] - 1]
+    is_whole = (end - begin) * traffic.facts.time_step >= LONG_ENOUGH
+    return Clock(instant, begin, end, is_whole)
 
 
 def path_speeds(
@@ -84,9 +94,10 @@ def excerpt(
         ahead = centre_ahead(int(traffic.kind[p]), float(traffic.length[p]))
         box[e] = traffic.length[p], traffic.width[p], ahead
         cosine, sine = np.cos(h), np.sin(h)
+        v = traffic.vx[at] * cosine + traffic.vy[at] * sine
         states[:, 0, e] = (
             traffic.x[at] - ahead * cosine, traffic.y[at] - ahead * sine, h,
-            traffic.vx[at] * cosine + traffic.vy[at] * sine, traffic.acceleration[at],
+            np.where((v < 0.0) & (v > -REVERSES), 0.0, v), traffic.acceleration[at],
             np.zeros(count),
         )  # fmt: skip
     x, y, h, v, a, offset = states

@@ -1,4 +1,4 @@
-"""``bridgegen mine``: read recordings, clean them, say where they are, account for them."""
+"""``bridgegen mine``: read recordings, clean and place them, find near misses, account for all."""
 
 from collections import Counter
 from collections.abc import Callable, Sequence
@@ -7,16 +7,20 @@ from pathlib import Path
 
 import numpy as np
 
+from bridgegen import ego as egos
 from bridgegen.arrays import Float
 from bridgegen.errors import FileFormatError, InputError, StorageError
+from bridgegen.mining.conflicts.find import RecordedConflict, conflicts_of, order
 from bridgegen.mining.events.find import FoundEvents, find_events
 from bridgegen.mining.events.of_scenarios import (
     ScenarioEvents,
     recorded_scenarios,
     scenario_events,
 )
+from bridgegen.mining.excerpt import clock_of
 from bridgegen.mining.lanes.account import LanesFound, account_of
 from bridgegen.mining.lanes.find import Located, locate, read_map
+from bridgegen.mining.replays.write import Prepared, Replay, prepare, write
 from bridgegen.recordings.clean import TIME_STEP, Cleaned, clean
 from bridgegen.recordings.formats import files_of, read
 from bridgegen.recordings.quality import Finding
@@ -27,6 +31,10 @@ POINTS_SHOWN = 40
 """Of a path in the picture."""
 MARGIN = 10.0
 """Around the paths in the picture [m]."""
+KEEP = 10
+"""Events that are written as scenarios."""
+CRITICAL, SUFFIXES = "critical", (".xosc", ".xodr", ".owl")
+"""The folder of these, as of a run, and what its files end in."""
 
 
 @dataclass(frozen=True)
@@ -47,6 +55,8 @@ class Summary:
         paths: for the picture: kind and points ``(n, 2)`` [m] of at most `PATHS_SHOWN` tracks.
         lanes: on which it was.
         events: in it.
+        conflicts: near misses, then contacts, the most harmful first.
+        names: of the participants in them, by number.
     """
 
     facts: Facts
@@ -62,6 +72,8 @@ class Summary:
     paths: tuple[tuple[int, Float], ...]
     lanes: LanesFound
     events: FoundEvents
+    conflicts: tuple[RecordedConflict, ...]
+    names: dict[int, str]
 
 
 @dataclass(frozen=True)
@@ -75,6 +87,7 @@ class Mined:
         time_step: after cleaning [s].
         out: the folder.
         warnings: of reading the map.
+        replays: the most critical events, as files.
         scenarios: the events that are a scenario, per scenario.
     """
 
@@ -84,6 +97,7 @@ class Mined:
     time_step: float
     out: Path
     warnings: tuple[str, ...] = ()
+    replays: tuple[Replay, ...] = ()
     scenarios: tuple[ScenarioEvents, ...] = ()
 
 
@@ -95,41 +109,55 @@ def mine(
     lenient: bool = False,
     time_step: float = TIME_STEP,
     scenarios: Sequence[Path] = (),
+    keep: int = KEEP,
+    ego: str | None = None,
     progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> Mined:
-    """Read and clean recordings, place them on lanes, and write what was recorded.
+    """Read and clean recordings, place them on lanes, find near misses, and write all that.
 
     Args:
         paths: files, or folders of files.
         out: a folder, new or of an earlier call; gets recordings.html, recordings.csv, lanes.csv,
-            quality.csv, events.csv, and a folder events.
+            quality.csv, events.csv, conflicts.csv, in the folder ``events`` the parameters of
+            scenarios, and in the folder ``critical`` the most critical events as scenarios.
         road_map: the OpenDRIVE map of all of them; without one the lanes are those that come with
             the recording, or inferred from its paths.
         lenient: leave out what cannot be read, and list it.
         time_step: to resample at [s].
         scenarios: files of scenarios that declare their events, besides those that ship.
+        keep: how many of the most critical events are written as scenarios.
+        ego: driver that takes the ego's place in these; by default it does what was recorded.
         progress: is told how many of how many files are done.
 
     Raises:
         FileFormatError: a file that is no recording, or breaks its format's rules.
-        InputError: no recordings, a time step out of range, a map of another place, or a scenario
-            that declares no events.
+        InputError: no recordings, a time step or a number out of range, a map of another place, or
+            a scenario that declares no events.
+        UnknownNameError: no such driver.
         StorageError: the folder holds other files of these names, or cannot be written.
     """
     from bridgegen.mining.page import refuse_foreign, write_all
 
+    if keep < 0:
+        raise InputError(f"0 <= keep must hold, got {keep}")
+    if ego is not None:
+        egos.get(ego)
     refuse_foreign(out)
     sought = recorded_scenarios(scenarios)
     on_map = read_map(road_map) if road_map is not None else None
     files, others = _files(paths)
     found: list[Summary] = []
     skipped: list[tuple[Path, tuple[str, ...]]] = []
+    kept: list[Prepared] = []
     for number, file in enumerate(files):
         progress(number, len(files))
         try:
             for traffic in read(file):
                 cleaned = clean(traffic, time_step)
-                found.append(summarise(traffic, cleaned, locate(cleaned.traffic, on_map)))
+                located = locate(cleaned.traffic, on_map)
+                conflicts = conflicts_of(cleaned.traffic)
+                found.append(summarise(traffic, cleaned, located, conflicts))
+                kept = _most_critical(kept, cleaned.traffic, conflicts, keep)
         except FileFormatError as error:
             if not lenient:
                 raise
@@ -138,18 +166,39 @@ def mine(
     if not found:
         problems = [text for _, texts in skipped for text in texts]
         raise FileFormatError(*problems, "no recording could be read")
+    replays = _written(kept, out / CRITICAL, ego)
     warnings = on_map.warnings if on_map is not None else ()
     events = [one.events for one in found]
     mined = Mined(
-        tuple(found), tuple(skipped), tuple(others), time_step, out, warnings,
+        tuple(found), tuple(skipped), tuple(others), time_step, out, warnings, replays,
         tuple(scenario_events(one, one.recorded, events) for one in sought if one.recorded),
     )  # fmt: skip
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise StorageError(f"{out}: cannot be made: {error.strerror}") from None
     write_all(mined)
     return mined
+
+
+def _most_critical(
+    kept: list[Prepared],
+    traffic: RecordedTraffic,
+    conflicts: tuple[RecordedConflict, ...],
+    keep: int,
+) -> list[Prepared]:
+    """Return the most critical events of earlier recordings and of one more."""
+    clock = clock_of(traffic)
+    more = [prepare(traffic, clock, one) for one in conflicts[:keep]]
+    return sorted([*kept, *more], key=lambda one: order(one.event))[:keep]
+
+
+def _written(kept: list[Prepared], folder: Path, ego: str | None) -> tuple[Replay, ...]:
+    """Write events in the place of those of an earlier call."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        for old in folder.glob("[0-9][0-9][0-9][0-9].*"):
+            if old.suffix in SUFFIXES:
+                old.unlink()
+    except OSError as error:
+        raise StorageError(f"{folder}: cannot be made: {error.strerror}") from None
+    return tuple(write(one, folder / f"{k:04}", ego) for k, one in enumerate(kept, 1))
 
 
 def _files(paths: Sequence[Path]) -> tuple[list[Path], list[Path]]:
@@ -164,7 +213,12 @@ def _files(paths: Sequence[Path]) -> tuple[list[Path], list[Path]]:
     return files, others
 
 
-def summarise(traffic: RecordedTraffic, cleaned: Cleaned, located: Located) -> Summary:
+def summarise(
+    traffic: RecordedTraffic,
+    cleaned: Cleaned,
+    located: Located,
+    conflicts: tuple[RecordedConflict, ...],
+) -> Summary:
     """Return what a recording holds, and where."""
     after = cleaned.traffic
     kinds = Counter(kind_in_words(kind) for kind in cleaned.kinds.tolist())
@@ -182,4 +236,6 @@ def summarise(traffic: RecordedTraffic, cleaned: Cleaned, located: Located) -> S
         read_hours=traffic.hours, read_kilometres=traffic.kilometres, tracks=len(after.names),
         findings=cleaned.quality.findings, paths=tuple(paths), lanes=lanes,
         events=find_events(after, located),
+        conflicts=conflicts,
+        names={p: after.names[p] for one in conflicts for p in (one.ego, one.other)},
     )  # fmt: skip

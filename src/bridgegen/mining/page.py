@@ -16,15 +16,17 @@ from bridgegen.disk import refuse_other, write_whole
 from bridgegen.ego.kinds import BICYCLE, MOTORCYCLE, NAMES, PEDESTRIAN
 from bridgegen.errors import StorageError
 from bridgegen.mining.cells import cell, html_table
+from bridgegen.mining.conflicts import section as conflicts
 from bridgegen.mining.events.page import events_section
 from bridgegen.mining.events.tables import HEAD as EVENTS_HEAD
 from bridgegen.mining.events.tables import TABLE as EVENTS
 from bridgegen.mining.events.tables import write_events
 from bridgegen.mining.lanes.account import LanesFound
-from bridgegen.mining.mine import PATHS_SHOWN, Mined, Summary
+from bridgegen.mining.mine import CRITICAL, PATHS_SHOWN, Mined, Summary
 
 GENERATOR = "BridgeGen recordings"
 PAGE, TABLE, LANES, QUALITY = "recordings.html", "recordings.csv", "lanes.csv", "quality.csv"
+CONFLICTS = "conflicts.csv"
 TABLE_HEAD = (
     "recording", "format", "file", "frame", "map", "time_step_s", "duration_s", "participants",
     *(f"n_{name}" for name in NAMES), "tracks", "states", "hours", "km", "hours_read", "km_read",
@@ -55,12 +57,14 @@ def refuse_foreign(out: Path) -> None:
     if out.exists() and not out.is_dir():
         raise StorageError(f"{out}: exists already, and is no folder")
     refuse_other(out / PAGE, GENERATOR, "page of recordings")
+    if (out / CRITICAL).exists() and not (out / PAGE).exists():
+        raise StorageError(
+            f"{out / CRITICAL}: exists already, is not of recordings, and is not overwritten"
+        )
     for name, head in (
-        (TABLE, TABLE_HEAD),
-        (LANES, LANES_HEAD),
-        (QUALITY, QUALITY_HEAD),
-        (EVENTS, EVENTS_HEAD),
-    ):
+        (TABLE, TABLE_HEAD), (LANES, LANES_HEAD), (QUALITY, QUALITY_HEAD),
+        (EVENTS, EVENTS_HEAD), (CONFLICTS, conflicts.HEAD),
+    ):  # fmt: skip
         try:
             with (out / name).open("rb") as file:
                 ours = file.readline(4096).decode("utf-8", "replace").strip() == ",".join(head)
@@ -86,6 +90,7 @@ def write_all(mined: Mined) -> None:
     write_whole(mined.out / LANES, _csv(LANES_HEAD, _lane_rows(mined)))
     write_whole(mined.out / QUALITY, _csv(QUALITY_HEAD, _quality_rows(mined)))
     write_events(mined.out, [one.events for one in mined.recordings], mined.scenarios)
+    write_whole(mined.out / CONFLICTS, _csv(conflicts.HEAD, conflicts.rows(mined)))
     fill = {
         "title": "What was recorded",
         "css": _own("page.css"),
@@ -93,6 +98,7 @@ def write_all(mined: Mined) -> None:
         "table": _table(mined),
         "events": events_section([one.events for one in mined.recordings], mined.scenarios),
         "recordings": "\n".join(_section(one, mined.time_step) for one in mined.recordings),
+        "conflicts": conflicts.section(mined),
         "left_out": _left_out(mined),
         "version": escape(version("bridgegen")),
     }

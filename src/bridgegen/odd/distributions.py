@@ -51,6 +51,13 @@ class Distribution(Protocol):
             value: ``(N,)`` in [low, high].
         """
 
+    def density(self, value: Float) -> Float:
+        """Return the density at these values, ``(N,)``; of single values, their probability.
+
+        Args:
+            value: ``(N,)``; 0 outside [low, high].
+        """
+
 
 def shares_within(distribution: Distribution, low: float, high: float) -> tuple[Float, Float]:
     """Return the first and the last share of a distribution's values in [low, high].
@@ -105,6 +112,11 @@ class Uniform:
         """See `Distribution`."""
         width = self.high - self.low
         return (value - self.low) / width if width > 0.0 else np.full(len(value), 0.5)
+
+    def density(self, value: Float) -> Float:
+        """See `Distribution`; of a single value, its probability."""
+        height = 1.0 / (self.high - self.low) if self.low < self.high else 1.0
+        return np.where((self.low <= value) & (value <= self.high), height, 0.0)
 
 
 @dataclass(frozen=True)
@@ -178,6 +190,13 @@ class Normal:
         share = np.clip((scipy.special.ndtr(standard) - below) / (above - below), 0.0, 1.0)
         return share if self._sign > 0.0 else 1.0 - share
 
+    def density(self, value: Float) -> Float:
+        """See `Distribution`."""
+        below, above = self._ends
+        standard = (value - self.mean) / self.deviation
+        height = _exp(-0.5 * standard * standard) / (self.deviation * math.sqrt(2.0 * math.pi))
+        return np.where((self.low <= value) & (value <= self.high), height / (above - below), 0.0)
+
 
 @dataclass(frozen=True)
 class LogNormal:
@@ -232,6 +251,12 @@ class LogNormal:
     def share(self, value: Float) -> Float:
         """See `Distribution`."""
         return self.logarithm.share(_log(value))
+
+    def density(self, value: Float) -> Float:
+        """See `Distribution`."""
+        inside = (self.low <= value) & (value <= self.high)
+        kept = np.where(inside, value, self.low)
+        return np.where(inside, self.logarithm.density(_log(kept)) / kept, 0.0)
 
 
 @dataclass(frozen=True)
@@ -320,6 +345,12 @@ class Discrete:
         middle: Float = (up_to - 0.5 * np.diff(up_to, prepend=0.0))[nearest]
         return middle
 
+    def density(self, value: Float) -> Float:
+        """See `Distribution`: the probability of a value."""
+        values, up_to = self._table
+        at = np.minimum(np.searchsorted(values, value), len(values) - 1)
+        return np.where(values[at] == value, np.diff(up_to, prepend=0.0)[at], 0.0)
+
 
 @dataclass(frozen=True)
 class Histogram:
@@ -385,6 +416,13 @@ class Histogram:
         within = np.clip((value - start[at]) / width[at], 0.0, 1.0)
         share: Float = below[at] + within * (below[at + 1] - below[at])
         return share
+
+    def density(self, value: Float) -> Float:
+        """See `Distribution`; at an end that two bins share, that of the upper one."""
+        start, width, below = self._table
+        at = np.maximum(np.searchsorted(start, value, side="right") - 1, 0)
+        inside = (start[at] <= value) & (value <= start[at] + width[at])
+        return np.where(inside, np.diff(below)[at] / width[at], 0.0)
 
 
 def _check_weights(weights: Sequence[float]) -> None:

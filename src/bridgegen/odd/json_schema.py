@@ -13,26 +13,33 @@ from typing import Any, Literal, get_args
 
 from bridgegen.disk import write_whole
 from bridgegen.errors import StorageError, UnknownNameError
+from bridgegen.odd.exposure_schema import ExposureFile
 from bridgegen.odd.kinds import FLOAT, KINDS
 from bridgegen.odd.parameters import UNITS
 from bridgegen.odd.reader import names
 from bridgegen.odd.roads import KNOBS, Template
 from bridgegen.odd.schema import FragmentFile, ScenarioFile
+from bridgegen.odd.shape import ShapedSection
 from bridgegen.odd.story import CONDITIONS
 from bridgegen.odd.story_schema import ACTIONS
 
 FILE = "bridgegen.schema.json"
 """What `bridgegen new` calls it."""
 
-Kind = Literal["scenario", "fragment"]
+Kind = Literal["scenario", "fragment", "exposure"]
+_MODELS: dict[Kind, type[ShapedSection]] = {
+    "scenario": ScenarioFile,
+    "fragment": FragmentFile,
+    "exposure": ExposureFile,
+}
 _ID = "urn:bridgegen:"
 _HEAD = 1000
 _NULL = {"type": "null"}
 
 
 def schema(kind: Kind = "scenario") -> dict[str, Any]:
-    """Return the JSON Schema of scenario files, or of the fragments that they include."""
-    model = ScenarioFile if kind == "scenario" else FragmentFile
+    """Return the JSON Schema of scenario files, of fragments that they include, or of exposures."""
+    model = _MODELS[kind]
     found = model.model_json_schema(ref_template="#/definitions/{model}")
     sections = found.pop("$defs")
     sections |= {model.__name__: found}
@@ -118,17 +125,18 @@ def _plain(one: Any) -> Any:
 
 def _between_keys(sections: dict[str, Any]) -> None:
     """Add rules between the keys of a section, as far as a schema can express them."""
-    for name in ("ParameterSection", "DerivedSection"):
+    for name in {"ParameterSection", "DerivedSection"} & sections.keys():
         unit = sections[name]["properties"]["unit"]
         unit.pop("anyOf", None)
         unit |= {
             "enum": list(UNITS),
             "description": ", ".join(f"{u} {w}" for u, w in UNITS.items()),
         }
-    sections["ParameterSection"]["allOf"] = [_of_kind(kind) for kind in KINDS]
+    if "ParameterSection" in sections:
+        sections["ParameterSection"]["allOf"] = [_of_kind(kind) for kind in KINDS]
     for one in sections.values():
         if "parameters" in one["properties"]:
-            for key in ("parameters", "derived"):
+            for key in {"parameters", "derived"} & one["properties"].keys():
                 one["properties"][key]["propertyNames"] = {"pattern": "^[a-z][a-z0-9_]{0,63}$"}
     if "ScenarioFile" not in sections:
         return

@@ -54,6 +54,12 @@ class Document:
             path = path[:-1]
         return f"{self.place}, line {self.lines.get(path, 1)}"
 
+    def below(self, key: str) -> "Document":
+        """Return what a top-level key holds, as a document with this one's lines."""
+        data = self.data[key] if isinstance(self.data, dict) else None
+        lines = {path[1:]: line for path, line in self.lines.items() if path[:1] == (key,)}
+        return Document(data, lines, self.place)
+
 
 def read_plain_yaml(data: bytes, place: str) -> Document:
     """Read a YAML document.

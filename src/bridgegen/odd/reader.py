@@ -98,7 +98,7 @@ def load(name_or_path: str | Path) -> LogicalScenario:
     if not is_path and len(path.parts) > 1:
         is_path = not any(name.startswith(f"{path.parts[0]}/") for name in pack_names())
     if is_path:
-        document, folder = _read_file(path), path.parent
+        document, folder = read_document(path), path.parent
     elif text in (known := (*names(), *pack_names())):
         document, folder = _read_shipped(text), None
     else:
@@ -106,7 +106,12 @@ def load(name_or_path: str | Path) -> LogicalScenario:
     return _build(document, folder)
 
 
-def _read_file(path: Path) -> Document:
+def read_document(path: Path) -> Document:
+    """Read a YAML file of a user's.
+
+    Raises:
+        FileFormatError: missing, unreadable, too large, no plain YAML; all that was found.
+    """
     try:
         if not path.is_file():
             raise FileFormatError(f"no such file: {path}")
@@ -328,7 +333,7 @@ def _read_fragment(name: str, folder: Path | None) -> Document:
         return _read_shipped(name)
     if folder is None or Path(name).is_absolute() or ".." in Path(name).parts:
         raise ScenarioError(f"a file to include lies beside the scenario, got '{name}'")
-    return _read_file(folder / name)
+    return read_document(folder / name)
 
 
 _USING = ("roads", "participants", "events", "jams", "road_works")
@@ -417,6 +422,7 @@ def _build(document: Document, folder: Path | None) -> LogicalScenario:
         matrix=matrix,
         clauses=clauses,
         recorded=recorded,
+        exposure=document.below("exposure") if given.exposure is not None else None,
     )
     try_out(scenario)
     return scenario

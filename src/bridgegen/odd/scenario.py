@@ -20,6 +20,7 @@ if TYPE_CHECKING:  # the checks of individuals start without pydantic
     from bridgegen.odd.clauses import Clause
     from bridgegen.odd.criteria import Criterion
     from bridgegen.odd.matrix import Grid
+    from bridgegen.odd.plain_yaml import Document
     from bridgegen.odd.recorded import RecordedSpec
 
 
@@ -210,6 +211,8 @@ class LogicalScenario(SearchedScenario):
         matrix: values that are tested of it, by edition.
         recorded: the recorded events that are this scenario; no part of its fingerprint, because
             it does not change what is simulated.
+        exposure: the file's block of that name, which no search depends on; see
+            `bridgegen.exposure`.
     """
 
     source: str
@@ -223,6 +226,7 @@ class LogicalScenario(SearchedScenario):
     adversary: Adversary | None = field(default=None, repr=False, kw_only=True)
     matrix: "tuple[Grid, ...]" = field(default=(), repr=False, kw_only=True)
     recorded: "RecordedSpec | None" = field(default=None, repr=False, kw_only=True)
+    exposure: "Document | None" = field(default=None, compare=False, repr=False, kw_only=True)
 
     @property
     def fingerprint(self) -> str:

@@ -10,6 +10,7 @@ from pydantic import Field, ValidationInfo, field_validator
 
 from bridgegen.odd.clauses import ClauseSection
 from bridgegen.odd.criteria import CriterionSection
+from bridgegen.odd.exposure_schema import ExposureSection
 from bridgegen.odd.matrix import GridSection
 from bridgegen.odd.recorded import RecordedSection
 from bridgegen.odd.roads_schema import RoadsSection
@@ -214,3 +215,5 @@ class ScenarioFile(ShapedSection):
         "harm"
     )
     """What is optimised, and what counts as critical; harm: see docs/conflicts.md."""
+    exposure: ExposureSection | None = None
+    """How often it is met, and with which values; no part of a search."""

@@ -7,6 +7,11 @@ from collections import Counter
 from dataclasses import asdict
 from typing import TYPE_CHECKING
 
+from bridgegen.mining.conflicts.section import (
+    conflicts_as_json,
+    recordings_in_words,
+    screen_rows,
+)
 from bridgegen.screen.live import Live
 from bridgegen.screen.tables import print_table
 
@@ -40,7 +45,15 @@ def print_mined(mined: "Mined", *, as_json: bool) -> None:
         print(f"bridgegen: warning: {text}", file=sys.stderr)
     if as_json:
         print(json.dumps({
-            "recordings": [_facts(one) for one in mined.recordings],
+            "recordings": [_facts(one, mined.time_step) for one in mined.recordings],
+            "scenarios": [
+                {"file": str(one.scenario), "recording": one.event.recording,
+                 "ego": one.event.names[0], "other": one.event.names[1],
+                 "position_off": None if one.problem else one.off,
+                 "speed_off": None if one.problem else one.too_fast,
+                 "problem": one.problem or None, "ontology_lacks": one.lacks}
+                for one in mined.replays
+            ],
             "skipped": [str(path) for path, _ in mined.skipped],
             "others": [str(path) for path in mined.others],
             **_events(mined),
@@ -66,10 +79,18 @@ def print_mined(mined: "Mined", *, as_json: bool) -> None:
         print_table(of_rules, found, as_json=False)
     else:
         print("quality: nothing to clean")
+    print()
+    for name, text in recordings_in_words(mined):
+        print(f"{name}: {text}")
+    if mined.replays:
+        print()
+        of_events = ("scenario", "recording", "ego and other", "type", "TTC [s]",
+                     "needed [m/s²]", "responsible")  # fmt: skip
+        print_table(of_events, list(screen_rows(mined)), as_json=False)
     print(f"\n{'page':<8}{mined.out / 'recordings.html'}")
     print(
         f"{'tables':<8}{mined.out / 'recordings.csv'}, {mined.out / 'lanes.csv'}, "
-        f"{mined.out / 'quality.csv'}, {mined.out / 'events.csv'}"
+        f"{mined.out / 'quality.csv'}, {mined.out / 'events.csv'}, {mined.out / 'conflicts.csv'}"
     )
     print(f"{'events':<8}{mined.out / 'events'}, a table per scenario")
 
@@ -122,7 +143,7 @@ def _events(mined: "Mined") -> "dict[str, object]":
         "hours_on_lanes": sum(one.hours for one in found),
         "km_on_lanes": sum(one.kilometres for one in found),
         "events": kinds,
-        "scenarios": {
+        "parameters": {
             one.scenario: {
                 "event": one.kind, "count": one.count, "rows": one.complete,
                 **_rates(one.encounters), "outside": [asdict(each) for each in one.outside],
@@ -166,7 +187,7 @@ def _quality(mined: "Mined") -> "Iterator[tuple[str, int, int, int, str]]":
         )
 
 
-def _facts(one: "Summary") -> dict[str, object]:
+def _facts(one: "Summary", time_step: float) -> dict[str, object]:
     facts = one.facts
     return {
         "name": facts.name, "format": facts.format, "file": facts.source, "frame": facts.frame,
@@ -181,6 +202,7 @@ def _facts(one: "Summary") -> dict[str, object]:
             "carriageways": [asdict(each) for each in one.lanes.carriageways],
             "notes": one.lanes.notes,
         },
+        "conflicts": conflicts_as_json(one, time_step),
         "quality": [
             {"rule": each.rule.value, "participants": each.participants, "count": each.count,
              "examples": each.examples}

@@ -25,8 +25,6 @@ EGOS = (CAR, TRUCK, BUS, MOTORCYCLE)
 """Kinds that may be the ego."""
 MOVES = 1.0
 """What has never been farther than this [m] from where it began does not move: it is parked."""
-LONG_ENOUGH = 1.0
-"""What is recorded for less [s] is a fragment, and in no conflict."""
 HORIZON = 4.0
 """[s]; the analysis predicts as far."""
 FARTHEST = 150.0
@@ -85,22 +83,22 @@ def conflicts_of(
             if pair not in best or one.urgency > best[pair].urgency:
                 best[pair] = one
     progress(len(partners), len(partners))
-    return tuple(sorted(best.values(), key=_order))
+    return tuple(sorted(best.values(), key=order))
 
 
-def _order(one: RecordedConflict) -> tuple[bool, bool, float, int, int]:
+def order(one: RecordedConflict) -> tuple[bool, bool, float, int, int]:
+    """Return what sorts conflicts: near misses, then doubtful ones, then contacts; by harm."""
     return one.is_contact, one.doubt != "", -one.found.harm, one.ego, one.other
 
 
 def candidates(traffic: RecordedTraffic, clock: Clock) -> dict[int, list[int]]:
-    """Return, by ego, with whom it might come into conflict."""
+    """Return, by ego, with whom it might come into conflict; fragments of tracks with nobody."""
     instant, participant = clock.instant, traffic.participant
     order = np.lexsort((traffic.x, instant))
     low = int(instant.min())
     first = np.searchsorted(instant[order], np.arange(low, int(instant.max()) + 2))
     reach = 0.5 * np.hypot(traffic.length, traffic.width) + 0.5 * MARGIN
     moves = np.array([_extent(traffic, states) > MOVES for states in traffic.states()])
-    is_whole = (clock.end - clock.begin) * traffic.facts.time_step >= LONG_ENOUGH
     keys = np.empty(1 << 20, np.int64)
     arguments = (
         order, first.astype(np.int64), participant, traffic.x, traffic.y, traffic.vx, traffic.vy,
@@ -115,7 +113,7 @@ def candidates(traffic: RecordedTraffic, clock: Clock) -> dict[int, list[int]]:
     is_ego = np.isin(traffic.kind, EGOS) & moves
     for p, q in zip(*(part.tolist() for part in np.divmod(pairs, len(moves))), strict=True):
         for ego, other in ((p, q), (q, p)):
-            if is_ego[ego] and is_whole[ego] and is_whole[other]:
+            if is_ego[ego] and clock.is_whole[ego] and clock.is_whole[other]:
                 found[ego].append(other)
     return dict(sorted(found.items()))
 

@@ -34,8 +34,11 @@ RATE = 2.0
 def others_near(
     traffic: RecordedTraffic, clock: Clock, ego: int, first: Sequence[int], begin: int, end: int
 ) -> list[int]:
-    """Return who is near the ego from one instant to another, those of ``first`` before all."""
-    is_there = (clock.begin <= end) & (clock.end >= begin)
+    """Return who is near the ego from one instant to another, those of ``first`` before all.
+
+    Fragments of tracks are left out.
+    """
+    is_there = (clock.begin <= end) & (clock.end >= begin) & clock.is_whole
     is_there[ego] = False
     nearest: list[tuple[float, int]] = []
     ego_at = np.arange(begin, end + 1) - clock.begin[ego] + traffic.first[ego]

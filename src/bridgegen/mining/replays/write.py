@@ -1,7 +1,6 @@
-"""The most critical events of a recording as files, each proven to replay what was recorded."""
+"""Recorded events as files, each proven to replay what was recorded."""
 
 import math
-from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -10,11 +9,14 @@ import numpy as np
 from bridgegen.disk import write_whole
 from bridgegen.errors import InputError
 from bridgegen.mining.conflicts.find import RecordedConflict
-from bridgegen.mining.excerpt import Clock, clock_of
+from bridgegen.mining.excerpt import Clock
 from bridgegen.mining.replays.road import along
 from bridgegen.mining.replays.scenario import driven, others_near, replay_of, with_map
+from bridgegen.openx.convert import import_file
 from bridgegen.openx.opendrive import write as opendrive
+from bridgegen.openx.opendrive.model import OpenDrive
 from bridgegen.openx.openscenario import write as openscenario
+from bridgegen.openx.openscenario.model import OpenScenario
 from bridgegen.openx.openscenario.recorded import Recording
 from bridgegen.recordings.table import RecordedTraffic
 from bridgegen.simulate import simulate_file
@@ -24,79 +26,100 @@ BEFORE, AFTER = 5.0, 3.0
 """Of an event [s], as far as the ego was recorded."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
+class Prepared:
+    """A recorded event that may be written.
+
+    Attributes:
+        recording: name of the recording.
+        event: what happened.
+        names: of the ego and the other, by the recording.
+        when: the event's instant, from the begin of the scenario [s].
+        scenario: all do what was recorded; its map is not named yet.
+        roads: along the ego's path.
+        start: where on its road the path begins [m].
+        motion: what was recorded, from time 0; its entity 1 is the other.
+        states: the same, as the scenario was made of.
+    """
+
+    recording: str
+    event: RecordedConflict
+    names: tuple[str, str]
+    when: float
+    scenario: OpenScenario
+    roads: OpenDrive
+    start: float
+    motion: Rollout
+    states: Recording
+
+
+@dataclass(frozen=True, eq=False)
 class Replay:
     """A recorded event as files.
 
     Attributes:
-        event: what happened.
-        begin: first instant, by the recording's clock.
-        end: last one.
-        scenario: the OpenSCENARIO file.
-        road: the OpenDRIVE file beside it.
-        motion: what was recorded, from time 0.
+        event: that is written.
+        scenario: the OpenSCENARIO file; the OpenDRIVE and ontology files have its name.
         off: the largest distance of any participant, when simulated, from where it was [m].
         too_fast: the largest difference of any speed [m/s].
-        problem: why it is not simulated; "" if it is.
+        problem: why it cannot be simulated; "" if it can.
+        lacks: what the ontology file lacks, and that OpenSCENARIO's has.
     """
 
-    event: RecordedConflict
-    begin: int
-    end: int
+    event: Prepared
     scenario: Path
-    road: Path
-    motion: Rollout
     off: float
     too_fast: float
-    problem: str = ""
+    problem: str
+    lacks: tuple[str, ...]
 
 
-def write_replays(
-    traffic: RecordedTraffic,
-    events: Sequence[RecordedConflict],
-    folder: Path,
-    *,
-    first: int = 1,
-    ego: str | None = None,
-) -> Iterator[Replay]:
-    """Write events of a cleaned recording; yield each as it is written.
-
-    Args:
-        traffic: cleaned.
-        events: in this order.
-        folder: for the files, ``0001.xosc``, ``0001.xodr`` and so on.
-        first: number of the first.
-        ego: a driver that takes the ego's place in the files; the recorded motion is proven first.
-
-    Raises:
-        StorageError: a file cannot be written.
-    """
-    clock = clock_of(traffic)
-    for number, event in enumerate(events, first):
-        yield _write(traffic, clock, event, folder / f"{number:04}", ego)
-
-
-def _write(
-    traffic: RecordedTraffic, clock: Clock, event: RecordedConflict, stem: Path, ego: str | None
-) -> Replay:
+def prepare(traffic: RecordedTraffic, clock: Clock, event: RecordedConflict) -> Prepared:
+    """Return an event of a cleaned recording with the traffic around it."""
     step = traffic.facts.time_step
     begin = max(event.instant - round(BEFORE / step), int(clock.begin[event.ego]))
     end = min(event.instant + round(AFTER / step), int(clock.end[event.ego]))
     others = others_near(traffic, clock, event.ego, [event.other], begin, end)
-    scenario, motion, recording = replay_of(traffic, clock, event.ego, others, begin, end)
+    scenario, motion, states = replay_of(traffic, clock, event.ego, others, begin, end)
     roads, start = along(motion.x[0, 0], motion.y[0, 0], motion.h[0, 0])
-    road, file = stem.with_suffix(".xodr"), stem.with_suffix(".xosc")
-    scenario = with_map(scenario, road.name)
-    write_whole(road, [opendrive.to_xml(roads)])
+    names = traffic.names[event.ego], traffic.names[event.other]
+    return Prepared(
+        traffic.facts.name, event, names, (event.instant - begin) * step, scenario, roads, start,
+        motion, states,
+    )  # fmt: skip
+
+
+def write(one: Prepared, stem: Path, ego: str | None = None) -> Replay:
+    """Write an event as ``.xosc``, ``.xodr`` and ``.owl``.
+
+    The file that replays what was recorded is simulated first, also where a driver takes the ego's
+    place in what is written.
+
+    Args:
+        one: the event.
+        stem: path of the files without ending.
+        ego: a driver that takes the ego's place.
+
+    Raises:
+        StorageError: a file cannot be written.
+    """
+    road, file, ontology = (stem.with_suffix(end) for end in (".xodr", ".xosc", ".owl"))
+    scenario = with_map(one.scenario, road.name)
+    write_whole(road, [opendrive.to_xml(one.roads)])
     write_whole(file, [openscenario.to_xml(scenario)])
-    off, too_fast, problem = _compared(file, recording)
+    off, too_fast, problem = _compared(file, one.states)
     if ego is not None:
-        scenario = driven(scenario, motion, ego, start, roads.roads[0].length)
+        scenario = driven(scenario, one.motion, ego, one.start, one.roads.roads[0].length)
         write_whole(file, [openscenario.to_xml(scenario)])
-    return Replay(event, begin, end, file, road, motion, off, too_fast, problem)
+    ontology.unlink(missing_ok=True)
+    try:
+        _, lacks = import_file(file, ontology, partial=True)
+    except InputError as error:
+        lacks = list(error.problems)
+    return Replay(one, file, off, too_fast, problem, tuple(lacks))
 
 
-def _compared(file: Path, recording: Recording) -> tuple[float, float, str]:
+def _compared(file: Path, states: Recording) -> tuple[float, float, str]:
     """Return how far a file's motion is off [m], how much too fast [m/s], and any problem."""
     try:
         played = simulate_file(file, metrics=("d_min",))
@@ -104,12 +127,12 @@ def _compared(file: Path, recording: Recording) -> tuple[float, float, str]:
         return math.nan, math.nan, str(error)
     if played.rollout.status[0] != 0:
         return math.nan, math.nan, played.status
-    order = [played.rollout.names.index(name) for name in recording.names]
-    n = min(played.rollout.shape[2], recording.x.shape[1])
+    order = [played.rollout.names.index(name) for name in states.names]
+    n = min(played.rollout.shape[2], states.x.shape[1])
     is_there = np.ones((len(order), n), np.bool_)
-    if recording.present is not None:
-        is_there = recording.present[:, :n]
+    if states.present is not None:
+        is_there = states.present[:, :n]
     x, y, v = (getattr(played.rollout, name)[0, order, :n] for name in ("x", "y", "v"))
-    off = np.hypot(x - recording.x[:, :n], y - recording.y[:, :n])
-    too_fast = np.abs(v - recording.v[:, :n])
+    off = np.hypot(x - states.x[:, :n], y - states.y[:, :n])
+    too_fast = np.abs(v - states.v[:, :n])
     return float(off[is_there].max()), float(too_fast[is_there].max()), ""

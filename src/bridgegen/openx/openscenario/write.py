@@ -1,6 +1,6 @@
 """From the model to an OpenSCENARIO file, driven by the model's declaration."""
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from lxml import etree
 
@@ -16,8 +16,11 @@ from bridgegen.openx.openscenario.element import (
 from bridgegen.openx.openscenario.storyboard import OpenScenario
 from bridgegen.openx.openscenario.values import ParameterRef, format_value
 
+if TYPE_CHECKING:
+    from bridgegen.openx.openscenario.distributions import DistributionFile
 
-def to_xml(scenario: OpenScenario) -> bytes:
+
+def to_xml(scenario: "OpenScenario | DistributionFile") -> bytes:
     """Return the file: UTF-8, indented, the same bytes for the same model.
 
     Numbers are written so that reading gives the same double back. A file of version 1.0 has what
