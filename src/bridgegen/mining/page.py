@@ -18,9 +18,9 @@ from bridgegen.errors import StorageError
 from bridgegen.mining.cells import cell, html_table
 from bridgegen.mining.conflicts import section as conflicts
 from bridgegen.mining.events.page import events_section
+from bridgegen.mining.events.tables import FOLDER, write_events
 from bridgegen.mining.events.tables import HEAD as EVENTS_HEAD
 from bridgegen.mining.events.tables import TABLE as EVENTS
-from bridgegen.mining.events.tables import write_events
 from bridgegen.mining.lanes.account import LanesFound
 from bridgegen.mining.mine import CRITICAL, PATHS_SHOWN, Mined, Summary
 
@@ -57,10 +57,11 @@ def refuse_foreign(out: Path) -> None:
     if out.exists() and not out.is_dir():
         raise StorageError(f"{out}: exists already, and is no folder")
     refuse_other(out / PAGE, GENERATOR, "page of recordings")
-    if (out / CRITICAL).exists() and not (out / PAGE).exists():
-        raise StorageError(
-            f"{out / CRITICAL}: exists already, is not of recordings, and is not overwritten"
-        )
+    for folder in (CRITICAL, FOLDER):
+        if (out / folder).exists() and not (out / PAGE).exists():
+            raise StorageError(
+                f"{out / folder}: exists already, is not of recordings, and is not overwritten"
+            )
     for name, head in (
         (TABLE, TABLE_HEAD), (LANES, LANES_HEAD), (QUALITY, QUALITY_HEAD),
         (EVENTS, EVENTS_HEAD), (CONFLICTS, conflicts.HEAD),
