@@ -199,7 +199,7 @@ class Page:
             whole = yaml.safe_load(start_scenario("made").read_text("utf-8"))
             for key, value in yaml.safe_load(block.text).items():
                 if isinstance(value, dict):
-                    whole[key] |= value
+                    whole[key] = whole.get(key, {}) | value
                 else:
                     whole[key] = value
             path.write_text(yaml.safe_dump(whole, allow_unicode=True), "utf-8")

@@ -28,6 +28,10 @@ def mine(
         typer.Option("--lenient", help="Skip files that cannot be read, and list them."),
     ] = False,
     dt: Annotated[float, typer.Option(help="Resample at this time step [s].")] = 0.05,
+    scenario: Annotated[
+        list[Path] | None,
+        typer.Option(help="A scenario file whose events to look for, too. May be repeated."),
+    ] = None,
     keep: Annotated[
         int, typer.Option(help="Number of the most critical events to write as scenarios.")
     ] = 10,
@@ -40,13 +44,15 @@ def mine(
     ] = None,
     as_json: common.Json = False,
 ) -> None:
-    """Find near misses in recorded traffic, cleaned.
+    """Find events and near misses in recorded traffic, cleaned.
 
     Says what was recorded: hours, kilometres, participants by kind, and all that cleaning found.
     Lanes are those of the map, or of the recording, or inferred from its paths. Near misses are
     found as in a search; the most critical ones become OpenSCENARIO files that replay them.
     The format is told by the content: tables of states, esmini's log, levelX, NGSIM, SMARTS,
     CommonRoad, INTERACTION, SUMO FCD, Waymo motion as JSON, Argoverse 2, ScenarioNet.
+    Finds events (cut-in, cut-out, lead-brakes, approach, following, lane-change)
+    and the parameters of the scenarios that declare theirs.
     Logical scenarios are not made of it yet.
     """
     from bridgegen.mining.mine import mine as mine_recordings
@@ -59,6 +65,7 @@ def mine(
             road_map=road_map,
             lenient=lenient,
             time_step=dt,
+            scenarios=scenario or (),
             keep=keep,
             ego=ego,
             progress=screen.progress,

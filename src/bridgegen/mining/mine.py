@@ -11,6 +11,12 @@ from bridgegen import ego as egos
 from bridgegen.arrays import Float
 from bridgegen.errors import FileFormatError, InputError, StorageError
 from bridgegen.mining.conflicts.find import RecordedConflict, conflicts_of, order
+from bridgegen.mining.events.find import FoundEvents, find_events
+from bridgegen.mining.events.of_scenarios import (
+    ScenarioEvents,
+    recorded_scenarios,
+    scenario_events,
+)
 from bridgegen.mining.excerpt import clock_of
 from bridgegen.mining.lanes.account import LanesFound, account_of
 from bridgegen.mining.lanes.find import Located, locate, read_map
@@ -48,6 +54,7 @@ class Summary:
         findings: of cleaning, all rules.
         paths: for the picture: kind and points ``(n, 2)`` [m] of at most `PATHS_SHOWN` tracks.
         lanes: on which it was.
+        events: in it.
         conflicts: near misses, then contacts, the most harmful first.
         names: of the participants in them, by number.
     """
@@ -64,6 +71,7 @@ class Summary:
     findings: tuple[Finding, ...]
     paths: tuple[tuple[int, Float], ...]
     lanes: LanesFound
+    events: FoundEvents
     conflicts: tuple[RecordedConflict, ...]
     names: dict[int, str]
 
@@ -80,6 +88,7 @@ class Mined:
         out: the folder.
         warnings: of reading the map.
         replays: the most critical events, as files.
+        scenarios: the events that are a scenario, per scenario.
     """
 
     recordings: tuple[Summary, ...]
@@ -89,6 +98,7 @@ class Mined:
     out: Path
     warnings: tuple[str, ...] = ()
     replays: tuple[Replay, ...] = ()
+    scenarios: tuple[ScenarioEvents, ...] = ()
 
 
 def mine(
@@ -98,6 +108,7 @@ def mine(
     road_map: Path | None = None,
     lenient: bool = False,
     time_step: float = TIME_STEP,
+    scenarios: Sequence[Path] = (),
     keep: int = KEEP,
     ego: str | None = None,
     progress: Callable[[int, int], None] = lambda done, total: None,
@@ -107,18 +118,21 @@ def mine(
     Args:
         paths: files, or folders of files.
         out: a folder, new or of an earlier call; gets recordings.html, recordings.csv, lanes.csv,
-            quality.csv, conflicts.csv, and in the folder ``critical`` the events as scenarios.
+            quality.csv, events.csv, conflicts.csv, in the folder ``events`` the parameters of
+            scenarios, and in the folder ``critical`` the most critical events as scenarios.
         road_map: the OpenDRIVE map of all of them; without one the lanes are those that come with
             the recording, or inferred from its paths.
         lenient: leave out what cannot be read, and list it.
         time_step: to resample at [s].
+        scenarios: files of scenarios that declare their events, besides those that ship.
         keep: how many of the most critical events are written as scenarios.
         ego: driver that takes the ego's place in these; by default it does what was recorded.
         progress: is told how many of how many files are done.
 
     Raises:
         FileFormatError: a file that is no recording, or breaks its format's rules.
-        InputError: no recordings, a time step or a number out of range, or a map of another place.
+        InputError: no recordings, a time step or a number out of range, a map of another place, or
+            a scenario that declares no events.
         UnknownNameError: no such driver.
         StorageError: the folder holds other files of these names, or cannot be written.
     """
@@ -129,6 +143,7 @@ def mine(
     if ego is not None:
         egos.get(ego)
     refuse_foreign(out)
+    sought = recorded_scenarios(scenarios)
     on_map = read_map(road_map) if road_map is not None else None
     files, others = _files(paths)
     found: list[Summary] = []
@@ -153,7 +168,11 @@ def mine(
         raise FileFormatError(*problems, "no recording could be read")
     replays = _written(kept, out / CRITICAL, ego)
     warnings = on_map.warnings if on_map is not None else ()
-    mined = Mined(tuple(found), tuple(skipped), tuple(others), time_step, out, warnings, replays)
+    events = [one.events for one in found]
+    mined = Mined(
+        tuple(found), tuple(skipped), tuple(others), time_step, out, warnings, replays,
+        tuple(scenario_events(one, one.recorded, events) for one in sought if one.recorded),
+    )  # fmt: skip
     write_all(mined)
     return mined
 
@@ -216,6 +235,7 @@ def summarise(
         duration=float(np.ptp(traffic.time)), hours=after.hours, kilometres=after.kilometres,
         read_hours=traffic.hours, read_kilometres=traffic.kilometres, tracks=len(after.names),
         findings=cleaned.quality.findings, paths=tuple(paths), lanes=lanes,
+        events=find_events(after, located),
         conflicts=conflicts,
         names={p: after.names[p] for one in conflicts for p in (one.ego, one.other)},
     )  # fmt: skip

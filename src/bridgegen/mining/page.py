@@ -15,7 +15,12 @@ import numpy as np
 from bridgegen.disk import refuse_other, write_whole
 from bridgegen.ego.kinds import BICYCLE, MOTORCYCLE, NAMES, PEDESTRIAN
 from bridgegen.errors import StorageError
+from bridgegen.mining.cells import cell, html_table
 from bridgegen.mining.conflicts import section as conflicts
+from bridgegen.mining.events.page import events_section
+from bridgegen.mining.events.tables import FOLDER, write_events
+from bridgegen.mining.events.tables import HEAD as EVENTS_HEAD
+from bridgegen.mining.events.tables import TABLE as EVENTS
 from bridgegen.mining.lanes.account import LanesFound
 from bridgegen.mining.mine import CRITICAL, PATHS_SHOWN, Mined, Summary
 
@@ -52,13 +57,14 @@ def refuse_foreign(out: Path) -> None:
     if out.exists() and not out.is_dir():
         raise StorageError(f"{out}: exists already, and is no folder")
     refuse_other(out / PAGE, GENERATOR, "page of recordings")
-    if (out / CRITICAL).exists() and not (out / PAGE).exists():
-        raise StorageError(
-            f"{out / CRITICAL}: exists already, is not of recordings, and is not overwritten"
-        )
+    for folder in (CRITICAL, FOLDER):
+        if (out / folder).exists() and not (out / PAGE).exists():
+            raise StorageError(
+                f"{out / folder}: exists already, is not of recordings, and is not overwritten"
+            )
     for name, head in (
         (TABLE, TABLE_HEAD), (LANES, LANES_HEAD), (QUALITY, QUALITY_HEAD),
-        (CONFLICTS, conflicts.HEAD),
+        (EVENTS, EVENTS_HEAD), (CONFLICTS, conflicts.HEAD),
     ):  # fmt: skip
         try:
             with (out / name).open("rb") as file:
@@ -84,12 +90,14 @@ def write_all(mined: Mined) -> None:
     write_whole(mined.out / TABLE, _csv(TABLE_HEAD, rows))
     write_whole(mined.out / LANES, _csv(LANES_HEAD, _lane_rows(mined)))
     write_whole(mined.out / QUALITY, _csv(QUALITY_HEAD, _quality_rows(mined)))
+    write_events(mined.out, [one.events for one in mined.recordings], mined.scenarios)
     write_whole(mined.out / CONFLICTS, _csv(conflicts.HEAD, conflicts.rows(mined)))
     fill = {
         "title": "What was recorded",
         "css": _own("page.css"),
         "facts": "".join(f"<li>{escape(one)}</li>" for one in _facts(mined)),
         "table": _table(mined),
+        "events": events_section([one.events for one in mined.recordings], mined.scenarios),
         "recordings": "\n".join(_section(one, mined.time_step) for one in mined.recordings),
         "conflicts": conflicts.section(mined),
         "left_out": _left_out(mined),
@@ -136,23 +144,8 @@ def _csv(head: Iterable[str], rows: Iterable[Iterable[object]]) -> Iterator[byte
     writer = csv.writer(text)
     writer.writerow(head)
     for row in rows:
-        writer.writerow([_cell(value) for value in row])
+        writer.writerow([cell(value) for value in row])
     yield text.getvalue().encode("utf-8", "replace")
-
-
-def _cell(value: object) -> object:
-    """Return a value that a spreadsheet does not take for a formula."""
-    if isinstance(value, str) and value[:1] in ("=", "+", "-", "@") and not _is_number(value):
-        return "'" + value
-    return value
-
-
-def _is_number(text: str) -> bool:
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return True
 
 
 def _facts(mined: Mined) -> Iterator[str]:
@@ -178,16 +171,7 @@ def _table(mined: Mined) -> str:
         ]
         for one in mined.recordings
     ]  # fmt: skip
-    return _html_table(head, rows)
-
-
-def _html_table(head: list[str], rows: list[list[str]]) -> str:
-    top = "".join(f"<th>{escape(name)}</th>" for name in head)
-    body = "".join(
-        f"<tr><th>{escape(row[0])}</th>{''.join(f'<td>{escape(one)}</td>' for one in row[1:])}</tr>"
-        for row in rows
-    )
-    return f"<table><thead><tr>{top}</tr></thead><tbody>{body}</tbody></table>"
+    return html_table(head, rows)
 
 
 def _section(one: Summary, time_step: float) -> str:
@@ -214,7 +198,7 @@ def _section(one: Summary, time_step: float) -> str:
         f"<section><h2>{escape(facts.name)}</h2><div class='card'><ul>{lines}</ul></div>"
         f"<div class='card'>{_picture(one)}<p class='muted'>{_caption(one)}</p></div>"
         f"{_lanes(one.lanes)}"
-        f"<div class='card'><div class='wide'>{_html_table(head, findings)}</div></div></section>"
+        f"<div class='card'><div class='wide'>{html_table(head, findings)}</div></div></section>"
     )
 
 
@@ -246,7 +230,7 @@ km off", *found.notes]  # fmt: skip
     lines = "".join(f"<li>{escape(text)}</li>" for text in notes)
     more = len(found.carriageways) - len(rows)
     rest = f"<p class='muted'>And {more:,} more, in {LANES}.</p>" if more > 0 else ""
-    table = f"<div class='wide'>{_html_table(head, rows)}</div>{rest}" if rows else ""
+    table = f"<div class='wide'>{html_table(head, rows)}</div>{rest}" if rows else ""
     return f"<div class='card'><ul>{lines}</ul>{table}</div>"
 
 

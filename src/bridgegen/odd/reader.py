@@ -22,6 +22,7 @@ from bridgegen.odd.others import DRIVERS, SCRIPTED, driven
 from bridgegen.odd.parameters import Axis, Bound, Derived, Parameter, at, nearest, read_axes
 from bridgegen.odd.plain_yaml import MAX_BYTES, Document, entries, read_plain_yaml
 from bridgegen.odd.quantities import Quantities
+from bridgegen.odd.recorded import read_recorded
 from bridgegen.odd.roads import KNOBS, RoadsSpec
 from bridgegen.odd.roads_reader import read_roads
 from bridgegen.odd.roads_schema import RoadsSection
@@ -377,6 +378,8 @@ def _build(document: Document, folder: Path | None) -> LogicalScenario:
     matrix = read_matrix(document, parameters, derived, quantities.report)
     clauses, wrong = read_clauses_in(document, criteria)
     problems += wrong
+    recorded, wrong = read_recorded(document, parameters, derived)
+    problems += wrong
     declarations.derived += changes.derived
     derived |= {one.name: one for one in changes.derived}
     between = bounds_between_layers(roads, story, parameters, declarations.prefixes, document.place)
@@ -418,6 +421,7 @@ def _build(document: Document, folder: Path | None) -> LogicalScenario:
         criteria=criteria,
         matrix=matrix,
         clauses=clauses,
+        recorded=recorded,
         exposure=document.below("exposure") if given.exposure is not None else None,
     )
     try_out(scenario)

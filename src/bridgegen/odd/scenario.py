@@ -21,6 +21,7 @@ if TYPE_CHECKING:  # the checks of individuals start without pydantic
     from bridgegen.odd.criteria import Criterion
     from bridgegen.odd.matrix import Grid
     from bridgegen.odd.plain_yaml import Document
+    from bridgegen.odd.recorded import RecordedSpec
 
 
 @dataclass(frozen=True)
@@ -208,6 +209,8 @@ class LogicalScenario(SearchedScenario):
             name of an entry point.
         adversary: driver of a participant, if `bridgegen.odd.adversary.adversarial` made it.
         matrix: values that are tested of it, by edition.
+        recorded: the recorded events that are this scenario; no part of its fingerprint, because
+            it does not change what is simulated.
         exposure: the file's block of that name, which no search depends on; see
             `bridgegen.exposure`.
     """
@@ -222,6 +225,7 @@ class LogicalScenario(SearchedScenario):
     road_end: Literal["leave", "stand"] = field(default="leave", kw_only=True)
     adversary: Adversary | None = field(default=None, repr=False, kw_only=True)
     matrix: "tuple[Grid, ...]" = field(default=(), repr=False, kw_only=True)
+    recorded: "RecordedSpec | None" = field(default=None, repr=False, kw_only=True)
     exposure: "Document | None" = field(default=None, compare=False, repr=False, kw_only=True)
 
     @property

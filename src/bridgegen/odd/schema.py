@@ -12,6 +12,7 @@ from bridgegen.odd.clauses import ClauseSection
 from bridgegen.odd.criteria import CriterionSection
 from bridgegen.odd.exposure_schema import ExposureSection
 from bridgegen.odd.matrix import GridSection
+from bridgegen.odd.recorded import RecordedSection
 from bridgegen.odd.roads_schema import RoadsSection
 from bridgegen.odd.shape import (
     AxisName,
@@ -208,6 +209,8 @@ class ScenarioFile(ShapedSection):
     """Values to test instead of a sample of the ranges: what 'bridgegen suite' runs."""
     clauses: list[ClauseSection] = []
     """Clauses of a regulation or protocol, which a suite judges."""
+    recorded: RecordedSection | None = None
+    """Which recorded events are this scenario, and its parameters in them: 'bridgegen mine'."""
     objective: Annotated[ObjectiveSection | Literal["harm"], OrWord(ObjectiveSection, "harm")] = (
         "harm"
     )

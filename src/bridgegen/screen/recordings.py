@@ -3,6 +3,7 @@
 import json
 import math
 import sys
+from collections import Counter
 from dataclasses import asdict
 from typing import TYPE_CHECKING
 
@@ -17,6 +18,7 @@ from bridgegen.screen.tables import print_table
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
+    from bridgegen.exposure.rates import Encounters
     from bridgegen.mining.mine import Mined, Summary
 
 CARRIAGEWAYS_SHOWN = 4
@@ -54,6 +56,7 @@ def print_mined(mined: "Mined", *, as_json: bool) -> None:
             ],
             "skipped": [str(path) for path, _ in mined.skipped],
             "others": [str(path) for path in mined.others],
+            **_events(mined),
         }, indent=2))  # fmt: skip
         return
     head = ("recording", "format", "participants", "h", "km", "step [s]", "frame")
@@ -67,6 +70,8 @@ def print_mined(mined: "Mined", *, as_json: bool) -> None:
     print()
     of_lanes = ("lanes of", "source", "carriageways", "lanes", "vehicles on", "RMS [m]")
     print_table(of_lanes, [_lane_row(one) for one in mined.recordings], as_json=False)
+    print()
+    _print_events(mined)
     print()
     found = [row for row in _quality(mined) if row[1]]
     if found:
@@ -85,8 +90,73 @@ def print_mined(mined: "Mined", *, as_json: bool) -> None:
     print(f"\n{'page':<8}{mined.out / 'recordings.html'}")
     print(
         f"{'tables':<8}{mined.out / 'recordings.csv'}, {mined.out / 'lanes.csv'}, "
-        f"{mined.out / 'quality.csv'}, {mined.out / 'conflicts.csv'}"
+        f"{mined.out / 'quality.csv'}, {mined.out / 'events.csv'}, {mined.out / 'conflicts.csv'}"
     )
+    print(f"{'events':<8}{mined.out / 'events'}, a table per scenario")
+
+
+def _print_events(mined: "Mined") -> None:
+    """Print the events by kind, those that are a scenario, and what they say against it."""
+    from bridgegen.mining.events.tables import against_in_words, kind_rows, rates_in_words
+
+    found = [one.events for one in mined.recordings]
+    rows = [
+        (kind, count, per_hour, per_km) for kind, count, per_hour, per_km, _ in kind_rows(found)
+    ]
+    print_table(("event", "count", "per hour (95 %)", "per 1000 km (95 %)"), rows, as_json=False)
+    for kind, _, _, _, refused in kind_rows(found):
+        if refused:
+            print(f"{kind}: refused {refused}")
+    met = [one for one in mined.scenarios if one.count]
+    if met:
+        print()
+        of_scenarios = ("scenario", "event", "rows", "incomplete", "per hour (95 %)")
+        print_table(of_scenarios, [
+            (one.scenario, one.kind, one.complete, one.incomplete,
+             rates_in_words(one.count, found)[0]) for one in met
+        ], as_json=False)  # fmt: skip
+    for one in met:
+        for text in against_in_words(one):
+            print(f"{one.scenario}: {text}")
+
+
+def _events(mined: "Mined") -> "dict[str, object]":
+    """Return the events by kind and by scenario, with rates and all that is refused."""
+    from bridgegen.mining.events.of_scenarios import encounters_of
+    from bridgegen.odd.event_kinds import EVENT_KINDS
+
+    found = [one.events for one in mined.recordings]
+    by_kind = {
+        kind: [one for each in found for one in each.kinds if one.kind.name == kind]
+        for kind in EVENT_KINDS
+    }
+    kinds = {}
+    for kind, events in by_kind.items():
+        count = sum(len(one) for one in events)
+        refused = Counter[str]()
+        for one in events:
+            refused.update(one.refused)
+        kinds[kind] = {
+            "count": count, **_rates(encounters_of(count, found)), "refused": dict(refused),
+        }  # fmt: skip
+    return {
+        "hours_on_lanes": sum(one.hours for one in found),
+        "km_on_lanes": sum(one.kilometres for one in found),
+        "events": kinds,
+        "parameters": {
+            one.scenario: {
+                "event": one.kind, "count": one.count, "rows": one.complete,
+                **_rates(one.encounters), "outside": [asdict(each) for each in one.outside],
+                "broken": dict(one.broken), "not_given": one.unmapped,
+            }
+            for one in mined.scenarios
+        },
+    }  # fmt: skip
+
+
+def _rates(met: "Encounters | None") -> "dict[str, object]":
+    rates = {"per_hour": met.per_hour, "per_km": met.per_km} if met else {}
+    return {name: asdict(one) for name, one in rates.items() if one is not None}
 
 
 def _lane_row(one: "Summary") -> tuple[str, str, int, str, str, str]:

@@ -1,0 +1,1 @@
+"""Events in recorded traffic: a detector per kind, and the parameters of scenarios in them."""

@@ -1,0 +1,109 @@
+"""Events as tables: all with all quantities, and per scenario a row of parameters per event."""
+
+import csv
+import io
+import math
+from collections import Counter
+from collections.abc import Iterable, Iterator, Sequence
+from pathlib import Path
+
+from bridgegen.disk import write_whole
+from bridgegen.errors import StorageError
+from bridgegen.mining.cells import cell
+from bridgegen.mining.events.event import ABSENT
+from bridgegen.mining.events.find import FoundEvents
+from bridgegen.mining.events.of_scenarios import ScenarioEvents, encounters_of
+from bridgegen.odd.event_kinds import EVENT_KINDS
+
+TABLE, FOLDER = "events.csv", "events"
+QUANTITIES = tuple(dict.fromkeys(name for one in EVENT_KINDS.values() for name in one.quantities))
+ROLES = tuple(dict.fromkeys(role for one in EVENT_KINDS.values() for role in one.roles))
+HEAD = ("recording", "file", "event", "ego", *ROLES, "begin", "end", *QUANTITIES)
+
+
+def write_events(
+    out: Path, found: Sequence[FoundEvents], scenarios: Sequence[ScenarioEvents]
+) -> None:
+    """Write the table of all events, and that of each scenario in a folder beside it.
+
+    Raises:
+        StorageError: they cannot be written.
+    """
+    write_whole(out / TABLE, _csv(HEAD, _rows(found)))
+    try:
+        (out / FOLDER).mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise StorageError(f"{out / FOLDER}: cannot be made: {error.strerror}") from None
+    for one in scenarios:
+        rows = zip(*(values.tolist() for values in one.rows.values()), strict=True)
+        path = out / FOLDER / f"{one.scenario}.csv"
+        write_whole(path, _csv(one.rows, ([f"{v:.7g}" for v in row] for row in rows)))
+
+
+def _rows(found: Sequence[FoundEvents]) -> Iterator[list[object]]:
+    for one in found:
+        for events in one.kinds:
+            for i, ego in enumerate(events.ego.tolist()):
+                others = {role: int(who[i]) for role, who in events.others.items()}
+                yield [
+                    one.recording, one.source, events.kind.name, one.names[ego],
+                    *(_name(one.names, others.get(role, ABSENT)) for role in ROLES),
+                    f"{events.begin[i]:.10g}", f"{events.end[i]:.10g}",
+                    *(_number(events.quantities[name][i]) if name in events.quantities else ""
+                      for name in QUANTITIES),
+                ]  # fmt: skip
+
+
+def _name(names: Sequence[str], who: int) -> str:
+    return names[who] if who != ABSENT else ""
+
+
+def _number(value: float) -> str:
+    return "" if math.isnan(value) else f"{value:.7g}"
+
+
+def _csv(head: Iterable[str], rows: Iterable[Iterable[object]]) -> Iterator[bytes]:
+    text = io.StringIO()
+    writer = csv.writer(text)
+    writer.writerow(head)
+    writer.writerows([cell(value) for value in row] for row in rows)
+    yield text.getvalue().encode("utf-8", "replace")
+
+
+def kind_rows(found: Sequence[FoundEvents]) -> Iterator[tuple[str, int, str, str, str]]:
+    """Yield per kind: its name, how many, rates per hour and per 1000 km, what was refused."""
+    for kind in EVENT_KINDS:
+        same = [one for each in found for one in each.kinds if one.kind.name == kind]
+        count = sum(len(one) for one in same)
+        refused: Counter[str] = Counter()
+        for one in same:
+            refused.update(one.refused)
+        yield (
+            kind, count, *rates_in_words(count, found),
+            "; ".join(f"{number:,} {reason}" for reason, number in refused.items()),
+        )  # fmt: skip
+
+
+def rates_in_words(count: int, found: Sequence[FoundEvents]) -> tuple[str, str]:
+    """Return how often something was met, per hour and per 1000 km, with the 95 % interval."""
+    met = encounters_of(count, found)
+    if met is None:
+        return "–", "–"
+    texts = []
+    for rate, scale in ((met.per_hour, 1.0), (met.per_km, 1000.0)):
+        if rate is None:
+            texts.append("–")
+        else:
+            estimate, low, high = (scale * v for v in (rate.estimate, rate.low, rate.high))
+            texts.append(f"{estimate:.3g} ({low:.3g} to {high:.3g})")
+    return texts[0], texts[1]
+
+
+def against_in_words(one: ScenarioEvents) -> tuple[str, ...]:
+    """Return what events say against the ranges and constraints of a scenario, a text each."""
+    texts = [
+        f"{each.parameter} [{each.unit}]: {each.below:,} below {each.low:g}, {each.above:,} above "
+        f"{each.high:g}; seen {each.least:.4g} to {each.most:.4g}"
+        for each in one.outside
+    ]
+    return (*texts, *(f"{count:,} break {rule}" for rule, count in one.broken))
