@@ -94,9 +94,15 @@ def rates_in_words(count: int, found: Sequence[FoundEvents]) -> tuple[str, str]:
         if rate is None:
             texts.append("–")
         else:
-            estimate, low, high = (scale * v for v in (rate.estimate, rate.low, rate.high))
-            texts.append(f"{estimate:.3g} ({low:.3g} to {high:.3g})")
+            estimate, low, high = (
+                _three_digits(scale * value) for value in (rate.estimate, rate.low, rate.high)
+            )
+            texts.append(f"{estimate} ({low} to {high})")
     return texts[0], texts[1]
+
+
+def _three_digits(value: float) -> str:
+    return f"{value:,.0f}" if value >= 999.5 else f"{value:.3g}"
 
 
 def against_in_words(one: ScenarioEvents) -> tuple[str, ...]:
