@@ -47,7 +47,7 @@ def in_words(one: Summary) -> str:
         share = len(touching) / max(one.tracks, 1)
         text += f"; boxes of {len(touching):,} participants ({share:.0%}) touch"
         if share > TRUSTED:
-            text += ": boxes or positions are wrong, and so may be the near misses"
+            text += ": unless these are accidents, boxes or positions are wrong, near misses too"
     return text
 
 
