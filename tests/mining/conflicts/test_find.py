@@ -10,6 +10,7 @@ from bridgegen.campaign.scenarios import load
 from bridgegen.conflict.analysis import CONTACT, NEAR_MISS, analyse
 from bridgegen.conflict.harm import harm_of_pairs
 from bridgegen.ego.kinds import CAR, PEDESTRIAN
+from bridgegen.mining.conflicts import find
 from bridgegen.mining.conflicts.find import candidates, conflicts_of
 from bridgegen.mining.excerpt import clock_of, excerpt
 from bridgegen.options import PipelineOptions
@@ -96,7 +97,7 @@ def test_bodies_that_touch_hide_no_near_miss():
     assert any(one.is_contact for one in found)
 
 
-def test_no_pair_in_conflict_is_left_out():
+def test_no_pair_in_conflict_is_left_out(monkeypatch):
     """Of many on crossing and common ways, the candidates hold all that conflict."""
     random = np.random.default_rng(0)
     tracks = []
@@ -118,6 +119,8 @@ def test_no_pair_in_conflict_is_left_out():
                 serious += 1
                 assert other in found[ego]
     assert serious > 10
+    monkeypatch.setattr(find, "BLOCK", 7)
+    assert candidates(cleaned, clock) == found
 
 
 def test_an_excerpt_is_what_was_recorded_and_who_comes_later_is_absent_first():

@@ -13,7 +13,7 @@ def mark_pairs(
 ) -> int:  # fmt: skip
     """Write the pairs that would come within reach of each other at constant velocity.
 
-    A pair is p · P + q with p < q, P participants; it is written once for each run of instants.
+    A pair is p · P + q with p < q, P participants; it is written at each instant.
 
     Args:
         order: ``(S,)`` states by instant and then by x.

@@ -1,4 +1,4 @@
-"""The conflicts of recorded traffic: whoever can be the ego is it, in turn.
+"""The conflicts of recorded traffic, with every motor vehicle as the ego in turn.
 
 Each is found by the analysis that a search uses (`bridgegen.conflict.analysis`). A pair has one
 conflict at most: the more harmful of the two views, and of equal ones that of the participant which
@@ -7,7 +7,7 @@ accidents, so a contact is only noted, and the other conflicts of its ego are lo
 """
 
 from collections import defaultdict
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -31,6 +31,8 @@ FARTHEST = 150.0
 """Between two participants [m] that may meet within the horizon: 2 · 67 km/h, or 135 km/h."""
 MARGIN = 0.5
 """By which bodies may miss each other by constant velocity [m] and yet be looked at."""
+BLOCK = 2000
+"""Instants whose pairs are looked for at once: a pair is found anew at each."""
 AROUND = 2.0
 """Before and after a conflict [s], in which its motion has to be plausible."""
 
@@ -43,7 +45,8 @@ class RecordedConflict:
         ego: participant.
         other: participant.
         instant: of a contact, or the most urgent of a near miss, by the recording's clock.
-        found: what happened, with its type and who is responsible; its harm is whoever's.
+        found: what happened, with its type and who is responsible. Its harm counts whoever is
+            responsible.
         doubt: why the motion around it could not happen; "" if it could.
     """
 
@@ -64,25 +67,15 @@ class RecordedConflict:
         return self.found.harm, self.found.needed_deceleration
 
 
-def conflicts_of(
-    traffic: RecordedTraffic, progress: Callable[[int, int], None] = lambda done, total: None
-) -> tuple[RecordedConflict, ...]:
-    """Return the near misses of a cleaned recording and the contacts, the most harmful first.
-
-    Args:
-        traffic: cleaned.
-        progress: is told how many of how many egos are done.
-    """
+def conflicts_of(traffic: RecordedTraffic) -> tuple[RecordedConflict, ...]:
+    """Return the near misses of a cleaned recording and the contacts, the most harmful first."""
     clock = clock_of(traffic)
     best: dict[tuple[int, int], RecordedConflict] = {}
-    partners = candidates(traffic, clock)
-    for number, (ego, others) in enumerate(partners.items()):
-        progress(number, len(partners))
+    for ego, others in candidates(traffic, clock).items():
         for one in _of_ego(traffic, clock, ego, others):
             pair = (min(one.ego, one.other), max(one.ego, one.other))
             if pair not in best or one.urgency > best[pair].urgency:
                 best[pair] = one
-    progress(len(partners), len(partners))
     return tuple(sorted(best.values(), key=order))
 
 
@@ -92,23 +85,29 @@ def order(one: RecordedConflict) -> tuple[bool, bool, float, int, int]:
 
 
 def candidates(traffic: RecordedTraffic, clock: Clock) -> dict[int, list[int]]:
-    """Return, by ego, with whom it might come into conflict; fragments of tracks with nobody."""
-    instant, participant = clock.instant, traffic.participant
-    order = np.lexsort((traffic.x, instant))
-    low = int(instant.min())
-    first = np.searchsorted(instant[order], np.arange(low, int(instant.max()) + 2))
+    """Return, by ego, the participants that may come into conflict with it.
+
+    Fragments of tracks are left out.
+    """
+    instant = clock.instant
+    by_instant = np.lexsort((traffic.x, instant))
+    every = np.arange(int(instant.min()), int(instant.max()) + 2)
+    first = np.searchsorted(instant[by_instant], every).astype(np.int64)
     reach = 0.5 * np.hypot(traffic.length, traffic.width) + 0.5 * MARGIN
     moves = np.array([_extent(traffic, states) > MOVES for states in traffic.states()])
+    parts, participant = [], traffic.participant
     keys = np.empty(1 << 20, np.int64)
-    arguments = (
-        order, first.astype(np.int64), participant, traffic.x, traffic.y, traffic.vx, traffic.vy,
-        reach, moves, HORIZON, FARTHEST,
-    )  # fmt: skip
-    count = mark_pairs(*arguments, keys)
-    if count > len(keys):
-        keys = np.empty(count, np.int64)
-        mark_pairs(*arguments, keys)
-    pairs = np.unique(keys[:count])
+    for begin in range(0, len(first) - 1, BLOCK):
+        arguments = (
+            by_instant, first[begin : begin + BLOCK + 1], participant, traffic.x, traffic.y,
+            traffic.vx, traffic.vy, reach, moves, HORIZON, FARTHEST,
+        )  # fmt: skip
+        count = mark_pairs(*arguments, keys)
+        if count > len(keys):
+            keys = np.empty(count, np.int64)
+            mark_pairs(*arguments, keys)
+        parts.append(np.unique(keys[:count]))
+    pairs = np.unique(np.concatenate(parts))
     found: dict[int, list[int]] = defaultdict(list)
     is_ego = np.isin(traffic.kind, EGOS) & moves
     for p, q in zip(*(part.tolist() for part in np.divmod(pairs, len(moves))), strict=True):

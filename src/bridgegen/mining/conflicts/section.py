@@ -93,8 +93,8 @@ def _proof(one: Replay) -> str:
     if one.problem:
         return f"not simulated: {escape(one.problem)}"
     return (
-        f"simulated here, nobody is farther than {max(one.off, 0.0005):.3f} m from where it was "
-        f"recorded, or {max(one.too_fast, 0.005):.2f} m/s too fast or slow"
+        f"simulated here, all participants are within {max(one.off, 0.001):.3f} m of where they "
+        f"were recorded, and within {max(one.too_fast, 0.01):.2f} m/s of their speed"
     )
 
 

@@ -10,7 +10,7 @@ from bridgegen.mining.events.scene import Scene
 LONGEST_HEADWAY = 4.0
 """[s]."""
 LEAST_SPEED = 1.0
-"""[m/s]; what stands follows nobody."""
+"""[m/s]; a slower vehicle stands and does not follow."""
 LARGEST_DIFFERENCE = 2.0
 """Of the speeds [m/s]."""
 LEAST_TIME = 3.0

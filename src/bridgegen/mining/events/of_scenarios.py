@@ -57,7 +57,7 @@ class ScenarioEvents:
         broken: the constraints that rows break, each with their number; what the events do not
             give has its default there.
         unmapped: the parameters of traffic participants that the events do not give.
-        encounters: how often it was met; None where nobody who can be the ego was on lanes.
+        encounters: how often it was met; None if no vehicle that may be the ego was on lanes.
     """
 
     scenario: str
