@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from bridgegen.exposure.fit import Fit, fit_exposure
     from bridgegen.odd.reader import load
     from bridgegen.preventability import PreventabilityMap, map_preventability
+    from bridgegen.risk import Risk, estimate_risk
     from bridgegen.safety_case import SafetyCase, export_safety_case
     from bridgegen.simulate import simulate_file
     from bridgegen.simulation.choice import SimulatorChoice
@@ -26,12 +27,14 @@ __all__ = [
     "Exposure",
     "Fit",
     "PreventabilityMap",
+    "Risk",
     "Run",
     "SafetyCase",
     "SimulatorChoice",
     "build_dashboard",
     "compare",
     "confirm",
+    "estimate_risk",
     "export_safety_case",
     "exposure_of",
     "fit_exposure",
@@ -58,6 +61,8 @@ _HOMES = {
     "load": "bridgegen.odd.reader",
     "map_preventability": "bridgegen.preventability",
     "PreventabilityMap": "bridgegen.preventability",
+    "Risk": "bridgegen.risk",
+    "estimate_risk": "bridgegen.risk",
     "resume": "bridgegen.campaign",
     "run_search": "bridgegen.campaign",
     "export_safety_case": "bridgegen.safety_case",

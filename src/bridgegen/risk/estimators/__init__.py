@@ -1,0 +1,1 @@
+"""Estimators of the probability of rare events, one file each."""

@@ -1,0 +1,315 @@
+"""Subset simulation: a rare event as a chain of events that are each likely given the last.
+
+A pilot run chooses the levels and how far proposals go; repetitions then use these without change,
+so that each is unbiased, and their spread says how sure the mean is.
+
+Sources: Au and Beck, Probabilistic Engineering Mechanics 16 (2001) 263-277; Papaioannou, Betz,
+Zwirglmaier and Straub, Probabilistic Engineering Mechanics 41 (2015) 89-103 (proposals); Botev and
+Kroese, Statistics and Computing 22 (2012) 1-16 (fixed levels and numbers of copies are unbiased).
+"""
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from bridgegen.arrays import Bool, Float, Int
+from bridgegen.risk.estimators.problem import SCORE, Aim, Problem, block_of
+from bridgegen.risk.estimators.weighted import Weighted
+
+PASSING = 0.1
+"""The share of each level that the next one begins with."""
+PILOT = 1000  # points of the pilot run
+ACCEPTED = 0.44  # share of proposals that the pilot run aims at
+DEEPEST = 20  # levels, at most: a probability of 1e-20
+STUCK = 0.01  # of a level at least must reach the next one
+TOGETHER = 20  # repetitions that run side by side
+POINTS, FEWEST_POINTS = 250, 25  # of a repetition
+MARGIN = 1.3  # of evaluations: repetitions take more or fewer
+FEWEST_REPETITIONS, MOST_ERROR, LEAST_ACCEPTED = 10, 0.5, 0.03
+"""What repetitions must keep for the interval to be believed."""
+EXPLODES = "repetitions take far more evaluations than the pilot run: the levels do not mix"
+
+
+@dataclass(frozen=True)
+class Level:
+    """A level of the chain.
+
+    Attributes:
+        score: its points reach it.
+        scale: ``(d,)`` how far proposals go in the level's chains, 1 for independent ones.
+    """
+
+    score: float
+    scale: Float
+
+
+@dataclass(frozen=True)
+class Pilot:
+    """What a pilot run found.
+
+    Attributes:
+        levels: from the easiest one up to the aim, if that was reached.
+        Z: ``(M, d)`` the points that reach the last level.
+        estimate: the probability of the last level.
+        passing: the share of points that reached each level.
+        accepted: the share of accepted proposals of each level.
+        evaluations: that it took.
+        reached: whether the last level is the aim.
+    """
+
+    levels: tuple[Level, ...]
+    Z: Float
+    estimate: float
+    passing: tuple[float, ...]
+    accepted: tuple[float, ...]
+    evaluations: int
+    reached: bool
+
+
+class _OutOfBudget(Exception):
+    """The next evaluations would exceed the limit.
+
+    Attributes:
+        evaluations: so far.
+    """
+
+    def __init__(self, evaluations: int) -> None:
+        super().__init__(evaluations)
+        self.evaluations = evaluations
+
+
+class _Chains:
+    """Chains of one level, of all repetitions side by side."""
+
+    def __init__(self, problem: Problem, random: np.random.Generator, limit: int) -> None:
+        self.problem, self.random, self.evaluations, self.limit = problem, random, 0, limit
+
+    def evaluate(self, Z: Float) -> Float:
+        """Evaluate points.
+
+        Raises:
+            _OutOfBudget: there are more of them than evaluations left.
+        """
+        if self.evaluations + len(Z) > self.limit:
+            raise _OutOfBudget(self.evaluations)
+        self.evaluations += len(Z)
+        return self.problem.evaluate(Z)
+
+    def start(self, count: int) -> tuple[Float, Float]:
+        """Return ``count`` independent feasible points, and their outcomes."""
+        parts: list[Float] = []
+        have = 0
+        while have < count:
+            Z = self.random.standard_normal((max(count, 256), self.problem.dimensions))
+            parts.append(Z[self.problem.feasible(Z)])
+            have += len(parts[-1])
+        Z = np.concatenate(parts)[:count]
+        return Z, self.evaluate(Z)
+
+    def step(self, Z: Float, found: Float, level: Level) -> tuple[Float, Float, Bool]:
+        """Move points on by one proposal each; those that leave the level stay."""
+        noise = self.random.standard_normal(Z.shape)
+        moved = np.sqrt(1.0 - level.scale**2) * Z + level.scale * noise
+        good = self.problem.feasible(moved)
+        at = np.flatnonzero(good)
+        if at.size:
+            outcome = self.evaluate(moved[at])
+            inside = outcome[:, SCORE] >= level.score
+            good[at[~inside]] = False
+            Z, found = Z.copy(), found.copy()
+            Z[at[inside]], found[at[inside]] = moved[at[inside]], outcome[inside]
+        return Z, found, good
+
+    def split(
+        self, Z: Float, found: Float, owner: Int, times: float, level: Level
+    ) -> tuple[Float, Float, Int]:
+        """Make each point several of its level, ``times`` on average: itself, and its chain."""
+        length = int(times) + (self.random.random(len(Z)) < times - int(times))
+        parts, active = [(Z, found, owner)], np.arange(len(Z))
+        for turn in range(1, int(length.max())):
+            keep = length[active] > turn
+            active, Z, found = active[keep], Z[keep], found[keep]
+            Z, found, _ = self.step(Z, found, level)
+            parts.append((Z, found, owner[active]))
+        Z, found, owner = (np.concatenate(one) for one in zip(*parts, strict=True))
+        return Z, found, owner
+
+
+def pilot(problem: Problem, aim: Aim, seed: int) -> Pilot:
+    """Choose levels up to the aim; or as far as a quarter of the budget suffices."""
+    points = max(min(PILOT, aim.budget // 40), 1)
+    chains = _Chains(problem, block_of(seed, 0), aim.budget // 4)
+    Z, found = chains.start(points)
+    levels: list[Level] = []
+    passing: list[float] = []
+    accepted: list[float] = []
+    total, before = 1.0, -np.inf
+    while len(levels) < DEEPEST:
+        scores = found[:, SCORE]
+        reached = bool(np.mean(scores >= aim.threshold) >= PASSING)
+        level = aim.threshold if reached else _next_level(scores, before)
+        there = scores >= level
+        if level >= aim.threshold:
+            level, reached, there = aim.threshold, True, scores >= aim.threshold
+        share = float(there.mean())
+        if share < STUCK or not level > before:
+            break
+        total *= share
+        passing.append(share)
+        seeds, outcome = Z[there], found[there]
+        scale = 0.6
+        spread = seeds.std(axis=0)
+        levels.append(Level(level, np.minimum(1.0, scale * spread)))
+        if reached:
+            return Pilot(
+                tuple(levels), seeds, total, tuple(passing), tuple(accepted),
+                chains.evaluations, True,
+            )  # fmt: skip
+        parts, results = [seeds], [outcome]
+        have, took = len(seeds), []
+        now, last = seeds, outcome
+        for turn in range(1, 10 * points):
+            if have >= points:
+                break
+            levels[-1] = Level(level, np.clip(scale * spread, 1e-6, 1.0))
+            try:
+                now, last, moved = chains.step(now, last, levels[-1])
+            except _OutOfBudget:
+                break
+            took.append(float(moved.mean()))
+            scale *= float(np.exp((took[-1] - ACCEPTED) / np.sqrt(turn)))
+            parts.append(now)
+            results.append(last)
+            have += len(now)
+        levels[-1] = Level(level, np.clip(scale * spread, 1e-6, 1.0))
+        accepted.append(float(np.mean(took)) if took else 1.0)
+        if have < points:
+            break
+        Z, found = np.concatenate(parts)[:points], np.concatenate(results)[:points]
+        before = level
+    none = np.empty((0, problem.dimensions))
+    return Pilot(
+        tuple(levels), none, total, tuple(passing), tuple(accepted), chains.evaluations, False
+    )
+
+
+def _next_level(scores: Float, before: float) -> float:
+    """Return the score that a tenth of the points reaches; the next higher one where they tie."""
+    ordered = np.sort(scores)
+    level = float(ordered[len(ordered) - int(np.ceil(PASSING * len(ordered)))])
+    higher = ordered[ordered > max(level, before)] if level <= before else ordered
+    if level <= before or np.mean(scores >= level) > 0.5:
+        higher = ordered[ordered > max(level, before)]
+        return float(higher[0]) if higher.size else before
+    return level
+
+
+def repeat(
+    problem: Problem, first: Pilot, points: int, count: int, random: np.random.Generator, limit: int
+) -> tuple[Float, Float, Float, Int, int]:
+    """Repeat a pilot run's chain with its levels as they are, ``count`` times side by side.
+
+    Each point that reaches a level becomes as many points of it as the pilot run says that it takes
+    to make up for those that do not, on average: itself, and what a chain from it visits.
+
+    Returns:
+        Points ``(M, d)``, outcomes, weights (their sum over a repetition estimates the probability
+        of the first level), the number of each one's repetition; and the evaluations that it took.
+
+    Raises:
+        _OutOfBudget: there would be more than ``limit`` of these.
+    """
+    chains = _Chains(problem, random, limit)
+    Z, found = chains.start(points * count)
+    owner: Int = np.repeat(np.arange(count), points)
+    weight = 1.0 / points
+    kept: list[tuple[Float, Float, Float, Int]] = []
+    for number, (level, passing) in enumerate(zip(first.levels, first.passing, strict=True)):
+        there = found[:, SCORE] >= level.score
+        if number:
+            kept.append((Z[~there], found[~there], np.full((~there).sum(), weight), owner[~there]))
+        Z, found, owner = Z[there], found[there], owner[there]
+        if number == len(first.levels) - 1 or not len(Z):
+            break
+        weight *= passing
+        Z, found, owner = chains.split(Z, found, owner, 1.0 / passing, level)
+    kept.append((Z, found, np.full(len(Z), weight), owner))
+    Z, found, weights, owner = (np.concatenate(one) for one in zip(*kept, strict=True))
+    return Z, found, weights, owner, chains.evaluations
+
+
+def estimate(problem: Problem, aim: Aim, seed: int) -> Weighted:
+    """Run the pilot, then repetitions until the precision or the budget is reached."""
+    return estimate_after(problem, aim, seed, pilot(problem, aim, seed))
+
+
+def estimate_after(problem: Problem, aim: Aim, seed: int, first: Pilot) -> Weighted:
+    """Repeat the chain that a pilot run found."""
+    spent, rounds = first.evaluations, 0
+    cost = 1.0 + sum(1.0 - one for one in first.passing[:-1])  # evaluations a point, expected
+    parts: list[tuple[Float, Float, Float, Int]] = []
+    result = _result(problem, parts, 0, spent)
+    while first.reached:
+        left = (aim.budget - spent) / (MARGIN * cost * TOGETHER)
+        points = int(min(left, POINTS, math.inf if rounds else max(0.25 * left, FEWEST_POINTS)))
+        if points < FEWEST_POINTS:
+            break
+        random, limit = block_of(seed, rounds + 1), aim.budget - spent
+        try:
+            Z, found, weights, owner, took = repeat(problem, first, points, TOGETHER, random, limit)
+        except _OutOfBudget as error:
+            return replace(result, evaluations=spent + error.evaluations, doubts=(EXPLODES,))
+        rounds += 1
+        kept = found[:, SCORE] >= aim.least
+        number = owner[kept] + TOGETHER * (rounds - 1)
+        parts.append((Z[kept], found[kept], weights[kept], number))
+        spent += took
+        cost = max(cost, took / (points * TOGETHER))
+        result = _result(problem, parts, TOGETHER * rounds, spent)
+        if result.probability(aim.threshold).precision <= aim.precision:
+            break
+    sums = result.sums(result.there(aim.threshold))
+    facts = {
+        "levels": float(len(first.levels)),
+        "repetitions": float(TOGETHER * rounds),
+        "accepted": float(min(first.accepted, default=1.0)),
+        "reached": float(first.reached),
+        "reaching": float(np.mean(sums > 0.0)) if rounds else 0.0,
+    }
+    return replace(result, doubts=tuple(_doubts(first, aim, sums, facts)), facts=facts)
+
+
+def _doubts(first: Pilot, aim: Aim, sums: Float, facts: dict[str, float]) -> Iterator[str]:
+    if not first.reached:
+        last = first.levels[-1].score if first.levels else 0.0
+        yield (
+            f"the levels end at a score of {last:.3g}, below {aim.threshold:.3g}: hardly any row "
+            "comes nearer; use mc, or importance from a search that found the event"
+        )
+    elif (reaching := int(np.sum(sums > 0.0))) < FEWEST_REPETITIONS:
+        yield (
+            f"{reaching} of {len(sums)} repetitions reach the event, and {FEWEST_REPETITIONS} are "
+            "needed"
+        )
+    elif (error := sums.std(ddof=1) / sums.mean() / np.sqrt(len(sums))) > MOST_ERROR:
+        yield (
+            f"repetitions differ so much that the standard error is {error:.0%} of their mean, and "
+            f"at most {MOST_ERROR:.0%} is believed: the levels do not mix"
+        )
+    elif facts["accepted"] < LEAST_ACCEPTED:
+        yield (
+            f"{facts['accepted']:.0%} of the proposals of a level are accepted, and "
+            f"{LEAST_ACCEPTED:.0%} are needed"
+        )
+
+
+def _result(
+    problem: Problem, parts: list[tuple[Float, Float, Float, Int]], count: int, spent: int
+) -> Weighted:
+    none = np.empty((0, problem.dimensions)), np.empty((0, 1)), np.empty(0), np.empty(0, np.int64)
+    Z, found, weights, owner = (np.concatenate(one) for one in zip(*(parts or [none]), strict=True))
+    share = weights / max(count, 1)
+    largest = float(share.max(initial=0.0))
+    return Weighted(Z, found, share, 0, owner, count, largest, (1.0, 1.0, 1.0), spent)

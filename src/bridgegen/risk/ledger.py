@@ -1,0 +1,120 @@
+"""The evaluations of an estimate on disk, batch by batch, so that a stopped one goes on.
+
+An estimator asks for the same batches each time. Those that are there, whole and of the same
+points, are read; from the first that is not, rows are simulated.
+"""
+
+import hashlib
+import io
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from bridgegen.arrays import Float
+from bridgegen.disk import write_whole
+from bridgegen.errors import StorageError
+from bridgegen.records import parse_json, read_bytes
+from bridgegen.risk.outcomes import Column, Outcomes
+
+SETTINGS = "settings.json"
+BATCHES = "batches"
+RESULTS = ("risk.json", "risk.html", "harmful.csv")
+SCENARIO = "most-likely."
+_LONGEST_MODE = 400
+
+
+class Ledger:
+    """The batches of an estimate, a file each.
+
+    Args:
+        folder: of the estimate; made if it does not exist.
+        settings: what the batches depend on, as JSON's types.
+
+    Raises:
+        StorageError: the folder holds another estimate or something else, or cannot be written.
+    """
+
+    def __init__(self, folder: Path, settings: Mapping[str, Any]) -> None:
+        self.folder = folder
+        made = json.loads(json.dumps(settings))
+        path = folder / SETTINGS
+        known = (SETTINGS, BATCHES, *RESULTS)
+        try:
+            (folder / BATCHES).mkdir(parents=True, exist_ok=True)
+            before = parse_json(read_bytes(path)) if path.exists() else None
+            other = any(
+                one.name not in known and not one.name.startswith(SCENARIO)
+                for one in folder.iterdir()
+            )
+        except OSError as error:
+            raise StorageError(f"{folder}: cannot be written: {error.strerror}") from None
+        except ValueError as error:
+            raise StorageError(f"{path}: is damaged: {error}") from None
+        if before is None:
+            if other:
+                raise StorageError(f"{folder}: holds something else than a risk, choose another")
+            write_whole(path, [json.dumps(made, indent=1).encode()])
+        elif before != made:
+            held = before if isinstance(before, dict) else {}
+            differs = ", ".join(name for name in made if held.get(name) != made[name])
+            raise StorageError(
+                f"{folder}: holds another estimate (it differs in {differs or 'its settings'}); "
+                "choose another folder (--out), or remove it"
+            )
+        self._number = 0
+
+    def next(self, Z: Float, least: float) -> Outcomes | None:
+        """Return the outcomes of the next batch if they are kept; None: simulate it, `keep` it.
+
+        Args:
+            Z: ``(N, d)`` its points.
+            least: score from which outcomes are whole.
+        """
+        try:
+            found = np.load(io.BytesIO(read_bytes(self._path())), allow_pickle=False)
+            if str(found["digest"]) != _digest(Z, least):
+                return None
+            at, held = found["at"], found["values"]
+            modes = tuple(str(one) for one in found["modes"].tolist())
+            shape = (len(at), len(Column))
+            if held.shape != shape or held.dtype != np.float64 or at.dtype != np.int64:
+                return None
+            values = Outcomes.lost(len(Z)).values
+            values[:, Column.RESULT] = found["results"]
+            values[at] = held
+        except (OSError, ValueError, EOFError, KeyError, IndexError):
+            return None
+        numbers = values[:, Column.MODE]
+        if not np.isfinite(values).all() or numbers.max(initial=-1.0) >= len(modes):
+            return None
+        self._number += 1
+        return Outcomes(values, modes)
+
+    def keep(self, Z: Float, least: float, outcomes: Outcomes) -> None:
+        """Keep the outcomes of the next batch, whole or not at all.
+
+        Raises:
+            StorageError: they cannot be written.
+        """
+        at = np.flatnonzero(outcomes.values[:, Column.SCORE] >= least)
+        data = io.BytesIO()
+        np.savez_compressed(
+            data,
+            digest=np.array(_digest(Z, least)),
+            at=at,
+            values=outcomes.values[at],
+            results=outcomes.values[:, Column.RESULT].astype(np.int8),
+            modes=np.array([one[:_LONGEST_MODE] for one in outcomes.modes] or [""]),
+        )
+        write_whole(self._path(), [data.getvalue()])
+        self._number += 1
+
+    def _path(self) -> Path:
+        return self.folder / BATCHES / f"{self._number:06d}.npz"
+
+
+def _digest(Z: Float, least: float) -> str:
+    return hashlib.sha256(np.ascontiguousarray(Z).tobytes() + repr(least).encode()).hexdigest()

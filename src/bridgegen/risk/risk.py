@@ -1,0 +1,294 @@
+"""Estimates a risk: exposure and driver, an experiment, a method, the result."""
+
+import shlex
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any, cast
+
+import numpy as np
+
+from bridgegen import ego as egos
+from bridgegen.arrays import Float
+from bridgegen.campaign.run import Run
+from bridgegen.campaign.scenario_files import write_scenario
+from bridgegen.campaign.scenarios import driven_by, is_file, load
+from bridgegen.conflict.analysis import analyse
+from bridgegen.conflict.harm import Count, decisive
+from bridgegen.conflict.summary import summarise
+from bridgegen.errors import InputError, Interrupted, StorageError, UnknownNameError
+from bridgegen.exposure import Exposure, exposure_of, read_exposure
+from bridgegen.exposure.reader import build_exposure
+from bridgegen.mining.replays.picture import moving_picture
+from bridgegen.odd.plain_yaml import read_plain_yaml
+from bridgegen.odd.scenario import LogicalScenario
+from bridgegen.options import PipelineOptions
+from bridgegen.pipeline import Pipeline
+from bridgegen.risk import events, methods
+from bridgegen.risk.estimators import monte_carlo
+from bridgegen.risk.estimators.problem import Aim
+from bridgegen.risk.experiment import Experiment
+from bridgegen.risk.ledger import Ledger
+from bridgegen.risk.result import MOST_LIKELY, Risk, most_likely
+from bridgegen.store import Store
+from bridgegen.workers import CarriedDriver, Choice, open_workers
+
+UNIFORM = "uniform"
+"""Names the exposure in which each parameter is uniform over its range: no road is like that."""
+
+_EVENLY = b"source: Uniform over the ranges, which no road is like.\nothers: uniform\n"
+MOST_EVALUATIONS = 10**10
+
+
+@dataclass(frozen=True)
+class RiskCallbacks:
+    """Called as an estimate progresses.
+
+    Attributes:
+        compile: before kernels are compiled.
+        evaluations: with the number of evaluations so far, and the budget.
+    """
+
+    compile: Callable[[], None] = field(default=lambda: None)
+    evaluations: Callable[[int, int], None] = field(default=lambda done, total: None)
+
+
+def estimate_risk(
+    scenario: str | Path,
+    *,
+    ego: str | None = None,
+    exposure: str | Path | Exposure | None = None,
+    event: str = "collision",
+    count: str = "ego",
+    method: str = methods.AUTO,
+    precision: float = 0.2,
+    budget: int = 200_000,
+    seed: int = 0,
+    start: str | Path | None = None,
+    check: int = 0,
+    vehicle: str | None = None,
+    others: str | None = None,
+    workers: Choice = None,
+    out: Path | str | None = None,
+    callbacks: RiskCallbacks | None = None,
+) -> Risk:
+    """Estimate how likely harm is per encounter, with an interval, and how often it happens.
+
+    Called again with the same arguments after it was stopped, it resumes. The result depends
+    neither on that nor on the workers.
+
+    Args:
+        scenario: a name of the catalogue or of a pack, or the path of a YAML file.
+        ego: the driver under test; the scenario's choice by default.
+        exposure: a file, the name of an example, `UNIFORM`, or the exposure itself; by default
+            that of the scenario's own file.
+        event: the one that is aimed at, see `events.EVENTS`.
+        count: "ego": conflicts that the ego is responsible for or could prevent; "any": all.
+        method: one of `methods.METHODS`.
+        precision: half of the 95 % interval over the estimate, at which it stops; 0: use the whole
+            budget.
+        budget: evaluations, at most.
+        seed: where all chance comes from, at least 0.
+        start: a search's run, whose harmful rows importance sampling may use.
+        check: evaluations of Monte Carlo beside, to compare with; 0 for none.
+        vehicle: how the ego moves.
+        others: driver of the other participants; the scenario's choice by default.
+        workers: a number of processes, ``"ray"``, or ``"ray://HOST:PORT"``; threads by default.
+        out: the folder; ``risk/SCENARIO`` by default.
+        callbacks: called as it progresses.
+
+    Raises:
+        InputError: an invalid argument or file, or no exposure.
+        StorageError: the folder holds something else, or cannot be written.
+        Interrupted: Ctrl-C; what is done is kept.
+    """
+    say = callbacks or RiskCallbacks()
+    aimed = events.require(event)
+    methods.require(method)
+    whose = _count(count)
+    _require_numbers(precision, budget, seed, check)
+    if ego is not None:
+        egos.get(ego)
+    logical = load(scenario)
+    if not isinstance(logical, LogicalScenario):
+        raise InputError(
+            f"a risk is that of a logical scenario (.yaml) with an exposure, got {scenario}"
+        )
+    driven = cast(LogicalScenario, driven_by(logical, others))
+    met = _exposure(driven, exposure)
+    if met.dimensions == 0:
+        raise InputError(
+            f"the exposure of {driven.name} distributes no parameter: nothing is random"
+        )
+    folder = Path("risk", driven.name) if out is None else Path(out)
+    with open_workers(workers) as hands:
+        options = PipelineOptions(ego=ego, vehicle=vehicle)
+        pipeline = Pipeline(driven, met.space, options, workers=hands)
+        name = pipeline.driver.name
+        Z = None if start is None else _points_of(Path(start), met, aimed.harm)
+        settings = {
+            "version": version("bridgegen"),
+            "scenario": driven.name,
+            "fingerprint": driven.fingerprint,
+            "exposure": _digest(met),
+            "driver": name,
+            "file of the driver": CarriedDriver.of(name).data is not None and _file_digest(name),
+            "vehicle": pipeline.vehicle,
+            "event": event,
+            "count": count,
+            "method": method,
+            "precision": precision,
+            "budget": budget,
+            "seed": seed,
+            "check": check,
+            "start": None if Z is None else len(Z),
+        }
+        command = _command(scenario, exposure, settings, others, start, folder)
+        ledger = Ledger(folder, settings)
+        say.compile()
+        pipeline.warm_up()
+        total = budget + check
+        experiment = Experiment(
+            pipeline, met, hands, whose, ledger, lambda done: say.evaluations(done, total)
+        )
+        try:
+            aim = Aim(aimed.harm, events.LEAST, budget, precision)
+            found = methods.estimate(method, experiment, aim, seed, Z)
+            failed, implausible = experiment.failed, experiment.implausible
+            beside = None
+            if check:
+                plain = Aim(aimed.harm, events.LEAST, check, 0.0)
+                beside = monte_carlo.estimate(experiment, plain, seed + 1)
+        except KeyboardInterrupt:
+            raise Interrupted(folder, experiment.evaluations, total, command=command) from None
+        worst = most_likely(met, found.weighted, event)
+        picture = "" if worst is None else _write_most_likely(pipeline, worst, whose, folder)
+    result = Risk(
+        met, pipeline.driver.label, event, count, found, seed, budget, tuple(experiment.modes),
+        failed, implausible, beside, picture, command, folder,
+    )  # fmt: skip
+    result.write()
+    return result
+
+
+def _write_most_likely(pipeline: Pipeline, x: Float, count: Count, folder: Path) -> str:
+    """Write the most likely harmful row as a scenario; return its moving picture."""
+    rollout = pipeline.rollout(x[np.newaxis])
+    conflicts = analyse(rollout)
+    try:
+        write_scenario(
+            pipeline,
+            x,
+            folder,
+            MOST_LIKELY,
+            rollout=rollout,
+            conflict=summarise(conflicts, count=count),
+        )
+    except OSError as error:
+        raise StorageError(f"{folder}: cannot be written: {error.strerror}") from None
+    other = int(decisive(conflicts, count)[0][0])
+    when = float(conflicts.instant[0, other]) * rollout.time_step
+    return moving_picture(rollout, other, when, "the most likely harmful encounter, from above")
+
+
+def _count(name: str) -> Count:
+    if name == "ego":
+        return "ego"
+    if name == "any":
+        return "any"
+    raise UnknownNameError("count", name, ("ego", "any"))
+
+
+def _require_numbers(precision: float, budget: int, seed: int, check: int) -> None:
+    problems = []
+    if not 0.0 <= precision < 1.0:
+        problems.append(f"--precision must be at least 0 and below 1, got {precision:g}")
+    if not 100 <= budget <= MOST_EVALUATIONS:
+        problems.append(f"--budget must be 100 to {MOST_EVALUATIONS:,} evaluations, got {budget}")
+    if not 0 <= check <= MOST_EVALUATIONS:
+        problems.append(f"--check must be 0 to {MOST_EVALUATIONS:,} evaluations, got {check}")
+    if seed < 0:
+        problems.append(f"--seed must be at least 0, got {seed}")
+    if problems:
+        raise InputError(*problems)
+
+
+def _exposure(scenario: LogicalScenario, given: str | Path | Exposure | None) -> Exposure:
+    """Return the exposure that was asked for.
+
+    Raises:
+        InputError: there is none, or it is that of another scenario.
+    """
+    if isinstance(given, Exposure):
+        if given.scenario.name != scenario.name:
+            raise InputError(
+                f"the exposure must be that of {scenario.name}, got one of {given.scenario.name}"
+            )
+        return given
+    if given == UNIFORM:
+        return build_exposure(read_plain_yaml(_EVENLY, UNIFORM), scenario, None)
+    if given is not None:
+        return read_exposure(given, scenario)
+    own = exposure_of(scenario)
+    if own is None:
+        raise InputError(
+            f"{scenario.name} has no exposure: how likely its parameters' values are is not known. "
+            "Name a file (--exposure FILE; 'bridgegen fit' makes one of recorded events), or "
+            f"--exposure {UNIFORM}, which says what share of the ranges is harmful"
+        )
+    return own
+
+
+def _points_of(run: Path, exposure: Exposure, harm: float) -> Float:
+    """Return the points that a search's rows stand for, of those with so much harm.
+
+    Raises:
+        StorageError: it is no run.
+        InputError: it is one of another scenario, or found none.
+    """
+    found = Run(run)
+    with Store.open(run) as store:
+        rows = store.read()
+    space = exposure.space
+    if tuple(found.parameters) != tuple(space.names):
+        raise InputError(f"{run}: a run of another scenario than {exposure.scenario.name}, or axes")
+    if "harm" not in found.metrics:
+        raise InputError(f"{run}: does not record harm")
+    good = (rows.metrics[:, found.metrics.index("harm")] >= harm) & exposure.feasible(rows.X)
+    X = rows.X[good]
+    X = X[np.isfinite(exposure.log_density(X))] if len(X) else X
+    if not len(X):
+        raise InputError(f"{run}: found no row with harm of {harm:g} that the exposure allows")
+    return exposure.to_normal(X)
+
+
+def _digest(exposure: Exposure) -> str:
+    """Return a digest of an exposure: of 64 of its rows, and of its source."""
+    import hashlib
+
+    rows = exposure.sample(64, 0).X
+    return hashlib.sha256(rows.tobytes() + exposure.source.encode()).hexdigest()
+
+
+def _file_digest(name: str) -> str:
+    import hashlib
+
+    return hashlib.sha256(CarriedDriver.of(name).data or b"").hexdigest()
+
+
+def _command(
+    scenario: str | Path, exposure: str | Path | Exposure | None, settings: dict[str, Any],
+    others: str | None, start: str | Path | None, folder: Path,
+) -> str:  # fmt: skip
+    """Return the command line that makes the risk again."""
+    where = str(Path(scenario).resolve()) if is_file(scenario) else str(scenario)
+    words: list[Any] = ["bridgegen", "risk", where, "--ego", settings["driver"]]
+    if exposure is not None:
+        words += ["--exposure", "EXPOSURE" if isinstance(exposure, Exposure) else exposure]
+    for name in ("event", "count", "method", "precision", "budget", "seed", "vehicle"):
+        words += [f"--{name}", settings[name]]
+    for name, value in (("check", settings["check"]), ("from", start), ("others", others)):
+        if value:
+            words += [f"--{name}", value]
+    return shlex.join([str(one) for one in (*words, "--out", folder)])

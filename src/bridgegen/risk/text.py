@@ -1,0 +1,41 @@
+"""A risk in words."""
+
+from bridgegen.risk.estimators.weighted import Probability
+from bridgegen.risk.events import WORDS
+from bridgegen.risk.result import Risk
+
+
+def number(value: float) -> str:
+    """Return a number with three digits; small ones with a power of ten."""
+    if value == 0.0:
+        return "0"
+    if 1e-3 <= value < 1e4:
+        return f"{value:.3g}"
+    digits, power = f"{value:.2e}".split("e")
+    return f"{digits}e{int(power)}"
+
+
+def sentence(risk: Risk) -> str:
+    """Return what a risk says, in one or two sentences."""
+    p, what = risk.probability(risk.event), WORDS[risk.event]
+    if risk.count == "ego":
+        what = f"{what} that the ego is responsible for or could have prevented"
+    if p is None:
+        reason = risk.findings[risk.event].doubt
+        return f"How likely {what} is, is not known: {reason}."
+    if p.estimate == 0.0:
+        return (
+            f"Of {risk.weighted.rows:,} encounters none was {what}: with 95 % confidence the "
+            f"probability is below {number(p.upper)} per encounter (rule of three)."
+        )
+    return (
+        f"The probability of {what} is {number(p.estimate)} per encounter (95 %: {number(p.low)} "
+        f"to {number(p.high)})."
+    )
+
+
+def interval(p: Probability | None) -> tuple[str, str, str]:
+    """Return a probability, its interval and its upper bound as texts; dashes without one."""
+    if p is None:
+        return "not known", "–", "–"
+    return number(p.estimate), f"{number(p.low)} to {number(p.high)}", number(p.upper)

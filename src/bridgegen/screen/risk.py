@@ -1,0 +1,60 @@
+"""A risk: one bar for its simulations, then its sentence and its table."""
+
+import json
+from typing import TYPE_CHECKING
+
+from bridgegen.screen.live import Live
+from bridgegen.screen.tables import print_table
+
+if TYPE_CHECKING:
+    from bridgegen.risk import Risk
+    from bridgegen.risk.risk import RiskCallbacks
+
+
+class RiskScreen(Live):
+    """A risk's live progress."""
+
+    @property
+    def callbacks(self) -> "RiskCallbacks":
+        """The callbacks for a risk."""
+        from bridgegen.risk.risk import RiskCallbacks
+
+        return RiskCallbacks(
+            compile=self.say_compiling,
+            evaluations=lambda done, total: self.show(what="simulations", done=done, total=total),
+        )
+
+
+def print_risk(result: "Risk", seconds: float, *, as_json: bool) -> None:
+    """Print a risk's sentence, its probabilities and rates, then its files; or its record."""
+    from bridgegen.risk.events import EVENTS, WORDS
+    from bridgegen.risk.result import PAGE
+    from bridgegen.risk.text import interval, number, sentence
+
+    if as_json:
+        print(json.dumps(result.to_dict(), indent=1))
+        return
+    print(f"{sentence(result)}\n")
+    met = result.exposure.encounters
+    units = [one for one in ("h", "km") if met is not None and getattr(met, _AMOUNTS[one])]
+    rows = []
+    for name, one in result.findings.items():
+        row = [WORDS[name], *interval(one.probability), f"{one.hits:,.0f}"]
+        for unit in units:
+            rate = result.rate(name, unit)
+            row.append("–" if rate is None else number(rate.estimate))
+        rows.append(tuple(row))
+    head = ("", "per encounter", "95 %", "below (95 %)", "effective rows")
+    print_table((*head, *(f"per {unit}" for unit in units)), rows, as_json=False)
+    for doubt in result.weighted.doubts:
+        print(f"\ndoubt       {doubt}")
+    print(f"\n{'method':<12}{result.estimated.method}: {result.estimated.why}")
+    if result.check is not None:
+        p = result.check.probability(EVENTS[result.event].harm)
+        values = interval(p)
+        print(f"{'check':<12}{values[0]} ({values[1]}) in {result.check.evaluations:,} by mc")
+    print(f"{'page':<12}{result.folder / PAGE}")
+    print(f"{'wall time':<12}{seconds:.1f} s, {result.weighted.evaluations:,} simulations")
+
+
+_AMOUNTS = {"h": "hours", "km": "km"}

@@ -1,0 +1,144 @@
+"""Analytic problems: harm by a formula, whose probability is known."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+import scipy.integrate
+import scipy.stats
+
+normal = scipy.stats.norm
+
+
+@dataclass
+class Analytic:
+    """The event is score ≥ 0.
+
+    Scores are computed in chunks of some rows, which must not matter; evaluations are counted.
+    """
+
+    dimensions: int
+    score: Callable
+    probability: float
+    allowed: Callable = lambda Z: np.ones(len(Z), np.bool_)
+    share: tuple[float, float, float] = (1.0, 1.0, 1.0)
+    chunk: int = 10**9
+    evaluations: int = field(default=0)
+
+    def feasible(self, Z):
+        return self.allowed(Z)
+
+    def evaluate(self, Z, least=-np.inf):
+        assert self.allowed(Z).all()
+        self.evaluations += len(Z)
+        parts = [self.score(Z[k : k + self.chunk]) for k in range(0, len(Z), self.chunk)]
+        score = np.concatenate(parts) if parts else np.empty(0)
+        return np.column_stack([score, np.arange(len(Z)) * 0.0])
+
+
+def linear(d, distance):
+    """A half space: RP107 of the TU Delft challenge with ten dimensions and a distance of 5."""
+    return Analytic(d, lambda Z: Z.sum(axis=1) / np.sqrt(d) - distance, normal.sf(distance))
+
+
+def two_sides(d, right, left):
+    """Two half spaces that do not meet."""
+    return Analytic(
+        d,
+        lambda Z: np.maximum(Z[:, 0] - right, -Z[:, 0] - left),
+        normal.sf(right) + normal.sf(left),
+    )
+
+
+def product():
+    """RP111: four regions, between hyperbolas."""
+    inner, _ = scipy.integrate.quad(
+        lambda x: normal.pdf(x) * normal.sf(12.5 / x),
+        1e-9,
+        40.0,
+        epsabs=0.0,
+        epsrel=1e-10,
+        limit=500,
+    )
+    return Analytic(2, lambda Z: np.abs(Z[:, 0] * Z[:, 1]) - 12.5, 4.0 * inner)
+
+
+def bent():
+    """RP22: a parabola."""
+
+    def score(Z):
+        x, y = Z.T
+        return (x + y) / np.sqrt(2.0) - 2.5 - 0.1 * (x - y) ** 2
+
+    return Analytic(2, score, 0.004207305511299618)
+
+
+def wedge():
+    """RP25: an intersection of a parabola's inside and a half plane."""
+
+    def score(Z):
+        x, y = Z.T
+        return -np.maximum(x**2 - 8.0 * y + 16.0, -16.0 * x + y + 32.0)
+
+    return Analytic(2, score, 4.148566293759747e-05)
+
+
+def branches():
+    """The four branch series system of Waarts (2000)."""
+
+    def score(Z):
+        x, y = Z.T
+        root = np.sqrt(2.0)
+        bow = 3.0 + 0.1 * (x - y) ** 2
+        return -np.min(
+            [bow - (x + y) / root, bow + (x + y) / root, x - y + 7.0 / root, y - x + 7.0 / root],
+            axis=0,
+        )
+
+    return Analytic(2, score, 0.002222)
+
+
+def stairs(d, distance):
+    """A half space whose score has plateaus and jumps, as harm has."""
+
+    def score(Z):
+        s = Z.sum(axis=1) / np.sqrt(d)
+        near = np.where(s < 1.0, 0.05 * np.exp(s - 1.0), 0.1 + 0.2 * (s - 1.0) / (distance - 1.0))
+        return np.where(s < distance, near, np.where(s < distance + 0.3, 0.35, 0.7)) - 0.3
+
+    return Analytic(d, score, normal.sf(distance))
+
+
+def discrete(p):
+    """A half space in one case of five, of which p is the share; three dimensions."""
+    limit = normal.isf(p)
+
+    def score(Z):
+        case = Z[:, 1] > limit
+        return np.where(case, Z[:, 0], np.minimum(Z[:, 0], 1.0) - 3.0) - 2.0
+
+    return Analytic(3, score, p * normal.sf(2.0))
+
+
+def constrained():
+    """A half space, of whose half only a part is allowed."""
+    return Analytic(
+        4, lambda Z: Z[:, 0] - 3.0, normal.sf(3.0), lambda Z: Z[:, 1] < 0.0, (0.5, 0.5, 0.5)
+    )
+
+
+def misleading():
+    """RP110: the score rises away from the event, and jumps there."""
+
+    def score(Z):
+        x, y = Z.T
+        first = np.where(x <= 3.5, 0.85 - 0.1 * x, 4.0 - x)
+        return -np.minimum(first, np.where(y <= 2.0, 2.3 - y, 0.5 - 0.1 * y))
+
+    union = normal.sf(4.0) + normal.sf(5.0) - normal.sf(4.0) * normal.sf(5.0)
+    return Analytic(2, score, union)
+
+
+def hidden():
+    """An event that no score leads to."""
+    return Analytic(3, lambda Z: np.where(Z[:, 0] > 4.5, 0.1, -1.0), normal.sf(4.5))
