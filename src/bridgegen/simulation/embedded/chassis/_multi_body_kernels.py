@@ -89,8 +89,9 @@ from bridgegen.simulation.embedded.chassis._single_track_kernels import (
 from bridgegen.simulation.embedded.chassis._tyre_kernels import rolling_tyre, slip_angle
 
 FINENESS = 1.0  # sub-step times the rate at which a wheel answers, at most
-LONGEST = 0.002  # s, sub-step: the fastest part of body and axles takes 5 ms
-ROLLED_OVER = 0.7  # rad, of body and axles, from which on the model says nothing
+LONGEST = 0.003  # s, sub-step
+ROLLED_OVER = 0.7  # rad of roll, from which on the model says nothing
+SCRAPES = 0.45  # friction of a body on the road, ours
 
 
 @kernel
@@ -250,12 +251,54 @@ def _changes(motion, at, weight, cosine, sine, force, acts, mu, press, uphill, a
 
 
 @kernel
-def _limit(motion, angle, rate):
-    """Keep an angle within what the model says anything of."""
-    if abs(motion[angle]) > ROLLED_OVER:
-        motion[angle] = math.copysign(ROLLED_OVER, motion[angle])
-        if motion[rate] * motion[angle] > 0.0:
-            motion[rate] = 0.0
+def settle(motion, press, chassis):
+    """Put a vehicle on its springs and its rolling wheels, upright, where and as fast as it is.
+
+    Args:
+        motion: its states, see ``_multi_body_columns``; how it moves along the road stays.
+        press: how hard the road is pressed upon [1].
+        chassis: the vehicle.
+    """
+    for i in range(ROLL, STATES):
+        motion[i] = 0.0
+    vx, turn = motion[VX], motion[YAW_RATE]
+    wheelbase = chassis[TO_FRONT] + chassis[TO_REAR]
+    sunk = pitch = 0.0
+    for axle in range(2):
+        a, c = AXLE_AT + axle * AXLE_STATES, AXLE + axle * AXLE_COLUMNS
+        ahead = chassis[TO_FRONT] if axle == 0 else -chassis[TO_REAR]
+        share = (chassis[TO_REAR] if axle == 0 else chassis[TO_FRONT]) / wheelbase
+        carried = share * chassis[SPRUNG]
+        load = press * GRAVITY * (carried + chassis[c + UNSPRUNG])
+        travel = 0.5 * (1.0 - press) * GRAVITY * carried / chassis[c + SPRING]
+        motion[a + PRESSED] = 0.5 * load / chassis[K_TYRE]
+        motion[a + ASIDE] = motion[VY] + ahead * turn
+        lower = motion[a + PRESSED] - travel
+        sunk += share * lower
+        pitch -= math.copysign(lower, ahead) / wheelbase
+        for side in range(2):
+            along = vx - (1.0 - 2.0 * side) * 0.5 * chassis[c + TRACK] * turn
+            motion[SPIN + 2 * axle + side] = along / chassis[RADIUS]
+    motion[SUNK], motion[PITCH] = sunk, pitch
+
+
+@kernel
+def _slide_on(motion, mu, press, dt, chassis):
+    """Move a vehicle that has rolled over on: it slides to a stop, and stays as it lies."""
+    vx, vy, turn, rear = motion[VX], motion[VY], motion[YAW_RATE], chassis[TO_REAR]
+    speed = math.sqrt(vx * vx + vy * vy)
+    slows = min(min(0.5 * (mu[0] + mu[1]), SCRAPES) * press * GRAVITY * dt / max(speed, 1e-9), 1.0)
+    mean, left, h = 1.0 - 0.5 * slows, 1.0 - slows, motion[H]
+    turned = mean * turn * dt
+    ch, sh = math.cos(h), math.sin(h)
+    cn, sn = math.cos(h + turned), math.sin(h + turned)
+    east, north = vx * ch - vy * sh, vx * sh + vy * ch
+    motion[X] += mean * east * dt + rear * (ch - cn)
+    motion[Y] += mean * north * dt + rear * (sh - sn)
+    motion[H] = h + turned
+    motion[VX] = left * (east * cn + north * sn)
+    motion[VY] = left * (north * cn - east * sn)
+    motion[YAW_RATE] = left * turn
 
 
 @kernel
@@ -274,6 +317,9 @@ def advance_bodies(motion, steer, force, mu, press, uphill, aside, dt, chassis):
         dt: the sub-step [s].
         chassis: the vehicle, see ``_multi_body_columns``.
     """
+    if abs(motion[ROLL]) >= ROLLED_OVER:
+        _slide_on(motion, mu, press, dt, chassis)
+        return
     vx, vy, x, y = motion[VX], motion[VY], motion[X], motion[Y]
     fast = min(max((math.sqrt(vx * vx + vy * vy) - ROLLING) / (SLIPPING - ROLLING), 0.0), 1.0)
     weight = fast * fast * (3.0 - 2.0 * fast)
@@ -310,6 +356,5 @@ def advance_bodies(motion, steer, force, mu, press, uphill, aside, dt, chassis):
         motion[VX] = motion[VY] = motion[YAW_RATE] = 0.0
         for i in range(4):
             motion[SPIN + i] = 0.0
-    _limit(motion, ROLL, ROLL_RATE)
-    for i in range(2):
-        _limit(motion, AXLE_AT + i * AXLE_STATES + LEAN, AXLE_AT + i * AXLE_STATES + LEAN_RATE)
+    if abs(motion[ROLL]) > ROLLED_OVER:
+        motion[ROLL] = math.copysign(ROLLED_OVER, motion[ROLL])

@@ -6,9 +6,10 @@ from dataclasses import dataclass, field, fields
 import numpy as np
 
 from bridgegen.arrays import Float
-from bridgegen.simulation.embedded.chassis import _multi_body_columns as columns
 from bridgegen.simulation.embedded.chassis import _chassis_columns as common
+from bridgegen.simulation.embedded.chassis import _multi_body_columns as columns
 from bridgegen.simulation.embedded.chassis.parameters import CLASSES, Tyre
+from bridgegen.simulation.vehicles import KINEMATIC, MULTI_BODY, SINGLE_TRACK
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -155,6 +156,14 @@ CARS = {
 }  # fmt: skip
 """By name."""
 
+CLASS = "car"
+"""The only object class with parameters; see `bridgegen.participants.OBJECT_CLASSES`."""
+
+MOTIONS = {
+    KINEMATIC: 0, SINGLE_TRACK: common.MOTION, MULTI_BODY: columns.MOTION_OF_BODIES,
+}  # fmt: skip
+"""The length of ``State.chassis``, by vehicle."""
+
 VAN = 1.8  # m, from which height on a body is taken to be a van's
 
 
@@ -176,14 +185,12 @@ def multi_body_of(wheelbase: float, body: Float) -> Float:
         found,
         wheelbase,
         float(body[1]),
-        CLASSES["car"].height * float(body[7]),
+        CLASSES[CLASS].height * float(body[7]),
         math.atan(wheelbase * float(body[6])),
     )
 
 
-def multi_body(
-    car: MultiBody, wheelbase: float, width: float, height: float, lock: float
-) -> Float:
+def multi_body(car: MultiBody, wheelbase: float, width: float, height: float, lock: float) -> Float:
     """Return the chassis of a car, stretched to other measures; masses and springs stay.
 
     Moments of inertia go with the square of length (yaw, pitch) or width (roll).
@@ -195,7 +202,7 @@ def multi_body(
         height: of the centre of gravity [m].
         lock: largest steering angle [rad].
     """
-    actuators = CLASSES["car"]
+    actuators = CLASSES[CLASS]
     long, wide = wheelbase / (car.to_front + car.to_rear), width / car.width
     made = np.zeros(columns.MULTI_BODY)
     for one in (actuators, car, car.tyre, car.camber):
