@@ -23,7 +23,7 @@ from bridgegen.simulation.embedded.chassis.multi_body import Axle, Camber, Multi
 from bridgegen.simulation.embedded.chassis.parameters import Tyre
 
 STEP = 0.05
-SIGNALS = ("yaw rate", "lateral acceleration", "roll", "speed", "x", "y")
+YAW_RATE, LATERAL, ROLL, SPEED, X, Y = range(6)
 SHIFTS = (
     "p_hx1", "p_vx1", "r_hx1", "r_hy1", "r_by3", "r_vy1", "p_hy1", "p_vy1",
 )  # fmt: skip
@@ -136,11 +136,11 @@ def theirs(car: Any, what: Manoeuvre, monkeypatch: Any) -> Float:
     return np.array(rows)
 
 
-def like(car: Any) -> tuple[Float, float]:
-    """Return our chassis of CommonRoad's car, without control of slip; and its friction.
+def multi_body_like(car: Any) -> MultiBody:
+    """Return our parameters of CommonRoad's car.
 
     Its camber is that of axes with y to the left, its roll of axes with y to the right: a tyre
-    pushes to the side from which it leans. Its torque does not make up for the wheels' inertia.
+    pushes to the side from which it leans.
     """
     tyre = car.tire
     axles = [
@@ -156,7 +156,7 @@ def like(car: Any) -> tuple[Float, float]:
         d_y3=tyre.p_dy3, h_y3=-tyre.p_hy3, v_y3=-tyre.p_vy3 / tyre.p_dy1, v_yk3=tyre.r_vy3,
         v_yk4=tyre.r_vy4, v_yk5=tyre.r_vy5, v_yk6=tyre.r_vy6,
     )  # fmt: skip
-    found = MultiBody(
+    return MultiBody(
         width=car.w, to_front=car.a, to_rear=car.b, mass=car.m, sprung=car.m_s, height=car.h_cg,
         sprung_height=car.h_s, i_roll=car.I_Phi_s, i_pitch=car.I_y_s, i_yaw=car.I_z,
         k_tyre=car.K_zt, shift=car.K_lt, drive_front=float(car.T_se), axles=tuple(axles),
@@ -164,14 +164,21 @@ def like(car: Any) -> tuple[Float, float]:
         k_front=-tyre.p_ky1, k_rear=-tyre.p_ky1,
         tyre=Tyre(mu_x=tyre.p_dx1 / tyre.p_dy1, e_y=tyre.p_ey1), camber=camber,
     )  # fmt: skip
-    made = multi_body(found, car.a + car.b, car.w, car.h_cg, 1.0)
+
+
+def like(car: Any) -> tuple[Float, float]:
+    """Return our chassis of CommonRoad's car, without control of slip; and its friction.
+
+    Its torque does not make up for the wheels' inertia.
+    """
+    made = multi_body(multi_body_like(car), car.a + car.b, car.w, car.h_cg, 1.0)
     made[columns.PUSH], made[common.BRAKE_FRONT] = car.m, car.T_sb
     made[columns.BEST] = math.inf
-    return made, tyre.p_dy1
+    return made, car.tire.p_dy1
 
 
-def begun(car: Float, speed: float, *, settled: bool = True) -> Float:
-    """Return a motion straight ahead; not settled as CommonRoad's begins, 2 cm too high."""
+def begun(car: Float, speed: float) -> Float:
+    """Return a motion straight ahead that begins as CommonRoad's, the body 2 cm too high."""
     motion = np.zeros(columns.MOTION_OF_BODIES)
     motion[common.VX] = speed
     motion[columns.SPIN : columns.SPIN + 4] = speed / car[columns.RADIUS]
@@ -186,7 +193,7 @@ def begun(car: Float, speed: float, *, settled: bool = True) -> Float:
 
 def ours(car: Float, what: Manoeuvre, mu: float = 1.0, finer: int = 1) -> Float:
     """Return the same of our model, with so many times its sub-steps."""
-    motion = begun(car, what.speed, settled=False)
+    motion = begun(car, what.speed)
     rear, mus = car[common.TO_REAR], (mu * what.mu[0], mu * what.mu[1])
     motion[common.X] = -rear
 

@@ -84,13 +84,14 @@ from bridgegen.simulation.embedded.chassis._single_track_kernels import (
     RELAXES,
     ROLLING,
     SLIPPING,
-    TURNS,
 )
 from bridgegen.simulation.embedded.chassis._tyre_kernels import rolling_tyre, slip_angle
 
 FINENESS = 1.0  # sub-step times the rate at which a wheel answers, at most
 LONGEST = 0.003  # s, sub-step
 ROLLED_OVER = 0.7  # rad of roll, from which on the model says nothing
+FADES = 0.5  # m/s of the rim, below which a brake's torque fades, so that a locked wheel is calm
+LEAST_FRICTION = 1e-6
 SCRAPES = 0.45  # friction of a body on the road, ours
 
 
@@ -98,8 +99,10 @@ SCRAPES = 0.45  # friction of a body on the road, ours
 def sub_steps_of_bodies(speed, dt, chassis):
     """Return into how many equal parts a step is divided, so that Runge–Kutta 4 has converged.
 
-    A wheel answers the faster, the slower it rolls.
+    A wheel answers the faster, the slower it rolls; below walking pace it just rolls along.
     """
+    if speed < ROLLING:
+        return max(int(dt / LONGEST + ALMOST), 1)
     load, radius = 0.25 * chassis[MASS] * GRAVITY, chassis[RADIUS]
     rate = chassis[K_X] * load * radius * radius / chassis[I_WHEEL] / max(speed, SLIPPING)
     return max(int(dt * max(rate / FINENESS, 1.0 / LONGEST) + ALMOST), 1)
@@ -129,7 +132,7 @@ def _speeds_up(spin, along, ahead, torque, mu, chassis):
     if torque > 0.0:
         kept = ((along + slip) / radius - spin) / lag
         return min(free + torque / inertia, max(kept, free))
-    sense = min(max(radius * spin / TURNS, -1.0), 1.0)
+    sense = min(max(radius * spin / FADES, -1.0), 1.0)
     braked = free + sense * torque / inertia
     if sense >= 0.0:
         return max(braked, min(((along - slip) / radius - spin) / lag, free))
@@ -198,7 +201,7 @@ def _changes(motion, at, weight, cosine, sine, force, acts, mu, press, uphill, a
             along, past = hub * cw + across * sw, across * cw - hub * sw
             w = at + SPIN + 2 * axle + side
             x = y = 0.0
-            if weight > 0.0 and load > 0.0:
+            if weight > 0.0 and load > 0.0 and mu[side] > LEAST_FRICTION:
                 kappa = (radius * motion[w] - along) / max(abs(along), ROLLING)
                 camber = roll + chassis[c + CAMBER] * (tilt + to_left * travel)
                 x, y = rolling_tyre(

@@ -26,6 +26,7 @@ from bridgegen.simulation.embedded.chassis._chassis_columns import (
     X,
     Y,
 )
+from bridgegen.simulation.embedded.chassis._multi_body_columns import AXLE_AT, PRESSED
 from bridgegen.simulation.embedded.chassis._multi_body_kernels import (
     advance_bodies,
     settle,
@@ -139,7 +140,7 @@ def move_multi_body(k, demanded, curvature, plan, roads, state, record):
         k, demanded, curvature, plan, roads, state, record
     )
     chassis, motion, dt = plan.chassis, state.chassis, plan.dt
-    if begins:
+    if begins or motion[AXLE_AT + PRESSED] == 0.0:  # its memory is 0 before it first moves
         motion[X], motion[Y], motion[H] = record.x[0, k], record.y[0, k], record.h[0, k]
         settle(motion, press, chassis)
     friction = state.weather[FRICTION] / GRAVITY
