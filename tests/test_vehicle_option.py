@@ -14,7 +14,7 @@ from bridgegen.pipeline import Pipeline
 from bridgegen.preventability import CellClass, map_preventability
 from bridgegen.suite.suite import FILE, read_suite
 
-UNKNOWN = "unknown vehicle 'tank'; known: kinematic, single-track, multi-body"
+UNKNOWN = "unknown vehicle 'tank'; known: kinematic, multi-body, single-track"
 ELSEWHERE = "the vehicle 'single-track' is of the embedded simulator; esmini moves the ego in its"
 
 

@@ -88,7 +88,7 @@ from bridgegen.simulation.embedded.chassis._single_track_kernels import (
 from bridgegen.simulation.embedded.chassis._tyre_kernels import rolling_tyre, slip_angle
 
 FINENESS = 1.0  # sub-step times the rate at which a wheel answers, at most
-LONGEST = 0.003  # s, sub-step
+LONGEST = 0.004  # s, sub-step
 ROLLED_OVER = 0.7  # rad of roll, from which on the model says nothing
 FADES = 0.5  # m/s of the rim, below which a brake's torque fades, so that a locked wheel is calm
 LEAST_FRICTION = 1e-6
