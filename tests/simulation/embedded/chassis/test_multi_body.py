@@ -117,7 +117,7 @@ def test_halved_sub_steps_change_no_signal_by_a_thousandth_of_its_peak(car, name
 
 
 @pytest.mark.parametrize("name", MADE)
-@pytest.mark.parametrize(("press", "uphill"), [(1.0, 0.0), (0.97, 2.0)])
+@pytest.mark.parametrize(("press", "uphill"), [(1.0, 0.0), (0.97, 0.0), (0.97, 2.0)])
 def test_at_rest_nothing_moves_and_the_wheels_carry_the_weight(name, press, uphill):
     car = MADE[name]
     first, *_, last = drive(car, 0.0, 0.1, -3.0, 5.0, uphill=uphill, press=press)
