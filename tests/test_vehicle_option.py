@@ -14,7 +14,7 @@ from bridgegen.pipeline import Pipeline
 from bridgegen.preventability import CellClass, map_preventability
 from bridgegen.suite.suite import FILE, read_suite
 
-UNKNOWN = "unknown vehicle 'tank'; known: kinematic, single-track"
+UNKNOWN = "unknown vehicle 'tank'; known: kinematic, multi-body, single-track"
 ELSEWHERE = "the vehicle 'single-track' is of the embedded simulator; esmini moves the ego in its"
 
 
@@ -86,12 +86,13 @@ def test_a_map_of_preventability_and_its_record(tmp_path):
     assert '"vehicle": "single-track"' in json.dumps(settings)
 
 
-def test_a_comparison_records_it_in_each_run(tmp_path):
+@pytest.mark.parametrize("vehicle", ["single-track", "multi-body"])
+def test_a_comparison_records_it_in_each_run(vehicle, tmp_path):
     given = {"algorithms": "random", "seeds": 1, "budget": 20, "workers": 1}
     out = tmp_path / "out"
-    bg.compare("cut-in", ego="route-follower", vehicle="single-track", **given, out=out)
+    bg.compare("cut-in", ego="route-follower", vehicle=vehicle, **given, out=out)
     (run,) = (out / "runs").iterdir()
-    assert bg.resume(run).settings.vehicle == "single-track"
+    assert bg.resume(run).settings.vehicle == vehicle
 
 
 def test_a_comparison_refuses_an_unknown_one(tmp_path, cli):

@@ -71,8 +71,9 @@ class PipelineOptions:
         default=None,
         metadata=option(
             TEXT,
-            "How the ego moves: kinematic, a bicycle within a friction circle; or single-track, "
-            "with tyres that slip, load transfer, and actuators that lag.",
+            "How the ego moves: kinematic, a bicycle within a friction circle; single-track, with "
+            "tyres that slip, load transfer, and actuators that lag; or multi-body, with four "
+            "wheels, roll and pitch besides (cars only; slow).",
             shown="kinematic, or what the file says",
             before=KINEMATIC,
             group=OF_DRIVER,

@@ -2,11 +2,12 @@
 
 from bridgegen.errors import UnknownNameError
 
-KINEMATIC, SINGLE_TRACK = "kinematic", "single-track"
+KINEMATIC, SINGLE_TRACK, MULTI_BODY = "kinematic", "single-track", "multi-body"
 
 VEHICLES = {
     KINEMATIC: "A bicycle that goes where it steers, within a friction circle.",
     SINGLE_TRACK: "Tyres that slip, load transfer, and actuators that lag: of cars, trucks, buses.",
+    MULTI_BODY: "Roll, pitch, heave, axles on springs and four wheels besides: of cars.",
 }
 """By name: a description."""
 

@@ -1,6 +1,7 @@
 """The ego's vehicle: in whole scenarios, in files, and where there is none."""
 
 import math
+from importlib.resources import files
 
 import numpy as np
 import pytest
@@ -23,6 +24,7 @@ from bridgegen.simulation.embedded.simulator import EmbeddedSimulator
 
 FIELDS = ("x", "y", "h", "v", "a", "offset", "n_steps", "status")
 N = 12
+DYNAMIC = ("single-track", "multi-body")
 
 
 def made(scenario="stopped-after-curve", ego="route-follower", vehicle="single-track", **options):
@@ -41,8 +43,9 @@ def same(one, other, at=slice(None)):
     return all(np.array_equal(getattr(one, n), getattr(other, n)[at]) for n in FIELDS)
 
 
-def test_a_row_s_result_is_the_same_in_any_batch(monkeypatch):
-    pipeline = made()
+@pytest.mark.parametrize("vehicle", DYNAMIC)
+def test_a_row_s_result_is_the_same_in_any_batch(vehicle, monkeypatch):
+    pipeline = made(vehicle=vehicle)
     X = rows(pipeline)
     whole = pipeline.rollout(X)
     assert (whole.status == 0).all()
@@ -52,17 +55,21 @@ def test_a_row_s_result_is_the_same_in_any_batch(monkeypatch):
     assert same(pipeline.rollout(X[order]), whole, order)
 
 
-def test_the_default_is_kinematic_to_the_bit_and_single_track_is_not():
+def test_the_default_is_kinematic_to_the_bit_and_others_are_not():
     pipeline = made(vehicle=None)
     X = rows(pipeline)
     default = pipeline.rollout(X)
     assert pipeline.vehicle == "kinematic"
     assert same(made(vehicle="kinematic").rollout(X), default)
-    assert not same(made().rollout(X), default)
+    single, multi = (made(vehicle=vehicle).rollout(X) for vehicle in DYNAMIC)
+    assert not same(single, default)
+    assert not same(multi, default)
+    assert not same(multi, single)
 
 
-def test_in_a_fast_bend_it_goes_wide_and_stays_below_friction():
-    pipeline = made()
+@pytest.mark.parametrize("vehicle", DYNAMIC)
+def test_in_a_fast_bend_it_goes_wide_and_stays_below_friction(vehicle):
+    pipeline = made(vehicle=vehicle)
     X = rows(pipeline, 60)
     wide = np.abs(pipeline.rollout(X).offset[:, 0]).max(axis=1)
     tight = np.abs(made(vehicle="kinematic").rollout(X).offset[:, 0]).max(axis=1)
@@ -74,27 +81,30 @@ def test_in_a_fast_bend_it_goes_wide_and_stays_below_friction():
     assert wide[share > 0.9].min() > wide[share < 0.3].max()
 
 
-def test_a_car_steers_fast_enough_for_its_driver_through_a_roundabout():
+@pytest.mark.parametrize("vehicle", DYNAMIC)
+def test_a_car_steers_fast_enough_for_its_driver_through_a_roundabout(vehicle):
     """From left to right within 0.5 s; at 0.4 rad/s it swings 4.1 m wide on the exit, on and on."""
-    pipeline = made("roundabout-entry", "reference")
-    rollout = pipeline.rollout(rows(pipeline, 64))
+    pipeline = made("roundabout-entry", "reference", vehicle)
+    rollout = pipeline.rollout(rows(pipeline, 64 if vehicle == "single-track" else 16))
     assert (rollout.status == 0).all()
     assert np.abs(rollout.offset[:, 0]).max() < 0.5
 
 
-def test_a_replay_with_a_kinematic_vehicle_is_the_kinematic_rollout():
-    pipeline = made(causes=True)
+@pytest.mark.parametrize("vehicle", DYNAMIC)
+def test_a_replay_with_a_kinematic_vehicle_is_the_kinematic_rollout(vehicle):
+    pipeline = made(vehicle=vehicle, causes=True)
     (fix,) = (one for one in pipeline.fixes if one.cause is Cause.VEHICLE_DYNAMICS)
     X = rows(pipeline)
     roads, at = pipeline._roads_of(X)
     assert same(pipeline._run(roads, at, X, fix), made(vehicle="kinematic").rollout(X))
 
 
-def test_the_cause_is_vehicle_dynamics_where_the_kinematic_vehicle_copes():
+@pytest.mark.parametrize("vehicle", DYNAMIC)
+def test_the_cause_is_vehicle_dynamics_where_the_kinematic_vehicle_copes(vehicle):
     dynamic, kinematic = (
-        made("lead-brakes", "careful-fsm", one, causes=True) for one in ("single-track", None)
+        made("lead-brakes", "careful-fsm", one, causes=True) for one in (vehicle, None)
     )
-    X = rows(dynamic, 200)
+    X = rows(dynamic, 80)
     found, other = dynamic.evaluate(X), kinematic.evaluate(X)
     late = found.critical & ~other.critical
     assert late.any()  # its brakes build up late
@@ -102,21 +112,22 @@ def test_the_cause_is_vehicle_dynamics_where_the_kinematic_vehicle_copes():
     assert not (found.cause[~late] == Cause.VEHICLE_DYNAMICS).any()
 
 
-def test_an_exported_file_states_it_and_does_the_same(tmp_path):
-    pipeline = made()
+@pytest.mark.parametrize("vehicle", DYNAMIC)
+def test_an_exported_file_states_it_and_does_the_same(vehicle, tmp_path):
+    pipeline = made(vehicle=vehicle)
     x = rows(pipeline)[3]
     *_, path = write_scenario(pipeline, x, tmp_path, "one")
     here = pipeline.rollout(x[np.newaxis])
     assert same(simulate_file(path).rollout, here)
-    assert same(simulate_file(path, vehicle="single-track").rollout, here)
+    assert same(simulate_file(path, vehicle=vehicle).rollout, here)
     kinematic = made(vehicle="kinematic")
     assert same(simulate_file(path, vehicle="kinematic").rollout, kinematic.rollout(x[np.newaxis]))
     text = path.read_text()
-    assert '"vehicle" value="single-track"' in text
-    path.write_text(text.replace('"vehicle" value="single-track"', '"vehicle" value="tank"'))
+    assert f'"vehicle" value="{vehicle}"' in text
+    path.write_text(text.replace(f'"vehicle" value="{vehicle}"', '"vehicle" value="tank"'))
     with pytest.raises(InputError, match=r"one.xosc, line \d+: property vehicle: .*'tank'"):
         simulate_file(path)
-    assert "single-track" not in str(with_vehicle(read(text.encode(), "one.xosc"), "kinematic"))
+    assert vehicle not in str(with_vehicle(read(text.encode(), "one.xosc"), "kinematic"))
 
 
 def test_a_run_records_it_and_resumes_with_it(tmp_path):
@@ -136,12 +147,53 @@ def test_a_run_records_it_and_resumes_with_it(tmp_path):
 
 
 def test_where_it_cannot_be():
-    with pytest.raises(UnknownNameError, match="vehicle 'tank'; known: kinematic, single-track"):
+    with pytest.raises(
+        UnknownNameError, match="'tank'; known: kinematic, multi-body, single-track"
+    ):
         made(vehicle="tank")
     file = made().concrete(rows(made())[0]).storyboard
     simulator = SimulatorChoice("esmini")
     with pytest.raises(InputError, match="'single-track' is of the embedded simulator; esmini"):
         simulator.around(EmbeddedSimulator(file, "here", vehicle="single-track"), file)
+
+
+def changed(tmp_path, old, new):
+    """Return a file of the catalogue's lead-brakes that says something else."""
+    path = tmp_path / "changed.yaml"
+    text = files("bridgegen.catalogue").joinpath("lead-brakes.yaml").read_text("utf-8")
+    assert old in text
+    path.write_text(text.replace(old, new, 1), "utf-8")
+    return path
+
+
+def test_a_multi_body_is_a_car_s(tmp_path):
+    lorry = changed(tmp_path, "type: car", "type: truck")
+    with pytest.raises(
+        InputError, match=r"the vehicle 'multi-body' must be a car without a trailer, .* a truck"
+    ):
+        made(lorry, vehicle="multi-body")
+    single = made(lorry)
+    assert (single.rollout(rows(single)).status == 0).all()
+
+
+@pytest.mark.parametrize("grade", ["-12 %", "12 %"])
+def test_on_a_steep_hill_it_stops_and_stays_where_it_stopped(grade, tmp_path):
+    """Behind a car that stands, with a driver that keeps its distance."""
+    hill = changed(tmp_path, "road_type: rural", f"road_type: rural, grade: {grade}")
+    pipeline = made(hill, "reference", "multi-body")
+    X = rows(pipeline)
+    X[:, pipeline.space.index("low_speed")] = 0.0
+    rollout = pipeline.rollout(X)
+    last = rollout.n_steps - 1
+    stood = 0
+    for row, end in enumerate(last):
+        still = rollout.v[row, 0, : end + 1] == 0.0
+        if still[end]:
+            begin = end - np.argmin(still[end::-1])
+            stood += end - begin > 20
+            x, y = rollout.x[row, 0, begin + 1 : end + 1], rollout.y[row, 0, begin + 1 : end + 1]
+            assert np.ptp(x) == np.ptp(y) == 0.0
+    assert stood >= N // 4
 
 
 @given(st.floats(-3.0, 3.0), st.floats(-3.0, 3.0), st.floats(0.1, 5.0), st.floats(0.01, 2.0))

@@ -238,7 +238,7 @@ class State(NamedTuple):
         far: ``(E,)`` scratch of one driver.
         attention: ``(E, 3)``, a careful driver's state per body; see its kernel.
         chassis: ``(MOTION,)`` how the ego's vehicle moves, if it has dynamics; see
-            ``_chassis_columns``.
+            ``_chassis_columns`` and ``_multi_body_columns``.
         key: ``(1,)`` uint64, of the row's random numbers; see `bridgegen.ego.noise`.
         sensors: ``(E, MEMORY)``, between two frames; see ``ego._perception_kernels``.
         tracks: ``(E, TRACK)`` what the ego perceives; see ``ego._tracking_kernels``.

@@ -15,8 +15,14 @@ from bridgegen.simulation.embedded._codes import (
     RELATIVE_SPEED,
 )
 from bridgegen.simulation.embedded._memory_kernels import Plan, Record, Roads, State
+from bridgegen.simulation.embedded.chassis._multi_body_columns import MULTI_BODY
 from bridgegen.simulation.embedded.conditions import look_closely
-from bridgegen.simulation.embedded.drivers import begin_waiting, heed, move_chassis
+from bridgegen.simulation.embedded.drivers import (
+    begin_waiting,
+    heed,
+    move_chassis,
+    move_multi_body,
+)
 from bridgegen.simulation.embedded.motion import (
     BEGINS,
     follow_course,
@@ -50,6 +56,7 @@ def addressed(plan: Plan, networks: Roads, states: State, records: Record) -> Pl
         if kind in BEGINS
     }
     along = (plan.places[:, PLACE_KIND] == BY_TRAJECTORY).any()
+    moves = move_multi_body if plan.chassis.size == MULTI_BODY else move_chassis
     chases = ((kinds >= RELATIVE_SPEED) & (kinds < FIRST_ACROSS)).any()
     return plan._replace(
         begins=np.array([begins.get(kind, 0) for kind in kinds.tolist()], dtype=np.int64),
@@ -61,7 +68,7 @@ def addressed(plan: Plan, networks: Roads, states: State, records: Record) -> Pl
         looks_closely=at(look_closely, types.int64) if plan.looks_closely else 0,
         heeds=at(heed, types.int64) if plan.attends else 0,
         moves_chassis=(
-            at(move_chassis, types.int64, types.float64, types.float64) if plan.chassis.size else 0
+            at(moves, types.int64, types.float64, types.float64) if plan.chassis.size else 0
         ),
         begins_waiting=at(begin_waiting, types.int64) if plan.attends else 0,
     )

@@ -35,7 +35,7 @@ from bridgegen.simulation.embedded._codes import (
     PRESS,
 )
 from bridgegen.simulation.embedded.addresses import addressed
-from bridgegen.simulation.embedded.chassis._chassis_columns import MOTION
+from bridgegen.simulation.embedded.chassis.multi_body import MOTIONS
 from bridgegen.simulation.embedded.drivers import (
     ANSWER,
     DEMANDS,
@@ -459,7 +459,7 @@ def _state(
         "seen": SEEN,
         "sensors": MEMORY,
         "track": TRACK,
-        "motion": MOTION if program.chassis.size else 0,
+        "motion": MOTIONS[program.vehicle],
         "around": AROUND,
         "passages": 2 * e + hypotheses,
         "passage": PASSAGE,

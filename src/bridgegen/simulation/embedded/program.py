@@ -275,7 +275,8 @@ class Program:
             see ``environments.py``; row 0 is the start's.
         driver: who drives the ego.
         vehicle: how its body moves, one of `bridgegen.simulation.vehicles.VEHICLES`.
-        chassis: ``(CHASSIS,)`` of a vehicle with dynamics, see ``_chassis_columns``; else empty.
+        chassis: of a vehicle with dynamics, see ``_chassis_columns`` and ``_multi_body_columns``;
+            else empty.
         others: ``(E,)`` who drives each of the others, ``SCRIPTED`` or ``ATTENTIVE`` of
             `bridgegen.ego.drivers`; the ego's is not looked at.
         time_step: [s].

@@ -24,9 +24,11 @@ from bridgegen.simulation.embedded.chassis._chassis_columns import (
     TO_REAR,
 )
 from bridgegen.simulation.embedded.chassis._tyre_kernels import (
+    SMALL_ANGLE,
     lateral,
     lateral_left,
     longitudinal,
+    slip_angle,
     stiffness_factor,
 )
 
@@ -67,24 +69,10 @@ def _share(force, load, weight, chassis):
     return load / weight if math.isnan(share) else share
 
 
-@inlined_kernel
-def _angle(across, along):
-    """Return atan2(across, |along|), by its series where it is small."""
-    along = max(abs(along), 1e-6)
-    if abs(across) > SMALL * along:
-        return math.atan2(across, along)
-    x = across / along
-    q = x * x
-    return x * (1.0 - q * (1.0 / 3.0 - q * (0.2 - q * (1.0 / 7.0 - q * (1.0 / 9.0)))))
-
-
-SMALL = 0.05  # the fifth term is below 1e-14 of the sum
-
-
 @kernel
 def turned(cosine, sine, angle):
     """Return cosine and sine of an angle that is larger by so much, by series where it is small."""
-    if abs(angle) > SMALL:
+    if abs(angle) > SMALL_ANGLE:
         c, s = math.cos(angle), math.sin(angle)
     else:
         q = angle * angle
@@ -98,7 +86,7 @@ def _slip_angles(vx, vy, turn, cosine, sine, chassis):
     """Return the slip angles of front and rear axle [rad]."""
     ahead = vy + chassis[TO_FRONT] * turn
     along, across = vx * cosine + ahead * sine, ahead * cosine - vx * sine
-    return _angle(across, along), _angle(vy - chassis[TO_REAR] * turn, vx)
+    return slip_angle(across, along), slip_angle(vy - chassis[TO_REAR] * turn, vx)
 
 
 @inlined_kernel

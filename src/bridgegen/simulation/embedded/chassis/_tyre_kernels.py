@@ -1,7 +1,7 @@
 """The tyres: the magic formula with combined slip.
 
-Source: Pacejka, Tyre and Vehicle Dynamics, 2nd ed., section 4.3.2, without camber, turn slip and
-shifts. Friction scales the peak, and not the stiffness.
+Source: Pacejka, Tyre and Vehicle Dynamics, 2nd ed., section 4.3.2, without turn slip and shifts,
+and with camber where said. Friction scales the peak, and not the stiffness.
 """
 
 # mypy: allow-untyped-defs
@@ -19,6 +19,7 @@ from bridgegen.simulation.embedded.chassis._chassis_columns import (
     C_XA,
     C_Y,
     C_YK,
+    E_X,
     E_XA,
     E_Y,
     E_YK,
@@ -28,6 +29,29 @@ from bridgegen.simulation.embedded.chassis._chassis_columns import (
     SLIP,
     SLIPS,
 )
+from bridgegen.simulation.embedded.chassis._multi_body_columns import (
+    D_Y3,
+    H_Y3,
+    V_Y3,
+    V_YK3,
+    V_YK4,
+    V_YK5,
+    V_YK6,
+)
+
+
+@inlined_kernel
+def slip_angle(across, along):
+    """Return atan2(across, |along|), by its series where it is small."""
+    along = max(abs(along), 1e-6)
+    if abs(across) > SMALL_ANGLE * along:
+        return math.atan2(across, along)
+    x = across / along
+    q = x * x
+    return x * (1.0 - q * (1.0 / 3.0 - q * (0.2 - q * (1.0 / 7.0 - q * (1.0 / 9.0)))))
+
+
+SMALL_ANGLE = 0.05  # the fifth term is below 1e-14 of the sum
 
 
 @inlined_kernel
@@ -126,3 +150,30 @@ def longitudinal(wanted, alpha, load, mu, chassis):
 
 
 ROUNDS, NEAR = 12, 0.01  # to find the slip, to such a share of the largest one
+
+
+@kernel
+def rolling_tyre(kappa, alpha, camber, load, mu, stiffness, chassis):
+    """Return a tyre's forces ahead and to the left [N], at a slip, an angle and a camber.
+
+    Args:
+        kappa: longitudinal slip [1], positive of a wheel that is driven.
+        alpha: slip angle [rad], see ``lateral``.
+        camber: how far the wheel leans to the right [rad].
+        load: [N], ≥ 0.
+        mu: of the road [1].
+        stiffness: cornering stiffness per load [1/rad].
+        chassis: the vehicle, a multi-body one.
+    """
+    peak = mu * chassis[MU_X]
+    z = _bent(chassis[K_X] / (chassis[C_X] * peak) * kappa, chassis[E_X])
+    ahead = peak * load * math.sin(chassis[C_X] * math.atan(z))
+    grip = mu * (1.0 - chassis[D_Y3] * camber * camber)
+    most = grip * chassis[MU_Y] * load
+    b = stiffness_factor(stiffness, grip, chassis)
+    left = lateral(alpha + chassis[H_Y3] * camber, most, b, chassis)
+    left = (left + mu * load * chassis[V_Y3] * camber) * lateral_left(alpha, kappa, chassis)
+    far = chassis[V_YK4] * alpha
+    turned = chassis[V_YK3] * camber / math.sqrt(1.0 + far * far)
+    left += most * turned * math.sin(chassis[V_YK5] * math.atan(chassis[V_YK6] * kappa))
+    return ahead * longitudinal_left(alpha, kappa, chassis), left

@@ -21,6 +21,7 @@ from bridgegen.simulation.embedded._codes import (
     EVENT,
     PROBE,
 )
+from bridgegen.simulation.embedded.chassis.multi_body import CLASS, multi_body_of
 from bridgegen.simulation.embedded.chassis.parameters import CLASSES, chassis_of
 from bridgegen.simulation.embedded.compiler import declared
 from bridgegen.simulation.embedded.compiler.actions import Actions
@@ -46,7 +47,7 @@ from bridgegen.simulation.embedded.program import (
     PathSpec,
     Program,
 )
-from bridgegen.simulation.vehicles import KINEMATIC
+from bridgegen.simulation.vehicles import KINEMATIC, MULTI_BODY
 
 DEFAULT_DURATION = 60.0  # s, of a file whose stop trigger names no simulation time
 
@@ -283,13 +284,16 @@ class _Compiler:
         if vehicle == KINEMATIC:
             return np.zeros(0)
         what, has_trailer = NAMES[kind(body)], bool((tows == 0).any())
-        if what not in CLASSES or has_trailer:
+        known = [CLASS] if vehicle == MULTI_BODY else list(CLASSES)
+        if what not in known or has_trailer:
             what = "vehicle with a trailer" if has_trailer else what
             raise InputError(
-                f"{self.place}: the vehicle '{vehicle}' must be a {' or '.join(CLASSES)} without a "
+                f"{self.place}: the vehicle '{vehicle}' must be a {' or '.join(known)} without a "
                 f"trailer, the ego is a {what} (--vehicle {KINEMATIC})"
             )
         assert isinstance(body, osc.Vehicle)
+        if vehicle == MULTI_BODY:
+            return multi_body_of(wheelbase(self.tables, body), measured)
         return chassis_of(what, wheelbase(self.tables, body), measured)
 
     def _others(self, objects: Sequence[Body], others: str | None) -> Int:

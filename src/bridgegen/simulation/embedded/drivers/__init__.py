@@ -1,6 +1,6 @@
 """What drives the ego and attentive participants, and how their demands move them."""
 
-from bridgegen.simulation.embedded.drivers._chassis_kernels import move_chassis
+from bridgegen.simulation.embedded.drivers._chassis_kernels import move_chassis, move_multi_body
 from bridgegen.simulation.embedded.drivers._conflict_view_kernels import see_conflicts_of_rows
 from bridgegen.simulation.embedded.drivers._control_kernels import (
     begin_control,
@@ -49,6 +49,7 @@ __all__ = [
     "is_steered",
     "move_chassis",
     "move_heeding",
+    "move_multi_body",
     "move_paced",
     "move_steered",
     "observe_rows",

@@ -26,6 +26,12 @@ from bridgegen.simulation.embedded.chassis._chassis_columns import (
     X,
     Y,
 )
+from bridgegen.simulation.embedded.chassis._multi_body_columns import AXLE_AT, PRESSED
+from bridgegen.simulation.embedded.chassis._multi_body_kernels import (
+    advance_bodies,
+    settle,
+    sub_steps_of_bodies,
+)
 from bridgegen.simulation.embedded.chassis._single_track_kernels import advance, sub_steps
 from bridgegen.simulation.embedded.places._slope_kernels import slope
 
@@ -56,12 +62,15 @@ def lagged(value, target, left, lag, rate):
 
 
 @kernel
-def move_chassis(k, demanded, curvature, plan, roads, state, record):
-    """Move the ego's vehicle on from instant k, to ``state.chassis``.
+def _asked_of(k, demanded, curvature, plan, roads, state, record):
+    """Return what actuators go to, and what the road does, at instant k.
 
-    The driver's demands become a steering angle, by the kinematic bicycle's inverse, and a force.
     A vehicle that is not where it has come to begins there anew, on its wheels: at the start, after
     a teleport, or where the storyboard has moved it.
+
+    Returns:
+        front wheels' angle [rad] and force per mass [m/s²] that are asked for; gravity against the
+        motion and to the right [m/s²], and how hard the road is pressed upon; whether it has begun.
     """
     chassis, motion, limits, dt = plan.chassis, state.chassis, plan.bodies[0], plan.dt
     x, y, h, v = record.x[0, k], record.y[0, k], record.h[0, k], record.v[0, k]
@@ -79,6 +88,21 @@ def move_chassis(k, demanded, curvature, plan, roads, state, record):
         motion[FORCE] = uphill
     wanted = min(max(demanded + uphill, -limits[5]), limits[4])
     wanted = min(wanted, (limits[3] - v) / dt + uphill)
+    return asked, wanted, uphill, aside, press, not came
+
+
+@kernel
+def move_chassis(k, demanded, curvature, plan, roads, state, record):
+    """Move the ego's single-track vehicle on from instant k, to ``state.chassis``.
+
+    The driver's demands become a steering angle, by the kinematic bicycle's inverse, and a force.
+    """
+    asked, wanted, uphill, aside, press, _ = _asked_of(
+        k, demanded, curvature, plan, roads, state, record
+    )
+    chassis, motion, dt = plan.chassis, state.chassis, plan.dt
+    x, y, h = record.x[0, k], record.y[0, k], record.h[0, k]
+    friction, rear = state.weather[FRICTION], chassis[TO_REAR]
     vx, vy, turn = motion[VX], motion[VY], motion[YAW_RATE]
     angle, force = motion[STEER], motion[FORCE]
     steering, rate = chassis[STEERING_LAG], chassis[STEERING_RATE]
@@ -104,3 +128,39 @@ def move_chassis(k, demanded, curvature, plan, roads, state, record):
     motion[X], motion[Y] = place[0] - rear * heads[0], place[1] - rear * heads[1]
     motion[H] = place[2]
     motion[SPEED] = math.sqrt(vx * vx + (vy - rear * turn) ** 2)
+
+
+@kernel
+def move_multi_body(k, demanded, curvature, plan, roads, state, record):
+    """Move the ego's multi-body vehicle on from instant k, to ``state.chassis``.
+
+    Left and right wheels roll on the same friction, for roads have no other.
+    """
+    asked, wanted, uphill, aside, press, begins = _asked_of(
+        k, demanded, curvature, plan, roads, state, record
+    )
+    chassis, motion, dt = plan.chassis, state.chassis, plan.dt
+    if begins or motion[AXLE_AT + PRESSED] == 0.0:  # its memory is 0 before it first moves
+        motion[X], motion[Y], motion[H] = record.x[0, k], record.y[0, k], record.h[0, k]
+        settle(motion, press, chassis)
+    friction = state.weather[FRICTION] / GRAVITY
+    angle, force = motion[STEER], motion[FORCE]
+    steering, rate = chassis[STEERING_LAG], chassis[STEERING_RATE]
+    vx, vy = motion[VX], motion[VY]
+    parts = sub_steps_of_bodies(math.sqrt(vx * vx + vy * vy), dt, chassis)
+    part = dt / parts
+    angle_left = math.exp(-0.5 * part / steering)
+    force_left = math.exp(-0.5 * part / chassis[BRAKE_LAG if wanted < force else DRIVE_LAG])
+    for _ in range(parts):
+        middle = lagged(angle, asked, angle_left, steering, rate)
+        last = lagged(middle, asked, angle_left, steering, rate)
+        acts = wanted - force_left * (wanted - force)
+        force = wanted - force_left * (wanted - acts)
+        advance_bodies(
+            motion, (angle, middle, last), acts, (friction, friction), press, uphill, aside, part,
+            chassis,
+        )  # fmt: skip
+        angle = last
+    motion[STEER], motion[FORCE] = angle, force
+    past = motion[VY] - chassis[TO_REAR] * motion[YAW_RATE]
+    motion[SPEED] = math.sqrt(motion[VX] * motion[VX] + past * past)
