@@ -69,5 +69,6 @@ def mine(
             keep=keep,
             ego=ego,
             progress=screen.progress,
+            fitting=screen.fitting,
         )
     print_mined(mined, as_json=as_json)

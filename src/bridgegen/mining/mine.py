@@ -17,10 +17,13 @@ from bridgegen.mining.events.of_scenarios import (
     recorded_scenarios,
     scenario_events,
 )
+from bridgegen.mining.events.tables import write_events
 from bridgegen.mining.excerpt import clock_of
 from bridgegen.mining.lanes.account import LanesFound, account_of
 from bridgegen.mining.lanes.find import Located, locate, read_map
 from bridgegen.mining.replays.write import Prepared, Replay, prepare, write
+from bridgegen.mining.scenarios.files import write_mined
+from bridgegen.mining.scenarios.mined import MinedScenario, Unmade
 from bridgegen.recordings.clean import TIME_STEP, Cleaned, clean
 from bridgegen.recordings.formats import files_of, read
 from bridgegen.recordings.quality import Finding
@@ -89,6 +92,7 @@ class Mined:
         warnings: of reading the map.
         replays: the most critical events, as files.
         scenarios: the events that are a scenario, per scenario.
+        mined: what was made of each of these.
     """
 
     recordings: tuple[Summary, ...]
@@ -99,6 +103,7 @@ class Mined:
     warnings: tuple[str, ...] = ()
     replays: tuple[Replay, ...] = ()
     scenarios: tuple[ScenarioEvents, ...] = ()
+    mined: tuple[MinedScenario | Unmade, ...] = ()
 
 
 def mine(
@@ -112,6 +117,7 @@ def mine(
     keep: int = KEEP,
     ego: str | None = None,
     progress: Callable[[int, int], None] = lambda done, total: None,
+    fitting: Callable[[int, int], None] = lambda done, total: None,
 ) -> Mined:
     """Read and clean recordings, place them on lanes, find near misses, and write all that.
 
@@ -119,7 +125,8 @@ def mine(
         paths: files, or folders of files.
         out: a folder, new or of an earlier call; gets recordings.html, recordings.csv, lanes.csv,
             quality.csv, events.csv, conflicts.csv, in the folder ``events`` the parameters of
-            scenarios, and in the folder ``critical`` the most critical events as scenarios.
+            scenarios, in the folder ``scenarios`` logical scenarios made of them, and in the folder
+            ``critical`` the most critical near misses as concrete ones.
         road_map: the OpenDRIVE map of all of them; without one the lanes are those that come with
             the recording, or inferred from its paths.
         lenient: leave out what cannot be read, and list it.
@@ -128,6 +135,7 @@ def mine(
         keep: how many of the most critical events are written as scenarios.
         ego: driver that takes the ego's place in these; by default it does what was recorded.
         progress: is told how many of how many files are done.
+        fitting: is told how many of how many scenarios are made of the events.
 
     Raises:
         FileFormatError: a file that is no recording, or breaks its format's rules.
@@ -169,9 +177,11 @@ def mine(
     replays = _written(kept, out / CRITICAL, ego)
     warnings = on_map.warnings if on_map is not None else ()
     events = [one.events for one in found]
+    met = tuple(scenario_events(one.scenario, one.spec, events) for one in sought)
+    write_events(out, events, met)
+    made = write_mined(out, sought, met, events, time_step, fitting)
     mined = Mined(
-        tuple(found), tuple(skipped), tuple(others), time_step, out, warnings, replays,
-        tuple(scenario_events(one, one.recorded, events) for one in sought if one.recorded),
+        tuple(found), tuple(skipped), tuple(others), time_step, out, warnings, replays, met, made,
     )  # fmt: skip
     write_all(mined)
     return mined

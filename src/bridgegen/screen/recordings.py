@@ -12,6 +12,9 @@ from bridgegen.mining.conflicts.section import (
     recordings_in_words,
     screen_rows,
 )
+from bridgegen.mining.scenarios.files import FOLDER as SCENARIOS
+from bridgegen.mining.scenarios.mined import MinedScenario, Unmade
+from bridgegen.mining.scenarios.page import made_as_json, made_row
 from bridgegen.screen.live import Live
 from bridgegen.screen.tables import print_table
 
@@ -30,6 +33,10 @@ class RecordingsScreen(Live):
     def progress(self, done: int, total: int) -> None:
         """Show how many of how many files are done."""
         self.show(what="files", done=done, total=total)
+
+    def fitting(self, done: int, total: int) -> None:
+        """Show how many of how many scenarios are made."""
+        self.show(what="scenarios", done=done, total=total)
 
 
 def print_mined(mined: "Mined", *, as_json: bool) -> None:
@@ -57,6 +64,7 @@ def print_mined(mined: "Mined", *, as_json: bool) -> None:
             "skipped": [str(path) for path, _ in mined.skipped],
             "others": [str(path) for path in mined.others],
             **_events(mined),
+            "mined": [made_as_json(one, mined.out) for one in mined.mined],
         }, indent=2))  # fmt: skip
         return
     head = ("recording", "format", "participants", "h", "km", "step [s]", "frame")
@@ -87,12 +95,23 @@ def print_mined(mined: "Mined", *, as_json: bool) -> None:
         of_events = ("scenario", "recording", "ego and other", "type", "TTC [s]",
                      "needed [m/s²]", "responsible")  # fmt: skip
         print_table(of_events, list(screen_rows(mined)), as_json=False)
+    made = [one for one in mined.mined if isinstance(one, MinedScenario)]
+    print()
+    for one in mined.mined:
+        if isinstance(one, Unmade):
+            print(f"{one.source}: no scenario: {one.reason}")
+    if made:
+        print()
+        of_made = ("mined scenario", "events", "per hour (95 %)", "parameters beyond the source's")
+        print_table(of_made, [made_row(one) for one in made], as_json=False)
     print(f"\n{'page':<8}{mined.out / 'recordings.html'}")
     print(
         f"{'tables':<8}{mined.out / 'recordings.csv'}, {mined.out / 'lanes.csv'}, "
         f"{mined.out / 'quality.csv'}, {mined.out / 'events.csv'}, {mined.out / 'conflicts.csv'}"
     )
     print(f"{'events':<8}{mined.out / 'events'}, a table per scenario")
+    if made:
+        print(f"{'mined':<8}{mined.out / SCENARIOS}, a scenario, its fit and its distribution each")
 
 
 def _print_events(mined: "Mined") -> None:
@@ -147,7 +166,8 @@ def _events(mined: "Mined") -> "dict[str, object]":
             one.scenario: {
                 "event": one.kind, "count": one.count, "rows": one.complete,
                 **_rates(one.encounters), "outside": [asdict(each) for each in one.outside],
-                "broken": dict(one.broken), "not_given": one.unmapped,
+                "broken": {each.rule: each.events for each in one.broken},
+                "not_given": one.unmapped,
             }
             for one in mined.scenarios
         },

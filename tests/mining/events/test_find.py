@@ -182,7 +182,8 @@ def test_events_are_set_against_ranges_and_constraints():
     assert outside == {"ego_speed": (0, 1)}
     close, _ = found((25.0 * T, RIGHT), (19.7 + 22.5 * T, change(4.0, 4.0, LEFT, RIGHT)))
     met = scenario_events(scenario, scenario.recorded, [close])
-    assert [rule.split(" ")[0] for rule, _ in met.broken] == ["cut_in_distance"]
+    (broken,) = met.broken
+    assert (broken.rule.split(" ")[0], broken.events) == ("cut_in_distance", ("cut-in-1",))
 
 
 def test_every_declared_kind_has_a_detector():
