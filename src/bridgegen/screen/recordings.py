@@ -132,7 +132,7 @@ def _print_events(mined: "Mined") -> None:
         of_scenarios = ("scenario", "event", "rows", "incomplete", "per hour (95 %)")
         print_table(of_scenarios, [
             (one.scenario, one.kind, one.complete, one.incomplete,
-             rates_in_words(one.count, found)[0]) for one in met
+             rates_in_words(one.encounters)[0]) for one in met
         ], as_json=False)  # fmt: skip
     for one in met:
         for text in against_in_words(one):
@@ -156,7 +156,7 @@ def _events(mined: "Mined") -> "dict[str, object]":
         for one in events:
             refused.update(one.refused)
         kinds[kind] = {
-            "count": count, **_rates(encounters_of(count, found)), "refused": dict(refused),
+            "count": count, **_rates(encounters_of(count, found, kind)), "refused": dict(refused),
         }  # fmt: skip
     return {
         "hours_on_lanes": sum(one.hours for one in found),

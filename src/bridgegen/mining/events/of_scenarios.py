@@ -10,6 +10,7 @@ import numpy as np
 from bridgegen.arrays import Bool, Float
 from bridgegen.errors import InputError
 from bridgegen.exposure.rates import Encounters
+from bridgegen.mining.events.event import NOT_WHOLE
 from bridgegen.mining.events.find import FoundEvents, named
 from bridgegen.odd.kinds import slack
 from bridgegen.odd.plain_yaml import Document
@@ -137,12 +138,31 @@ def recorded_scenarios(paths: Sequence[Path] = ()) -> tuple[Sought, ...]:
     return tuple(found)
 
 
-def encounters_of(count: int, found: Sequence[FoundEvents]) -> Encounters | None:
-    """Return how often events were met, in the driving in which they were looked for."""
-    hours, km = (sum(getattr(one, name) for one in found) for name in ("hours", "kilometres"))
+def encounters_of(count: int, found: Sequence[FoundEvents], kind: str = "") -> Encounters | None:
+    """Return how often events were met, in the driving in which they were looked for.
+
+    Events that the recording cuts off are not among them, so the driving is scaled by the share
+    that it does not (`whole_share`).
+
+    Args:
+        count: how many events there were.
+        found: of all recordings.
+        kind: of the events; by default of no kind that is cut off.
+    """
+    share = whole_share(found, kind)
+    hours, km = (share * sum(getattr(one, name) for one in found)
+                 for name in ("hours", "kilometres"))  # fmt: skip
     if hours <= 0.0:
         return None
     return Encounters(count, hours, km if km > 0.0 else None, "recorded traffic")
+
+
+def whole_share(found: Sequence[FoundEvents], kind: str) -> float:
+    """Return the share of the events of a kind that are recorded from begin to end."""
+    same = [one for each in found for one in each.kinds if one.kind.name == kind]
+    whole = sum(len(one) for one in same)
+    cut_off = sum(one.refused.get(NOT_WHOLE, 0) for one in same)
+    return whole / (whole + cut_off) if whole else 1.0
 
 
 def scenario_events(
@@ -178,7 +198,7 @@ def scenario_events(
     return ScenarioEvents(
         scenario.name, spec.event, counts, rows, called, int(counts - whole.sum()),
         tuple(_outside(scenario, rows)), broken,
-        unmapped(spec, scenario.parameters), encounters_of(counts, found),
+        unmapped(spec, scenario.parameters), encounters_of(counts, found, spec.event),
     )  # fmt: skip
 
 

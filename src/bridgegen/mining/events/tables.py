@@ -9,6 +9,7 @@ from pathlib import Path
 
 from bridgegen.disk import write_whole
 from bridgegen.errors import StorageError
+from bridgegen.exposure.rates import Encounters
 from bridgegen.mining.cells import cell
 from bridgegen.mining.events.event import ABSENT
 from bridgegen.mining.events.find import FoundEvents, named
@@ -80,14 +81,13 @@ def kind_rows(found: Sequence[FoundEvents]) -> Iterator[tuple[str, int, str, str
         for one in same:
             refused.update(one.refused)
         yield (
-            kind, count, *rates_in_words(count, found),
+            kind, count, *rates_in_words(encounters_of(count, found, kind)),
             "; ".join(f"{number:,} {reason}" for reason, number in refused.items()),
         )  # fmt: skip
 
 
-def rates_in_words(count: int, found: Sequence[FoundEvents]) -> tuple[str, str]:
+def rates_in_words(met: Encounters | None) -> tuple[str, str]:
     """Return how often something was met, per hour and per 1000 km, with the 95 % interval."""
-    met = encounters_of(count, found)
     if met is None:
         return "–", "–"
     texts = []

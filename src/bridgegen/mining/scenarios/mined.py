@@ -19,7 +19,7 @@ from bridgegen.arrays import Float
 from bridgegen.errors import InputError
 from bridgegen.exposure.fit import LEAST_ROWS, Fit, Progress, fit_exposure
 from bridgegen.mining.events.find import FoundEvents
-from bridgegen.mining.events.of_scenarios import ScenarioEvents, Sought, broken_by
+from bridgegen.mining.events.of_scenarios import ScenarioEvents, Sought, broken_by, whole_share
 from bridgegen.mining.scenarios.ranges import (
     Range,
     bounds_of_speeds,
@@ -139,8 +139,9 @@ def mined_scenario(
     about = _about(events, found, time_step)
     try:
         draft = _draft(sought, rows, names, about)
+        met = events.encounters
         fitted = fit_exposure(
-            draft.scenario, table, hours=_sum(found, "hours"), km=_sum(found, "kilometres") or None,
+            draft.scenario, table, hours=met.hours if met else None, km=met.km if met else None,
             ignore=[name for name in events.rows if name not in names],
             others="default" if _rest(draft.scenario, names) else None,
             source=about, replicates=REPLICATES, progress=progress,
@@ -359,6 +360,8 @@ def _about(events: ScenarioEvents, found: Sequence[FoundEvents], time_step: floa
         f"{time_step:g} s; {_sum(found, 'hours'):.4g} h and {_sum(found, 'kilometres'):.4g} km of "
         f"motor vehicles on lanes, each of which may be the ego; {left_out}"
     )
+    if (share := whole_share(found, events.kind)) < 1.0:
+        text += f"; hours and km of encounters are {share:.3g} of these, as others are cut off"
     if events.incomplete:
         text += f"; {events.incomplete} events lack a parameter"
     return text + "."
