@@ -24,6 +24,8 @@ from bridgegen.mining.lanes.find import Located, locate, read_map
 from bridgegen.mining.replays.write import Prepared, Replay, prepare, write
 from bridgegen.mining.scenarios.files import write_mined
 from bridgegen.mining.scenarios.mined import MinedScenario, Unmade
+from bridgegen.mining.scenarios.update import ENDING as DIFF
+from bridgegen.mining.scenarios.update import Update, refuse_same_names, write_updates
 from bridgegen.recordings.clean import TIME_STEP, Cleaned, clean
 from bridgegen.recordings.formats import files_of, read
 from bridgegen.recordings.quality import Finding
@@ -93,6 +95,7 @@ class Mined:
         replays: the most critical events, as files.
         scenarios: the events that are a scenario, per scenario.
         mined: what was made of each of these.
+        updates: ranges proposed for scenario files.
     """
 
     recordings: tuple[Summary, ...]
@@ -104,6 +107,7 @@ class Mined:
     replays: tuple[Replay, ...] = ()
     scenarios: tuple[ScenarioEvents, ...] = ()
     mined: tuple[MinedScenario | Unmade, ...] = ()
+    updates: tuple[Update, ...] = ()
 
 
 def mine(
@@ -114,6 +118,7 @@ def mine(
     lenient: bool = False,
     time_step: float = TIME_STEP,
     scenarios: Sequence[Path] = (),
+    update: Sequence[Path] = (),
     keep: int = KEEP,
     ego: str | None = None,
     progress: Callable[[int, int], None] = lambda done, total: None,
@@ -132,6 +137,8 @@ def mine(
         lenient: leave out what cannot be read, and list it.
         time_step: to resample at [s].
         scenarios: files of scenarios that declare their events, besides those that ship.
+        update: files of scenarios that declare their events, for which ranges are proposed that
+            hold them: ``NAME.yaml.diff``. The files stay as they are.
         keep: how many of the most critical events are written as scenarios.
         ego: driver that takes the ego's place in these; by default it does what was recorded.
         progress: is told how many of how many files are done.
@@ -150,8 +157,9 @@ def mine(
         raise InputError(f"0 <= keep must hold, got {keep}")
     if ego is not None:
         egos.get(ego)
-    refuse_foreign(out)
-    sought = recorded_scenarios(scenarios)
+    refuse_same_names(update)
+    refuse_foreign(out, [f"{path.name}{DIFF}" for path in update])
+    sought = recorded_scenarios([*update, *(path for path in scenarios if path not in update)])
     on_map = read_map(road_map) if road_map is not None else None
     files, others = _files(paths)
     found: list[Summary] = []
@@ -180,8 +188,10 @@ def mine(
     met = tuple(scenario_events(one.scenario, one.spec, events) for one in sought)
     write_events(out, events, met)
     made = write_mined(out, sought, met, events, time_step, fitting)
+    updates = write_updates(out, sought, met, update)
     mined = Mined(
         tuple(found), tuple(skipped), tuple(others), time_step, out, warnings, replays, met, made,
+        updates,
     )  # fmt: skip
     write_all(mined)
     return mined

@@ -4,7 +4,7 @@ import csv
 import io
 import math
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from html import escape
 from importlib.metadata import version
 from importlib.resources import files
@@ -50,8 +50,12 @@ SOURCES = {
 TWO_WHEELED = (BICYCLE, MOTORCYCLE)
 
 
-def refuse_foreign(out: Path) -> None:
+def refuse_foreign(out: Path, more: Sequence[str] = ()) -> None:
     """Refuse a folder in which other files have the names of ours.
+
+    Args:
+        out: the folder.
+        more: names of files and folders of this call that are not of every call.
 
     Raises:
         StorageError: it has, or is none.
@@ -59,7 +63,7 @@ def refuse_foreign(out: Path) -> None:
     if out.exists() and not out.is_dir():
         raise StorageError(f"{out}: exists already, and is no folder")
     refuse_other(out / PAGE, GENERATOR, "page of recordings")
-    for folder in (CRITICAL, FOLDER, SCENARIOS):
+    for folder in (CRITICAL, FOLDER, SCENARIOS, *more):
         if (out / folder).exists() and not (out / PAGE).exists():
             raise StorageError(
                 f"{out / folder}: exists already, is not of recordings, and is not overwritten"

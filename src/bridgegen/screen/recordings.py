@@ -15,14 +15,18 @@ from bridgegen.mining.conflicts.section import (
 from bridgegen.mining.scenarios.files import FOLDER as SCENARIOS
 from bridgegen.mining.scenarios.mined import MinedScenario, Unmade
 from bridgegen.mining.scenarios.page import made_as_json, made_row
+from bridgegen.mining.scenarios.update import ENDING as DIFF
+from bridgegen.mining.scenarios.update import in_words
 from bridgegen.screen.live import Live
 from bridgegen.screen.tables import print_table
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
+    from pathlib import Path
 
     from bridgegen.exposure.rates import Encounters
     from bridgegen.mining.mine import Mined, Summary
+    from bridgegen.mining.scenarios.update import Update
 
 CARRIAGEWAYS_SHOWN = 4
 
@@ -65,6 +69,7 @@ def print_mined(mined: "Mined", *, as_json: bool) -> None:
             "others": [str(path) for path in mined.others],
             **_events(mined),
             "mined": [made_as_json(one, mined.out) for one in mined.mined],
+            "updates": [{**asdict(one), "path": str(one.path)} for one in mined.updates],
         }, indent=2))  # fmt: skip
         return
     head = ("recording", "format", "participants", "h", "km", "step [s]", "frame")
@@ -112,6 +117,21 @@ def print_mined(mined: "Mined", *, as_json: bool) -> None:
     print(f"{'events':<8}{mined.out / 'events'}, a table per scenario")
     if made:
         print(f"{'mined':<8}{mined.out / SCENARIOS}, a scenario, its fit and its distribution each")
+    for update in mined.updates:
+        _print_update(update, mined.out)
+
+
+def _print_update(update: "Update", out: "Path") -> None:
+    """Print what events say of a scenario file, and the difference that is proposed."""
+    print()
+    for text in in_words(update):
+        print(f"{update.path.name}: {text}")
+    if not update.diff:
+        print(f"{update.path.name}: nothing to propose")
+        return
+    place = out / f"{update.path.name}{DIFF}"
+    print(f"{update.path.name}: apply it by: patch {update.path} {place}\n")
+    print(update.diff, end="")
 
 
 def _print_events(mined: "Mined") -> None:

@@ -8,6 +8,7 @@ more (a road's end, bodies inside each other). All that is in the file's words.
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -180,9 +181,12 @@ def _draft(sought: Sought, rows: Mapping[str, Float], names: Sequence[str], abou
                 for end in ("low", "high")
                 if (name, end) not in cut and _is_wider(sought.scenario, name, end, rows)
             ]
-            named = [one for one in left if any(one[0] in text for text in error.problems)]
             if not left:
                 raise
+            named = [one for one in left if any(one[0] in text for text in error.problems)]
+            for one in named or left:
+                with suppress(InputError):
+                    return _attempt(sought, rows, names, about, [*cut, one])
             cut.append((named or left)[0])
 
 
@@ -350,11 +354,7 @@ def _about(events: ScenarioEvents, found: Sequence[FoundEvents], time_step: floa
     for one in (each for every in found for each in every.kinds if each.kind.name == events.kind):
         refused.update(one.refused)
     reasons = "; ".join(f"{number} {reason}" for reason, number in refused.items())
-    left_out = (
-        f"{refused.total()} candidates were refused ({reasons})"
-        if refused
-        else "no candidate was refused"
-    )
+    left_out = f"candidates refused: {reasons or 'none'}"
     text = (
         f"{events.count} events of the kind {events.kind} in {count} ({shown}), resampled to "
         f"{time_step:g} s; {_sum(found, 'hours'):.4g} h and {_sum(found, 'kilometres'):.4g} km of "
