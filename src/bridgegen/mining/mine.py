@@ -17,8 +17,9 @@ from bridgegen.mining.events.of_scenarios import (
     recorded_scenarios,
     scenario_events,
 )
+from bridgegen.mining.events.playback import PlayedEvent, closest
 from bridgegen.mining.events.tables import write_events
-from bridgegen.mining.excerpt import clock_of
+from bridgegen.mining.excerpt import Clock, clock_of
 from bridgegen.mining.lanes.account import LanesFound, account_of
 from bridgegen.mining.lanes.find import Located, locate, read_map
 from bridgegen.mining.replays.write import Prepared, Replay, prepare, write
@@ -93,6 +94,7 @@ class Mined:
         out: the folder.
         warnings: of reading the map.
         replays: the most critical events, as files.
+        played: the closest events of each kind.
         scenarios: the events that are a scenario, per scenario.
         mined: what was made of each of these.
         updates: ranges proposed for scenario files.
@@ -105,6 +107,7 @@ class Mined:
     out: Path
     warnings: tuple[str, ...] = ()
     replays: tuple[Replay, ...] = ()
+    played: tuple[PlayedEvent, ...] = ()
     scenarios: tuple[ScenarioEvents, ...] = ()
     mined: tuple[MinedScenario | Unmade, ...] = ()
     updates: tuple[Update, ...] = ()
@@ -165,6 +168,8 @@ def mine(
     found: list[Summary] = []
     skipped: list[tuple[Path, tuple[str, ...]]] = []
     kept: list[Prepared] = []
+    played: list[PlayedEvent] = []
+    counts: Counter[str] = Counter()
     for number, file in enumerate(files):
         progress(number, len(files))
         try:
@@ -172,8 +177,12 @@ def mine(
                 cleaned = clean(traffic, time_step)
                 located = locate(cleaned.traffic, on_map)
                 conflicts = conflicts_of(cleaned.traffic)
-                found.append(summarise(traffic, cleaned, located, conflicts))
-                kept = _most_critical(kept, cleaned.traffic, conflicts, keep)
+                one = summarise(traffic, cleaned, located, conflicts)
+                found.append(one)
+                clock = clock_of(cleaned.traffic)
+                played = closest(played, cleaned.traffic, clock, one.events, counts)
+                counts.update({each.kind.name: len(each) for each in one.events.kinds})
+                kept = _most_critical(kept, cleaned.traffic, clock, conflicts, keep)
         except FileFormatError as error:
             if not lenient:
                 raise
@@ -190,7 +199,8 @@ def mine(
     made = write_mined(out, sought, met, events, time_step, fitting)
     updates = write_updates(out, sought, met, update)
     mined = Mined(
-        tuple(found), tuple(skipped), tuple(others), time_step, out, warnings, replays, met, made,
+        tuple(found), tuple(skipped), tuple(others), time_step, out, warnings, replays,
+        tuple(played), met, made,
         updates,
     )  # fmt: skip
     write_all(mined)
@@ -200,11 +210,11 @@ def mine(
 def _most_critical(
     kept: list[Prepared],
     traffic: RecordedTraffic,
+    clock: Clock,
     conflicts: tuple[RecordedConflict, ...],
     keep: int,
 ) -> list[Prepared]:
     """Return the most critical events of earlier recordings and of one more."""
-    clock = clock_of(traffic)
     more = [prepare(traffic, clock, one) for one in conflicts[:keep]]
     return sorted([*kept, *more], key=lambda one: order(one.event))[:keep]
 

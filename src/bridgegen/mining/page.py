@@ -18,6 +18,7 @@ from bridgegen.errors import StorageError
 from bridgegen.mining.cells import cell, html_table
 from bridgegen.mining.conflicts import section as conflicts
 from bridgegen.mining.events.page import events_section
+from bridgegen.mining.events.playback import playback_section
 from bridgegen.mining.events.tables import FOLDER
 from bridgegen.mining.events.tables import HEAD as EVENTS_HEAD
 from bridgegen.mining.events.tables import TABLE as EVENTS
@@ -103,6 +104,7 @@ def write_all(mined: Mined) -> None:
         "facts": "".join(f"<li>{escape(one)}</li>" for one in _facts(mined)),
         "table": _table(mined),
         "events": events_section([one.events for one in mined.recordings], mined.scenarios),
+        "playback": playback_section(mined.played),
         "scenarios": scenarios_section(mined.mined),
         "recordings": "\n".join(_section(one, mined.time_step) for one in mined.recordings),
         "conflicts": conflicts.section(mined),
