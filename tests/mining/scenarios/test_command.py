@@ -62,6 +62,7 @@ def test_it_writes_scenarios_their_fits_and_the_difference(cli, tmp_path, record
     assert exposure.encounters.hours == pytest.approx(2 * PAIRS * 6.0 / 3600, rel=0.02)
     assert {one.name for one in (out / "scenarios").iterdir()} == {
         "slower-lead-mined.yaml", "slower-lead-mined.html", "slower-lead-mined-distribution.xosc",
+        "mined.owl",
     }  # fmt: skip
     page = (out / "recordings.html").read_text(encoding="utf-8")
     for name in ("yaml", "html"):

@@ -11,6 +11,9 @@ from bridgegen.mining.events.find import FoundEvents
 from bridgegen.mining.events.of_scenarios import ScenarioEvents, Sought
 from bridgegen.mining.events.tables import FOLDER as EVENTS
 from bridgegen.mining.scenarios.mined import MinedScenario, Unmade, mined_scenario
+from bridgegen.mining.scenarios.ontology import FILE as ONTOLOGY
+from bridgegen.mining.scenarios.ontology import mined_individuals
+from bridgegen.ontology.files import save
 
 FOLDER = "scenarios"
 MINED = "-mined"
@@ -28,7 +31,9 @@ def write_mined(
     time_step: float,
     fitting: Callable[[int, int], None] = lambda done, total: None,
 ) -> tuple[MinedScenario | Unmade, ...]:
-    """Make a scenario of the events of each, and write it in the place of an earlier one.
+    """Make a scenario of the events of each, and write them in the place of earlier ones.
+
+    Their statistics are individuals in `ONTOLOGY`.
 
     Args:
         out: the folder of all, with the tables of events.
@@ -43,7 +48,7 @@ def write_mined(
     """
     folder = out / FOLDER
     _emptied(folder)
-    made = []
+    made: list[MinedScenario | Unmade] = []
     for number, (one, events) in enumerate(zip(sought, scenarios, strict=True)):
         fitting(number, len(scenarios))
         table = out / EVENTS / f"{events.scenario}.csv"
@@ -55,6 +60,8 @@ def write_mined(
             write_whole(distribution, [distribution_xml(result.fit.exposure, date=DATE)])
         made.append(result)
     fitting(len(scenarios), len(scenarios))
+    if scenarios_made := [one for one in made if isinstance(one, MinedScenario)]:
+        save(mined_individuals(scenarios_made), folder / ONTOLOGY)
     return tuple(made)
 
 
@@ -65,5 +72,6 @@ def _emptied(folder: Path) -> None:
         for end in ENDINGS:
             for old in folder.glob(f"*{MINED}{end}"):
                 old.unlink()
+        (folder / ONTOLOGY).unlink(missing_ok=True)
     except OSError as error:
         raise StorageError(f"{folder}: cannot be made: {error.strerror}") from None
