@@ -23,6 +23,7 @@ from bridgegen.mining.excerpt import Clock, clock_of
 from bridgegen.mining.lanes.account import LanesFound, account_of
 from bridgegen.mining.lanes.find import Located, locate, read_map
 from bridgegen.mining.replays.write import Prepared, Replay, prepare, write
+from bridgegen.mining.scenarios.files import FOLDER as MINED
 from bridgegen.mining.scenarios.files import write_mined
 from bridgegen.mining.scenarios.mined import MinedScenario, Unmade
 from bridgegen.mining.scenarios.update import ENDING as DIFF
@@ -160,6 +161,7 @@ def mine(
         raise InputError(f"0 <= keep must hold, got {keep}")
     if ego is not None:
         egos.get(ego)
+    _refuse_replaced([*update, *scenarios], out / MINED)
     refuse_same_names(update)
     refuse_foreign(out, [f"{path.name}{DIFF}" for path in update])
     sought = recorded_scenarios([*update, *(path for path in scenarios if path not in update)])
@@ -205,6 +207,16 @@ def mine(
     )  # fmt: skip
     write_all(mined)
     return mined
+
+
+def _refuse_replaced(paths: Sequence[Path], folder: Path) -> None:
+    """Refuse scenario files that lie where mined scenarios are written."""
+    for path in paths:
+        if path.resolve().parent == folder.resolve():
+            raise InputError(
+                f"{path}: lies in the folder {folder}, whose scenarios are replaced: copy it "
+                "elsewhere"
+            )
 
 
 def _most_critical(

@@ -2,6 +2,7 @@
 
 import csv
 import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -80,6 +81,21 @@ def test_it_writes_scenarios_their_fits_and_the_difference(cli, tmp_path, record
     assert found["slower-lead"]["scenario"] == str(out / "scenarios" / "slower-lead-mined.yaml")
 
 
+def test_events_on_the_page_have_their_names_in_the_table(cli, tmp_path, recording):
+    again = tmp_path / "again.csv"
+    again.write_bytes(recording.read_bytes())
+    out = tmp_path / "mined"
+    code, _, err = cli("mine", recording, again, "--keep", 0, "--out", out)
+    assert code == 0, err
+    page = (out / "recordings.html").read_text(encoding="utf-8")
+    with (out / "events.csv").open(newline="", encoding="utf-8") as file:
+        rows = {row["name"]: row for row in csv.DictReader(file)}
+    shown = re.findall(r"<figcaption>(\S+): ego (\S+ \d+) of (\w+), from", page)
+    assert {recording for _, _, recording in shown} == {"traffic", "again"}
+    for name, ego, of in shown:
+        assert (rows[name]["ego"], rows[name]["recording"]) == (ego, of)
+
+
 def test_files_of_others_are_not_overwritten(cli, tmp_path, recording):
     mine = tmp_path / "my.yaml"
     mine.write_bytes(SLOWER.read_bytes())
@@ -105,3 +121,15 @@ def test_what_cannot_be_updated_is_refused(cli, tmp_path, recording):
     code, _, err = cli("mine", recording, "--update", one)
     assert code == 2
     assert "must have the key 'recorded'" in " ".join(err.split())
+
+
+def test_a_scenario_is_not_taken_from_where_it_would_be_replaced(cli, tmp_path, recording):
+    out = tmp_path / "mined"
+    mine = out / "scenarios" / "slower-lead-mined.yaml"
+    mine.parent.mkdir(parents=True)
+    mine.write_bytes(SLOWER.read_bytes())
+    for option in ("--scenario", "--update"):
+        code, _, err = cli("mine", recording, option, mine, "--out", out)
+        assert code == 2
+        assert "copy it elsewhere" in " ".join(err.split())
+        assert mine.read_bytes() == SLOWER.read_bytes()

@@ -7,8 +7,9 @@ from pathlib import Path
 
 from bridgegen.exposure.page import facts, rate_text
 from bridgegen.mining.cells import html_table
+from bridgegen.mining.scenarios.draft import MinedRange
 from bridgegen.mining.scenarios.files import ENDINGS, FOLDER
-from bridgegen.mining.scenarios.mined import MinedRange, MinedScenario, Unmade
+from bridgegen.mining.scenarios.mined import MinedScenario, Unmade
 
 _LINKS = ("scenario", "how well its distributions fit", "OpenSCENARIO distribution")
 
