@@ -52,6 +52,20 @@ def test_the_file_has_the_statistics_of_the_events(tmp_path, made):
     assert low < found["encounters per h"][1] < high
 
 
+def test_the_command_validates_it(cli, tmp_path, made):
+    path = tmp_path / "mined.owl"
+    save(mined_individuals([made[0]]), path)
+    code, text, _ = cli("validate", path)
+    assert (code, "valid" in text) == (0, True)
+    text = path.read_text(encoding="utf-8")
+    begin = text.index("<bg:has_measured_unit", text.index("mined#slower-lead-mined"))
+    end = text.index("</bg:has_measured_unit>", begin) + len("</bg:has_measured_unit>")
+    path.write_text(text[:begin] + text[end:], encoding="utf-8")
+    code, _, err = cli("validate", path)
+    assert code == 2
+    assert "has_measured_unit" in err
+
+
 def test_it_keeps_the_rules_of_the_ontology_and_breaking_one_shows(tmp_path, made):
     one, _ = made
     path = tmp_path / "mined.owl"
