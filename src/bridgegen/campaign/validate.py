@@ -80,7 +80,7 @@ def _ontology(path: Path) -> list[str]:
     from bridgegen.openx.convert import scenario_of
 
     individuals = load(path)
-    if _is_map(individuals):
+    if _is_map(individuals) or _is_mined(individuals):
         return [str(one) for one in check(individuals)]
     individuals.text(individuals.one("Scenario"), "has_name")  # all of ours have one
     return [str(one) for one in check(individuals, scenario_of(individuals))]
@@ -92,6 +92,11 @@ def _is_map(individuals: Individuals) -> bool:
         individuals.optional_text(network, "has_map_file") is not None
         for network in individuals.of_class("RoadNetwork")
     )
+
+
+def _is_mined(individuals: Individuals) -> bool:
+    """Return whether these are mined scenarios and their statistics."""
+    return bool(not individuals.of_class("Scenario") and individuals.of_class("MinedScenario"))
 
 
 def _roads(path: Path, warnings: list[str] | None) -> list[str]:

@@ -32,6 +32,10 @@ def mine(
         list[Path] | None,
         typer.Option(help="A scenario file whose events to look for, too. May be repeated."),
     ] = None,
+    update: Annotated[
+        list[Path] | None,
+        typer.Option(help="A scenario file of yours: propose ranges that hold its events."),
+    ] = None,
     keep: Annotated[
         int, typer.Option(help="Number of the most critical events to write as scenarios.")
     ] = 10,
@@ -52,8 +56,9 @@ def mine(
     The format is told by the content: tables of states, esmini's log, levelX, NGSIM, SMARTS,
     CommonRoad, INTERACTION, SUMO FCD, Waymo motion as JSON, Argoverse 2, ScenarioNet.
     Finds events (cut-in, cut-out, lead-brakes, approach, following, lane-change)
-    and the parameters of the scenarios that declare theirs.
-    Logical scenarios are not made of it yet.
+    and the parameters of the scenarios that declare theirs. Makes a logical
+    scenario of those with enough events: ranges, exposure, distribution.
+    With --update, prints and writes new ranges for a file of yours as a diff.
     """
     from bridgegen.mining.mine import mine as mine_recordings
     from bridgegen.screen.recordings import RecordingsScreen, print_mined
@@ -66,8 +71,10 @@ def mine(
             lenient=lenient,
             time_step=dt,
             scenarios=scenario or (),
+            update=update or (),
             keep=keep,
             ego=ego,
             progress=screen.progress,
+            fitting=screen.fitting,
         )
     print_mined(mined, as_json=as_json)

@@ -17,10 +17,17 @@ from bridgegen.mining.events.of_scenarios import (
     recorded_scenarios,
     scenario_events,
 )
-from bridgegen.mining.excerpt import clock_of
+from bridgegen.mining.events.playback import PlayedEvent, closest
+from bridgegen.mining.events.tables import write_events
+from bridgegen.mining.excerpt import Clock, clock_of
 from bridgegen.mining.lanes.account import LanesFound, account_of
 from bridgegen.mining.lanes.find import Located, locate, read_map
 from bridgegen.mining.replays.write import Prepared, Replay, prepare, write
+from bridgegen.mining.scenarios.files import FOLDER as MINED
+from bridgegen.mining.scenarios.files import write_mined
+from bridgegen.mining.scenarios.mined import MinedScenario, Unmade
+from bridgegen.mining.scenarios.update import ENDING as DIFF
+from bridgegen.mining.scenarios.update import Update, refuse_same_names, write_updates
 from bridgegen.recordings.clean import TIME_STEP, Cleaned, clean
 from bridgegen.recordings.formats import files_of, read
 from bridgegen.recordings.quality import Finding
@@ -88,7 +95,10 @@ class Mined:
         out: the folder.
         warnings: of reading the map.
         replays: the most critical events, as files.
+        played: the closest events of each kind.
         scenarios: the events that are a scenario, per scenario.
+        mined: what was made of each of these.
+        updates: ranges proposed for scenario files.
     """
 
     recordings: tuple[Summary, ...]
@@ -98,7 +108,10 @@ class Mined:
     out: Path
     warnings: tuple[str, ...] = ()
     replays: tuple[Replay, ...] = ()
+    played: tuple[PlayedEvent, ...] = ()
     scenarios: tuple[ScenarioEvents, ...] = ()
+    mined: tuple[MinedScenario | Unmade, ...] = ()
+    updates: tuple[Update, ...] = ()
 
 
 def mine(
@@ -109,9 +122,11 @@ def mine(
     lenient: bool = False,
     time_step: float = TIME_STEP,
     scenarios: Sequence[Path] = (),
+    update: Sequence[Path] = (),
     keep: int = KEEP,
     ego: str | None = None,
     progress: Callable[[int, int], None] = lambda done, total: None,
+    fitting: Callable[[int, int], None] = lambda done, total: None,
 ) -> Mined:
     """Read and clean recordings, place them on lanes, find near misses, and write all that.
 
@@ -119,15 +134,19 @@ def mine(
         paths: files, or folders of files.
         out: a folder, new or of an earlier call; gets recordings.html, recordings.csv, lanes.csv,
             quality.csv, events.csv, conflicts.csv, in the folder ``events`` the parameters of
-            scenarios, and in the folder ``critical`` the most critical events as scenarios.
+            scenarios, in the folder ``scenarios`` logical scenarios made of them, and in the folder
+            ``critical`` the most critical near misses as concrete ones.
         road_map: the OpenDRIVE map of all of them; without one the lanes are those that come with
             the recording, or inferred from its paths.
         lenient: leave out what cannot be read, and list it.
         time_step: to resample at [s].
         scenarios: files of scenarios that declare their events, besides those that ship.
+        update: files of scenarios that declare their events, for which ranges are proposed that
+            hold them: ``NAME.yaml.diff``. The files stay as they are.
         keep: how many of the most critical events are written as scenarios.
         ego: driver that takes the ego's place in these; by default it does what was recorded.
         progress: is told how many of how many files are done.
+        fitting: is told how many of how many scenarios are made of the events.
 
     Raises:
         FileFormatError: a file that is no recording, or breaks its format's rules.
@@ -142,13 +161,17 @@ def mine(
         raise InputError(f"0 <= keep must hold, got {keep}")
     if ego is not None:
         egos.get(ego)
-    refuse_foreign(out)
-    sought = recorded_scenarios(scenarios)
+    _refuse_replaced([*update, *scenarios], out / MINED)
+    refuse_same_names(update)
+    refuse_foreign(out, [f"{path.name}{DIFF}" for path in update])
+    sought = recorded_scenarios([*update, *(path for path in scenarios if path not in update)])
     on_map = read_map(road_map) if road_map is not None else None
     files, others = _files(paths)
     found: list[Summary] = []
     skipped: list[tuple[Path, tuple[str, ...]]] = []
     kept: list[Prepared] = []
+    played: list[PlayedEvent] = []
+    counts: Counter[str] = Counter()
     for number, file in enumerate(files):
         progress(number, len(files))
         try:
@@ -156,8 +179,12 @@ def mine(
                 cleaned = clean(traffic, time_step)
                 located = locate(cleaned.traffic, on_map)
                 conflicts = conflicts_of(cleaned.traffic)
-                found.append(summarise(traffic, cleaned, located, conflicts))
-                kept = _most_critical(kept, cleaned.traffic, conflicts, keep)
+                one = summarise(traffic, cleaned, located, conflicts)
+                found.append(one)
+                clock = clock_of(cleaned.traffic)
+                played = closest(played, cleaned.traffic, clock, one.events, counts)
+                counts.update({each.kind.name: len(each) for each in one.events.kinds})
+                kept = _most_critical(kept, cleaned.traffic, clock, conflicts, keep)
         except FileFormatError as error:
             if not lenient:
                 raise
@@ -169,22 +196,37 @@ def mine(
     replays = _written(kept, out / CRITICAL, ego)
     warnings = on_map.warnings if on_map is not None else ()
     events = [one.events for one in found]
+    met = tuple(scenario_events(one.scenario, one.spec, events) for one in sought)
+    write_events(out, events, met)
+    made = write_mined(out, sought, met, events, time_step, fitting)
+    updates = write_updates(out, sought, met, update)
     mined = Mined(
         tuple(found), tuple(skipped), tuple(others), time_step, out, warnings, replays,
-        tuple(scenario_events(one, one.recorded, events) for one in sought if one.recorded),
+        tuple(played), met, made,
+        updates,
     )  # fmt: skip
     write_all(mined)
     return mined
 
 
+def _refuse_replaced(paths: Sequence[Path], folder: Path) -> None:
+    """Refuse scenario files that lie where mined scenarios are written."""
+    for path in paths:
+        if path.resolve().parent == folder.resolve():
+            raise InputError(
+                f"{path}: lies in the folder {folder}, whose scenarios are replaced: copy it "
+                "elsewhere"
+            )
+
+
 def _most_critical(
     kept: list[Prepared],
     traffic: RecordedTraffic,
+    clock: Clock,
     conflicts: tuple[RecordedConflict, ...],
     keep: int,
 ) -> list[Prepared]:
     """Return the most critical events of earlier recordings and of one more."""
-    clock = clock_of(traffic)
     more = [prepare(traffic, clock, one) for one in conflicts[:keep]]
     return sorted([*kept, *more], key=lambda one: order(one.event))[:keep]
 

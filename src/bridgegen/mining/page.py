@@ -4,7 +4,7 @@ import csv
 import io
 import math
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from html import escape
 from importlib.metadata import version
 from importlib.resources import files
@@ -18,11 +18,14 @@ from bridgegen.errors import StorageError
 from bridgegen.mining.cells import cell, html_table
 from bridgegen.mining.conflicts import section as conflicts
 from bridgegen.mining.events.page import events_section
-from bridgegen.mining.events.tables import FOLDER, write_events
+from bridgegen.mining.events.playback import playback_section
+from bridgegen.mining.events.tables import FOLDER
 from bridgegen.mining.events.tables import HEAD as EVENTS_HEAD
 from bridgegen.mining.events.tables import TABLE as EVENTS
 from bridgegen.mining.lanes.account import LanesFound
 from bridgegen.mining.mine import CRITICAL, PATHS_SHOWN, Mined, Summary
+from bridgegen.mining.scenarios.files import FOLDER as SCENARIOS
+from bridgegen.mining.scenarios.page import scenarios_section
 
 GENERATOR = "BridgeGen recordings"
 PAGE, TABLE, LANES, QUALITY = "recordings.html", "recordings.csv", "lanes.csv", "quality.csv"
@@ -48,8 +51,12 @@ SOURCES = {
 TWO_WHEELED = (BICYCLE, MOTORCYCLE)
 
 
-def refuse_foreign(out: Path) -> None:
+def refuse_foreign(out: Path, more: Sequence[str] = ()) -> None:
     """Refuse a folder in which other files have the names of ours.
+
+    Args:
+        out: the folder.
+        more: names of files and folders of this call that are not of every call.
 
     Raises:
         StorageError: it has, or is none.
@@ -57,7 +64,7 @@ def refuse_foreign(out: Path) -> None:
     if out.exists() and not out.is_dir():
         raise StorageError(f"{out}: exists already, and is no folder")
     refuse_other(out / PAGE, GENERATOR, "page of recordings")
-    for folder in (CRITICAL, FOLDER):
+    for folder in (CRITICAL, FOLDER, SCENARIOS, *more):
         if (out / folder).exists() and not (out / PAGE).exists():
             raise StorageError(
                 f"{out / folder}: exists already, is not of recordings, and is not overwritten"
@@ -90,7 +97,6 @@ def write_all(mined: Mined) -> None:
     write_whole(mined.out / TABLE, _csv(TABLE_HEAD, rows))
     write_whole(mined.out / LANES, _csv(LANES_HEAD, _lane_rows(mined)))
     write_whole(mined.out / QUALITY, _csv(QUALITY_HEAD, _quality_rows(mined)))
-    write_events(mined.out, [one.events for one in mined.recordings], mined.scenarios)
     write_whole(mined.out / CONFLICTS, _csv(conflicts.HEAD, conflicts.rows(mined)))
     fill = {
         "title": "What was recorded",
@@ -98,6 +104,8 @@ def write_all(mined: Mined) -> None:
         "facts": "".join(f"<li>{escape(one)}</li>" for one in _facts(mined)),
         "table": _table(mined),
         "events": events_section([one.events for one in mined.recordings], mined.scenarios),
+        "playback": playback_section(mined.played),
+        "scenarios": scenarios_section(mined.mined),
         "recordings": "\n".join(_section(one, mined.time_step) for one in mined.recordings),
         "conflicts": conflicts.section(mined),
         "left_out": _left_out(mined),

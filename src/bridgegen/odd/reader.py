@@ -92,18 +92,29 @@ def load(name_or_path: str | Path) -> LogicalScenario:
         FileFormatError: the file is missing, unreadable, too large, or no plain YAML.
         ScenarioError: it breaks rules; all of them, with file and line.
     """
+    return build(*document_of(name_or_path))
+
+
+def document_of(name_or_path: str | Path) -> tuple[Document, Path | None]:
+    """Return the file of a logical scenario, and the folder that it lies in; None if it ships.
+
+    Args:
+        name_or_path: see `load`.
+
+    Raises:
+        UnknownNameError: no such name in the catalogue or the packs.
+        FileFormatError: the file is missing, unreadable, too large, or no plain YAML.
+    """
     text = str(name_or_path)
     path = Path(text)
     is_path = isinstance(name_or_path, Path) or path.suffix in (".yaml", ".yml")
     if not is_path and len(path.parts) > 1:
         is_path = not any(name.startswith(f"{path.parts[0]}/") for name in pack_names())
     if is_path:
-        document, folder = read_document(path), path.parent
-    elif text in (known := (*names(), *pack_names())):
-        document, folder = _read_shipped(text), None
-    else:
-        raise UnknownNameError("scenario", text, known)
-    return _build(document, folder)
+        return read_document(path), path.parent
+    if text in (known := (*names(), *pack_names())):
+        return _read_shipped(text), None
+    raise UnknownNameError("scenario", text, known)
 
 
 def read_document(path: Path) -> Document:
@@ -348,7 +359,16 @@ def _texts(data: object) -> set[str]:
     return {data} if isinstance(data, str) else set()
 
 
-def _build(document: Document, folder: Path | None) -> LogicalScenario:
+def build(document: Document, folder: Path | None) -> LogicalScenario:
+    """Return the logical scenario of a file.
+
+    Args:
+        document: the file.
+        folder: where files lie that it includes; None: of a user's own, nowhere.
+
+    Raises:
+        ScenarioError: it breaks rules; all of them, with file and line.
+    """
     problems = shape_problems(ScenarioFile, document)
     declarations = _Declarations()
     declarations.include(document, folder)

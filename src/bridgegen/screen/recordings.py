@@ -12,14 +12,21 @@ from bridgegen.mining.conflicts.section import (
     recordings_in_words,
     screen_rows,
 )
+from bridgegen.mining.scenarios.files import FOLDER as SCENARIOS
+from bridgegen.mining.scenarios.mined import MinedScenario, Unmade
+from bridgegen.mining.scenarios.page import made_as_json, made_row
+from bridgegen.mining.scenarios.update import ENDING as DIFF
+from bridgegen.mining.scenarios.update import in_words
 from bridgegen.screen.live import Live
 from bridgegen.screen.tables import print_table
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
+    from pathlib import Path
 
     from bridgegen.exposure.rates import Encounters
     from bridgegen.mining.mine import Mined, Summary
+    from bridgegen.mining.scenarios.update import Update
 
 CARRIAGEWAYS_SHOWN = 4
 
@@ -30,6 +37,10 @@ class RecordingsScreen(Live):
     def progress(self, done: int, total: int) -> None:
         """Show how many of how many files are done."""
         self.show(what="files", done=done, total=total)
+
+    def fitting(self, done: int, total: int) -> None:
+        """Show how many of how many scenarios are made."""
+        self.show(what="scenarios", done=done, total=total)
 
 
 def print_mined(mined: "Mined", *, as_json: bool) -> None:
@@ -57,6 +68,8 @@ def print_mined(mined: "Mined", *, as_json: bool) -> None:
             "skipped": [str(path) for path, _ in mined.skipped],
             "others": [str(path) for path in mined.others],
             **_events(mined),
+            "mined": [made_as_json(one, mined.out) for one in mined.mined],
+            "updates": [{**asdict(one), "path": str(one.path)} for one in mined.updates],
         }, indent=2))  # fmt: skip
         return
     head = ("recording", "format", "participants", "h", "km", "step [s]", "frame")
@@ -87,12 +100,38 @@ def print_mined(mined: "Mined", *, as_json: bool) -> None:
         of_events = ("scenario", "recording", "ego and other", "type", "TTC [s]",
                      "needed [m/s²]", "responsible")  # fmt: skip
         print_table(of_events, list(screen_rows(mined)), as_json=False)
+    made = [one for one in mined.mined if isinstance(one, MinedScenario)]
+    print()
+    for one in mined.mined:
+        if isinstance(one, Unmade):
+            print(f"{one.source}: no scenario: {one.reason}")
+    if made:
+        print()
+        of_made = ("mined scenario", "events", "per hour (95 %)", "parameters beyond the source's")
+        print_table(of_made, [made_row(one) for one in made], as_json=False)
     print(f"\n{'page':<8}{mined.out / 'recordings.html'}")
     print(
         f"{'tables':<8}{mined.out / 'recordings.csv'}, {mined.out / 'lanes.csv'}, "
         f"{mined.out / 'quality.csv'}, {mined.out / 'events.csv'}, {mined.out / 'conflicts.csv'}"
     )
     print(f"{'events':<8}{mined.out / 'events'}, a table per scenario")
+    if made:
+        print(f"{'mined':<8}{mined.out / SCENARIOS}, a scenario, its fit and its distribution each")
+    for update in mined.updates:
+        _print_update(update, mined.out)
+
+
+def _print_update(update: "Update", out: "Path") -> None:
+    """Print what events say of a scenario file, and the difference that is proposed."""
+    print()
+    for text in in_words(update):
+        print(f"{update.path.name}: {text}")
+    if not update.diff:
+        print(f"{update.path.name}: nothing to propose")
+        return
+    place = out / f"{update.path.name}{DIFF}"
+    print(f"{update.path.name}: apply it by: patch {update.path} {place}\n")
+    print(update.diff, end="")
 
 
 def _print_events(mined: "Mined") -> None:
@@ -113,7 +152,7 @@ def _print_events(mined: "Mined") -> None:
         of_scenarios = ("scenario", "event", "rows", "incomplete", "per hour (95 %)")
         print_table(of_scenarios, [
             (one.scenario, one.kind, one.complete, one.incomplete,
-             rates_in_words(one.count, found)[0]) for one in met
+             rates_in_words(one.encounters)[0]) for one in met
         ], as_json=False)  # fmt: skip
     for one in met:
         for text in against_in_words(one):
@@ -137,7 +176,7 @@ def _events(mined: "Mined") -> "dict[str, object]":
         for one in events:
             refused.update(one.refused)
         kinds[kind] = {
-            "count": count, **_rates(encounters_of(count, found)), "refused": dict(refused),
+            "count": count, **_rates(encounters_of(count, found, kind)), "refused": dict(refused),
         }  # fmt: skip
     return {
         "hours_on_lanes": sum(one.hours for one in found),
@@ -147,7 +186,8 @@ def _events(mined: "Mined") -> "dict[str, object]":
             one.scenario: {
                 "event": one.kind, "count": one.count, "rows": one.complete,
                 **_rates(one.encounters), "outside": [asdict(each) for each in one.outside],
-                "broken": dict(one.broken), "not_given": one.unmapped,
+                "broken": {each.rule: each.events for each in one.broken},
+                "not_given": one.unmapped,
             }
             for one in mined.scenarios
         },

@@ -7,7 +7,7 @@ from tests.mining.lanes.planted import BOX, on_road, recorded
 from bridgegen.ego.kinds import CAR
 from bridgegen.mining.events.event import EGO_CHANGES, OVERLAP
 from bridgegen.mining.events.find import DETECTORS, find_events
-from bridgegen.mining.events.of_scenarios import encounters_of, scenario_events
+from bridgegen.mining.events.of_scenarios import encounters_of, scenario_events, whole_share
 from bridgegen.mining.lanes.find import Located
 from bridgegen.mining.lanes.fit import fit_of
 from bridgegen.mining.lanes.model import Strip, assemble
@@ -47,8 +47,8 @@ def ramp(first, last, begin, rate):
     return np.concatenate([[0.0], np.cumsum(0.05 * (speed[1:] + speed[:-1]))])
 
 
-def found(*paths, turn=0.0):
-    """Events by kind of vehicles with stations, and offsets of their rear axles."""
+def placed(*paths, turn=0.0):
+    """Cleaned traffic of vehicles with stations, and offsets of their rear axles, and its lanes."""
     tracks = []
     for s, t in paths:
         t = np.broadcast_to(t, T.shape)
@@ -58,8 +58,13 @@ def found(*paths, turn=0.0):
         tracks.append({"time": T, "x": x, "y": y})
     traffic = clean(recorded(tracks), 0.05).traffic
     lanes = two_lanes(turn)
-    placed = place(traffic, lanes)
-    events = find_events(traffic, Located(lanes, placed, fit_of(traffic, placed, lanes)))
+    states = place(traffic, lanes)
+    return traffic, Located(lanes, states, fit_of(traffic, states, lanes))
+
+
+def found(*paths, turn=0.0):
+    """Events, and by kind, of vehicles with stations, and offsets of their rear axles."""
+    events = find_events(*placed(*paths, turn=turn))
     return events, {one.kind.name: one for one in events.kinds}
 
 
@@ -169,6 +174,17 @@ def test_rates_are_of_all_that_can_be_the_ego():
     assert rate.high * events.hours == pytest.approx(5.571643, rel=1e-6)
 
 
+def test_driving_counts_by_the_share_of_events_that_are_not_cut_off():
+    """One lane change is recorded as a whole, of another one only the beginning."""
+    whole = (25.0 * T, RIGHT), (40.0 + 20.0 * T, change(4.0, 4.0, LEFT, RIGHT))
+    cut = (25.0 * T, RIGHT), (40.0 + 25.0 * T, change(10.8, 5.0, LEFT, RIGHT))
+    events = [found(*one)[0] for one in (whole, cut)]
+    assert whole_share(events, "cut-in") == 0.5
+    assert whole_share(events, "approach") == 1.0
+    assert encounters_of(1, events, "cut-in").hours == pytest.approx(2 * 13.9 / 3600, rel=0.01)
+    assert encounters_of(1, events).hours == pytest.approx(4 * 13.9 / 3600, rel=0.01)
+
+
 def test_events_are_set_against_ranges_and_constraints():
     """40 m/s are beyond the range, and 4 m ahead at a difference of 5 m/s no cut-in for it."""
     scenario = load("cut-in")
@@ -182,7 +198,8 @@ def test_events_are_set_against_ranges_and_constraints():
     assert outside == {"ego_speed": (0, 1)}
     close, _ = found((25.0 * T, RIGHT), (19.7 + 22.5 * T, change(4.0, 4.0, LEFT, RIGHT)))
     met = scenario_events(scenario, scenario.recorded, [close])
-    assert [rule.split(" ")[0] for rule, _ in met.broken] == ["cut_in_distance"]
+    (broken,) = met.broken
+    assert (broken.rule.split(" ")[0], broken.events) == ("cut_in_distance", ("cut-in-1",))
 
 
 def test_every_declared_kind_has_a_detector():

@@ -1,6 +1,7 @@
 """All events of a recording, and the driving in which they were found."""
 
-from collections.abc import Callable
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -63,3 +64,18 @@ def find_events(traffic: RecordedTraffic, located: Located) -> FoundEvents:
         tuple(find(scene, changes) for find in DETECTORS.values()),
         float(pairs.sum()) * scene.step / 3600.0, float(paths[pairs].sum()) / 1000.0,
     )  # fmt: skip
+
+
+def named(
+    found: Sequence[FoundEvents],
+) -> Iterator[tuple[FoundEvents, Events, tuple[str, ...]]]:
+    """Yield the events of each kind in each recording with their names, ``cut-in-12`` say.
+
+    They are numbered by kind, through all recordings.
+    """
+    counts: Counter[str] = Counter()
+    for one in found:
+        for events in one.kinds:
+            kind, first = events.kind.name, counts[events.kind.name] + 1
+            yield one, events, tuple(f"{kind}-{first + i}" for i in range(len(events)))
+            counts[kind] += len(events)

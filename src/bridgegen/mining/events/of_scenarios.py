@@ -7,13 +7,14 @@ from pathlib import Path
 
 import numpy as np
 
-from bridgegen.arrays import Float
+from bridgegen.arrays import Bool, Float
 from bridgegen.errors import InputError
 from bridgegen.exposure.rates import Encounters
-from bridgegen.mining.events.event import Events
-from bridgegen.mining.events.find import FoundEvents
+from bridgegen.mining.events.event import NOT_WHOLE
+from bridgegen.mining.events.find import FoundEvents, named
 from bridgegen.odd.kinds import slack
-from bridgegen.odd.reader import load, names, pack_names, shipped_text
+from bridgegen.odd.plain_yaml import Document
+from bridgegen.odd.reader import build, document_of, names, pack_names, shipped_text
 from bridgegen.odd.recorded import RecordedSpec, unmapped
 from bridgegen.odd.scenario import LogicalScenario
 
@@ -43,6 +44,19 @@ class Outside:
     most: float
 
 
+@dataclass(frozen=True)
+class Broken:
+    """A constraint that recorded events break.
+
+    Attributes:
+        rule: the constraint.
+        events: names of the events that break it, in their order.
+    """
+
+    rule: str
+    events: tuple[str, ...]
+
+
 @dataclass(frozen=True, eq=False)
 class ScenarioEvents:
     """The events that are a scenario.
@@ -52,10 +66,10 @@ class ScenarioEvents:
         kind: of the events.
         count: how many events are this scenario.
         rows: ``(N,)`` by parameter, of those that have a value of each, in the order of the events.
+        names: ``(N,)`` of these events.
         incomplete: how many have not.
         outside: the parameters of which values are outside the declared range.
-        broken: the constraints that rows break, each with their number; what the events do not
-            give has its default there.
+        broken: the constraints that rows break; what the events do not give has its default there.
         unmapped: the parameters of traffic participants that the events do not give.
         encounters: how often it was met; None if no vehicle that may be the ego was on lanes.
     """
@@ -64,9 +78,10 @@ class ScenarioEvents:
     kind: str
     count: int
     rows: dict[str, Float]
+    names: tuple[str, ...]
     incomplete: int
     outside: tuple[Outside, ...]
-    broken: tuple[tuple[str, int], ...]
+    broken: tuple[Broken, ...]
     unmapped: tuple[str, ...]
     encounters: Encounters | None
 
@@ -76,7 +91,24 @@ class ScenarioEvents:
         return self.count - self.incomplete
 
 
-def recorded_scenarios(paths: Sequence[Path] = ()) -> tuple[LogicalScenario, ...]:
+@dataclass(frozen=True)
+class Sought:
+    """A scenario whose events are looked for.
+
+    Attributes:
+        scenario: it.
+        spec: its declaration of events.
+        document: its file.
+        path: of the file; None if it ships.
+    """
+
+    scenario: LogicalScenario
+    spec: RecordedSpec
+    document: Document
+    path: Path | None
+
+
+def recorded_scenarios(paths: Sequence[Path] = ()) -> tuple[Sought, ...]:
     """Return the scenarios that declare their events: those that ship, and a user's own.
 
     Raises:
@@ -85,27 +117,52 @@ def recorded_scenarios(paths: Sequence[Path] = ()) -> tuple[LogicalScenario, ...
         InputError: a file declares no events, or has the name of another scenario.
     """
     shipped = [one for one in (*names(), *pack_names()) if b"\nrecorded:" in shipped_text(one)]
-    found = [load(name) for name in shipped]
-    for path in paths:
-        one = load(path)
+    found = []
+    sources: list[str | Path] = [*shipped, *paths]
+    for source in sources:
+        document, folder = document_of(source)
+        one = build(document, folder)
         if one.recorded is None:
             raise InputError(
-                f"{path}: a scenario to look for must have the key 'recorded', which says what "
+                f"{source}: a scenario to look for must have the key 'recorded', which says what "
                 "its parameters are in recorded events"
             )
-        found.append(one)
-    twice = [name for name, count in Counter(one.name for one in found).items() if count > 1]
+        found.append(
+            Sought(one, one.recorded, document, source if isinstance(source, Path) else None)
+        )
+    twice = [
+        name for name, count in Counter(one.scenario.name for one in found).items() if count > 1
+    ]
     if twice:
         raise InputError(f"two scenarios to look for have the name '{twice[0]}': rename yours")
     return tuple(found)
 
 
-def encounters_of(count: int, found: Sequence[FoundEvents]) -> Encounters | None:
-    """Return how often events were met, in the driving in which they were looked for."""
-    hours, km = (sum(getattr(one, name) for one in found) for name in ("hours", "kilometres"))
+def encounters_of(count: int, found: Sequence[FoundEvents], kind: str = "") -> Encounters | None:
+    """Return how often events were met, in the driving in which they were looked for.
+
+    Events that the recording cuts off are not among them, so the driving is scaled by the share
+    that it does not (`whole_share`).
+
+    Args:
+        count: how many events there were.
+        found: of all recordings.
+        kind: of the events; by default of no kind that is cut off.
+    """
+    share = whole_share(found, kind)
+    hours, km = (share * sum(getattr(one, name) for one in found)
+                 for name in ("hours", "kilometres"))  # fmt: skip
     if hours <= 0.0:
         return None
     return Encounters(count, hours, km if km > 0.0 else None, "recorded traffic")
+
+
+def whole_share(found: Sequence[FoundEvents], kind: str) -> float:
+    """Return the share of the events of a kind that are recorded from begin to end."""
+    same = [one for each in found for one in each.kinds if one.kind.name == kind]
+    whole = sum(len(one) for one in same)
+    cut_off = sum(one.refused.get(NOT_WHOLE, 0) for one in same)
+    return whole / (whole + cut_off) if whole else 1.0
 
 
 def scenario_events(
@@ -118,28 +175,31 @@ def scenario_events(
         spec: its declaration.
         found: the events of all recordings.
     """
-    counts, columns = 0, list[dict[str, Float]]()
-    for events in (one for each in found for one in each.kinds if one.kind.name == spec.event):
-        values, kept = _values(spec, events)
-        counts += kept
-        columns.append(values)
+    counts, columns, names = 0, list[dict[str, Float]](), list[str]()
+    for _, events, called in named(found):
+        if events.kind.name == spec.event:
+            kept = spec.counts(events.quantities)
+            values = spec.values(events.quantities)
+            counts += int(kept.sum())
+            columns.append({name: column[kept] for name, column in values.items()})
+            names += [name for name, counts_it in zip(called, kept.tolist(), strict=True)
+                      if counts_it]  # fmt: skip
     table = {
         name: np.concatenate([np.empty(0), *(one[name] for one in columns)])
         for name in spec.parameters
     }
     whole = np.isfinite(np.array(list(table.values()))).all(axis=0)
     rows = {name: column[whole] for name, column in table.items()}
+    called = tuple(name for name, is_whole in zip(names, whole.tolist(), strict=True) if is_whole)
+    broken = tuple(
+        Broken(rule, tuple(called[i] for i in np.flatnonzero(breaks)))
+        for rule, breaks in broken_by(scenario, rows)
+    )
     return ScenarioEvents(
-        scenario.name, spec.event, counts, rows, int(counts - whole.sum()),
-        tuple(_outside(scenario, rows)), tuple(_broken(scenario, rows)),
-        unmapped(spec, scenario.parameters), encounters_of(counts, found),
+        scenario.name, spec.event, counts, rows, called, int(counts - whole.sum()),
+        tuple(_outside(scenario, rows)), broken,
+        unmapped(spec, scenario.parameters), encounters_of(counts, found, spec.event),
     )  # fmt: skip
-
-
-def _values(spec: RecordedSpec, events: Events) -> tuple[dict[str, Float], int]:
-    kept = spec.counts(events.quantities)
-    values = spec.values(events.quantities)
-    return {name: column[kept] for name, column in values.items()}, int(kept.sum())
 
 
 def _outside(scenario: LogicalScenario, rows: dict[str, Float]) -> list[Outside]:
@@ -155,7 +215,13 @@ def _outside(scenario: LogicalScenario, rows: dict[str, Float]) -> list[Outside]
     return found
 
 
-def _broken(scenario: LogicalScenario, rows: dict[str, Float]) -> list[tuple[str, int]]:
+def broken_by(scenario: LogicalScenario, rows: dict[str, Float]) -> list[tuple[str, Bool]]:
+    """Return the constraints that rows break, and which rows, ``(N,)``.
+
+    Args:
+        scenario: whose constraints.
+        rows: ``(N,)`` by parameter; the others have their defaults.
+    """
     count = len(next(iter(rows.values())))
     if not count:
         return []
@@ -175,5 +241,5 @@ def _broken(scenario: LogicalScenario, rows: dict[str, Float]) -> list[tuple[str
             limit = np.asarray(bound.hi.evaluate(table))
             breaks |= value > limit + slack(limit)
         if breaks.any():
-            found.append((str(bound), int(breaks.sum())))
+            found.append((str(bound), breaks))
     return found

@@ -27,7 +27,7 @@ def events_section(found: Sequence[FoundEvents], scenarios: Sequence[ScenarioEve
     ]
     met = [
         [one.scenario, one.kind, f"{one.complete:,}", f"{one.incomplete:,}",
-         *rates_in_words(one.count, found), ", ".join(one.unmapped) or "–"]
+         *rates_in_words(one.encounters), ", ".join(one.unmapped) or "–"]
         for one in scenarios
     ]  # fmt: skip
     against = "".join(
@@ -40,8 +40,9 @@ def events_section(found: Sequence[FoundEvents], scenarios: Sequence[ScenarioEve
         f"<div class='card'><div class='wide'>"
         f"{html_table(['event', 'count', 'per hour', 'per 1000 km', 'refused'], kinds)}</div>"
         f"<p class='muted'>All are in {TABLE}. Rates are those of {hours:.4g} h and {km:.4g} km of "
-        "motor vehicles on lanes, each of which is the ego in turn; in brackets the exact 95 % "
-        "interval of a Poisson process.</p></div>"
+        "motor vehicles on lanes, each of which is the ego in turn, less the share of events that "
+        "the recording cuts off; in brackets the exact 95 % interval of a Poisson process."
+        "</p></div>"
         f"<div class='card'><h3>Scenarios</h3><div class='wide'>"
         f"{html_table(of_scenarios, met)}"
         f"</div><p class='muted'>A row of parameters per event is in {FOLDER}/SCENARIO.csv.</p>"

@@ -9,16 +9,19 @@ from pathlib import Path
 
 from bridgegen.disk import write_whole
 from bridgegen.errors import StorageError
+from bridgegen.exposure.rates import Encounters
 from bridgegen.mining.cells import cell
 from bridgegen.mining.events.event import ABSENT
-from bridgegen.mining.events.find import FoundEvents
-from bridgegen.mining.events.of_scenarios import ScenarioEvents, encounters_of
+from bridgegen.mining.events.find import FoundEvents, named
+from bridgegen.mining.events.of_scenarios import Broken, ScenarioEvents, encounters_of
 from bridgegen.odd.event_kinds import EVENT_KINDS
 
 TABLE, FOLDER = "events.csv", "events"
+NAMES_SHOWN = 3
+"""Of events that break a constraint."""
 QUANTITIES = tuple(dict.fromkeys(name for one in EVENT_KINDS.values() for name in one.quantities))
 ROLES = tuple(dict.fromkeys(role for one in EVENT_KINDS.values() for role in one.roles))
-HEAD = ("recording", "file", "event", "ego", *ROLES, "begin", "end", *QUANTITIES)
+HEAD = ("name", "recording", "file", "event", "ego", *ROLES, "begin", "end", *QUANTITIES)
 
 
 def write_events(
@@ -41,17 +44,16 @@ def write_events(
 
 
 def _rows(found: Sequence[FoundEvents]) -> Iterator[list[object]]:
-    for one in found:
-        for events in one.kinds:
-            for i, ego in enumerate(events.ego.tolist()):
-                others = {role: int(who[i]) for role, who in events.others.items()}
-                yield [
-                    one.recording, one.source, events.kind.name, one.names[ego],
-                    *(_name(one.names, others.get(role, ABSENT)) for role in ROLES),
-                    f"{events.begin[i]:.10g}", f"{events.end[i]:.10g}",
-                    *(_number(events.quantities[name][i]) if name in events.quantities else ""
-                      for name in QUANTITIES),
-                ]  # fmt: skip
+    for one, events, names in named(found):
+        for i, (name, ego) in enumerate(zip(names, events.ego.tolist(), strict=True)):
+            others = {role: int(who[i]) for role, who in events.others.items()}
+            yield [
+                name, one.recording, one.source, events.kind.name, one.names[ego],
+                *(_name(one.names, others.get(role, ABSENT)) for role in ROLES),
+                f"{events.begin[i]:.10g}", f"{events.end[i]:.10g}",
+                *(_number(events.quantities[name][i]) if name in events.quantities else ""
+                  for name in QUANTITIES),
+            ]  # fmt: skip
 
 
 def _name(names: Sequence[str], who: int) -> str:
@@ -79,14 +81,13 @@ def kind_rows(found: Sequence[FoundEvents]) -> Iterator[tuple[str, int, str, str
         for one in same:
             refused.update(one.refused)
         yield (
-            kind, count, *rates_in_words(count, found),
+            kind, count, *rates_in_words(encounters_of(count, found, kind)),
             "; ".join(f"{number:,} {reason}" for reason, number in refused.items()),
         )  # fmt: skip
 
 
-def rates_in_words(count: int, found: Sequence[FoundEvents]) -> tuple[str, str]:
+def rates_in_words(met: Encounters | None) -> tuple[str, str]:
     """Return how often something was met, per hour and per 1000 km, with the 95 % interval."""
-    met = encounters_of(count, found)
     if met is None:
         return "–", "–"
     texts = []
@@ -112,4 +113,11 @@ def against_in_words(one: ScenarioEvents) -> tuple[str, ...]:
         f"{each.high:g}; seen {each.least:.4g} to {each.most:.4g}"
         for each in one.outside
     ]
-    return (*texts, *(f"{count:,} break {rule}" for rule, count in one.broken))
+    return (*texts, *(broken_in_words(each) for each in one.broken))
+
+
+def broken_in_words(one: Broken) -> str:
+    """Return how many events break a constraint, and the first of them."""
+    more = ", …" if len(one.events) > NAMES_SHOWN else ""
+    first = ", ".join(one.events[:NAMES_SHOWN])
+    return f"{len(one.events):,} break {one.rule} ({first}{more})"

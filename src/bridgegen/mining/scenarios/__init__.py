@@ -1,0 +1,1 @@
+"""Logical scenarios made of recorded events, and new ranges proposed for scenarios of a user."""
