@@ -7,6 +7,7 @@ points, are read; from the first that is not, rows are simulated.
 import hashlib
 import io
 import json
+import zipfile
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -74,7 +75,11 @@ class Ledger:
             least: score from which outcomes are whole.
         """
         try:
-            found = np.load(io.BytesIO(read_bytes(self._path())), allow_pickle=False)
+            data = io.BytesIO(read_bytes(self._path()))
+            with zipfile.ZipFile(data) as members:
+                if any(one.compress_type != zipfile.ZIP_STORED for one in members.infolist()):
+                    return None
+            found = np.load(data, allow_pickle=False)
             if str(found["digest"]) != _digest(Z, least):
                 return None
             at, held = found["at"], found["values"]
@@ -83,9 +88,10 @@ class Ledger:
             if held.shape != shape or held.dtype != np.float64 or at.dtype != np.int64:
                 return None
             values = Outcomes.lost(len(Z)).values
-            values[:, Column.RESULT] = found["results"]
+            values[:, Column.RESULT] = 1.0
+            values[found["without"], Column.RESULT] = found["why"]
             values[at] = held
-        except (OSError, ValueError, EOFError, KeyError, IndexError):
+        except (OSError, ValueError, EOFError, KeyError, IndexError, zipfile.BadZipFile):
             return None
         numbers = values[:, Column.MODE]
         if not np.isfinite(values).all() or numbers.max(initial=-1.0) >= len(modes):
@@ -101,12 +107,14 @@ class Ledger:
         """
         at = np.flatnonzero(outcomes.values[:, Column.SCORE] >= least)
         data = io.BytesIO()
-        np.savez_compressed(
+        without = np.flatnonzero(outcomes.values[:, Column.RESULT] != 1.0)
+        np.savez(
             data,
             digest=np.array(_digest(Z, least)),
             at=at,
             values=outcomes.values[at],
-            results=outcomes.values[:, Column.RESULT].astype(np.int8),
+            without=without,
+            why=outcomes.values[without, Column.RESULT],
             modes=np.array([one[:_LONGEST_MODE] for one in outcomes.modes] or [""]),
         )
         write_whole(self._path(), [data.getvalue()])

@@ -23,7 +23,7 @@ class Column(IntEnum):
     SCORE = 0
     """``harm``, from that of a near miss on; below, how near the row comes to any conflict.
 
-    Where all conflicts count, ``harm_any``. 0 of a row without a result.
+    Where all conflicts count, ``harm_any`` is that harm. 0 of a row without a result.
     """
     HARM = 1
     SEVERITY = 2

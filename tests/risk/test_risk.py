@@ -1,0 +1,212 @@
+"""A risk of a catalogue scenario: what it says is what its rows say, whoever counts them."""
+
+import csv
+import json
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import bridgegen as bg
+from bridgegen.conflict.harm import NEAR_MISS
+from bridgegen.errors import InputError, StorageError
+from bridgegen.options import PipelineOptions
+from bridgegen.pipeline import Pipeline
+from bridgegen.risk.ledger import BATCHES
+from bridgegen.risk.outcomes import Column, outcomes
+from bridgegen.risk.risk import RiskCallbacks, estimate_risk
+
+SCENARIO, DRIVER = "crossroads-s1", "route-follower"
+GIVEN = {"ego": DRIVER, "exposure": "uniform", "method": "mc", "precision": 0.0, "budget": 1200}
+
+EXAMPLE = Path(__file__).parents[2] / "docs/examples/cut-in-exposure.yaml"
+
+
+@pytest.fixture(scope="module")
+def risk(tmp_path_factory):
+    return estimate_risk(SCENARIO, out=tmp_path_factory.mktemp("risk") / "one", **GIVEN)
+
+
+def files(folder):
+    return {
+        one.name: one.read_bytes()
+        for one in folder.iterdir()
+        if one.is_file() and one.name != "settings.json"
+    }
+
+
+def said(folder, name="risk.json"):
+    found = json.loads((folder / name).read_text())
+    found.pop("command")
+    return found
+
+
+def test_outcomes_are_those_of_a_search(risk):
+    exposure = risk.exposure
+    pipeline = Pipeline(exposure.scenario, exposure.space, PipelineOptions(ego=DRIVER))
+    pipeline.choose_objective()
+    X = exposure.sample(300, 5).X
+    searched = pipeline.evaluate(X)
+    found = outcomes(pipeline, X, "ego")
+    harm = searched.metrics[:, pipeline.metrics.index("harm")]
+    severity = searched.metrics[:, pipeline.metrics.index("severity")]
+    ok = found.values[:, Column.RESULT] == 1.0
+    assert ok.all()
+    assert np.array_equal(found.values[:, Column.HARM], harm)
+    harmful = harm >= NEAR_MISS
+    assert harmful.any()
+    assert not harmful.all()
+    assert np.array_equal(found.values[harmful, Column.SCORE], harm[harmful])
+    assert (found.values[~harmful, Column.SCORE] < NEAR_MISS).all()
+    assert np.array_equal(found.values[harmful, Column.SEVERITY], severity[harmful])
+    words = [found.modes[int(k)] for k in found.values[harmful, Column.MODE]]
+    rules = searched.findings.rule[harmful]
+    assert all(rule in one for rule, one in zip(rules, words, strict=True))
+    every = outcomes(pipeline, X, "any").values[:, Column.SCORE]
+    assert (every[harmful] >= harm[harmful]).all()
+
+
+def test_it_counts_what_its_table_holds(risk):
+    found = said(risk.folder)
+    lines = (risk.folder / "harmful.csv").read_text().splitlines()
+    harms = [float(row["harm"]) for row in csv.DictReader(lines)]
+    assert found["per_encounter"]["conflict"]["estimate"] == pytest.approx(len(harms) / 1200)
+    collisions = sum(harm >= 0.6 for harm in harms)
+    assert found["per_encounter"]["collision"]["estimate"] == pytest.approx(collisions / 1200)
+    modes = sum(one["estimate"] for one in found["by_mode"].values())
+    assert modes == pytest.approx(found["per_encounter"]["collision"]["estimate"])
+    assert found["evaluations"] == 1200
+    assert found["per_hour"]["collision"] is None
+    assert max(one["distance"] for one in found["parameters"].values()) > 0.2
+
+
+def test_its_most_likely_encounter_is_harmful(risk):
+    exposure = risk.exposure
+    pipeline = Pipeline(exposure.scenario, exposure.space, PipelineOptions(ego=DRIVER))
+    worst = risk.most_likely
+    assert outcomes(pipeline, worst[np.newaxis], "ego").values[0, Column.SCORE] >= 0.6
+    again = bg.simulate_file(risk.folder / "most-likely.xosc")
+    assert again.metrics["harm"] >= 0.6
+
+
+def test_the_page_says_it_without_scripts(risk):
+    page = (risk.folder / "risk.html").read_text()
+    assert "The probability of a collision that the ego is responsible for" in page
+    assert "<script" not in page
+    assert not re.search(r"(src|href)=.https?:", page)
+    assert page.count("<figure>") == len(risk.exposure.marginals)
+
+
+@pytest.mark.parametrize("at", [1, 700])
+def test_stopped_and_gone_on_it_is_the_same(risk, tmp_path, at):
+    def stop(done, total):
+        if done >= at:
+            raise KeyboardInterrupt
+
+    folder = tmp_path / "two"
+    given = GIVEN | {"precision": 0.01, "method": "subset"}
+    whole = estimate_risk(SCENARIO, out=tmp_path / "whole", **given)
+    with pytest.raises(bg.errors.Interrupted, match=r"resume with 'bridgegen risk crossroads-s1"):
+        estimate_risk(SCENARIO, out=folder, callbacks=RiskCallbacks(evaluations=stop), **given)
+    estimate_risk(SCENARIO, out=folder, **given)
+    assert said(folder) == said(whole.folder)
+    assert files(folder)["harmful.csv"] == files(whole.folder)["harmful.csv"]
+
+
+def test_damaged_and_hostile_batches_are_simulated_again(risk, tmp_path):
+    import shutil
+
+    folder = tmp_path / "copy"
+    shutil.copytree(risk.folder, folder)
+    batches = sorted((folder / BATCHES).iterdir())
+    batches[0].write_bytes(batches[0].read_bytes()[:100])
+    with (folder / BATCHES / batches[-1].name).open("wb") as file:
+        np.save(file, np.array([print], dtype=object), allow_pickle=True)
+    estimate_risk(SCENARIO, out=folder, **GIVEN)
+    assert said(folder) == said(risk.folder)
+
+
+def test_processes_find_what_threads_find(risk, tmp_path):
+    found = estimate_risk(SCENARIO, out=tmp_path / "two", workers=2, **GIVEN)
+    assert said(found.folder) == said(risk.folder)
+    assert files(found.folder)["harmful.csv"] == files(risk.folder)["harmful.csv"]
+
+
+def test_all_conflicts_are_those_that_count_and_the_others(tmp_path):
+    found = estimate_risk(
+        "cut-in", ego="careful", exposure=EXAMPLE, event="conflict", count="any", method="mc",
+        precision=0.0, budget=3000, out=tmp_path / "any",
+    )  # fmt: skip
+    every, own = found.probability("conflict"), found.preventable.probability
+    assert 0.0 <= own.estimate < every.estimate
+    met = found.exposure.encounters
+    rate = found.rate("conflict", "h")
+    assert rate.estimate == pytest.approx(every.estimate * met.count / met.hours)
+    assert rate.low < every.low * met.count / met.hours < every.high * met.count / met.hours
+    assert rate.high > every.high * met.count / met.hours
+
+
+def test_a_search_s_run_helps_and_counting_agrees(tmp_path):
+    run = bg.run_search(
+        SCENARIO, ego=DRIVER, budget=150, seed=1, out=tmp_path / "run", triage="none", keep=0
+    )
+    found = estimate_risk(
+        SCENARIO, ego=DRIVER, exposure="uniform", method="importance", budget=6000, precision=0.0,
+        start=run.folder, check=1500, out=tmp_path / "risk",
+    )  # fmt: skip
+    p, counted = found.probability("collision"), found.check.probability(0.6)
+    assert p is not None
+    assert p.low <= counted.high
+    assert counted.low <= p.high
+    assert found.weighted.evaluations <= 6000
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({}, "crossroads-s1 has no exposure"),
+        ({"exposure": EXAMPLE}, "must be that of crossroads-s1, got one of cut-in"),
+        ({"exposure": "uniform", "event": "harm"}, "unknown event 'harm'"),
+        ({"exposure": "uniform", "method": "magic"}, "unknown method 'magic'"),
+        ({"exposure": "uniform", "count": "all"}, "unknown count 'all'"),
+        ({"exposure": "uniform", "ego": "nobody"}, "unknown ego driver 'nobody'"),
+        ({"exposure": "uniform", "budget": 3}, "--budget must be 100 to"),
+        ({"exposure": "uniform", "precision": 1.0}, "--precision must be at least 0 and below 1"),
+        ({"exposure": "uniform", "seed": -1}, "--seed must be at least 0"),
+        ({"exposure": "uniform", "check": -1}, "--check must be 0 to"),
+    ],
+)
+def test_what_is_wrong_is_said_and_nothing_written(tmp_path, given, message):
+    with pytest.raises(InputError, match=re.escape(message)):
+        estimate_risk(SCENARIO, out=tmp_path / "new", **given)
+    assert not (tmp_path / "new").exists()
+
+
+def test_folders_of_others_are_left_alone(risk, tmp_path):
+    (tmp_path / "thesis.txt").write_text("mine")
+    with pytest.raises(StorageError, match="holds something else than a risk"):
+        estimate_risk(SCENARIO, out=tmp_path, **GIVEN)
+    with pytest.raises(StorageError, match=r"holds another estimate \(it differs in seed"):
+        estimate_risk(SCENARIO, out=risk.folder, **GIVEN, seed=9)
+
+
+def test_a_scenario_file_of_openscenario_is_refused(risk, tmp_path):
+    with pytest.raises(InputError, match="logical scenario"):
+        estimate_risk(risk.folder / "most-likely.xosc", exposure="uniform", out=tmp_path / "x")
+
+
+def test_the_command_judges_and_prints(cli, tmp_path):
+    words = ["risk", SCENARIO, "--ego", DRIVER, "--exposure", "uniform", "--method", "mc"]
+    words += ["--precision", "0", "--budget", "600", "--out", tmp_path / "cli"]
+    status, out, err = cli(*words, "--fail-if", "collision > 0.001", "--junit", tmp_path / "j.xml")
+    assert status == 3
+    assert "The probability of a collision" in out
+    assert "FAILED: not collision > 0.001" in err
+    assert 'failures="1"' in (tmp_path / "j.xml").read_text()
+    status, out, err = cli(*words, "--json")
+    assert status == 0
+    assert json.loads(out)["method"] == "mc"
+    status, out, err = cli(*words, "--fail-if", "boom > 1")
+    assert status == 2
+    assert "Traceback" not in err
