@@ -120,11 +120,18 @@ def estimate(problem: Problem, aim: Aim, seed: int, start: Float | None = None) 
             size = float(weights.sum() ** 2 / np.sum(weights * weights))
             found = Proposals.of(Z[inside], weights, size, random)
             proposals = replace(found, kernels=proposals.kernels)
-    return _drawn(problem, aim, seed, proposals, spent, known)
+    helped = start is not None and len(start) > 0
+    return _drawn(problem, aim, seed, proposals, spent, known, helped)
 
 
 def _drawn(
-    problem: Problem, aim: Aim, seed: int, proposals: Proposals, spent: int, known: Weighted
+    problem: Problem,
+    aim: Aim,
+    seed: int,
+    proposals: Proposals,
+    spent: int,
+    known: Weighted,
+    helped: bool,
 ) -> Weighted:
     unseen = _unseen(known, aim)
     kept: list[tuple[Float, Float, Float]] = []
@@ -144,7 +151,7 @@ def _drawn(
             check *= 2
             result = _result(problem, kept, drawn, spent + used, unseen)
             if result.probability(aim.threshold).precision <= aim.precision and not any(
-                _doubts(result, aim, known)
+                _doubts(result, aim, known, helped)
             ):
                 break
     result = _result(problem, kept, drawn, spent + used, unseen)
@@ -153,7 +160,7 @@ def _drawn(
         "effective_hits": result.hits(result.there(aim.threshold)),
         "heaviest": _heaviest(result, aim),
     }
-    return replace(result, doubts=tuple(_doubts(result, aim, known)), facts=facts)
+    return replace(result, doubts=tuple(_doubts(result, aim, known, helped)), facts=facts)
 
 
 def _heaviest(result: Weighted, aim: Aim) -> float:
@@ -163,7 +170,8 @@ def _heaviest(result: Weighted, aim: Aim) -> float:
     return float(parts.max()) / total if total > 0.0 else 0.0
 
 
-def _doubts(result: Weighted, aim: Aim, known: Weighted) -> Iterator[str]:
+def _doubts(result: Weighted, aim: Aim, known: Weighted, helped: bool) -> Iterator[str]:
+    """Yield why a result is not believed; ``helped`` by further points of the event or not."""
     yield from known.doubts
     hits, heaviest = result.hits(result.there(aim.threshold)), _heaviest(result, aim)
     found = result.probability(aim.threshold)
@@ -174,7 +182,8 @@ def _doubts(result: Weighted, aim: Aim, known: Weighted) -> Iterator[str]:
     elif heaviest > HEAVIEST:
         yield f"one row makes {heaviest:.0%} of the estimate: a region was missed"
     expected = known.probability(aim.threshold)
-    if not known.doubts and (found.low > expected.high or expected.low > found.high):
+    more = not helped and found.low > expected.high  # what a search found may be missing there
+    if not known.doubts and (more or expected.low > found.high):
         yield (
             f"subset simulation says {expected.low:.2g} to {expected.high:.2g}, and importance "
             f"sampling {found.low:.2g} to {found.high:.2g}"
