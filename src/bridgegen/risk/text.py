@@ -1,5 +1,6 @@
 """A risk in words."""
 
+from bridgegen.exposure.rates import Rate
 from bridgegen.risk.estimators.weighted import Probability
 from bridgegen.risk.events import WORDS
 from bridgegen.risk.result import Risk
@@ -32,6 +33,13 @@ def sentence(risk: Risk) -> str:
         f"The probability of {what} is {number(p.estimate)} per encounter (95 %: {number(p.low)} "
         f"to {number(p.high)})."
     )
+
+
+def rate_text(rate: Rate | None) -> str:
+    """Return a rate as text: its estimate, or what it is below if nothing was counted."""
+    if rate is None:
+        return "–"
+    return number(rate.estimate) if rate.estimate > 0.0 else f"< {number(rate.high)}"
 
 
 def interval(p: Probability | None) -> tuple[str, str, str]:

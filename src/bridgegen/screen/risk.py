@@ -29,7 +29,7 @@ def print_risk(result: "Risk", seconds: float, *, as_json: bool) -> None:
     """Print a risk's sentence, its probabilities and rates, then its files; or its record."""
     from bridgegen.risk.events import EVENTS, WORDS
     from bridgegen.risk.result import PAGE
-    from bridgegen.risk.text import interval, number, sentence
+    from bridgegen.risk.text import interval, rate_text, sentence
 
     if as_json:
         print(json.dumps(result.to_dict(), indent=1))
@@ -42,7 +42,7 @@ def print_risk(result: "Risk", seconds: float, *, as_json: bool) -> None:
         row = [WORDS[name], *interval(one.probability), f"{one.hits:,.0f}"]
         for unit in units:
             rate = result.rate(name, unit)
-            row.append("–" if rate is None else number(rate.estimate))
+            row.append(rate_text(rate))
         rows.append(tuple(row))
     head = ("", "per encounter", "95 %", "below (95 %)", "effective rows")
     print_table((*head, *(f"per {unit}" for unit in units)), rows, as_json=False)

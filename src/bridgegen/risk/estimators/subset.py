@@ -285,7 +285,7 @@ def _doubts(first: Pilot, aim: Aim, sums: Float, facts: dict[str, float]) -> Ite
     if not first.reached:
         last = first.levels[-1].score if first.levels else 0.0
         yield (
-            f"the levels end at a score of {last:.3g}, below {aim.threshold:.3g}: hardly any row "
+            f"the levels end at a score of {last:.4g}, below {aim.threshold:g}: hardly any row "
             "comes nearer; use mc, or importance from a search that found the event"
         )
     elif (reaching := int(np.sum(sums > 0.0))) < FEWEST_REPETITIONS:
