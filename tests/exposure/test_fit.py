@@ -249,3 +249,11 @@ def test_a_broken_table_is_refused_with_its_line(scenario, tmp_path, text, rule)
     with pytest.raises(BridgeGenError) as error:
         fit_exposure(scenario, path, others="default")
     assert rule.replace("TABLE", str(path)) in str(error.value)
+
+
+def test_parameters_without_a_column_may_be_bound_by_what_follows_later():
+    """In crossroads-s1 the weather, which follows from others, bounds the ego's speed."""
+    speeds = np.random.default_rng(4).uniform(0.8, 3.3, 60)
+    fit = fit_exposure(load("crossroads-s1"), {"bv_speed": speeds}, others="uniform", replicates=20)
+    assert fit.used == 60
+    assert fit.exposure.sample(100, 1).X.shape[0] == 100

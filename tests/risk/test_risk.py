@@ -210,3 +210,38 @@ def test_the_command_judges_and_prints(cli, tmp_path):
     status, out, err = cli(*words, "--fail-if", "boom > 1")
     assert status == 2
     assert "Traceback" not in err
+
+
+def test_few_data_leave_more_open_than_many(tmp_path):
+    """Speeds that are drawn from a normal distribution: the event is a fast bicycle."""
+    random = np.random.default_rng(4)
+    widths = []
+    for count in (60, 600):
+        rows = random.normal(2.2, 0.7, 3 * count)
+        rows = rows[(rows > 0.7) & (rows < 3.4)][:count]
+        table = tmp_path / f"{count}.csv"
+        table.write_text(
+            "id,bv_speed\n" + "\n".join(f"{i},{v!r}" for i, v in enumerate(rows.tolist()))
+        )
+        scenario = bg.load(SCENARIO)
+        fit = bg.fit_exposure(
+            scenario, table, ignore=["id"], others="uniform", replicates=40, hours=100.0
+        )
+        found = estimate_risk(
+            SCENARIO, ego=DRIVER, exposure=fit.exposure, events=fit, method="mc", precision=0.0,
+            budget=1200, out=tmp_path / f"{count}",
+        )  # fmt: skip
+        p = found.probability("collision")
+        assert found.data.low < p.estimate < found.data.high
+        widths.append((found.data.high - found.data.low) / p.estimate)
+        assert said(found.folder)["data"]["exposures"] == 40
+        assert "with exposures of resampled events" in (found.folder / "risk.html").read_text()
+    assert widths[1] < 0.6 * widths[0]
+
+
+def test_a_table_of_other_things_is_refused(tmp_path):
+    (tmp_path / "rows.csv").write_text("a,b\n1,2\n")
+    with pytest.raises(InputError, match="has none of the exposure's parameters"):
+        estimate_risk(
+            SCENARIO, exposure="uniform", events=tmp_path / "rows.csv", out=tmp_path / "out"
+        )

@@ -81,6 +81,14 @@ def risk(
             rich_help_panel=WHAT,
         ),
     ] = 0,
+    events: Annotated[
+        Path | None,
+        typer.Option(
+            help="The table (.csv) that the exposure was fitted to: says how much few data leave "
+            "open.",
+            rich_help_panel=WHAT,
+        ),
+    ] = None,
     vehicle: common.Vehicle = None,
     others: common.Others = None,
     workers: common.Workers = None,
@@ -119,7 +127,8 @@ def risk(
         result = estimate_risk(
             scenario, ego=ego, exposure=exposure, event=event, count=count, method=method,
             precision=precision, budget=budget, seed=seed, start=start, check=check,
-            vehicle=vehicle, others=others, workers=workers, out=out, callbacks=screen.callbacks,
+            events=events, vehicle=vehicle, others=others, workers=workers, out=out,
+            callbacks=screen.callbacks,
         )  # fmt: skip
     print_risk(result, screen.seconds, as_json=as_json)
     if not print_outcomes(judges.judge(result)):

@@ -251,7 +251,7 @@ class Exposure:
         return self._rows({}, len(points), columns)
 
     def rows(self, columns: Mapping[str, Float]) -> Float:
-        """Return rows with given values; the others stand at their default, as in a sample.
+        """Return rows with given values; the others stand at their default.
 
         Args:
             columns: ``(N,)`` by parameter; they may break a constraint.
@@ -299,6 +299,8 @@ class Exposure:
                 out[:] = self._given(name, table).value(tail, scores[name] > 0.0)
             elif name in space.derived:
                 out[:] = space.derived[name].value.evaluate(table)
+            elif name in self.marginals:  # what bounds it may be computed of it later
+                out[:] = space.defaults[name]
             else:
                 lo, hi = self._limits(name, table)
                 out[:] = np.clip(space.defaults[name], lo, np.maximum(lo, hi))

@@ -13,7 +13,7 @@ from bridgegen.odd.parameters import Parameter
 from bridgegen.risk.estimators.weighted import Probability
 from bridgegen.risk.events import EVENTS, WORDS
 from bridgegen.risk.result import BINS, Finding, ParameterShare, Risk
-from bridgegen.risk.text import number, sentence
+from bridgegen.risk.text import data_sentence, number, sentence
 
 _WIDTH, _ROW, _LEFT, _RIGHT = 900, 30, 330, 30
 _SMALL, _TALL = 260, 110
@@ -67,10 +67,11 @@ def unsure(risk: Risk) -> Iterator[str]:
             "Harm that is reached through no ever more harmful rows is not found by this method, "
             "however much of it there is; mc assumes nothing."
         )
-    yield (
-        "Few data: the exposure's numbers are taken as they are. "
-        f"Their source: {risk.exposure.source}"
-    )
+    if risk.data is not None:
+        yield data_sentence(risk.data)
+    else:
+        yield "Few data: the exposure's numbers are taken as they are."
+    yield f"Where the exposure comes from: {risk.exposure.source}"
     yield (
         "The simulation: drivers, participants, sensors and friction are those of the embedded "
         "simulator; bridgegen confirm runs what a search found in another one."

@@ -15,6 +15,7 @@ from bridgegen.arrays import Float
 from bridgegen.disk import write_whole
 from bridgegen.exposure import Exposure
 from bridgegen.exposure.rates import Rate
+from bridgegen.risk.data import DataBand
 from bridgegen.risk.estimators.weighted import FEWEST_HITS, Probability, Weighted
 from bridgegen.risk.events import EVENTS, INJURY
 from bridgegen.risk.methods import Estimated
@@ -80,6 +81,7 @@ class Risk:
         failed: rows without a result; they count as harmless.
         implausible: rows whose traffic could not happen; likewise.
         check: the same event by Monte Carlo, if that was asked for.
+        data: how much few data leave open, if the events of the exposure are known.
         picture: the most likely harmful row as a moving picture; empty without one.
         command: makes it again.
         folder: of its files.
@@ -96,6 +98,7 @@ class Risk:
     failed: int
     implausible: int
     check: Weighted | None
+    data: DataBand | None
     picture: str
     command: str
     folder: Path
@@ -220,6 +223,7 @@ class Risk:
                 **vars(self.check.probability(EVENTS[self.event].harm)),
                 "evaluations": self.check.evaluations,
             },
+            "data": None if self.data is None else vars(self.data),
             "command": self.command,
         }  # fmt: skip
 

@@ -19,15 +19,20 @@ from bridgegen.conflict.harm import Count, decisive
 from bridgegen.conflict.summary import summarise
 from bridgegen.errors import InputError, Interrupted, StorageError, UnknownNameError
 from bridgegen.exposure import Exposure, exposure_of, read_exposure
+from bridgegen.exposure.fit import Fit, fit_exposure
 from bridgegen.exposure.reader import build_exposure
+from bridgegen.exposure.tables import read_header
 from bridgegen.mining.replays.picture import moving_picture
 from bridgegen.odd.plain_yaml import read_plain_yaml
 from bridgegen.odd.scenario import LogicalScenario
 from bridgegen.options import PipelineOptions
 from bridgegen.pipeline import Pipeline
-from bridgegen.risk import events, methods
+from bridgegen.risk import methods
+from bridgegen.risk.data import data_band
 from bridgegen.risk.estimators import monte_carlo
 from bridgegen.risk.estimators.problem import Aim
+from bridgegen.risk.events import LEAST
+from bridgegen.risk.events import require as require_event
 from bridgegen.risk.experiment import Experiment
 from bridgegen.risk.ledger import Ledger
 from bridgegen.risk.result import MOST_LIKELY, Risk, most_likely
@@ -67,6 +72,7 @@ def estimate_risk(
     seed: int = 0,
     start: str | Path | None = None,
     check: int = 0,
+    events: str | Path | Fit | None = None,
     vehicle: str | None = None,
     others: str | None = None,
     workers: Choice = None,
@@ -92,6 +98,8 @@ def estimate_risk(
         seed: where all chance comes from, at least 0.
         start: a search's run, whose harmful rows importance sampling may use.
         check: evaluations of Monte Carlo beside, to compare with; 0 for none.
+        events: the table (.csv) that the exposure was fitted to, or the fit, to say how much few
+            data leave open.
         vehicle: how the ego moves.
         others: driver of the other participants; the scenario's choice by default.
         workers: a number of processes, ``"ray"``, or ``"ray://HOST:PORT"``; threads by default.
@@ -104,7 +112,7 @@ def estimate_risk(
         Interrupted: Ctrl-C; what is done is kept.
     """
     say = callbacks or RiskCallbacks()
-    aimed = events.require(event)
+    aimed = require_event(event)
     methods.require(method)
     whose = _count(count)
     _require_numbers(precision, budget, seed, check)
@@ -121,6 +129,7 @@ def estimate_risk(
         raise InputError(
             f"the exposure of {driven.name} distributes no parameter: nothing is random"
         )
+    fitted = _fit_of(driven, met, events)
     folder = Path("risk", driven.name) if out is None else Path(out)
     with open_workers(workers) as hands:
         options = PipelineOptions(ego=ego, vehicle=vehicle)
@@ -143,8 +152,9 @@ def estimate_risk(
             "seed": seed,
             "check": check,
             "start": None if Z is None else len(Z),
+            "events": None if fitted is None else fitted.used,
         }
-        command = _command(scenario, exposure, settings, others, start, folder)
+        command = _command(scenario, exposure, settings, others, start, events, folder)
         ledger = Ledger(folder, settings)
         say.compile()
         pipeline.warm_up()
@@ -153,20 +163,23 @@ def estimate_risk(
             pipeline, met, hands, whose, ledger, lambda done: say.evaluations(done, total)
         )
         try:
-            aim = Aim(aimed.harm, events.LEAST, budget, precision)
+            aim = Aim(aimed.harm, LEAST, budget, precision)
             found = methods.estimate(method, experiment, aim, seed, Z)
             failed, implausible = experiment.failed, experiment.implausible
             beside = None
             if check:
-                plain = Aim(aimed.harm, events.LEAST, check, 0.0)
+                plain = Aim(aimed.harm, LEAST, check, 0.0)
                 beside = monte_carlo.estimate(experiment, plain, seed + 1)
         except KeyboardInterrupt:
             raise Interrupted(folder, experiment.evaluations, total, command=command) from None
+        data = None
+        if fitted is not None:
+            data = data_band(met, found.weighted, aimed.harm, fitted)
         worst = most_likely(met, found.weighted, event)
         picture = "" if worst is None else _write_most_likely(pipeline, worst, whose, folder)
     result = Risk(
         met, pipeline.driver.label, event, count, found, seed, budget, tuple(experiment.modes),
-        failed, implausible, beside, picture, command, folder,
+        failed, implausible, beside, data, picture, command, folder,
     )  # fmt: skip
     result.write()
     return result
@@ -240,6 +253,26 @@ def _exposure(scenario: LogicalScenario, given: str | Path | Exposure | None) ->
     return own
 
 
+def _fit_of(
+    scenario: LogicalScenario, exposure: Exposure, events: str | Path | Fit | None
+) -> Fit | None:
+    """Return the fit to the events that an exposure was fitted to, if they are given.
+
+    Raises:
+        FileFormatError: the table cannot be read.
+        InputError: it has none of the exposure's parameters, or too few rows.
+    """
+    if events is None or isinstance(events, Fit):
+        return events
+    columns = read_header(Path(events))
+    if not (wanted := [name for name in columns if name in exposure.marginals]):
+        raise InputError(
+            f"{events}: has none of the exposure's parameters, {', '.join(exposure.marginals)}"
+        )
+    others = [name for name in columns if name not in wanted]
+    return fit_exposure(scenario, events, ignore=others, others="default")
+
+
 def _points_of(run: Path, exposure: Exposure, harm: float) -> Float:
     """Return the points that a search's rows stand for, of those with so much harm.
 
@@ -279,7 +312,7 @@ def _file_digest(name: str) -> str:
 
 def _command(
     scenario: str | Path, exposure: str | Path | Exposure | None, settings: dict[str, Any],
-    others: str | None, start: str | Path | None, folder: Path,
+    others: str | None, start: str | Path | None, events: str | Path | Fit | None, folder: Path,
 ) -> str:  # fmt: skip
     """Return the command line that makes the risk again."""
     where = str(Path(scenario).resolve()) if is_file(scenario) else str(scenario)
@@ -288,7 +321,12 @@ def _command(
         words += ["--exposure", "EXPOSURE" if isinstance(exposure, Exposure) else exposure]
     for name in ("event", "count", "method", "precision", "budget", "seed", "vehicle"):
         words += [f"--{name}", settings[name]]
-    for name, value in (("check", settings["check"]), ("from", start), ("others", others)):
+    for name, value in (
+        ("check", settings["check"]),
+        ("from", start),
+        ("others", others),
+        ("events", events),
+    ):
         if value:
             words += [f"--{name}", value]
     return shlex.join([str(one) for one in (*words, "--out", folder)])

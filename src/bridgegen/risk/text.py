@@ -1,6 +1,7 @@
 """A risk in words."""
 
 from bridgegen.exposure.rates import Rate
+from bridgegen.risk.data import DataBand
 from bridgegen.risk.estimators.weighted import Probability
 from bridgegen.risk.events import WORDS
 from bridgegen.risk.result import Risk
@@ -32,6 +33,20 @@ def sentence(risk: Risk) -> str:
     return (
         f"The probability of {what} is {number(p.estimate)} per encounter (95 %: {number(p.low)} "
         f"to {number(p.high)})."
+    )
+
+
+def data_sentence(band: DataBand) -> str:
+    """Return how much few data leave open, in a sentence."""
+    if band.low is None or band.high is None:
+        return (
+            f"Few data: {band.left_out} of {band.exposures} exposures of resampled events have "
+            "harmful encounters where hardly any were simulated, so how much the data leave open "
+            "is not known."
+        )
+    return (
+        f"Few data: with exposures of resampled events the estimate is {number(band.low)} to "
+        f"{number(band.high)} (95 % of {band.exposures})."
     )
 
 

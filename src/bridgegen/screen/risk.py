@@ -29,7 +29,7 @@ def print_risk(result: "Risk", seconds: float, *, as_json: bool) -> None:
     """Print a risk's sentence, its probabilities and rates, then its files; or its record."""
     from bridgegen.risk.events import EVENTS, WORDS
     from bridgegen.risk.result import PAGE
-    from bridgegen.risk.text import interval, rate_text, sentence
+    from bridgegen.risk.text import data_sentence, interval, rate_text, sentence
 
     if as_json:
         print(json.dumps(result.to_dict(), indent=1))
@@ -53,6 +53,8 @@ def print_risk(result: "Risk", seconds: float, *, as_json: bool) -> None:
         p = result.check.probability(EVENTS[result.event].harm)
         values = interval(p)
         print(f"{'check':<12}{values[0]} ({values[1]}) in {result.check.evaluations:,} by mc")
+    if result.data is not None:
+        print(f"{'data':<12}{data_sentence(result.data)}")
     print(f"{'page':<12}{result.folder / PAGE}")
     print(f"{'wall time':<12}{seconds:.1f} s, {result.weighted.evaluations:,} simulations")
 
