@@ -3,6 +3,9 @@
 `bridgegen.mining.events` has a detector per kind. Gaps are from bumper to bumper along the lane,
 speeds along the lane; a relative speed is positive where the ego comes nearer. A quantity is NaN
 where its event has none, such as the speed of a next vehicle where nothing is in sight.
+
+Events of paths that cross need no lanes. Their distances are along the paths, between the centres
+of the bodies and the point at which the paths cross.
 """
 
 from collections.abc import Mapping
@@ -34,6 +37,7 @@ class EventKind:
         rule: what counts as one.
         source: of the rule.
         quantities: by name.
+        needs_lanes: whether only driving on lanes can hold one.
     """
 
     name: str
@@ -41,6 +45,7 @@ class EventKind:
     rule: str
     source: str
     quantities: Mapping[str, EventQuantity]
+    needs_lanes: bool = True
 
 
 def _kind(
@@ -49,8 +54,10 @@ def _kind(
     rule: str,
     source: str,
     rows: tuple[tuple[str, str, str], ...],
+    needs_lanes: bool = True,
 ) -> EventKind:
-    return EventKind(name, roles, rule, source, {row[0]: EventQuantity(*row) for row in rows})
+    quantities = {row[0]: EventQuantity(*row) for row in rows}
+    return EventKind(name, roles, rule, source, quantities, needs_lanes)
 
 
 _EGO = ("ego_speed", "m/s", "speed of the ego at the beginning")
@@ -62,6 +69,35 @@ _CHANGE = (
     ("change_time", "s", "duration of the sinusoidal lane change that fits best"),
     ("lateral_speed", "m/s", "width of the lane change by its duration"),
     ("side", "1", "1 if it moves to the right, -1 if to the left"),
+)
+
+_MEETING = (
+    _EGO,
+    ("other_speed", "m/s", "speed of the other at the beginning"),
+    ("ego_distance", "m", "from the ego to the crossing point at the beginning"),
+    ("other_distance", "m", "from the other to the crossing point at the beginning"),
+    ("ego_crossing_speed", "m/s", "speed of the ego at the crossing point"),
+    ("other_crossing_speed", "m/s", "speed of the other at the crossing point"),
+    ("time_gap", "s", "between the instants at which their centres pass the crossing point"),
+    ("pet", "s", "post-encroachment time: least time between instants at which both bodies cover "
+     "a point"),
+    ("angle", "deg", "between their courses at the crossing point, 0 to 180"),
+    ("approach_angle", "deg", "between their courses 30 m of path before, 0 to 180"),
+    ("side", "1", "1 if the other comes from the right, -1 from the left"),
+    ("seen_time", "s", "from the beginning until the first of both passes the crossing point"),
+    ("set_off_distance", "m", "from the other to the crossing point when it sets off last"),
+    ("set_off_ego_distance", "m", "from the ego to the crossing point then, negative beyond it"),
+    ("set_off_apart", "m", "between the reference points of both then"),
+)
+_EGO_FIRST = ("ego_first", "1", "1 if the ego passes the crossing point first, else 0")
+_MEETING_RULE = (
+    "The centres of both pass the point at which their paths cross within 6 s. It begins 6 s "
+    "before the first of both passes, or when both are recorded, if that is later; it ends when "
+    "the second passes."
+)
+_MEETING_SOURCE = (
+    "NHTSA, Pre-Crash Scenario Typology (DOT HS 810 767), {}; Allen, Shin, Cooper, Transportation "
+    "Research Record 667 (1978) 67-74 (post-encroachment time); the thresholds are ours"
 )
 
 _CHANGE_RULE = "the lane change is the half wave of a cosine that fits its rear axle best"
@@ -185,6 +221,51 @@ EVENT_KINDS = {
                 ("passing_time", "s", "from the beginning until the ego is level with the leader "
                  "of the old lane"),
             ),
+        ),
+        _kind(
+            "crossing",
+            ("other",),
+            "The path of another motor vehicle crosses the ego's at 30° to 150°. The ego goes "
+            "straight on: it turns by 30° at most from 30 m before to 15 m after. They do not come "
+            f"from opposite directions. {_MEETING_RULE}",
+            _MEETING_SOURCE.format("straight crossing paths, left turn across path from a side"),
+            (
+                *_MEETING, _EGO_FIRST,
+                ("other_turn", "deg", "by how much the other turns, to the left positive"),
+            ),
+            needs_lanes=False,
+        ),
+        _kind(
+            "oncoming-left-turn",
+            ("other",),
+            "The ego and another motor vehicle come from opposite directions: their courses 30 m "
+            "before are 145° apart or more. One of them turns by more than 30° across the path of "
+            "the other, which goes straight on. Where traffic drives on the left that is a right "
+            f"turn. {_MEETING_RULE}",
+            _MEETING_SOURCE.format("left turn across path from opposite directions"),
+            (
+                *_MEETING, _EGO_FIRST,
+                ("ego_turns", "1", "1 if the ego turns, 0 if the other does"),
+                ("turn", "deg", "by how much the one turns that does"),
+            ),
+            needs_lanes=False,
+        ),
+        _kind(
+            "vru-crossing",
+            ("other", "occluder"),
+            "A pedestrian crosses the ego's path at 45° to 135°, or a bicycle at 30° to 150°, "
+            f"before the ego comes. {_MEETING_RULE} It is hidden if a vehicle that stands is on "
+            "the line from the ego's front to its centre within the last 2 s before it crosses.",
+            _MEETING_SOURCE.format("pedestrian crossing the roadway, pedalcyclist"),
+            (
+                *_MEETING,
+                ("ego_turn", "deg", "by how much the ego turns, to the left positive"),
+                ("is_bicycle", "1", "1 for a bicycle, 0 for a pedestrian"),
+                ("hidden", "1", "1 if it is hidden, else 0"),
+                ("occluder_gap", "m", "along the ego's course, from the crossing point to the "
+                 "nearest end of what hides it"),
+            ),
+            needs_lanes=False,
         ),
     )
 }  # fmt: skip

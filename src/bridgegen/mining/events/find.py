@@ -8,16 +8,20 @@ import numpy as np
 
 from bridgegen.mining.events import (
     approach,
+    crossing,
     cut_in,
     cut_out,
     following,
     lane_change,
     lead_brakes,
+    oncoming_turn,
+    vru_crossing,
 )
 from bridgegen.mining.events.changes import LaneChanges, lane_changes
 from bridgegen.mining.events.event import Events
 from bridgegen.mining.events.scene import Scene
 from bridgegen.mining.lanes.find import Located
+from bridgegen.odd.event_kinds import EVENT_KINDS
 from bridgegen.recordings.table import RecordedTraffic
 
 DETECTORS: dict[str, Callable[[Scene, LaneChanges], Events]] = {
@@ -27,6 +31,9 @@ DETECTORS: dict[str, Callable[[Scene, LaneChanges], Events]] = {
     "approach": approach.find,
     "following": following.find,
     "lane-change": lane_change.find,
+    "crossing": crossing.find,
+    "oncoming-left-turn": oncoming_turn.find,
+    "vru-crossing": vru_crossing.find,
 }
 """By kind; each returns what `bridgegen.odd.event_kinds.EVENT_KINDS` declares."""
 
@@ -42,6 +49,8 @@ class FoundEvents:
         kinds: the events, a kind each.
         hours: of driving on lanes by all who can be the ego [h].
         kilometres: likewise [km].
+        all_hours: of driving and standing anywhere by all who can be the ego [h].
+        all_kilometres: likewise [km].
     """
 
     recording: str
@@ -50,19 +59,28 @@ class FoundEvents:
     kinds: tuple[Events, ...]
     hours: float
     kilometres: float
+    all_hours: float
+    all_kilometres: float
+
+    def driving(self, kind: str) -> tuple[float, float]:
+        """Return the hours and kilometres in which a kind of event was looked for."""
+        if EVENT_KINDS[kind].needs_lanes:
+            return self.hours, self.kilometres
+        return self.all_hours, self.all_kilometres
 
 
 def find_events(traffic: RecordedTraffic, located: Located) -> FoundEvents:
     """Return the events of a cleaned recording."""
     scene = Scene(traffic, located)
     changes = lane_changes(scene)
-    counted = scene.drives & scene.is_ego[scene.participant]
-    pairs = counted[1:] & counted[:-1] & (scene.participant[1:] == scene.participant[:-1])
+    own = scene.is_ego[scene.participant[1:]] & (scene.participant[1:] == scene.participant[:-1])
+    pairs = own & scene.drives[1:] & scene.drives[:-1]
     paths = np.hypot(np.diff(traffic.x), np.diff(traffic.y))
     return FoundEvents(
         traffic.facts.name, traffic.facts.source, traffic.names,
         tuple(find(scene, changes) for find in DETECTORS.values()),
         float(pairs.sum()) * scene.step / 3600.0, float(paths[pairs].sum()) / 1000.0,
+        float(own.sum()) * scene.step / 3600.0, float(paths[own].sum()) / 1000.0,
     )  # fmt: skip
 
 

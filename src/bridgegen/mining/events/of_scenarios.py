@@ -71,7 +71,8 @@ class ScenarioEvents:
         outside: the parameters of which values are outside the declared range.
         broken: the constraints that rows break; what the events do not give has its default there.
         unmapped: the parameters of traffic participants that the events do not give.
-        encounters: how often it was met; None if no vehicle that may be the ego was on lanes.
+        encounters: how often it was met; None if no vehicle that may be the ego was
+            recorded where they can be.
     """
 
     scenario: str
@@ -138,7 +139,7 @@ def recorded_scenarios(paths: Sequence[Path] = ()) -> tuple[Sought, ...]:
     return tuple(found)
 
 
-def encounters_of(count: int, found: Sequence[FoundEvents], kind: str = "") -> Encounters | None:
+def encounters_of(count: int, found: Sequence[FoundEvents], kind: str) -> Encounters | None:
     """Return how often events were met, in the driving in which they were looked for.
 
     Events that the recording cuts off are not among them, so the driving is scaled by the share
@@ -147,11 +148,11 @@ def encounters_of(count: int, found: Sequence[FoundEvents], kind: str = "") -> E
     Args:
         count: how many events there were.
         found: of all recordings.
-        kind: of the events; by default of no kind that is cut off.
+        kind: of the events.
     """
     share = whole_share(found, kind)
-    hours, km = (share * sum(getattr(one, name) for one in found)
-                 for name in ("hours", "kilometres"))  # fmt: skip
+    driving = [one.driving(kind) for one in found]
+    hours, km = (share * sum(one[i] for one in driving) for i in range(2))
     if hours <= 0.0:
         return None
     return Encounters(count, hours, km if km > 0.0 else None, "recorded traffic")

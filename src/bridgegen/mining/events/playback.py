@@ -27,6 +27,8 @@ MOST_OTHERS = 12
 """Participants besides the ego."""
 GAPS = {"cut-in": "crossing_gap"}
 """The gap that counts, by kind; of the others their gap at the beginning."""
+MEETING = "pet"
+"""Who meets on crossing paths has this time instead."""
 LEAST_SPEED = 1.0
 """Slower egos count as so fast [m/s]."""
 
@@ -40,7 +42,7 @@ class PlayedEvent:
         name: of it, as in the table of events.
         recording: its name.
         ego: the participant's name.
-        time_gap: gap by the ego's speed [s]; inf if there is no gap.
+        time_gap: gap by the ego's speed, or post-encroachment time [s]; inf if there is none.
         motion: from `AROUND` before it on; entity 1 is the other of the event.
         when: its begin, from the motion's [s].
         seconds: of the motion's begin, by the recording's clock [s].
@@ -89,6 +91,8 @@ def closest(
 
 
 def _time_gaps(events: Events) -> Float:
+    if MEETING in events.quantities:
+        return np.nan_to_num(events.quantities[MEETING], nan=np.inf)
     gap = events.quantities[GAPS.get(events.kind.name, "gap")]
     time_gap = gap / np.maximum(events.quantities["ego_speed"], LEAST_SPEED)
     return np.where(np.isnan(time_gap), np.inf, time_gap)
@@ -126,14 +130,17 @@ def playback_section(played: Sequence[PlayedEvent]) -> str:
         return ""
     return (
         f"<p class='muted'>Of each kind up to {SHOWN} events, those with the least gap by the "
-        "ego's speed. Blue is the ego, orange the other; pale outlines show where both were when "
+        "ego's speed, or post-encroachment time. Blue is the ego, orange the other; pale outlines show where both were when "
         "the event began.</p>"
         f"{''.join(cards)}"
     )
 
 
 def _picture(one: PlayedEvent) -> str:
-    gap = f"{one.time_gap:.2f} s behind" if np.isfinite(one.time_gap) else "no leader"
+    if MEETING in EVENT_KINDS[one.kind].quantities:
+        gap = f"{one.time_gap:.2f} s between them"
+    else:
+        gap = f"{one.time_gap:.2f} s behind" if np.isfinite(one.time_gap) else "no leader"
     about = (
         f"{one.name}: ego {one.ego} of {one.recording}, from {one.seconds:.2f} s by the "
         f"recording's clock; {gap}"

@@ -9,6 +9,7 @@ import numpy as np
 
 from bridgegen.arrays import Bool, Float, Int
 from bridgegen.mining.conflicts.find import EGOS
+from bridgegen.mining.events.paths import Crossings, Paths
 from bridgegen.mining.excerpt import clock_of
 from bridgegen.mining.lanes.find import Located
 from bridgegen.mining.lanes.model import NONE
@@ -84,6 +85,26 @@ class Scene:
         begins = np.ones(len(who), np.bool_)
         begins[1:] = (leader[1:] != leader[:-1]) | (who[1:] != who[:-1])
         return np.maximum.accumulate(np.where(begins, np.arange(len(who)), 0))
+
+    @cached_property
+    def paths(self) -> Paths:
+        """Of all participants."""
+        return Paths(self.traffic, self.clock)
+
+    @cached_property
+    def crossings(self) -> Crossings:
+        """Where these cross."""
+        return self.paths.crossings()
+
+    @cached_property
+    def cosine(self) -> Float:
+        """``(S,)`` of the headings."""
+        return np.cos(self.traffic.heading)
+
+    @cached_property
+    def sine(self) -> Float:
+        """``(S,)`` of the headings."""
+        return np.sin(self.traffic.heading)
 
     @cached_property
     def _travelled(self) -> Float:

@@ -1,0 +1,28 @@
+"""Crossings: the ego goes straight on, and another motor vehicle crosses its path."""
+
+from bridgegen.mining.events.changes import LaneChanges
+from bridgegen.mining.events.event import Events
+from bridgegen.mining.events.meetings import (
+    CROSSING,
+    OPPOSITE,
+    STRAIGHT,
+    Meeting,
+    events_of_meetings,
+    meetings,
+)
+from bridgegen.mining.events.scene import Scene
+
+
+def find(scene: Scene, changes: LaneChanges) -> Events:
+    """Return the crossings of a recording; of two that go straight on, from both views."""
+    met = [
+        one for one in meetings(scene, scene.is_ego, scene.is_ego)
+        if CROSSING[0] <= one.angle <= CROSSING[1]
+        and one.approach_angle < OPPOSITE
+        and abs(one.ego_turn) <= STRAIGHT
+    ]  # fmt: skip
+    return events_of_meetings("crossing", scene, met, _turn)
+
+
+def _turn(one: Meeting) -> dict[str, float]:
+    return {"other_turn": one.other_turn}

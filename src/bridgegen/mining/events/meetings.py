@@ -1,0 +1,190 @@
+"""Two whose paths cross, from the view of the one or the other: what crossing events share."""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from types import MappingProxyType
+
+import numpy as np
+
+from bridgegen.arrays import Bool
+from bridgegen.metrics.pet import pet
+from bridgegen.mining.events.event import NOT_WHOLE, Events, events_of
+from bridgegen.mining.events.scene import Scene
+from bridgegen.mining.events.setting_off import apart, sets_off
+from bridgegen.mining.excerpt import excerpt
+from bridgegen.odd.event_kinds import EVENT_KINDS
+from bridgegen.recordings.table import wrap
+
+AHEAD = 6.0
+"""A meeting begins so long before the first of both passes, or once both are recorded [s]."""
+LEAST_SEEN = 1.0
+"""Both are recorded for so long before the first passes [s]."""
+AFTER = 1.0
+"""The bodies are looked at until so long after the second passes [s]."""
+STRAIGHT = 30.0
+"""Who turns less than this goes straight on [deg]."""
+CROSSING = (30.0, 150.0)
+"""Angles at which paths cross [deg]."""
+OPPOSITE = 145.0
+"""From this angle between their courses before, two come from opposite directions [deg]."""
+TOUCH = "bodies touch"
+
+
+@dataclass(frozen=True)
+class Meeting:
+    """An ego and another whose paths cross.
+
+    Attributes:
+        ego: participant.
+        other: participant.
+        ego_at: instant at which the ego's centre passes the point.
+        other_at: instant at which the other's does.
+        begin: instant.
+        angle: between the courses there [deg], 0 to 180.
+        approach_angle: between the courses before [deg], 0 to 180.
+        ego_turn: by how much the ego turns [deg], to the left positive.
+        other_turn: by how much the other turns [deg].
+        side: from which side of the ego the other comes: 1 right, -1 left.
+        course: of the ego there [rad].
+    """
+
+    ego: int
+    other: int
+    ego_at: float
+    other_at: float
+    begin: float
+    angle: float
+    approach_angle: float
+    ego_turn: float
+    other_turn: float
+    side: float
+    course: float
+
+    @property
+    def first_at(self) -> float:
+        """Instant at which the first of both passes."""
+        return min(self.ego_at, self.other_at)
+
+    @property
+    def last_at(self) -> float:
+        """Instant at which the second passes."""
+        return max(self.ego_at, self.other_at)
+
+
+def meetings(scene: Scene, egos: Bool, others: Bool) -> list[Meeting]:
+    """Return the meetings of some with others; of two that may be the ego, from both views.
+
+    Args:
+        scene: the recording.
+        egos: ``(P,)`` who can be the ego.
+        others: ``(P,)`` who can be the other.
+    """
+    met, found = scene.crossings, []
+    for one, other, one_at, other_at in zip(
+        met.one.tolist(), met.other.tolist(), met.one_at.tolist(), met.other_at.tolist(),
+        strict=True,
+    ):  # fmt: skip
+        if egos[one] and others[other]:
+            found.append(_meeting(scene, one, other, one_at, other_at))
+        if egos[other] and others[one]:
+            found.append(_meeting(scene, other, one, other_at, one_at))
+    return found
+
+
+def _meeting(scene: Scene, ego: int, other: int, ego_at: float, other_at: float) -> Meeting:
+    paths, clock = scene.paths, scene.clock
+    lengths = paths.length(ego, ego_at), paths.length(other, other_at)
+    own, its = paths.course(ego, lengths[0]), paths.course(other, lengths[1])
+    (before, turn), (its_before, its_turn) = (
+        paths.turn(who, length) for who, length in zip((ego, other), lengths, strict=True)
+    )
+    both = float(max(clock.begin[ego], clock.begin[other]))
+    begin = max(min(ego_at, other_at) - AHEAD / scene.step, both)
+    return Meeting(
+        ego, other, ego_at, other_at, begin,
+        float(np.degrees(abs(_wrapped(its - own)))),
+        float(np.degrees(abs(_wrapped(its_before - before)))),
+        float(np.degrees(turn)), float(np.degrees(its_turn)),
+        1.0 if np.sin(its - own) > 0.0 else -1.0, own,
+    )  # fmt: skip
+
+
+def _wrapped(angle: float) -> float:
+    return float(wrap(np.array([angle]))[0])
+
+
+def events_of_meetings(
+    kind: str,
+    scene: Scene,
+    met: Sequence[Meeting],
+    more: Callable[[Meeting], dict[str, float]],
+    roles: Mapping[str, Sequence[int]] = MappingProxyType({}),
+) -> Events:
+    """Return meetings as events of a kind, with the quantities that all of them have.
+
+    Args:
+        kind: name.
+        scene: the recording.
+        met: in any order.
+        more: the quantities that this kind has besides.
+        roles: participants besides the other, by role.
+    """
+    rows = [dict(_quantities(scene, one)) | more(one) for one in met]
+    table = {
+        name: np.array([row[name] for row in rows], np.float64)
+        for name in EVENT_KINDS[kind].quantities
+    }
+    ego, other = (np.array([getattr(one, key) for one in met], np.int64) for key in ("ego", "other"))
+    begin, first, last = (
+        np.array([getattr(one, key) for one in met], np.float64)
+        for key in ("begin", "first_at", "last_at")
+    )
+    return events_of(
+        kind, ego,
+        {"other": other} | {name: np.array(who, np.int64) for name, who in roles.items()},
+        (scene.seconds(begin), scene.seconds(last)), table,
+        {
+            NOT_WHOLE: (first - begin) * scene.step < LEAST_SEEN,
+            TOUCH: table["pet"] <= 0.0,
+        },
+    )  # fmt: skip
+
+
+def _quantities(scene: Scene, one: Meeting) -> Iterator[tuple[str, float]]:
+    paths = scene.paths
+    for name, who, at in (("ego", one.ego, one.ego_at), ("other", one.other, one.other_at)):
+        yield f"{name}_speed", _speed(scene, who, one.begin)
+        yield f"{name}_crossing_speed", _speed(scene, who, at)
+        yield f"{name}_distance", paths.length(who, at) - paths.length(who, one.begin)
+    yield "time_gap", (one.last_at - one.first_at) * scene.step
+    yield "pet", _pet(scene, one)
+    yield "angle", one.angle
+    yield "approach_angle", one.approach_angle
+    yield "side", one.side
+    yield "ego_first", float(one.ego_at < one.other_at)
+    yield "seen_time", (one.first_at - one.begin) * scene.step
+    at = sets_off(scene, one.other, one.other_at)
+    both = scene.clock.begin[one.ego] <= at <= scene.clock.end[one.ego]
+    lengths = [
+        paths.length(who, end) - paths.length(who, at) if both else np.nan
+        for who, end in ((one.other, one.other_at), (one.ego, one.ego_at))
+    ]
+    yield "set_off_distance", lengths[0]
+    yield "set_off_ego_distance", lengths[1]
+    yield "set_off_apart", apart(scene, one.ego, one.other, at) if both else np.nan
+
+
+def _speed(scene: Scene, who: int, instant: float) -> float:
+    low, high = float(scene.clock.begin[who]), float(scene.clock.end[who])
+    at = np.array([min(max(instant, low), high)])
+    return float(scene.at(scene.speed, np.array([who]), at)[0])
+
+
+def _pet(scene: Scene, one: Meeting) -> float:
+    """Return the least time between the instants at which both bodies cover a point [s]."""
+    late, early = (one.ego, one.other) if one.ego_at > one.other_at else (one.other, one.ego)
+    begin = int(np.ceil(one.begin))
+    end = min(int(one.last_at + AFTER / scene.step) + 1, int(scene.clock.end[late]))
+    if end <= begin:
+        return np.nan
+    return float(pet(excerpt(scene.traffic, scene.clock, late, [early], begin, end))[0])
