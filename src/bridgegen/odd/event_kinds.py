@@ -253,7 +253,7 @@ EVENT_KINDS = {
         _kind(
             "vru-crossing",
             ("other", "occluder"),
-            "A pedestrian crosses the ego's path at 45° to 135°, or a bicycle at 30° to 150°, "
+            "A pedestrian crosses the ego's path at 45° to 135°, or a bicycle at 20° to 160°, "
             f"before the ego comes. {_MEETING_RULE} It is hidden if a vehicle that stands is on "
             "the line from the ego's front to its centre within the last 2 s before it crosses.",
             _MEETING_SOURCE.format("pedestrian crossing the roadway, pedalcyclist"),

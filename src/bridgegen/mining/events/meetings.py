@@ -10,7 +10,7 @@ from bridgegen.arrays import Bool
 from bridgegen.metrics.pet import pet
 from bridgegen.mining.events.event import NOT_WHOLE, Events, events_of
 from bridgegen.mining.events.scene import Scene
-from bridgegen.mining.events.setting_off import apart, sets_off
+from bridgegen.mining.events.setting_off import apart, set_off_instants
 from bridgegen.mining.excerpt import excerpt
 from bridgegen.odd.event_kinds import EVENT_KINDS
 from bridgegen.recordings.table import wrap
@@ -129,7 +129,11 @@ def events_of_meetings(
         more: the quantities that this kind has besides.
         roles: participants besides the other, by role.
     """
-    rows = [dict(_quantities(scene, one)) | more(one) for one in met]
+    off = set_off_instants(scene, [one.other for one in met], [one.other_at for one in met])
+    rows = [
+        dict(_quantities(scene, one, at)) | more(one)
+        for one, at in zip(met, off.tolist(), strict=True)
+    ]
     table = {
         name: np.array([row[name] for row in rows], np.float64)
         for name in EVENT_KINDS[kind].quantities
@@ -150,7 +154,7 @@ def events_of_meetings(
     )  # fmt: skip
 
 
-def _quantities(scene: Scene, one: Meeting) -> Iterator[tuple[str, float]]:
+def _quantities(scene: Scene, one: Meeting, set_off: float) -> Iterator[tuple[str, float]]:
     paths = scene.paths
     for name, who, at in (("ego", one.ego, one.ego_at), ("other", one.other, one.other_at)):
         yield f"{name}_speed", _speed(scene, who, one.begin)
@@ -163,15 +167,14 @@ def _quantities(scene: Scene, one: Meeting) -> Iterator[tuple[str, float]]:
     yield "side", one.side
     yield "ego_first", float(one.ego_at < one.other_at)
     yield "seen_time", (one.first_at - one.begin) * scene.step
-    at = sets_off(scene, one.other, one.other_at)
-    both = scene.clock.begin[one.ego] <= at <= scene.clock.end[one.ego]
+    both = scene.clock.begin[one.ego] <= set_off <= scene.clock.end[one.ego]
     lengths = [
-        paths.length(who, end) - paths.length(who, at) if both else np.nan
+        paths.length(who, end) - paths.length(who, set_off) if both else np.nan
         for who, end in ((one.other, one.other_at), (one.ego, one.ego_at))
     ]
     yield "set_off_distance", lengths[0]
     yield "set_off_ego_distance", lengths[1]
-    yield "set_off_apart", apart(scene, one.ego, one.other, at) if both else np.nan
+    yield "set_off_apart", apart(scene, one.ego, one.other, set_off) if both else np.nan
 
 
 def _speed(scene: Scene, who: int, instant: float) -> float:

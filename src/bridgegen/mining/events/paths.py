@@ -19,7 +19,7 @@ VERTEX = 1.0
 """Between two points of a path at least [m]."""
 WINDOW = 6.0
 """Between two that pass the point at which their paths cross, at most [s]."""
-LEAST_ANGLE = np.radians(20.0)
+LEAST_ANGLE = np.radians(15.0)
 """Between pieces of paths that cross; detectors ask for more."""
 CELL = 4.0
 """Of the grid in which pieces are looked up, at least [m]."""

@@ -107,6 +107,11 @@ class Scene:
         return np.sin(self.traffic.heading)
 
     @cached_property
+    def forward(self) -> Float:
+        """``(S,)`` speed along the heading; of who stands, its noise has the mean 0 [m/s]."""
+        return self.traffic.vx * self.cosine + self.traffic.vy * self.sine
+
+    @cached_property
     def _travelled(self) -> Float:
         speed = self.traffic.speed
         steps = np.empty(len(speed))

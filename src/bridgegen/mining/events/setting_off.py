@@ -1,5 +1,7 @@
 """When somebody who stood sets off: a ramp of the speed."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from bridgegen.arrays import Float
@@ -26,33 +28,47 @@ def stands(scene: Scene, who: int, begin: int, end: int) -> bool:
     return bool(np.hypot(traffic.x[b] - traffic.x[a], traffic.y[b] - traffic.y[a]) < STANDS)
 
 
-def sets_off(scene: Scene, who: int, until: float) -> float:
-    """Return the instant at which a participant sets off last before another; NaN if it does not.
+def set_off_instants(scene: Scene, who: Sequence[int], until: Sequence[float]) -> Float:
+    """Return when participants set off last before some instants, ``(N,)``; NaN if they do not.
 
-    It has stood before for `STANDS_TIME`.
+    They have stood before for `STANDS_TIME`.
+
+    Args:
+        scene: the recording.
+        who: N participants.
+        until: N instants at which they are recorded.
     """
-    clock, traffic = scene.clock, scene.traffic
-    first = int(traffic.first[who])
-    last = first + int(until) - int(clock.begin[who])
+    traffic, clock = scene.traffic, scene.clock
+    found = np.full(len(who), np.nan)
+    rows, first, at, last = [], list[int](), list[int](), list[int]()
+    for i, (p, instant) in enumerate(zip(who, until, strict=True)):
+        begin = int(traffic.first[p])
+        end = begin + int(instant) - int(clock.begin[p])
+        state = _last_still(scene, begin, end)
+        if state is not None:
+            rows.append(i)
+            first.append(begin)
+            at.append(state)
+            last.append(end)
+    if not rows:
+        return found
+    low, ramp = np.array(first), RAMP / scene.step
+    guess = (np.array(at) - 0.5 * ramp, np.full(len(at), ramp))
+    fit = fit_steps(scene.forward, low, np.array(last), guess, scene.step, "ramp")
+    is_one = (np.abs(fit.level) <= STILL) & (fit.height > STILL) & (fit.begin >= low)
+    of_clock = clock.instant[low] - low
+    found[rows] = np.where(is_one, fit.begin + of_clock, np.nan)
+    return found
+
+
+def _last_still(scene: Scene, first: int, last: int) -> int | None:
+    """Return the last state until which somebody has stood, but not that at the end."""
     steps = max(round(STANDS_TIME / scene.step), 1)
-    if last - first <= steps:
-        return float("nan")
-    x, y = traffic.x[first : last + 1], traffic.y[first : last + 1]
+    x, y = (one[first : last + 1] for one in (scene.traffic.x, scene.traffic.y))
     still = np.flatnonzero(np.hypot(x[steps:] - x[:-steps], y[steps:] - y[:-steps]) < STANDS)
-    if not len(still) or still[-1] + steps >= last - first:
-        return float("nan")
-    at = first + int(still[-1]) + steps
-    heading = traffic.heading[first : last + 1]
-    speed = traffic.vx[first : last + 1] * np.cos(heading)
-    speed += traffic.vy[first : last + 1] * np.sin(heading)
-    fit = fit_steps(
-        speed, np.zeros(1, np.int64), np.array([last - first]),
-        (np.array([float(at - first) - 0.5 * RAMP / scene.step]), np.array([RAMP / scene.step])),
-        scene.step, "ramp",
-    )  # fmt: skip
-    if abs(fit.level[0]) > STILL or fit.height[0] <= STILL or fit.begin[0] < 0.0:
-        return float("nan")
-    return float(fit.begin[0]) + int(clock.begin[who])
+    if not len(still) or first + int(still[-1]) + steps >= last:
+        return None
+    return first + int(still[-1]) + steps
 
 
 def apart(scene: Scene, one: int, other: int, instant: float) -> float:

@@ -5,12 +5,14 @@ import numpy as np
 from bridgegen.ego.kinds import BICYCLE, PEDESTRIAN
 from bridgegen.mining.events.changes import LaneChanges
 from bridgegen.mining.events.event import Events
-from bridgegen.mining.events.meetings import CROSSING, Meeting, events_of_meetings, meetings
+from bridgegen.mining.events.meetings import Meeting, events_of_meetings, meetings
 from bridgegen.mining.events.scene import Scene
 from bridgegen.mining.events.sight import Hiding, hiding
 
 WALKING = (45.0, 135.0)
 """Angles at which the path of a pedestrian crosses the ego's [deg]."""
+RIDING = (20.0, 160.0)
+"""Likewise of a bicycle: who turns off crosses its path before having turned far."""
 
 
 def find(scene: Scene, changes: LaneChanges) -> Events:
@@ -28,7 +30,7 @@ def find(scene: Scene, changes: LaneChanges) -> Events:
 
 
 def _crosses(one: Meeting, kind: int) -> bool:
-    low, high = WALKING if kind == PEDESTRIAN else CROSSING
+    low, high = WALKING if kind == PEDESTRIAN else RIDING
     return low <= one.angle <= high
 
 

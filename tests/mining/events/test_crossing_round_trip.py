@@ -1,0 +1,168 @@
+"""Crossing paths of simulated scenarios come back, with their parameters, from their traffic.
+
+What happens is worked out from the simulation by itself: paths that cross by solving for all pairs
+of their pieces, lines of sight by points on them.
+"""
+
+import numpy as np
+import pytest
+from tests.mining.events.simulated import located, recorded, simulated
+
+from bridgegen.metrics.pet import pet
+from bridgegen.mining.events.find import find_events
+
+EVERY = 10
+"""Of the simulation's steps."""
+
+
+def centres(rollout, row, e):
+    """Centres of a body, and the time of each."""
+    k = np.arange(0, rollout.n_steps[row], EVERY)
+    if rollout.present.size:
+        k = k[rollout.present[row, e, k]]
+    x, y, h = (one[row, e, k] for one in (rollout.x, rollout.y, rollout.h))
+    ahead = rollout.box[e, 2]
+    return x + ahead * np.cos(h), y + ahead * np.sin(h), k * rollout.time_step
+
+
+def crossing_of(rollout, row, other):
+    """Return when the ego and another pass where their paths cross; NaN if they never do."""
+    (ax, ay, at), (bx, by, bt) = (centres(rollout, row, e) for e in (0, other))
+    ux, uy, vx, vy = np.diff(ax)[:, None], np.diff(ay)[:, None], np.diff(bx), np.diff(by)
+    dx, dy = bx[:-1] - ax[:-1, None], by[:-1] - ay[:-1, None]
+    cross = ux * vy - uy * vx
+    with np.errstate(divide="ignore", invalid="ignore"):
+        f, g = (dx * vy - dy * vx) / cross, (dx * uy - dy * ux) / cross
+    hits = (f >= 0) & (f < 1) & (g >= 0) & (g < 1) & (np.abs(cross) > 1e-9)
+    if not hits.any():
+        return np.nan, np.nan
+    i, j = np.argwhere(hits)[0]
+    step = rollout.time_step * EVERY
+    return at[i] + f[i, j] * step, bt[j] + g[i, j] * step
+
+
+def at_time(rollout, field, e, time):
+    k = np.clip(np.nan_to_num(time) / rollout.time_step, 0, rollout.x.shape[2] - 1).astype(int)
+    return getattr(rollout, field)[np.arange(len(k)), e, k]
+
+
+def apart_at(rollout, other, time):
+    x, y = (at_time(rollout, f, other, time) - at_time(rollout, f, 0, time) for f in ("x", "y"))
+    return np.hypot(x, y)
+
+
+def set_off_time(rollout, other):
+    moves = rollout.v[:, other] > 1e-9
+    return np.where(moves.any(axis=1), moves.argmax(axis=1) * rollout.time_step, 1e9)
+
+
+def sees_through(rollout, other, van, last):
+    """Return in which rows the van is on the line of sight within 2 s before an instant."""
+    found = np.zeros(len(last), bool)
+    share = np.linspace(0.0, 1.0, 200)
+    for back in np.arange(0.0, 2.0, 0.05):
+        x, y, h = (at_time(rollout, f, 0, last - back) for f in ("x", "y", "h"))
+        front = rollout.box[0, 2] + 0.5 * rollout.box[0, 0]
+        ends = [(x + front * np.cos(h), at_time(rollout, "x", other, last - back)),
+                (y + front * np.sin(h), at_time(rollout, "y", other, last - back))]  # fmt: skip
+        px, py = (a[:, None] + share * (b - a)[:, None] for a, b in ends)
+        length, width, ahead = rollout.box[van]  # along x, as the road
+        found |= ((np.abs(px - rollout.x[:, van, :1] - ahead) < 0.5 * length)
+                  & (np.abs(py - rollout.y[:, van, :1]) < 0.5 * width)).any(axis=1)  # fmt: skip
+    return found
+
+
+def encounter(own, other="bv", trigger="bv_trigger", speed="bv_speed"):
+    """Of a scenario whose other stands, and sets off while the ego has this way to go."""
+
+    def what(P, rollout, passes, name):
+        e = rollout.names.index(name)
+        go = set_off_time(rollout, e)
+        rest = own - P["ego_speed"] * go
+        happens = {
+            f"{trigger}_time": go, f"{trigger}_distance": apart_at(rollout, e, go),
+            speed: at_time(rollout, "v", e, passes[1]),
+        }  # fmt: skip
+        return (go > 1.5) & (rest > 0.5), (go > 0.8) & (rest > -0.5), P | happens
+
+    return what
+
+
+def behind_parked(P, rollout, passes, name):
+    hidden = sees_through(rollout, rollout.names.index(name), rollout.names.index("van"), passes[1])
+    return hidden, hidden, P
+
+
+def hidden_car(P, rollout, passes, name):
+    every = np.ones(len(passes[0]), bool)
+    return every, every, P
+
+
+def turning(P, rollout, passes, name):
+    begin = np.maximum(passes.min(axis=0) - 6.0, 0.25)
+    e = rollout.names.index(name)
+    pace = {"cyclist_speed": at_time(rollout, "v", e, begin),
+            "later_speed": at_time(rollout, "v", e, passes[1])}  # fmt: skip
+    every = np.ones(len(passes[0]), bool)
+    return every, every, P | pace
+
+
+CASES = {
+    "crossroads-s1": (900, "bv", encounter(53.35)),
+    "crossroads-s3": (500, "bv", encounter(48.23)),
+    "left-across-path": (400, "bv", hidden_car),
+    "pedestrian-behind-parked": (500, "walker", behind_parked),
+    "pedestrian-at-night": (400, "walker", encounter(56.18, trigger="trigger",
+                                                     speed="walker_speed")),
+    "cyclist-right-turn": (700, "cyclist", turning),
+}  # fmt: skip
+
+
+def round_trip(name, noise, dropped):
+    """Return precision, recall, how many rows count, and the errors as shares of the ranges."""
+    count, other, what = CASES[name]
+    scenario, P, rollout, lanes = simulated(name, count, "route-follower")
+    e = rollout.names.index(other)
+    passes = np.array([crossing_of(rollout, row, e) for row in range(count)]).T
+    surely, maybe, P = what(P, rollout, passes, other)
+    gap, first = np.abs(passes[0] - passes[1]), passes.min(axis=0)
+    closest = pet(rollout)
+    surely = surely & (gap < 5.9) & (first > 1.3) & (closest > 0.2)
+    maybe = maybe & (gap < 6.1) & (first > 0.7)
+    if scenario.recorded.event == "vru-crossing":
+        surely, maybe = surely & (passes[1] < passes[0] - 0.1), maybe & (passes[1] < passes[0] + 0.1)
+    traffic, where = located(recorded(rollout, range(count), noise, dropped), lanes)
+    found = next(
+        one for one in find_events(traffic, where).kinds
+        if one.kind.name == scenario.recorded.event
+    )  # fmt: skip
+    spec = scenario.recorded
+    called = [traffic.names[k].split("#")[0].split() for k in found.others["other"]]
+    own = [traffic.names[k].split("#")[0].endswith(" ego") for k in found.ego]
+    kept = spec.counts(found.quantities) & np.array(own)
+    kept &= np.array([what == other for _, what in called])
+    row = np.array([int(number) for number, _ in called])[kept]
+    assert len(set(row)) == len(row)
+    errors = {
+        key: np.abs(value[kept] - P[key][row])
+        / (scenario.parameters[key].high - scenario.parameters[key].low)
+        for key, value in spec.values(found.quantities).items()
+    }
+    return maybe[row].mean(), np.isin(np.flatnonzero(surely), row).mean(), int(surely.sum()), errors
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_parameters_come_back(name):
+    precision, recall, count, errors = round_trip(name, 0.0, 0.0)
+    assert count >= 100
+    assert min(precision, recall) >= 0.99
+    for key, error in errors.items():
+        assert np.quantile(error, 0.95) <= 0.01, key
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_parameters_come_back_of_noisy_traffic_with_gaps(name):
+    precision, recall, _, errors = round_trip(name, 0.2, 0.05)
+    assert min(precision, recall) >= 0.95
+    for key, error in errors.items():
+        assert np.median(error) <= 0.05, key
