@@ -79,8 +79,11 @@ _MEETING = (
     ("ego_crossing_speed", "m/s", "speed of the ego at the crossing point"),
     ("other_crossing_speed", "m/s", "speed of the other at the crossing point"),
     ("time_gap", "s", "between the instants at which their centres pass the crossing point"),
-    ("pet", "s", "post-encroachment time: least time between instants at which both bodies cover "
-     "a point"),
+    (
+        "pet",
+        "s",
+        "post-encroachment time: least time between instants at which both bodies cover a point",
+    ),
     ("angle", "deg", "between their courses at the crossing point, 0 to 180"),
     ("approach_angle", "deg", "between their courses 30 m of path before, 0 to 180"),
     ("side", "1", "1 if the other comes from the right, -1 from the left"),

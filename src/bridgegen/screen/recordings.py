@@ -181,6 +181,8 @@ def _events(mined: "Mined") -> "dict[str, object]":
     return {
         "hours_on_lanes": sum(one.hours for one in found),
         "km_on_lanes": sum(one.kilometres for one in found),
+        "hours_driven": sum(one.all_hours for one in found),
+        "km_driven": sum(one.all_kilometres for one in found),
         "events": kinds,
         "parameters": {
             one.scenario: {

@@ -169,7 +169,7 @@ def test_rates_are_of_all_that_can_be_the_ego():
     events, _ = found((25.0 * T, RIGHT), (40.0 + 20.0 * T, change(4.0, 4.0, LEFT, RIGHT)))
     assert events.hours == pytest.approx(2 * 13.9 / 3600, rel=0.01)
     assert events.kilometres == pytest.approx(0.0139 * 45, rel=0.01)
-    rate = encounters_of(1, [events]).per_hour
+    rate = encounters_of(1, [events], "cut-in").per_hour
     assert rate.low * events.hours == pytest.approx(0.025318, rel=1e-4)
     assert rate.high * events.hours == pytest.approx(5.571643, rel=1e-6)
 
@@ -182,7 +182,7 @@ def test_driving_counts_by_the_share_of_events_that_are_not_cut_off():
     assert whole_share(events, "cut-in") == 0.5
     assert whole_share(events, "approach") == 1.0
     assert encounters_of(1, events, "cut-in").hours == pytest.approx(2 * 13.9 / 3600, rel=0.01)
-    assert encounters_of(1, events).hours == pytest.approx(4 * 13.9 / 3600, rel=0.01)
+    assert encounters_of(1, events, "approach").hours == pytest.approx(4 * 13.9 / 3600, rel=0.01)
 
 
 def test_events_are_set_against_ranges_and_constraints():

@@ -37,7 +37,9 @@ def events(kind, quantities, refused=None):
         declared, someone, dict.fromkeys(declared.roles, someone + 1), np.zeros(n), np.ones(n),
         every, refused or {},
     )  # fmt: skip
-    return FoundEvents("a recording", "a.csv", tuple(map(str, range(n + 1))), (one,), HOURS, KM)
+    return FoundEvents(
+        "a recording", "a.csv", tuple(map(str, range(n + 1))), (one,), HOURS, KM, HOURS, KM
+    )
 
 
 def met(one, found, folder):

@@ -29,17 +29,17 @@ def mark_vertices(first: Int, x: Float, y: Float, apart: float, out: Bool) -> No
 
 @kernel
 def passed(x: Float, y: Float, a: int, b: int, share: float) -> float:
-    """Return when a body passes a point of the chord from state a to state b, as a place among them.
+    """Return when a body passes a point of the chord from state a to b, as a place among states.
 
     It is the last time, should it stop there.
-    """  # fmt: skip
+    """
     ux, uy = x[b] - x[a], y[b] - y[a]
     wanted = share * (ux * ux + uy * uy)
     for k in range(b - 1, a - 1, -1):
         here = (x[k] - x[a]) * ux + (y[k] - y[a]) * uy
         if here <= wanted:
             onward = (x[k + 1] - x[a]) * ux + (y[k + 1] - y[a]) * uy
-            return k + (wanted - here) / max(onward - here, 1e-12)
+            return float(k + (wanted - here) / max(onward - here, 1e-12))
     return float(a)
 
 

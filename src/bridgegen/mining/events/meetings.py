@@ -138,7 +138,9 @@ def events_of_meetings(
         name: np.array([row[name] for row in rows], np.float64)
         for name in EVENT_KINDS[kind].quantities
     }
-    ego, other = (np.array([getattr(one, key) for one in met], np.int64) for key in ("ego", "other"))
+    ego, other = (
+        np.array([getattr(one, key) for one in met], np.int64) for key in ("ego", "other")
+    )
     begin, first, last = (
         np.array([getattr(one, key) for one in met], np.float64)
         for key in ("begin", "first_at", "last_at")

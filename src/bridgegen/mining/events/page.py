@@ -20,7 +20,10 @@ def events_section(found: Sequence[FoundEvents], scenarios: Sequence[ScenarioEve
     of_scenarios = (
         "scenario", "event", "rows", "incomplete", "per hour", "per 1000 km", "not given",
     )  # fmt: skip
-    hours, km = (sum(getattr(one, name) for one in found) for name in ("hours", "kilometres"))
+    hours, km, all_hours, all_km = (
+        sum(getattr(one, name) for one in found)
+        for name in ("hours", "kilometres", "all_hours", "all_kilometres")
+    )
     kinds = [
         [kind, f"{count:,}", per_hour, per_km, refused]
         for kind, count, per_hour, per_km, refused in kind_rows(found)
@@ -40,7 +43,8 @@ def events_section(found: Sequence[FoundEvents], scenarios: Sequence[ScenarioEve
         f"<div class='card'><div class='wide'>"
         f"{html_table(['event', 'count', 'per hour', 'per 1000 km', 'refused'], kinds)}</div>"
         f"<p class='muted'>All are in {TABLE}. Rates are those of {hours:.4g} h and {km:.4g} km of "
-        "motor vehicles on lanes, each of which is the ego in turn, less the share of events that "
+        f"motor vehicles on lanes (of crossings {all_hours:.4g} h and {all_km:.4g} km, on lanes or "
+        "not), each of which is the ego in turn, less the share of events that "
         "the recording cuts off; in brackets the exact 95 % interval of a Poisson process."
         "</p></div>"
         f"<div class='card'><h3>Scenarios</h3><div class='wide'>"
