@@ -242,7 +242,7 @@ EVENT_KINDS = {
             "oncoming-left-turn",
             ("other",),
             "The ego and another motor vehicle come from opposite directions: their courses 30 m "
-            "before are 145° apart or more. One of them turns by more than 30° across the path of "
+            "before are 145° apart or more. One of them turns by more than 20° across the path of "
             "the other, which goes straight on. Where traffic drives on the left that is a right "
             f"turn. {_MEETING_RULE}",
             _MEETING_SOURCE.format("left turn across path from opposite directions"),

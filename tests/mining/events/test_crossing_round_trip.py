@@ -13,7 +13,7 @@ from tests.mining.events.simulated import located, recorded, simulated
 from bridgegen.metrics.pet import pet
 from bridgegen.mining.events.find import find_events
 
-EVERY = 10
+EVERY = 20
 """Of the simulation's steps."""
 
 
@@ -91,8 +91,12 @@ def encounter(own, other="bv", trigger="bv_trigger", speed="bv_speed"):
 
 
 def behind_parked(P, rollout, passes, name):
-    hidden = sees_through(rollout, rollout.names.index(name), rollout.names.index("van"), passes[1])
-    return hidden, hidden, P
+    """The parked car behind the van may hide the pedestrian, too."""
+    van, parked = (
+        sees_through(rollout, rollout.names.index(name), rollout.names.index(one), passes[1])
+        for one in ("van", "parked")
+    )
+    return van, van | parked, P
 
 
 def hidden_car(P, rollout, passes, name):
@@ -101,24 +105,27 @@ def hidden_car(P, rollout, passes, name):
 
 
 def turning(P, rollout, passes, name):
-    begin = np.maximum(passes.min(axis=0) - 6.0, 0.25)
+    """Speeds are averaged over 0.5 s before and after."""
+    begin = np.maximum(passes.min(axis=0) - 6.0, 0.0)
     e = rollout.names.index(name)
-    pace = {"cyclist_speed": at_time(rollout, "v", e, begin),
+    around = np.linspace(-0.5, 0.5, 41)
+    at_begin = np.mean([at_time(rollout, "v", e, begin + one) for one in around], axis=0)
+    pace = {"cyclist_speed": at_begin,
             "later_speed": at_time(rollout, "v", e, passes[1])}  # fmt: skip
     every = np.ones(len(passes[0]), bool)
     return every, every, P | pace
 
 
 CASES = {
-    "crossroads-s1": (500, "bv", encounter(53.35)),
-    "crossroads-s3": (400, "bv", encounter(48.23)),
-    "left-across-path": (250, "bv", hidden_car),
-    "pedestrian-behind-parked": (300, "walker", behind_parked),
-    "pedestrian-at-night": (400, "walker", encounter(56.18, trigger="trigger",
+    "crossroads-s1": (260, "bv", encounter(53.35)),
+    "crossroads-s3": (220, "bv", encounter(48.23)),
+    "left-across-path": (120, "bv", hidden_car),
+    "pedestrian-behind-parked": (120, "walker", behind_parked),
+    "pedestrian-at-night": (220, "walker", encounter(56.18, trigger="trigger",
                                                      speed="walker_speed")),
-    "cyclist-right-turn": (400, "cyclist", turning),
+    "cyclist-right-turn": (260, "cyclist", turning),
 }  # fmt: skip
-NOISY = ("crossroads-s1", "left-across-path", "pedestrian-behind-parked")
+NOISY = ("crossroads-s1", "pedestrian-behind-parked")
 
 
 def some_rows(surely, maybe, most):
@@ -172,8 +179,8 @@ def round_trip(name, noise, dropped, most):
 
 @pytest.mark.parametrize("name", CASES)
 def test_parameters_come_back(name):
-    precision, recall, count, errors = round_trip(name, 0.0, 0.0, 60)
-    assert count >= 50
+    precision, recall, count, errors = round_trip(name, 0.0, 0.0, 40)
+    assert count >= 30
     assert min(precision, recall) >= 0.99
     for key, error in errors.items():
         assert len(error) >= 0.8 * count
@@ -182,7 +189,7 @@ def test_parameters_come_back(name):
 
 @pytest.mark.parametrize("name", NOISY)
 def test_parameters_come_back_of_noisy_traffic_with_gaps(name):
-    precision, recall, _, errors = round_trip(name, 0.2, 0.05, 24)
+    precision, recall, _, errors = round_trip(name, 0.2, 0.05, 20)
     assert min(precision, recall) >= 0.95
     for key, error in errors.items():
         assert np.median(error) <= 0.05, key

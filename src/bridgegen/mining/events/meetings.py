@@ -21,6 +21,8 @@ LEAST_SEEN = 1.0
 """Both are recorded for so long before the first passes [s]."""
 AFTER = 1.0
 """The bodies are looked at until so long after the second passes [s]."""
+AVERAGED = 1.0
+"""Before and after the crossing point, over which a speed is averaged [s]."""
 STRAIGHT = 30.0
 """Who turns less than this goes straight on [deg]."""
 CROSSING = (30.0, 150.0)
@@ -160,7 +162,7 @@ def _quantities(scene: Scene, one: Meeting, set_off: float) -> Iterator[tuple[st
     paths = scene.paths
     for name, who, at in (("ego", one.ego, one.ego_at), ("other", one.other, one.other_at)):
         yield f"{name}_speed", _speed(scene, who, one.begin)
-        yield f"{name}_crossing_speed", _speed(scene, who, at)
+        yield f"{name}_crossing_speed", _crossing_speed(scene, who, at)
         yield f"{name}_distance", paths.length(who, at) - paths.length(who, one.begin)
     yield "time_gap", (one.last_at - one.first_at) * scene.step
     yield "pet", _pet(scene, one)
@@ -183,6 +185,14 @@ def _speed(scene: Scene, who: int, instant: float) -> float:
     low, high = float(scene.clock.begin[who]), float(scene.clock.end[who])
     at = np.array([min(max(instant, low), high)])
     return float(scene.at(scene.speed, np.array([who]), at)[0])
+
+
+def _crossing_speed(scene: Scene, who: int, at: float) -> float:
+    """Return a speed by the length of the path, which noise makes longer by little [m/s]."""
+    around, clock = AVERAGED / scene.step, scene.clock
+    low, high = max(at - around, float(clock.begin[who])), min(at + around, float(clock.end[who]))
+    way = scene.paths.length(who, high) - scene.paths.length(who, low)
+    return way / ((high - low) * scene.step)
 
 
 def _pet(scene: Scene, one: Meeting) -> float:

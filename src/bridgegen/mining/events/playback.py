@@ -130,8 +130,8 @@ def playback_section(played: Sequence[PlayedEvent]) -> str:
         return ""
     return (
         f"<p class='muted'>Of each kind up to {SHOWN} events, those with the least gap by the "
-        "ego's speed, or post-encroachment time. Blue is the ego, orange the other; pale outlines show where both were when "
-        "the event began.</p>"
+        "ego's speed, or post-encroachment time. Blue is the ego, orange the other; pale outlines "
+        "show where both were when the event began.</p>"
         f"{''.join(cards)}"
     )
 
