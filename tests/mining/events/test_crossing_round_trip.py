@@ -58,11 +58,11 @@ def set_off_time(rollout, other):
     return np.where(moves.any(axis=1), moves.argmax(axis=1) * rollout.time_step, 1e9)
 
 
-def sees_through(rollout, other, van, last):
-    """Return in which rows the van is on the line of sight within 2 s before an instant."""
+def sees_through(rollout, other, van, last, lately):
+    """Return in which rows a parked body is on the line of sight lately before an instant [s]."""
     found = np.zeros(len(last), bool)
     share = np.linspace(0.0, 1.0, 200)
-    for back in np.arange(0.0, 2.0, 0.05):
+    for back in np.arange(0.0, lately, 0.05):
         x, y, h = (at_time(rollout, f, 0, last - back) for f in ("x", "y", "h"))
         front = rollout.box[0, 2] + 0.5 * rollout.box[0, 0]
         ends = [(x + front * np.cos(h), at_time(rollout, "x", other, last - back)),
@@ -92,11 +92,13 @@ def encounter(own, other="bv", trigger="bv_trigger", speed="bv_speed"):
 
 def behind_parked(P, rollout, passes, name):
     """The parked car behind the van may hide the pedestrian, too."""
-    van, parked = (
-        sees_through(rollout, rollout.names.index(name), rollout.names.index(one), passes[1])
-        for one in ("van", "parked")
+    van, van_perhaps, parked = (
+        sees_through(
+            rollout, rollout.names.index(name), rollout.names.index(one), passes[1], lately
+        )
+        for one, lately in (("van", 1.9), ("van", 2.1), ("parked", 2.1))
     )
-    return van, van | parked, P
+    return van, van_perhaps | parked, P
 
 
 def hidden_car(P, rollout, passes, name):
