@@ -24,7 +24,7 @@ DEFENSIVE, AROUND = 0.1, 0.25
 FITTED, CENTRES = 1000, 200  # points, at most
 ROUNDS, OF_ROUND = 2, 2000
 """How often proposals are fitted again, and to how many rows."""
-PREPARED, FOUND = 0.4, 0.5
+PREPARED, FOUND = 0.6, 0.5
 """The share of the budget that subset simulation may take, and the precision at which it stops."""
 FEWEST_ROWS = 100  # of a round
 OF_CHAIN = 5.0  # points of chains are worth one independent one
