@@ -48,7 +48,7 @@ def test_memory_a_row_of_a_page(finished, tmp_path, monkeypatch):
     monkeypatch.setattr(payload, "ROWS", 500)
     monkeypatch.setattr(payload, "SIZE_OF_ROW", 0)  # no motions
     peak(repeated(finished, tmp_path / "first", 500))  # what is made once
-    sizes = (4_000, 12_000)
+    sizes = (10_000, 30_000)
     (small, page), (large, same) = (peak(repeated(finished, tmp_path / str(n), n)) for n in sizes)
     assert abs(same - page) < 0.1 * page
     assert (large - small) / (sizes[1] - sizes[0]) < A_ROW
