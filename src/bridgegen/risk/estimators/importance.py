@@ -159,6 +159,7 @@ def _drawn(
         "components": float(len(proposals.fitted.weights)),
         "effective_hits": result.hits(result.there(aim.threshold)),
         "heaviest": _heaviest(result, aim),
+        "reached": known.facts.get("reached", 1.0),
     }
     return replace(result, doubts=tuple(_doubts(result, aim, known, helped)), facts=facts)
 
@@ -172,7 +173,13 @@ def _heaviest(result: Weighted, aim: Aim) -> float:
 
 def _doubts(result: Weighted, aim: Aim, known: Weighted, helped: bool) -> Iterator[str]:
     """Yield why a result is not believed; ``helped`` by further points of the event or not."""
-    yield from known.doubts
+    if known.doubts and helped:
+        yield (
+            f"subset simulation is in doubt ({known.doubts[0]}), so harm other than what the "
+            "search found is not bounded; what it found is counted"
+        )
+    else:
+        yield from known.doubts
     hits, heaviest = result.hits(result.there(aim.threshold)), _heaviest(result, aim)
     found = result.probability(aim.threshold)
     if hits < FEWEST_HITS:
