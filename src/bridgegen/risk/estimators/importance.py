@@ -21,7 +21,7 @@ from bridgegen.risk.estimators.weighted import FEWEST_HITS, Weighted
 
 DEFENSIVE, AROUND = 0.1, 0.25
 """The shares of rows that are drawn as on the road, and around single points."""
-FITTED, CENTRES = 1000, 200  # points, at most
+FITTED, CENTRES = 500, 200  # points, at most
 ROUNDS, OF_ROUND = 2, 2000
 """How often proposals are fitted again, and to how many rows."""
 PREPARED, FOUND = 0.6, 0.5
