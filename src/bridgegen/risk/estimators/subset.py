@@ -26,7 +26,8 @@ DEEPEST = 20  # levels, at most: a probability of 1e-20
 STUCK = 0.01  # of a level at least must reach the next one
 MOST_TIED = 0.5  # of a level's points at most may be in the next one
 TOGETHER = 20  # repetitions that run side by side
-POINTS, FEWEST_POINTS = 250, 25  # of a repetition
+POINTS, FEWEST_POINTS = 250, 25  # of a repetition; all have the same number
+FEWEST_ROUNDS = 2  # so that the first one says what repetitions cost
 MARGIN = 1.3  # of evaluations: repetitions take more or fewer
 FEWEST_REPETITIONS, MOST_ERROR, LEAST_ACCEPTED = 10, 0.5, 0.03
 """What repetitions must keep for the interval to be believed."""
@@ -232,14 +233,15 @@ def estimate(problem: Problem, aim: Aim, seed: int) -> Weighted:
     first = pilot(problem, aim, seed)
     spent, rounds = first.evaluations, 0
     cost = 1.0 + sum(1.0 - one for one in first.passing[:-1])  # evaluations a point, expected
+    affordable = (aim.budget - spent) / (MARGIN * cost * TOGETHER)
+    points = int(affordable / max(FEWEST_ROUNDS, math.ceil(affordable / POINTS)))
     parts: list[tuple[Float, Float, Float, Int]] = []
     result = _result(problem, parts, 0, spent)
-    while first.reached:
-        left = (aim.budget - spent) / (MARGIN * cost * TOGETHER)
-        points = int(min(left, POINTS, math.inf if rounds else max(0.25 * left, FEWEST_POINTS)))
-        if points < FEWEST_POINTS:
+    while first.reached and points >= FEWEST_POINTS:
+        limit = aim.budget - spent
+        if MARGIN * cost * points * TOGETHER > limit:
             break
-        random, limit = block_of(seed, rounds + 1), aim.budget - spent
+        random = block_of(seed, rounds + 1)
         try:
             Z, found, weights, owner, took = repeat(problem, first, points, TOGETHER, random, limit)
         except _OutOfBudget as error:
