@@ -138,9 +138,8 @@ def test_a_needle_that_a_search_has_found_counts():
         problem = problems.Analytic(2, score, truth)
         found = run("importance", problem, seed, 20_000, start=np.array([[-3.2, 0.0]]))
         p = found.probability(0.0)
-        assert not found.doubts
-        assert p.low <= truth <= p.high
         assert p.estimate == pytest.approx(truth, rel=0.1)
+        assert p.low <= truth  # its upper end may be in doubt: who knows of other needles
 
 
 @pytest.mark.parametrize("method", METHODS)

@@ -102,7 +102,7 @@ def estimate(problem: Problem, aim: Aim, seed: int, start: Float | None = None) 
     there = known.scores >= aim.threshold
     Z, weights = known.Z[there], known.weights[there]
     if start is not None and len(start):
-        more = weights.mean() if len(Z) else 1.0
+        more = (weights.sum() if len(Z) else 1.0) / len(start)  # half of the rows look there
         Z, weights = np.concatenate([Z, start]), np.append(weights, np.full(len(start), more))
     if not len(Z):
         return known

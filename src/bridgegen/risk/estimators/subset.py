@@ -293,7 +293,10 @@ def _doubts(first: Pilot, aim: Aim, sums: Float, facts: dict[str, float]) -> Ite
 def _result(
     problem: Problem, parts: list[tuple[Float, Float, Float, Int]], count: int, spent: int
 ) -> Weighted:
-    none = np.empty((0, problem.dimensions)), np.empty((0, 1)), np.empty(0), np.empty(0, np.int64)
+    none = (
+        np.empty((0, problem.dimensions)), np.empty((0, problem.columns)), np.empty(0),
+        np.empty(0, np.int64),
+    )  # fmt: skip
     Z, found, weights, owner = (np.concatenate(one) for one in zip(*(parts or [none]), strict=True))
     share = weights / max(count, 1)
     largest = float(share.max(initial=0.0))
