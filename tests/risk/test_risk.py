@@ -187,7 +187,7 @@ def test_folders_of_others_are_left_alone(risk, tmp_path):
     (tmp_path / "thesis.txt").write_text("mine")
     with pytest.raises(StorageError, match="holds something else than a risk"):
         estimate_risk(SCENARIO, out=tmp_path, **GIVEN)
-    with pytest.raises(StorageError, match=r"holds another estimate \(it differs in seed"):
+    with pytest.raises(StorageError, match=r"holds another risk \(it differs in seed"):
         estimate_risk(SCENARIO, out=risk.folder, **GIVEN, seed=9)
 
 
