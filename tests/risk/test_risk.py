@@ -105,7 +105,7 @@ def test_stopped_and_gone_on_it_is_the_same(risk, tmp_path, at):
             raise KeyboardInterrupt
 
     folder = tmp_path / "two"
-    given = GIVEN | {"precision": 0.01, "method": "subset"}
+    given = GIVEN | {"budget": 4000, "method": "subset"}
     whole = estimate_risk(SCENARIO, out=tmp_path / "whole", **given)
     with pytest.raises(bg.errors.Interrupted, match=r"resume with 'bridgegen risk crossroads-s1"):
         estimate_risk(SCENARIO, out=folder, callbacks=RiskCallbacks(evaluations=stop), **given)
@@ -187,7 +187,7 @@ def test_folders_of_others_are_left_alone(risk, tmp_path):
     (tmp_path / "thesis.txt").write_text("mine")
     with pytest.raises(StorageError, match="holds something else than a risk"):
         estimate_risk(SCENARIO, out=tmp_path, **GIVEN)
-    with pytest.raises(StorageError, match=r"holds another estimate \(it differs in seed"):
+    with pytest.raises(StorageError, match=r"holds another risk \(it differs in seed"):
         estimate_risk(SCENARIO, out=risk.folder, **GIVEN, seed=9)
 
 

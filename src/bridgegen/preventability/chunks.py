@@ -1,7 +1,6 @@
 """A map's folder: what it is a map of, and the outcomes of the chunks of cells that are done."""
 
 import io
-import json
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -9,9 +8,9 @@ from typing import Any
 import numpy as np
 
 from bridgegen.disk import write_whole
-from bridgegen.errors import StorageError
 from bridgegen.preventability.classes import Codes, Outcome
-from bridgegen.records import parse_json, read_bytes
+from bridgegen.records import read_bytes
+from bridgegen.store.claimed import claim
 
 CHUNK = 16_384
 """Cells of a chunk: what is lost at most when a map is stopped. No result depends on it."""
@@ -35,27 +34,7 @@ class ChunkStore:
 
     def __init__(self, folder: Path, settings: Mapping[str, Any], drivers: int, cells: int) -> None:
         self.folder, self._drivers, self._cells = folder, drivers, cells
-        made = json.loads(json.dumps(settings))
-        path = folder / SETTINGS
-        try:
-            (folder / CHUNKS).mkdir(parents=True, exist_ok=True)
-            before = parse_json(read_bytes(path)) if path.exists() else None
-            other = any(one.name not in (SETTINGS, CHUNKS) for one in folder.iterdir())
-        except OSError as error:
-            raise StorageError(f"{folder}: cannot be written: {error.strerror}") from None
-        except ValueError as error:
-            raise StorageError(f"{path}: is damaged: {error}") from None
-        if before is None:
-            if other:
-                raise StorageError(f"{folder}: holds something else than a map, choose another")
-            write_whole(path, [json.dumps(made, indent=1).encode()])
-        elif before != made:
-            known = before if isinstance(before, dict) else {}
-            differs = ", ".join(name for name in made if known.get(name) != made[name])
-            raise StorageError(
-                f"{folder}: holds another map (it differs in {differs or 'its settings'}); choose "
-                "another folder (--out), or remove it"
-            )
+        claim(folder, settings, file=SETTINGS, pieces=CHUNKS, what="a map")
 
     @property
     def count(self) -> int:

@@ -43,6 +43,11 @@ class Experiment:
         return self._exposure.dimensions
 
     @property
+    def columns(self) -> int:
+        """The number of columns of an outcome."""
+        return len(Column)
+
+    @property
     def share(self) -> tuple[float, float, float]:
         """The feasible share of the exposure, and its interval: low, estimate, high."""
         found = self._exposure.feasible_share

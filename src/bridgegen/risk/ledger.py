@@ -6,7 +6,6 @@ points, are read; from the first that is not, rows are simulated.
 
 import hashlib
 import io
-import json
 import zipfile
 from collections.abc import Mapping
 from pathlib import Path
@@ -16,9 +15,9 @@ import numpy as np
 
 from bridgegen.arrays import Float
 from bridgegen.disk import write_whole
-from bridgegen.errors import StorageError
-from bridgegen.records import parse_json, read_bytes
+from bridgegen.records import read_bytes
 from bridgegen.risk.outcomes import Column, Outcomes
+from bridgegen.store.claimed import claim
 
 SETTINGS = "settings.json"
 BATCHES = "batches"
@@ -40,31 +39,7 @@ class Ledger:
 
     def __init__(self, folder: Path, settings: Mapping[str, Any]) -> None:
         self.folder = folder
-        made = json.loads(json.dumps(settings))
-        path = folder / SETTINGS
-        known = (SETTINGS, BATCHES, *RESULTS)
-        try:
-            (folder / BATCHES).mkdir(parents=True, exist_ok=True)
-            before = parse_json(read_bytes(path)) if path.exists() else None
-            other = any(
-                one.name not in known and not one.name.startswith(SCENARIO)
-                for one in folder.iterdir()
-            )
-        except OSError as error:
-            raise StorageError(f"{folder}: cannot be written: {error.strerror}") from None
-        except ValueError as error:
-            raise StorageError(f"{path}: is damaged: {error}") from None
-        if before is None:
-            if other:
-                raise StorageError(f"{folder}: holds something else than a risk, choose another")
-            write_whole(path, [json.dumps(made, indent=1).encode()])
-        elif before != made:
-            held = before if isinstance(before, dict) else {}
-            differs = ", ".join(name for name in made if held.get(name) != made[name])
-            raise StorageError(
-                f"{folder}: holds another estimate (it differs in {differs or 'its settings'}); "
-                "choose another folder (--out), or remove it"
-            )
+        claim(folder, settings, file=SETTINGS, pieces=BATCHES, belongs=_is_result, what="a risk")
         self._number = 0
 
     def next(self, Z: Float, least: float) -> Outcomes | None:
@@ -122,6 +97,10 @@ class Ledger:
 
     def _path(self) -> Path:
         return self.folder / BATCHES / f"{self._number:06d}.npz"
+
+
+def _is_result(name: str) -> bool:
+    return name in RESULTS or name.startswith(SCENARIO)
 
 
 def _digest(Z: Float, least: float) -> str:

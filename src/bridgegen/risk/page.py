@@ -150,9 +150,7 @@ def _intervals(risk: Risk) -> str:
     for power in range(first, last + 1):
         x = at(10.0**power)
         parts.append(f'<path class="grid" d="M{x:.1f} 6V{height - 28}"/>')
-        parts.append(
-            f'<text x="{x:.1f}" y="{height - 10}" text-anchor="middle">{number(10.0**power)}</text>'
-        )
+        parts.append(f'<text x="{x:.1f}" y="{height - 10}" text-anchor="middle">1e{power}</text>')
     for row, (kind, words, p) in enumerate(lines):
         y = 20 + _ROW * row
         short = words if len(words) < 48 else f"{words[:46]}…"

@@ -2,7 +2,7 @@
 
 import shlex
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any, cast
@@ -36,6 +36,7 @@ from bridgegen.risk.events import require as require_event
 from bridgegen.risk.experiment import Experiment
 from bridgegen.risk.ledger import Ledger
 from bridgegen.risk.result import MOST_LIKELY, Risk, most_likely
+from bridgegen.simulation.rollout import Rollout
 from bridgegen.store import Store
 from bridgegen.workers import CarriedDriver, Choice, open_workers
 
@@ -44,6 +45,7 @@ UNIFORM = "uniform"
 
 _EVENLY = b"source: Uniform over the ranges, which no road is like.\nothers: uniform\n"
 MOST_EVALUATIONS = 10**10
+BEFORE, AFTER = 4.0, 2.0  # s, of the picture, around the conflict's most urgent instant
 
 
 @dataclass(frozen=True)
@@ -201,8 +203,23 @@ def _write_most_likely(pipeline: Pipeline, x: Float, count: Count, folder: Path)
     except OSError as error:
         raise StorageError(f"{folder}: cannot be written: {error.strerror}") from None
     other = int(decisive(conflicts, count)[0][0])
-    when = float(conflicts.instant[0, other]) * rollout.time_step
-    return moving_picture(rollout, other, when, "the most likely harmful encounter, from above")
+    instant, step = int(conflicts.instant[0, other]), rollout.time_step
+    first = max(instant - round(BEFORE / step), 0)
+    shown = _between(rollout, first, instant + round(AFTER / step) + 1)
+    when = (instant - first) * step
+    return moving_picture(shown, other, when, "the most likely harmful encounter, from above")
+
+
+def _between(rollout: Rollout, first: int, last: int) -> Rollout:
+    """Return where everyone is between two instants."""
+    there = rollout.present
+    return replace(
+        rollout,
+        x=rollout.x[:, :, first:last],
+        y=rollout.y[:, :, first:last],
+        h=rollout.h[:, :, first:last],
+        present=there[:, :, first:last] if there.size else there,
+    )
 
 
 def _count(name: str) -> Count:

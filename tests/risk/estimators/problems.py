@@ -24,6 +24,7 @@ class Analytic:
     share: tuple[float, float, float] = (1.0, 1.0, 1.0)
     chunk: int = 10**9
     evaluations: int = field(default=0)
+    columns: int = 2
 
     def feasible(self, Z):
         return self.allowed(Z)

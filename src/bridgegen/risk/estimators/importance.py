@@ -21,10 +21,10 @@ from bridgegen.risk.estimators.weighted import FEWEST_HITS, Weighted
 
 DEFENSIVE, AROUND = 0.1, 0.25
 """The shares of rows that are drawn as on the road, and around single points."""
-FITTED, CENTRES = 1000, 200  # points, at most
+FITTED, CENTRES = 500, 200  # points, at most
 ROUNDS, OF_ROUND = 2, 2000
 """How often proposals are fitted again, and to how many rows."""
-PREPARED, FOUND = 0.4, 0.5
+PREPARED, FOUND = 0.6, 0.5
 """The share of the budget that subset simulation may take, and the precision at which it stops."""
 FEWEST_ROWS = 100  # of a round
 OF_CHAIN = 5.0  # points of chains are worth one independent one
@@ -102,7 +102,7 @@ def estimate(problem: Problem, aim: Aim, seed: int, start: Float | None = None) 
     there = known.scores >= aim.threshold
     Z, weights = known.Z[there], known.weights[there]
     if start is not None and len(start):
-        more = weights.mean() if len(Z) else 1.0
+        more = (weights.sum() if len(Z) else 1.0) / len(start)  # half of the rows look there
         Z, weights = np.concatenate([Z, start]), np.append(weights, np.full(len(start), more))
     if not len(Z):
         return known
@@ -159,6 +159,7 @@ def _drawn(
         "components": float(len(proposals.fitted.weights)),
         "effective_hits": result.hits(result.there(aim.threshold)),
         "heaviest": _heaviest(result, aim),
+        "reached": known.facts.get("reached", 1.0),
     }
     return replace(result, doubts=tuple(_doubts(result, aim, known, helped)), facts=facts)
 
@@ -172,7 +173,13 @@ def _heaviest(result: Weighted, aim: Aim) -> float:
 
 def _doubts(result: Weighted, aim: Aim, known: Weighted, helped: bool) -> Iterator[str]:
     """Yield why a result is not believed; ``helped`` by further points of the event or not."""
-    yield from known.doubts
+    if known.doubts and helped:
+        yield (
+            f"subset simulation is in doubt ({known.doubts[0]}), so harm other than what the "
+            "search found is not bounded; what it found is counted"
+        )
+    else:
+        yield from known.doubts
     hits, heaviest = result.hits(result.there(aim.threshold)), _heaviest(result, aim)
     found = result.probability(aim.threshold)
     if hits < FEWEST_HITS:

@@ -12,7 +12,7 @@ import scipy.spatial.distance
 
 from bridgegen.arrays import Float, Int
 
-MOST_COMPONENTS = 8
+MOST_COMPONENTS, PATIENCE = 8, 2
 FLOOR = 0.04  # added to variances: proposals never become thinner than 0.2
 _ROUNDS, _TOLERANCE = 60, 1e-3
 
@@ -104,16 +104,16 @@ def fit(Z: Float, weights: Float, size: float, random: np.random.Generator) -> M
     """
     weights = weights / weights.sum()
     d = Z.shape[1]
-    best, least = None, np.inf
+    best, least, chosen = None, np.inf, 0
     for count in range(1, MOST_COMPONENTS + 1):
-        if count > 1 and size < 5.0 * count * (d + 1):
+        if count > 1 and (size < 5.0 * count * (d + 1) or count > chosen + PATIENCE):
             break
         found = _maximised(Z, weights, _begin(Z, weights, count, random))
         likelihood = size * float(np.sum(weights * found.log_density(Z)))
         numbers = count * (1 + d + 0.5 * d * (d + 1)) - 1
         criterion = -2.0 * likelihood + numbers * np.log(size)
         if criterion < least:
-            best, least = found, criterion
+            best, least, chosen = found, criterion, count
     assert best is not None
     return best
 

@@ -19,6 +19,10 @@ class Problem(Protocol):
         """The number of independent standard normal variables, ≥ 1."""
 
     @property
+    def columns(self) -> int:
+        """The number of columns of an outcome, ≥ 1."""
+
+    @property
     def share(self) -> tuple[float, float, float]:
         """The probability that a point is feasible, and its 95 % interval."""
 
@@ -33,7 +37,7 @@ class Problem(Protocol):
             least: outcomes with a lower score may be returned as any lower score.
 
         Returns:
-            ``(N, C)``; column `SCORE` is the score, the others belong to the problem.
+            ``(N, columns)``; column `SCORE` is the score, the others belong to the problem.
         """
 
 

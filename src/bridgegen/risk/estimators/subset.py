@@ -24,8 +24,10 @@ PILOT = 1000  # points of the pilot run
 ACCEPTED = 0.44  # share of proposals that the pilot run aims at
 DEEPEST = 20  # levels, at most: a probability of 1e-20
 STUCK = 0.01  # of a level at least must reach the next one
+MOST_TIED = 0.5  # of a level's points at most may be in the next one
 TOGETHER = 20  # repetitions that run side by side
-POINTS, FEWEST_POINTS = 250, 25  # of a repetition
+POINTS, FEWEST_POINTS = 250, 25  # of a repetition; all have the same number
+FEWEST_ROUNDS = 2  # so that the first one says what repetitions cost
 MARGIN = 1.3  # of evaluations: repetitions take more or fewer
 FEWEST_REPETITIONS, MOST_ERROR, LEAST_ACCEPTED = 10, 0.5, 0.03
 """What repetitions must keep for the interval to be believed."""
@@ -51,8 +53,6 @@ class Pilot:
 
     Attributes:
         levels: from the easiest one up to the aim, if that was reached.
-        Z: ``(M, d)`` the points that reach the last level.
-        estimate: the probability of the last level.
         passing: the share of points that reached each level.
         accepted: the share of accepted proposals of each level.
         evaluations: that it took.
@@ -60,8 +60,6 @@ class Pilot:
     """
 
     levels: tuple[Level, ...]
-    Z: Float
-    estimate: float
     passing: tuple[float, ...]
     accepted: tuple[float, ...]
     evaluations: int
@@ -145,28 +143,22 @@ def pilot(problem: Problem, aim: Aim, seed: int) -> Pilot:
     levels: list[Level] = []
     passing: list[float] = []
     accepted: list[float] = []
-    total, before = 1.0, -np.inf
+    before, reached = -np.inf, False
     while len(levels) < DEEPEST:
         scores = found[:, SCORE]
-        reached = bool(np.mean(scores >= aim.threshold) >= PASSING)
-        level = aim.threshold if reached else _next_level(scores, before)
+        level = min(_next_level(scores, before), aim.threshold)
         there = scores >= level
-        if level >= aim.threshold:
-            level, reached, there = aim.threshold, True, scores >= aim.threshold
         share = float(there.mean())
         if share < STUCK or not level > before:
             break
-        total *= share
+        reached = level == aim.threshold
         passing.append(share)
         seeds, outcome = Z[there], found[there]
         scale = 0.6
         spread = seeds.std(axis=0)
         levels.append(Level(level, np.minimum(1.0, scale * spread)))
         if reached:
-            return Pilot(
-                tuple(levels), seeds, total, tuple(passing), tuple(accepted),
-                chains.evaluations, True,
-            )  # fmt: skip
+            break
         parts, results = [seeds], [outcome]
         have, took = len(seeds), []
         now, last = seeds, outcome
@@ -189,21 +181,17 @@ def pilot(problem: Problem, aim: Aim, seed: int) -> Pilot:
             break
         Z, found = np.concatenate(parts)[:points], np.concatenate(results)[:points]
         before = level
-    none = np.empty((0, problem.dimensions))
-    return Pilot(
-        tuple(levels), none, total, tuple(passing), tuple(accepted), chains.evaluations, False
-    )
+    return Pilot(tuple(levels), tuple(passing), tuple(accepted), chains.evaluations, reached)
 
 
 def _next_level(scores: Float, before: float) -> float:
     """Return the score that a tenth of the points reaches; the next higher one where they tie."""
     ordered = np.sort(scores)
     level = float(ordered[len(ordered) - int(np.ceil(PASSING * len(ordered)))])
-    higher = ordered[ordered > max(level, before)] if level <= before else ordered
-    if level <= before or np.mean(scores >= level) > 0.5:
-        higher = ordered[ordered > max(level, before)]
-        return float(higher[0]) if higher.size else before
-    return level
+    if level > before and np.mean(scores >= level) <= MOST_TIED:
+        return level
+    higher = ordered[ordered > max(level, before)]
+    return float(higher[0]) if higher.size else before
 
 
 def repeat(
@@ -242,21 +230,18 @@ def repeat(
 
 def estimate(problem: Problem, aim: Aim, seed: int) -> Weighted:
     """Run the pilot, then repetitions until the precision or the budget is reached."""
-    return estimate_after(problem, aim, seed, pilot(problem, aim, seed))
-
-
-def estimate_after(problem: Problem, aim: Aim, seed: int, first: Pilot) -> Weighted:
-    """Repeat the chain that a pilot run found."""
+    first = pilot(problem, aim, seed)
     spent, rounds = first.evaluations, 0
     cost = 1.0 + sum(1.0 - one for one in first.passing[:-1])  # evaluations a point, expected
+    affordable = (aim.budget - spent) / (MARGIN * cost * TOGETHER)
+    points = int(affordable / max(FEWEST_ROUNDS, math.ceil(affordable / POINTS)))
     parts: list[tuple[Float, Float, Float, Int]] = []
     result = _result(problem, parts, 0, spent)
-    while first.reached:
-        left = (aim.budget - spent) / (MARGIN * cost * TOGETHER)
-        points = int(min(left, POINTS, math.inf if rounds else max(0.25 * left, FEWEST_POINTS)))
-        if points < FEWEST_POINTS:
+    while first.reached and points >= FEWEST_POINTS:
+        limit = aim.budget - spent
+        if MARGIN * cost * points * TOGETHER > limit:
             break
-        random, limit = block_of(seed, rounds + 1), aim.budget - spent
+        random = block_of(seed, rounds + 1)
         try:
             Z, found, weights, owner, took = repeat(problem, first, points, TOGETHER, random, limit)
         except _OutOfBudget as error:
@@ -308,7 +293,10 @@ def _doubts(first: Pilot, aim: Aim, sums: Float, facts: dict[str, float]) -> Ite
 def _result(
     problem: Problem, parts: list[tuple[Float, Float, Float, Int]], count: int, spent: int
 ) -> Weighted:
-    none = np.empty((0, problem.dimensions)), np.empty((0, 1)), np.empty(0), np.empty(0, np.int64)
+    none = (
+        np.empty((0, problem.dimensions)), np.empty((0, problem.columns)), np.empty(0),
+        np.empty(0, np.int64),
+    )  # fmt: skip
     Z, found, weights, owner = (np.concatenate(one) for one in zip(*(parts or [none]), strict=True))
     share = weights / max(count, 1)
     largest = float(share.max(initial=0.0))

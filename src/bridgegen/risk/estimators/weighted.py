@@ -45,11 +45,9 @@ class Probability:
         """Half of the interval over the estimate; inf if that is 0."""
         return 0.5 * (self.high - self.low) / self.estimate if self.estimate > 0.0 else np.inf
 
-    def times(self, low: float, factor: float, high: float) -> "Probability":
-        """Return it times an uncertain factor, whose 95 % interval widens this one's."""
-        return Probability(
-            self.estimate * factor, self.low * low, self.high * high, self.upper * high
-        )
+    def widened(self, low: float, high: float) -> "Probability":
+        """Return it with its ends moved by factors, of at most and of at least 1."""
+        return Probability(self.estimate, self.low * low, self.high * high, self.upper * high)
 
 
 @dataclass(frozen=True)
@@ -64,7 +62,7 @@ class Weighted:
         repetition: ``(M,)`` the number of each one's repetition; empty where rows are independent.
         repetitions: how many repetitions there are.
         largest: the largest weight that a row could have had.
-        share: the factor, with its interval, that weights were multiplied by.
+        share: low, middle and high value of the factor that weights were multiplied by.
         evaluations: that it took, preparation included.
         doubts: why the interval should not be believed, a sentence each.
         facts: diagnostics by name.
@@ -115,23 +113,26 @@ class Weighted:
         parts = self.weights * values
         if self.repetitions:
             found = of_repetitions(self.sums(values))
-        elif np.ptp(parts[parts > 0.0]) == 0.0 if (parts > 0.0).any() else True:
-            found = of_counts(int((parts > 0.0).sum()), self.rows, self._each(parts))
         else:
-            found = of_weights(parts[parts > 0.0])
-        middle, low, high = self.share
-        return found.times(low / middle, 1.0, high / middle)
-
-    def _each(self, parts: Float) -> float:
-        """Return how much one hit counts, times the number of rows."""
-        held = parts[parts > 0.0]
-        return float(held[0]) * self.rows if held.size else self.largest * self.rows
+            held = parts[parts > 0.0]
+            each = held[0] if held.size else self.largest
+            is_count = not held.size or np.ptp(held) == 0.0
+            found = of_counts(held.size, self.rows, each) if is_count else of_weights(held)
+        low, middle, high = self.share
+        return found.widened(low / middle, high / middle)
 
 
-def of_counts(hits: int, rows: int, factor: float = 1.0) -> Probability:
-    """Return the exact interval of a share of independent rows, times a factor."""
+def of_counts(hits: int, rows: int, each: float) -> Probability:
+    """Return the exact interval of what hits sum up to.
+
+    Args:
+        hits: how many there are.
+        rows: of so many independent rows.
+        each: how much one counts.
+    """
     if not rows:
         return Probability(0.0, 0.0, 1.0, 1.0)
+    factor = rows * float(each)
     tail = 0.5 * (1.0 - LEVEL)
     beta = scipy.stats.beta.ppf
     low = float(beta(tail, hits, rows - hits + 1)) if hits else 0.0
