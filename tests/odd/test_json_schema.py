@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from bridgegen.errors import InputError, StorageError
 from bridgegen.odd.json_schema import schema, schema_text, write_schema
 from bridgegen.odd.plain_yaml import Document, read_plain_yaml
-from bridgegen.odd.reader import build, _Declarations, names
+from bridgegen.odd.reader import _Declarations, build, names
 from bridgegen.odd.schema import FragmentFile, ScenarioFile
 from bridgegen.odd.shape import shape_problems
 
