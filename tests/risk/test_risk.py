@@ -171,7 +171,7 @@ def test_a_search_s_run_helps_and_counting_agrees(tmp_path):
         ({"exposure": "uniform", "method": "magic"}, "unknown method 'magic'"),
         ({"exposure": "uniform", "count": "all"}, "unknown count 'all'"),
         ({"exposure": "uniform", "ego": "nobody"}, "unknown ego driver 'nobody'"),
-        ({"exposure": "uniform", "budget": 3}, "--budget must be 100 to"),
+        ({"exposure": "uniform", "budget": 3}, "--budget must be 20 to"),
         ({"exposure": "uniform", "precision": 1.0}, "--precision must be at least 0 and below 1"),
         ({"exposure": "uniform", "seed": -1}, "--seed must be at least 0"),
         ({"exposure": "uniform", "check": -1}, "--check must be 0 to"),

@@ -44,7 +44,7 @@ UNIFORM = "uniform"
 """Names the exposure in which each parameter is uniform over its range: no road is like that."""
 
 _EVENLY = b"source: Uniform over the ranges, which no road is like.\nothers: uniform\n"
-MOST_EVALUATIONS = 10**10
+LEAST_EVALUATIONS, MOST_EVALUATIONS = 20, 10**10
 BEFORE, AFTER = 4.0, 2.0  # s, of the picture, around the conflict's most urgent instant
 
 
@@ -234,8 +234,10 @@ def _require_numbers(precision: float, budget: int, seed: int, check: int) -> No
     problems = []
     if not 0.0 <= precision < 1.0:
         problems.append(f"--precision must be at least 0 and below 1, got {precision:g}")
-    if not 100 <= budget <= MOST_EVALUATIONS:
-        problems.append(f"--budget must be 100 to {MOST_EVALUATIONS:,} evaluations, got {budget}")
+    if not LEAST_EVALUATIONS <= budget <= MOST_EVALUATIONS:
+        problems.append(
+            f"--budget must be {LEAST_EVALUATIONS} to {MOST_EVALUATIONS:,} evaluations, got {budget}"
+        )
     if not 0 <= check <= MOST_EVALUATIONS:
         problems.append(f"--check must be 0 to {MOST_EVALUATIONS:,} evaluations, got {check}")
     if seed < 0:

@@ -144,7 +144,7 @@ def test_a_needle_that_a_search_has_found_counts():
 
 @pytest.mark.parametrize("method", METHODS)
 @settings(max_examples=12)
-@given(budget=st.integers(100, 9000), seed=st.integers(0, 2**31))
+@given(budget=st.integers(20, 9000), seed=st.integers(0, 2**31))
 def test_the_budget_is_kept_and_counted(method, budget, seed):
     problem = problems.linear(3, 2.0)
     found = run(method, problem, seed, budget)
