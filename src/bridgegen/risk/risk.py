@@ -236,7 +236,8 @@ def _require_numbers(precision: float, budget: int, seed: int, check: int) -> No
         problems.append(f"--precision must be at least 0 and below 1, got {precision:g}")
     if not LEAST_EVALUATIONS <= budget <= MOST_EVALUATIONS:
         problems.append(
-            f"--budget must be {LEAST_EVALUATIONS} to {MOST_EVALUATIONS:,} evaluations, got {budget}"
+            f"--budget must be {LEAST_EVALUATIONS} to {MOST_EVALUATIONS:,} evaluations, "
+            f"got {budget}"
         )
     if not 0 <= check <= MOST_EVALUATIONS:
         problems.append(f"--check must be 0 to {MOST_EVALUATIONS:,} evaluations, got {check}")
