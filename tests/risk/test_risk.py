@@ -245,3 +245,34 @@ def test_a_table_of_other_things_is_refused(tmp_path):
         estimate_risk(
             SCENARIO, exposure="uniform", events=tmp_path / "rows.csv", out=tmp_path / "out"
         )
+
+
+def test_what_is_in_doubt_is_not_stated(tmp_path):
+    """A budget that suffices for a pilot run alone."""
+    found = estimate_risk(
+        SCENARIO, out=tmp_path / "few", **GIVEN | {"method": "importance", "budget": 300}
+    )
+    assert found.weighted.doubts
+    assert not found.believed
+    assert all(one.probability is None for one in found.findings.values())
+    assert all(one.probability is None for one in found.by_mode.values())
+    assert found.parameters == ()
+    assert "is not known" in (found.folder / "risk.html").read_text()
+
+
+def test_too_few_hits_of_strata_are_not_believed(tmp_path):
+    found = estimate_risk(
+        SCENARIO, out=tmp_path / "few", **GIVEN | {"method": "stratified", "budget": 1500}
+    )
+    assert 0.0 < found.weighted.hits(found.weighted.there(0.6)) < 30.0
+    assert not found.believed
+
+
+def test_the_check_counts_other_rows(tmp_path):
+    """Where auto counts, too."""
+    given = GIVEN | {"method": "auto", "budget": 1200, "check": 1000}
+    found = estimate_risk(SCENARIO, out=tmp_path / "check", **given)
+    assert found.estimated.method == "mc"
+    same = np.isin(found.check.Z[:, 0], found.weighted.Z[:, 0])
+    assert len(same)
+    assert not same.any()

@@ -1,6 +1,5 @@
 """Makes a map: the drivers and the models in every cell that needs them, chunk by chunk."""
 
-import hashlib
 import shlex
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -205,8 +204,7 @@ def _distinct(names: Iterable[str], what: str) -> tuple[str, ...]:
 
 def digest_of(name: str) -> str | None:
     """Return a digest of the file of a user's driver; None where it has none."""
-    data = CarriedDriver.of(name).data
-    return None if data is None else hashlib.sha256(data).hexdigest()
+    return CarriedDriver.of(name).digest
 
 
 def _command(

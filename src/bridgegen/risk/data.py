@@ -45,7 +45,8 @@ def data_band(exposure: Exposure, weighted: Weighted, threshold: float, fit: Fit
         fit: to the events.
     """
     replicates = fit.replicates
-    at = np.flatnonzero(weighted.there(threshold))[:: max(1, len(weighted.Z) // MOST_ROWS)]
+    hits = np.flatnonzero(weighted.there(threshold))
+    at = hits[:: max(1, len(hits) // MOST_ROWS)]
     if not len(at):
         return DataBand(None, None, len(replicates), len(replicates))
     X = exposure.from_normal(weighted.Z[at])

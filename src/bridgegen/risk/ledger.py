@@ -24,6 +24,10 @@ BATCHES = "batches"
 RESULTS = ("risk.json", "risk.html", "harmful.csv")
 SCENARIO = "most-likely."
 _LONGEST_MODE = 400
+_DAMAGED = (
+    ValueError, TypeError, LookupError, EOFError, MemoryError, RuntimeError, zipfile.BadZipFile,
+)  # fmt: skip
+"""What reading a damaged or hostile batch may raise."""
 
 
 class Ledger:
@@ -66,7 +70,7 @@ class Ledger:
             values[:, Column.RESULT] = 1.0
             values[found["without"], Column.RESULT] = found["why"]
             values[at] = held
-        except (OSError, ValueError, EOFError, KeyError, IndexError, zipfile.BadZipFile):
+        except (OSError, *_DAMAGED):
             return None
         numbers = values[:, Column.MODE]
         if not np.isfinite(values).all() or numbers.max(initial=-1.0) >= len(modes):

@@ -88,11 +88,11 @@ def _table(risk: Risk) -> str:
     head = ["", "per encounter", "95 %", "below, with 95 %", "effective rows"]
     head += ["per hour", "per 1000 km"] if rates is not None else []
     rows = []
-    for name, one in risk.findings.items():
+    for words, name, one in risk.stated:
         cells = list(_cells(one))
         if rates is not None:
             for unit, factor in (("h", 1.0), ("km", 1000.0)):
-                rate = risk.rate(name, unit)
+                rate = None if name is None else risk.rate(name, unit)
                 cells.append(
                     "–"
                     if rate is None
@@ -100,7 +100,7 @@ def _table(risk: Risk) -> str:
                     f"{number(rate.high * factor)}</small>"
                 )
         row = "".join(f"<td>{cell}</td>" for cell in cells)
-        rows.append(f"<tr><th>{escape(WORDS[name])}</th>{row}</tr>")
+        rows.append(f"<tr><th>{escape(words)}</th>{row}</tr>")
     columns = "".join(f"<th>{one}</th>" for one in head)
     return f"<table><thead><tr>{columns}</tr></thead><tbody>{''.join(rows)}</tbody></table>"
 

@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping
 from csv import writer
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +18,7 @@ from bridgegen.exposure import Exposure
 from bridgegen.exposure.rates import Rate
 from bridgegen.risk.data import DataBand
 from bridgegen.risk.estimators.weighted import FEWEST_HITS, Probability, Weighted
-from bridgegen.risk.events import EVENTS, INJURY
+from bridgegen.risk.events import EVENTS, INJURY, WORDS
 from bridgegen.risk.methods import Estimated
 from bridgegen.risk.outcomes import Column
 
@@ -111,16 +112,12 @@ class Risk:
     @property
     def believed(self) -> bool:
         """Whether the event's interval is believed."""
-        return not self.weighted.doubts
+        return self.probability(self.event) is not None
 
-    @property
+    @cached_property
     def findings(self) -> dict[str, Finding]:
         """The probability of each event per encounter, by name; and of a serious injury."""
-        found = {name: self._finding(self._values(name)) for name in (*EVENTS, INJURY)}
-        if self.weighted.doubts:
-            aimed = found[self.event]
-            found[self.event] = Finding(None, aimed.hits, self.weighted.doubts[0])
-        return found
+        return {name: self._finding(self._values(name)) for name in (*EVENTS, INJURY)}
 
     def probability(self, name: str) -> Probability | None:
         """Return the probability of an event per encounter; None where it is not believed."""
@@ -134,7 +131,7 @@ class Risk:
         own = self.weighted.outcomes[:, Column.HARM] >= EVENTS[self.event].harm
         return self._finding(self._values(self.event) * own)
 
-    @property
+    @cached_property
     def by_mode(self) -> dict[str, Finding]:
         """The probability of the event by failure mode, most likely first."""
         values, number = self._values(self.event), self.weighted.outcomes[:, Column.MODE]
@@ -142,6 +139,15 @@ class Risk:
         sums = {words: float(parts[number == k].sum()) for k, words in enumerate(self.modes)}
         order = sorted((one for one in sums if sums[one] > 0.0), key=lambda one: -sums[one])
         return {one: self._finding(values * (number == self.modes.index(one))) for one in order}
+
+    @property
+    def stated(self) -> tuple[tuple[str, str | None, Finding], ...]:
+        """What is stated, in order: words, the event's name for its rate, and the finding."""
+        found = [(WORDS[name], name, one) for name, one in self.findings.items()]
+        if self.preventable is not None:
+            words = f"{WORDS[self.event]}, preventable"
+            return (*found, (words, None, self.preventable))
+        return tuple(found)
 
     def rate(self, name: str, unit: str) -> Rate | None:
         """Return how often an event happens per hour or km; None where that is not known.
@@ -168,12 +174,12 @@ class Risk:
         """The harmful row that is most likely on the road, ``(len(space.names),)``."""
         return most_likely(self.exposure, self.weighted, self.event)
 
-    @property
+    @cached_property
     def parameters(self) -> tuple[ParameterShare, ...]:
         """How harmful rows differ from the road, the most different parameter first."""
         there = self._values(self.event) > 0.0
         X, weights = self._rows(self.event), self.weighted.weights[there]
-        if self.weighted.hits(self._values(self.event)) < FEWEST_HITS:
+        if self.weighted.doubts or self.weighted.hits(self._values(self.event)) < FEWEST_HITS:
             return ()
         road = self.exposure.sample(COMPARED, self.seed).X
         found = [
@@ -273,6 +279,8 @@ class Risk:
 
     def _finding(self, values: Float) -> Finding:
         hits, one = self.weighted.hits(values), self.weighted
+        if one.doubts:  # of the aim; what comes with it is no surer
+            return Finding(None, hits, one.doubts[0])
         counted = bool(one.rows) and (not one.weights.size or np.ptp(one.weights) == 0.0)
         if counted or hits >= FEWEST_HITS:
             return Finding(one.mean(values), hits)

@@ -1,5 +1,6 @@
 """Estimates a risk: exposure and driver, an experiment, a method, the result."""
 
+import hashlib
 import shlex
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
@@ -45,6 +46,7 @@ UNIFORM = "uniform"
 
 _EVENLY = b"source: Uniform over the ranges, which no road is like.\nothers: uniform\n"
 LEAST_EVALUATIONS, MOST_EVALUATIONS = 20, 10**10
+OTHER_ROWS = 2  # added to the seed: no method counts rows of that one
 BEFORE, AFTER = 4.0, 2.0  # s, of the picture, around the conflict's most urgent instant
 
 
@@ -144,7 +146,7 @@ def estimate_risk(
             "fingerprint": driven.fingerprint,
             "exposure": _digest(met),
             "driver": name,
-            "file of the driver": CarriedDriver.of(name).data is not None and _file_digest(name),
+            "file of the driver": CarriedDriver.of(name).digest,
             "vehicle": pipeline.vehicle,
             "event": event,
             "count": count,
@@ -153,7 +155,7 @@ def estimate_risk(
             "budget": budget,
             "seed": seed,
             "check": check,
-            "start": None if Z is None else len(Z),
+            "start": None if Z is None else hashlib.sha256(Z.tobytes()).hexdigest(),
             "events": None if fitted is None else fitted.used,
         }
         command = _command(scenario, exposure, settings, others, start, events, folder)
@@ -171,11 +173,11 @@ def estimate_risk(
             beside = None
             if check:
                 plain = Aim(aimed.harm, LEAST, check, 0.0)
-                beside = monte_carlo.estimate(experiment, plain, seed + 1)
+                beside = monte_carlo.estimate(experiment, plain, seed + OTHER_ROWS)
         except KeyboardInterrupt:
             raise Interrupted(folder, experiment.evaluations, total, command=command) from None
         data = None
-        if fitted is not None:
+        if fitted is not None and not found.weighted.doubts:
             data = data_band(met, found.weighted, aimed.harm, fitted)
         worst = most_likely(met, found.weighted, event)
         picture = "" if worst is None else _write_most_likely(pipeline, worst, whose, folder)
@@ -290,7 +292,10 @@ def _fit_of(
             f"{events}: has none of the exposure's parameters, {', '.join(exposure.marginals)}"
         )
     others = [name for name in columns if name not in wanted]
-    return fit_exposure(scenario, events, ignore=others, others="default")
+    is_whole = len(wanted) == len(exposure.marginals)
+    return fit_exposure(
+        scenario, events, ignore=others, others="default" if is_whole else "uniform"
+    )
 
 
 def _points_of(run: Path, exposure: Exposure, harm: float) -> Float:
@@ -318,16 +323,8 @@ def _points_of(run: Path, exposure: Exposure, harm: float) -> Float:
 
 def _digest(exposure: Exposure) -> str:
     """Return a digest of an exposure: of 64 of its rows, and of its source."""
-    import hashlib
-
     rows = exposure.sample(64, 0).X
     return hashlib.sha256(rows.tobytes() + exposure.source.encode()).hexdigest()
-
-
-def _file_digest(name: str) -> str:
-    import hashlib
-
-    return hashlib.sha256(CarriedDriver.of(name).data or b"").hexdigest()
 
 
 def _command(

@@ -27,7 +27,7 @@ class RiskScreen(Live):
 
 def print_risk(result: "Risk", seconds: float, *, as_json: bool) -> None:
     """Print a risk's sentence, its probabilities and rates, then its files; or its record."""
-    from bridgegen.risk.events import EVENTS, WORDS
+    from bridgegen.risk.events import EVENTS
     from bridgegen.risk.result import PAGE
     from bridgegen.risk.text import data_sentence, interval, rate_text, sentence
 
@@ -38,11 +38,10 @@ def print_risk(result: "Risk", seconds: float, *, as_json: bool) -> None:
     met = result.exposure.encounters
     units = [one for one in ("h", "km") if met is not None and getattr(met, _AMOUNTS[one])]
     rows = []
-    for name, one in result.findings.items():
-        row = [WORDS[name], *interval(one.probability), f"{one.hits:,.0f}"]
+    for words, name, one in result.stated:
+        row = [words, *interval(one.probability), f"{one.hits:,.0f}"]
         for unit in units:
-            rate = result.rate(name, unit)
-            row.append(rate_text(rate))
+            row.append(rate_text(None if name is None else result.rate(name, unit)))
         rows.append(tuple(row))
     head = ("", "per encounter", "95 %", "below (95 %)", "effective rows")
     print_table((*head, *(f"per {unit}" for unit in units)), rows, as_json=False)

@@ -35,7 +35,8 @@ class RiskCriteria(Conditions):
             return ()
         figures = figures_of(result)
         verdict: Verdict = "passed" if result.believed else "unknown"
-        details = "; ".join(result.weighted.doubts) or f"method {result.estimated.method}"
+        doubt = result.findings[result.event].doubt
+        details = doubt or f"method {result.estimated.method}"
         found = [Outcome("the interval is believed", verdict, details)]
         found += [one.judge(figures) for one in self.conditions]
         if self.junit is not None:

@@ -47,7 +47,7 @@ def write_mined(
         StorageError: a file cannot be written.
     """
     folder = out / FOLDER
-    _emptied(folder)
+    _emptied(folder, [f"{one.scenario.name}{MINED}" for one in sought])
     made: list[MinedScenario | Unmade] = []
     for number, (one, events) in enumerate(zip(sought, scenarios, strict=True)):
         fitting(number, len(scenarios))
@@ -65,13 +65,13 @@ def write_mined(
     return tuple(made)
 
 
-def _emptied(folder: Path) -> None:
-    """Make the folder, and remove what an earlier call wrote into it."""
+def _emptied(folder: Path, names: Sequence[str]) -> None:
+    """Make the folder, and remove what an earlier call wrote into it, by the scenarios' names."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
         for end in ENDINGS:
-            for old in folder.glob(f"*{MINED}{end}"):
-                old.unlink()
+            for name in names:
+                (folder / f"{name}{end}").unlink(missing_ok=True)
         (folder / ONTOLOGY).unlink(missing_ok=True)
     except OSError as error:
         raise StorageError(f"{folder}: cannot be made: {error.strerror}") from None
