@@ -185,7 +185,7 @@ def _data(
     data = _stripped(sought.document.data)
     assert isinstance(data, dict)
     source = sought.scenario
-    data["scenario"] = f"{source.name}-mined"
+    data["scenario"] = mined_name(source)
     data["title"] = f"{source.title}, as recorded"
     data["source"] = (
         f"{about} The roads, the behaviour and the constraints are those of {source.name}: "
@@ -229,7 +229,7 @@ def _stripped(data: Any) -> Any:
 
 
 def _built(data: Mapping[str, Any], source: LogicalScenario) -> LogicalScenario:
-    return build(read_plain_yaml(dumped(data).encode(), f"{source.name}-mined.yaml"), None)
+    return build(read_plain_yaml(dumped(data).encode(), f"{mined_name(source)}.yaml"), None)
 
 
 def dumped(data: Mapping[str, Any]) -> str:
@@ -243,6 +243,11 @@ def _own_parameters(sought: Sought) -> frozenset[str]:
     """Return the parameters that the file declares itself, rather than a fragment."""
     data = sought.document.data
     return frozenset(data.get("parameters", {})) if isinstance(data, dict) else frozenset()
+
+
+def mined_name(source: LogicalScenario) -> str:
+    """Return the name of the scenario that is mined of a scenario's events, and of its files."""
+    return f"{source.name}-mined"
 
 
 def files_of(sought: Sought) -> str:

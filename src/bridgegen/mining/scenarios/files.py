@@ -10,13 +10,13 @@ from bridgegen.exposure.page import write_page
 from bridgegen.mining.events.find import FoundEvents
 from bridgegen.mining.events.of_scenarios import ScenarioEvents, Sought
 from bridgegen.mining.events.tables import FOLDER as EVENTS
+from bridgegen.mining.scenarios.draft import mined_name
 from bridgegen.mining.scenarios.mined import MinedScenario, Unmade, mined_scenario
 from bridgegen.mining.scenarios.ontology import FILE as ONTOLOGY
 from bridgegen.mining.scenarios.ontology import mined_individuals
 from bridgegen.ontology.files import save
 
 FOLDER = "scenarios"
-MINED = "-mined"
 ENDINGS = (".yaml", ".html", "-distribution.xosc")
 """Of a scenario's files: it, the page of its fit, and the distribution for OpenSCENARIO."""
 DATE = "2025-01-01T00:00:00"
@@ -47,7 +47,7 @@ def write_mined(
         StorageError: a file cannot be written.
     """
     folder = out / FOLDER
-    _emptied(folder, [f"{one.scenario.name}{MINED}" for one in sought])
+    _emptied(folder, [mined_name(one.scenario) for one in sought])
     made: list[MinedScenario | Unmade] = []
     for number, (one, events) in enumerate(zip(sought, scenarios, strict=True)):
         fitting(number, len(scenarios))
