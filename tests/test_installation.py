@@ -117,3 +117,17 @@ def test_a_cache_that_cannot_be_kept_is_a_problem(monkeypatch, tmp_path):
     main.mkdir(parents=True)
     (main / "a.nbi").touch()
     assert by_subject()["compiled code"] == Finding("compiled code", str(kept))
+
+
+def test_a_wheel_carries_every_file_of_the_package():
+    """Suffixes of any folder, so that a new package's page is not forgotten."""
+    package = PROJECT.parent / "src" / "bridgegen"
+    patterns = tomllib.loads(PROJECT.read_text("utf-8"))["tool"]["setuptools"]["package-data"]
+    carried = {path for pattern in patterns["bridgegen"] for path in package.glob(pattern)}
+    development = {package / "report/web" / name for name in ("jsconfig.json", "page.d.ts")}
+    found = {
+        path
+        for path in package.rglob("*")
+        if path.is_file() and path.suffix not in (".py", ".pyc", ".nbi", ".nbc")
+    }
+    assert found - carried == development

@@ -1,9 +1,6 @@
 """The packs that ship: names, sources, plausible motion, and figures of the regulation."""
 
 import re
-import tomllib
-from importlib import resources
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -114,10 +111,3 @@ def test_individuals_of_a_pack_s_scenario_find_it_again():
     found = scenario_of(individuals)
     assert found is not None
     assert found.place == "r157/deceleration.yaml"
-
-
-def test_a_wheel_carries_the_packs():
-    folder = resources.files("bridgegen.packs").joinpath("r157")
-    assert folder.joinpath("cut-in.yaml").is_file()
-    project = tomllib.loads(Path(__file__).parents[2].joinpath("pyproject.toml").read_text("utf-8"))
-    assert "packs/*/*.yaml" in project["tool"]["setuptools"]["package-data"]["bridgegen"]
