@@ -185,6 +185,20 @@ class Pipeline:
             )
         return one
 
+    def elsewhere(self, simulator: SimulatorChoice) -> "Pipeline":
+        """Return the same with another simulator, which seeks no causes unless one counts.
+
+        Raises:
+            InputError: see ``__init__``.
+        """
+        here = self._workers if self._workers.are_here else Threads()
+        one = Pipeline(
+            options=replace(self._options, causes=False), recorded=self.metrics, workers=here,
+            **self._made_with | {"simulator": simulator},
+        )  # fmt: skip
+        one.choose_objective(self.objective)
+        return one
+
     @property
     def vehicle(self) -> str:
         """How the ego moves, one of `bridgegen.simulation.vehicles.VEHICLES`."""

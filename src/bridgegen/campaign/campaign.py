@@ -18,6 +18,7 @@ from bridgegen.campaign.report import write_run_report
 from bridgegen.campaign.restored import pipeline_of, placed
 from bridgegen.campaign.run import Run
 from bridgegen.campaign.scenarios import driven_by, is_file, load, refuse_standstill
+from bridgegen.campaign.screen import BATCH, Screen, require_screen, screen_budget, screen_of
 from bridgegen.campaign.settings import Settings
 from bridgegen.errors import InputError, Interrupted, StorageError, WorkersError
 from bridgegen.odd.adversary import adversarial
@@ -29,7 +30,8 @@ from bridgegen.openx.opendrive.site_fit import ALL
 from bridgegen.options import SearchOptions, called_with, range_problems
 from bridgegen.pipeline import Pipeline
 from bridgegen.report.data import WHOLE
-from bridgegen.search.algorithm import Problem, resolve
+from bridgegen.search.algorithm import Arena, Problem, resolve
+from bridgegen.search.screened import Screened
 from bridgegen.simulation.choice import SimulatorChoice
 from bridgegen.store import Recorded, Store, refuse_used
 from bridgegen.triage.effort import effort
@@ -109,6 +111,7 @@ def run_search(given: SearchArguments) -> Run:
     seed = catalogue.seed if given.seed is None else given.seed
     if problems := range_problems(replace(given, budget=budget, seed=seed)):
         raise InputError(*problems)
+    require_screen(given, budget)
     effort(given.triage)
     method = toolkit.get(given.algorithm)
     columns = columns_of(method, given.objectives)
@@ -136,10 +139,11 @@ def run_search(given: SearchArguments) -> Run:
         refuse_standstill(logical)
     n_obj = 1 if columns == "one" else len(spec.terms)
     values = resolve(method, Problem(space.variables, n_obj=n_obj), seed, given.settings)
-    population = values.get("population")
-    if isinstance(population, int) and population > budget:
+    population, own_budget = values.get("population"), screen_budget(given, budget)
+    rows = budget if own_budget is None else own_budget
+    if isinstance(population, int) and population > rows:
         callbacks.warning(
-            f"population {population} is greater than the budget, {budget} evaluations: the search "
+            f"population {population} is greater than the budget, {rows} evaluations: the search "
             "ends within its first, random batch"
         )
     name = f"{logical.name}-{given.algorithm}-{seed}"
@@ -166,6 +170,8 @@ def run_search(given: SearchArguments) -> Run:
             algorithm=method.name,
             settings=values,
             budget=budget,
+            screen_budget=own_budget,
+            screen_batch=None if given.screen is None else given.screen_batch or BATCH,
             seed=seed,
             ego=pipeline.driver.name,
             ideal=sorted(pipeline.driver.ideal),
@@ -178,7 +184,9 @@ def run_search(given: SearchArguments) -> Run:
             optimised=chosen.to_dict(),
             criteria=[one.to_dict() for one in pipeline.monitor],
         )
-        searcher = _algorithm(pipeline, made_with)  # before there is a folder: it may refuse
+        searcher = _searcher(
+            pipeline, made_with, callbacks.warning
+        )  # before there is a folder: it may refuse
         with Store.create(
             folder, made_with.to_dict(), space.names, pipeline.metrics,
             n_var=space.n_var, n_obj=chosen.n_obj, labels=space.labels,
@@ -205,7 +213,8 @@ def resume(
         ego: where a driver of your own drives, that same driver: code that a folder names is never
             imported unasked.
         worse_than: likewise, the driver that the ego's is compared with.
-        simulator: the run's, with its place on this machine; as recorded by default.
+        simulator: the run's, or its screen, with its place on this machine; as recorded by
+            default.
         deliver: as for ``run_search``.
         workers: likewise.
         callbacks: called as it progresses.
@@ -226,8 +235,41 @@ def resume(
         )  # fmt: skip
         callbacks.stage("compile")
         pipeline.warm_up()
-        searcher = _algorithm(pipeline, run.settings)
+        settings = run.settings
+        screen = settings.screen
+        if simulator is not None and screen is not None and simulator.name == screen.name:
+            settings = replace(settings, screen=replace(screen, access=simulator.access))
+        searcher = _searcher(pipeline, settings, callbacks.warning)
         return _go(pipeline, searcher, store, run.settings, callbacks, deliver)
+
+
+def _searcher(
+    pipeline: Pipeline, settings: Settings, warn: Callable[[str], None]
+) -> toolkit.Algorithm:
+    """Return what searches: the run's algorithm, in the screen if there is one."""
+    if settings.screen is None:
+        return _algorithm(pipeline, settings)
+    there = screen_of(pipeline, settings.screen)
+    there.warm_up()
+    assert settings.screen_budget is not None
+    assert settings.screen_batch is not None
+    closed_loop = getattr(toolkit.get(settings.algorithm), "is_adversary", False)
+    return Screened(
+        _algorithm(there, settings),
+        None if closed_loop else lambda: _algorithm(pipeline, settings),
+        Screen(there, settings.screen.name, settings.screen_budget),
+        _problem(pipeline),
+        simulator=settings.simulator.name,
+        seed=settings.seed,
+        budget=settings.budget,
+        batch=settings.screen_batch,
+        say=warn,
+    )
+
+
+def _problem(pipeline: Pipeline, arena: Arena | None = None) -> Problem:
+    objective = pipeline.objective
+    return Problem(pipeline.space.variables, pipeline.metrics, objective.n_obj, arena)
 
 
 def _algorithm(pipeline: Pipeline, settings: Settings) -> toolkit.Algorithm:
@@ -236,8 +278,7 @@ def _algorithm(pipeline: Pipeline, settings: Settings) -> toolkit.Algorithm:
     arena = pipeline.arena() if getattr(method, "is_adversary", False) else None
     if arena is not None:
         arena.warm_up()
-    names, n_obj = pipeline.space.variables, pipeline.objective.n_obj
-    problem = Problem(names, pipeline.metrics, n_obj, arena)
+    problem = _problem(pipeline, arena)
     values = resolve(method, problem, settings.seed, settings.settings)
     return method(problem, settings.seed, **values)
 

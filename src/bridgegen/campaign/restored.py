@@ -93,7 +93,9 @@ def _simulator(settings: Settings, given: SimulatorChoice | None, folder: Path) 
     Raises:
         InputError: another one is given.
     """
-    if given is None:
+    screen = settings.screen
+    is_screen = given is not None and screen is not None and given.name == screen.name
+    if given is None or (is_screen and given.name != settings.simulator.name):
         return settings.simulator
     if given.name != settings.simulator.name:
         raise InputError(

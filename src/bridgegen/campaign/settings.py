@@ -32,6 +32,7 @@ RECORDED_AS: Mapping[str, str] = {
 MAX_TEXT = 4096
 """Characters of one text."""
 
+
 Part = Value | None | list[Value] | Mapping[str, Value]
 
 
@@ -64,6 +65,8 @@ class Settings(SearchOptions):
         chosen = {name: plain.pop(name) for name in CHOSEN}
         plain["simulator_settings"] = dict(self.simulator.settings)
         plain["simulator"] = self.simulator.name
+        if self.screen is not None:
+            plain["screen"] = {"name": self.screen.name, "settings": dict(self.screen.settings)}
         recorded = {RECORDED_AS.get(name, name): value for name, value in plain.items()}
         return recorded | {"chosen": chosen}
 
@@ -87,7 +90,12 @@ class Settings(SearchOptions):
             if any("\0" in text or len(text) > MAX_TEXT for text in _texts(data)):
                 raise ValueError(f"a text holds NUL, or more than {MAX_TEXT} characters")
             name, settings = given.pop("simulator"), given.pop("simulator_settings")
-            found = cls(**given, simulator=SimulatorChoice(name, settings))
+            screen = given.pop("screen")
+            found = cls(
+                **given,
+                simulator=SimulatorChoice(name, settings),
+                screen=None if screen is None else SimulatorChoice(**screen),
+            )
             if problems := range_problems(found):
                 raise InputError(*problems)
         except ValidationError as error:
@@ -96,7 +104,7 @@ class Settings(SearchOptions):
             where = ".".join([RECORDED_AS.get(name, name), *inside])
             what = f"{where}: {first['msg']}"
             raise StorageError(f"{place}: the run's settings are damaged: {what}") from None
-        except (InputError, ValueError) as error:
+        except (InputError, TypeError, ValueError) as error:
             raise StorageError(f"{place}: the run's settings are damaged: {error}") from None
         return found  # as recorded: an integer stays one
 
@@ -158,6 +166,7 @@ _ADAPTERS = {
         **{one.name: get_type_hints(Settings)[one.name] for one in fields(Settings)},
         "simulator": str,
         "simulator_settings": Mapping[str, Value],
+        "screen": Mapping[str, str | Mapping[str, Value]] | None,
         "optimised": Mapping[str, Part],
     }.items()
 }

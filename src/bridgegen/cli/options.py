@@ -1,5 +1,6 @@
 """The options that several commands share and no run records, and how they are parsed."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
@@ -11,7 +12,7 @@ from bridgegen.cli.declared import declaration
 from bridgegen.errors import InputError
 from bridgegen.options.forms import read_settings, read_value
 from bridgegen.options.option import DRIVER, OBJECTIVE, OUTPUT, SEARCH, SIMULATOR
-from bridgegen.simulation.choice import SimulatorChoice, Value
+from bridgegen.simulation.choice import SIMULATORS, SimulatorChoice, Value
 
 Json = Annotated[
     bool, typer.Option("--json", help="Print JSON for machines.", rich_help_panel=OUTPUT)
@@ -49,6 +50,23 @@ Simulator = Annotated[
         show_default="embedded",
         rich_help_panel=SIMULATOR,
         autocompletion=completing("simulator"),
+    ),
+]
+Screen = Annotated[
+    str | None,
+    typer.Option(
+        help="Cheap simulator in which the algorithm searches for what the simulator evaluates.",
+        show_default="none",
+        rich_help_panel=SIMULATOR,
+        autocompletion=completing("simulator"),
+    ),
+]
+ScreenSettings = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--screen-set",
+        help="A setting of the screen, NAME=VALUE; may be repeated.",
+        rich_help_panel=SIMULATOR,
     ),
 ]
 SimulatorSettings = Annotated[
@@ -143,6 +161,36 @@ def read_simulator(
             raise InputError(f"{what}: name the simulator that it is for (--simulator)")
         return None
     return SimulatorChoice(name, read_settings(settings, "--simulator-set"), connection)
+
+
+def read_simulators(
+    name: str | None,
+    settings: list[str] | None,
+    screen: str | None,
+    screen_settings: list[str] | None,
+    connection: Connection,
+) -> tuple[SimulatorChoice | None, SimulatorChoice | None]:
+    """Read the choices of a search's simulator and of its screen; None if none is named.
+
+    Args:
+        name: of the simulator.
+        settings: ``name=value`` pairs.
+        screen: name of the screen.
+        screen_settings: likewise.
+        connection: to either; what is for the screen alone is the screen's.
+
+    Raises:
+        InputError: settings or a connection without a name.
+    """
+    if screen is None:
+        if screen_settings:
+            raise InputError("--screen-set: name the screen that it is for (--screen)")
+        return read_simulator(name, settings, connection), None
+    chosen = SimulatorChoice(screen, read_settings(screen_settings, "--screen-set"))
+    for_screen = {k: v for k, v in connection.items() if k in SIMULATORS[screen].access}
+    own = SIMULATORS[name].access if name and name in SIMULATORS else {}
+    left = {k: v for k, v in connection.items() if k in own or k not in for_screen}
+    return read_simulator(name, settings, left), replace(chosen, access=for_screen)
 
 
 def read_algorithm_settings(pairs: list[str] | None) -> dict[str, dict[str, Value]]:

@@ -89,7 +89,7 @@ def keys_of(command: Callable[..., Any]) -> dict[str, Key]:
         types = {*get_args(kind)} - {NoneType} or {kind}
         option = declared.get(name)
         form = _FORMS[next(iter(types))]
-        if name == "simulator_set":
+        if name in ("simulator_set", "screen_set"):
             form = file_forms.SETTINGS
         elif option is not None and option.form.kind is not None:
             form = option.form.in_file

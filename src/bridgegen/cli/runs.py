@@ -49,6 +49,8 @@ def search(
     options: SearchOptions,
     simulator: common.Simulator = None,
     simulator_set: common.SimulatorSettings = None,
+    screen: common.Screen = None,
+    screen_set: common.ScreenSettings = None,
     connection: Connection = NO_CONNECTION,
     workers: common.Workers = None,
     out: Annotated[
@@ -83,13 +85,13 @@ def search(
         fail_if or (), junit, causes=options.causes,
         criteria=margins_of(scenario, options) if fail_if else (),
     )  # fmt: skip
-    chosen = common.read_simulator(simulator, simulator_set, connection)
-    options = replace(options, simulator=chosen or EMBEDDED)
-    with SearchScreen(options.budget) as screen:
+    chosen, cheap = common.read_simulators(simulator, simulator_set, screen, screen_set, connection)
+    options = replace(options, simulator=chosen or EMBEDDED, screen=cheap)
+    with SearchScreen(options.budget) as shown:
         run = campaign.run_search(
-            scenario, **vars(options), out=out, workers=workers, callbacks=screen.callbacks
+            scenario, **vars(options), out=out, workers=workers, callbacks=shown.callbacks
         )
-    print_summary(run, screen.seconds)
+    print_summary(run, shown.seconds)
     _end(criteria.judge(run))
 
 

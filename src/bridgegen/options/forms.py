@@ -158,6 +158,10 @@ def _simulator_words(_: str, choice: SimulatorChoice) -> list[str]:
     return named + _repeated(_setting_texts)("--simulator-set", choice.settings)
 
 
+def _screen_words(_: str, choice: SimulatorChoice) -> list[str]:
+    return ["--screen", choice.name, *_repeated(_setting_texts)("--screen-set", choice.settings)]
+
+
 TEXT = Form(str)
 WHOLE = Form(int, in_file=file_forms.WHOLE)
 NUMBER = Form(
@@ -215,3 +219,6 @@ CRITERIA = Form(
 
 SIMULATOR = Form(None, words=_simulator_words, keep=lambda choice: choice or EMBEDDED)
 """Its name and its settings. Where it is on this machine belongs to no run's command."""
+
+SCREEN = Form(None, words=_screen_words)
+"""Likewise, or none."""

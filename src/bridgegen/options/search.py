@@ -15,6 +15,7 @@ from bridgegen.options.forms import (
     NAMES,
     NUMBER,
     PATH,
+    SCREEN,
     SETTINGS,
     SIMULATOR,
     TERMS,
@@ -384,6 +385,40 @@ class SearchOptions(CommonOptions):
             before=EMBEDDED,
             group=OF_SIMULATOR,
             names="simulator",
+        ),
+    )
+    screen: SimulatorChoice | None = field(
+        default=None,
+        metadata=option(
+            SCREEN,
+            "Cheap simulator in which the algorithm searches for what the simulator evaluates.",
+            shown="none",
+            before=None,
+            group=OF_SIMULATOR,
+            names="simulator",
+        ),
+    )
+    screen_budget: int | None = field(
+        default=None,
+        metadata=option(
+            WHOLE,
+            "Number of evaluations in the screen, at most.",
+            shown="20 for each evaluation",
+            limits=(1, MAX_BUDGET),
+            before=None,
+            group=OF_SIMULATOR,
+        ),
+    )
+    screen_batch: int | None = field(
+        default=None,
+        metadata=option(
+            WHOLE,
+            "Number of evaluations that are chosen at a time, with a screen: a multiple of the "
+            "number of workers keeps all of them busy.",
+            shown="8",
+            limits=(1, MAX_BUDGET),
+            before=None,
+            group=OF_SIMULATOR,
         ),
     )
     causes: bool = field(default=True, metadata=_CAUSES)

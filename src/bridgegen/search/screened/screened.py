@@ -1,0 +1,239 @@
+"""An algorithm that searches in one simulator for the rows that another one evaluates."""
+
+from collections.abc import Callable, Mapping
+from typing import ClassVar, Protocol
+
+import numpy as np
+
+from bridgegen.arrays import Bool, Float
+from bridgegen.search.algorithm import JSON, Algorithm, Arity, Problem, Results, Setting, TakesNotes
+from bridgegen.search.screened.agreement import NOTE, Agreement, counts, place_of, rank_correlation
+from bridgegen.search.screened.compared import Compared
+from bridgegen.search.screened.correction import Correction
+from bridgegen.search.screened.pool import Pool
+
+LEAD = 0.25
+"""Share of the screen's budget that is spent before the first row is asked for."""
+
+CHECKS = 8
+"""One row in so many is random: it shows what the screen does not, and how far both agree."""
+
+LEAST = 24
+"""Compared rows before a screen is judged."""
+
+FEW = 0.2
+"""Share of the screen's critical rows that must be critical, where the objectives disagree."""
+
+PATIENCE = 100
+"""Batches in a row without a row that is new to the screen, after which a search has converged."""
+
+TRIES = 8
+"""Random rows that are drawn for one that is new to the screen."""
+
+
+class Screen(Protocol):
+    """A simulator that is cheap, with a budget of its own.
+
+    Attributes:
+        name: of the simulator.
+        budget: maximum number of evaluations.
+        evaluations: made so far; a row that is known costs none.
+    """
+
+    name: str
+    budget: int
+
+    @property
+    def evaluations(self) -> int:
+        """See above."""
+
+    def evaluate(self, U: Float) -> tuple[Results, Bool]:
+        """Evaluate rows; the caller keeps to the budget.
+
+        Args:
+            U: ``(n, n_var)``.
+
+        Returns:
+            Their results, and ``(n,)`` which rows are evaluated for the first time.
+        """
+
+
+class Screened:
+    """An `Algorithm` whose rows are proposed by another one, which searches in a screen.
+
+    The other algorithm gets the screen's results, with the difference to the run's simulator added
+    as far as it is known (`Correction`). What it asks for is kept; of that, each batch has
+    the rows that are most likely critical, or whose objective is best by the most favourable
+    difference, and which are far from each other and from those that have been evaluated. One row
+    in ``CHECKS`` is random.
+
+    A screen is given up where it fails in every row, and where the objectives of both simulators
+    are not correlated in ``LEAST`` rows of the run or more and few of its critical rows are
+    critical: then the algorithm begins afresh in the run's simulator, without a screen.
+
+    Args:
+        proposer: the algorithm, made with the problem as the screen sees it.
+        alone: makes the same algorithm for the run's simulator; None where there is none, and the
+            screen is never given up.
+        screen: evaluates what the proposer asks for.
+        problem: of the run.
+        simulator: the name of the run's simulator.
+        seed: of the run.
+        budget: evaluations of the run.
+        batch: rows that are asked for at a time.
+        say: called with a sentence if the screen is given up.
+    """
+
+    name: ClassVar[str] = "screened"
+    description: ClassVar[str] = "another algorithm proposes in a screen"
+    source: ClassVar[str] = "ours"
+    settings: ClassVar[Mapping[str, Setting]] = {}
+    objectives: ClassVar[Arity] = "any"
+
+    def __init__(
+        self,
+        proposer: Algorithm,
+        alone: Callable[[], Algorithm] | None,
+        screen: Screen,
+        problem: Problem,
+        *,
+        simulator: str,
+        seed: int,
+        budget: int,
+        batch: int,
+        say: Callable[[str], None] = lambda text: None,
+    ) -> None:
+        self._proposer, self._make_alone, self._screen = proposer, alone, screen
+        self._problem, self._simulator, self._say = problem, simulator, say
+        self._budget, self._batch = budget, batch
+        self._rng = np.random.Generator(np.random.PCG64([seed, 2]))
+        self._limit = screen.budget - budget // CHECKS  # of what is left, checks are made
+        self._converged = False
+        self._alone: Algorithm | None = None
+        self._ended, self._because = 0, ""
+        self._pool = Pool(problem.n_var, problem.n_obj)
+        self._correction = Correction.none(problem.n_var, problem.n_obj)
+        self._asked = Compared.none(problem.n_var, problem.n_obj)  # the last batch
+        self._run = self._asked
+
+    def ask(self) -> Float:
+        """Return the next rows for the run's simulator."""
+        if self._alone is not None:
+            return self._alone.ask()
+        self._propose()
+        if self._screen.evaluations and not self._pool.succeeded and self._make_alone:
+            self._give_up("it fails in every scenario", self._make_alone)
+            return self.ask()
+        n = min(self._batch, self._budget - len(self._run.U))
+        done = len(self._run.U)
+        checks = self._random((done + n) // CHECKS - done // CHECKS)
+        chosen = self._pool.take(n - len(checks.U), self._correction, self._run.U)
+        if self._converged and not len(chosen.U):
+            return chosen.U
+        self._asked = Compared.join(chosen, checks)
+        return self._asked.U
+
+    def tell(self, U: Float, results: Results) -> None:
+        """Compare the results with the screen's, and learn from the difference."""
+        if self._alone is not None:
+            self._alone.tell(U, results)
+            return
+        self._run = Compared.join(self._run, self._asked.told(results))
+        found = self._run.take(self._run.ok)
+        self._correction = Correction(
+            found.U, found.by_screen, found.F, found.screened, found.critical
+        )
+        if len(found.U) >= LEAST and self._make_alone and self._disagree(found):
+            self._give_up(
+                f"it disagrees with {self._simulator}: the rank correlation of the objectives of "
+                f"{len(found.U)} scenarios is not positive",
+                self._make_alone,
+            )
+
+    def notes(self) -> Mapping[str, JSON]:
+        """Return what both simulators agree in, and the notes of the algorithm."""
+        inner = self._alone or self._proposer
+        own = inner.notes() if isinstance(inner, TakesNotes) else {}
+        return {**own, NOTE: self.agreement().to_dict()}
+
+    def agreement(self) -> Agreement:
+        """Return how far both simulators agree so far."""
+        run = self._run
+        found = run.take(run.ok)
+        both, screen_only, simulator_only = counts(found.screened, found.critical)
+        false, half = found.screened & ~found.critical, len(found.U) // 2
+        x, y = found.sums()
+        return Agreement(
+            screen=self._screen.name,
+            simulator=self._simulator,
+            screen_evaluations=self._screen.evaluations,
+            screen_budget=self._screen.budget,
+            compared=len(found.U),
+            both=both,
+            screen_only=screen_only,
+            simulator_only=simulator_only,
+            rank_correlation=rank_correlation(x, y),
+            false_early=int(false[:half].sum()),
+            false_late=int(false[half:].sum()),
+            place=place_of(self._problem.parameters, found.U, np.abs(y - x)),
+            ended_after=self._ended if self._alone is not None else None,
+            ended_because=self._because,
+        )
+
+    def _propose(self) -> None:
+        """Let the algorithm search in the screen, up to the share of its budget that is due."""
+        lead = LEAD * self._limit
+        due = int(lead + (self._limit - lead) * len(self._run.U) / self._budget)
+        idle = 0
+        while not self._converged and self._screen.evaluations < due:
+            U = self._proposer.ask()
+            left = self._limit - self._screen.evaluations
+            if not len(U) or left < len(U):
+                self._keep(U[:left])
+                self._converged = True
+                return
+            results, fresh = self._keep(U)
+            self._proposer.tell(U, self._corrected(U, results))
+            idle = 0 if fresh.any() else idle + 1
+            self._converged = idle >= PATIENCE
+
+    def _keep(self, U: Float) -> tuple[Results, Bool]:
+        """Evaluate rows in the screen, and keep those that are new."""
+        results, fresh = self._screen.evaluate(U)
+        self._pool.add(U[fresh], results.F[fresh], results.critical[fresh], results.ok[fresh])
+        return results, fresh
+
+    def _corrected(self, U: Float, results: Results) -> Results:
+        """Return what is expected of the run's simulator, by the screen's results."""
+        good, F, critical = results.ok, results.F.copy(), results.critical.copy()
+        expected = self._correction.predict(U[good], F[good], critical[good])
+        F[good] += expected.difference
+        critical[good] = expected.critical >= 0.5
+        return Results(F, good, critical, results.metrics, results.cause)
+
+    def _random(self, n: int) -> Compared:
+        """Return n random rows and the screen's results of them, those that it had not met."""
+        rows = []
+        for _ in range(n):
+            for _ in range(TRIES):
+                U = self._rng.random((1, self._problem.n_var))
+                results, fresh = self._screen.evaluate(U)
+                if fresh[0]:
+                    rows.append(Compared.screened_by(U, results.F, results.critical, results.ok))
+                    break
+        return Compared.join(Compared.none(self._problem.n_var, self._problem.n_obj), *rows)
+
+    def _disagree(self, found: Compared) -> bool:
+        """Return whether the screen says nothing of the run's simulator."""
+        if (rank_correlation(*found.sums()) or 0.0) > 0.0:
+            return False
+        claimed = found.critical[found.screened]
+        return not len(claimed) or bool(claimed.mean() < FEW)
+
+    def _give_up(self, because: str, make: Callable[[], Algorithm]) -> None:
+        self._alone, self._because = make(), because
+        self._ended = len(self._run.U)
+        self._say(
+            f"the screen {self._screen.name} is given up after {self._ended} evaluations: "
+            f"{because}; the search continues without it"
+        )
