@@ -20,6 +20,7 @@ from bridgegen.campaign.settings import Settings
 from bridgegen.criteria import CriterionSummary, summarise_criteria
 from bridgegen.errors import StorageError
 from bridgegen.odd.criteria import read_criterion
+from bridgegen.search.screened import Agreement
 from bridgegen.simulation.rollout import STATUS_MESSAGES
 from bridgegen.store import Recorded, Rows, Store
 from bridgegen.store.summary import Summary, summarise
@@ -44,6 +45,8 @@ class Run:
         version: of BridgeGen that made it.
         notes: of the algorithm, by title; empty where it takes none. nsga2-dt: its trees' critical
             boxes.
+        screened: how far its screen agrees with its simulator; None without a screen, or before the
+            search has ended.
     """
 
     def __init__(self, folder: Path | str) -> None:
@@ -75,6 +78,10 @@ class Run:
         self.finished = store.finished is not None
         self.metrics, self.version, self.notes = store.metrics, store.version, store.notes
         self.parameters = store.parameters
+        try:
+            self.screened = Agreement.from_notes(store.notes)
+        except ValueError as error:
+            raise StorageError(f"{store.folder}: {error}") from None
 
     @cached_property
     def summary(self) -> Summary:

@@ -33,6 +33,8 @@ from bridgegen.report.further import further_playbacks
 from bridgegen.report.notes import tables
 from bridgegen.report.playback import Playback
 from bridgegen.report.playbacks import minimal_playbacks, playbacks
+from bridgegen.report.screened_payload import screened_payload
+from bridgegen.search.screened import NOTE
 from bridgegen.store import Recorded, Rows
 from bridgegen.store.summary import Summary
 from bridgegen.triage.record import Mode, Triage
@@ -156,7 +158,7 @@ def build_report(
         _evaluations(pipeline, rows),
         playbacks(pipeline, rows, kept, replays=replays),
         _coverage(pipeline, rows) if coverage else None,
-        tables(notes, pipeline.space),
+        tables({key: one for key, one in notes.items() if key != NOTE}, pipeline.space),
         regions,
         more=further_playbacks(pipeline, rows, {evaluation for _, evaluation, _ in kept}, first)
         if more
@@ -166,6 +168,7 @@ def build_report(
         triage=triage,
         minimal=_minimal(pipeline, modes, minimal_files),
         criteria=judged,
+        screened=screened_payload(notes, pipeline.space),
     )
 
 

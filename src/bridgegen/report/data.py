@@ -253,6 +253,7 @@ class ReportData:
         triage: the failure modes and the bound of the harmful share, once the run has finished.
         minimal: the minimal scenarios of failure modes; ``evaluation`` is the mode's ``shown``.
         criteria: how the evaluations meet the pass criteria, whose margins are metrics.
+        screened: how far the run's screen agrees, as `screened_payload` returns it.
     """
 
     summary: RunSummary
@@ -267,6 +268,7 @@ class ReportData:
     triage: Triage | None = None
     minimal: tuple[Playback, ...] = ()
     criteria: tuple[CriterionSummary, ...] = ()
+    screened: Mapping[str, Any] | None = None
 
     def __post_init__(self) -> None:
         n = self.evaluations.iteration.size

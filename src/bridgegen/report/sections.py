@@ -67,6 +67,10 @@ def _coverage(data: ReportData, _shown: Bool) -> Any:
     return coverage_payload(data.coverage) if data.coverage else None
 
 
+def _screened(data: ReportData, _shown: Bool) -> Any:
+    return data.screened
+
+
 def _notes(data: ReportData, _shown: Bool) -> Any:
     return notes_payload(data.notes)
 
@@ -76,6 +80,7 @@ SECTIONS = (
     Section("modes.js", "triage", _triage),
     Section("causes.js", "causes", _causes, grows=True),
     Section("elsewhere.js", "confirmations", _confirmations, grows=True),
+    Section("screened.js", "screened", _screened),
     Section("trends.js", "batches", _batches, grows=True),
     Section("regions.js", "regions", _regions, grows=True),
     Section("scatter.js"),

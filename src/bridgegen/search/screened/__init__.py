@@ -1,6 +1,6 @@
 """A search with two simulators: a cheap one, the screen, proposes what the other one evaluates."""
 
-from bridgegen.search.screened.agreement import Agreement
+from bridgegen.search.screened.agreement import NOTE, Agreement
 from bridgegen.search.screened.screened import Screen, Screened
 
-__all__ = ["Agreement", "Screen", "Screened"]
+__all__ = ["NOTE", "Agreement", "Screen", "Screened"]

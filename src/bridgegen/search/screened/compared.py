@@ -56,6 +56,11 @@ class Compared:
         ok = self.ok & results.ok
         return type(self)(self.U, self.by_screen, self.screened, results.F, results.critical, ok)
 
+    def best(self, n: int) -> Self:
+        """Return the n best rows of the run's simulator: critical ones, then by the objectives."""
+        rank = np.lexsort((self.F.sum(axis=1), ~self.critical, ~self.ok))
+        return self.take(rank[: min(n, int(self.ok.sum()))])
+
     def sums(self) -> tuple[Float, Float]:
         """Return the sum of the objectives, by the screen and by the run's simulator, ``(n,)``."""
         return self.by_screen.sum(axis=1), self.F.sum(axis=1)

@@ -27,6 +27,9 @@ class Pool:
         self.succeeded = 0
         self._rows = Compared.none(n_var, n_obj)
 
+    def __len__(self) -> int:
+        return len(self._rows.U)
+
     def add(self, U: Float, F: Float, critical: Bool, ok: Bool) -> None:
         """Add rows with the screen's results; those that failed there are left out."""
         self.succeeded += int(ok.sum())

@@ -15,6 +15,13 @@ from bridgegen.search.screened.pool import Pool
 LEAD = 0.25
 """Share of the screen's budget that is spent before the first row is asked for."""
 
+NEAR = 0.25
+"""Share of the screen's later evaluations that lie near the best rows of the run's simulator."""
+
+PARENTS, STEPS, MOVED = 10, (0.02, 0.2), 0.5
+"""How many of the best rows others lie near; least and greatest standard deviation of the steps to
+them; share of the parameters that change."""
+
 CHECKS = 8
 """One row in so many is random: it shows what the screen does not, and how far both agree."""
 
@@ -120,16 +127,14 @@ class Screened:
         """Return the next rows for the run's simulator."""
         if self._alone is not None:
             return self._alone.ask()
-        self._propose()
+        n = min(self._batch, self._budget - len(self._run.U))
+        self._propose(n)
         if self._screen.evaluations and not self._pool.succeeded and self._make_alone:
             self._give_up("it fails in every scenario", self._make_alone)
             return self.ask()
-        n = min(self._batch, self._budget - len(self._run.U))
         done = len(self._run.U)
         checks = self._random((done + n) // CHECKS - done // CHECKS)
         chosen = self._pool.take(n - len(checks.U), self._correction, self._run.U)
-        if self._converged and not len(chosen.U):
-            return chosen.U
         self._asked = Compared.join(chosen, checks)
         return self._asked.U
 
@@ -180,12 +185,16 @@ class Screened:
             ended_because=self._because,
         )
 
-    def _propose(self) -> None:
-        """Let the algorithm search in the screen, up to the share of its budget that is due."""
+    def _propose(self, n: int) -> None:
+        """Let the algorithm search in the screen, up to the share of its budget that is due.
+
+        Beyond it, until there are n rows to choose from.
+        """
         lead = LEAD * self._limit
         due = int(lead + (self._limit - lead) * len(self._run.U) / self._budget)
+        self._step(int(NEAR * (due - self._screen.evaluations)))
         idle = 0
-        while not self._converged and self._screen.evaluations < due:
+        while not self._converged and (self._screen.evaluations < due or len(self._pool) < n):
             U = self._proposer.ask()
             left = self._limit - self._screen.evaluations
             if not len(U) or left < len(U):
@@ -196,6 +205,21 @@ class Screened:
             self._proposer.tell(U, self._corrected(U, results))
             idle = 0 if fresh.any() else idle + 1
             self._converged = idle >= PATIENCE
+
+    def _step(self, n: int) -> None:
+        """Evaluate n rows in the screen that lie near the best rows of the run.
+
+        So a place is searched that is critical in the run's simulator and not in the screen.
+        """
+        best = self._run.best(PARENTS)
+        if n <= 0 or not len(best.U):
+            return
+        parents = best.U[self._rng.integers(len(best.U), size=n)]
+        low, high = np.log(STEPS)
+        size = np.exp(self._rng.uniform(low, high, (n, 1)))
+        moved = self._rng.random(parents.shape) < MOVED
+        steps = size * self._rng.standard_normal(parents.shape)
+        self._keep(np.clip(parents + np.where(moved, steps, 0.0), 0.0, 1.0))
 
     def _keep(self, U: Float) -> tuple[Results, Bool]:
         """Evaluate rows in the screen, and keep those that are new."""
