@@ -1,0 +1,236 @@
+"""A search whose scenarios a cheap simulator proposes; a biased copy of ours is the dear one."""
+
+import re
+from contextlib import suppress
+
+import numpy as np
+import pytest
+
+import bridgegen as bg
+from bridgegen.campaign import SearchCallbacks
+from bridgegen.cli import main
+from bridgegen.errors import InputError, Interrupted
+from bridgegen.simulation import choice
+from bridgegen.simulation.choice import EMBEDDED, Kind, SimulatorChoice
+from bridgegen.store import Store
+
+
+class Biased:
+    """The embedded simulator, in which parameters have other values than they are said to have."""
+
+    rows_at_once = runs_at_once = 4
+
+    def __init__(self, embedded, change):
+        self.embedded, self._change = embedded, change
+
+    def __getattr__(self, name):
+        return getattr(self.embedded, name)
+
+    def run(self, roads, rows, values, **more):
+        return self.embedded.run(roads, rows, self._change(dict(values)), **more)
+
+
+def slower(values):
+    """The ego starts slower, the other vehicle is faster and starts further away."""
+    for name, by in (("ego_speed", -0.7), ("bv_speed", 0.3), ("bv_start", 2.0)):
+        values[name] = values[name] + by
+    return values
+
+
+def not_finite(values):
+    raise InputError("no row can be simulated")
+
+
+@pytest.fixture(autouse=True)
+def simulators(monkeypatch):
+    for name, change in (("biased", slower), ("broken", not_finite)):
+        kind = Kind(
+            name,
+            "Ours, biased.",
+            lambda embedded, storyboard, settings, access, change=change: Biased(embedded, change),
+            settings={"noise": "none"},
+        )
+        monkeypatch.setitem(choice.SIMULATORS, name, kind)
+
+
+def search(out, budget=40, **changes):
+    given = {
+        "ego": "reference", "ideal": ["perception"], "algorithm": "es", "simulator": "biased",
+        "screen": EMBEDDED, "causes": False, "deliver": False,
+    }  # fmt: skip
+    given |= changes
+    for name in ("simulator", "screen"):
+        if isinstance(given[name], str):
+            given[name] = SimulatorChoice(given[name])
+    return bg.run_search("crossroads-s1", budget=budget, out=out, **given)
+
+
+def rows(folder):
+    with Store.open(folder) as store:
+        found = store.read()
+        return found.U.tobytes(), found.X.tobytes(), found.F.tobytes(), found.metrics.tobytes()
+
+
+def first(run):
+    critical = run.rows().critical
+    return int(np.argmax(critical)) + 1 if critical.any() else np.inf
+
+
+def test_the_first_failure_comes_sooner(tmp_path):
+    """Of what is critical in 0.3 % of all scenarios: three seeds of three."""
+    seeds = range(3)
+    screened = [first(search(tmp_path / f"s{k}", 60, seed=k)) for k in seeds]
+    alone = [first(search(tmp_path / f"a{k}", 60, seed=k, screen=None)) for k in seeds]
+    assert all(s < a for s, a in zip(screened, alone, strict=True))
+
+
+def test_it_is_recorded_and_counted_exactly(tmp_path):
+    run = search(tmp_path / "run", 20, screen_budget=300, screen_batch=5)
+    assert run.summary.evaluations == 20
+    settings = run.settings
+    assert settings.screen == EMBEDDED
+    assert (settings.screen_budget, settings.screen_batch) == (300, 5)
+    assert " --simulator biased --screen embedded --screen-budget 300 --screen-batch 5 " in (
+        settings.command(tmp_path)
+    )
+    told = run.screened
+    assert (told.screen, told.simulator, told.screen_budget) == ("embedded", "biased", 300)
+    assert 240 <= told.screen_evaluations <= 300
+    assert told.compared == 20
+    assert told.both + told.simulator_only == run.summary.critical
+    assert max(np.unique(run.frame()["batch"], return_counts=True)[1]) == 5
+
+
+def test_defaults(tmp_path):
+    settings = search(tmp_path / "run", 8).settings
+    assert (settings.screen_budget, settings.screen_batch) == (160, 8)
+
+
+def test_the_biased_simulator_s_results_are_those_of_the_run(tmp_path):
+    run = search(tmp_path / "run", 16)
+    for simulator, equal in ((SimulatorChoice("biased"), True), (EMBEDDED, False)):
+        again = search(
+            tmp_path / simulator.name, 16, simulator=simulator, screen=None, algorithm="random"
+        )
+        assert again.settings.screen is None
+        assert again.screened is None
+        X = run.rows().X
+        found = pipeline(again).evaluate(X)
+        assert np.array_equal(found.F, run.rows().F) is equal
+
+
+def pipeline(run):
+    from bridgegen.campaign.restored import pipeline_of
+
+    return pipeline_of(run, "test")
+
+
+def test_workers_do_not_matter(tmp_path, monkeypatch):
+    """Processes know no simulator of a test's: the embedded one screens for itself here."""
+    monkeypatch.setattr("bridgegen.campaign.campaign.require_screen", lambda given, budget: None)
+    given = {"simulator": EMBEDDED, "budget": 16}
+    one, other = (search(tmp_path / str(n), workers=n, **given) for n in (None, 2))
+    assert rows(one.folder) == rows(other.folder)
+    assert one.notes == other.notes
+    assert one.screened.rank_correlation == 1.0
+    assert one.screened.both + one.screened.neither == 16
+
+
+@pytest.mark.parametrize("stop_after", [1, 3])
+def test_an_interrupted_search_becomes_the_same(stop_after, tmp_path):
+    whole = search(tmp_path / "whole", 32)
+    batches = 0
+
+    def stop(progress):
+        nonlocal batches
+        batches += 1
+        if batches == stop_after:
+            raise KeyboardInterrupt
+
+    with suppress(Interrupted):
+        search(tmp_path / "part", 32, callbacks=SearchCallbacks(batch=stop))
+    with Store.open(tmp_path / "part") as store:
+        assert len(store) == 8 * stop_after
+    again = bg.resume(tmp_path / "part", deliver=False)
+    assert rows(whole.folder) == rows(again.folder)
+    assert again.notes == whole.notes
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"screen": "biased"}, "the screen must be another simulator than the search's.*biased"),
+        ({"screen": None, "screen_budget": 100}, "--screen-budget is for a search with a screen"),
+        ({"screen": None, "screen_batch": 4}, "--screen-batch is for a search with a screen"),
+        ({"screen_budget": 39}, r"screen_budget >= budget must hold, got 39 and 40"),
+        ({"screen_batch": 0}, "1 <= screen_batch <= 10000000 must hold, got 0"),
+        ({"screen": "esmini"}, "the screen esmini .*ESMINI_LIB"),
+        ({"vehicle": "single-track", "simulator": EMBEDDED, "screen": "biased"},
+         "the screen biased .*the vehicle 'single-track'"),
+    ],
+)  # fmt: skip
+def test_what_is_no_screen_is_refused(changes, message, tmp_path, monkeypatch):
+    monkeypatch.delenv("ESMINI_LIB", raising=False)
+    with pytest.raises(InputError, match=message) as refused:
+        search(tmp_path / "run", **changes)
+    assert "\n" not in str(refused.value)
+    assert not (tmp_path / "run").exists()
+
+
+def test_the_same_simulator_with_other_settings_is_a_screen(tmp_path):
+    other = SimulatorChoice("biased", {"noise": 1})
+    run = search(tmp_path / "run", 8, screen=other)
+    assert bg.Run(run.folder).settings.screen == other
+    assert "--screen biased --screen-set noise=1 " in run.settings.command(tmp_path)
+
+
+def test_a_screen_that_fails_everywhere_is_said_in_a_line(tmp_path, monkeypatch):
+    from bridgegen.pipeline import Pipeline
+
+    evaluate = Pipeline.evaluate
+
+    def fails(self, X):
+        found = evaluate(self, X)
+        if self._simulated_by != EMBEDDED:
+            return found
+        found.F[:] = np.nan
+        return found
+
+    monkeypatch.setattr(Pipeline, "evaluate", fails)
+    said = []
+    run = search(tmp_path / "run", 16, callbacks=SearchCallbacks(warning=said.append))
+    assert run.summary.evaluations == 16
+    (line,) = (one for one in said if "screen" in one)
+    assert line == (
+        "the screen embedded is given up after 0 evaluations: it fails in every scenario; the "
+        "search continues without it"
+    )
+
+
+def test_the_page_and_the_command_line_show_the_agreement(tmp_path, capsys, monkeypatch):
+    words = [
+        "bridgegen", "search", "crossroads-s1", "--ego", "reference", "--ideal", "perception",
+        "--simulator", "biased", "--screen", "embedded", "--budget", "24", "--keep", "1",
+        "--triage", "none", "--no-causes", "--algorithm", "es", "--out", str(tmp_path / "run"),
+    ]  # fmt: skip
+    monkeypatch.setattr("sys.argv", words)
+    with suppress(SystemExit):
+        main()
+    (line,) = re.findall(r"^screen +(.*)$", capsys.readouterr().out, re.MULTILINE)
+    told = bg.Run(tmp_path / "run").screened
+    assert line.startswith(f"embedded: {told.screen_evaluations} evaluations; of ")
+    page = (tmp_path / "run" / "report.html").read_text()
+    assert "Agreement with the screen" in page
+
+
+def test_a_scenario_file(tmp_path):
+    run = search(tmp_path / "s1", 8, screen=None, deliver=True, keep=1, triage="none")
+    del run
+    file = tmp_path / "s1" / "critical" / "0001.xosc"
+    if not file.exists():
+        pytest.skip("no scenario was exported")
+    found = bg.run_search(
+        file, budget=8, out=tmp_path / "file", simulator=SimulatorChoice("biased"), screen=EMBEDDED,
+        deliver=False, causes=False,
+    )  # fmt: skip
+    assert found.screened.compared == 8
