@@ -8,11 +8,14 @@ import pytest
 
 import bridgegen as bg
 from bridgegen.campaign import SearchCallbacks
+from bridgegen.campaign.restored import pipeline_of
 from bridgegen.cli import main
 from bridgegen.errors import InputError, Interrupted
 from bridgegen.simulation import choice
 from bridgegen.simulation.choice import EMBEDDED, Kind, SimulatorChoice
 from bridgegen.store import Store
+
+from .braking import write_pair
 
 
 class Biased:
@@ -33,7 +36,8 @@ class Biased:
 def slower(values):
     """The ego starts slower, the other vehicle is faster and starts further away."""
     for name, by in (("ego_speed", -0.7), ("bv_speed", 0.3), ("bv_start", 2.0)):
-        values[name] = values[name] + by
+        if name in values:
+            values[name] = values[name] + by
     return values
 
 
@@ -53,16 +57,16 @@ def simulators(monkeypatch):
         monkeypatch.setitem(choice.SIMULATORS, name, kind)
 
 
-def search(out, budget=40, **changes):
+def search(out, budget=16, **changes):
     given = {
-        "ego": "reference", "ideal": ["perception"], "algorithm": "es", "simulator": "biased",
-        "screen": EMBEDDED, "causes": False, "deliver": False,
+        "ego": "route-follower", "algorithm": "es", "objective": {"harm": None}, "causes": False,
+        "simulator": "biased", "screen": EMBEDDED, "deliver": False,
     }  # fmt: skip
     given |= changes
     for name in ("simulator", "screen"):
         if isinstance(given[name], str):
             given[name] = SimulatorChoice(given[name])
-    return bg.run_search("crossroads-s1", budget=budget, out=out, **given)
+    return bg.run_search("crossroads-s4", budget=budget, out=out, **given)
 
 
 def rows(folder):
@@ -77,11 +81,11 @@ def first(run):
 
 
 def test_the_first_failure_comes_sooner(tmp_path):
-    """Of what is critical in 0.3 % of all scenarios: three seeds of three."""
+    """Of what is critical in 1.4 % of all scenarios: three seeds of three."""
     seeds = range(3)
-    screened = [first(search(tmp_path / f"s{k}", 60, seed=k)) for k in seeds]
-    alone = [first(search(tmp_path / f"a{k}", 60, seed=k, screen=None)) for k in seeds]
-    assert all(s < a for s, a in zip(screened, alone, strict=True))
+    screened = [first(search(tmp_path / f"s{k}", 16, seed=k)) for k in seeds]
+    alone = [first(search(tmp_path / f"a{k}", 80, seed=k, screen=None)) for k in seeds]
+    assert max(screened) < min(alone)
 
 
 def test_it_is_recorded_and_counted_exactly(tmp_path):
@@ -101,28 +105,12 @@ def test_it_is_recorded_and_counted_exactly(tmp_path):
     assert max(np.unique(run.frame()["batch"], return_counts=True)[1]) == 5
 
 
-def test_defaults(tmp_path):
-    settings = search(tmp_path / "run", 8).settings
-    assert (settings.screen_budget, settings.screen_batch) == (160, 8)
-
-
-def test_the_biased_simulator_s_results_are_those_of_the_run(tmp_path):
-    run = search(tmp_path / "run", 16)
-    for simulator, equal in ((SimulatorChoice("biased"), True), (EMBEDDED, False)):
-        again = search(
-            tmp_path / simulator.name, 16, simulator=simulator, screen=None, algorithm="random"
-        )
-        assert again.settings.screen is None
-        assert again.screened is None
-        X = run.rows().X
-        found = pipeline(again).evaluate(X)
-        assert np.array_equal(found.F, run.rows().F) is equal
-
-
-def pipeline(run):
-    from bridgegen.campaign.restored import pipeline_of
-
-    return pipeline_of(run, "test")
+def test_the_results_are_those_of_the_run_s_simulator(tmp_path):
+    run = search(tmp_path / "run", 8)
+    assert (run.settings.screen_budget, run.settings.screen_batch) == (160, 8)
+    here = pipeline_of(run, "test")
+    np.testing.assert_array_equal(here.evaluate(run.rows().X).F, run.rows().F)
+    assert (here.elsewhere(EMBEDDED).evaluate(run.rows().X).F != run.rows().F).any()
 
 
 def test_workers_do_not_matter(tmp_path, monkeypatch):
@@ -136,9 +124,9 @@ def test_workers_do_not_matter(tmp_path, monkeypatch):
     assert one.screened.both + one.screened.neither == 16
 
 
-@pytest.mark.parametrize("stop_after", [1, 3])
+@pytest.mark.parametrize("stop_after", [1, 2])
 def test_an_interrupted_search_becomes_the_same(stop_after, tmp_path):
-    whole = search(tmp_path / "whole", 32)
+    whole = search(tmp_path / "whole", 24, screen_budget=240)
     batches = 0
 
     def stop(progress):
@@ -148,7 +136,7 @@ def test_an_interrupted_search_becomes_the_same(stop_after, tmp_path):
             raise KeyboardInterrupt
 
     with suppress(Interrupted):
-        search(tmp_path / "part", 32, callbacks=SearchCallbacks(batch=stop))
+        search(tmp_path / "part", 24, screen_budget=240, callbacks=SearchCallbacks(batch=stop))
     with Store.open(tmp_path / "part") as store:
         assert len(store) == 8 * stop_after
     again = bg.resume(tmp_path / "part", deliver=False)
@@ -162,7 +150,7 @@ def test_an_interrupted_search_becomes_the_same(stop_after, tmp_path):
         ({"screen": "biased"}, "the screen must be another simulator than the search's.*biased"),
         ({"screen": None, "screen_budget": 100}, "--screen-budget is for a search with a screen"),
         ({"screen": None, "screen_batch": 4}, "--screen-batch is for a search with a screen"),
-        ({"screen_budget": 39}, r"screen_budget >= budget must hold, got 39 and 40"),
+        ({"screen_budget": 15}, "screen_budget >= budget must hold, got 15 and 16"),
         ({"screen_batch": 0}, "1 <= screen_batch <= 10000000 must hold, got 0"),
         ({"screen": "esmini"}, "the screen esmini .*ESMINI_LIB"),
         ({"vehicle": "single-track", "simulator": EMBEDDED, "screen": "biased"},
@@ -209,7 +197,7 @@ def test_a_screen_that_fails_everywhere_is_said_in_a_line(tmp_path, monkeypatch)
 
 def test_the_page_and_the_command_line_show_the_agreement(tmp_path, capsys, monkeypatch):
     words = [
-        "bridgegen", "search", "crossroads-s1", "--ego", "reference", "--ideal", "perception",
+        "bridgegen", "search", "crossroads-s4", "--ego", "route-follower", "--objective", "harm",
         "--simulator", "biased", "--screen", "embedded", "--budget", "24", "--keep", "1",
         "--triage", "none", "--no-causes", "--algorithm", "es", "--out", str(tmp_path / "run"),
     ]  # fmt: skip
@@ -224,13 +212,10 @@ def test_the_page_and_the_command_line_show_the_agreement(tmp_path, capsys, monk
 
 
 def test_a_scenario_file(tmp_path):
-    run = search(tmp_path / "s1", 8, screen=None, deliver=True, keep=1, triage="none")
-    del run
-    file = tmp_path / "s1" / "critical" / "0001.xosc"
-    if not file.exists():
-        pytest.skip("no scenario was exported")
+    scenario, ranges = write_pair(tmp_path)
     found = bg.run_search(
-        file, budget=8, out=tmp_path / "file", simulator=SimulatorChoice("biased"), screen=EMBEDDED,
-        deliver=False, causes=False,
+        scenario, distribution=ranges, budget=8, out=tmp_path / "run", algorithm="random",
+        simulator=SimulatorChoice("biased"), screen=EMBEDDED, deliver=False, causes=False,
     )  # fmt: skip
     assert found.screened.compared == 8
+    assert found.screened.rank_correlation == 1.0  # it has none of the parameters that differ
