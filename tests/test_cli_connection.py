@@ -13,6 +13,8 @@ from bridgegen.cli.connection import (
     read_access,
     with_connection_options,
 )
+from bridgegen.cli.options import read_simulators
+from bridgegen.errors import InputError
 from bridgegen.simulation.choice import SIMULATORS
 
 
@@ -58,3 +60,24 @@ def test_the_choice_of_a_run_s_simulator():
     choice = read_access({"--esmini-lib": "there"})
     assert choice is not None
     assert (choice.name, choice.access) == ("esmini", {"--esmini-lib": "there"})
+
+
+@pytest.mark.parametrize(
+    ("simulator", "screen", "own", "cheap"),
+    [
+        ("esmini", "embedded", {"--esmini-lib": "x"}, {}),
+        ("carla", "esmini", {"--port": 1}, {"--esmini-lib": "x"}),
+        ("esmini", "esmini", {"--esmini-lib": "x"}, {"--esmini-lib": "x"}),
+    ],
+)
+def test_a_connection_is_the_simulator_s_or_the_screen_s(simulator, screen, own, cheap):
+    chosen, other = read_simulators(simulator, None, screen, None, {**own, **cheap})
+    assert (chosen.name, chosen.access) == (simulator, own)
+    assert (other.name, other.access) == (screen, cheap)
+
+
+def test_a_screen_s_settings_need_a_screen():
+    with pytest.raises(InputError, match="--screen-set: name the screen"):
+        read_simulators("esmini", None, None, ["steps=2"], {})
+    _, other = read_simulators(None, None, "esmini", ["steps=2"], {})
+    assert other.settings == {"steps": 2}

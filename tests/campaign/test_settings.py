@@ -93,6 +93,18 @@ def test_its_command_has_every_option():
     assert "--no-causes" in file.command(PLACE)
 
 
+def test_a_screen_is_recorded_without_its_place():
+    screen = {"name": "esmini", "settings": {"steps": 2}}
+    found = Settings.from_dict(
+        record(screen=screen, screen_budget=90, screen_batch=3, simulator="embedded",
+               simulator_settings={}), PLACE,
+    )  # fmt: skip
+    assert (found.screen.name, found.screen.settings) == ("esmini", {"steps": 2})
+    assert found.to_dict()["screen"] == screen
+    said = "--screen esmini --screen-set steps=2 --screen-budget 90 --screen-batch 3 "
+    assert said in found.command(PLACE)
+
+
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
@@ -112,6 +124,12 @@ def test_its_command_has_every_option():
         ({"scenario": "a\0b"}, "a text holds NUL, or more than 4096 characters"),
         ({"ego": "x" * 5000}, "a text holds NUL, or more than 4096 characters"),
         ({"simulator": "esmini3"}, "unknown simulator 'esmini3'"),
+        ({"screen": "embedded"}, "screen: "),
+        ({"screen": {"name": "esmini3", "settings": {}}}, "unknown simulator 'esmini3'"),
+        ({"screen": {"called": "esmini"}}, "the run's settings are damaged: "),
+        ({"screen": {"name": "esmini", "settings": "steps"}}, "the run's settings are damaged: "),
+        ({"screen": {"name": "esmini", "settings": {}}, "screen_budget": 0},
+         "1 <= screen_budget <= 10000000 must hold, got 0"),
     ],
 )  # fmt: skip
 def test_what_is_no_record_is_refused(changes, message):

@@ -73,6 +73,13 @@ def test_the_command_line_has_them_all():
         SearchOptions(objectives="many", road_map="town.xodr", junction="965", adversary="bv"),
         SearchOptions(others="scripted", count="any", distribution="d.xosc"),
         SearchOptions(simulator=SimulatorChoice("esmini", {"steps": 4})),
+        SearchOptions(
+            simulator=SimulatorChoice("esmini"),
+            screen=SimulatorChoice("embedded"),
+            screen_budget=100,
+            screen_batch=4,
+        ),
+        SearchOptions(screen=SimulatorChoice("esmini", {"steps": 2})),
     ],
 )
 def test_options_are_what_their_command_line_says(options, monkeypatch):

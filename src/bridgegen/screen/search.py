@@ -87,14 +87,12 @@ class SearchScreen(Live):
 def print_summary(run: "Run", seconds: float) -> None:
     """Print a run's figures, the total time [s], its failure modes; last, what matters most."""
     s, settings, found = run.summary, run.settings, run.triage
-    from bridgegen.report.screened_payload import in_a_line
-
     quick = "quick causes" if found is not None else "causes"
     rows = [
         ("scenario", f"{Path(settings.scenario).stem}, ego {settings.ego}{_worse(settings)}"),
         ("search", f"{settings.algorithm}, seed {settings.seed}"),
         ("evaluations", f"{s.evaluations}" + (f" ({s.failed} failed)" if s.failed else "")),
-        *([("screen", in_a_line(run.screened))] if run.screened is not None else []),
+        *screen_rows(run),
         ("R_critic", f"{s.r_critic:.3f} ({s.critical} critical{_by(settings.cause)})"),
         *([(quick, ", ".join(f"{k} {n}" for k, n in s.causes.items()))] if s.causes else []),
         ("first critical after", _count(s.first)),
@@ -117,6 +115,13 @@ def print_summary(run: "Run", seconds: float) -> None:
         _print_modes(found)
     print()
     _print_rows(conclusion(run))
+
+
+def screen_rows(run: "Run") -> list[tuple[str, str]]:
+    """Return how far the run's screen agrees; nothing without one."""
+    from bridgegen.report.screened_payload import in_a_line
+
+    return [] if run.screened is None else [("screen", in_a_line(run.screened))]
 
 
 def conclusion(run: "Run") -> list[tuple[str, str]]:
