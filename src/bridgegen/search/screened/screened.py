@@ -28,6 +28,9 @@ CHECKS = 8
 LEAST = 24
 """Compared rows before a screen is judged."""
 
+SIGNIFICANT = 1.64
+"""Normal deviate that a rank correlation must exceed, one-sided 95 %."""
+
 FEW = 0.2
 """Share of the screen's critical rows that must be critical, where the objectives disagree."""
 
@@ -74,9 +77,9 @@ class Screened:
     difference, and which are far from each other and from those that have been evaluated. One row
     in ``CHECKS`` is random.
 
-    A screen is given up where it fails in every row, and where the objectives of both simulators
-    are not correlated in ``LEAST`` rows of the run or more and few of its critical rows are
-    critical: then the algorithm begins afresh in the run's simulator, without a screen.
+    A screen is given up where it fails in every row, and where, in ``LEAST`` rows of the run or more,
+    the objectives of both simulators are not positively correlated and few of the screen's critical
+    rows are critical: then the algorithm begins afresh in the run's simulator, without a screen.
 
     Args:
         proposer: the algorithm, made with the problem as the screen sees it.
@@ -151,7 +154,7 @@ class Screened:
         if len(found.U) >= LEAST and self._make_alone and self._disagree(found):
             self._give_up(
                 f"it disagrees with {self._simulator}: the rank correlation of the objectives of "
-                f"{len(found.U)} scenarios is not positive",
+                f"{len(found.U)} scenarios is not significantly positive",
                 self._make_alone,
             )
 
@@ -191,7 +194,8 @@ class Screened:
         Beyond it, until there are n rows to choose from.
         """
         lead = LEAD * self._limit
-        due = int(lead + (self._limit - lead) * len(self._run.U) / self._budget)
+        done = len(self._run.U) / max(1, self._budget - self._batch)  # 1 before the last batch
+        due = int(lead + (self._limit - lead) * min(1.0, done))
         self._step(int(NEAR * (due - self._screen.evaluations)))
         idle = 0
         while not self._converged and (self._screen.evaluations < due or len(self._pool) < n):
@@ -249,7 +253,8 @@ class Screened:
 
     def _disagree(self, found: Compared) -> bool:
         """Return whether the screen says nothing of the run's simulator."""
-        if (rank_correlation(*found.sums()) or 0.0) > 0.0:
+        rank = rank_correlation(*found.sums()) or 0.0
+        if rank * np.sqrt(len(found.U) - 1) > SIGNIFICANT:
             return False
         claimed = found.critical[found.screened]
         return not len(claimed) or bool(claimed.mean() < FEW)
