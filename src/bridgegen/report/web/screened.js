@@ -11,8 +11,8 @@ function fillScreened({ screen, simulator, sentences, counts }, host) {
   const head = (text, scope) => element("th", { scope }, text);
   const line = (text, ...values) => element("tr", {}, head(text, "row"), ...values.map((value) => element("td", {}, number(value))));
   const table = element("table", {}, element("caption", { class: "hidden" }, `Scenarios by ${screen} and ${simulator}`),
-    element("thead", {}, element("tr", {}, head("Scenarios", "col"), head(`critical in ${simulator}`, "col"), head("not critical there", "col"))),
-    element("tbody", {}, line(`critical in ${screen}`, both, screenOnly), line("not critical there", simulatorOnly, neither)));
+    element("thead", {}, element("tr", {}, head("Scenarios", "col"), head(`critical in ${simulator}`, "col"), head(`not critical in ${simulator}`, "col"))),
+    element("tbody", {}, line(`critical in ${screen}`, both, screenOnly), line(`not critical in ${screen}`, simulatorOnly, neither)));
   host.append(element("div", { class: "card note-table" }, ...sentences.map((text) => element("p", {}, text)), table, element("p", { class: "muted small" }, CHOSEN)));
 }
 
