@@ -91,6 +91,8 @@ class Settings(SearchOptions):
                 raise ValueError(f"a text holds NUL, or more than {MAX_TEXT} characters")
             name, settings = given.pop("simulator"), given.pop("simulator_settings")
             screen = given.pop("screen")
+            if screen is not None and None in (given["screen_budget"], given["screen_batch"]):
+                raise ValueError("screen: its budget and its batch must be recorded, too")
             found = cls(
                 **given,
                 simulator=SimulatorChoice(name, settings),
