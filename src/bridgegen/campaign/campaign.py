@@ -236,8 +236,8 @@ def _algorithm(pipeline: Pipeline, settings: Settings) -> toolkit.Algorithm:
     arena = pipeline.arena() if getattr(method, "is_adversary", False) else None
     if arena is not None:
         arena.warm_up()
-    names, n_obj = pipeline.space.variables, pipeline.objective.n_obj
-    problem = Problem(names, pipeline.metrics, n_obj, arena)
+    space, n_obj = pipeline.space, pipeline.objective.n_obj
+    problem = Problem(space.variables, pipeline.metrics, n_obj, arena, space.levels)
     values = resolve(method, problem, settings.seed, settings.settings)
     return method(problem, settings.seed, **values)
 
