@@ -7,13 +7,16 @@ import numpy as np
 
 from bridgegen.arrays import Float
 from bridgegen.search.algorithm import Arity, Problem, Results, Setting, Value, resolve
-from bridgegen.search.space_filling import latin_hypercube
+from bridgegen.search.space_filling import latin_hypercube, sobol_rows
 from bridgegen.search.surrogates.gaussian_process import GaussianProcess, Parameters, telling
 from bridgegen.search.surrogates.known import Known, distances
 from bridgegen.search.surrogates.saved import Saved, packed, unpacked
 
 CANDIDATES = 512
 """Rows anywhere that a model chooses from, and as many near good rows; a power of two."""
+
+MODEL_ROWS = 300
+"""Maximum number of rows that a process is fitted to."""
 
 BEST, FOUND = 20, 40
 """Rows that candidates are near: the best ones, and the distinct critical ones found last."""
@@ -40,7 +43,7 @@ class Surrogate(Saved):
     found are other scenarios, not the first one again. Where no candidate is left that far away,
     the distance is halved.
 
-    With many rows, the processes are fitted to ``rows`` of them: half are the best, or the critical
+    With many rows, the processes are fitted to 300 of them: half are the best, or the critical
     ones; the others are spread over the rest (`telling`).
 
     Source: Thompson sampling in batches: Kandasamy et al. (2018), arXiv:1705.09236; the label by
@@ -62,7 +65,6 @@ class Surrogate(Saved):
             0.1, "distance kept from critical rows, as a share of the ranges, in root mean square",
             0.0, 1.0,
         ),
-        "rows": Setting(300, "maximum number of rows that a process is fitted to", 10, 2000),
     }  # fmt: skip
     objectives: ClassVar[Arity] = "one"
 
@@ -101,15 +103,13 @@ class Surrogate(Saved):
         return self._joined(batch, rows, points, paths)
 
     def _fitted(self, values: Float, parameters: Parameters | None) -> GaussianProcess:
-        rows = telling(values, self._values["rows"])
+        rows = telling(values, MODEL_ROWS)
         return GaussianProcess(self._known.points[rows], values[rows], parameters)
 
     def _candidates(self, bases: Float, batch: Float) -> tuple[Float, Float]:
         """Return new rows to choose from and their points, anywhere and near the bases."""
-        from scipy.stats import qmc  # takes a second to import
-
         rng, known, shape = self._rng, self._known, (CANDIDATES, self._n_var)
-        anywhere = qmc.Sobol(self._n_var, scramble=True, rng=rng).random(CANDIDATES)
+        anywhere = sobol_rows(rng, CANDIDATES, self._n_var)
         base = bases[rng.integers(len(bases), size=CANDIDATES)]
         scale = REACH * 2.0 ** (-3.0 * rng.random((CANDIDATES, 1)))
         share = min(1.0, 20.0 / self._n_var) * rng.random((CANDIDATES, 1))

@@ -8,7 +8,7 @@ import numpy as np
 
 from bridgegen.arrays import Float, Int
 from bridgegen.search.algorithm import Arity, Problem, Results, Setting, Value, resolve
-from bridgegen.search.space_filling import latin_hypercube
+from bridgegen.search.space_filling import latin_hypercube, sobol_rows
 from bridgegen.search.surrogates.gaussian_process import GaussianProcess, Parameters
 from bridgegen.search.surrogates.known import Known, distances
 from bridgegen.search.surrogates.saved import Saved, packed, unpacked
@@ -58,7 +58,7 @@ class TuRBO(Saved):
 
     It differs from the source:
 
-    - objectives are learnt as normal scores, so that plateaus and outliers do no harm;
+    - objectives are learnt by their logarithmic distances from the median (`compressed`);
     - a region's process learns from the nearest rows, whichever region asked for them;
     - a region stays away from critical scenarios that were known when it began, so that it finds
       others;
@@ -159,15 +159,13 @@ class TuRBO(Saved):
 
     def _candidates(self, region: _Region) -> Float:
         """Return new rows of a region's box; from anywhere, where it has none."""
-        from scipy.stats import qmc  # takes a second to import
-
         n_var, rng, columns = self._n_var, self._rng, self._known.columns
         lengths = np.ones(n_var) if region.parameters is None else region.parameters.lengths
         sides = region.length * lengths / np.exp(np.log(lengths).mean())
         centre = self._known.U[self._centre(region)]
         low, high = np.clip(centre - sides / 2, 0.0, 1.0), np.clip(centre + sides / 2, 0.0, 1.0)
         low[columns.discrete], high[columns.discrete] = 0.0, 1.0
-        inside = qmc.Sobol(n_var, scramble=True, rng=rng).random(CANDIDATES)
+        inside = sobol_rows(rng, CANDIDATES, n_var)
         share = np.full(n_var, min(1.0, 20.0 / n_var))
         share[columns.discrete] = np.minimum(share[columns.discrete], region.length)
         moved = rng.random((CANDIDATES, n_var)) < share

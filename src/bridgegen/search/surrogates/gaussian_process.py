@@ -68,7 +68,7 @@ def learnt(points: Float, values: Float, parameters: Parameters | None) -> Param
 
     Args:
         points: ``(n, d)`` float64 in the unit cube.
-        values: ``(n,)`` float64, about standard normal.
+        values: ``(n,)`` float64, of mean 0 and a size about 1.
         parameters: where to begin; the prior's mode if None.
 
     Source: Rasmussen and Williams (2006), "Gaussian Processes for Machine Learning", equations 5.8
@@ -140,7 +140,7 @@ class GaussianProcess:
 
     Args:
         points: ``(n, d)`` float64 in the unit cube, n ≥ 1.
-        values: ``(n,)`` float64, finite, about standard normal (`normal_scores`).
+        values: ``(n,)`` float64, finite, of a size about 1 (`compressed`).
         parameters: of an earlier fit, where the search for better ones begins.
     """
 

@@ -5,7 +5,7 @@ import numpy as np
 from bridgegen.arrays import Bool, Float, Int
 from bridgegen.search.algorithm import Problem
 from bridgegen.search.surrogates.columns import Columns
-from bridgegen.search.surrogates.transform import normal_scores
+from bridgegen.search.surrogates.transform import compressed
 
 FEW = 100_000
 """Different rows up to which all are enumerated in search of a new one."""
@@ -63,8 +63,8 @@ class Known:
                 self.distinct = np.append(self.distinct, k)
 
     def scores(self) -> Float:
-        """Return the normal scores of F, ``(n,)``."""
-        return normal_scores(self.F)
+        """Return F as a process learns it, ``(n,)``: `compressed`."""
+        return compressed(self.F)
 
     def new(self, U: Float) -> Int:
         """Return the places of rows that are not known, the first of equal ones, ascending."""
