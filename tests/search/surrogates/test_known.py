@@ -79,7 +79,9 @@ def test_distinct_critical_rows_are_apart_in_root_mean_square():
 def test_failed_rows_count_as_the_worst():
     known = Known(Problem.unnamed(1), 0.1)
     told(known, [[0.1]], ok=False)
-    known.add(np.array([[0.2], [0.3]]), np.array([5.0, np.nan]), np.ones(2, bool), np.zeros(2, bool))
+    known.add(
+        np.array([[0.2], [0.3]]), np.array([5.0, np.nan]), np.ones(2, bool), np.zeros(2, bool)
+    )
     np.testing.assert_array_equal(known.F, [np.inf, 5.0, np.inf])
 
 
