@@ -72,8 +72,8 @@ class TuRBO(Saved):
     description: ClassVar[str] = "trust regions with Gaussian processes, Thompson sampling"
     source: ClassVar[str] = "Eriksson et al. (2019), arXiv:1910.04867"
     settings: ClassVar[Mapping[str, Setting]] = {
-        "regions": Setting(3, "trust regions at a time", 1, 100),
-        "initial": Setting(10, "space-filling rows with which a region begins", 2, 10_000),
+        "regions": Setting(1, "trust regions at a time", 1, 100),
+        "initial": Setting(20, "space-filling rows with which a region begins", 2, 10_000),
         "batch": Setting(10, "rows per batch", 1, 10_000),
         "length": Setting(0.8, "initial length of a region, as a share of each range", 0.01, 1.6),
         "shortest": Setting(2.0**-7, "length below which a region restarts elsewhere", 1e-6, 0.5),
