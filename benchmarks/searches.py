@@ -107,8 +107,8 @@ def compared(
         scenarios[ego].append(scenario)
     return {
         ego: bg.compare(
-            names, methods, ego=ego, seeds=seeds, budget=budget, objective={"harm": None},
-            workers=workers, out=out / ego, deliver=False,
+            names, algorithms=methods, ego=ego, objective={"harm": None}, seeds=seeds,
+            budget=budget, workers=workers, out=out / ego, deliver=False,
         )
         for ego, names in scenarios.items()
     }  # fmt: skip

@@ -69,7 +69,7 @@ class Surrogate(Saved):
     objectives: ClassVar[Arity] = "one"
 
     def __init__(self, problem: Problem, seed: int, **settings: Value) -> None:
-        self._values = resolve(Surrogate, problem, seed, settings)
+        self._values = resolve(type(self), problem, seed, settings)
         self._n_var = problem.n_var
         self._known = Known(problem, self._values["apart"])
         self._rng = np.random.Generator(np.random.PCG64(seed))

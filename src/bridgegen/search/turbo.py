@@ -90,7 +90,7 @@ class TuRBO(Saved):
     objectives: ClassVar[Arity] = "one"
 
     def __init__(self, problem: Problem, seed: int, **settings: Value) -> None:
-        self._values = resolve(TuRBO, problem, seed, settings)
+        self._values = resolve(type(self), problem, seed, settings)
         self._n_var = problem.n_var
         self._patience = self._values["failures"] or max(5, problem.n_var)
         self._known = Known(problem, self._values["avoid"])
