@@ -25,6 +25,7 @@ from bridgegen.comparison.distinct import distinct, normalised
 from bridgegen.comparison.record import modes_of, space_of
 from bridgegen.errors import BridgeGenError
 from bridgegen.odd.space import SearchSpace
+from bridgegen.search import get
 from bridgegen.store import Store
 
 PAIRS = {
@@ -99,19 +100,25 @@ def compared(
     seeds: int,
     budget: int,
     workers: int | None,
-) -> dict[str, Comparison]:
-    """Make the runs that are missing, and return a comparison for each driver."""
-    scenarios = defaultdict(list)
+) -> list[Comparison]:
+    """Make the runs that are missing, and return the comparisons.
+
+    Methods of many objectives are compared apart: runs of one comparison have the same terms.
+    """
+    scenarios, kinds = defaultdict(list), defaultdict(list)
     for pair in pairs:
         scenario, ego = pair.split("/")
         scenarios[ego].append(scenario)
-    return {
-        ego: bg.compare(
-            names, algorithms=methods, ego=ego, objective={"harm": None}, seeds=seeds,
-            budget=budget, workers=workers, out=out / ego, deliver=False,
+    for name in methods:
+        kinds["-many" if get(name).objectives == "many" else ""].append(name)
+    return [
+        bg.compare(
+            names, algorithms=own, ego=ego, objective={"harm": None}, seeds=seeds,
+            budget=budget, workers=workers, out=out / f"{ego}{kind}", deliver=False,
         )
         for ego, names in scenarios.items()
-    }  # fmt: skip
+        for kind, own in kinds.items()
+    ]  # fmt: skip
 
 
 def median(values: Sequence[float]) -> str:
@@ -147,26 +154,28 @@ def main() -> None:
             f"{'':>12}{'budget':>8}{'found':>8}{'first':>8}{f'{MODES} modes':>9}{'modes':>7}"
             f"{'distinct':>10}{'R_critic':>10}{'ms':>8}"
         )
-        runs = [cell for cell in made[ego].records if cell.scenario == scenario]
-        space = space_of(made[ego].plan.folder(runs[0])) if runs else None
-        of_run = {
-            cell: found(made[ego].plan.folder(cell), space, budgets) for cell in runs if space
-        }
+        of = defaultdict(list)
+        for one in made:
+            if one.plan.options.ego == ego:
+                for cell in one.records:
+                    if cell.scenario == scenario:
+                        folder = one.plan.folder(cell)
+                        of[cell.algorithm].append(found(folder, space_of(folder), budgets))
         for name in given.methods:
-            for budget in budgets:
-                own = [one[budget] for cell, one in of_run.items() if cell.algorithm == name]
-                if own:
-                    print(
-                        f"{name:>12}{budget:>8}"
-                        f"{np.mean([np.isfinite(one.first) for one in own]):>8.2f}"
-                        f"{median([one.first for one in own]):>8}"
-                        f"{median([one.fifth_mode for one in own]):>9}"
-                        f"{np.mean([one.modes for one in own]):>7.1f}"
-                        f"{np.mean([one.distinct for one in own]):>10.1f}"
-                        f"{np.mean([one.r_critic for one in own]):>10.3f}{overhead[name]:>8.2f}"
-                    )
-        for gap in (f"{cell.name}: {why}" for cell, why in made[ego].gaps.items()):
-            print(gap)
+            for budget in budgets if of[name] else ():
+                own = [run[budget] for run in of[name]]
+                print(
+                    f"{name:>12}{budget:>8}"
+                    f"{np.mean([np.isfinite(one.first) for one in own]):>8.2f}"
+                    f"{median([one.first for one in own]):>8}"
+                    f"{median([one.fifth_mode for one in own]):>9}"
+                    f"{np.mean([one.modes for one in own]):>7.1f}"
+                    f"{np.mean([one.distinct for one in own]):>10.1f}"
+                    f"{np.mean([one.r_critic for one in own]):>10.3f}{overhead[name]:>8.2f}"
+                )
+    for one in made:
+        for cell, why in one.gaps.items():
+            print(f"{cell.name} ({one.plan.options.ego}): {why}")
 
 
 if __name__ == "__main__":
