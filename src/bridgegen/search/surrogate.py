@@ -1,16 +1,20 @@
 """Surrogate search: models of the whole space, asked for critical scenarios unlike known ones."""
 
 from collections.abc import Mapping
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
 from bridgegen.arrays import Float
 from bridgegen.search.algorithm import Arity, Problem, Results, Setting, Value, resolve
 from bridgegen.search.space_filling import latin_hypercube, sobol_rows
-from bridgegen.search.surrogates.gaussian_process import GaussianProcess, Parameters, telling
 from bridgegen.search.surrogates.known import Known, distances
+from bridgegen.search.surrogates.parameters import Parameters
 from bridgegen.search.surrogates.saved import Saved, packed, unpacked
+from bridgegen.search.surrogates.subset import telling
+
+if TYPE_CHECKING:
+    from bridgegen.search.surrogates.gaussian_process import GaussianProcess
 
 CANDIDATES = 512
 """Rows anywhere that a model chooses from, and as many near good rows; a power of two."""
@@ -102,7 +106,9 @@ class Surrogate(Saved):
         paths = model.sample(points, max(n - len(batch), 0), rng)
         return self._joined(batch, rows, points, paths)
 
-    def _fitted(self, values: Float, parameters: Parameters | None) -> GaussianProcess:
+    def _fitted(self, values: Float, parameters: Parameters | None) -> "GaussianProcess":
+        from bridgegen.search.surrogates.gaussian_process import GaussianProcess  # compiled
+
         rows = telling(values, MODEL_ROWS)
         return GaussianProcess(self._known.points[rows], values[rows], parameters)
 

@@ -2,16 +2,19 @@
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
 from bridgegen.arrays import Float, Int
 from bridgegen.search.algorithm import Arity, Problem, Results, Setting, Value, resolve
 from bridgegen.search.space_filling import latin_hypercube, sobol_rows
-from bridgegen.search.surrogates.gaussian_process import GaussianProcess, Parameters
 from bridgegen.search.surrogates.known import Known, distances
+from bridgegen.search.surrogates.parameters import Parameters
 from bridgegen.search.surrogates.saved import Saved, packed, unpacked
+
+if TYPE_CHECKING:
+    from bridgegen.search.surrogates.gaussian_process import GaussianProcess
 
 MODEL_ROWS = 256
 """Maximum number of rows of a region's model: those nearest to its centre."""
@@ -148,8 +151,10 @@ class TuRBO(Saved):
         """Return the place of a region's best row, the first of equal ones."""
         return int(region.own[self._known.F[region.own].argmin()])
 
-    def _model(self, region: _Region, scores: Float) -> GaussianProcess:
+    def _model(self, region: _Region, scores: Float) -> "GaussianProcess":
         """Return a region's process, and keep its parameters for the next."""
+        from bridgegen.search.surrogates.gaussian_process import GaussianProcess  # compiled
+
         points = self._known.points
         off = np.sum((points - points[self._centre(region)]) ** 2, axis=1)
         near = np.sort(np.argsort(off, kind="stable")[:MODEL_ROWS])

@@ -4,14 +4,8 @@ from sklearn.gaussian_process import GaussianProcessRegressor
 from sklearn.gaussian_process.kernels import ConstantKernel, Matern
 
 from bridgegen.search.surrogates import _gaussian_process_kernels as kernels
-from bridgegen.search.surrogates.gaussian_process import (
-    GaussianProcess,
-    Parameters,
-    _density,
-    _prior,
-    learnt,
-    telling,
-)
+from bridgegen.search.surrogates.gaussian_process import GaussianProcess, _density, learnt
+from bridgegen.search.surrogates.parameters import Parameters, prior
 
 
 @pytest.fixture
@@ -65,7 +59,7 @@ def test_the_density_is_likelihood_times_prior(rng):
     X = rng.random((30, 3))
     y = valley(X) - valley(X).mean()
     logs = np.log([0.3, 0.7, 2.0, 1.5, 0.02])
-    mean, spread = _prior(3)
+    mean, spread = prior(3)
     theirs = of_scikit_learn(Parameters(logs), X, y).log_marginal_likelihood_value_
     theirs += 15.0 * np.log(2.0 * np.pi) - 0.5 * np.sum(((logs - mean) / spread) ** 2)
     assert _density(X, y, logs)[0] == pytest.approx(theirs)
@@ -115,13 +109,3 @@ def test_equal_rows_with_other_values_do_no_harm(rng):
     X = np.repeat(rng.random((1, 3)), 20, axis=0)
     model = GaussianProcess(X, rng.standard_normal(20))
     assert np.isfinite(model.predict(X)[0]).all()
-
-
-def test_of_many_rows_the_smallest_half_is_kept_and_the_rest_is_spread():
-    values = np.random.default_rng(1).permutation(1000).astype(np.float64)
-    kept = telling(values, 100)
-    assert (np.diff(kept) > 0).all()
-    assert sorted(values[kept])[:50] == list(range(50))
-    assert sorted(values[kept])[-1] == 999
-    assert np.diff(sorted(values[kept])[50:]).max() < 25
-    np.testing.assert_array_equal(telling(values[:100], 100), np.arange(100))

@@ -1,12 +1,11 @@
 """A Gaussian process: what is known of the objective between the evaluated rows."""
 
-from dataclasses import dataclass
-from typing import Self
-
 import numpy as np
 
-from bridgegen.arrays import Float, Int
+from bridgegen.arrays import Float
 from bridgegen.search.surrogates import _gaussian_process_kernels as kernels
+from bridgegen.search.surrogates.parameters import HIGH, LOW, Parameters, prior
+from bridgegen.search.surrogates.subset import telling
 
 LEARN_FROM = 128
 """Maximum number of rows of which the likelihood is computed."""
@@ -16,49 +15,6 @@ FIRST_STEPS, NEXT_STEPS = 30, 5
 
 FEATURES = 512
 """Random features of a sample path."""
-
-_LOW, _HIGH = np.log([0.02, 0.05, 1e-4]), np.log([50.0, 20.0, 0.5])
-"""Least and greatest length, variance and noise."""
-
-
-@dataclass(frozen=True)
-class Parameters:
-    """The parameters of a Gaussian process.
-
-    Attributes:
-        logs: ``(d + 2,)`` float64, the logarithms of the length of each column, of the variance of
-            the process and of that of the noise.
-    """
-
-    logs: Float
-
-    @classmethod
-    def usual(cls, d: int) -> Self:
-        """Return the mode of the prior for points of d columns in the unit cube."""
-        return cls(_prior(d)[0])
-
-    @property
-    def lengths(self) -> Float:
-        """``(d,)`` float64, the distance over which the process changes in each column."""
-        lengths: Float = np.exp(self.logs[:-2])
-        return lengths
-
-    @property
-    def variance(self) -> float:
-        """Of the process."""
-        return float(np.exp(self.logs[-2]))
-
-    @property
-    def noise(self) -> float:
-        """Variance of the noise."""
-        return float(np.exp(self.logs[-1]))
-
-
-def _prior(d: int) -> tuple[Float, Float]:
-    """Return mean and standard deviation of the logarithms, normally distributed."""
-    mean = np.concatenate([np.full(d, np.log(0.5 * np.sqrt(d))), np.log([1.0, 1e-2])])
-    spread = np.concatenate([np.full(d, 1.0), [1.0, 2.0]])
-    return mean, spread
 
 
 def learnt(points: Float, values: Float, parameters: Parameters | None) -> Parameters:
@@ -76,7 +32,7 @@ def learnt(points: Float, values: Float, parameters: Parameters | None) -> Param
     """
     d = points.shape[1]
     logs = (Parameters.usual(d) if parameters is None else parameters).logs.copy()
-    low, high = np.concatenate([np.full(d, _LOW[0]), _LOW[1:]]), _HIGH[[0] * d + [1, 2]]
+    low, high = np.concatenate([np.full(d, LOW[0]), LOW[1:]]), HIGH[[0] * d + [1, 2]]
     step, before = np.full(d + 2, 0.2), np.zeros(d + 2)
     best, greatest = logs, -np.inf
     for _ in range(FIRST_STEPS if parameters is None else NEXT_STEPS):
@@ -96,7 +52,7 @@ def _density(points: Float, values: Float, logs: Float) -> tuple[float, Float]:
     scaled = points / now.lengths
     K = kernels.covariance(scaled, scaled, now.variance)
     R = K + now.noise * np.eye(len(K))
-    mean, spread = _prior(points.shape[1])
+    mean, spread = prior(points.shape[1])
     off = (logs - mean) / spread
     if not kernels.factorise(R):
         return -np.inf, -off / spread
@@ -113,20 +69,6 @@ def _weights(R: Float, values: Float) -> Float:
     kernels.solve_transposed(R, columns)
     kernels.solve(R, columns)
     return columns.reshape(values.shape)
-
-
-def telling(values: Float, count: int) -> Int:
-    """Return which rows a model keeps if it can have only some: ascending places.
-
-    Half of them are those with the smallest values; the others are spread evenly over the ranks of
-    the rest, so that the model knows the whole range. Ties go by their order.
-    """
-    if len(values) <= count:
-        return np.arange(len(values))
-    order = np.argsort(values, kind="stable")
-    smallest, others = order[: count // 2], order[count // 2 :]
-    spread = np.linspace(0, len(others) - 1, count - len(smallest)).round().astype(np.int64)
-    return np.sort(np.concatenate([smallest, others[spread]]))
 
 
 class GaussianProcess:
@@ -183,12 +125,12 @@ class GaussianProcess:
         weights = np.sqrt(2.0 * p.variance / FEATURES) * rng.standard_normal((FEATURES, n))
         noise = np.sqrt(p.noise) * rng.standard_normal((len(self._centred), n))
 
-        def prior(at: Float) -> Float:
+        def of_prior(at: Float) -> Float:
             waves = np.cos(kernels.product(at, frequencies) + phases)
             path: Float = kernels.product(waves, weights)
             return path
 
-        gap = self._centred[:, None] - prior(self._scaled) - noise
+        gap = self._centred[:, None] - of_prior(self._scaled) - noise
         cross = kernels.covariance(scaled, self._scaled, p.variance)
-        paths = prior(scaled) + kernels.product(cross, _weights(self._R, gap))
+        paths = of_prior(scaled) + kernels.product(cross, _weights(self._R, gap))
         return np.ascontiguousarray(paths.T) + self._centre
