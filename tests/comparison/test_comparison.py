@@ -18,7 +18,9 @@ import bridgegen as bg
 from bridgegen.campaign.coverage import coverage_of
 from bridgegen.cli import main
 from bridgegen.comparison import ComparisonCallbacks
+from bridgegen.comparison.page import FIGURE_NAMES
 from bridgegen.comparison.plan import Cell
+from bridgegen.comparison.record import points
 from bridgegen.errors import InputError, Interrupted, StorageError, UnknownNameError
 from bridgegen.search.random import Random
 from bridgegen.search.registry import ALGORITHMS
@@ -27,7 +29,7 @@ from bridgegen.store import Store
 GRID = {"algorithms": ["random", "pso"], "seeds": 2, "budget": 120, "baseline": "random"}
 SETTLED = (
     "runs.csv", "summary.csv",
-    *(f"figures/crossroads-s4-{name}.png" for name in ("r_critic", "critical", "hypervolume")),
+    *(f"figures/crossroads-s4-{name}.png" for name in FIGURE_NAMES),
 )  # fmt: skip
 
 
@@ -77,7 +79,17 @@ def test_every_number_is_its_run_s(done):
         told_of = rows.findings.take(rows.critical)
         keys = zip(told_of.conflict_type, told_of.responsible, told_of.rule, told_of.partner,
                    strict=True)  # fmt: skip
+        keys = list(keys)
         assert value["modes"] == len({key for key in keys if key[0]})
+        second = [k for k in range(len(keys)) if len({key for key in keys[: k + 1] if key[0]}) == 2]
+        assert value["to_2_modes"] == (hits[second[0]] if second else math.inf)
+        assert value["distinct"] < 5 or hits[4] <= value["to_5_distinct"] <= hits[-1]
+        at = points(120)
+        found = done.records[cell].distinct_found
+        assert found[-1] == value["distinct"]
+        assert (found == 0)[at < hits[0]].all()
+        assert (found > 0)[at >= hits[0]].all()
+        assert value["distinct"] < 5 or (found >= 5)[at >= value["to_5_distinct"]].all()
         assert set(told["folder"]) == {f"runs/{folder.name}"}
         assert set(told["evaluations"]) == {120}
 
@@ -148,7 +160,7 @@ def test_the_page_holds_every_run_and_needs_no_network(done):
             assert link[1:] in page.ids
         elif not link.startswith("data:image/png;base64,"):
             assert (done.folder / link).exists(), link
-    assert sum(link.startswith("data:") for link in page.links) == 6  # three, in two schemes
+    assert sum(link.startswith("data:") for link in page.links) == 8  # four, in two schemes
     for cell in done.plan.cells:
         assert f"replay/{cell.name}" in page.text
     assert done.plan.command() in page.text

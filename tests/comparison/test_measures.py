@@ -19,7 +19,9 @@ def record(reached: float, front: list[list[float]], *, critical=60, searched=("
         terms=("d_min", "v_d"), parameters=searched, command="", ended="budget",
         evaluations=1000, failed=0,
         critical=critical, reached={1: 2.0, 10: 20.0, 50: reached}, seconds=4.0,
-        seconds_reached={1: 0.1, 10: 0.2, 50: reached / 100.0}, distinct=5, critical_bins=7,
+        seconds_reached={1: 0.1, 10: 0.2, 50: reached / 100.0}, distinct=5,
+        distinct_reached={5: 30.0}, distinct_found=np.array([1, 5]), modes_reached={2: 7.0},
+        critical_bins=7,
         critical_pairs=9, modes=3, found=np.array([1, critical]), fronts=(x[:0], x),
         low=x.min(axis=0) if len(x) else None, high=x.max(axis=0) if len(x) else None,
     )  # fmt: skip
@@ -102,5 +104,5 @@ def test_modes_are_different_conflicts_and_passing_by_is_none():
         rule=texts("signs", "signs", "signs", "", "signs"),
         partner=texts("bv", "bv", "bv", "", "bv"), implausible=none,
     )  # fmt: skip
-    assert len(modes_of(found)) == 3
-    assert modes_of(Findings.none(4)) == set()
+    assert list(modes_of(found).values()) == [0, 2, 4]
+    assert modes_of(Findings.none(4)) == {}

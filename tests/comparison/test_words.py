@@ -60,7 +60,12 @@ def test_the_summary_tests_against_the_baseline_and_corrects_by_measure():
 def told(shares: dict[str, list[float]], critical: int = 1) -> list[str]:
     """The sentences of made-up runs."""
     values = {
-        Cell("s", name, seed): {"r_critic": share, "distinct": 5.0, "hypervolume": 0.5}
+        Cell("s", name, seed): {
+            "modes": 2.0,
+            "distinct": 5.0,
+            "r_critic": share,
+            "hypervolume": 0.5,
+        }
         for name, row in shares.items()
         for seed, share in enumerate(row)
     }
@@ -83,17 +88,25 @@ def told(shares: dict[str, list[float]], critical: int = 1) -> list[str]:
 
 def test_sentences_name_the_best_and_how_sure_that_is():
     seeds = np.arange(8) / 100.0
-    first, second, third = told(
+    modes, distinct, share, volume = told(
         {"a": [*(0.1 + seeds)], "b": [*(0.5 + seeds)], "c": [*(0.1 + seeds)]}
     )
-    assert first == (
+    assert modes.startswith("The largest number of failure modes is that of a, b and c (median 2)")
+    assert share == (
         "The largest share of critical scenarios, R_critic, is that of b (median 0.535; a: 0.135). "
         "Better than a: b (p < 0.001, A12 1.00, large); no difference from a shown: c."
     )
-    assert second.startswith(
+    assert distinct.startswith(
         "The largest number of different critical scenarios is that of a, b and c"
     )
-    assert third.endswith("No difference from a shown: b and c.")
+    assert volume.endswith("No difference from a shown: b and c.")
+
+
+def test_a_median_between_two_counts_is_no_whole_number():
+    modes = MEASURES["modes"]
+    for values, text in (([1.0, 2.0], "1.5"), ([2.0, 2.0], "2"), ([20.0, 21.0], "20")):
+        rows = {Cell("s", "a", k): {"modes": value} for k, value in enumerate(values)}
+        assert words.median(summarise(rows, ["s"], ["a"], "a", [modes])[0], modes) == text
 
 
 def test_too_few_runs_are_said_to_be_too_few():

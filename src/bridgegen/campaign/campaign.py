@@ -15,7 +15,7 @@ from bridgegen.campaign.exportable import require_exportable
 from bridgegen.campaign.failing_driver import FailingDriver
 from bridgegen.campaign.loop import Progress, Reason, run_loop
 from bridgegen.campaign.report import write_run_report
-from bridgegen.campaign.restored import pipeline_of, placed
+from bridgegen.campaign.restored import check_named, pipeline_of, placed
 from bridgegen.campaign.run import Run
 from bridgegen.campaign.scenarios import driven_by, is_file, load, refuse_standstill
 from bridgegen.campaign.settings import Settings
@@ -163,7 +163,7 @@ def run_search(given: SearchArguments) -> Run:
             scenario=_absolute(given.scenario) if is_file(given.scenario) else str(given.scenario),
             distribution=_absolute(given.distribution),
             fingerprint=catalogue.fingerprint,
-            algorithm=method.name,
+            algorithm=given.algorithm,
             settings=values,
             budget=budget,
             seed=seed,
@@ -191,6 +191,7 @@ def resume(
     *,
     ego: str | None = None,
     worse_than: str | None = None,
+    algorithm: str | None = None,
     simulator: SimulatorChoice | None = None,
     deliver: bool = True,
     workers: Choice = None,
@@ -205,6 +206,7 @@ def resume(
         ego: where a driver of your own drives, that same driver: code that a folder names is never
             imported unasked.
         worse_than: likewise, the driver that the ego's is compared with.
+        algorithm: likewise, an algorithm of your own.
         simulator: the run's, with its place on this machine; as recorded by default.
         deliver: as for ``run_search``.
         workers: likewise.
@@ -220,6 +222,7 @@ def resume(
     with Store.open(folder, write=True) as store, open_workers(workers) as pool:
         callbacks.workers(pool)
         run = Run.of(store)
+        check_named(run.settings.algorithm, algorithm, "algorithm", run.folder, "resume")
         pipeline = pipeline_of(
             run, "resume", ego=ego, worse_than=worse_than, compares=True, causes=True,
             simulator=simulator, workers=pool,

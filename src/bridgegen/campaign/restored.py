@@ -18,6 +18,7 @@ from bridgegen.odd.space import SearchSpace
 from bridgegen.openx.on_map import on_map, searchable
 from bridgegen.openx.opendrive.road_map import RoadMap, load_map
 from bridgegen.options import PipelineOptions
+from bridgegen.own_code import is_own
 from bridgegen.pipeline import Pipeline
 from bridgegen.simulation.choice import SimulatorChoice
 from bridgegen.workers import Workers
@@ -58,10 +59,10 @@ def pipeline_of(
     settings, folder = run.settings, run.folder
     if elsewhere is not None:
         settings = replace(settings, simulator=elsewhere, cause=None, worse_than=None)
-    _check_driver(settings.ego, ego, "ego", folder, command)
+    check_named(settings.ego, ego, "ego", folder, command)
     if settings.worse_than is not None:
         if compares or worse_than is not None or not is_spec(settings.worse_than):
-            _check_driver(settings.worse_than, worse_than, "worse-than", folder, command)
+            check_named(settings.worse_than, worse_than, "worse-than", folder, command)
         else:
             settings = replace(settings, worse_than=None)
     scenario, space, roads = searched(run)
@@ -103,26 +104,26 @@ def _simulator(settings: Settings, given: SimulatorChoice | None, folder: Path) 
     return replace(settings.simulator, access=given.access)
 
 
-def _check_driver(
-    recorded: str, given: str | None, option: str, folder: Path, command: str
-) -> None:
-    """Refuse another driver than the run's, and one of the user's that is not named again.
+def check_named(recorded: str, given: str | None, option: str, folder: Path, command: str) -> None:
+    """Refuse another driver or algorithm than the run's, and the user's own if not named again.
 
     Args:
         recorded: the run's.
         given: by the user, if at all.
-        option: "ego" or "worse-than", which names it.
+        option: "ego", "worse-than" or "algorithm", which names it.
         folder: of the run.
         command: the BridgeGen command that asks.
     """
-    if given is None and is_spec(recorded):
+    is_algorithm = option == "algorithm"
+    what = "algorithm" if is_algorithm else "driver"
+    if given is None and (is_own(recorded) if is_algorithm else is_spec(recorded)):
         raise InputError(
-            f"{folder}: its driver {recorded} is code; to run it, name it: "
+            f"{folder}: its {what} {recorded} is code; to run it, name it: "
             f"bridgegen {command} {folder} --{option} {shlex.quote(recorded)}"
         )
     if given not in (None, recorded):
         raise InputError(
-            f"{folder}: the driver of this run (--{option}) must be {recorded}, got {given}"
+            f"{folder}: the {what} of this run (--{option}) must be {recorded}, got {given}"
         )
 
 

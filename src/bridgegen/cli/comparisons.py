@@ -32,7 +32,8 @@ def compare(
     algorithms: Annotated[
         str,
         typer.Option(
-            help="See 'bridgegen list algorithms'; separated by commas.",
+            help="See 'bridgegen list algorithms'; or your own: module:Class, file.py:Class. "
+            "Separated by commas.",
             rich_help_panel=HOW,
             autocompletion=completing("algorithm"),
         ),
@@ -56,7 +57,7 @@ def compare(
         list[str] | None,
         typer.Option(
             "--set",
-            help="ALGORITHM.NAME=VALUE; may be repeated.",
+            help="ALGORITHM.NAME=VALUE, of your own CLASS.NAME=VALUE; may be repeated.",
             rich_help_panel=HOW,
         ),
     ] = None,

@@ -27,6 +27,12 @@ OwnBaseline = Annotated[
         "--worse-than", help="The run's baseline, if it is your own driver.", rich_help_panel=DRIVER
     ),
 ]
+OwnAlgorithm = Annotated[
+    str | None,
+    typer.Option(
+        "--algorithm", help="The run's algorithm, if it is your own.", rich_help_panel=SEARCH
+    ),
+]
 Ideal = Annotated[str | None, declaration("ideal", shown="the file's")]
 Vehicle = Annotated[str | None, declaration("vehicle")]
 TimeLimit = Annotated[float | None, declaration("time_limit")]

@@ -42,7 +42,7 @@ _FORMS: Mapping[Any, FileForm] = {
 _CRITERIA = "criteria"
 _YAML = (".yaml", ".yml")
 
-_CODE = {"ego", "detector"}
+_CODE = {"algorithm", "detector", "ego", "worse_than"}
 """Options whose value is a path in front of a colon, or a path if it ends in ``.fmu``."""
 
 

@@ -40,7 +40,13 @@ def search_all(
                 print(f"finished already: {out}")
             else:
                 with SearchScreen() as screen:
-                    run = resume(out, callbacks=screen.callbacks)
+                    run = resume(
+                        out,
+                        ego=values.get("ego"),
+                        worse_than=values.get("worse_than"),
+                        algorithm=values.get("algorithm"),
+                        callbacks=screen.callbacks,
+                    )
                 print_summary(run, screen.seconds)
         except Interrupted as stop:
             raise Interrupted(

@@ -46,7 +46,10 @@ class ComparisonArguments(CommonOptions):
     )
     algorithms: str | Sequence[str] = field(
         default=("random", "pso"),
-        metadata={"help": "One or several names of ``bridgegen list algorithms``."},
+        metadata={
+            "help": "One or several names of ``bridgegen list algorithms``, or your own: "
+            "``module:Class``, ``file.py:Class``."
+        },
     )
     settings: Mapping[str, Mapping[str, Value]] | None = field(
         default=None,

@@ -9,7 +9,7 @@ import numpy as np
 from bridgegen.arrays import Float
 from bridgegen.comparison.fronts import Scale, front, generational_distance, hypervolume, spread
 from bridgegen.comparison.plan import Cell
-from bridgegen.comparison.record import Record
+from bridgegen.comparison.record import DISTINCT, MODES, Record
 from bridgegen.comparison.statistics import quartiles
 
 SHARE = 0.05
@@ -48,10 +48,28 @@ def counts(budget: int) -> tuple[int, ...]:
 
 
 def measures(budget: int) -> tuple[Measure, ...]:
-    """Return all measures of a comparison with this budget, those of time last."""
+    """Return all measures of a comparison with this budget: what was found first, time last."""
     k = waited_for(budget)
     best = "divided by the best method's median"
     return (
+        Measure(
+            "modes", "modes", "different conflicts of the critical scenarios: type, responsible, "
+            "rule, partner", True,
+        ),
+        Measure("distinct", "distinct", "different critical scenarios", True),
+        Measure("to_1", "to 1st", "evaluations until the 1st critical scenario", False),
+        Measure(
+            f"to_{DISTINCT}_distinct", f"to {DISTINCT} distinct",
+            f"evaluations until {DISTINCT} different critical scenarios", False,
+        ),
+        Measure(
+            f"to_{MODES}_modes", f"to {MODES} modes", f"evaluations until {MODES} modes", False
+        ),
+        Measure("critical_bins", "bins", "bins of parameters that hold a critical scenario", True),
+        Measure(
+            "critical_pairs", "pairs", "pairs of two parameters' bins that hold a critical "
+            "scenario", True,
+        ),
         Measure("r_critic", "R_critic", "critical share of the evaluations made", True, digits=3),
         Measure(
             "t_critic", "T_critic", f"evaluations until critical scenario {k}, {best}", False,
@@ -60,17 +78,7 @@ def measures(budget: int) -> tuple[Measure, ...]:
         *(
             Measure(f"to_{n}", f"to {ordinal(n)}", f"evaluations until the {ordinal(n)} critical "
                     "scenario", False)
-            for n in counts(budget)
-        ),
-        Measure("distinct", "distinct", "different critical scenarios", True),
-        Measure(
-            "modes", "modes", "different conflicts of the critical scenarios: type, responsible, "
-            "rule, partner", True,
-        ),
-        Measure("critical_bins", "bins", "bins of parameters that hold a critical scenario", True),
-        Measure(
-            "critical_pairs", "pairs", "pairs of two parameters' bins that hold a critical "
-            "scenario", True,
+            for n in counts(budget)[1:]
         ),
         Measure(
             "hypervolume", "hypervolume", "share of the objective box that is dominated", True,
@@ -151,8 +159,12 @@ def measure(records: Mapping[Cell, Record], budget: int, baseline: str) -> Measu
             "t_critic": relative[cell],
             **{f"to_{n}": count for n, count in one.reached.items()},
             "modes": float(one.modes),
-            **dict.fromkeys(("distinct", "critical_bins", "critical_pairs"), float("nan")),
-            **(_in_parameters(one) if cell.algorithm not in strange else {}),
+            **{f"to_{n}_modes": count for n, count in one.modes_reached.items()},
+            **(
+                dict.fromkeys(_in_parameters(one), float("nan"))
+                if cell.algorithm in strange
+                else _in_parameters(one)
+            ),
             "hypervolume": float(curves[cell][-1]),
             "gd": generational_distance(final[cell], reference),
             "spread": spread(final[cell], reference),
@@ -168,6 +180,7 @@ def measure(records: Mapping[Cell, Record], budget: int, baseline: str) -> Measu
 def _in_parameters(one: Record) -> dict[str, float]:
     return {
         "distinct": float(one.distinct),
+        **{f"to_{n}_distinct": count for n, count in one.distinct_reached.items()},
         "critical_bins": float(one.critical_bins),
         "critical_pairs": float(one.critical_pairs),
     }

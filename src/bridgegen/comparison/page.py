@@ -24,6 +24,9 @@ from bridgegen.metrics import Quantity
 
 FIGURES = "figures"
 
+FIGURE_NAMES = ("distinct", "r_critic", "critical", "hypervolume")
+"""The ends of the files' names, in the page's order."""
+
 
 def write_page(comparison: Comparison) -> None:
     """Write the page, and its figures as files beside it.
@@ -81,11 +84,13 @@ def _scenario(comparison: Comparison, scenario: str, measures: Sequence[Measure]
     parts = [f"<h2>{escape(scenario)}</h2>", f'<div class="card">{text}</div>']
     if scenario in comparison.measured:
         legend = _legend(comparison.plan.baseline)
-        often = [one for one in measures if one.name[:2] in ("r_", "t_", "to")]
-        other = [one for one in measures if one not in often]
+        first = [one.name for one in measures].index("r_critic")
+        found, often = measures[:first], [one for one in measures[first:] if one.name[0] in "rt"]
+        other = [one for one in measures[first:] if one not in often]
         parts.append(_figures(comparison, scenario))
-        parts.append(_medians(comparison, scenario, often, "How often, and how soon", legend))
-        parts.append(_medians(comparison, scenario, other, "How different, and how bad at once"))
+        parts.append(_medians(comparison, scenario, found, "What was found, and how soon", legend))
+        parts.append(_medians(comparison, scenario, often, "How often"))
+        parts.append(_medians(comparison, scenario, other, "How bad at once"))
     parts.append(_runs(comparison, scenario, measures))
     return f"<section>{''.join(parts)}</section>"
 
@@ -163,6 +168,10 @@ def _figures(comparison: Comparison, scenario: str) -> str:
         name: np.array([comparison.records[cell].found for cell in of(name)], np.float64)
         for name in plan.algorithms
     }
+    distinct = {
+        name: np.array([comparison.records[cell].distinct_found for cell in of(name)], np.float64)
+        for name in plan.algorithms
+    }
     volumes = {
         name: np.array([measured.curves[cell] for cell in of(name)]) for name in plan.algorithms
     }
@@ -170,15 +179,20 @@ def _figures(comparison: Comparison, scenario: str) -> str:
     band = "Median over the runs, and the band between the quartiles"
     drawn = []
     for theme in (LIGHT, DARK):
+        different = figures.curves(
+            distinct, at, plan.baseline, "different critical scenarios", theme
+        )
         critical = figures.curves(found, at, plan.baseline, "critical scenarios", theme)
         volume = figures.curves(volumes, at, plan.baseline, "hypervolume", theme, from_zero=False)
-        drawn.append((figures.boxes(shares, plan.baseline, "R_critic", theme), critical, volume))
+        shares_drawn = figures.boxes(shares, plan.baseline, "R_critic", theme)
+        drawn.append((different, shares_drawn, critical, volume))
     captions = (
+        f"Different critical scenarios found. {band}.",
         "R_critic: the critical share of each run (points), quartiles and median.",
         f"Critical scenarios found. {band}.",
         f"Hypervolume of the front. {band}.",
     )
-    for kind, light in zip(("r_critic", "critical", "hypervolume"), drawn[0], strict=True):
+    for kind, light in zip(FIGURE_NAMES, drawn[0], strict=True):
         write_whole(comparison.folder / FIGURES / f"{scenario}-{kind}.png", [light])
     shown = (_figure(*one) for one in zip(*drawn, captions, strict=True))
     return f'<div class="figures">{"".join(shown)}</div>'

@@ -15,6 +15,7 @@ from bridgegen.comparison.distinct import APART
 from bridgegen.disk import write_whole
 from bridgegen.errors import InputError, StorageError, UnknownNameError
 from bridgegen.options import CommonOptions, SearchOptions, options_of
+from bridgegen.own_code import file_of, label_of
 from bridgegen.records import parse_json, read_bytes
 from bridgegen.search.algorithm import Problem, Value, resolve
 from bridgegen.store.run_file import FILE as RUN_FILE
@@ -34,7 +35,7 @@ class Cell:
 
     Attributes:
         scenario: the logical scenario's name.
-        algorithm: that searches it.
+        algorithm: that searches it, by its name in the comparison.
         seed: of the run.
     """
 
@@ -57,6 +58,7 @@ class Plan:
         scenarios: by name, as the user refers to each.
         fingerprints: digests of their contents, by name.
         algorithms: the user's settings of each, by its name; in the user's order.
+        methods: what the user called each, by its name: the same, or where the user's own is.
         seeds: runs of each algorithm in each scenario; their seeds are 0, 1, 2 …
         budget: evaluations of each run.
         baseline: the algorithm that the others are tested against.
@@ -68,6 +70,7 @@ class Plan:
     scenarios: Mapping[str, str]
     fingerprints: Mapping[str, str]
     algorithms: Mapping[str, Mapping[str, Value]]
+    methods: Mapping[str, str]
     seeds: int
     budget: int
     baseline: str
@@ -105,13 +108,14 @@ class Plan:
         unless the user chooses many objectives for all algorithms.
         """
         options = self.options
-        of_many = toolkit.get(cell.algorithm).objectives == "many"
+        method = self.methods[cell.algorithm]
+        of_many = toolkit.get(method).objectives == "many"
         if of_many and options.objectives is None:
             terms = options.objective and dict.fromkeys(options.objective)
             options = replace(options, weights=None, objective=terms)
         return SearchOptions.of(
             options,
-            algorithm=cell.algorithm,
+            algorithm=method,
             settings=self.algorithms[cell.algorithm],
             budget=self.budget,
             seed=cell.seed,
@@ -120,7 +124,7 @@ class Plan:
     def command(self) -> str:
         """Return the command line that starts or resumes this comparison."""
         words = ["bridgegen", "compare", *self.scenarios.values()]
-        words += ["--algorithms", ",".join(self.algorithms)]
+        words += ["--algorithms", ",".join(self.methods.values())]
         words += ["--seeds", str(self.seeds), "--budget", str(self.budget)]
         if self.baseline != next(iter(self.algorithms)):
             words += ["--baseline", self.baseline]
@@ -145,8 +149,11 @@ class Plan:
         }
         same |= {f"scenario {name}": mark for name, mark in self.fingerprints.items()}
         for name, settings in self.algorithms.items():
-            known = {key: one.default for key, one in toolkit.get(name).settings.items()}
+            method = self.methods[name]
+            known = {key: one.default for key, one in toolkit.get(method).settings.items()}
             same[f"settings of {name}"] = {**known, **settings}
+            if (file := file_of(method)) is not None:
+                same[f"algorithm {name}"] = _digest(file)
         return _plain(same)
 
 
@@ -168,7 +175,9 @@ def make_plan(
         InputError: a name twice or missing, a value out of range; a scenario that breaks a rule.
         UnknownNameError: no such scenario, algorithm or setting.
     """
-    problems = _twice("scenario", [str(one) for one in scenarios]) + _twice("algorithm", algorithms)
+    methods = {label_of(one): one for one in algorithms}
+    problems = _twice("scenario", [str(one) for one in scenarios])
+    problems += _twice("algorithm", [label_of(one) for one in algorithms])
     problems += [
         f"{low} <= {name} <= {high} must hold, got {value}"
         for name, value, low, high in (("seeds", seeds, 1, MAX_SEEDS), ("budget", budget, 1, 10**7))
@@ -180,11 +189,12 @@ def make_plan(
         problems.append("a distribution belongs to one scenario file; compare that one alone")
     if problems:
         raise InputError(*problems)
-    for name in algorithms:
-        resolve(toolkit.get(name), Problem.unnamed(1), 0, settings.get(name, {}))
-    for name in [*settings, *([baseline] if baseline else [])]:
-        if name not in algorithms:
-            raise UnknownNameError("algorithm of this comparison", name, algorithms)
+    first = label_of(baseline or algorithms[0])
+    for name, method in methods.items():
+        resolve(toolkit.get(method), Problem.unnamed(1), 0, settings.get(name, {}))
+    for name in [*settings, first]:
+        if name not in methods:
+            raise UnknownNameError("algorithm of this comparison", name, methods)
     loaded = [(str(one), load(one, options.distribution)) for one in scenarios]
     if problems := _twice("scenario called", [one.name for _, one in loaded]):
         raise InputError(*problems)
@@ -195,10 +205,11 @@ def make_plan(
             for given, one in loaded
         },
         fingerprints={one.name: one.fingerprint for _, one in loaded},
-        algorithms={name: dict(settings.get(name, {})) for name in algorithms},
+        algorithms={name: dict(settings.get(name, {})) for name in methods},
+        methods=methods,
         seeds=seeds,
         budget=budget,
-        baseline=baseline or algorithms[0],
+        baseline=first,
         apart=apart,
         options=options,
     )
@@ -268,7 +279,7 @@ def _plain(value: Any) -> dict[str, Any]:
 
 
 def _difference(name: str, before: Any, now: Any) -> str:
-    if name.startswith("scenario "):
+    if name.startswith(("algorithm ", "scenario ")):
         return f"{name} has changed"
     if name == "map":
         return "the map has changed"

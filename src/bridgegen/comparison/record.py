@@ -38,8 +38,11 @@ class Record:
         seconds: [s] that it took.
         seconds_reached: [s] by k, likewise.
         distinct: how many different critical scenarios it found.
+        distinct_reached: by k, the evaluations until the k-th different one; likewise.
+        distinct_found: ``(c,)`` int64, different critical scenarios by the c points of its curve.
         modes: how many different conflicts its critical scenarios have: type, responsible, rule,
             partner.
+        modes_reached: by k, the evaluations until the k-th different conflict; likewise.
         critical_bins: bins of parameters that hold a critical scenario.
         critical_pairs: pairs of bins of two parameters that do.
         found: ``(c,)`` int64, critical scenarios by the c points of its curve.
@@ -60,7 +63,10 @@ class Record:
     seconds: float
     seconds_reached: Mapping[int, float]
     distinct: int
+    distinct_reached: Mapping[int, float]
+    distinct_found: Int
     modes: int
+    modes_reached: Mapping[int, float]
     critical_bins: int
     critical_pairs: int
     found: Int
@@ -71,6 +77,10 @@ class Record:
 
 MODE = ("conflict_type", "responsible", "rule", "partner")
 """The fields in which conflicts of different modes differ."""
+
+
+DISTINCT, MODES = 5, 2
+"""The k of the times to the k-th different critical scenario, and to the k-th conflict."""
 
 
 def points(budget: int) -> Int:
@@ -112,6 +122,8 @@ def read(folder: Path, space: SearchSpace, budget: int, ks: Sequence[int], apart
         np.concatenate(reader.critical) if reader.critical else np.empty((0, len(space.names)))
     )
     n = len(critical)
+    is_new = distinct(normalised(space, critical), apart, n_var=space.n_var)
+    new_at = [reader.hits[k][0] for k in np.flatnonzero(is_new).tolist()]
     bins = coverage(space, critical, np.ones(n, np.bool_), strength=2, sample=0).ways
     hits = reader.hits
     return Record(
@@ -125,8 +137,11 @@ def read(folder: Path, space: SearchSpace, budget: int, ks: Sequence[int], apart
         reached={k: float(hits[k - 1][0]) if k <= n else float("inf") for k in ks},
         seconds=seconds,
         seconds_reached={k: hits[k - 1][1] if k <= n else float("inf") for k in ks},
-        distinct=int(distinct(normalised(space, critical), apart, n_var=space.n_var).sum()),
+        distinct=len(new_at),
+        distinct_reached={DISTINCT: _reached(new_at, DISTINCT)},
+        distinct_found=np.searchsorted(new_at, points(budget), side="right").astype(np.int64),
         modes=len(reader.modes),
+        modes_reached={MODES: _reached(list(reader.modes.values()), MODES)},
         critical_bins=bins[0].critical,
         critical_pairs=bins[1].critical if len(bins) > 1 else 0,
         found=np.array(reader.found, np.int64),
@@ -136,14 +151,23 @@ def read(folder: Path, space: SearchSpace, budget: int, ks: Sequence[int], apart
     )
 
 
-def modes_of(findings: Findings) -> set[tuple[str, ...]]:
-    """Return the different conflicts of some rows: type, responsible, rule and partner.
+def _reached(evaluations: Sequence[int], k: int) -> float:
+    """Return the k-th of ascending numbers of evaluations; +inf if there is none."""
+    return float(evaluations[k - 1]) if k <= len(evaluations) else float("inf")
 
-    Rows without a near miss or a contact have none.
+
+def modes_of(findings: Findings) -> dict[tuple[str, ...], int]:
+    """Return the different conflicts of some rows, and the first row of each.
+
+    Conflicts differ in type, responsible, rule or partner. Rows without a near miss or a contact
+    have none.
     """
     columns = findings.columns()
-    keys = zip(*(columns[name].tolist() for name in MODE), strict=True)
-    return {key for key in keys if key[0]}
+    found: dict[tuple[str, ...], int] = {}
+    for row, key in enumerate(zip(*(columns[name].tolist() for name in MODE), strict=True)):
+        if key[0]:
+            found.setdefault(key, row)
+    return found
 
 
 class _Reader:
@@ -154,7 +178,7 @@ class _Reader:
         self.count = self.failed = 0
         self.hits: list[tuple[int, float]] = []
         self.critical: list[Float] = []
-        self.modes: set[tuple[str, ...]] = set()
+        self.modes: dict[tuple[str, ...], int] = {}  # with the evaluations until the first of it
         self._front = np.empty((0, len(terms)))
         self.low: Float | None = None
         self.high: Float | None = None
@@ -181,7 +205,8 @@ class _Reader:
         before = len(self.hits)
         self.hits += zip(numbers, rows.seconds[at].tolist(), strict=True)
         self.critical.append(rows.X[at])
-        self.modes |= modes_of(rows.findings.take(at))
+        for mode, row in modes_of(rows.findings.take(at)).items():
+            self.modes.setdefault(mode, numbers[row])
         if ok.any():
             low, high = x[ok].min(axis=0), x[ok].max(axis=0)
             self.low = low if self.low is None else np.minimum(self.low, low)

@@ -96,7 +96,8 @@ def attempt(
     begun = (task.folder / FILE).exists()
     try:
         if begun:
-            resume(task.folder, ego=task.options.ego, worse_than=task.options.worse_than, **how)
+            how |= {"ego": task.options.ego, "worse_than": task.options.worse_than}
+            resume(task.folder, algorithm=task.options.algorithm, **how)
         else:
             run_search(task.scenario, **vars(task.options), out=task.folder, **how)
     except Interrupted:

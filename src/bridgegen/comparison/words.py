@@ -15,8 +15,9 @@ SURE = 0.05
 """A corrected p below this is called a difference."""
 
 SENTENCE_STARTS = {
-    "r_critic": "The largest share of critical scenarios, R_critic, is that of",
+    "modes": "The largest number of failure modes is that of",
     "distinct": "The largest number of different critical scenarios is that of",
+    "r_critic": "The largest share of critical scenarios, R_critic, is that of",
     "hypervolume": "The largest hypervolume, many bad outcomes at once, is that of",
 }
 """The beginning of the sentence about a measure; larger is better in each."""
@@ -30,8 +31,10 @@ def number(value: float, digits: int) -> str:
 
 
 def median(line: Line, one: Measure) -> str:
-    """Return a line's median."""
-    return number(line.quartiles.median, one.digits)
+    """Return a line's median; a small count that lies between two has a decimal."""
+    value = line.quartiles.median
+    between = one.digits == 0 and abs(value) < 10.0 and value % 1.0 > 0.0
+    return number(value, 1 if between else one.digits)
 
 
 def span(line: Line, one: Measure) -> str:
@@ -54,6 +57,11 @@ def verdict(line: Line) -> str:
     if isnan(line.p_holm) or line.p_holm >= SURE or line.a12 == 0.5:
         return ""
     return "better" if line.a12 > 0.5 else "worse"
+
+
+def runs_that_find(line: Line) -> str:
+    """Return in how many runs a time to the k-th scenario ended, "18 of 20"."""
+    return f"{line.runs - line.never} of {line.runs}"
 
 
 def sentences(comparison: Comparison, scenario: str) -> list[str]:

@@ -21,9 +21,9 @@ import numpy as np
 import numpy.typing as npt
 
 from bridgegen.arrays import Float, Int
-from bridgegen.ego.driver_process import module_of
 from bridgegen.ego.kinds import NAMES
 from bridgegen.errors import InputError
+from bridgegen.own_code import class_of
 
 
 @dataclass(frozen=True)
@@ -102,20 +102,12 @@ def load(spec: str) -> Detector:
     Raises:
         InputError: there is no such detector, or it lacks a method.
     """
-    where, _, name = spec.rpartition(":")
-    if not where:
-        raise InputError(f"--detector must read module:Class or file.py:Class, got '{spec}'")
-    try:
-        module = module_of(where)
-    except ImportError as error:
-        raise InputError(f"--detector: {where} cannot be imported: {error}") from error
-    found = getattr(module, name, None)
-    if not isinstance(found, type):
-        raise InputError(f"--detector: {where} must have a class '{name}'")
+    found = class_of(spec, "--detector")
     lacking = [one for one in ("reset", "detect") if not callable(getattr(found, one, None))]
     if lacking:
         raise InputError(
-            f"--detector: {name} must have the methods reset and detect, lacks {', '.join(lacking)}"
+            f"--detector: {found.__name__} must have the methods reset and detect, "
+            f"lacks {', '.join(lacking)}"
         )
     detector: Detector = found()
     return detector

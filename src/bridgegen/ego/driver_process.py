@@ -4,8 +4,6 @@ A driver that raises, times out or crashes its process costs only the row that i
 process is ended, and another is started for the next batch.
 """
 
-import importlib
-import importlib.util
 import os
 import sys
 import time
@@ -15,7 +13,6 @@ from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -32,6 +29,7 @@ from bridgegen.ego.trajectory import Plans, checked_plans
 from bridgegen.ego.views import MapSender, Viewer, Views
 from bridgegen.errors import InputError
 from bridgegen.isolated import Answer, CallError, IsolatedProcess, serve
+from bridgegen.own_code import module_of
 
 START_SECONDS = 120.0
 """Time limit [s] to import and construct a driver, which may load a network."""
@@ -202,26 +200,6 @@ def make(spec: str) -> BatchDriver | CompiledDriver:
         raise InputError(f"{name} must have the methods reset and act, lacks {', '.join(lacking)}")
     driver: BatchDriver = found()
     return driver
-
-
-def module_of(where: str) -> ModuleType:
-    """Import a module by its name, or a file that ends in .py.
-
-    Raises:
-        ImportError: there is no such module or file.
-    """
-    if not where.endswith(".py"):
-        return importlib.import_module(where)
-    path = Path(where)
-    if not path.is_file():
-        raise ImportError("there is no such file")
-    found = importlib.util.spec_from_file_location(path.stem, path)
-    assert found is not None
-    assert found.loader is not None
-    module = importlib.util.module_from_spec(found)
-    sys.modules[path.stem] = module
-    found.loader.exec_module(module)
-    return module
 
 
 def checked(answer: Any, seen: Observation, period: float) -> tuple[Float, Float] | Plans:

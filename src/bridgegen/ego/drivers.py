@@ -7,6 +7,7 @@ from enum import Enum
 from pathlib import Path
 from typing import Self
 
+from bridgegen import own_code
 from bridgegen.ego.address import address_of, is_remote
 from bridgegen.ego.planners.registry import planners, require
 from bridgegen.errors import InputError, UnknownNameError
@@ -225,17 +226,14 @@ def is_spec(name: str) -> bool:
     """Return whether a name is that of a user's own driver, which is code."""
     if is_remote(name):
         return True
-    where, _, cls = name.rpartition(":")
-    is_class = bool(where and cls.isidentifier())
-    return name.endswith(".fmu") or (is_class and not is_planner(name))
+    return name.endswith(".fmu") or (own_code.is_own(name) and not is_planner(name))
 
 
 def file_of(name: str) -> Path | None:
     """Return the file that the name of a user's own driver holds; None if it holds none."""
     if not is_spec(name) or is_remote(name):
         return None
-    where = name if name.endswith(".fmu") else name.rpartition(":")[0]
-    return Path(where) if where.endswith((".py", ".fmu")) else None
+    return Path(name) if name.endswith(".fmu") else own_code.file_of(name)
 
 
 def split(text: str) -> tuple[str, ...]:

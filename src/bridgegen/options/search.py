@@ -319,7 +319,8 @@ class SearchOptions(CommonOptions):
         default="pso",
         metadata=option(
             TEXT,
-            "Search algorithm, see 'bridgegen list algorithms'.",
+            "Search algorithm, see 'bridgegen list algorithms'; or your own: module:Class, "
+            "file.py:Class.",
             group=SEARCH,
             names="algorithm",
         ),

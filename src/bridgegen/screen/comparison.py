@@ -82,8 +82,8 @@ def print_comparison(comparison: "Comparison", seconds: float) -> None:
     for scenario in plan.scenarios:
         console.print(f"\n{scenario}, {plan.budget} evaluations a run, medians over the runs")
         if scenario in comparison.measured:
-            console.print(_criticality(comparison, scenario))
-            console.print(_variety(comparison, scenario))
+            console.print(_findings(comparison, scenario))
+            console.print(_others(comparison, scenario))
         for sentence in words.sentences(comparison, scenario):
             console.print(sentence)
     for cell, why in comparison.gaps.items():
@@ -95,40 +95,41 @@ def print_comparison(comparison: "Comparison", seconds: float) -> None:
     print(f"{'wall time':<10}{seconds:.1f} s")
 
 
-def _criticality(comparison: "Comparison", scenario: str) -> Table:
-    """Return the table of how often and how soon, with the tests of R_critic."""
+def _findings(comparison: "Comparison", scenario: str) -> Table:
+    """Return the table of what was found and how soon, with the tests of ``distinct``."""
     from bridgegen.comparison import words
 
-    early = [one for one in comparison.measures if one.name.startswith("to_")]
-    table = _table(
-        "algorithm", "runs", "R_critic", "quartiles", "p", "A12", "T_critic",
-        *(one.title for one in early),
-    )  # fmt: skip
     kinds = {one.name: one for one in comparison.measures}
+    early = [name for name in kinds if name.endswith(("_distinct", "_modes", "to_1"))]
+    table = _table(
+        "algorithm", "found in", "modes", "distinct", "quartiles", "p", "A12",
+        *(kinds[name].title for name in early), "R_critic",
+    )  # fmt: skip
     for name in comparison.plan.algorithms:
-        share, relative = (comparison.line(scenario, name, one) for one in ("r_critic", "t_critic"))
+        lines = {one: comparison.line(scenario, name, one) for one in kinds}
+        distinct = lines["distinct"]
         table.add_row(
             name,
-            str(share.runs),
-            words.median(share, kinds["r_critic"]),
-            words.span(share, kinds["r_critic"]),
-            words.p_value(share.p_holm),
-            words.number(share.a12, 2),
-            words.median(relative, kinds["t_critic"]),
-            *(words.median(comparison.line(scenario, name, one.name), one) for one in early),
+            words.runs_that_find(lines["to_1"]),
+            words.median(lines["modes"], kinds["modes"]),
+            words.median(distinct, kinds["distinct"]),
+            words.span(distinct, kinds["distinct"]),
+            words.p_value(distinct.p_holm),
+            words.number(distinct.a12, 2),
+            *(words.median(lines[one], kinds[one]) for one in (*early, "r_critic")),
         )
     return table
 
 
-def _variety(comparison: "Comparison", scenario: str) -> Table:
-    """Return the table of variety and of the time that it took."""
+def _others(comparison: "Comparison", scenario: str) -> Table:
+    """Return the table of the other measures, and of the time that it took."""
     from bridgegen.comparison import words
 
-    shown_names = {
-        "distinct", "modes", "critical_bins", "critical_pairs", "hypervolume", "gd", "spread",
-        "seconds",
+    names = {
+        "t_critic", "to_10", "to_50", "critical_bins", "critical_pairs", "hypervolume", "gd",
+        "spread", "seconds",
     }  # fmt: skip
-    shown = [one for one in comparison.measures if one.name in shown_names]
+    shown = [one for one in comparison.measures if one.name in names]
     table = _table("algorithm", *(one.title for one in shown))
     for name in comparison.plan.algorithms:
         lines = (comparison.line(scenario, name, one.name) for one in shown)

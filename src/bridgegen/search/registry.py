@@ -1,6 +1,9 @@
-"""The algorithms by name: BridgeGen's own, and those that installed packages add."""
+"""The algorithms by name: BridgeGen's own, those of installed packages, and of the user's files."""
+
+from typing import Any
 
 from bridgegen.errors import InputError
+from bridgegen.own_code import class_of, is_own
 from bridgegen.plugins import PlugIns
 from bridgegen.search.algorithm import Algorithm
 from bridgegen.search.cma_es import CMAES
@@ -22,6 +25,9 @@ from bridgegen.search.sobol import Sobol
 from bridgegen.search.spea2 import SPEA2
 from bridgegen.search.surrogate import Surrogate
 from bridgegen.search.turbo import TuRBO
+
+PARTS = ("name", "description", "source", "settings", "objectives", "ask", "tell")
+"""Of the protocol."""
 
 ADDED = PlugIns("algorithm", "bridgegen.algorithms")
 
@@ -59,22 +65,33 @@ def names() -> list[str]:
 def get(name: str) -> type[Algorithm]:
     """Return an algorithm's class.
 
+    Args:
+        name: of one that ships or that an installed package adds; or where the user's own is,
+            ``module:Class`` or ``file.py:Class``, which is imported.
+
     Raises:
         UnknownNameError: no such algorithm; names the nearest.
-        InputError: an installed package's algorithm that cannot be loaded, lacks a part of the
-            protocol, or takes a name that is in use.
+        InputError: another's algorithm that cannot be loaded, lacks a part of the protocol, or
+            takes a name that is in use.
     """
+    if is_own(name):
+        return _checked(class_of(name, "--algorithm"), f"algorithm '{name}'")
     found = ADDED.load(name, ALGORITHMS)
     if found is None:
         return ALGORITHMS[name]
-    parts = ("name", "description", "source", "settings", "objectives", "ask", "tell")
-    missing = [part for part in parts if not hasattr(found, part)]
-    if missing or not isinstance(found, type):
-        lack = f"lacks {', '.join(missing)}" if missing else "is not a class"
-        raise InputError(f"{ADDED.place(name)} {lack}; see bridgegen.search.Algorithm")
-    algorithm: type[Algorithm] = found
+    algorithm = _checked(found, ADDED.place(name))
     if algorithm.name != name:
         raise InputError(
             f"{ADDED.place(name)} has the name '{algorithm.name}'; the two names must agree"
         )
+    return algorithm
+
+
+def _checked(found: Any, place: str) -> type[Algorithm]:
+    """Return another's class, which must have all parts of the protocol."""
+    missing = [part for part in PARTS if not hasattr(found, part)]
+    if missing or not isinstance(found, type):
+        lack = f"lacks {', '.join(missing)}" if missing else "is not a class"
+        raise InputError(f"{place} {lack}; see bridgegen.search.Algorithm")
+    algorithm: type[Algorithm] = found
     return algorithm
