@@ -15,6 +15,7 @@ import bridgegen as bg
 from bridgegen.cli import main
 from bridgegen.errors import InputError
 from bridgegen.options import SearchOptions, options_of
+from bridgegen.simulation.choice import SimulatorChoice
 
 NAMES = st.text("abcdefgh_", min_size=1, max_size=8)
 NUMBERS = st.floats(-1e9, 1e9, allow_nan=False, width=32).map(float)
@@ -26,6 +27,10 @@ VALUES = {
     | st.dictionaries(NAMES, NUMBERS, min_size=1, max_size=3)
     | st.dictionaries(NAMES, st.none(), min_size=1, max_size=3),
     "budget": st.none() | st.integers(1, 10**7),
+    "screen": st.none()
+    | st.sampled_from([SimulatorChoice("embedded"), SimulatorChoice("esmini", {"steps": 1})]),
+    "screen_budget": st.none() | st.integers(1, 10**7),
+    "screen_batch": st.none() | st.integers(1, 10**7),
     "seed": st.none() | st.integers(0, 2**32 - 1),
     "keep": st.integers(0, 1000),
     "time_limit": st.none() | st.floats(0.1, 100.0),

@@ -165,6 +165,16 @@ def test_each_name_comes_equally_often_and_the_bound_follows_it(scenario, space)
     assert not space.violations(X)
 
 
+def test_levels_divide_the_cube_into_intervals_of_one_value_each(space):
+    assert max(space.levels) == 3
+    column = space.levels.index(3)
+    assert space.variables[column] == "manner"
+    U = np.full((6, space.n_var), 0.5)
+    U[:, column] = [0.0, 0.33, 0.34, 0.66, 0.67, 1.0]
+    found = space.decode(U)[:, space.index("manner")]
+    assert found.tolist() == [0.0, 0.0, 1.0, 1.0, 2.0, 2.0]
+
+
 @given(st.integers(2, 40), st.floats(-360, 360), st.floats(0, 360), st.integers(0, 2**32 - 1))
 def test_decode_and_encode_are_each_other_s_inverse(build, size, low, width, seed):
     high = low + width

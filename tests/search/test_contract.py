@@ -28,8 +28,9 @@ SMALL = {
     "ddpg": {"epochs": 1, "width": 8, "memory": 200, "noise": 1.0},
     "ppo": {"epochs": 4, "width": 8, "lr_actor": 0.03},
     "ppo-adversary": {"epochs": 2, "width": 8, "lr_actor": 0.03, "minibatch": 16},
+    "turbo": {"length": 0.4, "successes": 2, "failures": 3, "shortest": 0.4},
 }
-"""Other defaults: networks that are trained in no time, settings that show in six batches."""
+"""Other defaults: networks that are trained in no time, settings that show in a few batches."""
 
 
 def small(algorithm: Kind) -> Any:
@@ -41,8 +42,9 @@ def small(algorithm: Kind) -> Any:
         for key, value in SMALL[algorithm.name].items()
     }
     kind = type(algorithm.__name__, (algorithm,), {"settings": {**algorithm.settings, **changed}})
-    missing = not is_installed(algorithm.extra)
-    skip = pytest.mark.skipif(missing, reason=f"the extra {algorithm.extra} is not installed")
+    extra = getattr(algorithm, "extra", None)
+    missing = extra is not None and not is_installed(extra)
+    skip = pytest.mark.skipif(missing, reason=f"the extra {extra} is not installed")
     return pytest.param(kind, id=algorithm.name, marks=skip)
 
 

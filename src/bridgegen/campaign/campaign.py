@@ -18,7 +18,8 @@ from bridgegen.campaign.report import write_run_report
 from bridgegen.campaign.restored import check_named, pipeline_of, placed
 from bridgegen.campaign.run import Run
 from bridgegen.campaign.scenarios import driven_by, is_file, load, refuse_standstill
-from bridgegen.campaign.screen import BATCH, Screen, require_screen, screen_budget, screen_of
+from bridgegen.campaign.screen import BATCH, require_screen, screen_budget
+from bridgegen.campaign.searcher import searcher_of
 from bridgegen.campaign.settings import Settings
 from bridgegen.errors import InputError, Interrupted, StorageError, WorkersError
 from bridgegen.odd.adversary import adversarial
@@ -30,8 +31,7 @@ from bridgegen.openx.opendrive.site_fit import ALL
 from bridgegen.options import SearchOptions, called_with, range_problems
 from bridgegen.pipeline import Pipeline
 from bridgegen.report.data import WHOLE
-from bridgegen.search.algorithm import Arena, Problem, resolve
-from bridgegen.search.screened import Screened
+from bridgegen.search.algorithm import Problem, resolve
 from bridgegen.simulation.choice import SimulatorChoice
 from bridgegen.store import Recorded, Store, refuse_used
 from bridgegen.triage.effort import effort
@@ -184,9 +184,7 @@ def run_search(given: SearchArguments) -> Run:
             optimised=chosen.to_dict(),
             criteria=[one.to_dict() for one in pipeline.monitor],
         )
-        searcher = _searcher(
-            pipeline, made_with, callbacks.warning
-        )  # before there is a folder: it may refuse
+        searcher = searcher_of(pipeline, made_with, callbacks.warning)  # it may refuse
         with Store.create(
             folder, made_with.to_dict(), space.names, pipeline.metrics,
             n_var=space.n_var, n_obj=chosen.n_obj, labels=space.labels,
@@ -242,48 +240,8 @@ def resume(
         screen = settings.screen
         if simulator is not None and screen is not None and simulator.name == screen.name:
             settings = replace(settings, screen=replace(screen, access=simulator.access))
-        searcher = _searcher(pipeline, settings, callbacks.warning)
+        searcher = searcher_of(pipeline, settings, callbacks.warning)
         return _go(pipeline, searcher, store, run.settings, callbacks, deliver)
-
-
-def _searcher(
-    pipeline: Pipeline, settings: Settings, warn: Callable[[str], None]
-) -> toolkit.Algorithm:
-    """Return what searches: the run's algorithm, in the screen if there is one."""
-    if settings.screen is None:
-        return _algorithm(pipeline, settings)
-    there = screen_of(pipeline, settings.screen)
-    there.warm_up()
-    assert settings.screen_budget is not None
-    assert settings.screen_batch is not None
-    closed_loop = getattr(toolkit.get(settings.algorithm), "is_adversary", False)
-    return Screened(
-        _algorithm(there, settings),
-        None if closed_loop else lambda: _algorithm(pipeline, settings),
-        Screen(there, settings.screen.name, settings.screen_budget),
-        _problem(pipeline),
-        simulator=settings.simulator.name,
-        seed=settings.seed,
-        budget=settings.budget,
-        batch=settings.screen_batch,
-        say=warn,
-    )
-
-
-def _problem(pipeline: Pipeline, arena: Arena | None = None) -> Problem:
-    objective = pipeline.objective
-    return Problem(pipeline.space.variables, pipeline.metrics, objective.n_obj, arena)
-
-
-def _algorithm(pipeline: Pipeline, settings: Settings) -> toolkit.Algorithm:
-    """Return the run's search algorithm, as it begins."""
-    method = toolkit.get(settings.algorithm)
-    arena = pipeline.arena() if getattr(method, "is_adversary", False) else None
-    if arena is not None:
-        arena.warm_up()
-    problem = _problem(pipeline, arena)
-    values = resolve(method, problem, settings.seed, settings.settings)
-    return method(problem, settings.seed, **values)
 
 
 def _go(

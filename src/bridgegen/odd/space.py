@@ -100,6 +100,18 @@ class SearchSpace:
         return len(self.variables)
 
     @property
+    def levels(self) -> tuple[int, ...]:
+        """Per column of U, into how many equal intervals it is divided, each a single value.
+
+        0: it is continuous, or the intervals depend on other columns.
+        """
+        searched = [self.parameters[name] for name in self.variables]
+        return tuple(
+            round(one.high - one.low) + 1 if one.kind.apart and not self.bounds[one.name] else 0
+            for one in searched
+        )
+
+    @property
     def labels(self) -> dict[str, dict[str, Any]]:
         """How the values of its parameters are read, of those that are no plain numbers."""
         labels = {name: one.kind.labels() for name, one in self.parameters.items()}

@@ -83,12 +83,15 @@ class Problem:
         metrics: names of the recorded metrics, one per column of ``Results.metrics``.
         n_obj: objectives, all minimised.
         arena: where an adversary drives in closed loop; None without one.
+        levels: per column of U, into how many equal intervals it is divided, each a single value
+            of a category or an integer; 0: it is continuous. Empty: all are.
     """
 
     parameters: tuple[str, ...]
     metrics: tuple[str, ...] = ()
     n_obj: int = 1
     arena: Arena | None = None
+    levels: tuple[int, ...] = ()
 
     @property
     def n_var(self) -> int:

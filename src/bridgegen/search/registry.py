@@ -23,6 +23,8 @@ from bridgegen.search.pso import PSO
 from bridgegen.search.random import Random
 from bridgegen.search.sobol import Sobol
 from bridgegen.search.spea2 import SPEA2
+from bridgegen.search.surrogate import Surrogate
+from bridgegen.search.turbo import TuRBO
 
 PARTS = ("name", "description", "source", "settings", "objectives", "ask", "tell")
 """Of the protocol."""
@@ -45,6 +47,8 @@ ALGORITHMS: dict[str, type[Algorithm]] = {
         MOPSO,
         NSGA2DT,
         MAPElites,
+        TuRBO,
+        Surrogate,
         DQN,
         DDPG,
         PPO,

@@ -1,0 +1,50 @@
+"""What searches in a campaign: the run's algorithm, by itself or in a screen."""
+
+from collections.abc import Callable
+
+from bridgegen import search as toolkit
+from bridgegen.campaign.screen import Screen, screen_of
+from bridgegen.campaign.settings import Settings
+from bridgegen.pipeline import Pipeline
+from bridgegen.search.algorithm import Arena, Problem, resolve
+from bridgegen.search.screened import Screened
+
+
+def searcher_of(
+    pipeline: Pipeline, settings: Settings, warn: Callable[[str], None]
+) -> toolkit.Algorithm:
+    """Return what searches: the run's algorithm, in the screen if there is one."""
+    if settings.screen is None:
+        return _algorithm(pipeline, settings)
+    there = screen_of(pipeline, settings.screen)
+    there.warm_up()
+    assert settings.screen_budget is not None
+    assert settings.screen_batch is not None
+    closed_loop = getattr(toolkit.get(settings.algorithm), "is_adversary", False)
+    return Screened(
+        _algorithm(there, settings),
+        None if closed_loop else lambda: _algorithm(pipeline, settings),
+        Screen(there, settings.screen.name, settings.screen_budget),
+        _problem(pipeline),
+        simulator=settings.simulator.name,
+        seed=settings.seed,
+        budget=settings.budget,
+        batch=settings.screen_batch,
+        say=warn,
+    )
+
+
+def _problem(pipeline: Pipeline, arena: Arena | None = None) -> Problem:
+    space, n_obj = pipeline.space, pipeline.objective.n_obj
+    return Problem(space.variables, pipeline.metrics, n_obj, arena, space.levels)
+
+
+def _algorithm(pipeline: Pipeline, settings: Settings) -> toolkit.Algorithm:
+    """Return the run's search algorithm, as it begins."""
+    method = toolkit.get(settings.algorithm)
+    arena = pipeline.arena() if getattr(method, "is_adversary", False) else None
+    if arena is not None:
+        arena.warm_up()
+    problem = _problem(pipeline, arena)
+    values = resolve(method, problem, settings.seed, settings.settings)
+    return method(problem, settings.seed, **values)

@@ -1,0 +1,1 @@
+"""Models of the objective, learnt from the rows evaluated so far, for searches that are guided."""

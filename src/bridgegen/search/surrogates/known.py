@@ -1,0 +1,99 @@
+"""The rows that a search has been told of."""
+
+import numpy as np
+
+from bridgegen.arrays import Bool, Float, Int
+from bridgegen.search.algorithm import Problem
+from bridgegen.search.surrogates.columns import Columns
+from bridgegen.search.surrogates.transform import compressed
+
+FEW = 100_000
+"""Different rows up to which all are enumerated in search of a new one."""
+
+
+class Known:
+    """Rows with their results; a failed row counts as one of the greatest objective.
+
+    Attributes:
+        columns: what the columns of U are.
+        U: ``(n, n_var)`` float64.
+        points: ``(n, n_var)`` float64, what a model sees of U.
+        F: ``(n,)`` float64, smaller is more critical; +inf in failed rows and for NaN.
+        critical: ``(n,)`` bool, False in failed rows.
+        distinct: places of critical rows, each ``apart`` or more from the others in root mean
+            square, ascending.
+
+    Args:
+        problem: the search problem.
+        apart: of two critical rows that count as distinct.
+    """
+
+    def __init__(self, problem: Problem, apart: float) -> None:
+        n_var = problem.n_var
+        self.columns = Columns(n_var, problem.levels)
+        self._apart = apart
+        self.U, self.points, self.F = np.empty((0, n_var)), np.empty((0, n_var)), np.empty(0)
+        self.critical, self.distinct = np.empty(0, np.bool_), np.empty(0, np.int64)
+        self._rows: set[bytes] = set()
+
+    def __len__(self) -> int:
+        return len(self.F)
+
+    @property
+    def exhausted(self) -> bool:
+        """Whether all rows there are have been told."""
+        return 0 < self.columns.count <= len(self._rows)
+
+    def add(self, U: Float, F: Float, ok: Bool, critical: Bool) -> None:
+        """Add rows and their results.
+
+        Args:
+            U: ``(n, n_var)`` float64.
+            F: ``(n,)`` float64, anything in rows that are not ok.
+            ok: ``(n,)`` bool.
+            critical: ``(n,)`` bool.
+        """
+        points, before = self.columns.points(U), len(self)
+        self.U, self.points = np.concatenate([self.U, U]), np.concatenate([self.points, points])
+        self.F = np.concatenate([self.F, np.where(ok & ~np.isnan(F), F, np.inf)])
+        self.critical = np.concatenate([self.critical, ok & critical])
+        self._rows.update(_keys(self.columns.snapped(U)))
+        for k in before + np.flatnonzero(ok & critical):
+            if distances(self.points[[k]], self.points[self.distinct])[0] >= self._apart:
+                self.distinct = np.append(self.distinct, k)
+
+    def scores(self) -> Float:
+        """Return F as a process learns it, ``(n,)``: `compressed`."""
+        return compressed(self.F)
+
+    def new(self, U: Float) -> Int:
+        """Return the places of rows that are not known, the first of equal ones, ascending."""
+        first: dict[bytes, int] = {}
+        for k, key in enumerate(_keys(self.columns.snapped(U))):
+            first.setdefault(key, k)
+        return np.array([k for key, k in first.items() if key not in self._rows], np.int64)
+
+    def anywhere(self, n: int, rng: np.random.Generator) -> Float:
+        """Return n new rows drawn at random, fewer where there are no more; snapped."""
+        if 0 < self.columns.count <= FEW:
+            rows = self.columns.everything()
+            return rng.permutation(rows[self.new(rows)])[:n]
+        rows = self.columns.snapped(rng.random((n, self.U.shape[1])))
+        return rows[self.new(rows)]
+
+
+def _keys(rows: Float) -> list[bytes]:
+    return [row.tobytes() for row in rows + 0.0]  # −0.0 is 0.0
+
+
+def distances(points: Float, others: Float) -> Float:
+    """Return how far points are from the nearest of others, ``(n,)``; inf where there is none.
+
+    The distance is the root mean square of the columns' differences.
+    """
+    from scipy.spatial.distance import cdist
+
+    if not len(others):
+        return np.full(len(points), np.inf)
+    nearest: Float = cdist(points, others).min(axis=1) / np.sqrt(points.shape[1])
+    return nearest
