@@ -312,3 +312,14 @@ def test_mistakes_are_told_before_anything_is_run(tmp_path, arguments, error, to
         bg.compare("crossroads-s4", **{"workers": 1, "out": tmp_path / "c", **arguments})
     runs = tmp_path / "c" / "runs"
     assert not runs.exists() or not [*runs.rglob("run.sqlite")]
+
+
+def test_algorithms_of_one_and_of_many_objectives_are_compared_by_harm(tmp_path):
+    """Those of many minimise d_min, too; what both have is harm."""
+    found = bg.compare(
+        "crossroads-s1", algorithms=["random", "nsga2"], seeds=1, budget=40, workers=1,
+        objective={"harm": None}, ego="route-follower", deliver=False, out=tmp_path / "c",
+    )  # fmt: skip
+    assert {one.terms for one in found.records.values()} == {("harm",)}
+    assert len(found.records) == 2
+    assert not found.gaps

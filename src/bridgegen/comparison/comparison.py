@@ -8,7 +8,7 @@ from bridgegen.comparison.distinct import APART
 from bridgegen.comparison.measures import counts, measure, measures
 from bridgegen.comparison.page import write_page
 from bridgegen.comparison.plan import Cell, Plan, begin, make_plan
-from bridgegen.comparison.record import read, space_of
+from bridgegen.comparison.record import read, space_of, terms_of
 from bridgegen.comparison.result import Comparison
 from bridgegen.comparison.runs import RunCallbacks, Task, evaluations_of
 from bridgegen.comparison.table import summarise, write_tables
@@ -185,6 +185,7 @@ def _conclude(
     callbacks.stage("read")
     gaps, records = dict(failures), {}
     spaces: dict[tuple[str, str], SearchSpace] = {}  # an adversary has other parameters
+    terms = _common_terms(plan, gaps)
     for cell in plan.cells:
         if cell in gaps:
             continue
@@ -194,7 +195,9 @@ def _conclude(
             if kind not in spaces:
                 spaces[kind] = space_of(folder)
             space = spaces[kind]
-            records[cell] = read(folder, space, plan.budget, counts(plan.budget), plan.apart)
+            records[cell] = read(
+                folder, space, terms[cell.scenario], plan.budget, counts(plan.budget), plan.apart
+            )
         except StorageError as error:
             gaps[cell] = str(error)
     measured = {
@@ -211,6 +214,28 @@ def _conclude(
         callbacks.stage("draw")
         write_page(result)
     return result
+
+
+def _common_terms(plan: Plan, gaps: dict[Cell, str]) -> dict[str, tuple[str, ...]]:
+    """Return, by scenario, the terms of the objective that all of its runs have.
+
+    Algorithms of many objectives get one beside harm, which those of one objective lack.
+
+    Args:
+        plan: of the comparison.
+        gaps: why runs cannot be read; gets those that are damaged.
+    """
+    found: dict[str, tuple[str, ...]] = {}
+    for cell in plan.cells:
+        if cell in gaps:
+            continue
+        try:
+            own = terms_of(plan.folder(cell))
+        except StorageError as error:
+            gaps[cell] = str(error)
+            continue
+        found[cell.scenario] = tuple(one for one in found.get(cell.scenario, own) if one in own)
+    return found
 
 
 def _task(plan: Plan, cell: Cell) -> Task:

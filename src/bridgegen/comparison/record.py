@@ -27,7 +27,7 @@ class Record:
     """A run that has ended.
 
     Attributes:
-        terms: the metrics of the scenario's objective.
+        terms: the metrics by which the scenario's runs are compared.
         parameters: what it searched.
         command: the command line that repeats the run, into the folder ``replay``.
         ended: why it ended: "budget", "exhausted" or "converged".
@@ -98,12 +98,29 @@ def space_of(folder: Path) -> SearchSpace:
     return searched(Run(folder))[1]
 
 
-def read(folder: Path, space: SearchSpace, budget: int, ks: Sequence[int], apart: float) -> Record:
+def terms_of(folder: Path) -> tuple[str, ...]:
+    """Return the metrics that a run's objective is made of.
+
+    Raises:
+        StorageError: not a run, or damaged.
+    """
+    return Objective.from_dict(Run(folder).settings.optimised).names
+
+
+def read(
+    folder: Path,
+    space: SearchSpace,
+    terms: Sequence[str],
+    budget: int,
+    ks: Sequence[int],
+    apart: float,
+) -> Record:
     """Read a run that has ended.
 
     Args:
         folder: of the run.
         space: its search space.
+        terms: metrics of its objective by which the scenario's runs are compared.
         budget: its maximum number of evaluations.
         ks: of the times to the k-th critical scenario.
         apart: minimum distance of two different critical scenarios.
@@ -113,7 +130,6 @@ def read(folder: Path, space: SearchSpace, budget: int, ks: Sequence[int], apart
     """
     with Store.open(folder) as store:
         settings = Run.of(store).settings
-        terms = Objective.from_dict(settings.optimised).names
         reader = _Reader(terms, store.metrics, points(budget))
         for rows in store.rows():
             reader.take(rows)
@@ -127,7 +143,7 @@ def read(folder: Path, space: SearchSpace, budget: int, ks: Sequence[int], apart
     bins = coverage(space, critical, np.ones(n, np.bool_), strength=2, sample=0).ways
     hits = reader.hits
     return Record(
-        terms=terms,
+        terms=tuple(terms),
         parameters=space.variables,
         command=settings.command(Path("replay") / folder.name),
         ended=ended,
