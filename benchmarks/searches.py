@@ -7,7 +7,8 @@
 A pair is a scenario and the ego's driver; the objective is harm. Each method searches each pair
 once for each seed, with the largest budget: a smaller budget's run is the beginning of it. The runs
 are those of `bridgegen compare`, one comparison for each driver; called again with the same folder,
-it resumes them. Twelve pairs, seven methods and 20 seeds of 1000 take hours.
+it resumes them. A method may be `file.py:Class`, as those of docs/examples. Twelve pairs, seven
+methods and 20 seeds of 1000 take hours.
 """
 
 import argparse
@@ -25,7 +26,7 @@ from bridgegen.comparison.distinct import distinct, normalised
 from bridgegen.comparison.record import modes_of, space_of
 from bridgegen.errors import BridgeGenError
 from bridgegen.odd.space import SearchSpace
-from bridgegen.search import get
+from bridgegen.own_code import label_of
 from bridgegen.store import Store
 
 PAIRS = {
@@ -74,11 +75,7 @@ def found(folder: Path, space: SearchSpace, budgets: Sequence[int]) -> dict[int,
     at = np.flatnonzero(rows.critical)
     X = normalised(space, rows.X[at])
     new = distinct(X, n_var=space.n_var)
-    seen: dict[tuple[str, ...], int] = {}
-    for k in at.tolist():
-        for mode in modes_of(rows.findings.take(np.array([k]))):
-            seen.setdefault(mode, k + 1)
-    firsts = sorted(seen.values())
+    firsts = [int(at[k]) + 1 for k in modes_of(rows.findings.take(at)).values()]
     result = {}
     for budget in budgets:
         n = int(np.searchsorted(at, budget))
@@ -101,23 +98,17 @@ def compared(
     budget: int,
     workers: int | None,
 ) -> list[Comparison]:
-    """Make the runs that are missing, and return the comparisons.
-
-    Methods of many objectives are compared apart: runs of one comparison have the same terms.
-    """
-    scenarios, kinds = defaultdict(list), defaultdict(list)
+    """Make the runs that are missing, and return the comparisons, one for each driver."""
+    scenarios = defaultdict(list)
     for pair in pairs:
         scenario, ego = pair.split("/")
         scenarios[ego].append(scenario)
-    for name in methods:
-        kinds["-many" if get(name).objectives == "many" else ""].append(name)
     return [
         bg.compare(
-            names, algorithms=own, ego=ego, objective={"harm": None}, seeds=seeds,
-            budget=budget, workers=workers, out=out / f"{ego}{kind}", deliver=False,
+            names, algorithms=methods, ego=ego, objective={"harm": None}, seeds=seeds,
+            budget=budget, workers=workers, out=out / ego, deliver=False,
         )
         for ego, names in scenarios.items()
-        for kind, own in kinds.items()
     ]  # fmt: skip
 
 
@@ -161,7 +152,8 @@ def main() -> None:
                     if cell.scenario == scenario:
                         folder = one.plan.folder(cell)
                         of[cell.algorithm].append(found(folder, space_of(folder), budgets))
-        for name in given.methods:
+        for method in given.methods:
+            name = label_of(method)
             for budget in budgets if of[name] else ():
                 own = [run[budget] for run in of[name]]
                 print(
@@ -171,7 +163,7 @@ def main() -> None:
                     f"{median([one.fifth_mode for one in own]):>9}"
                     f"{np.mean([one.modes for one in own]):>7.1f}"
                     f"{np.mean([one.distinct for one in own]):>10.1f}"
-                    f"{np.mean([one.r_critic for one in own]):>10.3f}{overhead[name]:>8.2f}"
+                    f"{np.mean([one.r_critic for one in own]):>10.3f}{overhead[method]:>8.2f}"
                 )
     for one in made:
         for cell, why in one.gaps.items():

@@ -4,6 +4,7 @@ bridgegen compare crossroads-s4 --algorithms pso,docs/examples/optuna_search.py:
 """
 
 import warnings
+from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from typing import ClassVar
 
@@ -16,7 +17,7 @@ from bridgegen.search.algorithm import resolve
 optuna.logging.set_verbosity(optuna.logging.WARNING)
 
 
-class Sampled:
+class Sampled(ABC):
     """What the samplers share: a study that is asked for rows and told their objective."""
 
     name: ClassVar[str]
@@ -35,8 +36,9 @@ class Sampled:
             self.study = optuna.create_study(sampler=self.sampler(seed))
         self.asked: list[optuna.Trial] = []
 
+    @abstractmethod
     def sampler(self, seed: int) -> optuna.samplers.BaseSampler:
-        raise NotImplementedError
+        """Return Optuna's sampler."""
 
     def ask(self) -> np.ndarray:
         self.asked = [self.study.ask(self.ranges) for _ in range(self.batch)]

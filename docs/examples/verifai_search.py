@@ -4,6 +4,7 @@ bridgegen compare crossroads-s4 --algorithms pso,docs/examples/verifai_search.py
 """
 
 import random
+from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any, ClassVar
@@ -16,7 +17,7 @@ from bridgegen.search import Problem, Results, Setting
 from bridgegen.search.algorithm import resolve
 
 
-class Sampled:
+class Sampled(ABC):
     """What the samplers share. They learn from whether a row is critical: ρ is −1, or else 1."""
 
     name: ClassVar[str]
@@ -33,8 +34,9 @@ class Sampled:
             self.sampler = self.make(space)
         self.asked: list[tuple[Any, Any]] = []
 
+    @abstractmethod
     def make(self, space: FeatureSpace) -> Any:
-        raise NotImplementedError
+        """Return VerifAI's sampler."""
 
     @contextmanager
     def seeded(self) -> Iterator[None]:

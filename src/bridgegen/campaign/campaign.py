@@ -18,7 +18,7 @@ from bridgegen.campaign.report import write_run_report
 from bridgegen.campaign.restored import check_named, pipeline_of, placed
 from bridgegen.campaign.run import Run
 from bridgegen.campaign.scenarios import driven_by, is_file, load, refuse_standstill
-from bridgegen.campaign.screen import BATCH, require_screen, screen_budget
+from bridgegen.campaign.screening import BATCH, require_screen, screen_budget
 from bridgegen.campaign.searcher import searcher_of
 from bridgegen.campaign.settings import Settings
 from bridgegen.errors import InputError, Interrupted, StorageError, WorkersError

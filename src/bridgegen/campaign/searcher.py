@@ -3,7 +3,7 @@
 from collections.abc import Callable
 
 from bridgegen import search as toolkit
-from bridgegen.campaign.screen import Screen, screen_of
+from bridgegen.campaign.screening import Screen, screen_of
 from bridgegen.campaign.settings import Settings
 from bridgegen.pipeline import Pipeline
 from bridgegen.search.algorithm import Arena, Problem, resolve

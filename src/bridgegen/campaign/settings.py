@@ -32,7 +32,6 @@ RECORDED_AS: Mapping[str, str] = {
 MAX_TEXT = 4096
 """Characters of one text."""
 
-
 Part = Value | None | list[Value] | Mapping[str, Value]
 
 

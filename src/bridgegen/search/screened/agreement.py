@@ -10,7 +10,7 @@ from pydantic import FiniteFloat, NonNegativeInt, TypeAdapter, ValidationError
 
 from bridgegen.arrays import Bool, Float
 
-NOTE = "screen"
+NOTE = "agreement with the screen"
 """The title of an agreement among a run's notes."""
 
 SIGNIFICANT = 0.01

@@ -75,7 +75,8 @@ class GaussianProcess:
     """A Gaussian process with a Matérn 5/2 kernel and a length for each column.
 
     The parameters are learnt of 128 rows at most, the posterior is of all: a fit of 300 rows of 10
-    columns takes 20 ms. The mean beyond the rows is the rows' own.
+    columns takes 18 ms of processor time from earlier parameters, 47 ms without. The mean
+    beyond the rows is the rows' own.
 
     Attributes:
         parameters: learnt.
