@@ -5,8 +5,9 @@ python -m benchmarks.recordings FOLDER [--events 10000] [--formats highD …] [-
 The embedded simulator drives scenarios of the catalogue with random parameters. The traffic is
 written in each format at its usual rate, read, cleaned, placed on the map and searched for events.
 FOLDER gets pieces.jsonl, a line per scenario, format and 400 rows with the planted and the mined
-parameters of its events, and is where a run that was stopped goes on; the tables are printed. ``--noise`` is that of
-positions [m]: velocities then have 5 % of noise, too, and 5 % of the states are missing.
+parameters of its events, and is where a run that was stopped goes on; the tables are printed.
+``--noise`` is that of positions [m]: velocities then have 5 % of noise, too, and 5 % of the states
+are missing.
 """
 
 import argparse
@@ -122,9 +123,8 @@ def tables(pieces: list[dict[str, Any]]) -> None:
             f"| {format_name} | {noise:g} | {len(found):,} | {true.mean():.4f} | "
             f"{found.mean():.4f} | {holds(found.mean(), (~true.astype(bool)).mean(), rng):.3f} |"
         )
-    print(
-        "\n| format | noise | parameter | median error | 95 % | 98 % | KS |\n|---|---|---|---|---|---|---|"
-    )
+    print("\n| format | noise | parameter | median error | 95 % | 98 % | KS |")
+    print("|---|---|---|---|---|---|---|")
     for format_name, noise, name in sorted(
         {(one["format"], one["noise"], one["scenario"]) for one in pieces}
     ):
