@@ -272,3 +272,11 @@ def test_noise_of_slow_traffic_is_no_wrong_unit():
 def test_a_wrong_unit_is_told_among_noise():
     with pytest.raises(FileFormatError, match=r"got 3\.\d+ times them .*km/h"):
         clean(noisy(3.6), STEP)
+
+
+def test_between_the_states_of_a_smoothed_track_velocities_are_those_of_its_path():
+    rng, one = np.random.default_rng(2), drive(n=120, v=12.0)
+    one["x"] = one["x"] + 6.0 * np.sin(one["time"]) + rng.normal(0.0, 0.05, 120)
+    fine = clean(traffic(one), 0.01).traffic
+    middle = (fine.x[2:] - fine.x[:-2]) / 0.02
+    assert fine.vx[1:-1] == pytest.approx(middle, abs=5e-3)
