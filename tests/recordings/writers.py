@@ -15,6 +15,9 @@ from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
+from bridgegen.ego.kinds import TRUCK
+from bridgegen.recordings.bodies import centre_ahead
+
 STEP = 0.1
 N = 41
 SIZES = ((4.6, 1.9), (4.6, 1.9), (10.0, 2.5))  # the usual boxes, for formats that have none
@@ -31,11 +34,14 @@ def states(p):
     elif p == 1:
         x, vx = 40.0 + 18.0 * t - 1.0 * t * t, 18.0 - 2.0 * t
         y, vy, a = -8.0 + 0 * t, 0 * t, -2.0 + 0 * t
-    else:
-        x, vx = 22.0 * t, 22.0 + 0 * t
-        y, vy = -6.0 + 1.75 * np.tanh(t - 2.5), 1.75 / np.cosh(t - 2.5) ** 2
-        ay = -2.0 * vy * np.tanh(t - 2.5)
-        a = ay * vy / np.hypot(vx, vy)
+    else:  # the rear axle's path is given, and its wheels roll along it
+        vy, bend = 1.75 / np.cosh(t - 2.5) ** 2, -3.5 * np.tanh(t - 2.5) / np.cosh(t - 2.5) ** 2
+        h = np.arctan2(vy, 22.0)
+        turning, ahead = np.cos(h) ** 2 * bend / 22.0, centre_ahead(TRUCK, SIZES[p][0])
+        x = 22.0 * t + ahead * np.cos(h)
+        y = -6.0 + 1.75 * np.tanh(t - 2.5) + ahead * np.sin(h)
+        vx, vy = 22.0 - ahead * turning * np.sin(h), vy + ahead * turning * np.cos(h)
+        return t, x, y, h, vx, vy, bend * np.sin(h) - ahead * turning**2
     return t, x, y, np.arctan2(vy, vx), vx, vy, a
 
 

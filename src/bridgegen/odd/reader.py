@@ -371,8 +371,8 @@ def build(document: Document, folder: Path | None) -> LogicalScenario:
     """
     if isinstance(document.data, dict) and "exposure_of" in document.data:
         raise ScenarioError(
-            f"a scenario is needed, and this is an exposure of {document.data['exposure_of']}: name "
-            f"the scenario, and the exposure by --exposure ({document.at(('exposure_of',))})"
+            f"a scenario is needed, and this is an exposure of {document.data['exposure_of']}: "
+            f"name the scenario, and the exposure by --exposure ({document.at(('exposure_of',))})"
         )
     problems = shape_problems(ScenarioFile, document)
     declarations = _Declarations()

@@ -10,16 +10,19 @@ the formats' descriptions that come with the data.
 
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from bridgegen.arrays import Float, Int
 from bridgegen.ego.kinds import BICYCLE, BUS, CAR, MOTORCYCLE, PEDESTRIAN, TRUCK
 from bridgegen.errors import FileFormatError
+from bridgegen.recordings.bodies import centre_ahead
 from bridgegen.recordings.columns import Columns, read_columns, whole_numbers
 from bridgegen.recordings.format import Format, Head, read_head
 from bridgegen.recordings.lanelets import Lanelet
-from bridgegen.recordings.motion import STANDING
+from bridgegen.recordings.motion import SHORTEST_ARM, STANDING, headings_of_centres
 from bridgegen.recordings.table import (
     UNKNOWN_KIND,
     Facts,
@@ -100,10 +103,10 @@ def _read_highd(path: Path, stem: str, rate: float, about: dict[str, Float]) -> 
     length, width = meta.numbers["width"][rows], meta.numbers["height"][rows]
     vx, vy = data.pop("xVelocity"), -data.pop("yVelocity")
     along = np.where(meta.numbers["drivingDirection"][rows] == LEFTWARDS, np.pi, 0.0)[ids]
-    heading = np.where(np.hypot(vx, vy) > STANDING, np.arctan2(vy, vx), along)
-    columns = {
-        "time": data.pop("frame") / rate,
-        "x": data.pop("x") + 0.5 * data.pop("width"),
+    kinds, time = _kinds(meta, rows), data.pop("frame") / rate
+    heading = _headings(ids, time, vx, vy, along, kinds, length)
+    columns: dict[str, npt.NDArray[Any]] = {
+        "time": time, "x": data.pop("x") + 0.5 * data.pop("width"),
         "y": -(data.pop("y") + 0.5 * data.pop("height")),
         "heading": heading, "vx": vx, "vy": vy,
     }  # fmt: skip
@@ -118,8 +121,31 @@ def _read_highd(path: Path, stem: str, rate: float, about: dict[str, Float]) -> 
     lanelets = _lanes(path.with_name(stem + RECORDING_META), ends)
     return build(
         _facts(path, rate, about, frame, lanelets=lanelets), ids, columns, line_of_table(str(path)),
-        names=[str(one) for one in tracks], kind=_kinds(meta, rows), length=length, width=width,
+        names=[str(one) for one in tracks], kind=kinds, length=length, width=width,
     )  # fmt: skip
+
+
+def _headings(
+    ids: Int, time: Float, vx: Float, vy: Float, along: Float, kinds: Int, length: Float
+) -> Float:
+    """Return headings with which rear axles follow the centres, ``(S,)`` [rad].
+
+    Where nothing has moved yet, it is the driving direction ``along``.
+    """
+    order = np.lexsort((time, ids))
+    first = np.searchsorted(ids[order], np.arange(len(kinds) + 1))
+    begin = order[first[:-1]]
+    moves = np.hypot(vx[begin], vy[begin]) > STANDING
+    arm = np.array([
+        centre_ahead(CAR if kind == UNKNOWN_KIND else kind, one)
+        for kind, one in zip(kinds.tolist(), length.tolist(), strict=True)
+    ])  # fmt: skip
+    found = np.empty(len(ids))
+    found[order] = headings_of_centres(
+        time[order], vx[order], vy[order], first, np.maximum(arm, SHORTEST_ARM),
+        np.where(moves, np.arctan2(vy[begin], vx[begin]), along[begin]),
+    )  # fmt: skip
+    return found
 
 
 def _lanes(path: Path, ends: tuple[float, float]) -> tuple[Lanelet, ...]:

@@ -17,10 +17,10 @@ import numpy as np
 
 from bridgegen.arrays import Float, Int
 from bridgegen.ego.kinds import CAR, MOTORCYCLE, TRUCK
-from bridgegen.recordings._motion_kernels import headings_of_fronts
 from bridgegen.recordings.bodies import centre_ahead
 from bridgegen.recordings.columns import read_columns, whole_numbers
 from bridgegen.recordings.format import Format, Head
+from bridgegen.recordings.motion import SHORTEST_ARM, headings_behind
 from bridgegen.recordings.smoothing import NOISE, scatter, smooth
 from bridgegen.recordings.table import (
     NO_LANE,
@@ -34,8 +34,6 @@ from bridgegen.recordings.table import (
 )
 
 FOOT = 0.3048  # m
-SHORTEST_ARM = 0.5
-"""From the rear axle to the front [m]; of a vehicle whose length is not given."""
 CLASSES = {1: MOTORCYCLE, 2: CAR, 3: TRUCK}
 
 NUMBERS = (
@@ -101,7 +99,7 @@ def _recording(path: Path, place: str, values: dict[str, Float], lines: Int) -> 
         for kind, one in zip(kinds.tolist(), length.tolist(), strict=True)
     ])  # fmt: skip
     quiet = _without_noise(time, x, y, bounds)
-    heading = headings_of_fronts(*quiet, bounds, np.maximum(arm, SHORTEST_ARM))
+    heading = headings_behind(*quiet, bounds, np.maximum(arm, SHORTEST_ARM))
     behind = 0.5 * length[ids]
     speed, lane = values["v_Vel"] * FOOT, values["Lane_ID"]
     facts = Facts(
