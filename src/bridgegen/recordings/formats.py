@@ -10,6 +10,7 @@ from bridgegen.recordings import (
     interaction,
     levelx,
     ngsim,
+    osi,
     scenarionet,
     smarts,
     states,
@@ -30,6 +31,7 @@ FORMATS: tuple[Format, ...] = (
     womd_json.FORMAT,
     argoverse.FORMAT,
     scenarionet.FORMAT,
+    osi.FORMAT,
 )
 """No file is of more than one of them."""
 
