@@ -7,6 +7,7 @@ from bridgegen.errors import FileFormatError
 from bridgegen.recordings import (
     argoverse,
     commonroad,
+    esmini_dat,
     interaction,
     levelx,
     ngsim,
@@ -32,6 +33,7 @@ FORMATS: tuple[Format, ...] = (
     argoverse.FORMAT,
     scenarionet.FORMAT,
     osi.FORMAT,
+    esmini_dat.FORMAT,
 )
 """No file is of more than one of them."""
 
