@@ -17,11 +17,11 @@ DEEPEST = 16
 @inlined_kernel
 def varint(data: Int, at: int, end: int) -> tuple[int, int]:
     """Return the number at a place, as int64, and the place behind it; −1 if it is cut off."""
-    value = np.int64(0)
+    value = 0
     for shift in range(0, 70, 7):
         if at >= end:
             return 0, -1
-        byte = np.int64(data[at])
+        byte = int(data[at])
         at += 1
         value |= (byte & 127) << shift
         if byte < 128:

@@ -34,6 +34,8 @@ SAME_PLACE = 3.0
 JOINED = 1.0
 """How far a centre line may begin from where another one ends, to follow it [m]."""
 MOST_POINTS = 1_000_000
+MOST_PAIRS = 20_000_000
+"""Of points within reach of each other."""
 SHORTEST = 0.5  # m
 
 
@@ -87,7 +89,7 @@ def lanelets_of_centre_lines(
             f"{place}: a map's lines may have {MOST_POINTS * STEP / 1000:,.0f} km in all, got "
             f"{total / 1000:,.0f}"
         )
-    field = _Field(used, edges, outlines)
+    field = _Field(used, edges, outlines, place)
     pieces = _pieces(field)
     widths, measured = _half_widths(field)
     lanelets = _linked(field, used, pieces, widths)
@@ -136,7 +138,7 @@ class _Field:
 
     def __init__(
         self, lines: Sequence[CentreLine], edges: Sequence[tuple[str, Float]],
-        outlines: Sequence[tuple[str, Float]],
+        outlines: Sequence[tuple[str, Float]], place: str,
     ) -> None:  # fmt: skip
         parts = [_resampled(one.points) for one in lines]
         counts = [len(one) for one in parts]
@@ -146,9 +148,12 @@ class _Field:
         self.points = np.concatenate(parts)
         self.along = np.concatenate([_directions(one) for one in parts])
         self.line = np.repeat(np.arange(len(parts)), [len(one) for one in parts])
-        others = cKDTree(self.points)
-        own = self.points[: self.centres]
-        found = others.query_ball_point(own, NEIGHBOURS[1] + STEP)
+        others, own = cKDTree(self.points), self.points[: self.centres]
+        reach = NEIGHBOURS[1] + STEP
+        pairs = int(cKDTree(own).count_neighbors(others, reach))
+        if pairs > MOST_PAIRS:
+            raise FileFormatError(f"{place}: too many lines of the map lie upon each other")
+        found: list[list[int]] = list(others.query_ball_point(own, reach))  # type: ignore[arg-type]
         p = np.repeat(np.arange(self.centres), [len(one) for one in found])
         q = np.fromiter(itertools.chain.from_iterable(found), dtype=np.int64, count=len(p))
         apart = self.line[p] != self.line[q]

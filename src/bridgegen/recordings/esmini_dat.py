@@ -207,7 +207,9 @@ class _Log:
             ),
             ids,
             {
-                "time": time, "x": x + ahead * cos - aside * sin, "y": y + ahead * sin + aside * cos,
+                "time": time,
+                "x": x + ahead * cos - aside * sin,
+                "y": y + ahead * sin + aside * cos,
                 "heading": heading, "vx": speed * cos, "vy": speed * sin,
             },
             lambda i: f"{self.source}, byte {self.places[i]}",

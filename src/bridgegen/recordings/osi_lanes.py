@@ -38,8 +38,8 @@ def lanelets_of(truth: Message) -> tuple[tuple[Lanelet, ...], tuple[str, ...]]:
     road: dict[str, list[Float]] = {}
     for name, (begin, end) in zip(names.tolist(), spans[LANE_BOUNDARY].tolist(), strict=True):
         one = truth.part(begin, end)
-        points = _BOUNDARY_POINT.read(one, one.find(2)[2])
-        road.setdefault(str(name), []).append(_points(points))
+        points = _points(_BOUNDARY_POINT.read(one, one.find(2)[2]))
+        road.setdefault(str(name), []).append(points)
     lines, without = [], 0
     about = _LANE.read(truth, spans[LANE])
     for k, (begin, end) in enumerate(spans[LANE].tolist()):

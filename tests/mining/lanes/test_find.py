@@ -54,7 +54,9 @@ def test_a_recording_in_the_maps_projection_is_placed_by_the_headers_offset(scen
 def test_a_map_of_another_place_is_refused_with_both_places(scene):
     path, traffic, _ = scene
     there = clean(replace(traffic, x=traffic.x + 3000.0)).traffic
-    with pytest.raises(InputError, match=r"0% of the vehicles' states .* spans x 29\d\d to") as got:
+    with pytest.raises(
+        InputError, match=r"0% of the states of vehicles that drive .* spans x 29\d\d to"
+    ) as got:
         locate(there, read_map(path))
     assert str(path) in str(got.value)
 
