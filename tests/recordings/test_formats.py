@@ -12,6 +12,7 @@ from bridgegen.errors import FileFormatError
 from bridgegen.recordings.format import read_head
 from bridgegen.recordings.formats import FORMATS, files_of, read, recognise
 
+from . import binary_writers as b
 from . import writers as w
 
 
@@ -47,6 +48,10 @@ CASES = [
     ),
     pytest.param(Case(w.write_scenarionet, "ScenarioNet", accelerates=False, kinds=False),
                  id="ScenarioNet"),
+    pytest.param(Case(b.write_osi, "OSI", lanes=True), id="OSI"),
+    pytest.param(Case(b.write_osi_view, "OSI", lanes=True), id="OSI SensorView"),
+    pytest.param(Case(b.write_mcap, "OSI", lanes=True), id="OSI MCAP"),
+    pytest.param(Case(b.write_dat, "esmini", accelerates=False), id="esmini"),
 ]  # fmt: skip
 
 

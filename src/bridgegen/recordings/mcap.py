@@ -105,8 +105,8 @@ class _Reading:
             (number,) = fields.take("<H")
             self.schemas[number] = fields.text()
         elif code == _CHANNEL:
-            number, schema = fields.take("<HH")
-            name = self.schemas.get(schema, "")
+            number, of_schema = fields.take("<HH")
+            name = self.schemas.get(of_schema, "")
             self.channels[number] = fields.text(), name, fields.text()
         elif code == _CHUNK and not in_chunk:
             records, place = self._decompressed(fields), f"{source}, chunk at byte {offset}"
