@@ -20,7 +20,7 @@ from bridgegen.recordings.lanelets import Lanelet
 from bridgegen.recordings.table import FARTHEST
 
 STEP = 1.0
-"""Between points of centre lines and of lines of the road [m]."""
+"""Between points of centre lines [m]; half of it between points of the road's lines."""
 NARROWEST, WIDEST = 2.5, 4.5
 """Widths that a lane may get [m]."""
 USUAL = 3.5
@@ -106,13 +106,13 @@ def _length(points: Float, place: str, name: str) -> float:
     return float(np.hypot(*np.diff(points, axis=0).T).sum()) if len(points) > 1 else 0.0
 
 
-def _resampled(points: Float) -> Float:
-    """Return points of a line `STEP` apart at most, its ends included."""
+def _resampled(points: Float, step: float) -> Float:
+    """Return points of a line, a step apart at most [m], its ends included."""
     steps = np.hypot(*np.diff(points, axis=0).T)
     keep = np.concatenate([[True], steps > 1e-6])
     points = points[keep]
     station = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
-    at = np.linspace(0.0, station[-1], int(np.ceil(station[-1] / STEP)) + 1)
+    at = np.linspace(0.0, station[-1], int(np.ceil(station[-1] / step)) + 1)
     return np.column_stack([np.interp(at, station, points[:, k]) for k in (0, 1)])
 
 
@@ -140,11 +140,11 @@ class _Field:
         self, lines: Sequence[CentreLine], edges: Sequence[tuple[str, Float]],
         outlines: Sequence[tuple[str, Float]], place: str,
     ) -> None:  # fmt: skip
-        parts = [_resampled(one.points) for one in lines]
+        parts = [_resampled(one.points, STEP) for one in lines]
         counts = [len(one) for one in parts]
         self.first = np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
         self.centres = int(self.first[-1])
-        parts += [_resampled(one) for _, one in (*edges, *outlines)]
+        parts += [_resampled(one, STEP / 2) for _, one in (*edges, *outlines)]
         self.points = np.concatenate(parts)
         self.along = np.concatenate([_directions(one) for one in parts])
         self.line = np.repeat(np.arange(len(parts)), [len(one) for one in parts])
@@ -161,7 +161,7 @@ class _Field:
         step = self.points[q] - self.points[p]
         ahead = (step * self.along[p]).sum(axis=1)
         course = (self.along[q] * self.along[p]).sum(axis=1)
-        beside = (np.abs(ahead) <= 0.75 * STEP) & (np.abs(course) >= PARALLEL)
+        beside = (np.abs(ahead) <= STEP) & (np.abs(course) >= PARALLEL)
         self.near = np.column_stack([p, q])[beside]
         step, along = step[beside], self.along[p[beside]]
         self.left = along[:, 0] * step[:, 1] - along[:, 1] * step[:, 0]
