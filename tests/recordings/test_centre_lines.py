@@ -7,7 +7,9 @@ import numpy as np
 import pytest
 
 from bridgegen.errors import FileFormatError
+from bridgegen.mining.lanes.find import locate
 from bridgegen.recordings.centre_lines import CentreLine, lanelets_of_centre_lines
+from bridgegen.recordings.clean import clean
 from bridgegen.recordings.formats import read
 
 from . import writers as w
@@ -184,6 +186,18 @@ def test_the_same_map_gives_the_same_lanelets_in_each_format(tmp_path, write, ad
         assert one.right == pytest.approx(other.right, abs=1e-4)
         assert (one.left_same, one.right_same) == (other.left_same, other.right_same)
     assert any("2 centre lines" in note for note in found.facts.notes)
+
+
+def test_a_lane_change_is_one_on_the_lanes_of_the_map(tmp_path):
+    path = w.write_womd(tmp_path)
+    _womd(path)
+    (found,) = read(path)
+    located = locate(clean(found).traffic)
+    assert (located.lanes.source, located.fit.vehicle_share) == ("lanelets", 1.0)
+    truck = located.placed.lane[-40:]
+    assert [located.lanes.names[k] for k in truck[[0, -1]]] == ["12", "11"]
+    assert np.count_nonzero(np.diff(truck)) == 1
+    assert located.lanes.left[truck[0]] == truck[-1]
 
 
 @pytest.mark.parametrize(

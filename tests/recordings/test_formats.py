@@ -154,6 +154,7 @@ def test_vehicles_of_an_argoverse_file_have_the_box_of_their_kind_only_after_cle
         (b"PK\x03\x04" + b"../../etc/passwd", "is an archive (zip)"),
         (b"\x1f\x8b\x08\x00abc", "is an archive (gzip)"),
         (b"a,b,c\n1,2,3\n", "no known format"),
+        (b"version https://git-lfs.github.com/spec/v1\noid sha256:0\n", "is a Git LFS pointer"),
         (b"id,frameRate,locationId\n1,25,2\n", "belongs to a recording"),
         (b"SQLite format 3\x00" + b"\x00" * 84, "no valid database"),
         (b"<commonRoad commonRoadVersion='2017'/>", "commonRoadVersion must be"),
