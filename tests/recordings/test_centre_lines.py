@@ -92,7 +92,9 @@ def test_a_lane_is_cut_where_one_beside_it_begins_and_ends():
 
 
 def test_lanes_of_the_other_direction_are_opposite_and_do_not_cut():
-    found, _ = _lanelets([("a", _straight(0, 50, 0)), ("b", _straight(50, 0, 3.5))])
+    found, _ = _lanelets(
+        [("a", _straight(0, 50, 0)), ("b", _straight(50, 0, 3.5)), ("c", _straight(40, 10, -3.5))]
+    )
     assert (found["a"].left_opposite, found["b"].left_opposite) == ("b", "a")
     assert found["a"].left_same == ""
 

@@ -190,7 +190,7 @@ def test_a_compressed_file_holds_what_an_uncompressed_one_does(tmp_path, method)
     assert packed.time.tobytes() == plain.time.tobytes()
     assert packed.x.tobytes() == plain.x.tobytes()
     for size in (100, mcap.MOST_RECORD + 1):  # less than it holds, more than any may
-        path.write_bytes(b.mcap(records, pack, method.encode(), size=size))
+        path.write_bytes(b.mcap(records, pack, method.encode(), size, checksum=0))
         with pytest.raises(FileFormatError, match=r"byte \d+: (this chunk is|a chunk must)"):
             list(read(path))
     path.write_bytes(b.mcap(records, lambda data: pack(data)[:-40], method.encode()))
@@ -211,6 +211,7 @@ def test_without_the_extra_a_compressed_file_names_it(tmp_path, monkeypatch):
     [
         (b.mcap(b.records([_state()]), method=b"snappy"), "zstd or lz4, got 'snappy'"),
         (b.mcap(b.records([_state()]), checksum=1), "checksum differs"),
+        (b.mcap(b.records([_state()]), checksum=0, size=50), "is damaged"),
         (b.mcap(b.records([_state()]))[:-40], "cut off"),
         (b.mcap(b.logged(1, 0, _state())), "channel 1, unknown"),
         (b.mcap(b.channel(1, b"a")), "holds no osi3.GroundTruth"),
