@@ -1,16 +1,15 @@
 """The traffic of `writers`, in binary formats, byte by byte as their specifications say."""
 
+import itertools
 import math
 import struct
 import zlib
 from pathlib import Path
 
-import numpy as np
+from .writers import STEP, TRACKS, by_time
 
-from .writers import CLASSES, NAMES, SIZES, STEP, N, by_time, states
-
-VEHICLE_TYPES = {"car": 4, "truck": 7}  # of OSI
-CATEGORIES = {"car": 0, "truck": 2}  # of esmini
+VEHICLE_TYPES = {"car": 4, "truck": 7, "motorcycle": 10, "bicycle": 11}  # of OSI
+CATEGORIES = {"car": 0, "truck": 2, "motorcycle": 6, "bicycle": 7}  # of esmini
 
 
 def varint(value):
@@ -42,31 +41,31 @@ def message(**fields):
     return b"".join(field(int(name[1:]), value) for name, value in fields.items())
 
 
-def moving_object(p, row):
+def moving_object(one, row):
     """Return a participant's state as an OSI MovingObject."""
     _, x, y, h, vx, vy, a = row
     base = message(
-        _1=message(_1=SIZES[p][0], _2=SIZES[p][1], _3=1.5), _2=message(_1=x, _2=y, _3=0.75),
+        _1=message(_1=one.length, _2=one.width, _3=1.5), _2=message(_1=x, _2=y, _3=0.75),
         _3=message(_3=h), _4=message(_1=vx, _2=vy),
         _5=message(_1=a * math.cos(h), _2=a * math.sin(h)),
     )  # fmt: skip
+    is_vehicle = one.kind in VEHICLE_TYPES
     return message(
-        _1=message(_1=int(NAMES[p])), _2=base, _3=2, _7=b"car.osgb",
-        _6=message(_1=VEHICLE_TYPES[CLASSES[p]]), _9=message(_1=message(_1=p + 2)),
+        _1=message(_1=int(one.name)), _2=base, _3=2 if is_vehicle else 3, _7=b"model.osgb",
+        _6=message(_1=VEHICLE_TYPES[one.kind] if is_vehicle else 0),
+        _9=message(_1=message(_1=one.lane)),
     )  # fmt: skip
 
 
-def ground_truths(start=0, extra=b""):
-    """Yield an OSI GroundTruth per instant; ``extra`` are more fields of each."""
-    rows = list(by_time())
-    for step in sorted({step for step, _, _ in rows}):
-        nanos = step * round(STEP * 1e9)
+def ground_truths(tracks=TRACKS, step=STEP, start=0):
+    """Yield an OSI GroundTruth per instant."""
+    for frame, rows in itertools.groupby(by_time(tracks, step), lambda one: one[0]):
+        nanos = frame * round(step * 1e9)
         head = message(
             _1=message(_1=3, _2=7),
             _2=message(_1=start + nanos // 10**9, _2=nanos % 10**9),
         )
-        objects = [field(5, moving_object(p, row)) for at, p, row in rows if at == step]
-        yield head + b"".join(objects) + extra
+        yield head + b"".join(field(5, moving_object(one, row)) for _, one, row in rows)
 
 
 def trace(messages):
@@ -74,8 +73,8 @@ def trace(messages):
     return b"".join(struct.pack("<I", len(one)) + one for one in messages)
 
 
-def write_osi(folder: Path) -> Path:
-    return _bytes(folder / "traffic.osi", trace(ground_truths()))
+def write_osi(folder: Path, tracks=TRACKS, step=STEP) -> Path:
+    return _bytes(folder / "traffic.osi", trace(ground_truths(tracks, step)))
 
 
 def write_osi_view(folder: Path) -> Path:
@@ -119,7 +118,7 @@ def mcap(content, pack=None, method=b"", size=None, checksum=None):
     packed = pack(content) if pack else content
     size = len(content) if size is None else size
     checksum = zlib.crc32(content) if checksum is None else checksum
-    chunk = struct.pack("<QQQI", 0, N, size, checksum) + _text(method)
+    chunk = struct.pack("<QQQI", 0, 0, size, checksum) + _text(method)
     chunk += struct.pack("<Q", len(packed)) + packed
     magic = b"\x89MCAP0\r\n"
     return (
@@ -149,33 +148,32 @@ def dat_head(version=(5, 3), road=b"road.xodr"):
     return struct.pack("<III", *version, len(texts)) + texts
 
 
-def write_dat(folder: Path) -> Path:
-    tracks = [np.column_stack(states(p)) for p in range(3)]
-    begins = [round(track[0, 0] / STEP) for track in tracks]
-    found, known = [dat_head()], {}
-    rows = list(by_time())
-    for step in sorted({step for step, _, _ in rows}):
-        found += [packet(5, "d", step * STEP), packet(21, "d", STEP) if step < 2 else b""]
-        for p in range(3):
-            if step - begins[p] == N:
-                found += [packet(0, "i", p), packet(19)]
-            if not 0 <= step - begins[p] < N:
-                continue
-            _, x, y, h, vx, vy, _ = tracks[p][step - begins[p]]
-            ahead = 1.4  # positions are those of a point behind the centre
+def write_dat(folder: Path, tracks=TRACKS, step=STEP) -> Path:
+    number = {one.name: k for k, one in enumerate(tracks)}
+    ends = {one.name: round(one.states[-1, 0] / step) for one in tracks}
+    found, speeds = [dat_head()], {}
+    frames = itertools.groupby(by_time(tracks, step), lambda one: one[0])
+    for frame, rows in frames:
+        found += [packet(5, "d", frame * step), packet(21, "d", step) if frame < 2 else b""]
+        for name, end in ends.items():
+            if frame == end + 1:
+                found += [packet(0, "i", number[name]), packet(19)]
+        for _, one, (_, x, y, h, vx, vy, _) in rows:
+            ahead, speed = 1.4, math.hypot(vx, vy)  # positions are those of a point behind
             at = (x - ahead * math.cos(h), y - ahead * math.sin(h), 0.0, h, 0.0, 0.0)
-            found += [packet(0, "i", p), packet(13, "6d", *at)]
-            if known.get(p) != math.hypot(vx, vy):
-                known[p] = math.hypot(vx, vy)
-                found.append(packet(7, "d", known[p]))
-            if step == begins[p]:
+            found += [packet(0, "i", number[one.name]), packet(13, "6d", *at)]
+            if one.name not in speeds:
+                is_vehicle = one.kind in CATEGORIES
                 found += [
-                    packet(2, "i", 1), packet(3, "i", CATEGORIES[CLASSES[p]]),
-                    packet(10, "6d", ahead, 0.0, 0.75, *SIZES[p], 1.5),
-                    packet(6, f"I{len(NAMES[p])}s", len(NAMES[p]), NAMES[p].encode()),
+                    packet(2, "i", 1 if is_vehicle else 2),
+                    packet(3, "i", CATEGORIES.get(one.kind, 0)),
+                    packet(10, "6d", ahead, 0.0, 0.75, one.length, one.width, 1.5),
+                    packet(6, f"I{len(one.name)}s", len(one.name), one.name.encode()),
                 ]  # fmt: skip
-    last = max(step for step, _, _ in rows) * STEP
-    return _bytes(folder / "sim.dat", b"".join([*found, packet(22, "d", last)]))
+            if speeds.get(one.name) != speed:
+                speeds[one.name] = speed
+                found.append(packet(7, "d", speed))
+    return _bytes(folder / "sim.dat", b"".join([*found, packet(22, "d", frame * step)]))
 
 
 def _bytes(path: Path, data: bytes) -> Path:
