@@ -152,13 +152,20 @@ def write_dat(folder: Path, tracks=TRACKS, step=STEP) -> Path:
     number = {one.name: k for k, one in enumerate(tracks)}
     ends = {one.name: round(one.states[-1, 0] / step) for one in tracks}
     found, speeds = [dat_head()], {}
-    frames = itertools.groupby(by_time(tracks, step), lambda one: one[0])
-    for frame, rows in frames:
-        found += [packet(5, "d", frame * step), packet(21, "d", step) if frame < 2 else b""]
-        for name, end in ends.items():
-            if frame == end + 1:
-                found += [packet(0, "i", number[name]), packet(19)]
-        for _, one, (_, x, y, h, vx, vy, _) in rows:
+    frames = {end + 1: [] for end in ends.values()}
+    for frame, *row in by_time(tracks, step):
+        frames.setdefault(frame, []).append(row)
+    left = {}
+    for name, end in ends.items():
+        left.setdefault(end + 1, []).append(name)
+    for frame, rows in sorted(frames.items()):
+        found += [
+            packet(5, "d", frame * step),
+            packet(21, "d", step) if frame == min(frames) else b"",
+        ]
+        for name in left.get(frame, ()):
+            found += [packet(0, "i", number[name]), packet(19)]
+        for one, (_, x, y, h, vx, vy, _) in rows:
             ahead, speed = 1.4, math.hypot(vx, vy)  # positions are those of a point behind
             at = (x - ahead * math.cos(h), y - ahead * math.sin(h), 0.0, h, 0.0, 0.0)
             found += [packet(0, "i", number[one.name]), packet(13, "6d", *at)]

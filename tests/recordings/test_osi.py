@@ -233,3 +233,10 @@ def test_a_ground_truth_with_one_traffic_light_is_no_sensor_view():
     assert osi._ground_truth(message) is message
     view = Message.of(b.field(7, truth), "", 0)
     assert osi._ground_truth(view).begin == len(view.data) - len(truth)
+
+
+def test_an_id_of_64_bits_keeps_them(tmp_path):
+    (found,) = read(_osi(tmp_path, [_state(name=2**63 - 1)]))
+    assert found.names == (str(2**63 - 1),)
+    with pytest.raises(FileFormatError, match="must have an id"):  # OSI's mark of an invalid one
+        list(read(_osi(tmp_path, [_state(name=2**64 - 1)])))

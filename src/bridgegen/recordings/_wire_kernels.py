@@ -17,15 +17,15 @@ DEEPEST = 16
 @inlined_kernel
 def varint(data: Int, at: int, end: int) -> tuple[int, int]:
     """Return the number at a place, as int64, and the place behind it; −1 if it is cut off."""
-    value = 0
+    value = np.int64(0)
     for shift in range(0, 70, 7):
         if at >= end:
             return 0, -1
-        byte = int(data[at])
+        byte = np.int64(data[at])
         at += 1
-        value |= (byte & 127) << shift
+        value |= (byte & 127) << np.int64(shift)
         if byte < 128:
-            return value, at
+            return int(value), at
     return 0, -1
 
 
