@@ -8,9 +8,10 @@ import pytest
 
 from bridgegen.errors import FileFormatError
 from bridgegen.mining.lanes.find import locate
-from bridgegen.recordings.centre_lines import CentreLine, lanelets_of_centre_lines
+from bridgegen.recordings.centre_lines import lanelets_of_centre_lines
 from bridgegen.recordings.clean import clean
 from bridgegen.recordings.formats import read
+from bridgegen.recordings.road_lines import CentreLine
 
 from . import writers as w
 

@@ -8,8 +8,9 @@ from collections.abc import Iterable
 import numpy as np
 
 from bridgegen.arrays import Float
-from bridgegen.recordings.centre_lines import CentreLine, lanelets_of_centre_lines
+from bridgegen.recordings.centre_lines import lanelets_of_centre_lines
 from bridgegen.recordings.lanelets import Lanelet
+from bridgegen.recordings.road_lines import CentreLine
 from bridgegen.recordings.wire import Message, Shape
 
 LANE_BOUNDARY, LANE = 9, 10

@@ -9,9 +9,10 @@ import numpy as np
 
 from bridgegen.arrays import Float
 from bridgegen.errors import FileFormatError
-from bridgegen.recordings.centre_lines import CentreLine, lanelets_of_centre_lines
+from bridgegen.recordings.centre_lines import lanelets_of_centre_lines
 from bridgegen.recordings.lanelets import Lanelet
 from bridgegen.recordings.pickles import PickledArray
+from bridgegen.recordings.road_lines import CentreLine
 
 KINDS = {"LANE_BIKE_LANE": ("bicycleLane",)}
 

@@ -18,9 +18,10 @@ from bridgegen.arrays import Float
 from bridgegen.ego.kinds import BICYCLE, CAR, PEDESTRIAN
 from bridgegen.errors import FileFormatError
 from bridgegen.openx.xml import read_bytes
-from bridgegen.recordings.centre_lines import CentreLine, lanelets_of_centre_lines
+from bridgegen.recordings.centre_lines import lanelets_of_centre_lines
 from bridgegen.recordings.format import Format, Head
 from bridgegen.recordings.lanelets import Lanelet
+from bridgegen.recordings.road_lines import CentreLine
 from bridgegen.recordings.table import UNKNOWN_KIND, Facts, RecordedTraffic, build
 
 TIME_STEP = 0.1
