@@ -25,7 +25,7 @@ from scipy.stats import ks_2samp
 from tests.mining.events import simulated as planted
 from tests.mining.events import test_crossing_round_trip as meetings
 from tests.mining.events import test_round_trip as lane_events
-from tests.recordings import writers
+from tests.recordings import binary_writers, writers
 
 from bridgegen.exposure.rates import Encounters
 from bridgegen.recordings.formats import read
@@ -57,6 +57,8 @@ FORMATS = {
     "CommonRoad": Form(writers.write_commonroad, rows=100),
     "INTERACTION": Form(writers.write_interaction),
     "SUMO FCD": Form(writers.write_sumo),
+    "OSI": Form(binary_writers.write_osi, 0.05),
+    "esmini .dat": Form(binary_writers.write_dat, 0.05),
     "WOMD JSON": Form(writers.write_womd, rows=10),
     "ScenarioNet": Form(writers.write_scenarionet, rows=10),
 }

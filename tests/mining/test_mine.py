@@ -126,7 +126,9 @@ def test_lanes_of_a_map_and_a_map_of_another_place(cli, tmp_path):
     assert {row["source"] for row in rows(out / "lanes.csv")} == {"map"}
     code, _, err = cli("mine", path, "--map", map_of["elsewhere"], "--out", out)
     assert code == 2
-    assert "0% of the vehicles' states are on lanes of the map" in " ".join(err.split())
+    assert "0% of the states of vehicles that drive are on lanes of the map" in " ".join(
+        err.split()
+    )
     code, _, err = cli("mine", path, "--map", tmp_path / "none.xodr", "--out", out)
     assert code != 0
     assert "none.xodr" in err

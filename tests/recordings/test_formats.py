@@ -12,6 +12,7 @@ from bridgegen.errors import FileFormatError
 from bridgegen.recordings.format import read_head
 from bridgegen.recordings.formats import FORMATS, files_of, read, recognise
 
+from . import binary_writers as b
 from . import writers as w
 
 
@@ -52,6 +53,10 @@ CASES = [
     ),
     pytest.param(Case(w.write_scenarionet, "ScenarioNet", accelerates=False, kinds=False),
                  id="ScenarioNet"),
+    pytest.param(Case(b.write_osi, "OSI", lanes=True), id="OSI"),
+    pytest.param(Case(b.write_osi_view, "OSI", lanes=True), id="OSI SensorView"),
+    pytest.param(Case(b.write_mcap, "OSI", lanes=True), id="OSI MCAP"),
+    pytest.param(Case(b.write_dat, "esmini", accelerates=False), id="esmini"),
 ]  # fmt: skip
 
 
@@ -153,6 +158,7 @@ def test_vehicles_of_an_argoverse_file_have_the_box_of_their_kind_only_after_cle
         (b"PK\x03\x04" + b"../../etc/passwd", "is an archive (zip)"),
         (b"\x1f\x8b\x08\x00abc", "is an archive (gzip)"),
         (b"a,b,c\n1,2,3\n", "no known format"),
+        (b"version https://git-lfs.github.com/spec/v1\noid sha256:0\n", "is a Git LFS pointer"),
         (b"id,frameRate,locationId\n1,25,2\n", "belongs to a recording"),
         (b"SQLite format 3\x00" + b"\x00" * 84, "no valid database"),
         (b"<commonRoad commonRoadVersion='2017'/>", "commonRoadVersion must be"),

@@ -14,11 +14,14 @@ from bridgegen.recordings.clean import clean
 from bridgegen.recordings.formats import read
 from bridgegen.recordings.pickles import PickledArray, read_pickle
 
+from . import binary_writers as b
 from . import writers as w
 
 WRITERS = [
     w.write_states, w.write_highd, w.write_ind, w.write_ngsim, w.write_ngsim_text, w.write_smarts,
     w.write_commonroad, w.write_interaction, w.write_sumo, w.write_womd, w.write_scenarionet,
+    b.write_osi, b.write_osi_view, b.write_mcap, b.write_mcap_unchecked,
+    b.write_dat,
 ]  # fmt: skip
 
 
@@ -119,7 +122,9 @@ def test_a_damaged_file_is_read_or_refused(write, tmp_path_factory, data):
 @settings(max_examples=100, deadline=None)
 @given(data=st.binary(max_size=300), head=st.sampled_from(
     [b"", b"\x80\x04", b"SQLite format 3\x00", b"<fcd-export>", b'{"objects": [], "position": ',
-     b"time,entity,x,y,h,speed\n", b"esmini", b"\xef\xbb\xbf"]))  # fmt: skip
+     b"time,entity,x,y,h,speed\n", b"esmini", b"\xef\xbb\xbf", b"\x89MCAP0\r\n",
+     b"\x40\0\0\0\x12\2\x10\1",
+     b.dat_head()]))  # fmt: skip
 def test_garbage_is_refused(tmp_path_factory, data, head):
     path = tmp_path_factory.getbasetemp() / "garbage"
     path.write_bytes(head + data)

@@ -218,7 +218,7 @@ def lanes_in_words(found: LanesFound) -> str:
         ""
         if math.isnan(found.vehicle_share)
         else f", {found.vehicle_share:.1%} of the states \
-of vehicles on them"
+of vehicles that drive on them"
     )
     count = len(found.carriageways)
     ways = "1 carriageway" if count == 1 else f"{count:,} carriageways"

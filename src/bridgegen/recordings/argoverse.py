@@ -1,6 +1,6 @@
 """Argoverse 2 motion forecasting scenarios (Parquet); needs the extra ``parquet``.
 
-There are no boxes in them.
+There are no boxes in them. Lanes are those of the map that lies beside the file, if it does.
 
 Source: argoverse/av2-api, src/av2/datasets/motion_forecasting/data_schema.py.
 """
@@ -14,6 +14,7 @@ from bridgegen.arrays import Int
 from bridgegen.ego.kinds import BICYCLE, BUS, CAR, MOTORCYCLE, OTHER, PEDESTRIAN
 from bridgegen.errors import FileFormatError
 from bridgegen.extras import require
+from bridgegen.recordings.argoverse_map import map_beside, read_lanelets
 from bridgegen.recordings.format import Format, Head
 from bridgegen.recordings.table import (
     MOST_STATES,
@@ -68,9 +69,12 @@ def _read(path: Path) -> Iterator[RecordedTraffic]:
         rows = np.flatnonzero(codes == code)
         tracks, ids = numbered(np.array(texts["track_id"])[rows])
         _, at = np.unique(ids, return_index=True)
+        beside = map_beside(path, scenario)
         facts = Facts(
             name=scenario, format=FORMAT.name, source=str(path), time_step=TIME_STEP,
             frame=f"the city's ({texts['city'][rows[0]]})",
+            map=beside.name if beside else "",
+            lanelets=read_lanelets(beside) if beside else (),
         )  # fmt: skip
         of = {name: column[rows] for name, column in values.items()}
         yield build(

@@ -7,9 +7,11 @@ from bridgegen.errors import FileFormatError
 from bridgegen.recordings import (
     argoverse,
     commonroad,
+    esmini_dat,
     interaction,
     levelx,
     ngsim,
+    osi,
     scenarionet,
     smarts,
     states,
@@ -30,6 +32,8 @@ FORMATS: tuple[Format, ...] = (
     womd_json.FORMAT,
     argoverse.FORMAT,
     scenarionet.FORMAT,
+    osi.FORMAT,
+    esmini_dat.FORMAT,
 )
 """No file is of more than one of them."""
 
@@ -61,6 +65,10 @@ def read(path: Path) -> Iterator[RecordedTraffic]:
             raise FileFormatError(f"{path}: is an archive ({name}); unpack it, and name its files")
     if b"ustar" in head.data[257:263]:
         raise FileFormatError(f"{path}: is an archive (tar); unpack it, and name its files")
+    if head.data.startswith(b"version https://git-lfs"):
+        raise FileFormatError(
+            f"{path}: is a Git LFS pointer, not the file that it stands for: run 'git lfs pull'"
+        )
     for one in FORMATS:
         if one.companion(head):
             raise FileFormatError(

@@ -1,5 +1,7 @@
 """ScenarioNet's scenarios (pickle), read by a restricted reader; see `pickles`.
 
+Lanes are made of the map features.
+
 Source: metadriverse/scenarionet and metadrive/scenario/scenario_description.py.
 """
 
@@ -16,6 +18,7 @@ from bridgegen.ego.kinds import BICYCLE, CAR, MOTORCYCLE, OTHER, PEDESTRIAN
 from bridgegen.errors import FileFormatError
 from bridgegen.recordings.format import Format, Head
 from bridgegen.recordings.pickles import PickledArray, read_pickle
+from bridgegen.recordings.scenarionet_map import lanelets_of
 from bridgegen.recordings.table import UNKNOWN_KIND, Facts, RecordedTraffic, build, median_step
 
 KINDS = {
@@ -64,6 +67,7 @@ def _read(path: Path) -> Iterator[RecordedTraffic]:
         raise FileFormatError(f"{path}: holds no states")
     table, size, numbers = np.concatenate(parts), np.array(boxes), np.array(ids)
     first = np.searchsorted(numbers, np.arange(len(names) + 1))
+    lanelets, notes = lanelets_of(str(path), whole.get("map_features") or {})
     data_set = str(metadata.get("dataset", ""))[:40]
     facts = Facts(
         name=str(whole.get("id", path.stem))[:200], format=FORMAT.name, source=str(path),
@@ -71,6 +75,7 @@ def _read(path: Path) -> Iterator[RecordedTraffic]:
         frame=f"the scenario's ({data_set})" if data_set else "the scenario's",
         map="map features of the file" if whole.get("map_features") else "",
         lights=MappingProxyType(_lights(path, whole.get("dynamic_map_states"), times)),
+        notes=notes, lanelets=lanelets,
     )  # fmt: skip
     yield build(
         facts, numbers,

@@ -1,6 +1,7 @@
 """Waymo's motion data as JSON, in the form of GPUDrive, PufferDrive and Nocturne.
 
-Headings are radians; Nocturne's older files have degrees, which is told by their size.
+Headings are radians; Nocturne's older files have degrees, which is told by their size. Lanes are
+made of the centre lines, lines and edges among the roads.
 
 Source: Emerge-Lab/gpudrive, README and data_utils.
 """
@@ -13,15 +14,21 @@ from typing import Any
 
 import numpy as np
 
+from bridgegen.arrays import Float
 from bridgegen.ego.kinds import BICYCLE, CAR, PEDESTRIAN
 from bridgegen.errors import FileFormatError
 from bridgegen.openx.xml import read_bytes
+from bridgegen.recordings.centre_lines import lanelets_of_centre_lines
 from bridgegen.recordings.format import Format, Head
+from bridgegen.recordings.lanelets import Lanelet
+from bridgegen.recordings.road_lines import CentreLine
 from bridgegen.recordings.table import UNKNOWN_KIND, Facts, RecordedTraffic, build
 
 TIME_STEP = 0.1
 """Of the Waymo Open Motion Dataset [s]; the file does not repeat it."""
 KINDS = {"vehicle": CAR, "pedestrian": PEDESTRIAN, "cyclist": BICYCLE}
+BICYCLE_LANE = 3
+"""Waymo's number of this kind of lane."""
 MOST_BYTES = 256 * 2**20
 
 
@@ -61,11 +68,14 @@ def _read(path: Path) -> Iterator[RecordedTraffic]:
     if np.abs(table[:, 3]).max() > 2.0 * math.pi + 1e-3:
         table[:, 3] = np.radians(table[:, 3])
         notes.append("headings are taken as degrees")
+    lanelets, assumed = _lanelets(path, whole.get("roads") or [])
+    notes += assumed
     size = np.array(boxes)
     facts = Facts(
         name=str(whole.get("name", path.stem))[:200], format=FORMAT.name, source=str(path),
         time_step=TIME_STEP, frame="the scenario's (Waymo), metres",
         map="roads of the file" if whole.get("roads") else "", notes=tuple(notes),
+        lanelets=lanelets,
     )  # fmt: skip
     yield build(
         facts, np.array(ids),
@@ -76,6 +86,33 @@ def _read(path: Path) -> Iterator[RecordedTraffic]:
         lambda i: f"{path}, objects[{places[i][0]}], step {places[i][1]}",
         names=names, kind=kinds, length=size[:, 0], width=size[:, 1],
     )  # fmt: skip
+
+
+def _lanelets(path: Path, roads: Any) -> tuple[tuple[Lanelet, ...], tuple[str, ...]]:
+    if not isinstance(roads, list):
+        raise FileFormatError(f"{path}: roads must be a list")
+    lines: list[CentreLine] = []
+    road: dict[str, Float] = {}
+    for number, one in enumerate(roads):
+        kind = one.get("type") if isinstance(one, dict) else None
+        if kind not in ("lane", "road_line", "road_edge"):
+            continue
+        points = _line(f"{path}, roads[{number}]", one.get("geometry"))
+        if kind != "lane":
+            road[str(number)] = points
+            continue
+        is_bicycle = one.get("map_element_id") == BICYCLE_LANE
+        name = str(one.get("id", f"roads[{number}]"))[:200]
+        lines.append(CentreLine(name, points, kinds=("bicycleLane",) if is_bicycle else ()))
+    return lanelets_of_centre_lines(lines, road, str(path))
+
+
+def _line(place: str, geometry: Any) -> Float:
+    try:
+        points = np.array([[float(one["x"]), float(one["y"])] for one in geometry])
+    except (TypeError, KeyError, ValueError):
+        raise FileFormatError(f"{place}: geometry must be a list of points x, y") from None
+    return points.reshape(-1, 2)
 
 
 def _states(place: str, one: Any) -> list[list[float]]:

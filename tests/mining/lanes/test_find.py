@@ -13,6 +13,7 @@ from bridgegen.mining.lanes.find import locate, read_map
 from bridgegen.openx.opendrive.model import Offset
 from bridgegen.openx.opendrive.write import to_xml
 from bridgegen.recordings.clean import clean
+from bridgegen.recordings.lanelets import Lanelet
 
 
 @pytest.fixture(scope="module")
@@ -54,7 +55,9 @@ def test_a_recording_in_the_maps_projection_is_placed_by_the_headers_offset(scen
 def test_a_map_of_another_place_is_refused_with_both_places(scene):
     path, traffic, _ = scene
     there = clean(replace(traffic, x=traffic.x + 3000.0)).traffic
-    with pytest.raises(InputError, match=r"0% of the vehicles' states .* spans x 29\d\d to") as got:
+    with pytest.raises(
+        InputError, match=r"0% of the states of vehicles that drive .* spans x 29\d\d to"
+    ) as got:
         locate(there, read_map(path))
     assert str(path) in str(got.value)
 
@@ -72,3 +75,31 @@ def test_a_recording_without_vehicles_is_not_judged(scene):
     walk = {"time": np.arange(50) * 0.1, "x": np.arange(50) * 0.1 + 900.0, "y": np.zeros(50)}
     found = locate(clean(recorded([walk], kind=5)).traffic, read_map(path))
     assert np.isnan(found.fit.vehicle_share)
+
+
+def _on_a_lanelet(y):
+    """Return a recording of four parked cars and one that drives at y, on the lane at 0."""
+    time, rng = np.arange(100) * 0.1, np.random.default_rng(3)
+    tracks = [{"time": time, "x": 10.0 * time, "y": np.full(100, y)}]
+    for k in range(4):
+        noise = rng.normal(0.0, 0.3, (2, 100))
+        tracks.append({"time": time, "x": 20.0 * k + noise[0], "y": 6.0 + noise[1]})
+    ends = np.array([-10.0, 130.0])
+    lane = Lanelet(
+        name="1",
+        left=np.column_stack([ends, np.full(2, 1.75)]),
+        right=np.column_stack([ends, np.full(2, -1.75)]),
+    )
+    return clean(recorded(tracks, lanelets=[lane])).traffic
+
+
+def test_parked_vehicles_do_not_speak_against_the_lanes():
+    found = locate(_on_a_lanelet(0.0))
+    assert (found.lanes.source, found.fit.vehicle_share) == ("lanelets", 1.0)
+    assert found.placed.on_lane.mean() < 0.3
+
+
+def test_lanes_that_nobody_drives_on_are_not_used():
+    found = locate(_on_a_lanelet(4.0))
+    assert found.lanes.source == "none"
+    assert "hold 0% of the states of vehicles that drive" in found.lanes.notes[0]

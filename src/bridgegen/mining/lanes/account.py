@@ -42,7 +42,7 @@ class LanesFound:
     Attributes:
         source: as in `RecordedLanes`.
         carriageways: with states, most first.
-        vehicle_share: share of the vehicles' states on lanes; NaN without vehicles.
+        vehicle_share: as in `Fit`.
         km_on: of paths on lanes [km].
         km_off: of paths off lanes [km].
         notes: in sentences.

@@ -19,7 +19,7 @@ from bridgegen.openx.opendrive.read import read
 from bridgegen.recordings.table import RecordedTraffic, wrap
 
 LEAST_SHARE = 0.5
-"""Of the vehicles' states that must be on the lanes of a map, or of lanelets, to belong to them."""
+"""Of the states of vehicles that drive; less are not on the lanes of their map or lanelets."""
 USUAL_SHARE = 0.9
 """With less there is a warning."""
 
@@ -71,7 +71,7 @@ def locate(traffic: RecordedTraffic, road_map: MapLanes | None = None) -> Locate
         road_map: in the recording's coordinates, or in those that its header's offset leads to.
 
     Raises:
-        InputError: less than half of the vehicles' states are on the map's lanes.
+        InputError: less than half of the states of vehicles that drive are on the map's lanes.
     """
     if road_map is not None:
         return _on_map(traffic, road_map)
@@ -81,8 +81,8 @@ def locate(traffic: RecordedTraffic, road_map: MapLanes | None = None) -> Locate
     if not found.fit.vehicle_share < LEAST_SHARE:
         return found
     note = (
-        f"the recording's own lanes hold {found.fit.vehicle_share:.0%} of its vehicles' states, "
-        "and are not used"
+        f"the recording's own lanes hold {found.fit.vehicle_share:.0%} of the states of vehicles "
+        "that drive, and are not used"
     )
     lanes = infer_lanes(traffic)
     return _on(traffic, replace(lanes, notes=(note, *lanes.notes)))
@@ -102,16 +102,16 @@ def _on_map(traffic: RecordedTraffic, road_map: MapLanes) -> Located:
     best = found.fit.vehicle_share
     if LEAST_SHARE <= best < USUAL_SHARE:
         note = (
-            f"{traffic.facts.source}: only {best:.0%} of the vehicles' states are on the map's "
-            "lanes: is it the map of the place?"
+            f"{traffic.facts.source}: only {best:.0%} of the states of vehicles that drive are on "
+            "the map's lanes: is it the map of the place?"
         )
         lanes = replace(found.lanes, notes=(*found.lanes.notes, note))
         return Located(lanes, found.placed, found.fit)
     if not best < LEAST_SHARE:
         return found
     raise InputError(
-        f"{traffic.facts.source}: {best:.0%} of the vehicles' states are on lanes of the map "
-        f"{road_map.path}, and {LEAST_SHARE:.0%} must be; the recording spans "
+        f"{traffic.facts.source}: {best:.0%} of the states of vehicles that drive are on lanes of "
+        f"the map {road_map.path}, and {LEAST_SHARE:.0%} must be; the recording spans "
         f"{_span(traffic.x, traffic.y)}, the map {_span(road_map.lanes.x, road_map.lanes.y)}: give "
         "the map of the place, in the recording's coordinates"
     )

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bridgegen.arrays import Float, Int
+from bridgegen.arrays import Bool, Float, Int
 from bridgegen.mining.lanes.model import RecordedLanes
 from bridgegen.mining.lanes.placing import WALKS, Placed
 from bridgegen.recordings.table import RecordedTraffic
@@ -12,6 +12,8 @@ from bridgegen.recordings.table import RecordedTraffic
 BIN = 0.01
 """Of offsets, from which the percentiles are taken [m]."""
 BINS = 1000
+DRIVES = 5.0
+"""How far a vehicle gets that is not parked [m]; more than the noise of trackers."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -22,8 +24,8 @@ class Fit:
         states: ``(L,)`` int64 on each lane.
         rms: ``(L,)`` of the offsets from the lane's middle [m]; NaN where nothing was.
         p95: ``(L,)`` 95th percentile of the offsets' absolute values, within 0.01 m [m].
-        vehicle_share: share of the vehicles' states that are on a lane, pedestrians, animals and
-            objects left out; NaN without vehicles.
+        vehicle_share: share of the states on a lane, of vehicles that drive; pedestrians, animals,
+            objects and parked vehicles are left out. NaN without any.
         km_on: of all participants' paths, from one state on a lane to the next [km].
         km_off: the rest [km].
     """
@@ -52,7 +54,7 @@ def fit_of(traffic: RecordedTraffic, placed: Placed, lanes: RecordedLanes) -> Fi
     reached = np.cumsum(below, axis=1) >= 0.95 * states[used, None]
     p95 = np.full(count, np.nan)
     p95[used] = (reached.argmax(axis=1) + 1) * BIN
-    vehicles = ~np.isin(traffic.kind, WALKS)
+    vehicles = ~np.isin(traffic.kind, WALKS) & _drive(traffic)
     of_vehicles = np.repeat(vehicles, np.diff(traffic.first))
     steps = np.hypot(np.diff(traffic.x), np.diff(traffic.y))
     steps[traffic.first[1:-1] - 1] = 0.0
@@ -62,3 +64,14 @@ def fit_of(traffic: RecordedTraffic, placed: Placed, lanes: RecordedLanes) -> Fi
         states, rms, p95, share, km_on,
         max(float(steps.sum()) / 1000.0 - km_on, 0.0),
     )  # fmt: skip
+
+
+def _drive(traffic: RecordedTraffic) -> Bool:
+    """Return which participants get farther than `DRIVES`; ``(P,)``."""
+    begin = traffic.first[:-1]
+    across = [
+        np.maximum.reduceat(value, begin) - np.minimum.reduceat(value, begin)
+        for value in (traffic.x, traffic.y)
+    ]
+    far: Bool = np.hypot(*across) > DRIVES
+    return far
