@@ -14,6 +14,7 @@ from bridgegen.mining.events import (
     following,
     lane_change,
     lead_brakes,
+    merging,
     oncoming_turn,
     vru_crossing,
 )
@@ -34,6 +35,7 @@ DETECTORS: dict[str, Callable[[Scene, LaneChanges], Events]] = {
     "crossing": crossing.find,
     "oncoming-left-turn": oncoming_turn.find,
     "vru-crossing": vru_crossing.find,
+    "merging": merging.find,
 }
 """By kind; each returns what `bridgegen.odd.event_kinds.EVENT_KINDS` declares."""
 

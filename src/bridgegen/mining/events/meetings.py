@@ -87,13 +87,14 @@ def meetings(scene: Scene, egos: Bool, others: Bool) -> list[Meeting]:
         strict=True,
     ):  # fmt: skip
         if egos[one] and others[other]:
-            found.append(_meeting(scene, one, other, one_at, other_at))
+            found.append(meeting(scene, one, other, one_at, other_at))
         if egos[other] and others[one]:
-            found.append(_meeting(scene, other, one, other_at, one_at))
+            found.append(meeting(scene, other, one, other_at, one_at))
     return found
 
 
-def _meeting(scene: Scene, ego: int, other: int, ego_at: float, other_at: float) -> Meeting:
+def meeting(scene: Scene, ego: int, other: int, ego_at: float, other_at: float) -> Meeting:
+    """Return the meeting of an ego and another that pass a point at two instants."""
     paths, clock = scene.paths, scene.clock
     lengths = paths.length(ego, ego_at), paths.length(other, other_at)
     own, its = paths.course(ego, lengths[0]), paths.course(other, lengths[1])
@@ -121,6 +122,7 @@ def events_of_meetings(
     met: Sequence[Meeting],
     more: Callable[[Meeting], dict[str, float]],
     roles: Mapping[str, Sequence[int]] = MappingProxyType({}),
+    refused: Mapping[str, Sequence[bool]] = MappingProxyType({}),
 ) -> Events:
     """Return meetings as events of a kind, with the quantities that all of them have.
 
@@ -130,6 +132,7 @@ def events_of_meetings(
         met: in any order.
         more: the quantities that this kind has besides.
         roles: participants besides the other, by role.
+        refused: further reasons for which meetings are no events.
     """
     off = set_off_instants(scene, [one.other for one in met], [one.other_at for one in met])
     rows = [
@@ -154,7 +157,8 @@ def events_of_meetings(
         {
             NOT_WHOLE: (first - begin) * scene.step < LEAST_SEEN,
             TOUCH: table["pet"] <= 0.0,
-        },
+        }
+        | {reason: np.array(mask, np.bool_) for reason, mask in refused.items()},
     )  # fmt: skip
 
 
@@ -162,7 +166,7 @@ def _quantities(scene: Scene, one: Meeting, set_off: float) -> Iterator[tuple[st
     paths = scene.paths
     for name, who, at in (("ego", one.ego, one.ego_at), ("other", one.other, one.other_at)):
         yield f"{name}_speed", _speed(scene, who, one.begin)
-        yield f"{name}_crossing_speed", _crossing_speed(scene, who, at)
+        yield f"{name}_crossing_speed", crossing_speed(scene, who, at)
         yield f"{name}_distance", paths.length(who, at) - paths.length(who, one.begin)
     yield "time_gap", (one.last_at - one.first_at) * scene.step
     yield "pet", _pet(scene, one)
@@ -187,7 +191,7 @@ def _speed(scene: Scene, who: int, instant: float) -> float:
     return float(scene.at(scene.speed, np.array([who]), at)[0])
 
 
-def _crossing_speed(scene: Scene, who: int, at: float) -> float:
+def crossing_speed(scene: Scene, who: int, at: float) -> float:
     """Return a speed by the length of the path, which noise makes longer by little [m/s]."""
     around, clock = AVERAGED / scene.step, scene.clock
     low, high = max(at - around, float(clock.begin[who])), min(at + around, float(clock.end[who]))

@@ -1,7 +1,7 @@
-"""The paths of a recording's participants as lines, and where those of two cross.
+"""The paths of a recording's participants as lines, and where those of two cross or join.
 
 A path leads through states that are 1 m apart at least, so that noise of who stands makes none.
-Crossings need no lanes.
+Neither needs lanes.
 """
 
 from dataclasses import dataclass
@@ -12,6 +12,7 @@ from bridgegen.arrays import Float, Int
 from bridgegen.ego.kinds import BICYCLE, PEDESTRIAN
 from bridgegen.mining.conflicts.find import EGOS
 from bridgegen.mining.events._crossing_kernels import mark_crossings, mark_vertices
+from bridgegen.mining.events._joining_kernels import mark_joins
 from bridgegen.mining.excerpt import Clock
 from bridgegen.recordings.table import RecordedTraffic, wrap
 
@@ -27,6 +28,37 @@ AROUND = 2.0
 """Before and after a point of a path, between which its course is taken [m]."""
 BEFORE, AFTER = 30.0, 15.0
 """Of a crossing: from there to there a path turns [m]."""
+
+NEAR = 2.0
+"""Paths that are nearer than this are one [m]: a car is 1.8 m wide."""
+ONE_WAY = np.radians(20.0)
+"""Between the courses of paths that are one, at most."""
+
+
+@dataclass(frozen=True, eq=False)
+class Joins:
+    """Where paths of two motor vehicles come together, and lead the same way for a while.
+
+    A pair may have several. Where one of both has been on the shared part from its beginning there
+    is none.
+
+    Attributes:
+        one: ``(K,)`` participant.
+        other: ``(K,)`` participant, a greater number.
+        one_at: ``(K,)`` instant at which its centre comes to the shared part.
+        other_at: ``(K,)``.
+        one_length: ``(K,)`` of its path until there [m].
+        other_length: ``(K,)`` [m].
+        shared: ``(K,)`` length of the shared part [m].
+    """
+
+    one: Int
+    other: Int
+    one_at: Float
+    other_at: Float
+    one_length: Float
+    other_length: Float
+    shared: Float
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,6 +127,32 @@ class Paths:
                 break
             room = count
         return _of_pairs(pairs[:count], times[:count])
+
+    def joins(self) -> Joins:
+        """Return where paths of motor vehicles join that are passed within `WINDOW`."""
+        traffic, vertex = self.traffic, self._vertex
+        who, instant = traffic.participant[vertex], self.clock.instant
+        x, y = traffic.x[vertex], traffic.y[vertex]
+        column, line = (np.floor(values / NEAR).astype(np.int64) for values in (x, y))
+        column, line = column - column.min(), line - line.min() + 1
+        row = int(line.max()) + 2
+        cell = column * row + line
+        entries = np.lexsort((instant[vertex], cell))
+        cells, first = np.unique(cell[entries], return_index=True)
+        arguments = (
+            cells, np.append(first, len(entries)).astype(np.int64), row, entries, cell, self._first,
+            who, x, y, self._length, vertex, traffic.x, traffic.y, instant,
+            _roles(traffic, self.clock), WINDOW / traffic.facts.time_step, NEAR,
+            float(np.cos(ONE_WAY)),
+        )  # fmt: skip
+        room = 1 << 12
+        while True:
+            pairs, places = np.empty((room, 2), np.int64), np.empty((room, 5))
+            count = mark_joins(*arguments, pairs, places)
+            if count <= room:
+                break
+            room = count
+        return Joins(*pairs[:count].T, *places[:count].T)
 
     def length(self, who: int, instant: float) -> float:
         """Return how long a path is up to an instant at which its participant is recorded [m]."""

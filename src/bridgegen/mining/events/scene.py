@@ -9,7 +9,7 @@ import numpy as np
 
 from bridgegen.arrays import Bool, Float, Int
 from bridgegen.mining.conflicts.find import EGOS
-from bridgegen.mining.events.paths import Crossings, Paths
+from bridgegen.mining.events.paths import Crossings, Joins, Paths
 from bridgegen.mining.excerpt import clock_of
 from bridgegen.mining.lanes.find import Located
 from bridgegen.mining.lanes.model import NONE
@@ -95,6 +95,11 @@ class Scene:
     def crossings(self) -> Crossings:
         """Where these cross."""
         return self.paths.crossings()
+
+    @cached_property
+    def joins(self) -> Joins:
+        """Where these join."""
+        return self.paths.joins()
 
     @cached_property
     def cosine(self) -> Float:

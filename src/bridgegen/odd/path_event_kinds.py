@@ -1,0 +1,132 @@
+"""The kinds of events of paths that cross or join, with lanes or without.
+
+Distances are along the paths, between the centres of the bodies and the point at which the paths
+cross or join.
+"""
+
+from bridgegen.odd.event_kind import EGO_SPEED, event_kind
+
+_MEETING = (
+    EGO_SPEED,
+    ("other_speed", "m/s", "speed of the other at the beginning"),
+    ("ego_distance", "m", "from the ego to the crossing point at the beginning"),
+    ("other_distance", "m", "from the other to the crossing point at the beginning"),
+    ("ego_crossing_speed", "m/s", "speed of the ego at the crossing point"),
+    ("other_crossing_speed", "m/s", "speed of the other at the crossing point"),
+    ("time_gap", "s", "between the instants at which their centres pass the crossing point"),
+    (
+        "pet",
+        "s",
+        "post-encroachment time: least time between instants at which both bodies cover a point",
+    ),
+    ("angle", "deg", "between their courses at the crossing point, 0 to 180"),
+    ("approach_angle", "deg", "between their courses 30 m of path before, 0 to 180"),
+    ("side", "1", "1 if the other comes from the right, -1 from the left"),
+    ("seen_time", "s", "from the beginning until the first of both passes the crossing point"),
+    ("set_off_distance", "m", "from the other to the crossing point when it sets off last"),
+    ("set_off_ego_distance", "m", "from the ego to the crossing point then, negative beyond it"),
+    ("set_off_apart", "m", "between the reference points of both then"),
+)
+_EGO_FIRST = ("ego_first", "1", "1 if the ego passes the crossing point first, else 0")
+_MEETING_RULE = (
+    "The centres of both pass the point at which their paths cross within 6 s. It begins 6 s "
+    "before the first of both passes, or when both are recorded, if that is later; it ends when "
+    "the second passes."
+)
+_MEETING_SOURCE = (
+    "NHTSA, Pre-Crash Scenario Typology (DOT HS 810 767), {}; Allen, Shin, Cooper, Transportation "
+    "Research Record 667 (1978) 67-74 (post-encroachment time); the thresholds are ours"
+)
+
+_MERGING = (
+    EGO_SPEED,
+    ("other_speed", "m/s", "speed of the other at the beginning"),
+    ("ego_distance", "m", "from the ego to the joining point at the beginning"),
+    ("other_distance", "m", "from the other to the joining point at the beginning"),
+    ("ego_joining_speed", "m/s", "speed of the ego at the joining point"),
+    ("other_joining_speed", "m/s", "speed of the other at the joining point"),
+    ("ego_merges", "1", "1 if the ego comes into the other's lane, 0 if the other into the ego's"),
+    ("ego_first", "1", "1 if the ego passes the joining point first, else 0"),
+    ("time_gap", "s", "between the instants at which their centres pass the joining point"),
+    (
+        "pet",
+        "s",
+        "post-encroachment time, until 1 s after the second has passed the joining point",
+    ),
+    ("gap", "m", "between both when the one that merges passes the joining point"),
+    ("lead_gap", "m", "from the one that merges to whoever is ahead of it in the lane then"),
+    ("follower_gap", "m", "from whoever is behind it then to the one that merges"),
+    ("angle", "deg", "between their courses 10 m of path before, or of their lanes, 0 to 180"),
+    ("side", "1", "1 if the other comes from the right, -1 from the left"),
+    ("seen_time", "s", "from the beginning until the first of both passes the joining point"),
+    ("set_off_distance", "m", "from the other to the joining point when it sets off last"),
+    ("set_off_ego_distance", "m", "from the ego to the joining point then, negative beyond it"),
+    ("set_off_apart", "m", "between the reference points of both then"),
+    ("lane_left", "m", "from the joining point to the end of the lane that ends"),
+    ("change_time", "s", "duration of the sinusoidal lane change that fits best"),
+)
+
+PATH_KINDS = (
+    event_kind(
+        "crossing",
+        ("other",),
+        "The path of another motor vehicle crosses the ego's at 30° to 150°. The ego goes "
+        "straight on: it turns by 30° at most from 30 m before to 15 m after. They do not come "
+        f"from opposite directions. {_MEETING_RULE}",
+        _MEETING_SOURCE.format("straight crossing paths, left turn across path from a side"),
+        (
+            *_MEETING, _EGO_FIRST,
+            ("other_turn", "deg", "by how much the other turns, to the left positive"),
+        ),
+        needs_lanes=False,
+    ),
+    event_kind(
+        "oncoming-left-turn",
+        ("other",),
+        "The ego and another motor vehicle come from opposite directions: their courses 30 m "
+        "before are 145° apart or more. One of them turns by more than 20° across the path of "
+        "the other, which goes straight on. Where traffic drives on the left that is a right "
+        f"turn. {_MEETING_RULE}",
+        _MEETING_SOURCE.format("left turn across path from opposite directions"),
+        (
+            *_MEETING, _EGO_FIRST,
+            ("ego_turns", "1", "1 if the ego turns, 0 if the other does"),
+            ("turn", "deg", "by how much the one turns that does"),
+        ),
+        needs_lanes=False,
+    ),
+    event_kind(
+        "vru-crossing",
+        ("other", "occluder"),
+        "A pedestrian crosses the ego's path at 45° to 135°, or a bicycle at 20° to 160°, "
+        f"before the ego comes. {_MEETING_RULE} It is hidden if a vehicle that stands is on "
+        "the line from the ego's front to its centre within the last 2 s before it crosses.",
+        _MEETING_SOURCE.format("pedestrian crossing the roadway, pedalcyclist"),
+        (
+            *_MEETING,
+            ("ego_turn", "deg", "by how much the ego turns, to the left positive"),
+            ("is_bicycle", "1", "1 for a bicycle, 0 for a pedestrian"),
+            ("hidden", "1", "1 if it is hidden, else 0"),
+            ("occluder_gap", "m", "along the ego's course, from the crossing point to the "
+             "nearest end of what hides it"),
+        ),
+        needs_lanes=False,
+    ),
+    event_kind(
+        "merging",
+        ("other",),
+        "The ego and another motor vehicle come to one lane, and the centres of both pass the "
+        "joining point within 6 s; of those in the lane the other is the next one ahead of who "
+        "merges, or the next one behind. Either their paths join: they are 20° to 120° apart 10 m "
+        "before the joining point, do not cross, and lead the same way from there for 10 m or "
+        "more, less than 2 m apart; who merges is the one that has not come along the bend of the "
+        "shared part, continued backwards. Or one leaves a lane that ends within 400 m, at the "
+        "line that it crosses; or two lanes lead into one. It begins 6 s before the first of "
+        "both passes, or when both are recorded, if that is later; it ends when the second passes.",
+        "NHTSA, Pre-Crash Scenario Typology (DOT HS 810 767), vehicles changing lanes, turning at "
+        "junctions; FHWA, NCHRP Report 672 (2010), entering and circulating vehicles; the "
+        "thresholds are ours",
+        _MERGING,
+        needs_lanes=False,
+    ),
+)  # fmt: skip
