@@ -56,7 +56,7 @@ _MERGING = (
     ("gap", "m", "between both when the one that merges passes the joining point"),
     ("lead_gap", "m", "from the one that merges to whoever is ahead of it in the lane then"),
     ("follower_gap", "m", "from whoever is behind it then to the one that merges"),
-    ("angle", "deg", "between their courses 10 m of path before, or of their lanes, 0 to 180"),
+    ("angle", "deg", "between their courses 5 m of path before, or of their lanes, 0 to 180"),
     ("side", "1", "1 if the other comes from the right, -1 from the left"),
     ("seen_time", "s", "from the beginning until the first of both passes the joining point"),
     ("set_off_distance", "m", "from the other to the joining point when it sets off last"),
@@ -64,6 +64,12 @@ _MERGING = (
     ("set_off_apart", "m", "between the reference points of both then"),
     ("lane_left", "m", "from the joining point to the end of the lane that ends"),
     ("change_time", "s", "duration of the sinusoidal lane change that fits best"),
+    ("change_distance", "m", "from where that begins to the joining point"),
+    ("slow_speed", "m/s", "of the one that merges, before it speeds up"),
+    ("fast_speed", "m/s", "of it, once it has"),
+    ("speeding_rate", "m/s²", "slope of the ramp of its speed that fits best"),
+    ("speeding_distance", "m", "from it to the joining point when it begins to speed up"),
+    ("speeding_main_distance", "m", "from the other to the joining point then"),
 )
 
 PATH_KINDS = (
@@ -117,7 +123,7 @@ PATH_KINDS = (
         ("other",),
         "The ego and another motor vehicle come to one lane, and the centres of both pass the "
         "joining point within 6 s; of those in the lane the other is the next one ahead of who "
-        "merges, or the next one behind. Either their paths join: they are 20° to 120° apart 10 m "
+        "merges, or the next one behind. Either their paths join: they are 20° to 150° apart 5 m "
         "before the joining point, do not cross, and lead the same way from there for 10 m or "
         "more, less than 2 m apart; who merges is the one that has not come along the bend of the "
         "shared part, continued backwards. Or one leaves a lane that ends within 400 m, at the "

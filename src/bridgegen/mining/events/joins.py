@@ -9,13 +9,13 @@ from bridgegen.mining.events.paths import WINDOW, Paths
 from bridgegen.mining.events.scene import Scene
 from bridgegen.recordings.table import wrap
 
-LOOK_BACK = 10.0
+LOOK_BACK = 5.0
 """Before they join, where courses are compared [m]."""
 LEAST_SHARED = 10.0
 """Length of the way that both go then [m]."""
 MOST_SHARED = 15.0
 """Of it, from which its bend is taken [m]."""
-ANGLES = (20.0, 120.0)
+ANGLES = (20.0, 150.0)
 """Between the courses before, of paths that join [deg]."""
 CROSSES = 30.0
 """Paths that cross at this angle or more do not join [deg]."""
@@ -33,7 +33,8 @@ class Join:
         angle: between their courses before [deg], 0 to 180.
         side: from which side of the main one the other comes: 1 right, -1 left.
         lane_left: from the joining point to the end of the lane that ends [m]; NaN if none does.
-        change_time: duration of the lane change [s]; NaN if there is none.
+        change_begin: instant at which the lane change begins; NaN if there is none.
+        change_time: its duration [s].
         is_change: whether the path is that of a lane change that is recorded as a whole.
         is_of_paths: whether their paths show it, not their lanes.
     """
@@ -45,6 +46,7 @@ class Join:
     angle: float
     side: float
     lane_left: float = np.nan
+    change_begin: float = np.nan
     change_time: float = np.nan
     is_change: bool = True
     is_of_paths: bool = False

@@ -54,7 +54,7 @@ def _from_ending_lanes(scene: Scene, changes: LaneChanges) -> Iterator[Join]:
         left = left_of(lane)
         if np.isnan(left):
             continue
-        left -= float(placed.station[state - 1] - lanes.station[lanes.points(lane)][0])
+        left -= float(placed.station[state] - lanes.station[lanes.points(lane)][0])
         merging, at = int(changes.who[i]), float(changes.crossing[i])
         if left > FARTHEST_END or not scene.is_ego[merging]:
             continue
@@ -66,7 +66,7 @@ def _from_ending_lanes(scene: Scene, changes: LaneChanges) -> Iterator[Join]:
             if np.isfinite(main_at):
                 yield Join(
                     main, merging, main_at, at, 0.0, float(changes.side[i]), left,
-                    float(changes.end[i] - changes.begin[i]) * step,
+                    float(changes.begin[i]), float(changes.end[i] - changes.begin[i]) * step,
                     bool(changes.is_change[i] and changes.is_whole[i]),
                 )  # fmt: skip
 

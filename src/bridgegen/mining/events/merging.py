@@ -15,10 +15,13 @@ from bridgegen.mining.events.meetings import (
     events_of_meetings,
     meeting,
 )
+from bridgegen.mining.events.pace import pace_changes
 from bridgegen.mining.events.scene import Scene
 
 AT_ONCE = 2.0
 """Joins of one merging vehicle within this time are at one place [s]."""
+LEAST_SPEEDING = 1.0
+"""Of a speed before joining that counts as speeding up [m/s]."""
 
 
 @dataclass(frozen=True)
@@ -32,7 +35,7 @@ class _Gaps:
 def find(scene: Scene, changes: LaneChanges) -> Events:
     """Return the mergings of a recording, from both views."""
     joins = list(_next_ones(scene, [*path_joins(scene), *lane_joins(scene, changes)]))
-    gaps = _gaps(scene, joins)
+    gaps, paces = _gaps(scene, joins), _paces(scene, joins)
     of, met = {}, []
     for join in joins:
         for ego_merges in (False, True):
@@ -40,7 +43,8 @@ def find(scene: Scene, changes: LaneChanges) -> Events:
             of[view] = join
             met.append(view)
     return events_of_meetings(
-        "merging", scene, met, lambda one: _more(scene, one, of[one], gaps[of[one]]),
+        "merging", scene, met,
+        lambda one: _more(scene, one, of[one], gaps[of[one]]) | paces[of[one]],
         refused={NO_CHANGE: [not of[one].is_change for one in met]},
     )  # fmt: skip
 
@@ -105,6 +109,31 @@ def _gaps(scene: Scene, joins: list[Join]) -> dict[Join, _Gaps]:
     return found
 
 
+def _paces(scene: Scene, joins: list[Join]) -> dict[Join, dict[str, float]]:
+    """Return of each join how the one that merges speeds up before, and where both are then."""
+    found = pace_changes(
+        scene, [one.merging for one in joins], [one.merging_at for one in joins], LEAST_SPEEDING
+    )  # fmt: skip
+    paces = {}
+    for i, one in enumerate(joins):
+        begin = float(found.begin[i]) if found.after[i] > found.before[i] else np.nan
+        paces[one] = {
+            "speeding_rate": float(found.rate[i]) if np.isfinite(begin) else np.nan,
+            "slow_speed": float(found.before[i]) if np.isfinite(begin) else np.nan,
+            "fast_speed": float(found.after[i]) if np.isfinite(begin) else np.nan,
+            "speeding_distance": _way(scene, one.merging, begin, one.merging_at),
+            "speeding_main_distance": _way(scene, one.main, begin, one.main_at),
+        }
+    return paces
+
+
+def _way(scene: Scene, who: int, begin: float, end: float) -> float:
+    """Return the length of a path between two instants [m]; NaN where it is not recorded."""
+    if not scene.clock.begin[who] <= begin <= scene.clock.end[who]:
+        return np.nan
+    return scene.paths.length(who, end) - scene.paths.length(who, begin)
+
+
 def _more(scene: Scene, one: Meeting, join: Join, gaps: _Gaps) -> dict[str, float]:
     return {
         "ego_merges": float(one.ego == join.merging),
@@ -112,4 +141,5 @@ def _more(scene: Scene, one: Meeting, join: Join, gaps: _Gaps) -> dict[str, floa
         "other_joining_speed": crossing_speed(scene, one.other, one.other_at),
         "gap": _gap(scene, join), "lead_gap": gaps.lead, "follower_gap": gaps.follower,
         "lane_left": join.lane_left, "change_time": join.change_time,
+        "change_distance": _way(scene, join.merging, join.change_begin, join.merging_at),
     }  # fmt: skip
