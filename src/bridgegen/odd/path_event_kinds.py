@@ -28,6 +28,13 @@ _MEETING = (
     ("set_off_apart", "m", "between the reference points of both then"),
 )
 _EGO_FIRST = ("ego_first", "1", "1 if the ego passes the crossing point first, else 0")
+_PACE = (
+    ("pace_before", "m/s", "speed of the other before the greatest change of its pace"),
+    ("pace_after", "m/s", "its speed after that"),
+    ("pace_distance", "m", "from the other to the crossing point when that begins"),
+    ("pace_ego_distance", "m", "from the ego to the crossing point then, negative beyond it"),
+    ("pace_apart", "m", "between the reference points of both then"),
+)
 _MEETING_RULE = (
     "The centres of both pass the point at which their paths cross within 6 s. It begins 6 s "
     "before the first of both passes, or when both are recorded, if that is later; it ends when "
@@ -83,6 +90,9 @@ PATH_KINDS = (
         (
             *_MEETING, _EGO_FIRST,
             ("other_turn", "deg", "by how much the other turns, to the left positive"),
+            ("ego_ran_red", "1", "1 if the ego ran a red light before, else 0"),
+            ("other_ran_red", "1", "1 if the other ran one, else 0"),
+            *_PACE,
         ),
         needs_lanes=False,
     ),
@@ -133,6 +143,29 @@ PATH_KINDS = (
         "junctions; FHWA, NCHRP Report 672 (2010), entering and circulating vehicles; the "
         "thresholds are ours",
         _MERGING,
+        needs_lanes=False,
+    ),
+    event_kind(
+        "red-light-violation",
+        (),
+        "The front of the ego passes the stop line of a lane whose light has been red for more "
+        "than 0.3 s: at most 1.75 m beside the lane's middle, within 45° of its direction; beyond "
+        "the line it follows that lane within 2 m. Of several lights at a line, that of the lane "
+        "counts which it follows best. It begins 6 s before, or when it is recorded, if that is "
+        "later.",
+        "NHTSA, Pre-Crash Scenario Typology (DOT HS 810 767), running red light; the thresholds "
+        "are ours",
+        (
+            EGO_SPEED,
+            ("ego_distance", "m", "driven until its front is over the stop line"),
+            ("line_speed", "m/s", "speed at the stop line"),
+            ("least_speed", "m/s", "its lowest speed before"),
+            ("red_time", "s", "how long the light has been red, or has been recorded as red"),
+            ("red_seen", "1", "1 if it is recorded to turn red, 0 if it is red from the beginning"),
+            ("red_speed", "m/s", "speed of the ego when the light turns red"),
+            ("red_distance", "m", "from its front to the stop line then"),
+            ("turn", "deg", "by how much it turns from 5 m before to 25 m after, left positive"),
+        ),
         needs_lanes=False,
     ),
 )  # fmt: skip

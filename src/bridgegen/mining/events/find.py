@@ -16,6 +16,7 @@ from bridgegen.mining.events import (
     lead_brakes,
     merging,
     oncoming_turn,
+    red_light,
     vru_crossing,
 )
 from bridgegen.mining.events.changes import LaneChanges, lane_changes
@@ -36,6 +37,7 @@ DETECTORS: dict[str, Callable[[Scene, LaneChanges], Events]] = {
     "oncoming-left-turn": oncoming_turn.find,
     "vru-crossing": vru_crossing.find,
     "merging": merging.find,
+    "red-light-violation": red_light.find,
 }
 """By kind; each returns what `bridgegen.odd.event_kinds.EVENT_KINDS` declares."""
 

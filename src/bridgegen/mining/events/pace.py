@@ -73,7 +73,8 @@ def pace_changes(
 
 def _states(scene: Scene, who: Sequence[int], until: Sequence[float]) -> Float:
     number = np.array(who, np.int64)
-    return np.array(until) - scene.clock.begin[number] + scene.traffic.first[number]
+    first = (scene.traffic.first[number] - scene.clock.begin[number]).astype(np.float64)
+    return np.array(until, np.float64) + first
 
 
 def _run(scene: Scene, who: int, until: float) -> tuple[int, int, int, int] | None:

@@ -84,20 +84,25 @@ class Paths:
     Args:
         traffic: the recording.
         clock: its own.
+
+    Attributes:
+        traffic: the recording.
+        clock: its own.
+        vertices: the states through which the paths lead, by participant and time.
     """
 
     def __init__(self, traffic: RecordedTraffic, clock: Clock) -> None:
         self.traffic, self.clock = traffic, clock
         marked = np.zeros(len(traffic.x), np.bool_)
         mark_vertices(traffic.first, traffic.x, traffic.y, VERTEX, marked)
-        self._vertex = np.flatnonzero(marked)
-        self._first = np.searchsorted(self._vertex, traffic.first)
-        steps = np.hypot(np.diff(traffic.x[self._vertex]), np.diff(traffic.y[self._vertex]))
+        self.vertices = np.flatnonzero(marked)
+        self._first = np.searchsorted(self.vertices, traffic.first)
+        steps = np.hypot(np.diff(traffic.x[self.vertices]), np.diff(traffic.y[self.vertices]))
         self._length = np.concatenate([[0.0], np.cumsum(steps)])
 
     def crossings(self) -> Crossings:
         """Return where paths cross that are passed within `WINDOW`; one at least by a vehicle."""
-        traffic, vertex = self.traffic, self._vertex
+        traffic, vertex = self.traffic, self.vertices
         who = traffic.participant[vertex]
         piece = np.flatnonzero(who[1:] == who[:-1])
         a, b, who = vertex[piece], vertex[piece + 1], who[piece]
@@ -130,7 +135,7 @@ class Paths:
 
     def joins(self) -> Joins:
         """Return where paths of motor vehicles join that are passed within `WINDOW`."""
-        traffic, vertex = self.traffic, self._vertex
+        traffic, vertex = self.traffic, self.vertices
         who, instant = traffic.participant[vertex], self.clock.instant
         x, y = traffic.x[vertex], traffic.y[vertex]
         column, line = (np.floor(values / NEAR).astype(np.int64) for values in (x, y))
@@ -158,8 +163,8 @@ class Paths:
         """Return how long a path is up to an instant at which its participant is recorded [m]."""
         x, y, state = self._position(who, instant)
         first, last = int(self._first[who]), int(self._first[who + 1])
-        v = first + int(np.searchsorted(self._vertex[first:last], state, side="right")) - 1
-        at = self._vertex[v]
+        v = first + int(np.searchsorted(self.vertices[first:last], state, side="right")) - 1
+        at = self.vertices[v]
         rest = float(np.hypot(x - self.traffic.x[at], y - self.traffic.y[at]))
         return float(self._length[v] - self._length[first]) + rest
 
@@ -167,7 +172,7 @@ class Paths:
         """Return the point of a path at a length, or the nearer end (x, y) [m]."""
         part = slice(int(self._first[who]), int(self._first[who + 1]))
         lengths = self._length[part] - self._length[part.start]
-        at = self._vertex[part]
+        at = self.vertices[part]
         return (
             float(np.interp(length, lengths, self.traffic.x[at])),
             float(np.interp(length, lengths, self.traffic.y[at])),
