@@ -114,7 +114,8 @@ def test_traffic_lights_of_scenarionet_change_when_they_are_recorded_to(tmp_path
     lit = {"type": "TRAFFIC_LIGHT", "state": {"object_state": words}, "lane": 184}
     far = lit | {"lane": 7, "stop_point": np.zeros(3, np.float32)}
     whole["dynamic_map_states"] = {
-        184: lit | {"stop_point": np.array([3.0, 4.5, 0.0], np.float32)}, 7: far
+        184: lit | {"stop_point": np.array([3.0, 4.5, 0.0], np.float32)},
+        7: far,
     }
     line = np.column_stack([np.arange(6.0), np.full(6, 4.0), np.zeros(6)]).astype(np.float32)
     whole["map_features"] = {

@@ -6,6 +6,7 @@ from bridgegen.ego.kinds import CAR
 from bridgegen.mining.events.find import find_events
 from bridgegen.mining.lanes.find import locate
 from bridgegen.recordings.clean import clean
+from bridgegen.recordings.lights import RecordedLight
 from bridgegen.recordings.table import Facts, build
 
 T = np.arange(0.0, 14.0, 0.1)
@@ -39,7 +40,7 @@ def course_of(x, y):
     return np.interp(np.arange(len(x)), np.flatnonzero(moves), course)
 
 
-def traffic_of(tracks, kinds=None, turn=0.0, shift=(0.0, 0.0), later=0.0):
+def traffic_of(tracks, kinds=None, lights=(), turn=0.0, shift=(0.0, 0.0), later=0.0):
     kinds = [CAR] * len(tracks) if kinds is None else kinds
     t, x, y = (np.concatenate(values) for values in zip(*tracks, strict=True))
     c, s = np.cos(turn), np.sin(turn)
@@ -49,13 +50,20 @@ def traffic_of(tracks, kinds=None, turn=0.0, shift=(0.0, 0.0), later=0.0):
     }  # fmt: skip
     boxes = np.array([CAR_BOX if kind == CAR else PERSON_BOX for kind in kinds])
     ids = np.repeat(np.arange(len(tracks)), [len(track[0]) for track in tracks])
-    facts = Facts("planted", "none", "planted", 0.1, "a plane")
+    known = {
+        str(k): RecordedLight(
+            tuple((time + later, state) for time, state in changes), str(k),
+            np.array(path) @ np.array([[c, s], [-s, c]]) + shift,
+        )
+        for k, (changes, path) in enumerate(lights)
+    }  # fmt: skip
+    facts = Facts("planted", "none", "planted", 0.1, "a plane", lights=known)
     return build(facts, ids, columns, lambda i: f"state {i}", kind=np.array(kinds),
                  length=boxes[:, 0], width=boxes[:, 1])  # fmt: skip
 
 
-def found(tracks, kinds=None, **moved):
-    cleaned = clean(traffic_of(tracks, kinds, **moved), 0.05).traffic
+def found(tracks, kinds=None, lights=(), **moved):
+    cleaned = clean(traffic_of(tracks, kinds, lights, **moved), 0.05).traffic
     events = find_events(cleaned, locate(cleaned))
     return events, {one.kind.name: one for one in events.kinds}
 

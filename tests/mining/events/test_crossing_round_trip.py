@@ -75,6 +75,17 @@ def turning(P, rollout, passes, name):
     return every, every, P | pace
 
 
+def runs_red(P, rollout, passes, name):
+    """Its light is red all the time. It changes pace by enough, and after it has begun."""
+    e = rollout.names.index(name)
+    assert (rollout.lights[:, rollout.light_names.index("403")] == 1).all()
+    changes = rollout.v[:, e] != rollout.v[:, e, :1]
+    go = changes.argmax(axis=1) * rollout.time_step
+    much = changes.any(axis=1) & (np.abs(P["crossing_speed"] - P["runner_speed"]) > 0.7)
+    surely = much & (go > 0.5) & (go < passes[1] - 1.0)
+    return surely, np.ones(len(go), bool), P
+
+
 CASES = {
     "crossroads-s1": (260, "bv", encounter(53.35)),
     "crossroads-s3": (220, "bv", encounter(48.23)),
@@ -83,8 +94,9 @@ CASES = {
     "pedestrian-at-night": (220, "walker", encounter(56.18, trigger="trigger",
                                                      speed="walker_speed")),
     "cyclist-right-turn": (260, "cyclist", turning),
+    "red-light-runner": (160, "runner", runs_red),
 }  # fmt: skip
-NOISY = ("crossroads-s1", "pedestrian-behind-parked")
+NOISY = ("crossroads-s1", "pedestrian-behind-parked", "red-light-runner")
 
 
 def round_trip(name, noise, dropped, most):

@@ -75,14 +75,16 @@ def _passings_of(paths: Paths, who: int, light: RecordedLight) -> Iterator[Passi
     stop, onward = light.path[0], light.path[1] - light.path[0]
     course = onward / np.hypot(*onward)
     heads = np.column_stack([np.cos(heading), np.sin(heading)])
-    front = np.column_stack([traffic.x[states], traffic.y[states]])
-    away = front + 0.5 * traffic.length[who] * heads - stop
-    along, aside = away @ course, away @ np.array([-course[1], course[0]])
+    centre = np.column_stack([traffic.x[states], traffic.y[states]])
+    front = centre + 0.5 * traffic.length[who] * heads - stop
+    along, aside = front @ course, front @ np.array([-course[1], course[0]])
+    beyond = (centre - stop) @ course >= 0.0
     passes = (along[:-1] < 0.0) & (along[1:] >= 0.0) & (np.abs(aside[1:]) <= BESIDE)
     passes &= heads[1:] @ course >= np.cos(ASKEW)
     for k in np.flatnonzero(passes).tolist():
         share = float(along[k] / (along[k] - along[k + 1]))
-        off, followed = _off_lane(front[k + 1 :], light.path)
+        over = k + 1 + int(beyond[k + 1 :].argmax())
+        off, followed = _off_lane(centre[over:], light.path)
         if off <= OFF_LANE:
             yield Passing(who, float(paths.clock.begin[who]) + k + share, light, off, followed)
 
@@ -90,7 +92,7 @@ def _passings_of(paths: Paths, who: int, light: RecordedLight) -> Iterator[Passi
 def _off_lane(track: Float, path: Float) -> tuple[float, float]:
     """Return how far a track is from a lane's middle at its farthest, and how long it is [m].
 
-    Only points of the track beside the part of the lane that is `FOLLOWED` are looked at.
+    Only its part beside what of the lane is known, and `FOLLOWED`, is looked at.
     """
     way = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(track, axis=0).T))])
     last = int(np.searchsorted(way, FOLLOWED, side="right"))
