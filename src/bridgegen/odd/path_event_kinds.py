@@ -168,4 +168,46 @@ PATH_KINDS = (
         ),
         needs_lanes=False,
     ),
+    event_kind(
+        "right-turn-with-bicycle",
+        ("other",),
+        "The ego turns right by more than 45°, and crosses at 15° to 160° the path of a bicycle on "
+        "its right that goes straight on. Their courses 30 m before are at most 45° apart. "
+        f"{_MEETING_RULE}",
+        "Euro NCAP, AEB/LSS VRU, CBTA; UN Regulation No. 151; the thresholds are ours",
+        (
+            *_MEETING, _EGO_FIRST,
+            ("ego_turn", "deg", "by how much the ego turns, to the left positive"),
+            ("ahead", "m", "from the ego's centre to that of the bicycle along the ego's course "
+             "at the beginning, negative behind it"),
+            ("aside", "m", "likewise across it, to the right positive"),
+            *_PACE,
+        ),
+        needs_lanes=False,
+    ),
+    event_kind(
+        "bicycle-swings-out",
+        ("other", "obstacle"),
+        "A bicycle ahead of the ego, in its direction within 30°, moves sideways by 0.5 m or more: "
+        "before, its body is clear of the ego's path, after that it is in it. The move is the half "
+        "wave of a cosine that fits best. The ego would be there within 6 s. Its path is averaged "
+        "over 25 m before and after, so that its own evasion counts little. An obstacle is the "
+        "nearest vehicle that stands ahead of the bicycle, at most 50 m, where it would have "
+        "passed within 0.5 m.",
+        "Euro NCAP, AEB/LSS VRU, CBLA; the thresholds are ours",
+        (
+            EGO_SPEED,
+            ("other_speed", "m/s", "speed of the bicycle at the beginning"),
+            ("relative_speed", "m/s", "ego_speed less other_speed"),
+            ("gap", "m", "from the ego to the bicycle at the beginning"),
+            ("offset_before", "m", "of the bicycle from the ego's path, left positive"),
+            ("offset_after", "m", "likewise after the move"),
+            ("change_time", "s", "how long the move takes"),
+            ("lateral_speed", "m/s", "width of the move by its duration"),
+            ("side", "1", "1 if the bicycle comes from the right, -1 from the left"),
+            ("obstacle_gap", "m", "from the bicycle to the obstacle at the beginning"),
+            ("obstacle_apart", "m", "between the reference points of both then"),
+        ),
+        needs_lanes=False,
+    ),
 )  # fmt: skip

@@ -17,6 +17,8 @@ from bridgegen.mining.events import (
     merging,
     oncoming_turn,
     red_light,
+    right_turn,
+    swing_out,
     vru_crossing,
 )
 from bridgegen.mining.events.changes import LaneChanges, lane_changes
@@ -38,6 +40,8 @@ DETECTORS: dict[str, Callable[[Scene, LaneChanges], Events]] = {
     "vru-crossing": vru_crossing.find,
     "merging": merging.find,
     "red-light-violation": red_light.find,
+    "right-turn-with-bicycle": right_turn.find,
+    "bicycle-swings-out": swing_out.find,
 }
 """By kind; each returns what `bridgegen.odd.event_kinds.EVENT_KINDS` declares."""
 
