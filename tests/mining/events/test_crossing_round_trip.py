@@ -9,26 +9,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from tests.mining.events.simulated import located, recorded, simulated
-from tests.mining.events.truth import EVERY, at_time, centres, encounter, some_rows
+from tests.mining.events.truth import at_time, crossing_of, encounter, some_rows
 
 from bridgegen.metrics.pet import pet
 from bridgegen.mining.events.find import find_events
-
-
-def crossing_of(rollout, row, other):
-    """Return when the ego and another pass where their paths cross; NaN if they never do."""
-    (ax, ay, at), (bx, by, bt) = (centres(rollout, row, e) for e in (0, other))
-    ux, uy, vx, vy = np.diff(ax)[:, None], np.diff(ay)[:, None], np.diff(bx), np.diff(by)
-    dx, dy = bx[:-1] - ax[:-1, None], by[:-1] - ay[:-1, None]
-    cross = ux * vy - uy * vx
-    with np.errstate(divide="ignore", invalid="ignore"):
-        f, g = (dx * vy - dy * vx) / cross, (dx * uy - dy * ux) / cross
-    hits = (f >= 0) & (f < 1) & (g >= 0) & (g < 1) & (np.abs(cross) > 1e-9)
-    if not hits.any():
-        return np.nan, np.nan
-    i, j = np.argwhere(hits)[0]
-    step = rollout.time_step * EVERY
-    return at[i] + f[i, j] * step, bt[j] + g[i, j] * step
 
 
 def sees_through(rollout, other, van, last, lately):
@@ -63,18 +47,6 @@ def hidden_car(P, rollout, passes, name):
     return every, every, P
 
 
-def turning(P, rollout, passes, name):
-    """Speeds are averaged over 0.5 s before and after."""
-    begin = np.maximum(passes.min(axis=0) - 6.0, 0.0)
-    e = rollout.names.index(name)
-    around = np.linspace(-0.5, 0.5, 41)
-    at_begin = np.mean([at_time(rollout, "v", e, begin + one) for one in around], axis=0)
-    pace = {"cyclist_speed": at_begin,
-            "later_speed": at_time(rollout, "v", e, passes[1])}  # fmt: skip
-    every = np.ones(len(passes[0]), bool)
-    return every, every, P | pace
-
-
 def runs_red(P, rollout, passes, name):
     """Its light is red all the time. It changes pace by enough, and after it has begun."""
     e = rollout.names.index(name)
@@ -93,7 +65,6 @@ CASES = {
     "pedestrian-behind-parked": (120, "walker", behind_parked),
     "pedestrian-at-night": (220, "walker", encounter(56.18, trigger="trigger",
                                                      speed="walker_speed")),
-    "cyclist-right-turn": (260, "cyclist", turning),
     "red-light-runner": (160, "runner", runs_red),
 }  # fmt: skip
 NOISY = ("crossroads-s1", "pedestrian-behind-parked", "red-light-runner")

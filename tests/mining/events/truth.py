@@ -16,6 +16,22 @@ def centres(rollout, row, e):
     return x + ahead * np.cos(h), y + ahead * np.sin(h), k * rollout.time_step
 
 
+def crossing_of(rollout, row, other):
+    """Return when the ego and another pass where their paths cross; NaN if they never do."""
+    (ax, ay, at), (bx, by, bt) = (centres(rollout, row, e) for e in (0, other))
+    ux, uy, vx, vy = np.diff(ax)[:, None], np.diff(ay)[:, None], np.diff(bx), np.diff(by)
+    dx, dy = bx[:-1] - ax[:-1, None], by[:-1] - ay[:-1, None]
+    cross = ux * vy - uy * vx
+    with np.errstate(divide="ignore", invalid="ignore"):
+        f, g = (dx * vy - dy * vx) / cross, (dx * uy - dy * ux) / cross
+    hits = (f >= 0) & (f < 1) & (g >= 0) & (g < 1) & (np.abs(cross) > 1e-9)
+    if not hits.any():
+        return np.nan, np.nan
+    i, j = np.argwhere(hits)[0]
+    step = rollout.time_step * EVERY
+    return at[i] + f[i, j] * step, bt[j] + g[i, j] * step
+
+
 def at_time(rollout, field, e, time):
     k = np.clip(np.nan_to_num(time) / rollout.time_step, 0, rollout.x.shape[2] - 1).astype(int)
     return getattr(rollout, field)[np.arange(len(k)), e, k]

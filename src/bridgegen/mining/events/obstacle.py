@@ -13,6 +13,8 @@ FARTHEST = 50.0
 """Ahead [m]."""
 CLEAR = 0.5
 """Who would have passed it by less than this has it in the way [m]."""
+BEFORE = 4.0
+"""The course that counts is that so far before [m], which a move that begins does not bend."""
 
 
 @dataclass(frozen=True)
@@ -39,7 +41,7 @@ def obstacle_ahead(scene: Scene, other: int, instant: float) -> Obstacle:
     who = np.flatnonzero(there)
     at = traffic.first[who] + k - clock.begin[who]
     here = int(traffic.first[other] + k - clock.begin[other])
-    course = scene.paths.course(other, scene.paths.length(other, instant))
+    course = scene.paths.course(other, max(scene.paths.length(other, instant) - BEFORE, 0.0))
     c, s = np.cos(course), np.sin(course)
     dx, dy = traffic.x[at] - traffic.x[here], traffic.y[at] - traffic.y[here]
     along, aside = dx * c + dy * s, np.abs(dy * c - dx * s)

@@ -13,8 +13,10 @@ LEAST_RATE = 0.3
 """Of a change of pace [m/s²]."""
 WORST_FIT = 0.15
 """RMS of what remains of the speed, as a share of the change."""
-LEAST_RMS = 0.3
+LEAST_RMS = 0.6
 """That is allowed whatever the change: noise of recorded speeds [m/s]."""
+KNOWN = 0.5
+"""For how long the speed before is recorded, at least [s]."""
 AFTER = 4.0
 """How far after an instant a change that has begun before it is looked at [s]."""
 
@@ -62,7 +64,8 @@ def pace_changes(
     fit = fit_steps(scene.forward, first, last, guess, scene.step, "ramp")
     seconds = fit.duration * scene.step
     rate = np.abs(fit.height) / seconds
-    is_one = (np.abs(fit.height) >= least) & (rate >= LEAST_RATE) & (fit.begin > first)
+    is_one = (np.abs(fit.height) >= least) & (rate >= LEAST_RATE)
+    is_one &= fit.begin >= first + KNOWN / scene.step
     is_one &= fit.rms <= np.maximum(WORST_FIT * np.abs(fit.height), LEAST_RMS)
     is_one &= fit.begin <= _states(scene, who, until)[rows]
     columns = (fit.begin + scene.clock.instant[first] - first, fit.level, fit.level + fit.height,

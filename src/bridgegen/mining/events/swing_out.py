@@ -26,6 +26,8 @@ AVERAGED = 25.0
 """Before and after a point of the ego's path, over which its place is averaged [m]."""
 BEYOND = 60.0
 """By which an ego's path is continued straight on, should it end [m]."""
+BEFORE = 1.0
+"""Where the ego was so long ago, it did not evade yet [s]."""
 LEAST_MOVE = 0.5
 """To the side [m]."""
 SHORTEST = 0.5
@@ -45,7 +47,8 @@ class _Pair:
         other: participant.
         begin: first instant.
         apart: ``(n,)`` of the bicycle's centre from the ego's along its path [m], by instant.
-        offset: ``(n,)`` of its reference point from the path [m], left positive.
+        offset: ``(n,)`` of its reference point from the averaged path [m], left positive.
+        own: ``(n,)`` of the ego from it, `BEFORE` it is there [m].
     """
 
     ego: int
@@ -53,6 +56,7 @@ class _Pair:
     begin: int
     apart: Float
     offset: Float
+    own: Float
 
 
 def find(scene: Scene, changes: LaneChanges) -> Events:
@@ -107,7 +111,7 @@ def _together(scene: Scene, ego: int, other: int) -> Iterator[_Pair]:
     rear = np.column_stack([
         traffic.x[its] - ahead * scene.cosine[its], traffic.y[its] - ahead * scene.sine[its]
     ])  # fmt: skip
-    ego_way, _, _ = _beside(line, np.column_stack([traffic.x[own], traffic.y[own]]))
+    ego_way, ego_offset, _ = _beside(line, np.column_stack([traffic.x[own], traffic.y[own]]))
     way, offset, course = _beside(line, rear)
     turned = np.abs(np.remainder(traffic.heading[its] - course + np.pi, 2.0 * np.pi) - np.pi)
     apart = way + ahead - ego_way
@@ -115,7 +119,8 @@ def _together(scene: Scene, ego: int, other: int) -> Iterator[_Pair]:
     edges = np.flatnonzero(np.diff(np.concatenate([[0], holds.astype(np.int8), [0]])))
     for a, b in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
         if (b - a) * scene.step >= 2.0 * SHORTEST:
-            yield _Pair(ego, other, begin + a, apart[a:b], offset[a:b])
+            before = np.maximum(np.arange(a, b) - round(BEFORE / scene.step), 0)
+            yield _Pair(ego, other, begin + a, apart[a:b], offset[a:b], ego_offset[before])
 
 
 def _smooth_line(scene: Scene, ego: int) -> Float | None:
@@ -164,15 +169,15 @@ def _guesses(scene: Scene, pairs: list[_Pair], first: Int) -> tuple[Int, tuple[F
     picked, begin, duration = [], [], []
     half = max(round(SHORTEST / scene.step), 1)
     for i, one in enumerate(pairs):
-        near = _half_widths(scene, one)
-        clear = np.abs(one.offset) > near
+        offset = one.offset - one.own
+        clear = np.abs(offset) > _half_widths(scene, one)
         low, high = np.arange(len(clear)) - half, np.arange(len(clear)) + half
         inside = ~clear
         enters = np.flatnonzero(clear[:-1] & inside[1:])
         if not len(enters):
             continue
         slope = one.offset[np.minimum(high, len(clear) - 1)] - one.offset[np.maximum(low, 0)]
-        towards = -slope * np.sign(one.offset)
+        towards = -slope * np.sign(offset)
         at = int(enters[int(towards[enters].argmax())])
         rate = max(float(towards[at]) / (2.0 * half), 1e-3)
         took = float(np.clip(0.5 * np.pi * 2.0 * LEAST_MOVE / rate, 2.0 * half,
@@ -190,43 +195,44 @@ def _half_widths(scene: Scene, one: _Pair) -> float:
 
 def _events(scene: Scene, pairs: list[_Pair], low: Int, high: Int, fit: Float) -> Events:
     begin, duration, level, height, rms = fit
-    near = np.array([_half_widths(scene, one) for one in pairs])
-    after = level + height
-    moves = (np.abs(level) > near) & (np.abs(after) < near) & (np.abs(height) >= LEAST_MOVE)
     at = np.clip(begin, low, high)
+    centres, own = (
+        np.array([
+            np.interp(place - origin, np.arange(len(one.apart)), getattr(one, column))
+            for place, origin, one in zip(at.tolist(), low.tolist(), pairs, strict=True)
+        ])
+        for column in ("apart", "own")
+    )  # fmt: skip
+    before, after = level - own, level + height - own
+    near = np.array([_half_widths(scene, one) for one in pairs])
+    moves = (np.abs(before) > near) & (np.abs(after) < near) & (np.abs(height) >= LEAST_MOVE)
     ego, other = (
         np.array([getattr(one, key) for one in pairs], np.int64) for key in ("ego", "other")
     )
     instant = np.array([one.begin for one in pairs], np.float64) - low
     length = scene.traffic.length
-    centres = np.array([
-        np.interp(place - origin, np.arange(len(one.apart)), one.apart)
-        for place, origin, one in zip(at.tolist(), low.tolist(), pairs, strict=True)
-    ])  # fmt: skip
     gap = centres - 0.5 * (length[ego] + length[other])
     start = at + instant
     speed, its = (scene.at(scene.speed, who, start) for who in (ego, other))
     soon = (gap > 0.0) & (gap <= WINDOW * np.maximum(speed, LEAST_SPEED))
     seconds = duration * scene.step
     kept = np.flatnonzero(moves & soon)
-    before = [
-        obstacle_ahead(scene, int(other[i]), float(start[i])) for i in kept.tolist()
-    ]  # fmt: skip
+    standing = [obstacle_ahead(scene, int(other[i]), float(start[i])) for i in kept.tolist()]
     cut = SHORTEST / scene.step
     whole = (begin >= low - cut) & (begin + duration <= high + cut)
     fits = (rms <= WORST_FIT * np.abs(height)) & (seconds >= SHORTEST) & (seconds <= LONGEST)
     return events_of(
         "bicycle-swings-out", ego[kept],
-        {"other": other[kept], "obstacle": np.array([one.who for one in before], np.int64)},
+        {"other": other[kept], "obstacle": np.array([one.who for one in standing], np.int64)},
         (scene.seconds(start[kept]), scene.seconds((start + duration)[kept])),
         {
             "ego_speed": speed[kept], "other_speed": its[kept],
             "relative_speed": (speed - its)[kept], "gap": gap[kept],
-            "offset_before": level[kept], "offset_after": after[kept],
+            "offset_before": before[kept], "offset_after": after[kept],
             "change_time": seconds[kept], "lateral_speed": np.abs(height / seconds)[kept],
-            "side": -np.sign(level[kept]),
-            "obstacle_gap": np.array([one.gap for one in before], np.float64),
-            "obstacle_apart": np.array([one.apart for one in before], np.float64),
+            "side": -np.sign(before[kept]),
+            "obstacle_gap": np.array([one.gap for one in standing], np.float64),
+            "obstacle_apart": np.array([one.apart for one in standing], np.float64),
         },
         {NO_CHANGE: ~fits[kept], NOT_WHOLE: ~whole[kept]},
     )  # fmt: skip
