@@ -190,10 +190,10 @@ PATH_KINDS = (
         ("other", "obstacle"),
         "A bicycle ahead of the ego, in its direction within 30°, moves sideways by 0.5 m or more: "
         "before, its body is clear of the ego's path, after that it is in it. The move is the half "
-        "wave of a cosine that fits best. The ego would be there within 6 s. Its path is averaged "
-        "over 25 m before and after, so that its own evasion counts little. An obstacle is the "
-        "nearest vehicle that stands ahead of the bicycle, at most 50 m, where it would have "
-        "passed within 0.5 m.",
+        "wave of a cosine that fits best. The ego would be there within 6 s, and its path bends "
+        "by 30° at most until then. The path is smoothed over 40 m before and after, so that its "
+        "own evasion counts little. An obstacle is the nearest vehicle that stands ahead of the "
+        "bicycle, at most 50 m, where it would have passed within 0.5 m.",
         "Euro NCAP, AEB/LSS VRU, CBLA; the thresholds are ours",
         (
             EGO_SPEED,

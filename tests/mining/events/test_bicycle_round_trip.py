@@ -89,7 +89,7 @@ def test_parameters_come_back(name):
 
 @pytest.mark.parametrize("name", CASES)
 def test_parameters_come_back_of_noisy_traffic_with_gaps(name):
-    precision, recall, _, errors = round_trip(name, 0.2, 0.05, 24)
+    precision, recall, _, errors = round_trip(name, 0.2, 0.05, 16)
     assert min(precision, recall) >= 0.95
     for key, error in errors.items():
         known = error[np.isfinite(error)]

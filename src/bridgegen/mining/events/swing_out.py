@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.signal import savgol_filter
 from scipy.spatial import KDTree
 
 from bridgegen.arrays import Float, Int
@@ -15,6 +16,7 @@ from bridgegen.mining.events.paths import WINDOW
 from bridgegen.mining.events.scene import Scene
 from bridgegen.mining.events.steps import fit_steps
 from bridgegen.recordings.bodies import centre_ahead
+from bridgegen.recordings.table import wrap
 
 FARTHEST = 90.0
 """Ahead of the ego [m]."""
@@ -22,8 +24,14 @@ EVERY = 0.5
 """Between the instants at which it is looked who is near whom [s]."""
 ALONG = 30.0
 """Between the courses of both, at most [deg]."""
-AVERAGED = 25.0
-"""Before and after a point of the ego's path, over which its place is averaged [m]."""
+SMOOTHED = 40.0
+"""Before and after a point of the ego's path, to which a parabola is fitted there [m]."""
+SHORTEST_PATH = 20.0
+"""Of an ego [m]."""
+STRAIGHT = 30.0
+"""By which the ego's path bends at most until `BEYOND_IT` the bicycle [deg]."""
+BEYOND_IT = 10.0
+"""[m]."""
 BEYOND = 60.0
 """By which an ego's path is continued straight on, should it end [m]."""
 BEFORE = 1.0
@@ -47,7 +55,7 @@ class _Pair:
         other: participant.
         begin: first instant.
         apart: ``(n,)`` of the bicycle's centre from the ego's along its path [m], by instant.
-        offset: ``(n,)`` of its reference point from the averaged path [m], left positive.
+        offset: ``(n,)`` of its reference point from the smoothed path [m], left positive.
         own: ``(n,)`` of the ego from it, `BEFORE` it is there [m].
     """
 
@@ -61,7 +69,9 @@ class _Pair:
 
 def find(scene: Scene, changes: LaneChanges) -> Events:
     """Return the bicycles of a recording that swing out before an ego."""
-    pairs = [pair for ego, other in _near(scene) for pair in _together(scene, ego, other)]
+    near = _near(scene)
+    lines = {ego: _smooth_line(scene, ego) for ego in sorted({ego for ego, _ in near})}
+    pairs = [pair for ego, other in near for pair in _together(scene, ego, other, lines[ego])]
     lengths = np.array([len(one.offset) for one in pairs], np.int64)
     first = np.concatenate([[0], np.cumsum(lengths)]).astype(np.int64)
     offsets = np.concatenate([np.empty(0), *(one.offset for one in pairs)])
@@ -93,15 +103,12 @@ def _near(scene: Scene) -> list[tuple[int, int]]:
     return sorted(pairs)
 
 
-def _together(scene: Scene, ego: int, other: int) -> Iterator[_Pair]:
+def _together(scene: Scene, ego: int, other: int, line: Float | None) -> Iterator[_Pair]:
     """Yield the pair, where both are recorded, near each other and in the same direction."""
     clock, traffic = scene.clock, scene.traffic
     begin = int(max(clock.begin[ego], clock.begin[other]))
     end = int(min(clock.end[ego], clock.end[other]))
-    if (end - begin) * scene.step < 2.0 * SHORTEST:
-        return
-    line = _smooth_line(scene, ego)
-    if line is None:
+    if line is None or (end - begin) * scene.step < 2.0 * SHORTEST:
         return
     own, its = (
         slice(*(int(k - clock.begin[p] + traffic.first[p]) for k in (begin, end + 1)))
@@ -113,7 +120,7 @@ def _together(scene: Scene, ego: int, other: int) -> Iterator[_Pair]:
     ])  # fmt: skip
     ego_way, ego_offset, _ = _beside(line, np.column_stack([traffic.x[own], traffic.y[own]]))
     way, offset, course = _beside(line, rear)
-    turned = np.abs(np.remainder(traffic.heading[its] - course + np.pi, 2.0 * np.pi) - np.pi)
+    turned = np.abs(wrap(traffic.heading[its] - course))
     apart = way + ahead - ego_way
     holds = (np.abs(apart) <= FARTHEST) & (turned <= np.radians(2.0 * ALONG))
     edges = np.flatnonzero(np.diff(np.concatenate([[0], holds.astype(np.int8), [0]])))
@@ -124,17 +131,15 @@ def _together(scene: Scene, ego: int, other: int) -> Iterator[_Pair]:
 
 
 def _smooth_line(scene: Scene, ego: int) -> Float | None:
-    """Return a path each metre, averaged and continued at both ends, ``(n, 2)`` [m]."""
+    """Return a path each metre, smoothed and continued at both ends, ``(n, 2)`` [m]."""
     whole = scene.paths.length(ego, float(scene.clock.end[ego]))
-    if whole < 2.0 * AVERAGED:
+    if whole < SHORTEST_PATH:
         return None
     wanted = np.arange(0.0, whole, 1.0)
     points = np.array([scene.paths.point(ego, float(one)) for one in wanted])
-    sums = np.concatenate([np.zeros((1, 2)), np.cumsum(points, axis=0)])
-    at = np.arange(len(points))
-    half = np.minimum(np.minimum(at, at[::-1]), round(AVERAGED))
-    line = (sums[at + half + 1] - sums[at - half]) / (2.0 * half + 1.0)[:, None]
-    reach = min(round(AVERAGED), len(line) - 1)
+    half = min(round(SMOOTHED), (len(points) - 1) // 2)
+    line: Float = savgol_filter(points, 2 * half + 1, 2, axis=0)
+    reach = min(round(0.5 * SMOOTHED), half)
     ahead, back = line[-1] - line[-1 - reach], line[0] - line[reach]
     return np.concatenate([
         [line[0] + back / np.hypot(*back) * BEYOND], line,
@@ -216,7 +221,10 @@ def _events(scene: Scene, pairs: list[_Pair], low: Int, high: Int, fit: Float) -
     speed, its = (scene.at(scene.speed, who, start) for who in (ego, other))
     soon = (gap > 0.0) & (gap <= WINDOW * np.maximum(speed, LEAST_SPEED))
     seconds = duration * scene.step
-    kept = np.flatnonzero(moves & soon)
+    kept = np.array([
+        i for i in np.flatnonzero(moves & soon).tolist()
+        if _bend(scene, int(ego[i]), float(start[i]), float(centres[i])) <= STRAIGHT
+    ], np.int64)  # fmt: skip
     standing = [obstacle_ahead(scene, int(other[i]), float(start[i])) for i in kept.tolist()]
     cut = SHORTEST / scene.step
     whole = (begin >= low - cut) & (begin + duration <= high + cut)
@@ -236,3 +244,10 @@ def _events(scene: Scene, pairs: list[_Pair], low: Int, high: Int, fit: Float) -
         },
         {NO_CHANGE: ~fits[kept], NOT_WHOLE: ~whole[kept]},
     )  # fmt: skip
+
+
+def _bend(scene: Scene, ego: int, instant: float, ahead: float) -> float:
+    """Return how far an ego's path bends until it is beyond something ahead of it [deg]."""
+    length = scene.paths.length(ego, instant)
+    a, b = (scene.paths.course(ego, length + way) for way in (0.0, ahead + BEYOND_IT))
+    return abs(float(np.degrees(wrap(np.array([b - a]))[0])))
