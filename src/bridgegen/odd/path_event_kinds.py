@@ -132,8 +132,7 @@ PATH_KINDS = (
         "merging",
         ("other",),
         "The ego and another motor vehicle come to one lane, and the centres of both pass the "
-        "joining point within 6 s; of those in the lane the other is the next one ahead of who "
-        "merges, or the next one behind. Either their paths join: they are 20° to 150° apart 5 m "
+        "joining point within 6 s, and nobody else between them. Either their paths join: they are 20° to 150° apart 5 m "
         "before the joining point, do not cross, and lead the same way from there for 10 m or "
         "more, less than 2 m apart; who merges is the one that has not come along the bend of the "
         "shared part, continued backwards. Or one leaves a lane that ends within 400 m, at the "

@@ -19,7 +19,7 @@ from bridgegen.mining.events.pace import pace_changes
 from bridgegen.mining.events.scene import Scene
 
 AT_ONCE = 2.0
-"""Joins of one merging vehicle within this time are at one place [s]."""
+"""Joins of one vehicle within this time are at one place [s]."""
 LEAST_SPEEDING = 1.0
 """Of a speed before joining that counts as speeding up [m/s]."""
 
@@ -50,23 +50,29 @@ def find(scene: Scene, changes: LaneChanges) -> Events:
 
 
 def _next_ones(scene: Scene, joins: Iterable[Join]) -> Iterator[Join]:
-    """Yield of each vehicle that merges the join with the next one ahead, and the next behind.
+    """Yield the joins of two between whom nobody else joins: the next one ahead, or behind.
 
     A pair joins once: by its paths, or else by its lanes.
     """
-    kept: dict[tuple[int, bool], list[float]] = {}
-    pairs: dict[tuple[int, int], list[float]] = {}
+    kept: dict[tuple[int, bool, bool], list[float]] = {}
+    pairs = set[tuple[int, int]]()
     most = AT_ONCE / scene.step
-    for rank, group in enumerate(_by_source(joins)):
+    for group in _by_source(joins):
+        before = frozenset(pairs)
         for one in sorted(group, key=lambda one: (abs(one.main_at - one.merging_at), one.main_at)):
-            key = (one.merging, one.merging_at < one.main_at)
-            pair = (min(one.main, one.merging), max(one.main, one.merging))
-            if any(abs(one.merging_at - at) <= most for at in kept.get(key, [])):
+            is_first = one.merging_at < one.main_at
+            places = {
+                (one.merging, True, is_first): one.merging_at,
+                (one.main, False, is_first): one.main_at,
+            }
+            if (min(one.main, one.merging), max(one.main, one.merging)) in before:
                 continue
-            if rank and pair in pairs:
+            if any(abs(at - other) <= most
+                   for key, at in places.items() for other in kept.get(key, [])):  # fmt: skip
                 continue
-            kept.setdefault(key, []).append(one.merging_at)
-            pairs.setdefault(pair, []).append(one.merging_at)
+            for key, at in places.items():
+                kept.setdefault(key, []).append(at)
+            pairs.add((min(one.main, one.merging), max(one.main, one.merging)))
             yield one
 
 
