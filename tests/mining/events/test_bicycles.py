@@ -45,6 +45,12 @@ def test_the_bicycle_may_be_first():
     assert event.quantities["ego_first"].tolist() == [0.0]
 
 
+@pytest.mark.parametrize("lead", [16.0, 20.0, 28.0, 36.0])
+def test_an_ego_that_turns_across_is_not_swung_out_before(lead):
+    events = found(right_turn(lead=lead), [CAR, BICYCLE])[1][SWINGS_OUT]
+    assert len(events) == 0
+
+
 def test_how_near_the_ego_was_when_the_bicycle_changed_pace():
     """It brakes from 4 to 2 m/s at 1 m/s², from 5 s on, when it is 4 m behind the car."""
     t, x, _ = right_turn()[1]
@@ -92,7 +98,8 @@ def street():
 
 
 def test_a_bicycle_swings_out_before_a_car_that_stands():
-    _, by_kind = found(street(), [CAR, BICYCLE, CAR])
+    beside = T, np.full_like(T, 66.0), np.full_like(T, -6.0)
+    _, by_kind = found([*street(), beside], [CAR, BICYCLE, CAR, CAR])
     event = by_kind[SWINGS_OUT]
     roles = {role: who.tolist() for role, who in event.others.items()}
     assert (event.ego.tolist(), roles) == ([0], {"other": [1], "obstacle": [2]})
@@ -133,6 +140,13 @@ def test_who_does_not_come_into_the_path_closely_ahead_swings_not_out(other):
     """It leaves the path, stays beside it, is in it, is behind, far ahead, or comes towards it."""
     events = found([street()[0], other], [CAR, BICYCLE])[1][SWINGS_OUT]
     assert (len(events), events.refused) == (0, {})
+
+
+def test_who_is_in_the_path_already_swings_not_out():
+    """It drifts to the edge of the path, and later goes to its middle."""
+    t, x, y = swinging(one=-1.05, other=0.2)
+    drifts = y - 0.15 + 0.15 * np.clip(T - 2.0, 0.0, 1.0)
+    assert len(found([street()[0], (t, x, drifts)], [CAR, BICYCLE])[1][SWINGS_OUT]) == 0
 
 
 def test_an_ego_that_evades_has_been_in_the_way_nevertheless():

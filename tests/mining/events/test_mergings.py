@@ -103,11 +103,18 @@ def test_who_crosses_or_drives_beside_does_not_merge():
         assert (len(events), events.refused) == (0, {})
 
 
-def test_paths_that_part_at_once_do_not_join():
-    """It turns on, away from the street after 6 m."""
+def test_paths_that_part_soon_do_not_join():
+    """It moves on to a line 3 m aside, so that they are one for 7 m."""
     one, (t, x, y) = turns_into_a_street()
-    away = np.maximum(x - 2.0, 0.0)
-    assert len(found([one, (t, x, y - away)])[1]["merging"]) == 0
+    aside = 3.0 * np.clip((x + 6.0) / 10.0, 0.0, 1.0)
+    assert len(found([one, (t, x, y - aside)])[1]["merging"]) == 0
+
+
+def test_who_turns_into_the_far_side_of_a_street_crosses_it():
+    """It crosses the other path at acos(0.84) = 33°, and goes on 1.6 m to its left."""
+    one, (t, x, y) = turns_into_a_street()
+    assert len(found([one, (t, x, y + 1.6)])[1]["merging"]) == 0
+    assert len(found([one, (t, x, y + 0.5)])[1]["merging"]) == 2
 
 
 @pytest.mark.parametrize(("later", "count"), [(3.0, 2), (5.8, 2), (6.2, 0)])

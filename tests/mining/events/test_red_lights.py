@@ -59,7 +59,8 @@ def test_a_light_that_is_red_from_the_beginning():
 def test_who_crosses_or_drives_beside_the_lane_does_not_pass_its_line():
     beside = line(-82.0, 2.0, 0.0, 10.0)
     against = line(82.0, 0.0, np.pi, 10.0)
-    for other in (SOUTH_TO_NORTH, beside, against):
+    askew = line(-41.0, -71.0, np.radians(60.0), 10.0)
+    for other in (SOUTH_TO_NORTH, beside, against, askew):
         assert len(found([other], lights=[turns_red(2.0)])[1][KIND]) == 0
 
 
@@ -72,6 +73,7 @@ def lanes_of_one_line():
 
 def test_of_several_lights_that_of_the_lane_that_is_taken_counts():
     assert len(found([drives_over()], lights=lanes_of_one_line())[1][KIND]) == 0
+    assert len(found([drives_over()], lights=lanes_of_one_line()[1:])[1][KIND]) == 0
     turns = turning(-82.0, 0.0, 0.0, 10.0, 82.0, 14.0, 1.0)
     runs = found([turns], lights=lanes_of_one_line())[1][KIND]
     assert len(runs) == 1

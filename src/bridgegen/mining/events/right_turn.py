@@ -28,7 +28,6 @@ def find(scene: Scene, changes: LaneChanges) -> Events:
         one for one in meetings(scene, scene.is_ego, scene.traffic.kind == BICYCLE)
         if one.ego_turn < -TURNS and abs(one.other_turn) <= STRAIGHT
         and one.approach_angle <= SAME_WAY and ANGLES[0] <= one.angle <= ANGLES[1]
-        and one.side > 0.0
     ]  # fmt: skip
     paces = paces_of(scene, met)
     return events_of_meetings(
