@@ -5,8 +5,9 @@ import numpy as np
 import pytest
 
 import bridgegen as bg
+from bridgegen.campaign.coverage import coverage_of
 from bridgegen.campaign.regions import regions_of
-from bridgegen.errors import InputError, StorageError
+from bridgegen.errors import InputError, ScenarioError, StorageError
 from bridgegen.odd.within import in_box
 from bridgegen.ontology.files import load
 from bridgegen.ontology.vocabulary import LABEL
@@ -232,3 +233,46 @@ def test_of_a_scenario_file_s_choices_the_values_are_said(tmp_path, cli):
 def test_python_says_where_a_search_is_missing(tmp_path):
     with pytest.raises((InputError, StorageError)):
         regions_of(tmp_path)
+
+
+EXPOSURE = """\
+exposure_of: crossroads-s3
+exposure:
+  source: Made for a test.
+  others: uniform
+  parameters:
+    ego_speed: {distribution: normal, mean: 7, deviation: 0.1}
+"""
+
+
+def test_with_an_exposure_it_says_how_likely_it_is_to_meet_them(folder, tmp_path, cli):
+    place = copied(folder, tmp_path / "run")
+    plain = regions_of(place, samples=50)
+    assert "exposure" not in plain.record
+    even = regions_of(place, samples=50, exposure="uniform")
+    rules = [[one["rule"] for one in each.record["regions"]] for each in (plain, even)]
+    assert rules[0] == rules[1]
+    for told, one in zip(even.record["regions"], even.found.regions, strict=True):
+        low, high = told["exposure"]["interval"]
+        assert low <= told["exposure"]["share"] <= high
+        assert told["exposure"]["share"] == pytest.approx(one.space_share, abs=0.06)
+    (tmp_path / "road.yaml").write_text(EXPOSURE)
+    code, out, err = cli("regions", place, "--samples", 50, "--exposure", tmp_path / "road.yaml")
+    assert code == 0, err
+    assert "Its source: Made for a test." in " ".join(out.split())
+    record = json.loads((place / "regions.json").read_text("utf-8"))
+    exposure = bg.read_exposure(tmp_path / "road.yaml")
+    X, index = exposure.sample(20_000, 9).X, exposure.space.index
+    for one in record["regions"]:
+        inside = np.ones(len(X), bool)
+        for name, ends in one["box"].items():
+            inside &= (X[:, index(name)] >= ends["low"]) & (X[:, index(name)] <= ends["high"])
+        assert one["exposure"]["share"] == pytest.approx(inside.mean(), abs=0.015)
+
+
+def test_an_exposure_of_another_scenario_is_refused(folder, tmp_path):
+    (tmp_path / "road.yaml").write_text(EXPOSURE.replace("crossroads-s3", "cut-in"))
+    with pytest.raises(ScenarioError, match="must be that of crossroads-s3, got one of cut-in"):
+        regions_of(folder, exposure=tmp_path / "road.yaml")
+    with pytest.raises(ScenarioError, match="must be that of crossroads-s3, got one of cut-in"):
+        coverage_of(folder, exposure=tmp_path / "road.yaml")

@@ -38,6 +38,23 @@ def test_two_parameters_by_hand(build, make_parameter):
     assert two.share == 0.75
 
 
+def test_how_much_of_the_road_that_is_by_hand(build, make_parameter):
+    space = build([make_parameter("a"), make_parameter("b", -1.0, 1.0)]).space()
+    X = np.array([[0.0, -1.0], [4.9, 0.9], [5.0, 0.0], [10.0, 1.0]])
+    road = np.array([[1.0, -0.5], [2.0, -0.5], [9.0, -0.5], [9.0, 0.5], [1.0, 0.5]])
+    found = coverage(space, X, np.array([False, True, False, False]), bins=2, met=road)
+    a, b = found.parameters
+    assert (a.met.tolist(), b.met.tolist()) == ([0.6, 0.4], [0.6, 0.4])
+    one, two = found.ways
+    assert one.met_evaluated == 1.0
+    assert one.met_critical == pytest.approx((0.6 + 0.4) / 2)  # a is low, b is high
+    assert two.met_evaluated == pytest.approx(0.8)  # all but (high, low)
+    assert two.met_critical == pytest.approx(0.2)
+    without = coverage(space, X, np.array([False, True, False, False]), bins=2)
+    assert without.ways[0].met_evaluated is None
+    assert without.parameters[0].met is None
+
+
 def test_whole_numbers_have_a_bin_each(build, make_parameter):
     space = build([make_parameter("n", 2.0, 4.0, kind=INTEGER)]).space()
     found = coverage(space, np.array([[2.0], [4.0], [4.0]]), none([0] * 3), bins=50)

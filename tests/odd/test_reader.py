@@ -244,3 +244,11 @@ def test_any_damage_is_one_clear_error_or_a_scenario(write, s4_text, data):
     # A fragment's bound is to blame where the scenario no longer declares what it limits.
     places = (str(path), "encounter.yaml, line ")
     assert all(any(place in problem for place in places) for problem in problems)
+
+
+def test_an_exposure_is_no_scenario():
+    with pytest.raises(ScenarioError) as error:
+        load(Path(__file__).parents[2] / "docs/examples/cut-in-exposure.yaml")
+    (problem,) = error.value.problems
+    assert problem.startswith("a scenario is needed, and this is an exposure of cut-in: name the")
+    assert problem.endswith("cut-in-exposure.yaml, line 3)")

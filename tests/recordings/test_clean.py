@@ -253,3 +253,30 @@ def test_headings_are_smoothed_with_their_positions():
     noisy = one | {"heading": heading, "vx": np.full(60, 5.6), "vy": np.zeros(60)}
     found = clean(traffic(noisy), 0.05).traffic
     assert np.abs(np.diff(found.heading)).max() < 0.05
+
+
+def noisy(factor, noise=0.2):
+    """Slow traffic of which many stand, with noise in its positions and speeds off by a factor."""
+    rng, tracks = np.random.default_rng(1), []
+    for v in (0.0, 0.0, 0.0, 2.0, 4.0):
+        one = drive(n=200, v=v)
+        one |= {"vx": np.full(200, factor * v), "vy": np.zeros(200)}
+        tracks.append(one | {name: one[name] + rng.normal(0.0, noise, 200) for name in "xy"})
+    return traffic(*tracks)
+
+
+def test_noise_of_slow_traffic_is_no_wrong_unit():
+    clean(noisy(1.0), STEP)
+
+
+def test_a_wrong_unit_is_told_among_noise():
+    with pytest.raises(FileFormatError, match=r"got 3\.\d+ times them .*km/h"):
+        clean(noisy(3.6), STEP)
+
+
+def test_between_the_states_of_a_smoothed_track_velocities_are_those_of_its_path():
+    rng, one = np.random.default_rng(2), drive(n=120, v=12.0)
+    one["x"] = one["x"] + 6.0 * np.sin(one["time"]) + rng.normal(0.0, 0.05, 120)
+    fine = clean(traffic(one), 0.01).traffic
+    middle = (fine.x[2:] - fine.x[:-2]) / 0.02
+    assert fine.vx[1:-1] == pytest.approx(middle, abs=5e-3)

@@ -8,14 +8,18 @@ from typing import Any
 
 import numpy as np
 
+from bridgegen.arrays import Bool, Float
 from bridgegen.campaign.report import rewrite_report
-from bridgegen.campaign.restored import pipeline_of
+from bridgegen.campaign.restored import pipeline_of, searched
 from bridgegen.campaign.run import Run
 from bridgegen.disk import write_whole
 from bridgegen.errors import InputError
+from bridgegen.exposure import Exposure
+from bridgegen.exposure.chosen import chosen_exposure, rows_on_the_road
 from bridgegen.odd.space import SearchSpace
 from bridgegen.ontology.files import save
 from bridgegen.pipeline import Pipeline
+from bridgegen.regions.evidence import Evidence
 from bridgegen.regions.find import AT_LEAST, SAMPLES, Found, Region, check, find_regions
 from bridgegen.regions.owl import carriers, classes, statable
 from bridgegen.regions.record import JSON_FILE, to_json
@@ -57,6 +61,7 @@ def regions_of(
     samples: int = SAMPLES,
     at_least: float = AT_LEAST,
     seed: int | None = None,
+    exposure: str | Path | Exposure | None = None,
     workers: Choice = None,
     stage: Callable[[str], None] | None = None,
     progress: Callable[[int, int], None] | None = None,
@@ -74,6 +79,8 @@ def regions_of(
         samples: fresh scenarios to simulate in each region.
         at_least: the share of critical scenarios that makes a region critical.
         seed: of the fresh scenarios; the run's by default.
+        exposure: how parameters are distributed on the road, see `chosen_exposure`; the record then
+            says how likely it is to meet the regions.
         workers: simulate, see ``run_search``; the results do not depend on them.
         stage: called as a stage begins: "compile", "regions", "report".
         progress: called with the number of fresh scenarios simulated, and of all.
@@ -88,6 +95,7 @@ def regions_of(
     if seed is not None and not 0 <= seed <= MAX_SEED:
         raise InputError(f"0 <= seed <= {MAX_SEED} must hold, got {seed}")
     run = Run(folder)
+    met = chosen_exposure(searched(run)[0], exposure)
     rows, settings, place = run.rows(), run.settings, run.folder
     with open_workers(workers) as pool:
         pipeline = pipeline_of(
@@ -105,7 +113,7 @@ def regions_of(
             samples=samples, at_least=at_least, seed=seed, progress=progress,
         )  # fmt: skip
     driver = pipeline.driver.label
-    record = {
+    record: dict[str, Any] = {
         "run": str(place),
         "scenario": space.name,
         "ego": driver,
@@ -118,6 +126,9 @@ def regions_of(
         "seed": seed,
         **to_json(found, space, driver),
     }
+    if met is not None:
+        record["exposure"] = met.source
+        _add_exposure(record, found, rows_on_the_road(met, space), space)
     text = json.dumps(record, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
     write_whole(place / JSON_FILE, [text.encode()])
     origin = f"{len(rows)} evaluations of {settings.algorithm} with seed {settings.seed}"
@@ -129,6 +140,29 @@ def regions_of(
         files=tuple(files),
         unstated=tuple(one for one in found.confirmed if one not in stated),
     )  # fmt: skip
+
+
+def _add_exposure(record: dict[str, Any], found: Found, X: Float, space: SearchSpace) -> None:
+    """Add how likely it is to meet each region, and any confirmed one, with 95 % intervals.
+
+    Args:
+        record: of the regions.
+        found: they.
+        X: ``(n, len(space.names))``, what is met on the road.
+        space: what was searched.
+    """
+    columns = X[:, [space.index(name) for name in space.variables]]
+    anywhere = np.zeros(len(X), np.bool_)
+    for told, one in zip(record["regions"], found.regions, strict=True):
+        inside = one.box.holds(columns)
+        told["exposure"] = _share_of(inside)
+        anywhere |= inside & one.confirmed
+    record["exposure_share"] = _share_of(anywhere)
+
+
+def _share_of(inside: Bool) -> dict[str, Any]:
+    met = Evidence(len(inside), int(inside.sum()))
+    return {"share": met.share, "interval": list(met.interval)}
 
 
 def _state(pipeline: Pipeline, found: Found, path: Path, origin: str) -> list[Region]:

@@ -121,6 +121,14 @@ Criterion = Annotated[
         rich_help_panel=OBJECTIVE,
     ),
 ]
+Exposure = Annotated[
+    str | None,
+    typer.Option(
+        help="How its parameters are distributed on the road: a file (.yaml), an example of "
+        "'bridgegen list exposures', or uniform.",
+        show_default="the exposure in the scenario's file",
+    ),
+]
 FileFailIf = Annotated[
     list[str] | None,
     typer.Option(

@@ -166,16 +166,18 @@ def coverage(
     strength: Annotated[
         int, typer.Option(help="Maximum number of parameters in a combination of bins: 1, 2, 3.")
     ] = 3,
+    exposure: common.Exposure = None,
     as_json: common.Json = False,
 ) -> None:
     """Show which bins of the parameters a run evaluated.
 
-    Also shows which combinations of bins, and which of them are critical.
+    Also shows which combinations of bins, and which of them are critical; with an
+    exposure, how much of what is met on the road these are.
     """
     from bridgegen.campaign.coverage import coverage_of
     from bridgegen.screen.coverage import print_coverage
 
-    settings, found = coverage_of(run, bins=bins, strength=strength)
+    settings, found = coverage_of(run, bins=bins, strength=strength, exposure=exposure)
     print_coverage(run, settings, found, as_json=as_json)
 
 
@@ -197,6 +199,7 @@ def regions(
         int | None,
         typer.Option(help="Seed of the fresh scenarios.", show_default="the run's"),
     ] = None,
+    exposure: common.Exposure = None,
     ego: common.OwnEgo = None,
     worse_than: common.OwnBaseline = None,
     connection: Connection = NO_CONNECTION,
@@ -205,7 +208,8 @@ def regions(
 ) -> None:
     """Find regions in which most scenarios are critical.
 
-    Each is a readable rule, verified by fresh scenarios.
+    Each is a readable rule, verified by fresh scenarios; with an exposure, with the
+    share of encounters that lie in it.
     """
     from bridgegen.campaign.regions import regions_of
     from bridgegen.screen.regions import RegionsScreen, print_regions
@@ -219,6 +223,7 @@ def regions(
             samples=samples,
             at_least=at_least,
             seed=seed,
+            exposure=exposure,
             workers=workers,
             stage=screen.stage,
             progress=screen.progress,

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from math import prod
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -25,6 +26,7 @@ class BinnedRows:
         sizes: per parameter n, its bins.
         n_rows: N.
         n_critical: critical ones among the rows.
+        n_met: how many rows say what is met on the road.
 
     Args:
         space: what was searched.
@@ -32,6 +34,7 @@ class BinnedRows:
         critical: ``(N,)`` bool.
         bins: equal bins over the declared range; a parameter of whole numbers has one for each.
         sample: random points of the space.
+        met: ``(M, len(space.names))`` float64, what is met on the road.
 
     Raises:
         ValueError: wrong shape.
@@ -39,7 +42,13 @@ class BinnedRows:
     """
 
     def __init__(
-        self, space: SearchSpace, X: Numbers, critical: Bool, bins: int, sample: int
+        self,
+        space: SearchSpace,
+        X: Numbers,
+        critical: Bool,
+        bins: int,
+        sample: int,
+        met: Float | None = None,
     ) -> None:
         as_float("X", X[:0], (None, len(space.names)))  # no row may be there to be checked
         hit = np.asarray(critical, np.bool_)
@@ -61,6 +70,8 @@ class BinnedRows:
             self._where[:, end : end + sampled.shape[1]] = sampled
             end += sampled.shape[1]
         self._ends = (self.n_critical, self.n_rows, self._where.shape[1])
+        self.n_met = 0 if met is None else len(met)
+        self._met = np.empty((len(self.names), 0), kind) if met is None else self._bin(met)
 
     def counts(self, chosen: Sequence[int]) -> tuple[Int, Int, Int]:
         """Return how many are in each combination of the chosen parameters' bins.
@@ -98,6 +109,25 @@ class BinnedRows:
             start = end
         return counts
 
+    def met(self, number: int) -> Float:
+        """Return the share of what is met on the road in each bin of a parameter, ``(n,)``."""
+        counts = np.bincount(self._met[number], minlength=self.sizes[number])
+        return np.asarray(counts / self.n_met)
+
+    def met_among(self, chosen: Sequence[int]) -> tuple[float, float]:
+        """Return what share of what is met is in a combination of bins that rows are in.
+
+        Args:
+            chosen: numbers of parameters.
+
+        Returns:
+            In combinations of critical rows, and of all rows.
+        """
+        rows, road = self._codes(chosen), self._codes_of(self._met, chosen)
+        found = (np.isin(road, np.unique(rows[:end])).mean() for end in self._ends[:2])
+        critical, evaluated = (float(one) for one in found)
+        return critical, evaluated
+
     def _bin(self, X: Float) -> npt.NDArray[np.int32]:
         """Return ``(len(names), len(X))``, the bin of every parameter."""
         where = np.empty((len(self.names), len(X)), np.int32)
@@ -116,10 +146,13 @@ class BinnedRows:
 
     def _codes(self, chosen: Sequence[int]) -> Int:
         """Return for every row and sample the number of its combination, in C order."""
-        codes = np.zeros(self._where.shape[1], np.int64)
+        return self._codes_of(self._where, chosen)
+
+    def _codes_of(self, where: npt.NDArray[Any], chosen: Sequence[int]) -> Int:
+        codes = np.zeros(where.shape[1], np.int64)
         for k in chosen:
             codes *= self.sizes[k]
-            codes += self._where[k]
+            codes += where[k]
         return codes
 
 

@@ -47,6 +47,7 @@ class ParameterBins:
         evaluated: ``(n,)`` int64, rows in each bin.
         critical: ``(n,)`` int64, critical ones among them.
         feasible: ``(n,)`` bool, whether the sample or the run has a row there.
+        met: ``(n,)`` float64, the share of what is met on the road; None if that is not known.
     """
 
     name: str
@@ -59,6 +60,7 @@ class ParameterBins:
     evaluated: Int
     critical: Int
     feasible: Bool
+    met: Float | None = None
 
 
 @dataclass(frozen=True)
@@ -71,6 +73,9 @@ class Ways:
         feasible: those met in the sample or in the run; at most ``total``.
         evaluated: those that an evaluated row is in; at most ``feasible``.
         critical: those that a critical row is in; at most ``evaluated``.
+        met_evaluated: the share of what is met on the road in evaluated ones, the mean over all
+            choices of t parameters; None if that is not known.
+        met_critical: likewise in those of critical rows.
     """
 
     strength: int
@@ -78,6 +83,8 @@ class Ways:
     feasible: int
     evaluated: int
     critical: int
+    met_evaluated: float | None = None
+    met_critical: float | None = None
 
     @property
     def share(self) -> float:
@@ -146,6 +153,7 @@ def coverage(
     bins: int = 5,
     strength: int = MAX_STRENGTH,
     sample: int = SAMPLE,
+    met: Float | None = None,
 ) -> Coverage:
     """Count the bins, and the t-way combinations of bins, that rows are in.
 
@@ -156,13 +164,14 @@ def coverage(
         bins: equal bins over the declared range; a parameter of whole numbers has one for each.
         strength: the largest t.
         sample: random points that show what is feasible, besides X.
+        met: ``(M, len(space.names))`` float64, what is met on the road.
 
     Raises:
         InputError: bins or strength out of range.
         ValueError: wrong shape.
     """
     _check(bins, strength)
-    rows = BinnedRows(space, X, critical, bins, sample)
+    rows = BinnedRows(space, X, critical, bins, sample, met)
     ways = (_ways(rows, t) for t in range(1, min(strength, len(rows.names)) + 1))
     return Coverage(rows.n_rows, rows.n_critical, sample, _parameters(rows), tuple(ways))
 
@@ -227,6 +236,7 @@ def _parameters(rows: BinnedRows) -> tuple[ParameterBins, ...]:
                 evaluated=evaluated,
                 critical=critical,
                 feasible=met > 0,
+                met=rows.met(number) if rows.n_met else None,
             )
         )
     return tuple(found)
@@ -234,10 +244,14 @@ def _parameters(rows: BinnedRows) -> tuple[ParameterBins, ...]:
 
 def _ways(rows: BinnedRows, t: int) -> Ways:
     total, found = 0, np.zeros(3, np.int64)
+    met: list[tuple[float, float]] = []
     for chosen in combinations(range(len(rows.names)), t):
         total += prod(rows.sizes[k] for k in chosen)
         found += rows.distinct(chosen)
-    return Ways(t, total, int(found[2]), int(found[1]), int(found[0]))
+        if rows.n_met:
+            met.append(rows.met_among(chosen))
+    hit, seen = np.mean(met, axis=0).tolist() if met else (None, None)
+    return Ways(t, total, int(found[2]), int(found[1]), int(found[0]), seen, hit)
 
 
 def _pair(rows: BinnedRows, i: int, j: int) -> PairBins:

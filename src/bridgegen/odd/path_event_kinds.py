@@ -132,12 +132,13 @@ PATH_KINDS = (
         "merging",
         ("other",),
         "The ego and another motor vehicle come to one lane, and the centres of both pass the "
-        "joining point within 6 s, and nobody else between them. Either their paths join: they are "
-        "20° to 150° apart 5 m before the joining point, do not cross, and lead the same way from "
-        "there for 10 m or more, less than 2 m apart; who merges is the one that has not "
-        "come along the bend of the shared part, continued backwards. Or one leaves a lane that ends within 400 m, at the "
-        "line that it crosses; or two lanes lead into one. It begins 6 s before the first of "
-        "both passes, or when both are recorded, if that is later; it ends when the second passes.",
+        "joining point within 6 s, and nobody else between them. Either their paths join: they "
+        "are 20° to 150° apart 5 m before the joining point, do not cross, and lead the same way "
+        "from there for 10 m or more, less than 2 m apart; who merges is the one that has not "
+        "come along the bend of the shared part, continued backwards. Or one leaves a lane that "
+        "ends within 400 m, at the line that it crosses; or two lanes lead into one. It begins 6 "
+        "s before the first of both passes, or when both are recorded, if that is later; it ends "
+        "when the second passes.",
         "NHTSA, Pre-Crash Scenario Typology (DOT HS 810 767), vehicles changing lanes, turning at "
         "junctions; FHWA, NCHRP Report 672 (2010), entering and circulating vehicles; the "
         "thresholds are ours",

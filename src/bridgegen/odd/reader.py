@@ -369,6 +369,11 @@ def build(document: Document, folder: Path | None) -> LogicalScenario:
     Raises:
         ScenarioError: it breaks rules; all of them, with file and line.
     """
+    if isinstance(document.data, dict) and "exposure_of" in document.data:
+        raise ScenarioError(
+            f"a scenario is needed, and this is an exposure of {document.data['exposure_of']}: name "
+            f"the scenario, and the exposure by --exposure ({document.at(('exposure_of',))})"
+        )
     problems = shape_problems(ScenarioFile, document)
     declarations = _Declarations()
     declarations.include(document, folder)

@@ -47,10 +47,11 @@ class Cleaned:
 
 @dataclass
 class _Track:
-    """One participant's states, or a piece of them."""
+    """One participant's states, or a piece; of a spline, velocities are the slopes of its path."""
 
     columns: dict[str, Float]
     lane: npt.NDArray[np.int32]
+    is_spline: bool = False
 
     def __len__(self) -> int:
         return len(self.lane)
@@ -228,10 +229,11 @@ def _complete(
         done = {
             "x": smoothing.hermite(within, time, columns["x"], vx),
             "y": smoothing.hermite(within, time, columns["y"], vy),
-            "heading": smoothing.hermite(within, time, heading, np.gradient(heading, time)),
-            **{key: np.interp(within, time, values) for key, values in (
-                ("vx", vx), ("vy", vy), ("acceleration", acceleration),
-            )},
+            **{speed: smoothing.hermite_slopes(within, time, columns[place], slopes)
+               if track.is_spline else np.interp(within, time, slopes)
+               for place, speed, slopes in (("x", "vx", vx), ("y", "vy", vy))},
+            "heading": smoothing.hermite(within, time, heading, smoothing.slopes(time, heading)),
+            "acceleration": np.interp(within, time, acceleration),
         }  # fmt: skip
         lane = track.lane[np.searchsorted(time, within + SAME, side="right") - 1]
     return _Track({"time": at, **done, "heading": wrap(done["heading"])}, lane)
@@ -275,7 +277,7 @@ def _smoothed(traffic: RecordedTraffic, p: int, track: _Track, quality: Quality)
     return _Track(
         {"time": time, "x": x, "y": y, "vx": vx, "vy": vy, "heading": heading,
          "acceleration": along},
-        track.lane[nearest],
+        track.lane[nearest], is_spline=True,
     )  # fmt: skip
 
 

@@ -31,11 +31,3 @@ def headings(vx: Float, vy: Float) -> tuple[Float, bool]:
     last = np.searchsorted(moving, np.arange(len(vx)), side="right") - 1
     at = moving[np.maximum(last, 0)]
     return wrap(np.arctan2(vy[at], vx[at])), True
-
-
-def smooth_headings(time: Float, x: Float, y: Float, window: float) -> Float:
-    """Return the direction of motion over a window [s], for tracks that are not smoothed yet."""
-    begin = np.interp(time - window / 2, time, np.arange(len(time))).astype(np.int64)
-    end = np.ceil(np.interp(time + window / 2, time, np.arange(len(time)))).astype(np.int64)
-    span = np.maximum(time[end] - time[begin], 1e-9)
-    return headings((x[end] - x[begin]) / span, (y[end] - y[begin]) / span)[0]

@@ -2,7 +2,7 @@
 
 Lengths are feet, times milliseconds. Local_Y runs along the road, Local_X from its left edge to the
 right; a position is that of the front's centre. Here x runs along the road and y to its left, and
-the centre is half a length behind the front, against the direction of motion over `WINDOW`.
+the centre is half a length behind the front, along the heading with which the rear axle follows it.
 Vehicle numbers are used again, so a vehicle is told by its number and its number of frames.
 
 Source: US DOT FHWA, Next Generation Simulation (NGSIM) Vehicle Trajectories, metadata.
@@ -17,9 +17,11 @@ import numpy as np
 
 from bridgegen.arrays import Float, Int
 from bridgegen.ego.kinds import CAR, MOTORCYCLE, TRUCK
+from bridgegen.recordings._motion_kernels import headings_of_fronts
+from bridgegen.recordings.bodies import centre_ahead
 from bridgegen.recordings.columns import read_columns, whole_numbers
 from bridgegen.recordings.format import Format, Head
-from bridgegen.recordings.motion import smooth_headings
+from bridgegen.recordings.smoothing import NOISE, scatter, smooth
 from bridgegen.recordings.table import (
     NO_LANE,
     UNKNOWN_KIND,
@@ -32,7 +34,8 @@ from bridgegen.recordings.table import (
 )
 
 FOOT = 0.3048  # m
-WINDOW = 1.0  # s
+SHORTEST_ARM = 0.5
+"""From the rear axle to the front [m]; of a vehicle whose length is not given."""
 CLASSES = {1: MOTORCYCLE, 2: CAR, 3: TRUCK}
 
 NUMBERS = (
@@ -89,26 +92,29 @@ def _recording(path: Path, place: str, values: dict[str, Float], lines: Int) -> 
     sizes = {name: per_participant(ids, values[name]) for name in ("v_length", "v_Width")}
     classes = per_participant(ids, values["v_Class"])
     bounds = np.searchsorted(ids, np.arange(len(keys) + 1))
-    heading = np.empty(len(ids))
-    for begin, end in itertools.pairwise(bounds):
-        at = slice(begin, end)
-        heading[at] = smooth_headings(time[at], x[at], y[at], WINDOW)
-    behind = 0.5 * FOOT * np.nan_to_num(sizes["v_length"])[ids]
+    kinds = np.array([
+        UNKNOWN_KIND if np.isnan(one) else CLASSES.get(int(one), UNKNOWN_KIND) for one in classes
+    ])  # fmt: skip
+    length = np.nan_to_num(sizes["v_length"]) * FOOT
+    arm = 0.5 * length + np.array([
+        centre_ahead(CAR if kind == UNKNOWN_KIND else kind, one)
+        for kind, one in zip(kinds.tolist(), length.tolist(), strict=True)
+    ])  # fmt: skip
+    quiet = _without_noise(time, x, y, bounds)
+    heading = headings_of_fronts(*quiet, bounds, np.maximum(arm, SHORTEST_ARM))
+    behind = 0.5 * length[ids]
     speed, lane = values["v_Vel"] * FOOT, values["Lane_ID"]
     facts = Facts(
         name=place, format=FORMAT.name, source=str(path),
         time_step=median_step(time, bounds),
         frame="the road's: x along Local_Y, y to the left",
-        notes=("headings are those of the motion over 1 s",),
+        notes=("headings are those with which rear axles follow the fronts",),
     )  # fmt: skip
     numbers = [key // 2**24 for key in keys.tolist()]
     used = Counter(numbers)
     names = [
         str(number) if used[number] == 1 else f"{number} of {key % 2**24} frames"
         for number, key in zip(numbers, keys.tolist(), strict=True)
-    ]
-    kinds = [
-        UNKNOWN_KIND if np.isnan(one) else CLASSES.get(int(one), UNKNOWN_KIND) for one in classes
     ]
     return build(
         facts, ids,
@@ -122,6 +128,17 @@ def _recording(path: Path, place: str, values: dict[str, Float], lines: Int) -> 
         names=names, kind=kinds,
         length=sizes["v_length"] * FOOT, width=sizes["v_Width"] * FOOT,
     )  # fmt: skip
+
+
+def _without_noise(time: Float, x: Float, y: Float, bounds: Int) -> tuple[Float, Float]:
+    """Return positions, smoothed where they scatter, for directions."""
+    x, y = x.copy(), y.copy()
+    for begin, end in itertools.pairwise(bounds.tolist()):
+        at = slice(begin, end)
+        if scatter(x[at], y[at]) > NOISE:
+            step = float(time[end - 1] - time[begin]) / (end - begin - 1)
+            x[at], y[at] = (smooth(values[at], step, 0) for values in (x, y))
+    return x, y
 
 
 FORMAT = Format(

@@ -4,6 +4,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from bridgegen.arrays import Float
 from bridgegen.ego.kinds import CAR
 from bridgegen.errors import FileFormatError
 from bridgegen.recordings.table import RecordedTraffic
@@ -18,6 +19,8 @@ CARS = (2.0, 9.0)
 """Within these the median length of cars must lie [m]."""
 AGREEMENT = 1.25
 """Speeds given, and those of the positions, may differ by this factor (median)."""
+OVER = 1.0
+"""Time over which positions are compared, so that their noise counts little [s]."""
 LEAST_MOVING = 20  # states
 MOVING = 1.0  # m/s
 UNITS = {
@@ -67,8 +70,10 @@ def _problems(traffic: RecordedTraffic) -> Iterator[str]:
             "metres, times in seconds, and ids those of one participant each?"
         )
         return
-    said = 0.5 * (traffic.speed[1:] + traffic.speed[:-1])
-    at = np.flatnonzero(within & (moved > MOVING) & np.isfinite(said))
+    moved, said = _over(traffic, max(1, round(OVER / max(traffic.facts.time_step, 1e-3))))
+    if np.count_nonzero(moved > MOVING) < LEAST_MOVING:
+        moved, said = _over(traffic, 1)
+    at = np.flatnonzero((moved > MOVING) & np.isfinite(said))
     if len(at) < LEAST_MOVING:
         return
     ratio = float(np.median(said[at] / moved[at]))
@@ -79,3 +84,20 @@ def _problems(traffic: RecordedTraffic) -> Iterator[str]:
             f"{traffic.where(int(at[0]))}: speeds must be those of the positions, got {ratio:.4g} "
             f"times them (median of {len(at)} states){hint}"
         )
+
+
+def _over(traffic: RecordedTraffic, lag: int) -> tuple[Float, Float]:
+    """Return speeds over a number of states [m/s], ``(S - lag,)``: by the positions, and as given.
+
+    The former is 0 where the states are of two participants, the latter NaN where one is unknown.
+    """
+    each = 0.5 * (traffic.speed[1:] + traffic.speed[:-1]) * np.diff(traffic.time)
+    driven, unknown = (
+        np.append(0.0, np.cumsum(one)) for one in (np.nan_to_num(each), np.isnan(each))
+    )
+    who = traffic.participant
+    same = who[lag:] == who[:-lag]
+    span = np.where(same, traffic.time[lag:] - traffic.time[:-lag], 1.0)
+    distance = np.hypot(traffic.x[lag:] - traffic.x[:-lag], traffic.y[lag:] - traffic.y[:-lag])
+    said = np.where(unknown[lag:] == unknown[:-lag], driven[lag:] - driven[:-lag], np.nan)
+    return np.where(same, distance / span, 0.0), said / span

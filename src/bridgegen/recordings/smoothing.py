@@ -87,3 +87,16 @@ def hermite(at: Float, time: Float, values: Float, slopes: Float) -> Float:
     a = slopes[i] * span - rise
     b = rise - slopes[i + 1] * span
     return values[i] + u * rise + u * (1.0 - u) * (a * (1.0 - u) + b * u)
+
+
+def hermite_slopes(at: Float, time: Float, values: Float, slopes: Float) -> Float:
+    """Return the slopes of `hermite`."""
+    i = np.clip(np.searchsorted(time, at, side="right") - 1, 0, len(time) - 2)
+    span = time[i + 1] - time[i]
+    u = (at - time[i]) / span
+    mean = (values[i + 1] - values[i]) / span
+    return (
+        6.0 * u * (1.0 - u) * mean
+        + (1.0 - u) * (1.0 - 3.0 * u) * slopes[i]
+        + u * (3.0 * u - 2.0) * slopes[i + 1]
+    )

@@ -28,6 +28,11 @@ def read_record(path: Path) -> Mapping[str, Any] | None:
             _check(one)
         _whole(*(record[key] for key in ("evaluations", "critical", "critical_held")))
         _number(*(record[key] for key in ("confidence", "at_least", "space_share")))
+        if "exposure" in record:
+            _of(str, record["exposure"])
+            for told in (record["exposure_share"], *(one["exposure"] for one in record["regions"])):
+                low, high = told["interval"]
+                _number(told["share"], low, high)
     except FileNotFoundError:
         return None
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:

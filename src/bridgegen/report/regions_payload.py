@@ -37,10 +37,16 @@ def regions_payload(
                 "box": {name: [ends["low"], ends["high"]] for name, ends in box.items()},
                 "fresh": _evidence(one["fresh"]),
                 "search": _evidence(one["search"]),
+                "exposure": one.get("exposure"),
                 "rows": np.flatnonzero(inside).tolist(),
             }
         )
-    return {**{key: record[key] for key in keys}, "regions": regions}
+    return {
+        **{key: record[key] for key in keys},
+        "exposure": record.get("exposure_share"),
+        "exposure_source": record.get("exposure", ""),
+        "regions": regions,
+    }
 
 
 def _evidence(one: Mapping[str, Any]) -> dict[str, Any]:

@@ -19,12 +19,11 @@ from bridgegen.conflict.analysis import analyse
 from bridgegen.conflict.harm import Count, decisive
 from bridgegen.conflict.summary import summarise
 from bridgegen.errors import InputError, Interrupted, StorageError, UnknownNameError
-from bridgegen.exposure import Exposure, exposure_of, read_exposure
+from bridgegen.exposure import Exposure
+from bridgegen.exposure.chosen import UNIFORM, chosen_exposure
 from bridgegen.exposure.fit import Fit, fit_exposure
-from bridgegen.exposure.reader import build_exposure
 from bridgegen.exposure.tables import read_header
 from bridgegen.mining.replays.picture import moving_picture
-from bridgegen.odd.plain_yaml import read_plain_yaml
 from bridgegen.odd.scenario import LogicalScenario
 from bridgegen.options import PipelineOptions
 from bridgegen.pipeline import Pipeline
@@ -41,10 +40,6 @@ from bridgegen.simulation.rollout import Rollout
 from bridgegen.store import Store
 from bridgegen.workers import CarriedDriver, Choice, open_workers
 
-UNIFORM = "uniform"
-"""Names the exposure in which each parameter is uniform over its range: no road is like that."""
-
-_EVENLY = b"source: Uniform over the ranges, which no road is like.\nothers: uniform\n"
 LEAST_EVALUATIONS, MOST_EVALUATIONS = 20, 10**10
 OTHER_ROWS = 2  # added to the seed: no method counts rows of that one
 BEFORE, AFTER = 4.0, 2.0  # s, of the picture, around the conflict's most urgent instant
@@ -255,24 +250,14 @@ def _exposure(scenario: LogicalScenario, given: str | Path | Exposure | None) ->
     Raises:
         InputError: there is none, or it is that of another scenario.
     """
-    if isinstance(given, Exposure):
-        if given.scenario.name != scenario.name:
-            raise InputError(
-                f"the exposure must be that of {scenario.name}, got one of {given.scenario.name}"
-            )
-        return given
-    if given == UNIFORM:
-        return build_exposure(read_plain_yaml(_EVENLY, UNIFORM), scenario, None)
-    if given is not None:
-        return read_exposure(given, scenario)
-    own = exposure_of(scenario)
-    if own is None:
+    found = chosen_exposure(scenario, given)
+    if found is None:
         raise InputError(
             f"{scenario.name} has no exposure: how likely its parameters' values are is not known. "
             "Name a file (--exposure FILE; 'bridgegen fit' makes one of recorded events), or "
             f"--exposure {UNIFORM}, which says what share of the ranges is harmful"
         )
-    return own
+    return found
 
 
 def _fit_of(

@@ -38,6 +38,8 @@ def print_coverage(run: Path, settings: "Settings", found: "Coverage", *, as_jso
     for one in found.parameters:
         print(f"{one.name:<{width}}  {one.axis}, {one.span}")
         print(f"    {_cells(one)}")
+        if one.met is not None:
+            print("    " + "".join(f"{f'{share:.1%}':>10}" for share in one.met) + "  of the road")
 
 
 def _cells(one: "ParameterBins") -> str:

@@ -68,6 +68,13 @@ def print_regions(run: "RunRegions", *, as_json: bool) -> None:
             f"{found.critical_held} of the run's {found.critical} critical scenarios, and "
             f"{_percent(found.space_share)} of all random scenarios."
         )
+        if "exposure" in facts:
+            low, high = map(_percent, facts["exposure_share"]["interval"])
+            print(
+                f"Of the encounters that the exposure describes, "
+                f"{_percent(facts['exposure_share']['share'])} ({low.removesuffix(' %')} to "
+                f"{high}) lie in them. Its source: {facts['exposure']}"
+            )
     files = ", ".join(map(str, run.files))
     print(f"{found.simulations} fresh scenarios, seed {facts['seed']}: {files}")
     if run.unstated:
@@ -83,7 +90,9 @@ def _print_regions(run: "RunRegions", start: int, stop: int) -> None:
 
     failed = any(one.fresh.failed for one in run.found.regions[start:stop])
     table = Table(box=None, pad_edge=False, header_style="bold", padding=(0, 2, 1, 0))
-    for name in ("#", "region", "fresh", "run", "space", *(["failed"] if failed else [])):
+    told = run.record["regions"][start:stop]
+    met = ["road"] if "exposure" in run.record else []
+    for name in ("#", "region", "fresh", "run", "space", *met, *(["failed"] if failed else [])):
         table.add_column(name, overflow="fold")
     for number, one in enumerate(run.found.regions[start:stop], start=start + 1):
         rule = "\nand ".join(conditions(one.box, run.space)) or ANYWHERE
@@ -94,6 +103,7 @@ def _print_regions(run: "RunRegions", start: int, stop: int) -> None:
             _shares(one.fresh),
             _shares(one.search),
             _percent(one.space_share),
+            *([_percent(told[number - start - 1]["exposure"]["share"])] if met else []),
             *([str(one.fresh.failed)] if failed else []),
         )
     Console(markup=False, emoji=False, highlight=False).print(table)

@@ -135,3 +135,29 @@ def test_an_excerpt_is_what_was_recorded_and_who_comes_later_is_absent_first():
     assert motion.present[0, 1].tolist() == [k >= 20 for k in range(5, 36)]
     assert replace(motion, present=np.zeros((0, 0, 0), bool)).shape == (1, 2, 31)
     assert CONTACT not in analyse(motion).kind
+
+
+@pytest.mark.parametrize("span", [2.0, 7.0, 1e6])
+def test_the_parts_in_which_an_ego_is_analysed_do_not_matter(monkeypatch, span):
+    """In 200 s, an ego meets 20 who stand in its way and step aside late, and touches some."""
+    rng, t = np.random.default_rng(5), 0.1 * np.arange(2000)
+    v = 14.0 + 4.0 * np.sin(0.4 * t)
+    x = np.append(0.0, np.cumsum(0.05 * (v[1:] + v[:-1])))
+    tracks = [{"time": t, "x": x, "y": 0.0 * t, "heading": 0.0 * t}]
+    for passes in rng.integers(60, 1960, 20):
+        k = np.arange(passes - 60, min(passes + 30, 2000))
+        aside = np.clip((t[k] - t[passes] + rng.uniform(0.6, 1.6)) / 1.2, 0.0, 1.0)
+        tracks.append({"time": t[k], "x": np.full(len(k), x[passes]),
+                       "y": 2.0 * (1.0 - np.cos(np.pi * aside)), "heading": 0.0 * k})  # fmt: skip
+    cleaned = clean(traffic(*tracks), 0.1).traffic
+    known = conflicts_of(cleaned)
+    assert sum(not one.is_contact for one in known) >= 5
+    assert any(one.is_contact for one in known)
+    monkeypatch.setattr(find, "SPAN", span)
+    found = conflicts_of(cleaned)
+    facts = [[(one.ego, one.other, one.instant, one.found.type, one.found.responsible, one.doubt)
+              for one in each] for each in (found, known)]  # fmt: skip
+    assert facts[0] == facts[1]
+    for one, other in zip(found, known, strict=True):
+        assert one.found.ttc == pytest.approx(other.found.ttc, abs=2e-3)
+        assert one.found.harm == pytest.approx(other.found.harm, abs=1e-3)

@@ -2,11 +2,10 @@
 
 import numpy as np
 import pytest
-from tests.mining.events.simulated import located, recorded, simulated
+from tests.mining.events.simulated import compare, observed, simulated
 from tests.mining.events.truth import at_time, crossing_of, some_rows
 
 from bridgegen.metrics.pet import pet
-from bridgegen.mining.events.find import find_events
 
 
 def first(holds):
@@ -53,45 +52,29 @@ CASES = {"cyclist-swings-out": (130, swings_out), "cyclist-right-turn": (260, tu
 
 
 def round_trip(name, noise, dropped, most):
-    """Return precision, recall, how many rows count, and the errors as shares of the ranges."""
+    """Return what became of the events of some rows of a scenario."""
     count, what = CASES[name]
     scenario, P, rollout, lanes = simulated(name, count, "route-follower")
     surely, maybe, P = what(P, rollout)
     rows = some_rows(surely, maybe, most)
-    traffic, where = located(recorded(rollout, rows, noise, dropped), lanes)
-    spec = scenario.recorded
-    found = next(
-        one for one in find_events(traffic, where).kinds if one.kind.name == spec.event
-    )  # fmt: skip
-    kept = spec.counts(found.quantities)
-    kept &= np.array([traffic.names[k].split("#")[0].endswith(" ego") for k in found.ego])
-    row = np.array([int(traffic.names[k].split()[0]) for k in found.ego])[kept]
-    assert len(set(row)) == len(row)
-    errors = {
-        key: (np.abs(value[kept] - P[key][row]))
-        / (scenario.parameters[key].high - scenario.parameters[key].low)
-        for key, value in spec.values(found.quantities).items()
-    }
-    there = rows[surely[rows]]
-    return maybe[row].mean(), np.isin(there, row).mean(), len(there), errors
+    recordings = observed(rollout, rows, lanes, noise, dropped)
+    return compare(scenario, P, rows, surely, maybe, recordings)
 
 
 @pytest.mark.parametrize("name", CASES)
 def test_parameters_come_back(name):
-    precision, recall, count, errors = round_trip(name, 0.0, 0.0, 80)
-    assert count >= 30
-    assert min(precision, recall) >= 0.99
-    for key, error in errors.items():
-        known = error[np.isfinite(error)]
-        assert len(known) >= (5 if key == "trigger_distance" else 0.99 * len(error)), key
-        assert np.quantile(known, 0.95) <= 0.01, key
+    found = round_trip(name, 0.0, 0.0, 80)
+    assert len(found.found) >= 30
+    assert min(found.precision, found.recall) >= 0.99
+    for key, error in found.errors().items():
+        assert len(error) >= (5 if key == "trigger_distance" else 0.99 * len(found.found)), key
+        assert np.quantile(error, 0.95) <= 0.01, key
 
 
 @pytest.mark.parametrize("name", CASES)
 def test_parameters_come_back_of_noisy_traffic_with_gaps(name):
-    precision, recall, _, errors = round_trip(name, 0.2, 0.05, 16)
-    assert min(precision, recall) >= 0.95
-    for key, error in errors.items():
-        known = error[np.isfinite(error)]
-        assert len(known), key
-        assert np.median(known) <= 0.05, key
+    found = round_trip(name, 0.2, 0.05, 16)
+    assert min(found.precision, found.recall) >= 0.95
+    for key, error in found.errors().items():
+        assert len(error), key
+        assert np.median(error) <= 0.05, key

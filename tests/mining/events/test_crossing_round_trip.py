@@ -8,11 +8,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tests.mining.events.simulated import located, recorded, simulated
+from tests.mining.events.simulated import compare, observed, simulated
 from tests.mining.events.truth import at_time, crossing_of, encounter, some_rows
 
 from bridgegen.metrics.pet import pet
-from bridgegen.mining.events.find import find_events
 
 
 def sees_through(rollout, other, van, last, lately):
@@ -70,10 +69,11 @@ CASES = {
 NOISY = ("crossroads-s1", "pedestrian-behind-parked", "red-light-runner")
 
 
-def round_trip(name, noise, dropped, most):
-    """Return precision, recall, how many rows count, and the errors as shares of the ranges."""
-    count, other, what = CASES[name]
-    scenario, P, rollout, lanes = simulated(name, count, "route-follower")
+def round_trip(name, noise, dropped, most, count=None, seed=1, observe=observed):
+    """Return what became of the events of some rows of a scenario."""
+    usual, other, what = CASES[name]
+    count = count or usual
+    scenario, P, rollout, lanes = simulated(name, count, "route-follower", seed)
     e = rollout.names.index(other)
     passes = np.array([crossing_of(rollout, row, e) for row in range(count)]).T
     surely, maybe, P = what(P, rollout, passes, other)
@@ -89,41 +89,23 @@ def round_trip(name, noise, dropped, most):
     rows = some_rows(surely, maybe, most)
     until = np.where(np.isfinite(gap), passes.max(axis=0) + 3.0, 12.0) / rollout.time_step
     cut = replace(rollout, n_steps=np.minimum(rollout.n_steps, until.astype(int)))
-    traffic, where = located(recorded(cut, rows, noise, dropped), lanes)
-    found = next(
-        one for one in find_events(traffic, where).kinds
-        if one.kind.name == scenario.recorded.event
-    )  # fmt: skip
-    spec = scenario.recorded
-    called = [traffic.names[k].split("#")[0].split() for k in found.others["other"]]
-    own = [traffic.names[k].split("#")[0].endswith(" ego") for k in found.ego]
-    kept = spec.counts(found.quantities) & np.array(own)
-    kept &= np.array([what == other for _, what in called])
-    row = np.array([int(number) for number, _ in called])[kept]
-    assert len(set(row)) == len(row)
-    errors = {
-        key: np.abs(value[kept] - P[key][row])
-        / (scenario.parameters[key].high - scenario.parameters[key].low)
-        for key, value in spec.values(found.quantities).items()
-    }
-    there = rows[surely[rows]]
-    errors = {key: error[np.isfinite(error)] for key, error in errors.items()}
-    return maybe[row].mean(), np.isin(there, row).mean(), len(there), errors
+    recordings = observe(cut, rows, lanes, noise, dropped)
+    return compare(scenario, P, rows, surely, maybe, recordings, other)
 
 
 @pytest.mark.parametrize("name", CASES)
 def test_parameters_come_back(name):
-    precision, recall, count, errors = round_trip(name, 0.0, 0.0, 40)
-    assert count >= 30
-    assert min(precision, recall) >= 0.99
-    for key, error in errors.items():
-        assert len(error) >= 0.8 * count
+    found = round_trip(name, 0.0, 0.0, 40)
+    assert len(found.found) >= 30
+    assert min(found.precision, found.recall) >= 0.99
+    for key, error in found.errors().items():
+        assert len(error) >= 0.8 * len(found.found)
         assert np.quantile(error, 0.95) <= 0.01, key
 
 
 @pytest.mark.parametrize("name", NOISY)
 def test_parameters_come_back_of_noisy_traffic_with_gaps(name):
-    precision, recall, _, errors = round_trip(name, 0.2, 0.05, 20)
-    assert min(precision, recall) >= 0.95
-    for key, error in errors.items():
+    found = round_trip(name, 0.2, 0.05, 20)
+    assert min(found.precision, found.recall) >= 0.95
+    for key, error in found.errors().items():
         assert np.median(error) <= 0.05, key

@@ -5,11 +5,10 @@ Where paths join is worked out from the simulation by itself, by the distances o
 
 import numpy as np
 import pytest
-from tests.mining.events.simulated import APART, located, recorded, simulated
+from tests.mining.events.simulated import compare, observed, simulated
 from tests.mining.events.truth import at_time, centres, encounter, some_rows
 
 from bridgegen.metrics.pet import pet
-from bridgegen.mining.events.find import find_events
 
 NEAR, SHARED = 2.0, 10.0  # m
 BARELY = (1.0, 11.0)  # m; rows in which the shared part is as short are left out
@@ -96,7 +95,7 @@ CASES = {
 
 
 def round_trip(name, noise, dropped, most):
-    """Return precision, recall, how many rows count, and the errors as shares of the ranges."""
+    """Return what became of the events of some rows of a scenario."""
     count, joined, barely, what = CASES[name]
     scenario, P, rollout, lanes = simulated(name, count, "route-follower")
     e = rollout.names.index("bv")
@@ -108,37 +107,23 @@ def round_trip(name, noise, dropped, most):
     maybe = (gap < 6.1) & (first > 0.8)
     rows = some_rows(surely, maybe, most)
     rows = np.array([row for row in rows if not barely(rollout, row, e)])
-    traffic, where = located(recorded(rollout, rows, noise, dropped), lanes)
-    found = next(one for one in find_events(traffic, where).kinds if one.kind.name == "merging")
-    spec = scenario.recorded
-    kept = spec.counts(found.quantities)
-    kept &= np.array([traffic.names[k].split("#")[0].endswith(" ego") for k in found.ego])
-    row = np.array([int(traffic.names[k].split()[0]) for k in found.ego])[kept]
-    assert len(set(row)) == len(row)
-    assert found.begin[kept] - row * APART == pytest.approx(begin[row], abs=0.15)
-    errors = {
-        key: np.abs(value[kept] - P[key][row])
-        / (scenario.parameters[key].high - scenario.parameters[key].low)
-        for key, value in spec.values(found.quantities).items()
-    }
-    there = rows[surely[rows]]
-    errors = {key: error[np.isfinite(error)] for key, error in errors.items()}
-    return maybe[row].mean(), np.isin(there, row).mean(), len(there), errors
+    recordings = observed(rollout, rows, lanes, noise, dropped)
+    return compare(scenario, P, rows, surely, maybe, recordings)
 
 
 @pytest.mark.parametrize("name", CASES)
 def test_parameters_come_back(name):
-    precision, recall, count, errors = round_trip(name, 0.0, 0.0, 40)
-    assert count >= 25
-    assert min(precision, recall) >= 0.99
-    for key, error in errors.items():
-        assert len(error) >= 0.8 * count
+    found = round_trip(name, 0.0, 0.0, 40)
+    assert len(found.found) >= 25
+    assert min(found.precision, found.recall) >= 0.99
+    for key, error in found.errors().items():
+        assert len(error) >= 0.8 * len(found.found)
         assert np.quantile(error, 0.95) <= 0.01, key
 
 
 @pytest.mark.parametrize("name", CASES)
 def test_parameters_come_back_of_noisy_traffic_with_gaps(name):
-    precision, recall, _, errors = round_trip(name, 0.2, 0.05, 12)
-    assert min(precision, recall) >= 0.95
-    for key, error in errors.items():
+    found = round_trip(name, 0.2, 0.05, 12)
+    assert min(found.precision, found.recall) >= 0.95
+    for key, error in found.errors().items():
         assert np.median(error) <= 0.05, key

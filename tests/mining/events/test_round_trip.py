@@ -2,9 +2,7 @@
 
 import numpy as np
 import pytest
-from tests.mining.events.simulated import located, recorded, simulated
-
-from bridgegen.mining.events.find import find_events
+from tests.mining.events.simulated import compare, observed, simulated
 
 LENGTH = 4.6  # of a car
 
@@ -24,13 +22,13 @@ def steps(rollout, time):
 
 
 def cut_in(P, rollout):
-    """The BV is ahead of the ego when it crosses the line."""
+    """The BV is ahead of the ego when it crosses the line, and did not begin with the recording."""
     along = np.sqrt(np.maximum(P["cut_in_distance"] ** 2 - P["lane_width"] ** 2, 0.0))
     begin = np.clip((P["gap"] - along) / np.maximum(P["speed_difference"], 1e-9), 0.0, 8.0)
     crossing = steps(rollout, begin + 0.5 * P["change_time"])
     gap = ahead(rollout, "bv", "ego")[np.arange(len(crossing)), crossing] - LENGTH
     at_begin = np.hypot(P["gap"] - P["speed_difference"] * begin, P["lane_width"])
-    return gap > 0.5, gap > -0.5, P | {"cut_in_distance": at_begin}
+    return (gap > 0.5) & (begin > 0.2), gap > -0.5, P | {"cut_in_distance": at_begin}
 
 
 def cut_out(P, rollout):
@@ -51,48 +49,35 @@ def lead_brakes(P, rollout):
 
 
 CASES = {
-    "cut-in": ("un-r157", 230, cut_in), "cut-out": ("route-follower", 210, cut_out),
+    "cut-in": ("un-r157", 350, cut_in), "cut-out": ("route-follower", 210, cut_out),
     "lead-brakes": ("route-follower", 320, lead_brakes),
 }  # fmt: skip
 
 
-def round_trip(name, noise, dropped):
-    """Return precision, recall, how many rows count, and the errors as shares of the ranges."""
-    ego, count, happens = CASES[name]
-    scenario, P, rollout, lanes = simulated(name, count, ego)
+def round_trip(name, noise, dropped, count=None, seed=1, observe=observed):
+    """Return what became of the events of rows of a scenario."""
+    ego, usual, happens = CASES[name]
+    count = count or usual
+    scenario, P, rollout, lanes = simulated(name, count, ego, seed)
     surely, maybe, P = happens(P, rollout)
-    traffic, where = located(recorded(rollout, range(count), noise, dropped), lanes)
-    found = next(
-        one for one in find_events(traffic, where).kinds
-        if one.kind.name == scenario.recorded.event
-    )  # fmt: skip
-    spec = scenario.recorded
-    own = [traffic.names[e].split("#")[0].endswith(" ego") for e in found.ego]
-    kept = spec.counts(found.quantities) & np.array(own)
-    row = np.array([int(traffic.names[e].split()[0]) for e in found.ego])[kept]
-    assert len(set(row)) == len(row)
-    errors = {
-        key: np.abs(value[kept] - P[key][row])
-        / (scenario.parameters[key].high - scenario.parameters[key].low)
-        for key, value in spec.values(found.quantities).items()
-    }
-    found_rows = np.isin(np.flatnonzero(surely), row)
-    return maybe[row].mean(), found_rows.mean(), int(surely.sum()), errors
+    rows = np.arange(count)
+    return compare(scenario, P, rows, surely, maybe, observe(rollout, rows, lanes, noise, dropped))
 
 
 @pytest.mark.parametrize("name", CASES)
 def test_parameters_come_back(name):
-    precision, recall, count, errors = round_trip(name, 0.0, 0.0)
-    assert count >= 200
-    assert min(precision, recall) >= 0.99
-    for key, error in errors.items():
+    found = round_trip(name, 0.0, 0.0)
+    assert len(found.found) >= 200
+    assert min(found.precision, found.recall) >= 0.99
+    for key, error in found.errors().items():
+        assert len(error) == len(found.true)
         assert np.quantile(error, 0.98) <= 0.01, key
         assert error.max() <= 0.1, key
 
 
 @pytest.mark.parametrize("name", CASES)
 def test_parameters_come_back_of_noisy_traffic_with_gaps(name):
-    precision, recall, _, errors = round_trip(name, 0.2, 0.05)
-    assert min(precision, recall) >= 0.95
-    for key, error in errors.items():
+    found = round_trip(name, 0.2, 0.05)
+    assert min(found.precision, found.recall) >= 0.95
+    for key, error in found.errors().items():
         assert np.median(error) <= 0.05, key

@@ -33,6 +33,10 @@ MARGIN = 0.5
 """By which bodies may miss each other by constant velocity [m] and yet be looked at."""
 BLOCK = 2000
 """Instants whose pairs are looked for at once: a pair is found anew at each."""
+SPAN = 60.0
+"""Of an ego's way that is analysed at once [s]."""
+CONTEXT = 15.0
+"""Before and after it, that tells how a conflict arose and where paths lead [s]."""
 AROUND = 2.0
 """Before and after a conflict [s], in which its motion has to be plausible."""
 
@@ -125,8 +129,25 @@ def _extent(traffic: RecordedTraffic, states: slice) -> float:
 def _of_ego(
     traffic: RecordedTraffic, clock: Clock, ego: int, others: list[int]
 ) -> Iterator[RecordedConflict]:
-    """Yield the conflicts of an ego; those after a contact as if the other had not been there."""
-    begin, end = int(clock.begin[ego]), int(clock.end[ego])
+    """Yield the conflicts of an ego, part by part of its way, so that memory is bounded."""
+    begin, end, step = int(clock.begin[ego]), int(clock.end[ego]), traffic.facts.time_step
+    span, context = (max(1, round(seconds / step)) for seconds in (SPAN, CONTEXT))
+    for first in range(begin, end + 1, span):
+        last = min(first + span - 1, end)
+        around = max(first - context, begin), min(last + context, end)
+        there = [
+            one for one in others
+            if clock.begin[one] <= around[1] and clock.end[one] >= around[0]
+        ]  # fmt: skip
+        for one in _of_part(traffic, clock, ego, there, *around):
+            if first <= one.instant <= last:
+                yield one
+
+
+def _of_part(
+    traffic: RecordedTraffic, clock: Clock, ego: int, others: list[int], begin: int, end: int
+) -> Iterator[RecordedConflict]:
+    """Yield conflicts between two instants; those after a contact without the one that touches."""
     left = list(others)
     while left:
         found = analyse(excerpt(traffic, clock, ego, left, begin, end))

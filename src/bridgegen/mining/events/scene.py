@@ -123,8 +123,14 @@ class Scene:
         return self.traffic.vx * self.cosine + self.traffic.vy * self.sine
 
     @cached_property
+    def _pace(self) -> Float:
+        """``(S,)`` speed of the rear axle; of who walks, that of the body [m/s]."""
+        walks = np.repeat(np.isin(self.traffic.kind, WALKS), np.diff(self.traffic.first))
+        return np.where(walks, self.traffic.speed, self.forward)
+
+    @cached_property
     def _travelled(self) -> Float:
-        speed = self.traffic.speed
+        speed = self._pace
         steps = np.empty(len(speed))
         steps[0], steps[1:] = 0.0, 0.5 * (speed[1:] + speed[:-1]) * self.step
         return np.cumsum(steps)
@@ -142,7 +148,7 @@ class Scene:
         low, high = self._around(AVERAGED)
         path = self._travelled
         mean = (path[high] - path[low]) / (np.maximum(high - low, 1) * self.step)
-        return np.where(high > low, mean, self.traffic.speed)
+        return np.abs(np.where(high > low, mean, self._pace))
 
     @cached_property
     def acceleration(self) -> Float:

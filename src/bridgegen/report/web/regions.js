@@ -24,6 +24,11 @@ class Regions {
     $("regions-lead").textContent = hold
       ? `Boxes of the parameter space in which at least ${least}${NARROW}% of all scenarios are critical, with ${sure}${NARROW}% confidence: each was tried on fresh random scenarios, simulated for this alone. They hold ${number(found.critical_held)} of the ${number(found.critical)} critical scenarios that the search had found then, after ${number(found.evaluations)} evaluations, and ${percentOf(found.space_share)}${NARROW}% of all random scenarios.`
       : `No box was confirmed in which at least ${least}${NARROW}% of all scenarios are critical, with ${sure}${NARROW}% confidence.`;
+    if (found.exposure) {
+      const [low, high] = found.exposure.interval.map(percentOf);
+      $("regions-lead").textContent += ` Of the encounters that the exposure describes, ${percentOf(found.exposure.share)}${NARROW}% (${low} to ${high}) lie in the confirmed ones. Source of the exposure: ${found.exposure_source}`;
+      $("regions-road").hidden = false;
+    }
     $("regions-body").replaceChildren(...regionList.map((region, k) => this.row(region, k)));
     document.addEventListener("filters", () => this.show());
   }
@@ -41,7 +46,8 @@ class Regions {
     const verdict = region.confirmed ? "confirmed" : region.narrowed ? "not confirmed; narrowed to others" : "not confirmed";
     const row = element("tr", { class: region.confirmed ? "holds" : "fails" }, element("td", {}, `${region.number}`),
       element("td", { class: "rule", title: region.sentence }, ...rules, element("small", {}, verdict)), evidence(region.fresh),
-      evidence(region.search), element("td", {}, `${percentOf(region.space_share)}${NARROW}%`), element("td", {}, button));
+      evidence(region.search), element("td", {}, `${percentOf(region.space_share)}${NARROW}%`),
+      ...(region.exposure ? [element("td", {}, `${percentOf(region.exposure.share)}${NARROW}%`)] : []), element("td", {}, button));
     return row;
   }
 
