@@ -72,14 +72,18 @@ def motorway(P, rollout, passes, begin):
 
 
 def roundabout(P, rollout, passes, begin):
-    """The other's speed at the beginning of the event, and where it would have been at first."""
+    """The other's speed at the beginning of the event, and where it would have been at first.
+
+    It had not entered then, and the event begins in the first 6 s.
+    """
     e = rollout.names.index("bv")
     speed = around(rollout, "v", e, begin, 0.5)
     way = np.array([rollout.v[i, e, : int(one / rollout.time_step)].sum() * rollout.time_step
                     for i, one in enumerate(np.nan_to_num(begin))])  # fmt: skip
     happens = {"bv_speed": speed, "bv_start": P["bv_start"] + begin * speed - way,
                "ring_speed": around(rollout, "v", e, passes[1], 1.0)}  # fmt: skip
-    return np.ones(len(begin), bool), P | happens
+    outside = (happens["bv_start"] > 1.0) & (begin < 5.8)
+    return outside, P | happens
 
 
 def stood(P, rollout, passes, begin):
