@@ -36,6 +36,8 @@ BEYOND = 60.0
 """By which an ego's path is continued straight on, should it end [m]."""
 BEFORE = 1.0
 """Where the ego was so long ago, it did not evade yet [s]."""
+SPAN = 4.0
+"""Before that, over which its place is averaged [s]."""
 LEAST_MOVE = 0.5
 """To the side [m]."""
 SHORTEST = 0.5
@@ -56,7 +58,7 @@ class _Pair:
         begin: first instant.
         apart: ``(n,)`` of the bicycle's centre from the ego's along its path [m], by instant.
         offset: ``(n,)`` of its reference point from the smoothed path [m], left positive.
-        own: ``(n,)`` of the ego from it, `BEFORE` it is there [m].
+        own: ``(n,)`` of the ego from it, averaged over `SPAN` until `BEFORE` [m].
     """
 
     ego: int
@@ -121,13 +123,15 @@ def _together(scene: Scene, ego: int, other: int, line: Float | None) -> Iterato
     ego_way, ego_offset, _ = _beside(line, np.column_stack([traffic.x[own], traffic.y[own]]))
     way, offset, course = _beside(line, rear)
     turned = np.abs(wrap(traffic.heading[its] - course))
-    apart = way + ahead - ego_way
+    apart, sums = way + ahead - ego_way, np.concatenate([[0.0], np.cumsum(ego_offset)])
     holds = (np.abs(apart) <= FARTHEST) & (turned <= np.radians(2.0 * ALONG))
     edges = np.flatnonzero(np.diff(np.concatenate([[0], holds.astype(np.int8), [0]])))
     for a, b in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
         if (b - a) * scene.step >= 2.0 * SHORTEST:
-            before = np.maximum(np.arange(a, b) - round(BEFORE / scene.step), 0)
-            yield _Pair(ego, other, begin + a, apart[a:b], offset[a:b], ego_offset[before])
+            last = np.maximum(np.arange(a, b) - round(BEFORE / scene.step), 0)
+            since = np.maximum(last - round(SPAN / scene.step), 0)
+            own = (sums[last + 1] - sums[since]) / (last + 1 - since)
+            yield _Pair(ego, other, begin + a, apart[a:b], offset[a:b], own)
 
 
 def _smooth_line(scene: Scene, ego: int) -> Float | None:
