@@ -7,7 +7,8 @@ import pytest
 from bridgegen.errors import ScenarioError
 from bridgegen.odd.reader import load
 
-LONG = """parameters:
+LONG = """
+parameters:
   long_green:
     axis: static
     unit: s
@@ -17,7 +18,8 @@ LONG = """parameters:
     description: How long green lasts.
     source: ours.
 """
-DELAY = """parameters:
+DELAY = """
+parameters:
   delay:
     axis: participants
     unit: s
@@ -55,7 +57,7 @@ def test_timing_of_lights_must_be_constant(tmp_path, knob):
     roads = "{lanes_per_direction: 2, signals: two-phase, green_time: 30.0, signal_offset: 5.0, "
     told = problems(
         tmp_path,
-        ("parameters:\n", LONG),
+        ("\nparameters:\n", LONG),
         (roads, f"{{lanes_per_direction: 2, signals: two-phase, {knob}: long_green, "),
     )
     (problem,) = told
@@ -65,7 +67,7 @@ def test_timing_of_lights_must_be_constant(tmp_path, knob):
 
 def test_nor_may_a_parameter_of_the_knob_s_own_name_give_it(tmp_path):
     own = LONG.replace("long_green", "yellow_time").replace("20.0", "3.0").replace("40.0", "5.0")
-    (problem,) = problems(tmp_path, ("parameters:\n", own.replace("30.0", "4.0")))
+    (problem,) = problems(tmp_path, ("\nparameters:\n", own.replace("30.0", "4.0")))
     assert problem.startswith("yellow_time [s] must be a constant, got 'yellow_time'")
 
 
@@ -73,6 +75,6 @@ def test_a_delay_must_be_constant(tmp_path):
     second = SECOND.replace("DELAY", "1.5")
     assert problems(tmp_path, ("events:\n", second)) == []
     second = SECOND.replace("DELAY", "delay")
-    (problem,) = problems(tmp_path, ("events:\n", second), ("parameters:\n", DELAY))
+    (problem,) = problems(tmp_path, ("events:\n", second), ("\nparameters:\n", DELAY))
     assert problem.startswith("value of an 'after' condition [s] must be a constant, got 'delay'")
     assert "own.yaml, line " in problem

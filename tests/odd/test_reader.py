@@ -135,7 +135,7 @@ def test_a_parameter_without_effect_is_refused(refuse, s4_text):
     extra = f"  ego_sped: {entry}\n  windd: {entry}\n  free: {entry}\n"
     for axis in ("participants", "weather", "extension"):
         extra = extra.replace("AXIS", axis, 1)
-    problems = refuse(s4_text.replace("parameters:\n", "parameters:\n" + extra))
+    problems = refuse(s4_text.replace("\nparameters:\n", "\nparameters:\n" + extra))
     assert [problem.split(" (")[0] for problem in problems] == [
         "nothing in mine.yaml uses ego_sped [m/s] of the axis participants",
         "nothing in mine.yaml uses windd [m/s] of the axis weather",
@@ -147,7 +147,7 @@ def test_a_rate_must_stay_above_zero(refuse, write, s4_text):
         "{axis: participants, unit: m/s², low: 0, high: 4, default: 3, description: d, source: s}"
     )
     text = s4_text.replace("rate: 3.0", "rate: bv_rate")
-    text = text.replace("parameters:\n", f"parameters:\n  bv_rate: {entry}\n")
+    text = text.replace("\nparameters:\n", f"\nparameters:\n  bv_rate: {entry}\n")
     (problem,) = refuse(text)
     assert problem.startswith(
         "events.bv_sets_off.rate [m/s²] must be greater than 0, 'bv_rate' goes down to 0 ("

@@ -197,7 +197,7 @@ def test_a_lane_change_is_one_on_the_lanes_of_the_map(tmp_path):
     (found,) = read(path)
     located = locate(clean(found).traffic)
     assert (located.lanes.source, located.fit.vehicle_share) == ("lanelets", 1.0)
-    truck = located.placed.lane[-40:]
+    truck = located.placed.lane[-60:]
     assert [located.lanes.names[k] for k in truck[[0, -1]]] == ["12", "11"]
     assert np.count_nonzero(np.diff(truck)) == 1
     assert located.lanes.left[truck[0]] == truck[-1]

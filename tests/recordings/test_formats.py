@@ -56,7 +56,7 @@ CASES = [
     pytest.param(Case(b.write_osi, "OSI", lanes=True), id="OSI"),
     pytest.param(Case(b.write_osi_view, "OSI", lanes=True), id="OSI SensorView"),
     pytest.param(Case(b.write_mcap, "OSI", lanes=True), id="OSI MCAP"),
-    pytest.param(Case(b.write_dat, "esmini", accelerates=False), id="esmini"),
+    pytest.param(Case(b.write_dat, "esmini", speed=SWINGS, accelerates=False), id="esmini"),
 ]  # fmt: skip
 
 
@@ -120,15 +120,39 @@ def test_traffic_lights_of_scenarionet_change_when_they_are_recorded_to(tmp_path
     path = w.write_scenarionet(tmp_path)
     whole = pickle.loads(path.read_bytes())
     words = ["LANE_STATE_STOP"] * 10 + ["LANE_STATE_GO"] * 5 + ["odd"] * (w.N - 10)
+    lit = {"type": "TRAFFIC_LIGHT", "state": {"object_state": words}, "lane": 184}
+    far = lit | {"lane": 7, "stop_point": np.zeros(3, np.float32)}
     whole["dynamic_map_states"] = {
-        184: {"type": "TRAFFIC_LIGHT", "state": {"object_state": words}, "lane": 184}
+        184: lit | {"stop_point": np.array([3.0, 4.5, 0.0], np.float32)},
+        7: far,
+    }
+    line = np.column_stack([np.arange(6.0), np.full(6, 4.0), np.zeros(6)]).astype(np.float32)
+    whole["map_features"] = {
+        "184": {"type": "LANE_SURFACE_STREET", "polyline": line},
+        "7": {"type": "LANE_SURFACE_STREET", "polyline": line + np.float32(100.0)},
     }
     path.write_bytes(pickle.dumps(whole))
     (found,) = read(path)
-    ((name, changes),) = found.facts.lights.items()
-    assert name == "184"
-    assert [word for _, word in changes] == ["red", "green", "unknown"]
-    assert [time for time, _ in changes] == pytest.approx([0.0, 1.0, 1.5])
+    light, unknown = (found.facts.lights[name] for name in ("184", "7"))
+    assert light.lane == "184"
+    assert [word for _, word in light.changes] == ["red", "green", "unknown"]
+    assert [time for time, _ in light.changes] == pytest.approx([0.0, 1.0, 1.5])
+    assert light.path.tolist() == [[3.0, 4.5], [4.0, 4.0], [5.0, 4.0]]
+    assert len(unknown.path) == 0
+
+
+@pytest.mark.parametrize(("wrong", "rule"), [
+    ({"stop_point": ["a"]}, "stop_point must be an array of numbers"),
+    ({"state": {"object_state": "red"}}, "object_state must be a list"),
+])  # fmt: skip
+def test_lights_of_scenarionet_are_checked(tmp_path, wrong, rule):
+    path = w.write_scenarionet(tmp_path)
+    whole = pickle.loads(path.read_bytes())
+    whole["dynamic_map_states"] = {"1": {"state": {"object_state": []}, "lane": [1]} | wrong}
+    whole["map_features"] = {"[1]": {"polyline": [[0.0, 0.0], [1.0, 0.0]]}}
+    path.write_bytes(pickle.dumps(whole))
+    with pytest.raises(FileFormatError, match=rule):
+        list(read(path))
 
 
 def test_a_folder_gives_its_recordings_and_names_the_rest(tmp_path):

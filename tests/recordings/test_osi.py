@@ -124,10 +124,10 @@ def test_a_lamp_changes_when_it_is_recorded_to(tmp_path):
     seen = [(2, 3), (2, 3), (2, 2), (3, 4)]
     path = _osi(tmp_path, [_state(nanos=k * 10**8) + lamp(*one) for k, one in enumerate(seen)])
     (found,) = read(path)
-    ((name, changes),) = found.facts.lights.items()
+    ((name, light),) = found.facts.lights.items()
     assert name == "9"
-    assert [word for _, word in changes] == ["red", "off", "flashing yellow"]
-    assert [time for time, _ in changes] == pytest.approx([1.0, 1.2, 1.3])
+    assert [word for _, word in light.changes] == ["red", "off", "flashing yellow"]
+    assert [time for time, _ in light.changes] == pytest.approx([1.0, 1.2, 1.3])
 
 
 def _lane(name, points, ascending, left, right, before=0, after=0):

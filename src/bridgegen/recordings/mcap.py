@@ -144,7 +144,7 @@ def _decompress(method: str, data: bytes, size: int, place: str) -> bytes:
 
         try:
             reader = zstandard.ZstdDecompressor(max_window_size=MOST_RECORD).stream_reader(data)
-            return reader.read(size + 1)
+            return bytes(reader.read(size + 1))
         except zstandard.ZstdError as error:
             raise FileFormatError(f"{place}: no valid zstd: {str(error)[:80]}") from None
     if method == "lz4":

@@ -32,6 +32,7 @@ from bridgegen.recordings import mcap
 from bridgegen.recordings.columns import MOST_BYTES
 from bridgegen.recordings.format import Format, Head
 from bridgegen.recordings.lanelets import Lanelet
+from bridgegen.recordings.lights import RecordedLight
 from bridgegen.recordings.osi_lanes import LANE, lanelets_of
 from bridgegen.recordings.table import (
     MOST_STATES,
@@ -240,7 +241,7 @@ class _Trace:
             width=per_participant(ids, columns["width"]),
         )  # fmt: skip
 
-    def _lights(self, start: int) -> dict[str, tuple[tuple[float, str], ...]]:
+    def _lights(self, start: int) -> dict[str, RecordedLight]:
         """Return when each light changes [s], and to what; a light is one lamp."""
         changes: dict[int, list[tuple[float, str]]] = {}
         for one in sorted(self.lights, key=lambda each: int(each["time"])):
@@ -253,7 +254,7 @@ class _Trace:
                 seen = changes.setdefault(name, [])
                 if not seen or seen[-1][1] != word:
                     seen.append((time, word))
-        return {str(name): tuple(seen) for name, seen in changes.items()}
+        return {str(name): RecordedLight(tuple(seen)) for name, seen in changes.items()}
 
 
 def _ground_truth(message: Message) -> Message:

@@ -17,6 +17,7 @@ import numpy.typing as npt
 from bridgegen.ego.kinds import BICYCLE, CAR, MOTORCYCLE, OTHER, PEDESTRIAN
 from bridgegen.errors import FileFormatError
 from bridgegen.recordings.format import Format, Head
+from bridgegen.recordings.lights import RecordedLight, changes_of
 from bridgegen.recordings.pickles import PickledArray, read_pickle
 from bridgegen.recordings.scenarionet_map import lanelets_of
 from bridgegen.recordings.table import UNKNOWN_KIND, Facts, RecordedTraffic, build, median_step
@@ -32,6 +33,8 @@ LIGHTS = {
     "LANE_STATE_FLASHING_CAUTION": "flashing yellow",
 }  # fmt: skip
 """Any other state is unknown."""
+BESIDE_LANE = 5.0
+"""A stop point that is farther from its lane is none [m]: unknown ones are at the origin."""
 _PROTOCOLS = (b"\x80\x02", b"\x80\x03", b"\x80\x04", b"\x80\x05")
 
 
@@ -74,8 +77,7 @@ def _read(path: Path) -> Iterator[RecordedTraffic]:
         time_step=median_step(table[:, 0], first),
         frame=f"the scenario's ({data_set})" if data_set else "the scenario's",
         map="map features of the file" if whole.get("map_features") else "",
-        lights=MappingProxyType(_lights(path, whole.get("dynamic_map_states"), times)),
-        notes=notes, lanelets=lanelets,
+        lights=MappingProxyType(_lights(path, whole, times)), notes=notes, lanelets=lanelets,
     )  # fmt: skip
     yield build(
         facts, numbers,
@@ -86,29 +88,52 @@ def _read(path: Path) -> Iterator[RecordedTraffic]:
 
 
 def _lights(
-    path: Path, states: Any, times: npt.NDArray[np.float64]
-) -> dict[str, tuple[tuple[float, str], ...]]:
-    """Return when each traffic light changes [s], and to what."""
+    path: Path, whole: dict[Any, Any], times: npt.NDArray[np.float64]
+) -> dict[str, RecordedLight]:
+    """Return the traffic lights, and where the lanes lead that they govern."""
+    states, features = whole.get("dynamic_map_states"), whole.get("map_features")
     if states is None:
         return {}
     if not isinstance(states, dict):
         raise FileFormatError(f"{path}: dynamic_map_states must be a dictionary")
     found = {}
     for name, light in states.items():
+        place = f"{path}, light '{str(name)[:40]}'"
         inner = light.get("state") if isinstance(light, dict) else None
         words = inner.get("object_state") if isinstance(inner, dict) else None
         if not isinstance(words, list) or len(words) > len(times):
-            raise FileFormatError(
-                f"{path}, light '{str(name)[:40]}': object_state must be a list, one of an instant"
-            )
+            raise FileFormatError(f"{place}: object_state must be a list, one of an instant")
         seen = [LIGHTS.get(str(word), "unknown") for word in words]
-        changes = [
-            (float(time), word)
-            for k, (time, word) in enumerate(zip(times, seen, strict=False))
-            if k == 0 or word != seen[k - 1]
-        ]
-        found[str(name)[:200]] = tuple(changes)
+        lane = str(light.get("lane", ""))[:200]
+        feature = features.get(lane) if isinstance(features, dict) else None
+        found[str(name)[:200]] = RecordedLight(
+            changes_of(times.tolist(), seen), lane, _beyond_stop(place, light, feature)
+        )
     return found
+
+
+def _beyond_stop(place: str, light: dict[Any, Any], feature: Any) -> npt.NDArray[np.float64]:
+    """Return a lane's centre line from the stop point on; none if the file does not say."""
+    none = np.zeros((0, 2))
+    if light.get("stop_point") is None or not isinstance(feature, dict):
+        return none
+    if feature.get("polyline") is None:
+        return none
+    stop = _column(place, light, "stop_point").reshape(-1)[:2]
+    line = _column(f"{place}, its lane", feature, "polyline")
+    if len(stop) < 2 or line.ndim != 2 or line.shape[1] < 2 or len(line) < 2:
+        return none
+    line = line[:, :2]
+    if not (np.isfinite(stop).all() and np.isfinite(line).all()):
+        return none
+    apart = np.hypot(*(line - stop).T)
+    at = int(apart.argmin())
+    if apart[at] > BESIDE_LANE:
+        return none
+    course = line[min(at + 1, len(line) - 1)] - line[min(at, len(line) - 2)]
+    beyond = line[at:][(line[at:] - stop) @ course > 0.0]
+    beyond = beyond if len(beyond) else (stop + course)[None]
+    return np.concatenate([stop[None], beyond])
 
 
 def _track(

@@ -17,6 +17,7 @@ from bridgegen.arrays import Float, Int
 from bridgegen.ego.kinds import NAMES
 from bridgegen.errors import FileFormatError
 from bridgegen.recordings.lanelets import Lanelet
+from bridgegen.recordings.lights import RecordedLight
 
 MOST_STATES = 40_000_000
 MOST_PARTICIPANTS = 1_000_000
@@ -41,7 +42,7 @@ class Facts:
         time_step: between its states [s].
         frame: what x and y are, in words.
         map: the map that it names; "" for none.
-        lights: per traffic light, by id: the instants [s] and from then on its state.
+        lights: traffic lights, by id.
         notes: what was assumed in reading.
         lanelets: the lanes that come with it, in its coordinates.
     """
@@ -52,9 +53,7 @@ class Facts:
     time_step: float
     frame: str
     map: str = ""
-    lights: Mapping[str, tuple[tuple[float, str], ...]] = field(
-        default_factory=lambda: MappingProxyType({})
-    )
+    lights: Mapping[str, RecordedLight] = field(default_factory=lambda: MappingProxyType({}))
     notes: tuple[str, ...] = ()
     lanelets: tuple[Lanelet, ...] = ()
 

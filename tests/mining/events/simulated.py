@@ -17,11 +17,13 @@ from bridgegen.odd.reader import load
 from bridgegen.options import PipelineOptions
 from bridgegen.pipeline import Pipeline
 from bridgegen.recordings.clean import clean
+from bridgegen.recordings.lights import RecordedLight, changes_of
 from bridgegen.recordings.table import Facts, build
 from bridgegen.suite.rows import rows_of
 
 STEP = 0.01
 """So that events begin when their conditions hold [s]."""
+LIGHTS = ("off", "red", "red and yellow", "yellow", "green")
 APART = 100.0
 """Between the beginnings of two rows [s]."""
 
@@ -86,12 +88,28 @@ def recorded(rollout, rows, noise=0.0, dropped=0.0, step=0.05, seed=0):
     tracks, called = tracks_of(rollout, rows, noise, dropped, step, seed)
     time, x, y, heading = np.concatenate([one.states[:, :4] for one in tracks]).T
     ids = np.repeat(np.arange(len(tracks)), [len(one.states) for one in tracks])
-    facts = Facts("simulated", "none", "simulated", step, "a plane")
+    facts = Facts("simulated", "none", "simulated", step, "a plane", lights=lights(rollout, rows))
     return build(
         facts, ids, {"time": time, "x": x, "y": y, "heading": heading}, lambda i: f"state {i}",
         names=called, kind=[NAMES.index(one.kind) for one in tracks],
         length=[one.length for one in tracks], width=[one.width for one in tracks],
     )  # fmt: skip
+
+
+def lights(rollout, rows):
+    """The lights of a recording of these rows, each with its stop line."""
+    found = {}
+    for line, light in enumerate(rollout.stop_lights.tolist()):
+        x, y, h = rollout.stop_lines[rows[0], line]
+        times, words = [], []
+        for number, row in enumerate(rows):
+            k = np.arange(rollout.n_steps[row])
+            times.append(number * APART + k * rollout.time_step)
+            words += [LIGHTS[state] for state in rollout.lights[row, light, k].tolist()]
+        path = np.array([[x, y], [x + np.cos(h), y + np.sin(h)]])
+        name = rollout.light_names[light]
+        found[name] = RecordedLight(changes_of(np.concatenate(times).tolist(), words), name, path)
+    return found
 
 
 def located(traffic, lanes, time_step=0.05):

@@ -9,7 +9,9 @@ from bridgegen.mining.events.meetings import (
     Meeting,
     events_of_meetings,
     meetings,
+    paces_of,
 )
+from bridgegen.mining.events.red_light import ran_red
 from bridgegen.mining.events.scene import Scene
 
 
@@ -21,8 +23,13 @@ def find(scene: Scene, changes: LaneChanges) -> Events:
         and one.approach_angle < OPPOSITE
         and abs(one.ego_turn) <= STRAIGHT
     ]  # fmt: skip
-    return events_of_meetings("crossing", scene, met, _turn)
+    paces = paces_of(scene, met)
+    return events_of_meetings("crossing", scene, met, lambda one: _more(scene, one) | paces[one])
 
 
-def _turn(one: Meeting) -> dict[str, float]:
-    return {"other_turn": one.other_turn}
+def _more(scene: Scene, one: Meeting) -> dict[str, float]:
+    return {
+        "other_turn": one.other_turn,
+        "ego_ran_red": ran_red(scene, one.ego, one.ego_at),
+        "other_ran_red": ran_red(scene, one.other, one.other_at),
+    }

@@ -14,7 +14,11 @@ from bridgegen.mining.events import (
     following,
     lane_change,
     lead_brakes,
+    merging,
     oncoming_turn,
+    red_light,
+    right_turn,
+    swing_out,
     vru_crossing,
 )
 from bridgegen.mining.events.changes import LaneChanges, lane_changes
@@ -34,6 +38,10 @@ DETECTORS: dict[str, Callable[[Scene, LaneChanges], Events]] = {
     "crossing": crossing.find,
     "oncoming-left-turn": oncoming_turn.find,
     "vru-crossing": vru_crossing.find,
+    "merging": merging.find,
+    "red-light-violation": red_light.find,
+    "right-turn-with-bicycle": right_turn.find,
+    "bicycle-swings-out": swing_out.find,
 }
 """By kind; each returns what `bridgegen.odd.event_kinds.EVENT_KINDS` declares."""
 

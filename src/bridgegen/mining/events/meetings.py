@@ -9,6 +9,7 @@ import numpy as np
 from bridgegen.arrays import Bool
 from bridgegen.metrics.pet import pet
 from bridgegen.mining.events.event import NOT_WHOLE, Events, events_of
+from bridgegen.mining.events.pace import pace_changes
 from bridgegen.mining.events.scene import Scene
 from bridgegen.mining.events.setting_off import apart, set_off_instants
 from bridgegen.mining.excerpt import excerpt
@@ -23,6 +24,8 @@ AFTER = 1.0
 """The bodies are looked at until so long after the second passes [s]."""
 AVERAGED = 1.0
 """Before and after the crossing point, over which a speed is averaged [s]."""
+LEAST_PACE = 0.5
+"""By which the other changes its pace, at least [m/s]."""
 STRAIGHT = 30.0
 """Who turns less than this goes straight on [deg]."""
 CROSSING = (30.0, 150.0)
@@ -87,13 +90,14 @@ def meetings(scene: Scene, egos: Bool, others: Bool) -> list[Meeting]:
         strict=True,
     ):  # fmt: skip
         if egos[one] and others[other]:
-            found.append(_meeting(scene, one, other, one_at, other_at))
+            found.append(meeting(scene, one, other, one_at, other_at))
         if egos[other] and others[one]:
-            found.append(_meeting(scene, other, one, other_at, one_at))
+            found.append(meeting(scene, other, one, other_at, one_at))
     return found
 
 
-def _meeting(scene: Scene, ego: int, other: int, ego_at: float, other_at: float) -> Meeting:
+def meeting(scene: Scene, ego: int, other: int, ego_at: float, other_at: float) -> Meeting:
+    """Return the meeting of an ego and another that pass a point at two instants."""
     paths, clock = scene.paths, scene.clock
     lengths = paths.length(ego, ego_at), paths.length(other, other_at)
     own, its = paths.course(ego, lengths[0]), paths.course(other, lengths[1])
@@ -121,6 +125,7 @@ def events_of_meetings(
     met: Sequence[Meeting],
     more: Callable[[Meeting], dict[str, float]],
     roles: Mapping[str, Sequence[int]] = MappingProxyType({}),
+    refused: Mapping[str, Sequence[bool]] = MappingProxyType({}),
 ) -> Events:
     """Return meetings as events of a kind, with the quantities that all of them have.
 
@@ -130,6 +135,7 @@ def events_of_meetings(
         met: in any order.
         more: the quantities that this kind has besides.
         roles: participants besides the other, by role.
+        refused: further reasons for which meetings are no events.
     """
     off = set_off_instants(scene, [one.other for one in met], [one.other_at for one in met])
     rows = [
@@ -154,15 +160,44 @@ def events_of_meetings(
         {
             NOT_WHOLE: (first - begin) * scene.step < LEAST_SEEN,
             TOUCH: table["pet"] <= 0.0,
-        },
+        }
+        | {reason: np.array(mask, np.bool_) for reason, mask in refused.items()},
     )  # fmt: skip
+
+
+def paces_of(scene: Scene, met: Sequence[Meeting]) -> dict[Meeting, dict[str, float]]:
+    """Return of meetings how the other changes its pace before it passes the point."""
+    found = pace_changes(
+        scene, [one.other for one in met], [one.other_at for one in met], LEAST_PACE
+    )  # fmt: skip
+    paces = {}
+    for i, one in enumerate(met):
+        begin = float(found.begin[i])
+        ways, distance = _ways_left(scene, one, begin)
+        paces[one] = {
+            "pace_before": float(found.before[i]), "pace_after": float(found.after[i]),
+            "pace_distance": ways[0], "pace_ego_distance": ways[1], "pace_apart": distance,
+        }  # fmt: skip
+    return paces
+
+
+def _ways_left(scene: Scene, one: Meeting, at: float) -> tuple[list[float], float]:
+    """Return how far other and ego have to go at an instant, and how far apart they are [m]."""
+    paths, clock = scene.paths, scene.clock
+    if not clock.begin[one.ego] <= at <= clock.end[one.ego]:
+        return [np.nan, np.nan], np.nan
+    ways = [
+        paths.length(who, end) - paths.length(who, at)
+        for who, end in ((one.other, one.other_at), (one.ego, one.ego_at))
+    ]
+    return ways, apart(scene, one.ego, one.other, at)
 
 
 def _quantities(scene: Scene, one: Meeting, set_off: float) -> Iterator[tuple[str, float]]:
     paths = scene.paths
     for name, who, at in (("ego", one.ego, one.ego_at), ("other", one.other, one.other_at)):
         yield f"{name}_speed", _speed(scene, who, one.begin)
-        yield f"{name}_crossing_speed", _crossing_speed(scene, who, at)
+        yield f"{name}_crossing_speed", crossing_speed(scene, who, at)
         yield f"{name}_distance", paths.length(who, at) - paths.length(who, one.begin)
     yield "time_gap", (one.last_at - one.first_at) * scene.step
     yield "pet", _pet(scene, one)
@@ -171,14 +206,10 @@ def _quantities(scene: Scene, one: Meeting, set_off: float) -> Iterator[tuple[st
     yield "side", one.side
     yield "ego_first", float(one.ego_at < one.other_at)
     yield "seen_time", (one.first_at - one.begin) * scene.step
-    both = scene.clock.begin[one.ego] <= set_off <= scene.clock.end[one.ego]
-    lengths = [
-        paths.length(who, end) - paths.length(who, set_off) if both else np.nan
-        for who, end in ((one.other, one.other_at), (one.ego, one.ego_at))
-    ]
-    yield "set_off_distance", lengths[0]
-    yield "set_off_ego_distance", lengths[1]
-    yield "set_off_apart", apart(scene, one.ego, one.other, set_off) if both else np.nan
+    ways, distance = _ways_left(scene, one, set_off)
+    yield "set_off_distance", ways[0]
+    yield "set_off_ego_distance", ways[1]
+    yield "set_off_apart", distance
 
 
 def _speed(scene: Scene, who: int, instant: float) -> float:
@@ -187,7 +218,7 @@ def _speed(scene: Scene, who: int, instant: float) -> float:
     return float(scene.at(scene.speed, np.array([who]), at)[0])
 
 
-def _crossing_speed(scene: Scene, who: int, at: float) -> float:
+def crossing_speed(scene: Scene, who: int, at: float) -> float:
     """Return a speed by the length of the path, which noise makes longer by little [m/s]."""
     around, clock = AVERAGED / scene.step, scene.clock
     low, high = max(at - around, float(clock.begin[who])), min(at + around, float(clock.end[who]))

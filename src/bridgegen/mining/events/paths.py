@@ -1,7 +1,7 @@
-"""The paths of a recording's participants as lines, and where those of two cross.
+"""The paths of a recording's participants as lines, and where those of two cross or join.
 
 A path leads through states that are 1 m apart at least, so that noise of who stands makes none.
-Crossings need no lanes.
+Neither needs lanes.
 """
 
 from dataclasses import dataclass
@@ -12,6 +12,7 @@ from bridgegen.arrays import Float, Int
 from bridgegen.ego.kinds import BICYCLE, PEDESTRIAN
 from bridgegen.mining.conflicts.find import EGOS
 from bridgegen.mining.events._crossing_kernels import mark_crossings, mark_vertices
+from bridgegen.mining.events._joining_kernels import mark_joins
 from bridgegen.mining.excerpt import Clock
 from bridgegen.recordings.table import RecordedTraffic, wrap
 
@@ -27,6 +28,37 @@ AROUND = 2.0
 """Before and after a point of a path, between which its course is taken [m]."""
 BEFORE, AFTER = 30.0, 15.0
 """Of a crossing: from there to there a path turns [m]."""
+
+NEAR = 2.0
+"""Paths that are nearer than this are one [m]: a car is 1.8 m wide."""
+ONE_WAY = np.radians(20.0)
+"""Between the courses of paths that are one, at most."""
+
+
+@dataclass(frozen=True, eq=False)
+class Joins:
+    """Where paths of two motor vehicles come together, and lead the same way for a while.
+
+    A pair may have several. Where one of both has been on the shared part from its beginning there
+    is none.
+
+    Attributes:
+        one: ``(K,)`` participant.
+        other: ``(K,)`` participant, a greater number.
+        one_at: ``(K,)`` instant at which its centre comes to the shared part.
+        other_at: ``(K,)``.
+        one_length: ``(K,)`` of its path until there [m].
+        other_length: ``(K,)`` [m].
+        shared: ``(K,)`` length of the shared part [m].
+    """
+
+    one: Int
+    other: Int
+    one_at: Float
+    other_at: Float
+    one_length: Float
+    other_length: Float
+    shared: Float
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,20 +84,25 @@ class Paths:
     Args:
         traffic: the recording.
         clock: its own.
+
+    Attributes:
+        traffic: the recording.
+        clock: its own.
+        vertices: the states through which the paths lead, by participant and time.
     """
 
     def __init__(self, traffic: RecordedTraffic, clock: Clock) -> None:
         self.traffic, self.clock = traffic, clock
         marked = np.zeros(len(traffic.x), np.bool_)
         mark_vertices(traffic.first, traffic.x, traffic.y, VERTEX, marked)
-        self._vertex = np.flatnonzero(marked)
-        self._first = np.searchsorted(self._vertex, traffic.first)
-        steps = np.hypot(np.diff(traffic.x[self._vertex]), np.diff(traffic.y[self._vertex]))
+        self.vertices = np.flatnonzero(marked)
+        self._first = np.searchsorted(self.vertices, traffic.first)
+        steps = np.hypot(np.diff(traffic.x[self.vertices]), np.diff(traffic.y[self.vertices]))
         self._length = np.concatenate([[0.0], np.cumsum(steps)])
 
     def crossings(self) -> Crossings:
         """Return where paths cross that are passed within `WINDOW`; one at least by a vehicle."""
-        traffic, vertex = self.traffic, self._vertex
+        traffic, vertex = self.traffic, self.vertices
         who = traffic.participant[vertex]
         piece = np.flatnonzero(who[1:] == who[:-1])
         a, b, who = vertex[piece], vertex[piece + 1], who[piece]
@@ -96,12 +133,38 @@ class Paths:
             room = count
         return _of_pairs(pairs[:count], times[:count])
 
+    def joins(self) -> Joins:
+        """Return where paths of motor vehicles join that are passed within `WINDOW`."""
+        traffic, vertex = self.traffic, self.vertices
+        who, instant = traffic.participant[vertex], self.clock.instant
+        x, y = traffic.x[vertex], traffic.y[vertex]
+        column, line = (np.floor(values / NEAR).astype(np.int64) for values in (x, y))
+        column, line = column - column.min(), line - line.min() + 1
+        row = int(line.max()) + 2
+        cell = column * row + line
+        entries = np.lexsort((instant[vertex], cell))
+        cells, first = np.unique(cell[entries], return_index=True)
+        arguments = (
+            cells, np.append(first, len(entries)).astype(np.int64), row, entries, cell, self._first,
+            who, x, y, self._length, vertex, traffic.x, traffic.y, instant,
+            _roles(traffic, self.clock), WINDOW / traffic.facts.time_step, NEAR,
+            float(np.cos(ONE_WAY)),
+        )  # fmt: skip
+        room = 1 << 12
+        while True:
+            pairs, places = np.empty((room, 2), np.int64), np.empty((room, 5))
+            count = mark_joins(*arguments, pairs, places)
+            if count <= room:
+                break
+            room = count
+        return Joins(*pairs[:count].T, *places[:count].T)
+
     def length(self, who: int, instant: float) -> float:
         """Return how long a path is up to an instant at which its participant is recorded [m]."""
         x, y, state = self._position(who, instant)
         first, last = int(self._first[who]), int(self._first[who + 1])
-        v = first + int(np.searchsorted(self._vertex[first:last], state, side="right")) - 1
-        at = self._vertex[v]
+        v = first + int(np.searchsorted(self.vertices[first:last], state, side="right")) - 1
+        at = self.vertices[v]
         rest = float(np.hypot(x - self.traffic.x[at], y - self.traffic.y[at]))
         return float(self._length[v] - self._length[first]) + rest
 
@@ -109,7 +172,7 @@ class Paths:
         """Return the point of a path at a length, or the nearer end (x, y) [m]."""
         part = slice(int(self._first[who]), int(self._first[who + 1]))
         lengths = self._length[part] - self._length[part.start]
-        at = self._vertex[part]
+        at = self.vertices[part]
         return (
             float(np.interp(length, lengths, self.traffic.x[at])),
             float(np.interp(length, lengths, self.traffic.y[at])),

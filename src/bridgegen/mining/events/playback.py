@@ -93,7 +93,9 @@ def closest(
 def _time_gaps(events: Events) -> Float:
     if MEETING in events.quantities:
         return np.nan_to_num(events.quantities[MEETING], nan=np.inf)
-    gap = events.quantities[GAPS.get(events.kind.name, "gap")]
+    gap = events.quantities.get(GAPS.get(events.kind.name, "gap"))
+    if gap is None:
+        return np.full(len(events), np.inf)
     time_gap = gap / np.maximum(events.quantities["ego_speed"], LEAST_SPEED)
     return np.where(np.isnan(time_gap), np.inf, time_gap)
 
@@ -138,12 +140,14 @@ def playback_section(played: Sequence[PlayedEvent]) -> str:
 
 def _picture(one: PlayedEvent) -> str:
     if MEETING in EVENT_KINDS[one.kind].quantities:
-        gap = f"{one.time_gap:.2f} s between them"
+        gap = f"; {one.time_gap:.2f} s between them"
+    elif "gap" in EVENT_KINDS[one.kind].quantities:
+        gap = f"; {one.time_gap:.2f} s behind" if np.isfinite(one.time_gap) else "; no leader"
     else:
-        gap = f"{one.time_gap:.2f} s behind" if np.isfinite(one.time_gap) else "no leader"
+        gap = ""
     about = (
         f"{one.name}: ego {one.ego} of {one.recording}, from {one.seconds:.2f} s by the "
-        f"recording's clock; {gap}"
+        f"recording's clock{gap}"
     )
     picture = moving_picture(one.motion, 1, one.when, about)
     return (

@@ -9,7 +9,8 @@ import numpy as np
 
 from bridgegen.arrays import Bool, Float, Int
 from bridgegen.mining.conflicts.find import EGOS
-from bridgegen.mining.events.paths import Crossings, Paths
+from bridgegen.mining.events.paths import Crossings, Joins, Paths
+from bridgegen.mining.events.stop_lines import Passing, passings
 from bridgegen.mining.excerpt import clock_of
 from bridgegen.mining.lanes.find import Located
 from bridgegen.mining.lanes.model import NONE
@@ -95,6 +96,16 @@ class Scene:
     def crossings(self) -> Crossings:
         """Where these cross."""
         return self.paths.crossings()
+
+    @cached_property
+    def joins(self) -> Joins:
+        """Where these join."""
+        return self.paths.joins()
+
+    @cached_property
+    def passings(self) -> list[Passing]:
+        """Who passes the stop lines of traffic lights."""
+        return passings(self.paths, self.is_ego)
 
     @cached_property
     def cosine(self) -> Float:
