@@ -55,16 +55,10 @@ def jumps(time: Float, x: Float, y: Float) -> Jumps:
     """Return where one track jumps: in place, of a body whose velocity is that around."""
     n = len(time)
     steps = np.diff(time)
-    vx, vy = np.diff(x) / steps, np.diff(y) / steps
-    far = np.zeros(n - 1, dtype=np.bool_)
-    medians = np.zeros((n - 1, 2))
-    for i in range(n - 1):
-        around = np.r_[max(0, i - NEIGHBOURS) : i, i + 1 : min(n - 1, i + 1 + NEIGHBOURS)]
-        if not len(around):
-            continue
-        medians[i] = np.median(vx[around]), np.median(vy[around])
-        error = np.hypot(*(np.array([vx[i], vy[i]]) - medians[i])) * steps[i]
-        far[i] = error > JUMP + 0.5 * STRONGEST * steps[i] ** 2
+    velocity = np.column_stack([np.diff(x) / steps, np.diff(y) / steps])
+    medians = _medians_around(velocity)
+    error = np.hypot(*(velocity - medians).T) * steps
+    far = error > JUMP + 0.5 * STRONGEST * steps**2
     off, after = [], []
     i = 0
     while i < n - 1:
@@ -76,6 +70,22 @@ def jumps(time: Float, x: Float, y: Float) -> Jumps:
             after.append(i)
         i += 1
     return Jumps(np.array(off, dtype=np.int64), np.array(after, dtype=np.int64))
+
+
+def _medians_around(values: Float) -> Float:
+    """Return per row the median of those around it, without its own, ``(n, 2)``; alone, its own."""
+    n, width = len(values), 2 * NEIGHBOURS + 1
+    medians = values.copy()
+    if n >= width:
+        windows = np.lib.stride_tricks.sliding_window_view(values, width, axis=0)
+        others = np.delete(windows, NEIGHBOURS, axis=2)
+        medians[NEIGHBOURS : n - NEIGHBOURS] = np.median(others, axis=2)
+    inner = range(NEIGHBOURS, n - NEIGHBOURS) if n >= width else range(0)
+    for i in set(range(n)).difference(inner):
+        around = np.r_[max(0, i - NEIGHBOURS) : i, i + 1 : min(n, i + 1 + NEIGHBOURS)]
+        if len(around):
+            medians[i] = np.median(values[around], axis=0)
+    return medians
 
 
 def _returns(time: Float, x: Float, y: Float, velocity: Float, i: int) -> bool:
