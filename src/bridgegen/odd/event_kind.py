@@ -30,6 +30,8 @@ class EventKind:
         source: of the rule.
         quantities: by name.
         needs_lanes: whether only driving on lanes can hold one.
+        needs_lights: whether only recordings with traffic lights can hold one.
+        of_lights: the quantities that only such recordings say.
     """
 
     name: str
@@ -38,6 +40,8 @@ class EventKind:
     source: str
     quantities: Mapping[str, EventQuantity]
     needs_lanes: bool = True
+    needs_lights: bool = False
+    of_lights: tuple[str, ...] = ()
 
 
 EGO_SPEED = ("ego_speed", "m/s", "speed of the ego at the beginning")
@@ -50,7 +54,11 @@ def event_kind(
     source: str,
     rows: tuple[tuple[str, str, str], ...],
     needs_lanes: bool = True,
+    needs_lights: bool = False,
+    of_lights: tuple[str, ...] = (),
 ) -> EventKind:
     """Return a kind of the rows of its quantities: name, unit, description."""
     quantities = {row[0]: EventQuantity(*row) for row in rows}
-    return EventKind(name, roles, rule, source, quantities, needs_lanes)
+    return EventKind(
+        name, roles, rule, source, quantities, needs_lanes, needs_lights, of_lights
+    )  # fmt: skip

@@ -95,6 +95,7 @@ PATH_KINDS = (
             *_PACE,
         ),
         needs_lanes=False,
+        of_lights=("ego_ran_red", "other_ran_red"),
     ),
     event_kind(
         "oncoming-left-turn",
@@ -167,6 +168,7 @@ PATH_KINDS = (
             ("turn", "deg", "by how much it turns from 5 m before to 25 m after, left positive"),
         ),
         needs_lanes=False,
+        needs_lights=True,
     ),
     event_kind(
         "right-turn-with-bicycle",

@@ -30,6 +30,14 @@ class RecordedSpec:
     where: Expression | None = None
     place: str = field(default="", compare=False, repr=False)
 
+    @property
+    def needs_lights(self) -> bool:
+        """Whether only recordings with traffic lights say which events count."""
+        kind = EVENT_KINDS[self.event]
+        return kind.needs_lights or (
+            self.where is not None and not self.where.names.isdisjoint(kind.of_lights)
+        )
+
     def counts(self, quantities: Mapping[str, Float]) -> Bool:
         """Return which events count, ``(N,)``; not where a quantity that decides is missing.
 

@@ -102,9 +102,12 @@ def print_mined(mined: "Mined", *, as_json: bool) -> None:
         print_table(of_events, list(screen_rows(mined)), as_json=False)
     made = [one for one in mined.mined if isinstance(one, MinedScenario)]
     print()
+    unmade: dict[str, list[str]] = {}
     for one in mined.mined:
         if isinstance(one, Unmade):
-            print(f"{one.source}: no scenario: {one.reason}")
+            unmade.setdefault(one.reason, []).append(one.source)
+    for reason, sources in unmade.items():
+        print(f"{', '.join(sources)}: no scenario: {reason}")
     if made:
         print()
         of_made = ("mined scenario", "events", "per hour (95 %)", "parameters beyond the source's")
@@ -139,11 +142,15 @@ def _print_events(mined: "Mined") -> None:
     from bridgegen.mining.events.tables import against_in_words, kind_rows, rates_in_words
 
     found = [one.events for one in mined.recordings]
-    rows = [
-        (kind, count, per_hour, per_km) for kind, count, per_hour, per_km, _ in kind_rows(found)
-    ]
-    print_table(("event", "count", "per hour (95 %)", "per 1000 km (95 %)"), rows, as_json=False)
-    for kind, _, _, _, refused in kind_rows(found):
+    kinds = list(kind_rows(found))
+    rows = [row[:4] for row in kinds if row[1]]
+    if rows:
+        head = ("event", "count", "per hour (95 %)", "per 1000 km (95 %)")
+        print_table(head, rows, as_json=False)
+    none = [f"{kind} {per_hour}" for kind, count, per_hour, _, _ in kinds if not count]
+    if none:
+        print(f"none found, per hour (95 %): {', '.join(none)}; –: nothing to look in")
+    for kind, _, _, _, refused in kinds:
         if refused:
             print(f"{kind}: refused {refused}")
     met = [one for one in mined.scenarios if one.count]

@@ -6,7 +6,9 @@ from tests.mining.events.planted import found, line, rows_of, turning
 
 from bridgegen.ego.kinds import BICYCLE
 from bridgegen.mining.events.event import NOT_WHOLE
+from bridgegen.mining.events.of_scenarios import encounters_of
 from bridgegen.mining.events.red_light import RIGHT_ON_RED
+from bridgegen.odd.reader import load
 from bridgegen.recordings.lights import RecordedLight
 
 KIND = "red-light-violation"
@@ -152,3 +154,15 @@ def test_since_when_a_light_is_red():
     assert light.red_since(4.9) == 2.0
     assert light.red_since(7.0) == 6.0
     assert np.isnan([light.red_since(time) for time in (1.9, 5.5, -1.0)]).all()
+
+
+def test_without_lights_there_is_no_rate_of_who_runs_them():
+    dark, _ = found([drives_over()])
+    lit, _ = found([drives_over()], lights=[turns_red(6.5)])
+    for kind, needs in ((KIND, False), ("crossing", True)):
+        assert encounters_of(0, [dark], kind, needs_lights=needs) is None
+        met = encounters_of(1, [dark, lit], kind, needs_lights=needs)
+        assert met.hours == lit.all_hours
+    assert encounters_of(0, [dark], "crossing").hours == dark.all_hours
+    specs = {name: load(name).recorded for name in ("red-light-runner", "crossroads-s1", "cut-in")}
+    assert [one.needs_lights for one in specs.values()] == [True, False, False]

@@ -38,7 +38,7 @@ def events(kind, quantities, refused=None):
         every, refused or {},
     )  # fmt: skip
     return FoundEvents(
-        "a recording", "a.csv", tuple(map(str, range(n + 1))), (one,), HOURS, KM, HOURS, KM
+        "a recording", "a.csv", tuple(map(str, range(n + 1))), (one,), HOURS, KM, HOURS, KM, False
     )
 
 

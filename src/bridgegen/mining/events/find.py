@@ -59,6 +59,7 @@ class FoundEvents:
         kilometres: likewise [km].
         all_hours: of driving and standing anywhere by all who can be the ego [h].
         all_kilometres: likewise [km].
+        has_lights: whether it has traffic lights whose stop lines are known.
     """
 
     recording: str
@@ -69,9 +70,12 @@ class FoundEvents:
     kilometres: float
     all_hours: float
     all_kilometres: float
+    has_lights: bool
 
-    def driving(self, kind: str) -> tuple[float, float]:
+    def driving(self, kind: str, *, needs_lights: bool = False) -> tuple[float, float]:
         """Return the hours and kilometres in which a kind of event was looked for."""
+        if (needs_lights or EVENT_KINDS[kind].needs_lights) and not self.has_lights:
+            return 0.0, 0.0
         if EVENT_KINDS[kind].needs_lanes:
             return self.hours, self.kilometres
         return self.all_hours, self.all_kilometres
@@ -89,6 +93,7 @@ def find_events(traffic: RecordedTraffic, located: Located) -> FoundEvents:
         tuple(find(scene, changes) for find in DETECTORS.values()),
         float(pairs.sum()) * scene.step / 3600.0, float(paths[pairs].sum()) / 1000.0,
         float(own.sum()) * scene.step / 3600.0, float(paths[own].sum()) / 1000.0,
+        any(len(light.path) for light in traffic.facts.lights.values()),
     )  # fmt: skip
 
 

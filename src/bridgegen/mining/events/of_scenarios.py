@@ -139,7 +139,9 @@ def recorded_scenarios(paths: Sequence[Path] = ()) -> tuple[Sought, ...]:
     return tuple(found)
 
 
-def encounters_of(count: int, found: Sequence[FoundEvents], kind: str) -> Encounters | None:
+def encounters_of(
+    count: int, found: Sequence[FoundEvents], kind: str, *, needs_lights: bool = False
+) -> Encounters | None:
     """Return how often events were met, in the driving in which they were looked for.
 
     Events that the recording cuts off are not among them, so the driving is scaled by the share
@@ -149,9 +151,13 @@ def encounters_of(count: int, found: Sequence[FoundEvents], kind: str) -> Encoun
         count: how many events there were.
         found: of all recordings.
         kind: of the events.
+        needs_lights: whether only recordings with traffic lights say which events these are.
+
+    Returns:
+        None if there was no such driving.
     """
     share = whole_share(found, kind)
-    driving = [one.driving(kind) for one in found]
+    driving = [one.driving(kind, needs_lights=needs_lights) for one in found]
     hours, km = (share * sum(one[i] for one in driving) for i in range(2))
     if hours <= 0.0:
         return None
@@ -199,7 +205,8 @@ def scenario_events(
     return ScenarioEvents(
         scenario.name, spec.event, counts, rows, called, int(counts - whole.sum()),
         tuple(_outside(scenario, rows)), broken,
-        unmapped(spec, scenario.parameters), encounters_of(counts, found, spec.event),
+        unmapped(spec, scenario.parameters),
+        encounters_of(counts, found, spec.event, needs_lights=spec.needs_lights),
     )  # fmt: skip
 
 

@@ -115,10 +115,6 @@ def _rest(scenario: LogicalScenario, names: Sequence[str]) -> list[str]:
     return [name for name in scenario.space().variables if name not in names]
 
 
-def _sum(found: Sequence[FoundEvents], name: str) -> float:
-    return float(sum(getattr(one, name) for one in found))
-
-
 def _about(events: ScenarioEvents, found: Sequence[FoundEvents], time_step: float) -> str:
     """Return where the events come from, and what was left out."""
     recordings = [one.recording for one in found]
@@ -129,10 +125,11 @@ def _about(events: ScenarioEvents, found: Sequence[FoundEvents], time_step: floa
         refused.update(one.refused)
     reasons = "; ".join(f"{number} {reason}" for reason, number in refused.items())
     left_out = f"candidates refused: {reasons or 'none'}"
+    hours, km = np.sum([one.driving(events.kind) for one in found], axis=0)
     text = (
         f"{events.count} events of the kind {events.kind} in {count} ({shown}), resampled to "
-        f"{time_step:g} s; {_sum(found, 'hours'):.4g} h and {_sum(found, 'kilometres'):.4g} km of "
-        f"motor vehicles on lanes, each of which may be the ego; {left_out}"
+        f"{time_step:g} s; {hours:.4g} h and {km:.4g} km of motor vehicles, each of which may be "
+        f"the ego; {left_out}"
     )
     if (share := whole_share(found, events.kind)) < 1.0:
         text += f"; hours and km of encounters are {share:.3g} of these, as others are cut off"
