@@ -158,10 +158,11 @@ def write_dat(folder: Path, tracks=TRACKS, step=STEP) -> Path:
     left = {}
     for name, end in ends.items():
         left.setdefault(end + 1, []).append(name)
+    first = min(frames)
     for frame, rows in sorted(frames.items()):
         found += [
             packet(5, "d", frame * step),
-            packet(21, "d", step) if frame == min(frames) else b"",
+            packet(21, "d", step) if frame == first else b"",
         ]
         for name in left.get(frame, ()):
             found += [packet(0, "i", number[name]), packet(19)]
