@@ -24,7 +24,7 @@ from bridgegen.campaign.settings import Settings
 from bridgegen.errors import InputError, Interrupted, StorageError, WorkersError
 from bridgegen.odd.adversary import adversarial
 from bridgegen.odd.parameters import Axis
-from bridgegen.odd.scenario import LogicalScenario
+from bridgegen.odd.scenario import LogicalScenario, SearchedScenario
 from bridgegen.openx.opendrive.road_map import RoadMap
 from bridgegen.openx.opendrive.site_adapted import adapted
 from bridgegen.openx.opendrive.site_fit import ALL
@@ -32,6 +32,7 @@ from bridgegen.options import SearchOptions, called_with, range_problems
 from bridgegen.pipeline import Pipeline
 from bridgegen.report.data import WHOLE
 from bridgegen.search.algorithm import Problem, resolve
+from bridgegen.search.automatic import AUTO, automatic
 from bridgegen.simulation.choice import SimulatorChoice
 from bridgegen.store import Recorded, Store, refuse_used
 from bridgegen.triage.effort import effort
@@ -113,6 +114,7 @@ def run_search(given: SearchArguments) -> Run:
         raise InputError(*problems)
     require_screen(given, budget)
     effort(given.triage)
+    given = _with_algorithm(given, catalogue, budget)
     method = toolkit.get(given.algorithm)
     columns = columns_of(method, given.objectives)
     spec = chosen_objective(catalogue.objective, given, columns)
@@ -335,6 +337,21 @@ def _critical_by_objective(rows: Recorded, keep: int) -> Int:
     at = np.flatnonzero(rows.critical)
     found: Int = at[most_critical(rows.U[at], rows.F[at], rows.critical[at], keep)]
     return found
+
+
+def _with_algorithm(
+    given: SearchArguments, scenario: SearchedScenario, budget: int
+) -> SearchArguments:
+    """Return options that name the algorithm; where they say `AUTO`, the one that it is."""
+    if given.algorithm != AUTO:
+        return given
+    name = automatic(
+        screen_budget(given, budget) or budget,
+        scenario.space(given.axes, given.fixed).n_var,
+        many=given.objectives == "many",
+        closed_loop=given.adversary is not None,
+    )
+    return replace(given, algorithm=name)
 
 
 def _junction(given: SearchArguments, roads: RoadMap | None) -> str | None:

@@ -49,8 +49,9 @@ def _scenarios_of_suite(ctx: typer.Context) -> Iterable[str]:
 
 def _algorithms(_: typer.Context) -> Iterable[str]:
     from bridgegen.search import names
+    from bridgegen.search.automatic import AUTO
 
-    return names()
+    return (*names(), AUTO)
 
 
 def _settings(ctx: typer.Context) -> Iterable[str]:

@@ -320,8 +320,8 @@ class SearchOptions(CommonOptions):
         default="pso",
         metadata=option(
             TEXT,
-            "Search algorithm, see 'bridgegen list algorithms'; or your own: module:Class, "
-            "file.py:Class.",
+            "Search algorithm, see 'bridgegen list algorithms'; auto, chosen by the budget; or "
+            "your own: module:Class, file.py:Class.",
             group=SEARCH,
             names="algorithm",
         ),

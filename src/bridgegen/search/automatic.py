@@ -1,0 +1,25 @@
+"""Which search algorithm `auto` is: the one that found most in its place, by measurement."""
+
+AUTO = "auto"
+"""Names no algorithm, but the choice of one."""
+
+MOST_MODELLED = 3000
+"""Rows up to which models of the space are worth their time, 12 ms a row."""
+MOST_PARAMETERS = 40
+"""Beyond, a Gaussian process of some hundred rows says little."""
+
+
+def automatic(rows: int, parameters: int, *, many: bool, closed_loop: bool) -> str:
+    """Return the name of the algorithm for a search (docs/decisions/search.md has the figures).
+
+    Args:
+        rows: of the search.
+        parameters: that are searched.
+        many: whether several objectives are optimised.
+        closed_loop: whether a participant's decisions are searched, too.
+    """
+    if many:
+        return "nsga2"
+    if rows <= MOST_MODELLED and parameters <= MOST_PARAMETERS and not closed_loop:
+        return "surrogate"
+    return "es"
