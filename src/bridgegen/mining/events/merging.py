@@ -26,7 +26,7 @@ LEAST_SPEEDING = 1.0
 
 @dataclass(frozen=True)
 class _Gaps:
-    """Of the vehicle that merges, to whoever is ahead and behind when it joins [m]."""
+    """The gaps ahead of and behind the vehicle that merges, when it joins [m]."""
 
     lead: float = np.nan
     follower: float = np.nan
@@ -50,7 +50,7 @@ def find(scene: Scene, changes: LaneChanges) -> Events:
 
 
 def _next_ones(scene: Scene, joins: Iterable[Join]) -> Iterator[Join]:
-    """Yield the joins of two between whom nobody else joins: the next one ahead, or behind.
+    """Yield the joins with the next vehicle ahead and the next one behind.
 
     A pair joins once: by its paths, or else by its lanes.
     """

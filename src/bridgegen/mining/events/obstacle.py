@@ -33,7 +33,7 @@ class Obstacle:
 
 
 def obstacle_ahead(scene: Scene, other: int, instant: float) -> Obstacle:
-    """Return what stands ahead of somebody at an instant."""
+    """Return the nearest standing obstacle ahead of a participant at an instant."""
     clock, traffic = scene.clock, scene.traffic
     k = round(instant)
     there = (clock.begin <= k) & (clock.end >= k) & ~np.isin(traffic.kind, WALKS)
