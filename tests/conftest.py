@@ -14,6 +14,8 @@ from typing import Any
 import pytest
 from hypothesis import settings
 
+from bridgegen.garbage import collect_rarely
+
 CHECKERS = "BRIDGEGEN_CHECKERS"
 
 # No deadline: the first example may compile a kernel, and shared machines stall.
@@ -24,6 +26,9 @@ settings.load_profile("ci" if os.environ.get("CI") else "default")
 # Rewriting the assertions of all test modules takes each process 40 s, unless it may be kept.
 sys.dont_write_bytecode = False
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+
+# A search for cyclic garbage visits the 600,000 objects of all test modules: it is made less often.
+collect_rarely()
 
 # A shell's background job ignores Ctrl-C, and what it starts inherits that: some tests send it.
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:

@@ -55,7 +55,11 @@ SHORT = {
 }
 """What commands are run with instead of what the page says."""
 
-FEW = {"suite": {"--samples": "6"}, "diff": {"--samples": "6"}}
+FEW = {
+    "suite": {"--samples": "6"},
+    "diff": {"--samples": "6"},
+    "search": {"--workers": "1"},  # processes: tests/campaign/test_workers.py
+}
 """The same, of options that the page names."""
 
 COARSE = {
@@ -102,8 +106,8 @@ def words_of(line: str) -> list[str]:
 def shortened(words: list[str]) -> list[str]:
     """Return a bridgegen command that takes less time."""
     short = dict(SHORT.get(words[1], {}))
-    if "--budget" in short and any(".py:" in word for word in words):
-        short["--budget"] = "40"  # a driver in Python takes its time
+    if "--budget" in short and any(".py:" in word or word == "--adversary" for word in words):
+        short["--budget"] = "40"  # a driver in Python, or a course for each row, takes its time
     found = list(words)
     for option, value in FEW.get(words[1], {}).items():
         if option in found:

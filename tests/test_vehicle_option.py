@@ -92,7 +92,7 @@ def test_a_comparison_records_it_in_each_run(vehicle, tmp_path):
     out = tmp_path / "out"
     bg.compare("cut-in", ego="route-follower", vehicle=vehicle, **given, out=out)
     (run,) = (out / "runs").iterdir()
-    assert bg.resume(run).settings.vehicle == vehicle
+    assert bg.resume(run, deliver=False).settings.vehicle == vehicle
 
 
 def test_a_comparison_refuses_an_unknown_one(tmp_path, cli):

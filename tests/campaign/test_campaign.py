@@ -280,7 +280,7 @@ def test_one_seed_one_result_and_another_seed_another(tmp_path):
 
 def start(folder: Path, budget: int) -> subprocess.Popen[str]:
     command = (
-        f"search crossroads-s4 --budget {budget} --seed 3 --keep 2 --triage short --out {folder}"
+        f"search crossroads-s4 --budget {budget} --seed 3 --keep 2 --triage none --out {folder}"
     )
     code = "from bridgegen.cli import main; main()"
     return subprocess.Popen(
@@ -304,7 +304,7 @@ def wait_for_rows(folder: Path, process: subprocess.Popen[str], count: int) -> N
 
 def test_killed_and_resumed_is_as_if_undisturbed(tmp_path):
     undisturbed = bg.run_search(
-        "crossroads-s4", budget=1000, seed=3, keep=2, triage="short", out=tmp_path / "whole"
+        "crossroads-s4", budget=1000, seed=3, keep=2, triage="none", out=tmp_path / "whole"
     )
     process = start(tmp_path / "killed", 1000)
     wait_for_rows(tmp_path / "killed", process, 200)

@@ -55,12 +55,9 @@ def run_criterion(run):
 
 
 def test_the_same_bits_after_an_interruption_and_with_processes(tmp_path):
-    whole = run_search(
-        "cut-in", criteria=[GAP], budget=120, triage="short", out=tmp_path / "a", **GIVEN
-    )
-    processes = run_search(
-        "cut-in", criteria=[GAP], budget=120, workers=2, deliver=False, out=tmp_path / "b", **GIVEN
-    )
+    search = {"criteria": [GAP], "budget": 120, "keep": 1, "triage": "none", **GIVEN}
+    whole = run_search("cut-in", **search, out=tmp_path / "a")
+    processes = run_search("cut-in", **search, workers=2, deliver=False, out=tmp_path / "b")
     assert rows(whole).metrics.tobytes() == rows(processes).metrics.tobytes()
     again = resume(processes.folder)
     assert rows(whole).metrics.tobytes() == rows(again).metrics.tobytes()

@@ -13,7 +13,7 @@ DRIVERS = Path(__file__).parents[1] / "ego" / "drivers.py"
 COMPILED = DRIVERS.with_name("compiled_drivers.py")
 
 
-def search(tmp_path, name, budget=30, file=DRIVERS, **kwargs):
+def search(tmp_path, name, budget=30, file=DRIVERS, triage="none", **kwargs):
     ego = f"{file}:{name}"
     out = tmp_path / name
     return campaign.run_search(
@@ -21,7 +21,7 @@ def search(tmp_path, name, budget=30, file=DRIVERS, **kwargs):
         algorithm="random",
         budget=budget,
         ego=ego,
-        triage="short",
+        triage=triage,
         out=out,
         keep=2,
         **kwargs,
@@ -29,7 +29,7 @@ def search(tmp_path, name, budget=30, file=DRIVERS, **kwargs):
 
 
 def test_a_search_outlives_its_driver(tmp_path):
-    run = search(tmp_path, "FailsFast")
+    run = search(tmp_path, "FailsFast", triage="short")
     assert 0 < run.summary.failed < run.summary.evaluations == 30
     (reason, count) = next(iter(run.failures.items()))
     assert reason.startswith("the driver raised an error: ValueError: too fast for me (drivers.py:")

@@ -23,7 +23,8 @@ DRIVERS = Path(__file__).parents[1] / "ego" / "drivers.py"
 DOUBLES = Path(__file__).parents[1] / "workers" / "doubles"
 SEARCH = {
     "scenario": "crossroads-s4", "algorithm": "pso", "budget": 160, "seed": 5, "keep": 0,
-    "ego": "reference", "weights": "entropy", "objective": {"d_min": None, "v_d": None},
+    "triage": "none", "ego": "reference", "weights": "entropy",
+    "objective": {"d_min": None, "v_d": None},
 }  # fmt: skip
 
 
@@ -34,7 +35,7 @@ def rows_of(folder: Path):
 
 @pytest.fixture(scope="module")
 def undisturbed(tmp_path_factory):
-    return bg.run_search(**SEARCH, triage="short", out=tmp_path_factory.mktemp("threads") / "run")
+    return bg.run_search(**SEARCH, out=tmp_path_factory.mktemp("threads") / "run")
 
 
 @pytest.mark.parametrize("count", [1, 3])
@@ -50,7 +51,6 @@ def test_processes_find_what_threads_find_whoever_is_killed(
 
     run = bg.run_search(
         **SEARCH,
-        triage="short",
         out=tmp_path / "run",
         workers=pool,
         callbacks=SearchCallbacks(batch=kill),
@@ -89,10 +89,16 @@ def test_a_row_that_takes_its_process_with_it_fails_alone(monkeypatch):
 
 
 def test_a_driver_of_ones_own_is_made_in_each_process(tmp_path, same_rows):
-    search = {"scenario": "crossroads-s1", "algorithm": "random", "budget": 16, "keep": 0}
+    search = {
+        "scenario": "crossroads-s1",
+        "algorithm": "random",
+        "budget": 16,
+        "keep": 0,
+        "triage": "none",
+    }
     ego = f"{DRIVERS}:FailsFast"
-    one = bg.run_search(**search, ego=ego, triage="short", out=tmp_path / "one")
-    two = bg.run_search(**search, ego=ego, triage="short", out=tmp_path / "two", workers=2)
+    one = bg.run_search(**search, ego=ego, out=tmp_path / "one")
+    two = bg.run_search(**search, ego=ego, out=tmp_path / "two", workers=2)
     assert one.summary.failed == two.summary.failed > 0
     assert same_rows(one.folder, two.folder)
     assert one.failures == two.failures
@@ -100,7 +106,7 @@ def test_a_driver_of_ones_own_is_made_in_each_process(tmp_path, same_rows):
 
 def test_a_wrong_name_is_told_as_ever(tmp_path):
     with pytest.raises(UnknownNameError, match="unknown metric 'd_mim'"):
-        bg.run_search(**SEARCH, metrics=["d_mim"], triage="short", out=tmp_path / "run", workers=2)
+        bg.run_search(**SEARCH, metrics=["d_mim"], out=tmp_path / "run", workers=2)
 
 
 def start(folder: Path, *more: str) -> subprocess.Popen[str]:

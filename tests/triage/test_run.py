@@ -1,6 +1,7 @@
 """The triage of real runs: what is recorded, exported, shown and judged."""
 
 import json
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -159,10 +160,13 @@ def test_figures_of_the_triage_are_judged(run, tmp_path, cli):
     assert figures["worst_severity"] == max(one.severity for one in run.modes)
     assert figures["harmful.upper"] == run.triage.bound.space.high
     junit = tmp_path / "junit.xml"
-    code, _, _ = cli("resume", run.folder, "--fail-if", "harmful.upper > 0.99", "--junit", junit)
-    assert code == 0
+    criteria = ["--fail-if", "harmful.upper > 0.99", "--fail-if", "modes > 0"]
+    assert cli("resume", run.folder, *criteria, "--junit", junit)[0] == 3
     assert run.triage.bound.sentence in junit.read_text("utf-8")
-    assert cli("resume", run.folder, "--fail-if", "modes > 0")[0] == 3
+    cases = {case.get("name"): case for case in ElementTree.parse(junit).getroot().iter("testcase")}
+    failed = {name for name, case in cases.items() if case.find("failure") is not None}
+    assert "not harmful.upper > 0.99" in cases.keys() - failed
+    assert "not modes > 0" in failed
 
 
 def test_a_driver_without_failures_leaves_an_empty_export_and_a_bound(tmp_path, capsys):

@@ -12,6 +12,7 @@ import typer
 
 from bridgegen.cli.groups import ONTOLOGY, SEARCH, Application, PanelledGroup, WithDefault
 from bridgegen.errors import BridgeGenError, Interrupted
+from bridgegen.garbage import collect_rarely
 
 FAILED = 3
 """The exit status if a criterion of ``--fail-if`` holds; 1 is Python's for a bug, 2 a user's error,
@@ -83,6 +84,7 @@ def main() -> None:
 
     SIGTERM ends it as Ctrl-C does, what is computed kept, with another exit status.
     """
+    collect_rarely()
     terminations: list[int] = []
 
     def terminate(number: int, frame: object) -> None:

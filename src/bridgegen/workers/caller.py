@@ -4,11 +4,13 @@ import pickle
 import queue
 
 from bridgegen.child import Say, connect, leave
+from bridgegen.garbage import collect_rarely
 from bridgegen.workers.pipeline_cache import picklable
 
 
 def main() -> None:
     """Answer requests until the parent process ends."""
+    collect_rarely()
     requests, say = connect()
     try:
         _answer(requests, say)

@@ -77,7 +77,7 @@ def test_parameters_come_back(name):
 
 @pytest.mark.parametrize("name", CASES)
 def test_parameters_come_back_of_noisy_traffic_with_gaps(name):
-    found = round_trip(name, 0.2, 0.05)
+    found = round_trip(name, 0.2, 0.05, count=120)
     assert min(found.precision, found.recall) >= 0.95
     for key, error in found.errors().items():
         assert np.median(error) <= 0.05, key
