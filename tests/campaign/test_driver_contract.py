@@ -1,4 +1,5 @@
 import re
+from importlib import resources
 from pathlib import Path
 
 import pytest
@@ -13,13 +14,29 @@ NETWORKS = DRIVERS.with_name("network_drivers.py")
 EXAMPLES = Path(__file__).parents[2] / "docs" / "examples"
 
 
+CROSSROADS, CUT_IN = "crossroads-s1.yaml", "cut-in.yaml"
+
+
+@pytest.fixture(scope="module")
+def short_scenarios(tmp_path_factory):
+    """The folder of two scenarios that end after 8 s."""
+    folder = tmp_path_factory.mktemp("scenarios")
+    for name in (CROSSROADS, CUT_IN):
+        text = resources.files("bridgegen.catalogue").joinpath(name).read_text("utf-8")
+        short, n = re.subn(r"^duration: [\d.]+", "duration: 8.0", text, flags=re.M)
+        assert n == 1
+        (folder / name).write_text(short, "utf-8")
+    return folder
+
+
 @pytest.fixture(autouse=True)
-def a_short_batch(monkeypatch):
+def a_short_batch(short_scenarios, monkeypatch):
     """A driver's speed is measured for a tenth of a second."""
+    monkeypatch.chdir(short_scenarios)
     monkeypatch.setattr(driver_contract, "SECONDS", 0.1)
 
 
-def checked(name, file=DRIVERS, scenario="crossroads-s1"):
+def checked(name, file=DRIVERS, scenario=CROSSROADS):
     return list(check_driver(f"{file}:{name}", [scenario], time_limit=0.5))
 
 
@@ -74,7 +91,7 @@ def test_a_driver_that_mixes_its_scenarios_is_found_out():
         *found
     }
     assert in_short(checks) == {
-        "drives": "yes", "deterministic": "yes", "free of cross-talk": "no, see crossroads-s1"
+        "drives": "yes", "deterministic": "yes", "free of cross-talk": "no, see crossroads-s1.yaml"
     }  # fmt: skip
     assert re.match(
         r"row \d+ differs first at 0 s: acceleration \[m/s²\] of 'ego' = \S+, and then ",
@@ -87,7 +104,7 @@ def test_a_driver_that_is_not_deterministic_is_found_out(name):
     checks = checked(name)
     found = {check.rule for check in checks if check.problem}
     assert "the same row again gives the same motion" in found
-    assert in_short(checks)["deterministic"] == "no, see crossroads-s1"
+    assert in_short(checks)["deterministic"] == "no, see crossroads-s1.yaml"
     assert in_short(checks)["free of cross-talk"] == "not known"
 
 
@@ -128,7 +145,7 @@ def test_a_driver_that_fails_is_found_out_and_when():
         problem,
     )
     assert in_short(checks) == {
-        "drives": "no, see crossroads-s1", "deterministic": "yes", "free of cross-talk": "yes"
+        "drives": "no, see crossroads-s1.yaml", "deterministic": "yes", "free of cross-talk": "yes"
     }  # fmt: skip
 
 
@@ -143,15 +160,15 @@ def test_a_driver_that_drives_nothing_is_not_tried_further():
 @pytest.mark.parametrize("name", ["my_planner.py:MyPlanner", "my_driver.py:MyDriver"])
 def test_the_examples_keep_everything(name):
     file, _, driver = name.partition(":")
-    checks = checked(driver, EXAMPLES / file, "cut-in")
+    checks = checked(driver, EXAMPLES / file, CUT_IN)
     assert not any(check.problem for check in checks)
 
 
 def test_the_command_says_it_and_ends_with_a_status():
     run = CliRunner().invoke
-    good = run(app, ["check-driver", f"{DRIVERS}:Cruises", "--scenario", "crossroads-s1"])
+    good = run(app, ["check-driver", f"{DRIVERS}:Cruises", "--scenario", CROSSROADS])
     assert good.exit_code == 0
     assert "ok  the order of the rows does not matter" in good.output
-    bad = run(app, ["check-driver", f"{DRIVERS}:Mixes", "--scenario", "crossroads-s1", "--json"])
+    bad = run(app, ["check-driver", f"{DRIVERS}:Mixes", "--scenario", CROSSROADS, "--json"])
     assert bad.exit_code == 1
     assert '"problem": "row ' in bad.output
