@@ -185,8 +185,8 @@ def test_all_mistakes_at_once(cli, tmp_path, monkeypatch, text, messages):
 def test_several_runs_are_resumed_and_the_same_to_the_bit(cli, tmp_path, monkeypatch, same_rows):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "two.yaml").write_text(
-        "runs:\n  first: {scenario: crossroads-s4, budget: 60, keep: 1}\n"
-        "  second: {scenario: crossroads-s4, budget: 60, keep: 1, seed: 1}\n",
+        "runs:\n  first: {scenario: crossroads-s4, budget: 60, keep: 1, triage: short}\n"
+        "  second: {scenario: crossroads-s4, budget: 60, keep: 1, triage: short, seed: 1}\n",
         "utf-8",
     )
     code, out, err = cli("search", "two.yaml")

@@ -59,8 +59,9 @@ def double(monkeypatch):
 def finished(tmp_path_factory):
     place = tmp_path_factory.mktemp("runs") / "s4"
     bg.run_search(
-        "crossroads-s4", budget=150, ego="route-follower", keep=4, causes=False, out=place
-    )
+        "crossroads-s4", budget=150, ego="route-follower", keep=4, causes=False, triage="short",
+        out=place,
+    )  # fmt: skip
     return place
 
 
@@ -417,7 +418,7 @@ def by_criteria(tmp_path_factory):
     bg.run_search(
         "cut-in", budget=120, keep=3, causes=False, algorithm="ga", out=place,
         criteria=["R-12: always(gap to bv > 2 m)", "R-14: n_collision == 0"], critical="criteria",
-        objective={"criterion:R-12": None},
+        objective={"criterion:R-12": None}, triage="short",
     )  # fmt: skip
     return place
 

@@ -163,6 +163,8 @@ def test_junit_has_a_test_for_each_criterion(cli, tmp_path):
             "--keep",
             1,
             "--no-causes",
+            "--triage",
+            "short",
             *words,
             "--junit",
             tmp_path / f"{name}.xml",

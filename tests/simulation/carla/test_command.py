@@ -76,7 +76,7 @@ def test_a_search_in_carla(cli, machine, tmp_path):
     status, _, err = cli(
         "search", "crossroads-s1", "--simulator", "carla", "--port", machine.port,
         "--simulator-set", "ego=kinematic", "--budget", 4, "--algorithm", "random", "--no-causes",
-        "--out", tmp_path / "r",
+        "--triage", "short", "--out", tmp_path / "r",
     )  # fmt: skip
     assert status == 0, err
     assert (tmp_path / "r" / "report.html").exists()
@@ -94,8 +94,9 @@ def test_what_was_found_is_confirmed_and_simulated_in_carla(cli, machine, tmp_pa
 
     run = tmp_path / "r"
     status, _, err = cli(
-        "search", "crossroads-s4", "--budget", 200, "--no-causes", "--keep", 2, "--out", run
-    )
+        "search", "crossroads-s4", "--budget", 200, "--no-causes", "--keep", 2,
+        "--triage", "short", "--out", run,
+    )  # fmt: skip
     assert status == 0, err
     status, out, err = cli("confirm", run, "--simulator", "carla", "--port", machine.port, "--json")
     assert status == 0, err
