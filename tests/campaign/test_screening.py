@@ -13,49 +13,17 @@ from bridgegen.campaign.restored import pipeline_of
 from bridgegen.cli import main
 from bridgegen.errors import InputError, Interrupted
 from bridgegen.simulation import choice
-from bridgegen.simulation.choice import EMBEDDED, Kind, SimulatorChoice
+from bridgegen.simulation.choice import EMBEDDED, SimulatorChoice
 from bridgegen.store import Store
 
+from .biased import biased_kind, not_finite, slower
 from .braking import write_pair
-
-
-class Biased:
-    """The embedded simulator, in which parameters have other values than they are said to have."""
-
-    rows_at_once = runs_at_once = 4
-
-    def __init__(self, embedded, change):
-        self.embedded, self._change = embedded, change
-
-    def __getattr__(self, name):
-        return getattr(self.embedded, name)
-
-    def run(self, roads, rows, values, **more):
-        return self.embedded.run(roads, rows, self._change(dict(values)), **more)
-
-
-def slower(values):
-    """The ego starts slower, the other vehicle is faster and starts further away."""
-    for name, by in (("ego_speed", -0.7), ("bv_speed", 0.3), ("bv_start", 2.0)):
-        if name in values:
-            values[name] = values[name] + by
-    return values
-
-
-def not_finite(values):
-    raise InputError("no row can be simulated")
 
 
 @pytest.fixture(autouse=True)
 def simulators(monkeypatch):
     for name, change in (("biased", slower), ("broken", not_finite)):
-        kind = Kind(
-            name,
-            "Ours, biased.",
-            lambda embedded, storyboard, settings, access, change=change: Biased(embedded, change),
-            settings={"noise": "none"},
-        )
-        monkeypatch.setitem(choice.SIMULATORS, name, kind)
+        monkeypatch.setitem(choice.SIMULATORS, name, biased_kind(name, change))
 
 
 def search(out, budget=16, **changes):

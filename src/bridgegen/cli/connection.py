@@ -21,7 +21,7 @@ OPTIONS: Mapping[str, Any] = {
         Path | None,
         typer.Option(
             rich_help_panel=SIMULATOR,
-            help="esmini's library, libesminiLib.so, for --simulator esmini.",
+            help="esmini's library, libesminiLib.so, for esmini.",
             show_default="ESMINI_LIB of the environment",
         ),
     ],
@@ -29,7 +29,7 @@ OPTIONS: Mapping[str, Any] = {
         str | None,
         typer.Option(
             rich_help_panel=SIMULATOR,
-            help="The server's machine, for --simulator carla.",
+            help="The server's machine, for CARLA.",
             show_default="localhost",
         ),
     ],
@@ -37,7 +37,7 @@ OPTIONS: Mapping[str, Any] = {
         int | None,
         typer.Option(
             rich_help_panel=SIMULATOR,
-            help="The server's port, for --simulator carla.",
+            help="The server's port, for CARLA.",
             show_default="2000",
         ),
     ],
@@ -61,8 +61,7 @@ OPTIONS: Mapping[str, Any] = {
         Path | None,
         typer.Option(
             rich_help_panel=SIMULATOR,
-            help="A new folder for camera images, LiDAR points, boxes and incidents, with "
-            "--simulator carla.",
+            help="A new folder for camera images, LiDAR points, boxes and incidents, with CARLA.",
         ),
     ],
     "detector": Annotated[

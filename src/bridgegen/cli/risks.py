@@ -8,11 +8,13 @@ import typer
 from bridgegen.cli import options as common
 from bridgegen.cli.app import FAILED, app
 from bridgegen.cli.completion import completing
+from bridgegen.cli.connection import NO_CONNECTION, Connection, with_connection_options
 from bridgegen.cli.groups import SEARCH
-from bridgegen.options.option import DRIVER, OUTPUT, WHAT
+from bridgegen.options.option import DRIVER, OUTPUT, SIMULATOR, WHAT
 
 
 @app.command(rich_help_panel=SEARCH)
+@with_connection_options
 def risk(
     scenario: Annotated[
         str,
@@ -91,6 +93,21 @@ def risk(
     ] = None,
     vehicle: common.Vehicle = None,
     others: common.Others = None,
+    simulator: Annotated[
+        str | None,
+        typer.Option(
+            help="Also simulate rows around the harmful ones in this simulator, and say by which "
+            "factor the event is more or less likely there.",
+            show_default="none",
+            rich_help_panel=SIMULATOR,
+            autocompletion=completing("simulator"),
+        ),
+    ] = None,
+    simulator_rows: Annotated[
+        int, typer.Option(help="How many rows there.", rich_help_panel=SIMULATOR)
+    ] = 200,
+    simulator_set: common.SimulatorSettings = None,
+    connection: Connection = NO_CONNECTION,
     workers: common.Workers = None,
     out: Annotated[
         Path | None,
@@ -123,12 +140,13 @@ def risk(
     from bridgegen.verdict.of_risk import RiskCriteria
 
     judges = RiskCriteria.read(fail_if or (), junit)
+    elsewhere = common.read_simulator(simulator, simulator_set, connection)
     with RiskScreen() as screen:
         result = estimate_risk(
             scenario, ego=ego, exposure=exposure, event=event, count=count, method=method,
             precision=precision, budget=budget, seed=seed, start=start, check=check,
-            events=events, vehicle=vehicle, others=others, workers=workers, out=out,
-            callbacks=screen.callbacks,
+            events=events, vehicle=vehicle, others=others, simulator=elsewhere,
+            simulator_rows=simulator_rows, workers=workers, out=out, callbacks=screen.callbacks,
         )  # fmt: skip
     print_risk(result, screen.seconds, as_json=as_json)
     if not print_outcomes(judges.judge(result)):

@@ -23,6 +23,8 @@ SETTINGS = "settings.json"
 BATCHES = "batches"
 RESULTS = ("risk.json", "risk.html", "harmful.csv")
 SCENARIO = "most-likely."
+ELSEWHERE = "elsewhere-"
+"""The folder of what another simulator says begins so, and goes on with the simulator's name."""
 _LONGEST_MODE = 400
 _DAMAGED = (
     ValueError, TypeError, LookupError, EOFError, MemoryError, RuntimeError, zipfile.BadZipFile,
@@ -104,7 +106,7 @@ class Ledger:
 
 
 def _is_result(name: str) -> bool:
-    return name in RESULTS or name.startswith(SCENARIO)
+    return name in RESULTS or name.startswith((SCENARIO, ELSEWHERE))
 
 
 def _digest(Z: Float, least: float) -> str:

@@ -13,7 +13,7 @@ from bridgegen.odd.parameters import Parameter
 from bridgegen.risk.estimators.weighted import Probability
 from bridgegen.risk.events import EVENTS, WORDS
 from bridgegen.risk.result import BINS, Finding, ParameterShare, Risk
-from bridgegen.risk.text import data_sentence, number, sentence
+from bridgegen.risk.text import data_sentence, elsewhere_sentence, number, sentence
 
 _WIDTH, _ROW, _LEFT, _RIGHT = 900, 30, 330, 30
 _SMALL, _TALL = 260, 110
@@ -74,7 +74,12 @@ def unsure(risk: Risk) -> Iterator[str]:
     yield f"Where the exposure comes from: {risk.exposure.source}"
     yield (
         "The simulation: drivers, participants, sensors and friction are those of the embedded "
-        "simulator; bridgegen confirm runs what a search found in another one."
+        "simulator."
+    )
+    yield (
+        "Not compared with another simulator (--simulator)."
+        if risk.elsewhere is None
+        else elsewhere_sentence(risk.elsewhere)
     )
     if risk.failed or risk.implausible:
         yield (

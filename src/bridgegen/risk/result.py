@@ -17,6 +17,7 @@ from bridgegen.disk import write_whole
 from bridgegen.exposure import Exposure
 from bridgegen.exposure.rates import Rate
 from bridgegen.risk.data import DataBand
+from bridgegen.risk.elsewhere import Elsewhere
 from bridgegen.risk.estimators.weighted import FEWEST_HITS, Probability, Weighted
 from bridgegen.risk.events import EVENTS, INJURY, WORDS
 from bridgegen.risk.methods import Estimated
@@ -83,6 +84,7 @@ class Risk:
         implausible: rows whose traffic could not happen; likewise.
         check: the same event by Monte Carlo, if that was asked for.
         data: how much few data leave open, if the events of the exposure are known.
+        elsewhere: the event in another simulator, if that was asked for.
         picture: the most likely harmful row as a moving picture; empty without one.
         command: makes it again.
         folder: of its files.
@@ -100,6 +102,7 @@ class Risk:
     implausible: int
     check: Weighted | None
     data: DataBand | None
+    elsewhere: Elsewhere | None
     picture: str
     command: str
     folder: Path
@@ -230,6 +233,7 @@ class Risk:
                 "evaluations": self.check.evaluations,
             },
             "data": None if self.data is None else vars(self.data),
+            "elsewhere": None if self.elsewhere is None else self.elsewhere.to_dict(),
             "command": self.command,
         }  # fmt: skip
 

@@ -3,7 +3,7 @@
 import hashlib
 import shlex
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any, cast
@@ -13,36 +13,34 @@ import numpy as np
 from bridgegen import ego as egos
 from bridgegen.arrays import Float
 from bridgegen.campaign.run import Run
-from bridgegen.campaign.scenario_files import write_scenario
 from bridgegen.campaign.scenarios import driven_by, is_file, load
-from bridgegen.conflict.analysis import analyse
-from bridgegen.conflict.harm import Count, decisive
-from bridgegen.conflict.summary import summarise
-from bridgegen.errors import InputError, Interrupted, StorageError, UnknownNameError
+from bridgegen.conflict.harm import Count
+from bridgegen.errors import InputError, Interrupted, UnknownNameError
 from bridgegen.exposure import Exposure
 from bridgegen.exposure.chosen import UNIFORM, chosen_exposure
 from bridgegen.exposure.fit import Fit, fit_exposure
 from bridgegen.exposure.tables import read_header
-from bridgegen.mining.replays.picture import moving_picture
 from bridgegen.odd.scenario import LogicalScenario
 from bridgegen.options import PipelineOptions
 from bridgegen.pipeline import Pipeline
 from bridgegen.risk import methods
 from bridgegen.risk.data import data_band
+from bridgegen.risk.elsewhere import HERE, kept_elsewhere, look_elsewhere
 from bridgegen.risk.estimators import monte_carlo
 from bridgegen.risk.estimators.problem import Aim
 from bridgegen.risk.events import LEAST
 from bridgegen.risk.events import require as require_event
 from bridgegen.risk.experiment import Experiment
 from bridgegen.risk.ledger import Ledger
-from bridgegen.risk.result import MOST_LIKELY, Risk, most_likely
-from bridgegen.simulation.rollout import Rollout
+from bridgegen.risk.most_likely import write_most_likely
+from bridgegen.risk.result import Risk, most_likely
+from bridgegen.simulation.choice import EMBEDDED, SimulatorChoice
 from bridgegen.store import Store
 from bridgegen.workers import CarriedDriver, Choice, open_workers
 
 LEAST_EVALUATIONS, MOST_EVALUATIONS = 20, 10**10
+MOST_ELSEWHERE = 10**6  # rows in another simulator
 OTHER_ROWS = 2  # added to the seed: no method counts rows of that one
-BEFORE, AFTER = 4.0, 2.0  # s, of the picture, around the conflict's most urgent instant
 
 
 @dataclass(frozen=True)
@@ -52,10 +50,12 @@ class RiskCallbacks:
     Attributes:
         compile: before kernels are compiled.
         evaluations: with the number of evaluations so far, and the budget.
+        elsewhere: with the number of rows in another simulator so far, and of all.
     """
 
     compile: Callable[[], None] = field(default=lambda: None)
     evaluations: Callable[[int, int], None] = field(default=lambda done, total: None)
+    elsewhere: Callable[[int, int], None] = field(default=lambda done, total: None)
 
 
 def estimate_risk(
@@ -74,6 +74,8 @@ def estimate_risk(
     events: str | Path | Fit | None = None,
     vehicle: str | None = None,
     others: str | None = None,
+    simulator: SimulatorChoice | str | None = None,
+    simulator_rows: int = 200,
     workers: Choice = None,
     out: Path | str | None = None,
     callbacks: RiskCallbacks | None = None,
@@ -101,6 +103,9 @@ def estimate_risk(
             data leave open.
         vehicle: how the ego moves.
         others: driver of the other participants; the scenario's choice by default.
+        simulator: another simulator in which rows around the harmful ones are simulated, too, to
+            say by which factor the event is more or less likely there; none by default.
+        simulator_rows: how many.
         workers: a number of processes, ``"ray"``, or ``"ray://HOST:PORT"``; threads by default.
         out: the folder; ``risk/SCENARIO`` by default.
         callbacks: called as it progresses.
@@ -114,7 +119,13 @@ def estimate_risk(
     aimed = require_event(event)
     methods.require(method)
     whose = _count(count)
-    _require_numbers(precision, budget, seed, check)
+    _require_numbers(precision, budget, seed, check, simulator_rows)
+    elsewhere = SimulatorChoice(simulator) if isinstance(simulator, str) else simulator
+    if elsewhere is not None and elsewhere.name == EMBEDDED.name:
+        raise InputError(
+            f"the risk is that in the simulator {EMBEDDED.name}; compare it with another one "
+            "(--simulator)"
+        )
     if ego is not None:
         egos.get(ego)
     logical = load(scenario)
@@ -153,11 +164,17 @@ def estimate_risk(
             "start": None if Z is None else hashlib.sha256(Z.tobytes()).hexdigest(),
             "events": None if fitted is None else fitted.used,
         }
-        command = _command(scenario, exposure, settings, others, start, events, folder)
+        there = None
+        if elsewhere is not None:
+            there = Pipeline(driven, met.space, options, simulator=elsewhere, workers=hands)
+        asked = {"check": check, "from": start, "others": others, "events": events}
+        if elsewhere is not None:
+            asked |= {"simulator": elsewhere.name, "simulator-rows": simulator_rows}
+        command = _command(scenario, exposure, settings, asked, elsewhere, folder)
         ledger = Ledger(folder, settings)
         say.compile()
         pipeline.warm_up()
-        total = budget + check
+        total = budget + check + (HERE if there else 0)
         experiment = Experiment(
             pipeline, met, hands, whose, ledger, lambda done: say.evaluations(done, total)
         )
@@ -169,54 +186,30 @@ def estimate_risk(
             if check:
                 plain = Aim(aimed.harm, LEAST, check, 0.0)
                 beside = monte_carlo.estimate(experiment, plain, seed + OTHER_ROWS)
+            other = None
+            if there is not None and elsewhere is not None:
+                kept = kept_elsewhere(folder, elsewhere, settings)
+                beyond = Experiment(
+                    there, met, hands, whose, kept,
+                    lambda done: say.elsewhere(done, simulator_rows),
+                )  # fmt: skip
+                other = look_elsewhere(
+                    experiment, beyond, elsewhere.name, found.weighted, aimed.harm,
+                    simulator_rows, seed,
+                )  # fmt: skip
         except KeyboardInterrupt:
             raise Interrupted(folder, experiment.evaluations, total, command=command) from None
         data = None
         if fitted is not None and not found.weighted.doubts:
             data = data_band(met, found.weighted, aimed.harm, fitted)
         worst = most_likely(met, found.weighted, event)
-        picture = "" if worst is None else _write_most_likely(pipeline, worst, whose, folder)
+        picture = "" if worst is None else write_most_likely(pipeline, worst, whose, folder)
     result = Risk(
         met, pipeline.driver.label, event, count, found, seed, budget, tuple(experiment.modes),
-        failed, implausible, beside, data, picture, command, folder,
+        failed, implausible, beside, data, other, picture, command, folder,
     )  # fmt: skip
     result.write()
     return result
-
-
-def _write_most_likely(pipeline: Pipeline, x: Float, count: Count, folder: Path) -> str:
-    """Write the most likely harmful row as a scenario; return its moving picture."""
-    rollout = pipeline.rollout(x[np.newaxis])
-    conflicts = analyse(rollout)
-    try:
-        write_scenario(
-            pipeline,
-            x,
-            folder,
-            MOST_LIKELY,
-            rollout=rollout,
-            conflict=summarise(conflicts, count=count),
-        )
-    except OSError as error:
-        raise StorageError(f"{folder}: cannot be written: {error.strerror}") from None
-    other = int(decisive(conflicts, count)[0][0])
-    instant, step = int(conflicts.instant[0, other]), rollout.time_step
-    first = max(instant - round(BEFORE / step), 0)
-    shown = _between(rollout, first, instant + round(AFTER / step) + 1)
-    when = (instant - first) * step
-    return moving_picture(shown, other, when, "the most likely harmful encounter, from above")
-
-
-def _between(rollout: Rollout, first: int, last: int) -> Rollout:
-    """Return where everyone is between two instants."""
-    there = rollout.present
-    return replace(
-        rollout,
-        x=rollout.x[:, :, first:last],
-        y=rollout.y[:, :, first:last],
-        h=rollout.h[:, :, first:last],
-        present=there[:, :, first:last] if there.size else there,
-    )
 
 
 def _count(name: str) -> Count:
@@ -227,8 +220,10 @@ def _count(name: str) -> Count:
     raise UnknownNameError("count", name, ("ego", "any"))
 
 
-def _require_numbers(precision: float, budget: int, seed: int, check: int) -> None:
+def _require_numbers(precision: float, budget: int, seed: int, check: int, rows: int) -> None:
     problems = []
+    if not 1 <= rows <= MOST_ELSEWHERE:
+        problems.append(f"--simulator-rows must be 1 to {MOST_ELSEWHERE:,}, got {rows}")
     if not 0.0 <= precision < 1.0:
         problems.append(f"--precision must be at least 0 and below 1, got {precision:g}")
     if not LEAST_EVALUATIONS <= budget <= MOST_EVALUATIONS:
@@ -314,21 +309,20 @@ def _digest(exposure: Exposure) -> str:
 
 def _command(
     scenario: str | Path, exposure: str | Path | Exposure | None, settings: dict[str, Any],
-    others: str | None, start: str | Path | None, events: str | Path | Fit | None, folder: Path,
+    asked: dict[str, Any], elsewhere: SimulatorChoice | None, folder: Path,
 ) -> str:  # fmt: skip
-    """Return the command line that makes the risk again."""
+    """Return the command line that makes the risk again.
+
+    ``settings`` are those that it always names, ``asked`` those that have a value.
+    """
     where = str(Path(scenario).resolve()) if is_file(scenario) else str(scenario)
     words: list[Any] = ["bridgegen", "risk", where, "--ego", settings["driver"]]
     if exposure is not None:
         words += ["--exposure", "EXPOSURE" if isinstance(exposure, Exposure) else exposure]
     for name in ("event", "count", "method", "precision", "budget", "seed", "vehicle"):
         words += [f"--{name}", settings[name]]
-    for name, value in (
-        ("check", settings["check"]),
-        ("from", start),
-        ("others", others),
-        ("events", events),
-    ):
-        if value:
-            words += [f"--{name}", value]
+    words += [word for name, value in asked.items() if value for word in (f"--{name}", value)]
+    if elsewhere is not None:
+        for name, value in elsewhere.settings.items():
+            words += ["--simulator-set", f"{name}={value}"]
     return shlex.join([str(one) for one in (*words, "--out", folder)])

@@ -2,6 +2,7 @@
 
 from bridgegen.exposure.rates import Rate
 from bridgegen.risk.data import DataBand
+from bridgegen.risk.elsewhere import Elsewhere, Ratio
 from bridgegen.risk.estimators.weighted import Probability
 from bridgegen.risk.events import WORDS
 from bridgegen.risk.result import Risk
@@ -48,6 +49,27 @@ def data_sentence(band: DataBand) -> str:
         f"Few data: with exposures of resampled events the estimate is {number(band.low)} to "
         f"{number(band.high)} (95 % of {band.exposures})."
     )
+
+
+def elsewhere_sentence(found: Elsewhere) -> str:
+    """Return how likely the event is in another simulator, in one or two sentences."""
+    if found.factor is None:
+        return (
+            f"In {found.simulator} the event may be more or less likely; how much is not known: "
+            f"{found.doubt}."
+        )
+    failed = f" {found.failed} rows have no result there." if found.failed else ""
+    return (
+        f"In {found.simulator} the event is {_ratio(found.factor)} times as likely: "
+        f"{found.confirmed.estimate:.0%} of the probability here are confirmed, and "
+        f"{found.new.estimate:.0%} as much comes from rows that are only close to harm here. "
+        f"{found.rows} rows were simulated there; harm that is far from harm here was not looked "
+        f"for.{failed}"
+    )
+
+
+def _ratio(one: Ratio) -> str:
+    return f"{one.estimate:.3g} (95 %: {one.low:.3g} to {one.high:.3g})"
 
 
 def rate_text(rate: Rate | None) -> str:

@@ -22,6 +22,7 @@ class RiskScreen(Live):
         return RiskCallbacks(
             compile=self.say_compiling,
             evaluations=lambda done, total: self.show(what="simulations", done=done, total=total),
+            elsewhere=lambda done, total: self.show(what="elsewhere", done=done, total=total),
         )
 
 
@@ -29,7 +30,13 @@ def print_risk(result: "Risk", seconds: float, *, as_json: bool) -> None:
     """Print a risk's sentence, its probabilities and rates, then its files; or its record."""
     from bridgegen.risk.events import EVENTS
     from bridgegen.risk.result import PAGE
-    from bridgegen.risk.text import data_sentence, interval, rate_text, sentence
+    from bridgegen.risk.text import (
+        data_sentence,
+        elsewhere_sentence,
+        interval,
+        rate_text,
+        sentence,
+    )
 
     if as_json:
         print(json.dumps(result.to_dict(), indent=1))
@@ -54,6 +61,8 @@ def print_risk(result: "Risk", seconds: float, *, as_json: bool) -> None:
         print(f"{'check':<12}{values[0]} ({values[1]}) in {result.check.evaluations:,} by mc")
     if result.data is not None:
         print(f"{'data':<12}{data_sentence(result.data)}")
+    if result.elsewhere is not None:
+        print(f"{'elsewhere':<12}{elsewhere_sentence(result.elsewhere)}")
     print(f"{'page':<12}{result.folder / PAGE}")
     print(f"{'wall time':<12}{seconds:.1f} s, {result.weighted.evaluations:,} simulations")
 
