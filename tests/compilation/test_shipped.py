@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 import yaml
 
+from bridgegen.compilation import shipped as shipped_module
 from bridgegen.compilation.shipped import BASELINE, described, features, shipped
 
 ROOT = Path(__file__).parents[2]
@@ -40,21 +41,38 @@ def test_carried_code_is_used_and_not_written(carried, compiled_by):
     assert compiled_by(CODE) == ["high", "low"]
 
 
-@pytest.mark.parametrize("key", ["python", "numba", "triple"])
-def test_code_for_something_else_is_not_used(carried, compiled_by, key):
-    (carried / "_kernels" / "machine.json").write_text(json.dumps(described() | {key: "other"}))
+def test_code_for_something_else_is_not_used(carried, compiled_by):
+    (carried / "_kernels" / "machine.json").write_text(json.dumps(described() | {"numba": "0.1"}))
     assert compiled_by(CODE) == ["high", "low"]
 
 
-def test_code_for_a_better_processor_is_not_used(carried, compiled_by):
-    lacks = "from bridgegen.compilation import shipped; shipped.FEATURES += ('avx1024',)\n    "
-    assert compiled_by(lacks + CODE) == ["high", "low"]
+@pytest.fixture
+def found(tmp_path, monkeypatch):
+    """Returns what is found of an installation whose code is described by a text."""
+    monkeypatch.setattr(shipped_module, "FOLDER", tmp_path)
+
+    def found_with(text):
+        (tmp_path / "machine.json").write_text(text)
+        return shipped.__wrapped__()
+
+    if fits():
+        assert found_with(json.dumps(described())).folder == tmp_path
+    return found_with
+
+
+@pytest.mark.parametrize("key", ["python", "numba", "triple"])
+def test_a_description_of_something_else_does_not_fit(found, key):
+    assert found(json.dumps(described() | {key: "other"})) is None
+
+
+def test_code_for_a_better_processor_does_not_fit(found, monkeypatch):
+    monkeypatch.setattr(shipped_module, "FEATURES", (*shipped_module.FEATURES, "avx1024"))
+    assert found(json.dumps(described())) is None
 
 
 @pytest.mark.parametrize("text", ["", "{", "[]", "\0"])
-def test_a_damaged_description_is_no_description(carried, compiled_by, text):
-    (carried / "_kernels" / "machine.json").write_text(text)
-    assert compiled_by(CODE) == ["high", "low"]
+def test_a_damaged_description_is_no_description(found, text):
+    assert found(text) is None
 
 
 def test_a_clone_carries_nothing():
