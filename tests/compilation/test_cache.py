@@ -5,11 +5,13 @@ import shutil
 import stat
 import subprocess
 import sys
+import tempfile
 from pathlib import Path
 
 import pytest
 
 import bridgegen
+from bridgegen.compilation.folder import cache_folder
 
 FOLDER = """
 from bridgegen.compilation import folder
@@ -48,11 +50,23 @@ def result(process: subprocess.Popen[str]) -> str:
     return out.strip()
 
 
-def folder(**environment: str) -> Path:
-    return Path(result(begin(FOLDER, **environment)))
+@pytest.fixture
+def folder(monkeypatch):
+    """Returns the cache's folder in an environment that has but some variables."""
+
+    def found(**environment: str) -> Path:
+        with monkeypatch.context() as patched:
+            for name in ("HOME", "NUMBA_CACHE_DIR", "TMPDIR", "XDG_CACHE_HOME"):
+                patched.delenv(name, raising=False)
+            for name, value in environment.items():
+                patched.setenv(name, value)
+            patched.setattr(tempfile, "tempdir", None)
+            return cache_folder.__wrapped__()
+
+    return found
 
 
-def test_the_cache_lies_in_the_user_s_cache_folder(tmp_path):
+def test_the_cache_lies_in_the_user_s_cache_folder(folder, tmp_path):
     found = folder(XDG_CACHE_HOME=str(tmp_path))
     assert found.is_relative_to(tmp_path / "bridgegen")
     assert folder(HOME=str(tmp_path)).is_relative_to(tmp_path / ".cache" / "bridgegen")
@@ -75,14 +89,14 @@ def test_a_full_disk_costs_the_cache_only(tmp_path):
     assert result(begin(FULL + COMPILES, tmp_path, **environment)) == "1"
 
 
-def test_the_folder_is_the_same_whatever_the_source(tmp_path):
+def test_the_folder_is_the_same_whatever_the_source(folder, tmp_path):
     """What of it is used depends on the source: see test_sources."""
     shutil.copytree(Path(bridgegen.__file__).parent, tmp_path / "bridgegen")
     environment = {"PYTHONPATH": str(tmp_path), "HOME": str(tmp_path)}
-    assert folder(**environment) == folder(HOME=str(tmp_path))
+    assert result(begin(FOLDER, **environment)) == str(folder(HOME=str(tmp_path)))
 
 
-def test_the_user_may_say_where(tmp_path):
+def test_the_user_may_say_where(folder, tmp_path):
     assert folder(NUMBA_CACHE_DIR=str(tmp_path / "mine")).is_relative_to(tmp_path / "mine")
 
 
@@ -95,7 +109,7 @@ def no_home(tmp_path):
     return {"HOME": str(blocked), "XDG_CACHE_HOME": str(blocked), "TMPDIR": str(shared)}
 
 
-def test_where_nothing_can_be_written_a_temporary_folder_serves(no_home):
+def test_where_nothing_can_be_written_a_temporary_folder_serves(folder, no_home):
     shared = Path(no_home["TMPDIR"]) / f"bridgegen-{os.getuid()}"
     found = folder(**no_home)
     assert found.parent == shared
@@ -104,7 +118,7 @@ def test_where_nothing_can_be_written_a_temporary_folder_serves(no_home):
 
 
 @pytest.mark.parametrize("trap", ["writable by all", "a link", "another user's"])
-def test_what_somebody_else_may_have_written_is_not_read(no_home, tmp_path, trap):
+def test_what_somebody_else_may_have_written_is_not_read(folder, no_home, tmp_path, trap):
     """Numba unpickles what it finds: whoever wrote it would run code as this user."""
     shared = Path(no_home["TMPDIR"]) / f"bridgegen-{os.getuid()}"
     if trap == "a link":
@@ -125,7 +139,7 @@ def test_what_somebody_else_may_have_written_is_not_read(no_home, tmp_path, trap
     assert stat.S_IMODE(found.stat().st_mode) == 0o700
 
 
-def test_a_home_cache_that_others_can_write_is_not_read(tmp_path):
+def test_a_home_cache_that_others_can_write_is_not_read(folder, tmp_path):
     home = {"XDG_CACHE_HOME": str(tmp_path / "cache"), "TMPDIR": str(tmp_path)}
     found = folder(**home)
     found.chmod(0o777)
@@ -140,6 +154,7 @@ def mine(tmp_path):
 
 DAMAGES = """
 import sys
+import tempfile
 from pathlib import Path
 sys.path.insert(0, sys.argv[1])
 from numba.core import event
