@@ -71,7 +71,7 @@ def test_it_searches_with_the_defaults_and_writes_what_is_uploaded(tmp_path):
 
 @pytest.mark.parametrize("criterion", ["failed > 0\nevaluations > 10", "evaluations > 10"])
 def test_a_criterion_fails_the_job_and_arguments_are_words(tmp_path, criterion):
-    arguments = "--fix 'fog_density=80' --ego route-follower --no-causes"
+    arguments = "--fix 'fog_density=80' --ego route-follower --no-causes --triage none"
     done = search(tmp_path, budget="40", fail_if=criterion, arguments=arguments)
     assert done.returncode == 3, done.stderr
     assert "crossroads-s4, ego route-follower" in done.stdout
