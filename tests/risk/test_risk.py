@@ -138,6 +138,9 @@ def test_all_conflicts_are_those_that_count_and_the_others(tmp_path):
         "cut-in", ego="careful", exposure=EXAMPLE, event="conflict", count="any", method="mc",
         precision=0.0, budget=3000, out=tmp_path / "any",
     )  # fmt: skip
+    density = found.exposure.log_density
+    drawn = found.exposure.from_normal(found.weighted.Z)
+    assert density(found.most_likely[np.newaxis])[0] >= density(drawn).max()
     every, own = found.probability("conflict"), found.preventable.probability
     assert 0.0 <= own.estimate < every.estimate
     met = found.exposure.encounters

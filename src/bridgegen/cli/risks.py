@@ -64,7 +64,7 @@ def risk(
         ),
     ] = 0.2,
     budget: Annotated[
-        int, typer.Option(help="Simulations, at most.", rich_help_panel=WHAT)
+        int, typer.Option(help="Simulations of the estimate, at most.", rich_help_panel=WHAT)
     ] = 200_000,
     seed: Annotated[int, typer.Option(help="Of all random numbers.", rich_help_panel=WHAT)] = 0,
     start: Annotated[

@@ -85,7 +85,9 @@ class Risk:
         check: the same event by Monte Carlo, if that was asked for.
         data: how much few data leave open, if the events of the exposure are known.
         elsewhere: the event in another simulator, if that was asked for.
-        picture: the most likely harmful row as a moving picture; empty without one.
+        most_likely: the harmful row that is most likely on the road, ``(len(space.names),)``; None
+            if none was found.
+        picture: it as a moving picture; empty without one.
         command: makes it again.
         folder: of its files.
     """
@@ -103,6 +105,7 @@ class Risk:
     check: Weighted | None
     data: DataBand | None
     elsewhere: Elsewhere | None
+    most_likely: Float | None
     picture: str
     command: str
     folder: Path
@@ -171,11 +174,6 @@ class Risk:
         low = math.hypot(math.log(each.estimate / each.low), math.log(p.estimate / p.low))
         high = math.hypot(math.log(each.high / each.estimate), math.log(p.high / p.estimate))
         return Rate(estimate, estimate * math.exp(-low), estimate * math.exp(high))
-
-    @property
-    def most_likely(self) -> Float | None:
-        """The harmful row that is most likely on the road, ``(len(space.names),)``."""
-        return most_likely(self.exposure, self.weighted, self.event)
 
     @cached_property
     def parameters(self) -> tuple[ParameterShare, ...]:
@@ -289,16 +287,6 @@ class Risk:
         if counted or hits >= FEWEST_HITS:
             return Finding(one.mean(values), hits)
         return Finding(None, hits, f"{hits:.0f} effective rows, and {FEWEST_HITS:.0f} are needed")
-
-
-def most_likely(exposure: Exposure, weighted: Weighted, event: str) -> Float | None:
-    """Return the row of an event that is most likely on the road; None if there is none."""
-    Z = weighted.Z[weighted.there(EVENTS[event].harm) > 0.0]
-    if not len(Z):
-        return None
-    X = exposure.from_normal(Z)
-    found: Float = X[int(np.argmax(exposure.log_density(X)))]
-    return found
 
 
 def _share(name: str, unit: str, values: Float, weights: Float, road: Float) -> ParameterShare:
