@@ -1,12 +1,12 @@
 """How often the intervals of a risk hold the truth, and what estimates cost against counting.
 
 python benchmarks/risk.py coverage [--repeats 400] [--budget 60000] [METHOD …]
-python benchmarks/risk.py scenarios FOLDER [--count 400000] [--pairs SCENARIO/DRIVER …]
+python benchmarks/risk.py scenarios FOLDER [--pairs SCENARIO/DRIVER …]
 
 ``coverage``: on the analytic problems of the tests, whose probability is known. ``scenarios``: of
-catalogue scenarios, with each parameter normal around its default and so narrow that harm is rare.
-The truth is counted without any estimator: rows that are uniform over the ranges are simulated, and
-the harmful ones weighted by their density. Stopped and started again, it goes on.
+catalogue scenarios, with exposures under which harm is rare. The truth is counted without any
+estimator: rows that are uniform over the ranges are simulated, and the harmful ones weighted by how
+likely they are. Stopped and started again, it goes on.
 """
 
 import argparse
@@ -14,6 +14,8 @@ import importlib.util
 import json
 import sys
 import time
+from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
 
@@ -22,27 +24,60 @@ import numpy as np
 from bridgegen.campaign.scenarios import load
 from bridgegen.conflict.harm import NEAR_MISS
 from bridgegen.exposure import Exposure
-from bridgegen.exposure.chosen import UNIFORM, chosen_exposure
+from bridgegen.exposure.chosen import UNIFORM
 from bridgegen.exposure.reader import build_exposure
-from bridgegen.odd.kinds import FLOAT
 from bridgegen.odd.plain_yaml import read_plain_yaml
+from bridgegen.odd.scenario import LogicalScenario
 from bridgegen.risk import Risk, estimate_risk
 from bridgegen.risk.estimators.problem import Aim
 from bridgegen.risk.estimators.weighted import Probability, of_weights
 from bridgegen.risk.methods import estimate
 
 TESTS = Path(__file__).parents[1] / "tests/risk/estimators/problems.py"
-PAIRS = {
-    ("cut-in", "careful"): 0.2, ("cut-in", "route-follower"): 0.1,
-    ("lead-brakes", "careful"): 0.1, ("lead-brakes", "reference"): 0.3,
-    ("crossroads-s1", "route-follower"): 0.1, ("crossroads-s1", "un-r157"): 0.1,
-    ("left-across-path", "careful"): 0.2, ("left-across-path", "route-follower"): 0.1,
-    ("emergency-vehicle-on-red", "careful"): 0.1,
-    ("emergency-vehicle-on-red", "route-follower"): 0.1,
-    ("bus-pulls-out", "careful"): 0.1, ("bus-pulls-out", "un-r157"): 0.1,
-    ("red-light-runner", "careful"): 0.2, ("red-light-runner", "route-follower"): 0.1,
-}  # fmt: skip
-"""Scenarios and drivers, and the standard deviation of each parameter as a part of its range."""
+
+
+@dataclass(frozen=True)
+class Case:
+    """A scenario, a driver, and an exposure that is made up.
+
+    Attributes:
+        scenario: of the catalogue.
+        driver: of the ego.
+        rows: how many are counted.
+        deviation: of the parameters that are normal, as a share of their ranges.
+        means: of these, likewise, by name; all others are uniform.
+    """
+
+    scenario: str
+    driver: str
+    rows: int
+    deviation: float
+    means: Mapping[str, float]
+
+
+CASES = (
+    Case("cut-in", "careful", 400_000, 0.1, {"speed_difference": 0.2}),
+    Case("cut-in", "route-follower", 400_000, 0.15,
+         {"speed_difference": 0.8, "cut_in_distance": 0.2, "change_time": 0.8}),
+    Case("lead-brakes", "careful", 400_000, 0.15,
+         {"ego_speed": 0.2, "gap": 0.8, "low_speed": 0.8}),
+    Case("lead-brakes", "reference", 1_000_000, 0.3, {"gap": 0.3}),
+    Case("left-across-path", "careful", 200_000, 0.15,
+         {"van_start": 0.8, "van_speed": 0.2, "van_time": 0.2}),
+    Case("left-across-path", "route-follower", 200_000, 0.15,
+         {"ego_speed": 0.2, "van_speed": 0.8, "van_time": 0.8}),
+    Case("emergency-vehicle-on-red", "careful", 200_000, 0.15,
+         {"ego_speed": 0.2, "ambulance_start": 0.2, "ambulance_speed": 0.65}),
+    Case("emergency-vehicle-on-red", "route-follower", 200_000, 0.15,
+         {"ego_speed": 0.2, "ambulance_start": 0.2, "crossing_speed": 0.8}),
+    Case("bus-pulls-out", "careful", 200_000, 0.15,
+         {"ego_speed": 0.2, "pull_out_distance": 0.5, "trigger_gap": 0.8}),
+    Case("bus-pulls-out", "un-r157", 200_000, 0.1,
+         {"ego_speed": 0.2, "bus_acceleration": 0.8, "trigger_gap": 0.8}),
+    Case("crossroads-s1", "route-follower", 200_000, 0.15,
+         {"ego_speed": 0.65, "bv_start": 0.8, "bv_speed": 0.2}),
+    Case("red-light-runner", "route-follower", 200_000, 0.15, {"crossing_speed": 0.35}),
+)  # fmt: skip
 METHODS = ("auto", "importance", "subset")
 BUDGET = 200_000
 
@@ -93,54 +128,57 @@ def coverage(repeats: int, budget: int, methods: list[str]) -> None:
             )
 
 
-def narrow(scenario: str, deviation: float) -> Exposure:
-    """Return the exposure whose parameters are normal around their defaults."""
-    even = chosen_exposure(load(scenario), UNIFORM)
-    assert even is not None
+def made_up(case: Case) -> Exposure:
+    """Return the exposure of a case."""
+    scenario = load(case.scenario)
+    assert isinstance(scenario, LogicalScenario)
     normal = {}
-    for name in even.names:
-        one = even.space.parameters[name]
-        if one.kind == FLOAT:
-            spread = deviation * (one.high - one.low)
-            normal[name] = {"distribution": "normal", "mean": one.default, "deviation": spread}
-    source = f"Made up: normal around the defaults, deviations of {deviation:g} of the ranges."
-    node = {"source": source, "others": "uniform", "parameters": normal}
-    return build_exposure(read_plain_yaml(json.dumps(node).encode(), "narrow"), even.scenario, None)
+    for name, mean in case.means.items():
+        one = scenario.parameters[name]
+        size = one.high - one.low
+        normal[name] = {
+            "distribution": "normal", "mean": one.low + mean * size,
+            "deviation": case.deviation * size,
+        }  # fmt: skip
+    node = {"source": "Made up for this benchmark.", "others": "uniform", "parameters": normal}
+    return build_exposure(read_plain_yaml(json.dumps(node).encode(), "made up"), scenario, None)
 
 
 def truth(counted: Risk, wanted: Exposure) -> Probability:
-    """Return the probability under an exposure, of rows that were counted under another one."""
+    """Return the probability under an exposure, of rows that were drawn from another one."""
     rows = counted.weighted
     X = counted.exposure.from_normal(rows.Z[rows.there(NEAR_MISS) > 0.0])
     likelier = np.exp(wanted.log_density(X) - counted.exposure.log_density(X))
     return of_weights(likelier / rows.rows)
 
 
-def scenarios(folder: Path, count: int, pairs: list[str]) -> None:
+def scenarios(folder: Path, pairs: list[str]) -> None:
     """Print estimates of catalogue scenarios by each method, and by counting."""
     print("| scenario | driver | counted | 95 % | method | estimate | 95 % | evaluations | s |")
     print("|---|---|---|---|---|---|---|---|---|")
-    for (scenario, driver), deviation in PAIRS.items():
-        pair = f"{scenario}/{driver}"
-        if pairs and pair not in pairs:
+    for case in CASES:
+        if pairs and f"{case.scenario}/{case.driver}" not in pairs:
             continue
-        there = folder / f"{scenario}-{driver}"
+        there = folder / f"{case.scenario}-{case.driver}"
         counted = estimate_risk(
-            scenario, ego=driver, exposure="uniform", event="conflict", method="mc",
-            budget=count, precision=0.0, seed=1, out=there / "counted",
+            case.scenario, ego=case.driver, exposure=UNIFORM, event="conflict", method="mc",
+            budget=case.rows, precision=0.0, seed=1, out=there / "counted",
         )  # fmt: skip
-        wanted = narrow(scenario, deviation)
+        wanted = made_up(case)
         true = truth(counted, wanted)
         for method in METHODS:
             start = time.perf_counter()
             found = estimate_risk(
-                scenario, ego=driver, exposure=wanted, event="conflict", method=method,
+                case.scenario, ego=case.driver, exposure=wanted, event="conflict", method=method,
                 budget=BUDGET, out=there / method,
             )  # fmt: skip
             seconds = time.perf_counter() - start
             p = found.probability("conflict")
-            cells = [scenario, driver, f"{true.estimate:.3g}", f"{true.low:.3g} to {true.high:.3g}"]
-            cells.append(method + (f" ({found.estimated.method})" if method == "auto" else ""))
+            cells = [
+                case.scenario, case.driver, f"{true.estimate:.3g}",
+                f"{true.low:.3g} to {true.high:.3g}",
+                method if method != "auto" else f"auto: {found.estimated.method}",
+            ]  # fmt: skip
             cells += (
                 ["in doubt", found.weighted.doubts[0]]
                 if p is None
@@ -160,13 +198,12 @@ def main() -> None:
     one.add_argument("--budget", type=int, default=60_000)
     other = parts.add_parser("scenarios")
     other.add_argument("folder", type=Path)
-    other.add_argument("--count", type=int, default=400_000)
     other.add_argument("--pairs", nargs="*", default=[])
     given = parser.parse_args()
     if given.what == "coverage":
         coverage(given.repeats, given.budget, given.methods)
     else:
-        scenarios(given.folder, given.count, given.pairs)
+        scenarios(given.folder, given.pairs)
 
 
 if __name__ == "__main__":
