@@ -13,6 +13,7 @@ from bridgegen.conflict.harm import NEAR_MISS
 from bridgegen.errors import InputError, StorageError
 from bridgegen.options import PipelineOptions
 from bridgegen.pipeline import Pipeline
+from bridgegen.risk.experiment import Experiment
 from bridgegen.risk.ledger import BATCHES
 from bridgegen.risk.outcomes import Column, outcomes
 from bridgegen.risk.risk import RiskCallbacks, estimate_risk
@@ -131,6 +132,24 @@ def test_processes_find_what_threads_find(risk, tmp_path):
     found = estimate_risk(SCENARIO, out=tmp_path / "two", workers=2, **GIVEN)
     assert said(found.folder) == said(risk.folder)
     assert files(found.folder)["harmful.csv"] == files(risk.folder)["harmful.csv"]
+
+
+def test_spread_rows_stand_for_the_road():
+    """Their weights are a density over another one: 1 on average, whatever the exposure."""
+    exposure = bg.read_exposure(EXAMPLE)
+    pipeline = Pipeline(exposure.scenario, exposure.space, PipelineOptions(ego="careful"))
+    experiment = Experiment(pipeline, exposure, None, "ego", None, print)
+    Z, weights = experiment.spread(20_000, np.random.default_rng(1))
+    assert Z.shape == (20_000, exposure.dimensions)
+    assert weights.mean() == pytest.approx(1.0, abs=4.0 * weights.std() / 20_000**0.5)
+    there = weights > 0.0
+    assert experiment.feasible(Z[there]).all()
+    X = exposure.from_normal(Z[there])
+    speeds = X[:, exposure.space.index("ego_speed")]
+    road = exposure.sample(20_000, 1).X[:, exposure.space.index("ego_speed")]
+    mean = np.average(speeds, weights=weights[there])
+    assert mean == pytest.approx(road.mean(), abs=0.3)
+    assert speeds.std() > 1.3 * road.std()
 
 
 def test_all_conflicts_are_those_that_count_and_the_others(tmp_path):
@@ -273,7 +292,7 @@ def test_too_few_hits_of_strata_are_not_believed(tmp_path):
 
 def test_the_check_counts_other_rows(tmp_path):
     """Where auto counts, too."""
-    given = GIVEN | {"method": "auto", "budget": 1200, "check": 1000}
+    given = GIVEN | {"method": "auto", "budget": 4000, "check": 1000}
     found = estimate_risk(SCENARIO, out=tmp_path / "check", **given)
     assert found.estimated.method == "mc"
     same = np.isin(found.check.Z[:, 0], found.weighted.Z[:, 0])

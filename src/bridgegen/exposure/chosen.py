@@ -1,5 +1,6 @@
 """Which exposure a command takes: the one that is named, or the scenario's own."""
 
+import json
 from pathlib import Path
 
 import numpy as np
@@ -47,6 +48,14 @@ def chosen_exposure(
     if given is not None:
         return read_exposure(given, scenario)
     return exposure_of(scenario) if isinstance(scenario, LogicalScenario) else None
+
+
+def evenly(exposure: Exposure) -> Exposure:
+    """Return the exposure that distributes the same parameters, each uniformly over its range."""
+    uniform = {name: {"distribution": "uniform"} for name in exposure.names}
+    node = {"source": "Uniform over the ranges.", "others": "default", "parameters": uniform}
+    text = json.dumps(node).encode()
+    return build_exposure(read_plain_yaml(text, UNIFORM), exposure.scenario, None)
 
 
 def rows_on_the_road(exposure: Exposure, space: SearchSpace, n: int = ROWS) -> Float:

@@ -22,8 +22,8 @@ import scipy.stats
 
 from bridgegen.arrays import Bool, Float
 from bridgegen.errors import InputError
-from bridgegen.risk.estimators.importance import OF_CHAIN, Proposals
 from bridgegen.risk.estimators.problem import block_of
+from bridgegen.risk.estimators.proposals import OF_CHAIN, Proposals
 from bridgegen.risk.estimators.weighted import FEWEST_HITS, LEVEL, Weighted
 from bridgegen.risk.experiment import Experiment
 from bridgegen.risk.ledger import ELSEWHERE, Ledger

@@ -7,6 +7,7 @@ import numpy as np
 from bridgegen.arrays import Bool, Float
 from bridgegen.conflict.harm import Count
 from bridgegen.exposure import Exposure
+from bridgegen.exposure.chosen import evenly
 from bridgegen.pipeline import Pipeline
 from bridgegen.risk.ledger import Ledger
 from bridgegen.risk.outcomes import Column, Outcomes, outcomes
@@ -56,6 +57,26 @@ class Experiment:
     def feasible(self, Z: Float) -> Bool:
         """Return which points keep the scenario's constraints."""
         return self._exposure.feasible(self._exposure.from_normal(Z))
+
+    def spread(self, n: int, random: np.random.Generator) -> tuple[Float, Float]:
+        """Return points whose rows are uniform over the ranges, and their weights.
+
+        Args:
+            n: how many.
+            random: all random numbers.
+
+        Returns:
+            ``(n, dimensions)``; and ``(n,)``, how much likelier each one is on the road.
+        """
+        met = self._exposure
+        even = evenly(met)
+        X = even.sample(n, int(random.integers(2**31))).X
+        weights = np.exp(met.log_density(X) - even.log_density(X))
+        Z = np.zeros((n, met.dimensions))
+        there = weights > 0.0
+        Z[there] = met.to_normal(X[there])
+        weights[there] *= met.feasible(met.from_normal(Z[there]))
+        return Z, weights
 
     def evaluate(self, Z: Float, least: float = -np.inf) -> Float:
         """Return the outcomes of N feasible points, ``(N, len(Column))``."""

@@ -62,7 +62,13 @@ def unsure(risk: Risk) -> Iterator[str]:
             "Few simulations: the interval says how far the estimate may be off, if the exposure "
             "and the simulation are right."
         )
-    if risk.estimated.method in ("subset", "importance"):
+    if "explored_hits" in risk.weighted.facts:
+        yield (
+            "Harm was found by rows that are spread over the ranges, for no ever more harmful rows "
+            "lead to it; a region so small that none of them lay in it is allowed for in the upper "
+            "end alone."
+        )
+    elif risk.estimated.method in ("subset", "importance"):
         yield (
             "Harm that is reached through no ever more harmful rows is not found by this method, "
             "however much of it there is; mc assumes nothing."

@@ -29,6 +29,12 @@ class Analytic:
     def feasible(self, Z):
         return self.allowed(Z)
 
+    def spread(self, n, random):
+        """Return points of a distribution twice as wide."""
+        Z = 2.0 * random.standard_normal((n, self.dimensions))
+        weights = 2.0**self.dimensions * np.exp(-0.375 * (Z * Z).sum(axis=1))
+        return Z, weights * self.allowed(Z) / self.share[1]
+
     def evaluate(self, Z, least=-np.inf):
         assert self.allowed(Z).all()
         self.evaluations += len(Z)

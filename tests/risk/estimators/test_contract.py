@@ -108,8 +108,22 @@ def test_what_scores_do_not_lead_to_is_in_doubt_or_within(make):
     assert wrong <= 4  # of 16: no method that follows a score can exclude it
 
 
+def test_what_no_score_leads_to_is_found_by_spread_points():
+    believed = 0
+    for seed in range(6):
+        problem = problems.hidden()
+        found = run("importance", problem, seed, 50_000, precision=0.2)
+        p = found.probability(0.0)
+        assert p.low <= 1.1 * problem.probability
+        assert problem.probability <= p.high
+        assert p.high > 1.03 * p.estimate  # what few spread points may have missed
+        believed += not found.doubts
+    assert believed >= 4
+
+
 def test_auto_falls_back_on_counting():
-    found = estimate("auto", problems.hidden(), Aim(0.0, 0.0, 20_000, 0.2), 0, None)
+    problem = problems.Analytic(3, lambda Z: np.where(Z[:, 0] > 12.0, 0.1, -1.0), 0.0)
+    found = estimate("auto", problem, Aim(0.0, 0.0, 20_000, 0.2), 0, None)
     assert found.method == "mc"
     p = found.weighted.probability(0.0)
     assert p.estimate == 0.0

@@ -1,89 +1,31 @@
 """Importance sampling: rows are drawn where the event happens, and weighted by how likely they are.
 
-Proposals are a mixture of three: normal distributions fitted to points of the event; narrow ones
-around single points of it, so that no region that was seen is left out; and, for a tenth of the
-rows, the distribution of the road itself. The last one keeps all weights below ten.
-
-Sources: Rubinstein and Kroese, The Cross-Entropy Method (2004); Owen and Zhou, Journal of the
-American Statistical Association 95 (2000) 135-143 (defensive mixtures).
+Where it happens, subset simulation says; if its levels do not lead there, rows that are spread
+over the ranges do (`exploration`). For what rows are drawn from, see `proposals`.
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from bridgegen.arrays import Float
-from bridgegen.risk.estimators import mixture, subset
-from bridgegen.risk.estimators.mixture import Kernels, Mixture
+from bridgegen.risk.estimators import exploration, subset
 from bridgegen.risk.estimators.problem import SCORE, Aim, Problem, block_of
+from bridgegen.risk.estimators.proposals import DEFENSIVE, OF_CHAIN, Proposals
 from bridgegen.risk.estimators.weighted import FEWEST_HITS, Weighted
 
-DEFENSIVE, AROUND = 0.1, 0.25
-"""The shares of rows that are drawn as on the road, and around single points."""
-FITTED, CENTRES = 500, 200  # points, at most
 ROUNDS, OF_ROUND = 2, 2000
 """How often proposals are fitted again, and to how many rows."""
 PREPARED, FOUND = 0.6, 0.5
 """The share of the budget that subset simulation may take, and the precision at which it stops."""
+EXPLORED = 0.5
+"""The share of what is left that exploration may take."""
 FEWEST_ROWS = 100  # of a round
-OF_CHAIN = 5.0  # points of chains are worth one independent one
 BLOCK, FIRST = 16_384, 1024
 MOST_UNSEEN = 0.9  # of the probability in regions that nobody has seen: no upper end to speak of
 HEAVIEST = 0.2
 """Of the estimate at most may come from one row."""
-_INFLATED = 1.2  # standard deviations: tails that are too thin make weights too large
-
-
-@dataclass(frozen=True)
-class Proposals:
-    """What rows are drawn from."""
-
-    fitted: Mixture
-    kernels: Kernels
-
-    @classmethod
-    def of(cls, Z: Float, weights: Float, size: float, random: np.random.Generator) -> "Proposals":
-        """Fit them to weighted points of the event.
-
-        Args:
-            Z: ``(M, d)``, M ≥ 1.
-            weights: ``(M,)``, positive.
-            size: how many independent points they are worth.
-            random: chooses points and where components begin.
-        """
-        Z, first = np.unique(Z, axis=0, return_inverse=True)
-        sums = np.bincount(first.reshape(-1), weights, len(Z)).astype(np.float64)
-        p = sums / sums.sum()
-        if len(Z) > FITTED:
-            Z = Z[random.choice(len(Z), FITTED, p=p)]
-            p = np.full(FITTED, 1.0 / FITTED)
-        made = mixture.fit(Z, p, size, random)
-        centres = Z[random.choice(len(Z), min(CENTRES, len(Z)), replace=False, p=p)]
-        wide = replace(made, factors=made.factors * _INFLATED)
-        return cls(wide, Kernels.around(centres, made.within))
-
-    def draw(self, n: int, random: np.random.Generator) -> tuple[Float, Float]:
-        """Draw n points; return them and their weights."""
-        d = self.fitted.means.shape[1]
-        Z = self.fitted.sample(n, random)
-        kind = random.random(n)
-        plain, around = kind < DEFENSIVE, kind >= 1.0 - AROUND
-        Z[plain] = random.standard_normal((int(plain.sum()), d))
-        Z[around] = self.kernels.sample(int(around.sum()), random)
-        return Z, self.weights(Z)
-
-    def weights(self, Z: Float) -> Float:
-        """Return how much likelier points are on the road than among these proposals, ``(N,)``."""
-        d = Z.shape[1]
-        road = -0.5 * np.sum(Z * Z, axis=1) - 0.5 * d * np.log(2.0 * np.pi)
-        parts = (
-            (1.0 - DEFENSIVE - AROUND, self.fitted.log_density(Z)),
-            (AROUND, self.kernels.log_density(Z)),
-        )
-        ratio = sum(share * np.exp(np.minimum(one - road, 700.0)) for share, one in parts)
-        found: Float = 1.0 / (DEFENSIVE + ratio)
-        return found
 
 
 def estimate(problem: Problem, aim: Aim, seed: int, start: Float | None = None) -> Weighted:
@@ -101,13 +43,21 @@ def estimate(problem: Problem, aim: Aim, seed: int, start: Float | None = None) 
     known = subset.estimate(problem, less, seed)
     there = known.scores >= aim.threshold
     Z, weights = known.Z[there], known.weights[there]
+    if known.doubts and not (start is not None and len(start)):
+        rest = replace(aim, budget=int(EXPLORED * (aim.budget - known.evaluations)))
+        wide = exploration.explore(problem, rest, seed)
+        there = wide.scores >= aim.threshold
+        spent = known.evaluations + wide.evaluations
+        known = replace(wide if there.any() else known, evaluations=spent)
+        Z, weights = wide.Z[there], wide.weights[there]
     if start is not None and len(start):
         more = (weights.sum() if len(Z) else 1.0) / len(start)  # half of the rows look there
         Z, weights = np.concatenate([Z, start]), np.append(weights, np.full(len(start), more))
     if not len(Z):
         return known
     random, spent = block_of(seed, 0, 1), known.evaluations
-    proposals = Proposals.of(Z, weights, len(Z) / OF_CHAIN, random)
+    size = len(Z) / OF_CHAIN if known.repetitions else known.hits(known.there(aim.threshold))
+    proposals = Proposals.of(Z, weights, size, random)
     rows = min(OF_ROUND, (aim.budget - spent) // (4 * ROUNDS))
     for _ in range(ROUNDS if rows >= FEWEST_ROWS else 0):
         Z, weights = proposals.draw(rows, random)
@@ -161,6 +111,8 @@ def _drawn(
         "heaviest": _heaviest(result, aim),
         "reached": known.facts.get("reached", 1.0),
     }
+    if "explored_hits" in known.facts:
+        facts["explored_hits"] = known.facts["explored_hits"]
     return replace(result, doubts=tuple(_doubts(result, aim, known, helped)), facts=facts)
 
 
@@ -189,10 +141,11 @@ def _doubts(result: Weighted, aim: Aim, known: Weighted, helped: bool) -> Iterat
     elif heaviest > HEAVIEST:
         yield f"one row makes {heaviest:.0%} of the estimate: a region was missed"
     expected = known.probability(aim.threshold)
+    before = "subset simulation" if known.repetitions else "exploration"
     more = not helped and found.low > expected.high  # what a search found may be missing there
     if not known.doubts and (more or expected.low > found.high):
         yield (
-            f"subset simulation says {expected.low:.2g} to {expected.high:.2g}, and importance "
+            f"{before} says {expected.low:.2g} to {expected.high:.2g}, and importance "
             f"sampling {found.low:.2g} to {found.high:.2g}"
         )
 
@@ -201,9 +154,12 @@ def _unseen(known: Weighted, aim: Aim) -> float:
     """Return the share of the event's probability that regions may have which nobody has seen.
 
     Subset simulation that knows the probability to a relative standard error c has seen as much of
-    it as 1 / c² independent harmful rows show. A region that n of them all miss has less than 3 / n
-    of the probability, with 95 % confidence.
+    it as 1 / c² independent harmful rows show; exploration, as much as its effective harmful rows
+    do. A region that n of them all miss has less than 3 / n of the probability, with 95 %
+    confidence.
     """
+    if not known.repetitions:
+        return min(3.0 / max(known.hits(known.there(aim.threshold)), 1e-9), MOST_UNSEEN)
     sums = known.sums(known.there(aim.threshold))
     if len(sums) < 2 or not sums.mean() > 0.0:
         return MOST_UNSEEN

@@ -29,6 +29,18 @@ class Problem(Protocol):
     def feasible(self, Z: Float) -> Bool:
         """Return which of N points ``(N, dimensions)`` can happen at all, ``(N,)``."""
 
+    def spread(self, n: int, random: np.random.Generator) -> tuple[Float, Float]:
+        """Return points that are spread over all of the space, and their weights.
+
+        Args:
+            n: how many.
+            random: all random numbers.
+
+        Returns:
+            ``(n, dimensions)``, independent; and ``(n,)``, how much likelier each one is among
+            feasible points than among these: 0 of one that is not feasible.
+        """
+
     def evaluate(self, Z: Float, least: float = -np.inf) -> Float:
         """Evaluate N feasible points; a point's outcome depends on that point alone.
 

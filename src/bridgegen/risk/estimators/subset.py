@@ -271,7 +271,7 @@ def _doubts(first: Pilot, aim: Aim, sums: Float, facts: dict[str, float]) -> Ite
         last = first.levels[-1].score if first.levels else 0.0
         yield (
             f"the levels end at a score of {last:.4g}, below {aim.threshold:g}: hardly any row "
-            "comes nearer; use mc, or importance from a search that found the event"
+            "comes nearer; use importance, which looks elsewhere, too, or mc"
         )
     elif (reaching := int(np.sum(sums > 0.0))) < FEWEST_REPETITIONS:
         yield (
