@@ -1,5 +1,7 @@
 """The event found without a score that leads to it, by points spread over all of the space."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from bridgegen.risk.estimators.problem import SCORE, Aim, Problem, block_of
@@ -29,14 +31,9 @@ def explore(problem: Problem, aim: Aim, seed: int) -> Weighted:
     none = np.empty(0, np.int64)
     known = Weighted(Z, found, weights, n, none, 0, largest, (1.0, 1.0, 1.0), len(there))
     hits = known.hits(known.there(aim.threshold))
-    doubts = (
-        ()
-        if hits >= FEWEST
-        else (
-            f"{hits:.1f} effective ones of {n:,} rows that are spread over the ranges are harmful",
-        )
+    doubt = f"{hits:.1f} effective ones of {n:,} rows that are spread over the ranges are harmful"
+    return replace(
+        known,
+        doubts=() if hits >= FEWEST else (doubt,),
+        facts={"explored_hits": hits, "reached": 0.0},
     )
-    return Weighted(
-        Z, found, weights, n, none, 0, largest, (1.0, 1.0, 1.0), len(there), doubts,
-        {"explored_hits": hits, "reached": 0.0},
-    )  # fmt: skip
