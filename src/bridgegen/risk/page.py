@@ -68,6 +68,12 @@ def unsure(risk: Risk) -> Iterator[str]:
             "lead to it; a region so small that none of them lay in it is allowed for in the upper "
             "end alone."
         )
+    elif "spread" in risk.weighted.facts:
+        yield (
+            "Harm that is reached through no ever more harmful rows is found only where one of "
+            f"{risk.weighted.facts['spread']:,.0f} rows lies in it that are spread over the "
+            "ranges; mc assumes nothing."
+        )
     elif risk.estimated.method in ("subset", "importance"):
         yield (
             "Harm that is reached through no ever more harmful rows is not found by this method, "

@@ -149,3 +149,13 @@ def misleading():
 def hidden():
     """An event that no score leads to."""
     return Analytic(3, lambda Z: np.where(Z[:, 0] > 4.5, 0.1, -1.0), normal.sf(4.5))
+
+
+def partly_hidden():
+    """A score leads to a fifth of the probability, and says nothing of the rest."""
+    shown, rest = normal.sf(4.5), normal.sf(4.2)
+
+    def score(Z):
+        return np.where(Z[:, 1] > 4.2, 0.1, Z[:, 0] - 4.5)
+
+    return Analytic(3, score, shown + rest - shown * rest)

@@ -121,6 +121,19 @@ def test_what_no_score_leads_to_is_found_by_spread_points():
     assert believed >= 4
 
 
+def test_a_region_that_levels_miss_is_found_by_spread_points():
+    """Levels lead to a fifth of the probability and say nothing of the rest."""
+    believed = 0
+    for seed in range(6):
+        problem = problems.partly_hidden()
+        found = run("importance", problem, seed, 100_000, precision=0.2)
+        p = found.probability(0.0)
+        assert found.doubts or p.low <= problem.probability <= p.high
+        assert p.estimate == pytest.approx(problem.probability, rel=0.3)
+        believed += not found.doubts
+    assert believed >= 4
+
+
 def test_auto_falls_back_on_counting():
     problem = problems.Analytic(3, lambda Z: np.where(Z[:, 0] > 12.0, 0.1, -1.0), 0.0)
     found = estimate("auto", problem, Aim(0.0, 0.0, 20_000, 0.2), 0, None)

@@ -2,8 +2,8 @@
 
 A first few thousand rows decide, as they happen on the road. Where their share of harmful ones lets
 Monte Carlo reach the precision within the budget, it is taken: it assumes nothing. Otherwise
-importance sampling; if its result is in doubt, subset simulation; if that is, too, what is left of
-the budget is counted.
+importance sampling; if its result is in doubt, subset simulation; if that is, too, or if it lies
+below what importance sampling has shown at least, what is left of the budget is counted.
 """
 
 from dataclasses import replace
@@ -49,10 +49,11 @@ def estimate(
         return "importance", why, replace(found, evaluations=spent)
     doubt = found.doubts[0]
     if found.facts.get("reached", 1.0):
+        least = found.probability(aim.threshold).low
         part = replace(aim, budget=int(SECOND_SHARE * (aim.budget - spent)))
         found = subset.estimate(problem, part, seed + 1)
         spent += found.evaluations
-        if not found.doubts:
+        if not found.doubts and found.probability(aim.threshold).high >= least:
             why = f"{why}, and importance sampling is in doubt ({doubt})"
             return "subset", why, replace(found, evaluations=spent)
     return (

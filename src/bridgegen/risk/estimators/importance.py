@@ -1,7 +1,7 @@
 """Importance sampling: rows are drawn where the event happens, and weighted by how likely they are.
 
-Where it happens, subset simulation says; if its levels do not lead there, rows that are spread
-over the ranges do (`exploration`). For what rows are drawn from, see `proposals`.
+Where it happens, subset simulation says, and rows that are spread over the ranges: they also find
+what its levels do not lead to (`exploration`). For what rows are drawn from, see `proposals`.
 """
 
 from collections.abc import Iterator
@@ -19,8 +19,10 @@ ROUNDS, OF_ROUND = 2, 2000
 """How often proposals are fitted again, and to how many rows."""
 PREPARED, FOUND = 0.6, 0.5
 """The share of the budget that subset simulation may take, and the precision at which it stops."""
-EXPLORED = 0.5
-"""The share of what is left that exploration may take."""
+EXPLORED, CHECKED = 0.5, 0.1
+"""The share of what is left that exploration may take, if subset simulation is in doubt or not."""
+STRANGE = 0.25
+"""Of the first proposals at most are around spread points, beside those of levels; less if few."""
 FEWEST_ROWS = 100  # of a round
 BLOCK, FIRST = 16_384, 1024
 MOST_UNSEEN = 0.9  # of the probability in regions that nobody has seen: no upper end to speak of
@@ -40,23 +42,20 @@ def estimate(problem: Problem, aim: Aim, seed: int, start: Float | None = None) 
         start: ``(M, d)`` further points of the event, from a search say.
     """
     less = replace(aim, budget=max(int(PREPARED * aim.budget), 1), precision=FOUND)
-    known = subset.estimate(problem, less, seed)
-    there = known.scores >= aim.threshold
-    Z, weights = known.Z[there], known.weights[there]
-    if known.doubts and not (start is not None and len(start)):
-        rest = replace(aim, budget=int(EXPLORED * (aim.budget - known.evaluations)))
-        wide = exploration.explore(problem, rest, seed)
-        there = wide.scores >= aim.threshold
-        spent = known.evaluations + wide.evaluations
-        known = replace(wide if there.any() else known, evaluations=spent)
-        Z, weights = wide.Z[there], wide.weights[there]
+    levels = subset.estimate(problem, less, seed)
+    left = aim.budget - levels.evaluations
+    rest = replace(aim, budget=int((EXPLORED if levels.doubts else CHECKED) * left))
+    spread = exploration.explore(problem, rest, seed)
+    Z, weights = _points(levels, spread, aim)
     if start is not None and len(start):
         more = (weights.sum() if len(Z) else 1.0) / len(start)  # half of the rows look there
         Z, weights = np.concatenate([Z, start]), np.append(weights, np.full(len(start), more))
+    spent = levels.evaluations + spread.evaluations
     if not len(Z):
-        return known
-    random, spent = block_of(seed, 0, 1), known.evaluations
-    size = len(Z) / OF_CHAIN if known.repetitions else known.hits(known.there(aim.threshold))
+        return replace(levels, evaluations=spent)
+    random = block_of(seed, 0, 1)
+    helped = start is not None and len(start) > 0
+    size = _hits(spread, aim) if levels.doubts and not helped else len(Z) / OF_CHAIN
     proposals = Proposals.of(Z, weights, size, random)
     rows = min(OF_ROUND, (aim.budget - spent) // (4 * ROUNDS))
     for _ in range(ROUNDS if rows >= FEWEST_ROWS else 0):
@@ -70,8 +69,21 @@ def estimate(problem: Problem, aim: Aim, seed: int, start: Float | None = None) 
             size = float(weights.sum() ** 2 / np.sum(weights * weights))
             found = Proposals.of(Z[inside], weights, size, random)
             proposals = replace(found, kernels=proposals.kernels)
-    helped = start is not None and len(start) > 0
-    return _drawn(problem, aim, seed, proposals, spent, known, helped)
+    return _drawn(problem, aim, seed, proposals, spent, (levels, spread), helped)
+
+
+def _points(levels: Weighted, spread: Weighted, aim: Aim) -> tuple[Float, Float]:
+    """Return points of the event that proposals begin with, ``(M, d)``, and weights, ``(M,)``."""
+    Z, weights = (part[spread.scores >= aim.threshold] for part in (spread.Z, spread.weights))
+    if levels.doubts or not levels.repetitions:
+        return Z, weights
+    there = levels.scores >= aim.threshold
+    known, added = levels.weights[there], float(weights.sum())
+    share = STRANGE * min(_hits(spread, aim) / exploration.FEWEST, 1.0)
+    most = share / (1.0 - share) * float(known.sum())
+    if added > most:
+        weights = weights * (most / added)
+    return np.concatenate([levels.Z[there], Z]), np.append(known, weights)
 
 
 def _drawn(
@@ -80,10 +92,9 @@ def _drawn(
     seed: int,
     proposals: Proposals,
     spent: int,
-    known: Weighted,
+    before: tuple[Weighted, Weighted],
     helped: bool,
 ) -> Weighted:
-    unseen = _unseen(known, aim)
     kept: list[tuple[Float, Float, Float]] = []
     drawn = used = block = 0
     check, limit = FIRST, max(aim.budget - spent, 1)
@@ -99,21 +110,49 @@ def _drawn(
         kept.append((Z[good][hit], found[hit], weights[good][hit]))
         if drawn == check:
             check *= 2
-            result = _result(problem, kept, drawn, spent + used, unseen)
-            if result.probability(aim.threshold).precision <= aim.precision and not any(
-                _doubts(result, aim, known, helped)
-            ):
+            result = _judged(_result(problem, kept, drawn, spent + used), aim, before, helped)
+            if not result.doubts and result.probability(aim.threshold).precision <= aim.precision:
                 break
-    result = _result(problem, kept, drawn, spent + used, unseen)
+    result = _judged(_result(problem, kept, drawn, spent + used), aim, before, helped)
+    components = float(len(proposals.fitted.weights))
+    return replace(result, facts={"components": components, **result.facts})
+
+
+def _judged(
+    result: Weighted, aim: Aim, before: tuple[Weighted, Weighted], helped: bool
+) -> Weighted:
+    """Return a result with its doubts, its facts, and what regions nobody has seen may add.
+
+    Subset simulation and exploration are heard in this order; who is not in doubt and agrees with
+    the result bounds what it has not seen.
+    """
+    levels, spread = before
+    sure = [one for one in before if not one.doubts]
+    found = [_beside(result, aim, known, helped) for known in sure]
+    if not found:
+        known = spread if len(spread.Z) and not helped else levels
+        found = [_beside(result, aim, known, helped)]
+    best = next((one for one in found if not one.doubts), found[0])
+    return replace(best, facts={**best.facts, "spread": float(spread.rows)})
+
+
+def _beside(result: Weighted, aim: Aim, known: Weighted, helped: bool) -> Weighted:
+    """Return a result with the doubts and facts that it has beside what was known before."""
+    low, share, high = result.share
+    result = replace(result, share=(low, share, high / (1.0 - _unseen(known, aim))))
     facts = {
-        "components": float(len(proposals.fitted.weights)),
-        "effective_hits": result.hits(result.there(aim.threshold)),
+        "effective_hits": _hits(result, aim),
         "heaviest": _heaviest(result, aim),
         "reached": known.facts.get("reached", 1.0),
     }
     if "explored_hits" in known.facts:
         facts["explored_hits"] = known.facts["explored_hits"]
     return replace(result, doubts=tuple(_doubts(result, aim, known, helped)), facts=facts)
+
+
+def _hits(result: Weighted, aim: Aim) -> float:
+    """Return the effective number of rows in which the event happens."""
+    return result.hits(result.there(aim.threshold))
 
 
 def _heaviest(result: Weighted, aim: Aim) -> float:
@@ -132,7 +171,7 @@ def _doubts(result: Weighted, aim: Aim, known: Weighted, helped: bool) -> Iterat
         )
     else:
         yield from known.doubts
-    hits, heaviest = result.hits(result.there(aim.threshold)), _heaviest(result, aim)
+    hits, heaviest = _hits(result, aim), _heaviest(result, aim)
     found = result.probability(aim.threshold)
     if hits < FEWEST_HITS:
         yield (
@@ -159,7 +198,7 @@ def _unseen(known: Weighted, aim: Aim) -> float:
     confidence.
     """
     if not known.repetitions:
-        return min(3.0 / max(known.hits(known.there(aim.threshold)), 1e-9), MOST_UNSEEN)
+        return min(3.0 / max(_hits(known, aim), 1e-9), MOST_UNSEEN)
     sums = known.sums(known.there(aim.threshold))
     if len(sums) < 2 or not sums.mean() > 0.0:
         return MOST_UNSEEN
@@ -168,12 +207,12 @@ def _unseen(known: Weighted, aim: Aim) -> float:
 
 
 def _result(
-    problem: Problem, kept: list[tuple[Float, Float, Float]], drawn: int, spent: int, unseen: float
+    problem: Problem, kept: list[tuple[Float, Float, Float]], drawn: int, spent: int
 ) -> Weighted:
     Z, found, weight = (np.concatenate(one) for one in zip(*kept, strict=True))
     low, share, high = problem.share
     factor = 1.0 / (drawn * share)
     return Weighted(
         Z, found, weight * factor, drawn, np.empty(0, np.int64), 0, factor / DEFENSIVE,
-        (1.0 / high, 1.0 / share, 1.0 / (low * (1.0 - unseen))), spent,
+        (1.0 / high, 1.0 / share, 1.0 / low), spent,
     )  # fmt: skip
