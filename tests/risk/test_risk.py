@@ -152,6 +152,18 @@ def test_spread_rows_stand_for_the_road():
     assert speeds.std() > 1.3 * road.std()
 
 
+def test_spread_rows_take_the_single_values_of_a_range():
+    exposure = bg.read_exposure("lead-brakes-new-york")
+    pipeline = Pipeline(exposure.scenario, exposure.space, PipelineOptions(ego="careful"))
+    experiment = Experiment(pipeline, exposure, None, "ego", None, print)
+    Z, weights = experiment.spread(20_000, np.random.default_rng(1))
+    assert weights.mean() == pytest.approx(1.0, abs=4.0 * weights.std() / 20_000**0.5)
+    rain = exposure.from_normal(Z)[:, exposure.space.index("precipitation")]
+    there = weights > 0.0
+    assert there.mean() > 0.5
+    assert np.average(rain[there] > 0.0, weights=weights[there]) == pytest.approx(0.066, abs=0.01)
+
+
 def test_all_conflicts_are_those_that_count_and_the_others(tmp_path):
     found = estimate_risk(
         "cut-in", ego="careful", exposure=EXAMPLE, event="conflict", count="any", method="mc",

@@ -8,7 +8,9 @@ import numpy as np
 from bridgegen.arrays import Float
 from bridgegen.errors import InputError
 from bridgegen.exposure.exposure import Exposure
+from bridgegen.exposure.marginals import Conditional, Marginal, Shared
 from bridgegen.exposure.reader import build_exposure, exposure_of, read_exposure
+from bridgegen.odd.distributions import Discrete
 from bridgegen.odd.plain_yaml import read_plain_yaml
 from bridgegen.odd.scenario import LogicalScenario, SearchedScenario
 from bridgegen.odd.space import SearchSpace
@@ -51,11 +53,20 @@ def chosen_exposure(
 
 
 def evenly(exposure: Exposure) -> Exposure:
-    """Return the exposure that distributes the same parameters, each uniformly over its range."""
-    uniform = {name: {"distribution": "uniform"} for name in exposure.names}
-    node = {"source": "Uniform over the ranges.", "others": "default", "parameters": uniform}
+    """Return the exposure that distributes the same parameters, each uniformly over its range.
+
+    One that takes single values of its range takes each of them equally often.
+    """
+    even = {name: _even(one) for name, one in exposure.marginals.items()}
+    node = {"source": "Uniform over the ranges.", "others": "default", "parameters": even}
     text = json.dumps(node).encode()
     return build_exposure(read_plain_yaml(text, UNIFORM), exposure.scenario, None)
+
+
+def _even(marginal: Marginal | Conditional) -> dict[str, object]:
+    if isinstance(marginal, Shared) and isinstance(marginal.distribution, Discrete):
+        return {"distribution": "discrete", "values": list(marginal.distribution.values)}
+    return {"distribution": "uniform"}
 
 
 def rows_on_the_road(exposure: Exposure, space: SearchSpace, n: int = ROWS) -> Float:

@@ -44,7 +44,8 @@ def estimate(problem: Problem, aim: Aim, seed: int, start: Float | None = None) 
     less = replace(aim, budget=max(int(PREPARED * aim.budget), 1), precision=FOUND)
     levels = subset.estimate(problem, less, seed)
     left = aim.budget - levels.evaluations
-    rest = replace(aim, budget=int((EXPLORED if levels.doubts else CHECKED) * left))
+    check = min(int(CHECKED * left), levels.evaluations)
+    rest = replace(aim, budget=int(EXPLORED * left) if levels.doubts else check)
     spread = exploration.explore(problem, rest, seed)
     Z, weights = _points(levels, spread, aim)
     if start is not None and len(start):
