@@ -22,8 +22,8 @@ def test_the_ego_strikes_a_rear(track, meeting, course):
     assert text == (
         "The ego's front struck the rear of 'bv' at 19.9 m/s closing speed; the ego is "
         "responsible: it did not keep a safe distance to the vehicle ahead (RSS (Shalev-Shwartz et "
-        "al., 2017), definition 1; StVO § 4 (1)); the risk arose 4.0 s before, and a careful "
-        "driver (UN R157, Annex 3) would have avoided it."
+        "al., 2017), definition 1; StVO § 4 (1)); the risk arose 4.0 s before, and a driver who "
+        "brakes 0.75 s later with 0.774 g (UN R157, Annex 3) would have avoided it."
     )
 
 
@@ -33,7 +33,7 @@ def test_a_standing_ego_is_struck(track, meeting):
         "The front of 'bv' struck the rear of the ego, which had stood for 2.6 s, at 10.0 m/s "
         "closing speed; 'bv' is responsible: it drove into a standing vehicle (StVO"
     )
-    assert "careful driver" not in text
+    assert "brakes" not in text
 
 
 def test_signs_against_the_other(track, meeting):
@@ -48,17 +48,18 @@ def test_a_pedestrian_steps_out(track, meeting):
     boxes = [(4.0, 2.0, 0.0), (0.5, 0.5, 0.0)]
     text = of(meeting(ego, walker, kinds=[CAR, PEDESTRIAN], boxes=boxes))
     assert "'bv' is responsible: it came into the path when stopping was no longer" in text
-    assert text.endswith("a careful driver (UN R157, Annex 3) would not have avoided it.")
+    judged = "and a driver who brakes 0.75 s later with 0.774 g (UN R157, Annex 3) would not have"
+    assert text.endswith(f"{judged} avoided it.")
 
 
 def test_what_stands_far_ahead_is_no_risk_for_so_long(track, meeting):
     text = of(meeting(track(v=10.0, t=9.0), track(x=84.0, t=9.0)))
     assert text.endswith(
-        "; it stood there, hidden by no other participant, for the last 8.0 s, and a careful "
-        "driver (UN R157, Annex 3) would have avoided it."
+        "; it stood there, hidden by no other participant, for the last 8.0 s, and a driver "
+        "who brakes 0.75 s later with 0.774 g (UN R157, Annex 3) would have avoided it."
     )
     near = of(meeting(track(v=10.0), track(x=34.0)))
-    assert "; the risk arose 3.0 s before, and a careful driver" in near
+    assert "; the risk arose 3.0 s before, and a driver who brakes" in near
 
 
 def test_one_that_came_on_the_wrong_side_and_stopped(track, meeting):
@@ -72,12 +73,12 @@ def test_one_that_came_on_the_wrong_side_and_stopped(track, meeting):
     assert (
         "the ego is responsible: it did not stop for what stood in the path for long enough (StVO "
         "§ 3 (1): stop within the distance seen); it stood there, hidden by no other participant, "
-        "for the last 4.5 s, and a careful driver"
+        "for the last 4.5 s, and a driver who brakes 0.75 s later"
     ) in met(4.5)
     assert (
         "'bv' is responsible: it drove on the wrong side of the road, towards the ego (Vienna "
-        "Convention, Art. 10; StVO § 2 (1), (2)); the risk arose 4.0 s before, and a careful "
-        "driver (UN R157, Annex 3) would have avoided it."
+        "Convention, Art. 10; StVO § 2 (1), (2)); the risk arose 4.0 s before, and a driver who "
+        "brakes 0.75 s later with 0.774 g (UN R157, Annex 3) would have avoided it."
     ) in met(1.0)
 
 

@@ -6,6 +6,7 @@ The sentence depends on the numbers of `Conflicts` alone.
 from bridgegen.conflict._limits import HORIZON
 from bridgegen.conflict.analysis import CONTACT, COURSE, NEAR_MISS, NO_CONFLICT, Conflicts
 from bridgegen.conflict.types import RULES, ConflictType, Responsible, Rule, Zone
+from bridgegen.physics import CAREFUL_BRAKING_G, CAREFUL_REACTION
 
 _BEARS = {
     Responsible.EGO: "the ego is responsible: it {rule}",
@@ -13,6 +14,11 @@ _BEARS = {
     Responsible.SHARED: "both are responsible: the ego {rule}",
     Responsible.NONE: "neither is responsible: {rule}",
 }
+
+_BRAKING = (
+    f"a driver who brakes {CAREFUL_REACTION:g} s later with {CAREFUL_BRAKING_G:g} g "
+    "(UN R157, Annex 3)"
+)
 
 _BY_NEITHER = {
     Rule.STEPPED_OUT: "{other} came into the path when stopping was no longer possible",
@@ -102,7 +108,7 @@ def _responsibility(conflicts: Conflicts, row: int, other: int, name: str) -> st
 
 
 def _time_left(conflicts: Conflicts, row: int, other: int) -> str:
-    """Return when the risk arose, and whether a careful driver would have avoided the event."""
+    """Return when the risk arose, and whether braking then would have avoided the event."""
     kind = ConflictType(int(conflicts.type[row, other]))
     rule = Rule(int(conflicts.rule[row, other]))
     by_others = (
@@ -120,4 +126,4 @@ def _time_left(conflicts: Conflicts, row: int, other: int) -> str:
         return arose
     would = "would" if conflicts.preventable[row, other] else "would not"
     avoided = "it" if conflicts.kind[row, other] == CONTACT else "the near miss"
-    return f"{arose}, and a careful driver (UN R157, Annex 3) {would} have avoided {avoided}"
+    return f"{arose}, and {_BRAKING} {would} have avoided {avoided}"
