@@ -14,6 +14,7 @@ from typing import Any
 import pytest
 from hypothesis import settings
 
+from bridgegen.child import ONE_THREAD
 from bridgegen.garbage import collect_rarely
 
 CHECKERS = "BRIDGEGEN_CHECKERS"
@@ -26,6 +27,9 @@ settings.load_profile("ci" if os.environ.get("CI") else "default")
 # Rewriting the assertions of all test modules takes each process 40 s, unless it may be kept.
 sys.dont_write_bytecode = False
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+
+# A process for each core: threads of linear algebra would only wait for each other. Before NumPy.
+os.environ.update(ONE_THREAD)
 
 # A search for cyclic garbage visits the 600,000 objects of all test modules: it is made less often.
 collect_rarely()
