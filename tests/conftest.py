@@ -6,6 +6,7 @@ import shutil
 import signal
 import sys
 import time
+from collections import Counter
 from collections.abc import Iterator
 from importlib.metadata import EntryPoint, EntryPoints
 from pathlib import Path
@@ -14,9 +15,18 @@ from typing import Any
 import pytest
 from hypothesis import settings
 
+from bridgegen.child import ONE_THREAD
 from bridgegen.garbage import collect_rarely
 
 CHECKERS = "BRIDGEGEN_CHECKERS"
+
+LONGEST = (
+    "test_snippets.py", "test_fuzzing.py", "benchmark/test_benchmark.py", "suite/test_page.py",
+    "mining/events/test_round_trip.py", "mining/events/test_merging_round_trip.py",
+    "campaign/test_file_scenario.py", "reproduction/test_reproduction.py",
+    "risk/estimators/test_contract.py", "search/test_contract.py", "compilation/test_library.py",
+)  # fmt: skip
+"""Files that take some ten seconds of processor time or more: processes take them first."""
 
 # No deadline: the first example may compile a kernel, and shared machines stall.
 settings.register_profile("default", deadline=None, max_examples=60)
@@ -27,12 +37,31 @@ settings.load_profile("ci" if os.environ.get("CI") else "default")
 sys.dont_write_bytecode = False
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 
+# A process for each core: threads of linear algebra would only wait for each other. Before NumPy.
+os.environ.update(ONE_THREAD)
+
 # A search for cyclic garbage visits the 600,000 objects of all test modules: it is made less often.
 collect_rarely()
 
 # A shell's background job ignores Ctrl-C, and what it starts inherits that: some tests send it.
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Order files that processes share: the longest, then by number of tests.
+
+    So that no process has a long file to run when the others have none.
+    """
+    if "PYTEST_XDIST_WORKER" in os.environ:
+        sort_by_file(items)
+
+
+def sort_by_file(items: list[Any]) -> None:
+    """Sort items by their ``path``, in place; those of a file stay together, in their order."""
+    longest = {Path(__file__).parent / name: len(LONGEST) - k for k, name in enumerate(LONGEST)}
+    number = Counter(item.path for item in items)
+    items.sort(key=lambda item: (longest.get(item.path, 0), number[item.path]), reverse=True)
 
 
 @pytest.fixture(scope="session")

@@ -1,21 +1,24 @@
 """Does a scenario keep its rules? Answers in sentences that a person understands.
 
 SHACL decides (`shapes`, run by pyshacl over a ``pyoxigraph.Store``) and `words` phrases the result.
-pyshacl is imported at the first check, as that takes half a second.
+Individuals that surely keep all rules are found without pyshacl, in a quarter of its time: their
+structure by `structure`, the queries by Oxigraph alone. Whatever is in doubt, pyshacl is asked,
+which is imported then.
 """
 
 import logging
 from collections.abc import Iterator, Sequence, Set
 from contextlib import contextmanager
-from functools import cache
-from typing import TYPE_CHECKING, Any
+from functools import cache, cached_property
+from typing import TYPE_CHECKING, Any, cast
 
 import pyoxigraph as ox
 
 from bridgegen.ontology.graph import Individuals
 from bridgegen.ontology.rule import Rule
-from bridgegen.ontology.shapes import rules, structure, turtle
-from bridgegen.ontology.vocabulary import SUBCLASS, TYPE, local_name, tbox
+from bridgegen.ontology.shapes import required, rules, structure, turtle
+from bridgegen.ontology.structure import Node, Structure
+from bridgegen.ontology.vocabulary import PREFIXES, SUBCLASS, TYPE, bg, local_name, tbox
 from bridgegen.ontology.words import Finding, Violation, violations_of
 
 if TYPE_CHECKING:
@@ -42,11 +45,15 @@ def check(individuals: Individuals, scenario: "LogicalScenario | None" = None) -
     store = ox.Store()
     store.extend(individuals.quads)
     store.extend(_hierarchy())
-    found = {
-        (one.nodes, one.message): one
-        for finding in compiled.validate(store, _terms(individuals))
-        for one in violations_of(individuals, scenario, compiled.rules, finding)
-    }
+    terms = _terms(individuals)
+    if compiled.surely_conform(individuals, store, terms):
+        found = {}
+    else:
+        found = {
+            (one.nodes, one.message): one
+            for finding in compiled.validate(store, terms)
+            for one in violations_of(individuals, scenario, compiled.rules, finding)
+        }
     if not found:
         _keep(compiled.conforming, quads, True)
     return sorted(found.values(), key=lambda one: (one.individual, one.message))
@@ -76,30 +83,60 @@ def _terms(individuals: Individuals) -> frozenset[str]:
 
 
 class _Compiled:
-    """The shapes of one scenario, as pyshacl has read them."""
+    """The shapes of one scenario.
 
-    def __init__(self, text: str, rules: Sequence[Rule]) -> None:
+    Args:
+        text: in Turtle.
+        rules: those among them that are queries.
+        required: (class, property) where each individual of the class must have a value.
+    """
+
+    def __init__(
+        self, text: str, rules: Sequence[Rule], required: Sequence[tuple[str, str]]
+    ) -> None:
+        self.rules: dict[str, Rule] = {rule.key: rule for rule in rules}
+        self.conforming: dict[frozenset[ox.Quad], bool] = {}
+        self._text, self._required = text, required
+
+    @cached_property
+    def _shapes(self) -> Any:
+        """All of them, as pyshacl has read them."""
         import rdflib
         from pyshacl.graph_abstraction import to_rdf
         from pyshacl.shapes_graph import ShapesGraph
 
-        self.rules: dict[str, Rule] = {rule.key: rule for rule in rules}
         graph = rdflib.Graph()
-        for quad in ox.parse(text, format=ox.RdfFormat.TURTLE):
+        for quad in ox.parse(self._text, format=ox.RdfFormat.TURTLE):
             graph.add((to_rdf(quad.subject), to_rdf(quad.predicate), to_rdf(quad.object)))
-        self.shapes: Any = ShapesGraph(graph)
-        self.needs = {
-            str(shape.node): self._needs(local_name(str(shape.node)))
-            for shape in self.shapes.shapes  # builds them, once
-        }
-        self.conforming: dict[frozenset[ox.Quad], bool] = {}
+        return ShapesGraph(graph)
 
-    def _needs(self, key: str) -> frozenset[str]:
-        """Return the terms without which a shape finds nothing to check."""
+    @cached_property
+    def _needs(self) -> dict[str, frozenset[str]]:
+        """Per shape, by its IRI, the terms without which it finds nothing to check."""
+        nodes = [str(shape.node) for shape in self._shapes.shapes]  # builds them, once
+        return {node: self._needs_of(local_name(node)) for node in nodes}
+
+    def _needs_of(self, key: str) -> frozenset[str]:
         if key in self.rules:
             return frozenset({self.rules[key].focus, *self.rules[key].needs})
         first, _, rest = key.partition("-")
         return frozenset({rest if first == "property" else first})
+
+    def surely_conform(self, individuals: Individuals, store: ox.Store, terms: Set[str]) -> bool:
+        """Return whether individuals surely keep all shapes; if not, `validate` says.
+
+        Args:
+            individuals: in question.
+            store: of them and of the subclass relations.
+            terms: that occur.
+        """
+        held = Structure(individuals.quads)
+        return held.surely_holds(self._required) and not any(
+            _is_broken(rule, store, focus)
+            for key, rule in self.rules.items()
+            if self._needs_of(key) <= terms
+            for focus in held.instances(bg(rule.focus))
+        )
 
     def validate(self, store: ox.Store, terms: Set[str]) -> Iterator[Finding]:
         """Yield what the shapes find, but for those whose terms do not occur."""
@@ -110,10 +147,10 @@ class _Compiled:
         # pyshacl.validate() would read the shapes anew at each call
         validator = Validator(
             DataGraph.from_oxigraph_store(store),
-            shacl_graph=self.shapes.graph,
-            options={"use_shapes": [one for one, needs in self.needs.items() if needs <= terms]},
+            shacl_graph=self._shapes.graph,
+            options={"use_shapes": [one for one, needs in self._needs.items() if needs <= terms]},
         )
-        validator.shacl_graph = self.shapes
+        validator.shacl_graph = self._shapes
         with _quiet():
             conforms, report, _ = validator.run()
         if conforms:
@@ -134,16 +171,27 @@ class _Compiled:
             )
 
 
+def _is_broken(rule: Rule, store: ox.Store, focus: Node) -> bool:
+    """Return whether a rule's query finds anything of one individual, as SHACL evaluates it."""
+    found = store.query(
+        rule.select,
+        prefixes=PREFIXES,
+        use_default_graph_as_union=True,
+        substitutions={ox.Variable("this"): focus},
+    )
+    return any(True for _ in cast(ox.QuerySolutions, found))
+
+
 _of_scenario: dict[int, tuple["LogicalScenario | None", _Compiled]] = {}
 _of_text: dict[str, _Compiled] = {}
 
 
 def _compiled(scenario: "LogicalScenario | None") -> _Compiled:
-    """Return the shapes of a scenario, compiled at the first check of one with these shapes."""
+    """Return the shapes of a scenario, made at the first check of one with these shapes."""
     kept = _of_scenario.get(id(scenario))  # has no hash; being kept here, its id stays its own
     if kept is None:
         text = turtle(scenario)
-        compiled = _of_text.get(text) or _Compiled(text, rules(scenario))
+        compiled = _of_text.get(text) or _Compiled(text, rules(scenario), required(scenario))
         _keep(_of_text, text, compiled)
         kept = (scenario, compiled)
         _keep(_of_scenario, id(scenario), kept)

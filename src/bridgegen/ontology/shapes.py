@@ -22,7 +22,13 @@ from bridgegen.ontology.placement import placement_rules
 from bridgegen.ontology.rule import Rule, slack
 from bridgegen.ontology.sparql import binds, literal, variable
 from bridgegen.ontology.story import WEATHER
-from bridgegen.ontology.vocabulary import BG, ONTOLOGY, RDFS, XSD, tbox
+from bridgegen.ontology.structure import (
+    property_shapes,
+    quoted,
+    required_turtle,
+    requirements,
+)
+from bridgegen.ontology.vocabulary import BG, ONTOLOGY, RDFS, XSD
 
 if TYPE_CHECKING:
     from bridgegen.odd.scenario import LogicalScenario
@@ -52,8 +58,7 @@ _HEADER = f"""\
 def turtle(scenario: "LogicalScenario | None" = None) -> str:
     """Return the shapes as Turtle: the structure, and a scenario's constraints."""
     parts = [_HEADER, structure()]
-    if scenario is not None and any(name in WEATHER_PATHS for name in scenario.parameters):
-        parts.append(_required("Scenario", "has_weather"))
+    parts += [required_turtle(cls, name) for cls, name in _required_weather(scenario)]
     parts += [_sparql_shape(rule) for rule in rules(scenario)]
     return "\n".join(parts)
 
@@ -63,35 +68,19 @@ def turtle(scenario: "LogicalScenario | None" = None) -> str:
 
 @cache
 def structure() -> str:
-    """Return the shapes of single properties: kind, number and range of values; what is required.
-
-    One shape per property instead of one per class: pyshacl looks at all individuals at once then,
-    which takes it half the time.
-    """
-    ontology = tbox()
-    shapes = []
-    for name, target in ontology.ranges.items():
-        data = target.value.startswith(XSD)
-        facts = [f"sh:{'datatype' if data else 'class'} <{target.value}>"]
-        if name in ontology.functional:
-            facts.append("sh:maxCount 1")
-        if name in ontology.above:
-            facts.append(f'sh:minExclusive "{ontology.above[name]!r}"^^xsd:double')
-        if name in ontology.allowed:
-            facts.append(f"sh:in ( {' '.join(map(_quoted, ontology.allowed[name]))} )")
-        shapes.append(
-            f":property-{name} a sh:PropertyShape ; sh:targetSubjectsOf bg:{name} ; "
-            f"sh:path bg:{name} ; {' ; '.join(facts)} ."
-        )
-    shapes += [_required(cls, name) for cls, names in ontology.requires.items() for name in names]
-    return "\n".join(shapes)
+    """Return the shapes of single properties, and of what individuals must have."""
+    shapes = [shape.turtle() for shape in property_shapes()]
+    return "\n".join([*shapes, *(required_turtle(cls, name) for cls, name in requirements())])
 
 
-def _required(cls: str, name: str) -> str:
-    return (
-        f":{cls}-{name} a sh:PropertyShape ; sh:targetClass bg:{cls} ; "
-        f"sh:path bg:{name} ; sh:minCount 1 ."
-    )
+def required(scenario: "LogicalScenario | None" = None) -> tuple[tuple[str, str], ...]:
+    """Return (class, property) where each individual of the class must have a value."""
+    return (*requirements(), *_required_weather(scenario))
+
+
+def _required_weather(scenario: "LogicalScenario | None") -> tuple[tuple[str, str], ...]:
+    has_weather = scenario is not None and any(one in WEATHER_PATHS for one in scenario.parameters)
+    return (("Scenario", "has_weather"),) if has_weather else ()
 
 
 def _general_rules() -> Iterator[Rule]:
@@ -251,11 +240,6 @@ def _bound_by(parameter: str) -> str:
 def _sparql_shape(rule: Rule) -> str:
     return (
         f":{rule.key} a sh:NodeShape ; sh:targetClass bg:{rule.focus} ;\n"
-        f"  sh:sparql [ sh:prefixes :prefixes ; sh:message {_quoted(rule.message)} ;\n"
-        f"    sh:select {_quoted(rule.select)} ] .\n"
+        f"  sh:sparql [ sh:prefixes :prefixes ; sh:message {quoted(rule.message)} ;\n"
+        f"    sh:select {quoted(rule.select)} ] .\n"
     )
-
-
-def _quoted(text: str) -> str:
-    escaped = text.replace("\\", "\\\\").replace('"', '\\"').replace("\n", "\\n")
-    return '"' + escaped.replace("\r", "\\r") + '"'
