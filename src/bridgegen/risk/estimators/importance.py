@@ -22,7 +22,9 @@ PREPARED, FOUND = 0.6, 0.5
 EXPLORED, CHECKED = 0.5, 0.1
 """The share of what is left that exploration may take, if subset simulation is in doubt or not."""
 STRANGE = 0.25
-"""Of the first proposals at most are around spread points, beside those of levels; less if few."""
+"""Of the first proposals at most are around spread points, beside those of levels."""
+SINGLE = 50
+"""Spread points at most that rows are drawn around where they are too few for more."""
 FEWEST_ROWS = 100  # of a round
 BLOCK, FIRST = 16_384, 1024
 MOST_UNSEEN = 0.9  # of the probability in regions that nobody has seen: no upper end to speak of
@@ -58,6 +60,8 @@ def estimate(problem: Problem, aim: Aim, seed: int, start: Float | None = None) 
     helped = start is not None and len(start) > 0
     size = _hits(spread, aim) if levels.doubts and not helped else len(Z) / OF_CHAIN
     proposals = Proposals.of(Z, weights, size, random)
+    if spread.doubts and not levels.doubts:
+        proposals = proposals.also_around(_heaviest_points(spread, aim))
     rows = min(OF_ROUND, (aim.budget - spent) // (4 * ROUNDS))
     for _ in range(ROUNDS if rows >= FEWEST_ROWS else 0):
         Z, weights = proposals.draw(rows, random)
@@ -79,12 +83,19 @@ def _points(levels: Weighted, spread: Weighted, aim: Aim) -> tuple[Float, Float]
     if levels.doubts or not levels.repetitions:
         return Z, weights
     there = levels.scores >= aim.threshold
-    known, added = levels.weights[there], float(weights.sum())
-    share = STRANGE * min(_hits(spread, aim) / exploration.FEWEST, 1.0)
-    most = share / (1.0 - share) * float(known.sum())
-    if added > most:
-        weights = weights * (most / added)
+    known = levels.weights[there]
+    if spread.doubts:
+        return levels.Z[there], known
+    most = STRANGE / (1.0 - STRANGE) * float(known.sum())
+    weights = weights * min(most / float(weights.sum()), 1.0)
     return np.concatenate([levels.Z[there], Z]), np.append(known, weights)
+
+
+def _heaviest_points(spread: Weighted, aim: Aim) -> Float:
+    """Return the points of the event that are likeliest on the road, `SINGLE` at most."""
+    order = np.argsort(-spread.weights * spread.there(aim.threshold), kind="stable")
+    found: Float = spread.Z[order[: min(SINGLE, int(spread.there(aim.threshold).sum()))]]
+    return found
 
 
 def _drawn(

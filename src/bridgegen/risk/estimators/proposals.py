@@ -51,6 +51,11 @@ class Proposals:
         wide = replace(made, factors=made.factors * _INFLATED)
         return cls(wide, Kernels.around(centres, made.within))
 
+    def also_around(self, points: Float) -> "Proposals":
+        """Return proposals that are around more single points ``(K, d)``, too."""
+        centres = np.concatenate([self.kernels.points, points])
+        return replace(self, kernels=replace(self.kernels, points=centres))
+
     def draw(self, n: int, random: np.random.Generator) -> tuple[Float, Float]:
         """Draw n points; return them and their weights."""
         d = self.fitted.means.shape[1]
