@@ -15,7 +15,9 @@ import bridgegen as bg
 @pytest.fixture(scope="session")
 def finished(tmp_path_factory) -> "bg.Run":
     folder = tmp_path_factory.mktemp("runs") / "s4"
-    return bg.run_search("crossroads-s4", budget=120, keep=2, triage="short", out=folder)
+    return bg.run_search(
+        "crossroads-s4", algorithm="pso", budget=120, keep=2, triage="short", out=folder
+    )
 
 
 @pytest.fixture

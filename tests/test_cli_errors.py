@@ -60,7 +60,7 @@ def test_options_that_may_be_repeated_may(cli):
 
 def test_a_population_beyond_the_budget_is_a_warning(cli, tmp_path):
     words = ("search", "crossroads-s4", "--budget", 20, "--keep", 0, "--out", tmp_path / "r")
-    code, _, err = cli(*words, "--set", "population=100")
+    code, _, err = cli(*words, "--algorithm", "ga", "--set", "population=100")
     assert code == 0
     assert "warning: population 100 is greater than the budget, 20 evaluations" in err
 

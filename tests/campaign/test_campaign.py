@@ -81,7 +81,7 @@ def test_a_run_of_the_first_version_opens_resumes_and_is_reported(tmp_path, monk
     with monkeypatch.context() as patch:
         patch.setattr("bridgegen.pipeline.metrics_of", lambda *_, **__: FIRST_SEVEN)
         patch.setattr("bridgegen.campaign.campaign._finish", lambda *_: None)
-        bg.run_search("crossroads-s4", budget=80, out=tmp_path / "run")
+        bg.run_search("crossroads-s4", algorithm="pso", budget=80, out=tmp_path / "run")
     with sqlite3.connect(tmp_path / "run" / "run.sqlite") as connection:
         ((text,),) = connection.execute("SELECT value FROM run WHERE key = 'settings'")
         settings = json.loads(text)
@@ -255,7 +255,7 @@ def test_many_objectives_are_recorded_handed_over_and_reported(tmp_path):
 
 def test_the_recorded_command_makes_the_same_run(tmp_path, monkeypatch):
     first = bg.run_search(
-        "crossroads-s4", budget=60, seed=5, settings={"population": 15}, out=tmp_path / "a", keep=1,
+        "crossroads-s4", budget=60, seed=5, settings={"batch": 15}, out=tmp_path / "a", keep=1,
         triage="none", fixed={"fog_density": 25.0}, weights="entropy",
     )  # fmt: skip
     words = shlex.split(first.settings.command(tmp_path / "b"))
@@ -432,8 +432,8 @@ def test_an_unknown_name_suggests_the_nearest(tmp_path, arguments, message):
         ({"seed": -1}, "0 <= seed"),
         ({"keep": -1}, "0 <= keep"),
         ({"fixed": {"fog_density": 180.0}}, "fog_density"),
-        ({"settings": {"population": 0}}, "population"),
-        ({"settings": {"popuation": 10}}, "did you mean 'population'"),
+        ({"settings": {"batch": 0}}, "batch"),
+        ({"settings": {"bach": 10}}, "did you mean 'batch'"),
         ({"fixed": {"fog_densty": 1.0}}, "did you mean 'fog_density'"),
         ({"road_map": Path("nowhere.xodr")}, "nowhere.xodr"),
     ],

@@ -16,7 +16,7 @@ from bridgegen.verdict.of_run import FIGURES, PassFailCriteria, figures_of
 @pytest.fixture(scope="module")
 def run(tmp_path_factory) -> "bg.Run":
     folder = tmp_path_factory.mktemp("verdict") / "s4"
-    return bg.run_search("crossroads-s4", budget=120, keep=2, triage="short", out=folder)
+    return bg.run_search("crossroads-s4", budget=60, keep=2, triage="short", out=folder)
 
 
 def test_every_figure_of_the_summary_can_be_named():

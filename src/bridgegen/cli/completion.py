@@ -57,7 +57,7 @@ def _algorithms(_: typer.Context) -> Iterable[str]:
 def _settings(ctx: typer.Context) -> Iterable[str]:
     from bridgegen.search import get
 
-    return [f"{name}=" for name in get(ctx.params.get("algorithm") or "pso").settings]
+    return [f"{name}=" for name in get(ctx.params.get("algorithm") or "surrogate").settings]
 
 
 def _drivers(_: typer.Context) -> Iterable[str]:

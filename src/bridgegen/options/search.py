@@ -317,7 +317,7 @@ class SearchOptions(CommonOptions):
     """All options of a run that its result depends on: those that it records."""
 
     algorithm: str = field(
-        default="pso",
+        default="auto",
         metadata=option(
             TEXT,
             "Search algorithm, see 'bridgegen list algorithms'; auto, chosen by the budget; or "

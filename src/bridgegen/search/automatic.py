@@ -3,8 +3,8 @@
 AUTO = "auto"
 """Names no algorithm, but the choice of one."""
 
-MOST_MODELLED = 3000
-"""Rows up to which models of the space are worth their time, 12 ms a row."""
+MOST_MODELLED = 100_000
+"""Rows up to which models of the space are known to be worth their time."""
 MOST_PARAMETERS = 40
 """Beyond, a Gaussian process of some hundred rows says little."""
 

@@ -43,6 +43,9 @@ class Surrogate(Saved):
     - once a critical row is known: rows that are most likely critical, by a process of the label
       alone. Harm often leaps where it becomes critical, and the objective around tells little.
 
+    The more critical rows are known, the more rows a batch has, so that a row costs less; a tenth
+    of all rows counts as critical for this.
+
     All of them keep a distance from distinct critical rows and from one another, so that what is
     found are other scenarios, not the first one again. Where no candidate is left that far away,
     the distance is halved.
@@ -59,7 +62,10 @@ class Surrogate(Saved):
     source: ClassVar[str] = "Kandasamy et al. (2018), arXiv:1705.09236, for Thompson sampling"
     settings: ClassVar[Mapping[str, Setting]] = {
         "initial": Setting(20, "number of initial space-filling rows", 2, 100_000),
-        "batch": Setting(10, "rows per batch", 1, 10_000),
+        "batch": Setting(10, "rows per batch, at least", 1, 10_000),
+        "growth": Setting(
+            0.2, "rows per batch at least, as a share of the critical ones known", 0.0, 1.0
+        ),
         "explore": Setting(0.2, "share of a batch that is drawn at random", 0.0, 1.0),
         "critical": Setting(
             0.7, "share of the others that are likely critical, once a critical row is known",
@@ -82,7 +88,9 @@ class Surrogate(Saved):
 
     def ask(self) -> Float:
         """Return a sample of the cube at first, then batches; none where all rows are known."""
-        known, rng, n = self._known, self._rng, self._values["batch"]
+        known, rng = self._known, self._rng
+        many = max(int(known.critical.sum()), len(known) // 10)
+        n = max(self._values["batch"], int(self._values["growth"] * many))
         if known.exhausted:
             return np.empty((0, self._n_var))
         if not len(known):
