@@ -41,6 +41,6 @@ class Evolved(ABC):
         """Select the survivors, or the next moves, by the rows' results.
 
         Raises:
-            ValueError: U is not the result of the last ``ask``.
+            ValueError: U are not the first rows that were asked for and are not told.
         """
         self._search.tell(U, results)
