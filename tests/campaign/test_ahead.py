@@ -1,6 +1,7 @@
 """Searches that run ahead of their results: no worker is idle, and no bit depends on durations."""
 
 import os
+import re
 import signal
 from collections import deque
 from contextlib import closing
@@ -18,7 +19,8 @@ from bridgegen.arrays import Float
 from bridgegen.campaign import SearchCallbacks
 from bridgegen.campaign.loop import LoopResult, Reason, run_loop
 from bridgegen.errors import InputError, Interrupted
-from bridgegen.search import Problem, get
+from bridgegen.search import ALGORITHMS, Problem, get
+from bridgegen.search.algorithm import asynchronous
 from bridgegen.store import Store
 from bridgegen.workers import Lost, Recipe
 from bridgegen.workers.pool import PoolStream, WorkerPool
@@ -437,3 +439,12 @@ def test_who_cannot_run_ahead_is_refused(given, message, tmp_path):
     with pytest.raises(InputError, match=message):
         bg.run_search(**SEARCH | given, out=tmp_path / "run")
     assert not (tmp_path / "run").exists()
+
+
+def test_the_page_names_the_algorithms_that_can_run_ahead():
+    page = (Path(__file__).parents[2] / "docs" / "scale.md").read_text()
+    (line,) = (one for one in page.splitlines() if one.startswith("- **Which algorithms**"))
+    able = line.split(". The others")[0]
+    assert set(re.findall(r"`([\w-]+)`", able)) == {
+        name for name, one in ALGORITHMS.items() if asynchronous(one)
+    }

@@ -4,6 +4,7 @@ from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from itertools import islice
 from typing import Any
 
 import numpy as np
@@ -54,9 +55,9 @@ class _Asked:
 class Generations:
     """An algorithm of pymoo; one generation per batch; restarts when it has no more rows.
 
-    It may be asked again before all results are told; then the survivors are selected among those
-    that are told at a time, whichever generation they are of. Rows of an earlier start, and first
-    rows of a population that was complete without them, are told in vain.
+    It may be asked again before all results are told, if it is asynchronous; then the survivors are
+    selected among those that are told at a time, whichever generation they are of. Rows of an
+    earlier start, and first rows of a population that was complete without them, are told in vain.
 
     Args:
         build: constructs pymoo's algorithm, not yet set up.
@@ -70,6 +71,7 @@ class Generations:
         scaled: it measures distances between objectives, so each is scaled to [0, 1] over the
             population and its children. Dominance stays the same.
         box: bounds of the search; the whole cube by default.
+        asynchronous: whether it may be told a part of the rows; else all are told at once.
     """
 
     def __init__(
@@ -81,7 +83,9 @@ class Generations:
         *,
         scaled: bool = False,
         box: Box | None = None,
+        asynchronous: bool = False,
     ) -> None:
+        self._asynchronous = asynchronous
         self._build, self._problem, self._scaled = build, problem, scaled
         self._seed = [seed] if isinstance(seed, int) else list(seed)
         self._box = box or (np.zeros(problem.n_var), np.ones(problem.n_var))
@@ -127,9 +131,12 @@ class Generations:
         Raises:
             ValueError: U are not those rows.
         """
-        asked = [self._untold.popleft() for _ in range(min(len(U), len(self._untold)))]
-        if len(asked) < len(U) or not np.array_equal(U, [one.individual.X for one in asked]):
+        n = len(U) if self._asynchronous else len(self._untold)
+        asked = list(islice(self._untold, n))
+        if not asked or not np.array_equal(U, [one.individual.X for one in asked]):
             raise ValueError("U must be the first rows that were asked for and are not told")
+        for _ in asked:
+            self._untold.popleft()
         finite, failed = self._penalty.apply(results.F, results.ok)
         told = []
         for one, F, is_failed in zip(asked, finite, failed.tolist(), strict=True):

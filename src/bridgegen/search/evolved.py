@@ -5,7 +5,15 @@ from collections.abc import Mapping
 from typing import Any, ClassVar
 
 from bridgegen.arrays import Float
-from bridgegen.search.algorithm import Arity, Problem, Results, Setting, Value, resolve
+from bridgegen.search.algorithm import (
+    Arity,
+    Problem,
+    Results,
+    Setting,
+    Value,
+    asynchronous,
+    resolve,
+)
 
 
 class Evolved(ABC):
@@ -27,7 +35,10 @@ class Evolved(ABC):
 
         self._values = resolve(type(self), problem, seed, settings)
         within = self._values["restart_within"]
-        self._search = Generations(self._build, problem, seed, within, scaled=self.scaled)
+        self._search = Generations(
+            self._build, problem, seed, within, scaled=self.scaled,
+            asynchronous=asynchronous(type(self)),
+        )  # fmt: skip
 
     @abstractmethod
     def _build(self) -> Any:
