@@ -9,15 +9,20 @@ import importlib.util
 import os
 import subprocess
 import sys
+import tempfile
 import threading
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
+from types import SimpleNamespace
 
 import numpy as np
 
 from bridgegen.arrays import Float
-from bridgegen.workers import Recipe, Workers, open_workers
+from bridgegen.campaign.loop import run_loop
+from bridgegen.search import Problem, get
+from bridgegen.store import Store
+from bridgegen.workers import Recipe, Stream, Workers, open_workers
 from bridgegen.workers.processes import Processes
 
 ROWS = 40
@@ -131,12 +136,81 @@ def together(campaigns: int, batches: int = 5) -> tuple[float, float]:
     return whole, (min(ends) - start) / whole
 
 
+class Uneven(Burner):
+    """Waits for each row, 0.02 to 0.2 s by the row's bits, as for a simulator elsewhere."""
+
+    @property
+    def recipe(self) -> Recipe:
+        """See `bridgegen.workers.workers.Portable`."""
+        return Recipe.of(Uneven, 0.0, 1)
+
+    def wait(self, X: Float) -> tuple[float, float, float]:
+        """Return the objective of a row, and when it began and ended [s]."""
+        begun, dice = time.monotonic(), np.random.default_rng(X[0].view(np.uint64))
+        time.sleep(float(np.clip(0.06 * np.exp(0.8 * dice.standard_normal()), 0.02, 0.2)))
+        return float(((X - 0.3) ** 2).sum()), begun, time.monotonic()
+
+
+class Timed:
+    """The rows of a search, with the times at which workers evaluate them.
+
+    Attributes:
+        times: of each row its beginning and its end [s].
+    """
+
+    def __init__(self, rows: Stream[tuple[float, float, float]]) -> None:
+        self._rows, self.times = rows, list[tuple[float, float]]()
+        self.submit = rows.submit
+
+    def take(self, n: int) -> SimpleNamespace:
+        """See `bridgegen.campaign.loop.Stream`."""
+        results = [one.result for one in self._rows.take(n)]
+        self.times += [(begun, ended) for _, begun, ended in results]
+        F = np.array([[value] for value, _, _ in results])
+        return SimpleNamespace(
+            messages={}, cause=None, findings=None, metrics=F, F=F, critical=F[:, 0] < 0.1,
+            status=np.zeros(n, np.int8),
+        )  # fmt: skip
+
+
+def idle(count: int, ahead: int, method: str, budget: int = 300) -> float:
+    """Return the idle share of processes between the first row's beginning and the last's end."""
+    names = [f"x{k}" for k in range(8)]
+    search = get(method)(Problem.unnamed(len(names)), 0)
+    uneven = Uneven(0.0, 1)
+
+    with (
+        tempfile.TemporaryDirectory() as folder,
+        Store.create(folder, {}, names, ["m"], n_var=len(names), n_obj=1) as store,
+        closing(Processes(count)) as pool,
+        closing(pool.stream(uneven, Uneven.wait)) as rows,
+    ):
+        rows.submit(np.random.default_rng(1).random((2 * count, len(names))))
+        rows.take(2 * count)  # all have started
+        timed = Timed(rows)
+        run_loop(search, lambda U: U, timed, store, budget, ahead=ahead)
+    begun, ended = np.array(timed.times).T
+    return 1.0 - float((ended - begun).sum() / (count * (ended.max() - begun.min())))
+
+
 def workers() -> list[tuple[str, str, str]]:
     """Return the table's rows."""
     load = os.getloadavg()[0]
     median, least, most = speedup()
     local = Processes(1)
+    idle(2, 8, "surrogate", 40)  # compiled
+    waiting = [
+        (
+            f"idle share, {count} processes, rows of 0.02 to 0.2 s, {method}, --ahead {ahead}",
+            f"{idle(count, ahead, method):.3f}",
+            "≤ 0.05" if ahead == 16 else "",
+        )
+        for method in ("es", "surrogate")
+        for count in (2, 4)
+        for ahead in (0, 8, 16)
+    ]
     told = [
+        *waiting,
         (f"two processes over one, 50 ms a row (load {load:.1f})", f"{median:.2f}", "≥ 1.8"),
         ("  least and most of 7 pairs", f"{least:.2f} to {most:.2f}", ""),
         ("a chunk that does nothing, a process, ms", f"{1e3 * overhead(local):.2f}", ""),

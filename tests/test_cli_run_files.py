@@ -31,6 +31,7 @@ VALUES = {
     | st.sampled_from([SimulatorChoice("embedded"), SimulatorChoice("esmini", {"steps": 1})]),
     "screen_budget": st.none() | st.integers(1, 10**7),
     "screen_batch": st.none() | st.integers(1, 10**7),
+    "ahead": st.none() | st.integers(1, 10_000),
     "seed": st.none() | st.integers(0, 2**32 - 1),
     "keep": st.integers(0, 1000),
     "time_limit": st.none() | st.floats(0.1, 100.0),

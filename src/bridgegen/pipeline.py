@@ -41,7 +41,7 @@ from bridgegen.simulation.rollout import joined as joined_rollouts
 from bridgegen.simulation.simulator import Simulator
 from bridgegen.simulation.vehicles import KINEMATIC
 from bridgegen.variants import Variants, nominal_of
-from bridgegen.workers import CarriedDriver, Lost, Part, Recipe, Threads, Workers
+from bridgegen.workers import CarriedDriver, Lost, Part, Recipe, Stream, Threads, Workers
 from bridgegen.workers.compile_ahead import compiled_ahead
 
 if TYPE_CHECKING:
@@ -429,7 +429,15 @@ class Pipeline:
         Args:
             X: ``(N, len(space.names))`` float64, feasible rows.
         """
-        parts = self._map(type(self).evaluate_rows, X, self.objective)
+        return self.joined(self._map(type(self).evaluate_rows, X, self.objective))
+
+    def stream(self) -> "EvaluationStream":
+        """Return what evaluates rows while its caller does something else."""
+        rows = self._workers.stream(self, type(self).evaluate_rows, self.objective)
+        return EvaluationStream(self, rows)
+
+    def joined(self, parts: Sequence[Part[Evaluation]]) -> Evaluation:
+        """Return the evaluation of consecutive rows from the workers' results."""
         return Evaluation.join(
             [
                 self._lost(one.rows, one.result) if isinstance(one.result, Lost) else one.result
@@ -741,6 +749,36 @@ class Pipeline:
     def _road_names(self) -> tuple[str, ...]:
         """The parameters that a row's road network, and the courses on it, depend on."""
         return tuple(dict.fromkeys((*self.source.static_names, *self.source.course_names)))
+
+
+class EvaluationStream:
+    """Rows that a pipeline's workers evaluate one by one; their results in the order of submission.
+
+    A context manager; at its end, rows that have not been taken are abandoned.
+    """
+
+    def __init__(self, pipeline: Pipeline, rows: Stream[Evaluation]) -> None:
+        self._pipeline, self._rows = pipeline, rows
+        self._pending = 0
+
+    def submit(self, X: Float) -> None:
+        """Add rows, ``(n, len(space.names))`` float64, feasible ones."""
+        self._rows.submit(X)
+        self._pending += len(X)
+
+    def take(self, n: int) -> Evaluation:
+        """Wait for the evaluation of the next n rows; as many must have been added."""
+        parts = self._rows.take(n)
+        self._pending -= n
+        return self._pipeline.joined(parts)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self._pending:
+            self._pipeline.simulator.stop()
+        self._rows.close()
 
 
 def _changed(fix: Counterfactual | None) -> dict[str, Any]:

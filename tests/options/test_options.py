@@ -80,6 +80,7 @@ def test_the_command_line_has_them_all():
             screen_batch=4,
         ),
         SearchOptions(screen=SimulatorChoice("esmini", {"steps": 2})),
+        SearchOptions(algorithm="surrogate", ahead=8),
     ],
 )
 def test_options_are_what_their_command_line_says(options, monkeypatch):

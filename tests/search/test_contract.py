@@ -17,7 +17,7 @@ from bridgegen.campaign.loop import Reason, run_loop
 from bridgegen.errors import InputError, UnknownNameError
 from bridgegen.extras import is_installed
 from bridgegen.search import ALGORITHMS, Algorithm, Problem, Results
-from bridgegen.search.algorithm import resolve
+from bridgegen.search.algorithm import asynchronous, resolve
 from bridgegen.store import Store
 
 Kind = type[Algorithm]
@@ -155,6 +155,23 @@ def run(folder, algorithm: Kind, budget: int, *, stop=None, n_var: int = 4, seed
         )
         rows = store.read()
     return result, rows
+
+
+@pytest.mark.parametrize(("n_var", "ok"), [(1, 0.5), (3, 1.0), (3, 0.0), (30, 0.5)])
+@pytest.mark.parametrize("ahead", [1, 13, 100])
+def test_an_asynchronous_one_gets_results_late(algorithm: Kind, n_var, ok, ahead, late):
+    if not asynchronous(algorithm):
+        pytest.skip("it needs all results before it is asked again")
+    n_obj = n_obj_of(algorithm)
+    first, second = (
+        drive(late(algorithm(problem(algorithm, n_var, n_obj), 3), ahead), 14, n_obj, ok)
+        for _ in range(2)
+    )
+    assert in_cube(first, n_var)
+    assert len(first) >= 14 or algorithm.name in DESIGNS
+    assert first.tobytes() == second.tobytes()
+    if algorithm.name not in DESIGNS:
+        assert len(np.unique(first, axis=0)) > 0.8 * len(first)
 
 
 def test_it_describes_itself(algorithm: Kind):

@@ -43,9 +43,10 @@ def drive(search, evaluate, budget: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 @both
-def test_it_closes_in_on_a_pocket(kind):
-    _, critical = drive(kind(Problem.unnamed(4), 0), pockets, 120)
-    assert critical.sum() > 10  # chance: less than one
+@pytest.mark.parametrize("ahead", [0, 5, 16])
+def test_it_closes_in_on_a_pocket(kind, ahead, late):
+    _, critical = drive(late(kind(Problem.unnamed(4), 0), ahead), pockets, 120)
+    assert critical.sum() > (5 if ahead else 10)  # chance: less than one
 
 
 def test_surrogate_finds_both_pockets():
@@ -69,6 +70,28 @@ def test_categories_alone_are_searched_to_the_last_row(kind):
     U, _ = drive(kind(problem, 0), lambda U: results(U.sum(axis=1), U[:, 0] < 0.5), 1000)
     assert len(np.unique(np.floor(U * [2, 3, 5]), axis=0)) == 30
     assert len(U) <= 60  # first rows, drawn before anything is known, may be equal
+
+
+@both
+def test_rows_that_are_not_told_are_not_asked_for_again(kind):
+    """Eight rows there are, and the first of them is told last."""
+    search = kind(Problem(("a", "b"), levels=(4, 2)), 0, initial=2, batch=2)
+    rows = [search.ask()]
+    search.tell(rows[0], results(rows[0][:, 0], rows[0][:, 0] < 0.0))
+    while len(U := search.ask()):
+        rows.append(U)
+        assert len(rows) <= 8
+    asked = np.concatenate(rows)
+    assert len(asked) == len(np.unique(asked, axis=0)) == 8
+
+
+def test_surrogate_keeps_off_rows_that_are_not_told():
+    search = Surrogate(Problem.unnamed(4), 0, initial=20, batch=5, explore=0.0, apart=0.1)
+    U = search.ask()
+    search.tell(U, pockets(U))
+    untold = np.concatenate([search.ask() for _ in range(4)])
+    off = np.sqrt(((untold[:, None] - untold) ** 2).mean(axis=2))
+    assert off[~np.eye(len(off), dtype=bool)].min() >= 0.1
 
 
 @both

@@ -69,6 +69,8 @@ class SimulatedPool(WorkerPool[int]):
     def _run(self, worker, key, work, X, args):
         self.pending[worker] = lambda: ("answer", self.caches[worker].run(key, work, X, args))
 
+    def wake(self): ...
+
     def _receive(self):
         fate = self.fates.popleft() if self.fates else 0
         worker = sorted(self.pending)[fate % len(self.pending)]

@@ -2,6 +2,7 @@
 
 import hashlib
 from collections.abc import Callable
+from contextlib import nullcontext
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -19,7 +20,7 @@ from bridgegen.campaign.restored import check_named, pipeline_of, placed
 from bridgegen.campaign.run import Run
 from bridgegen.campaign.scenarios import driven_by, is_file, load, refuse_standstill
 from bridgegen.campaign.screening import BATCH, require_screen, screen_budget
-from bridgegen.campaign.searcher import searcher_of
+from bridgegen.campaign.searcher import require_asynchronous, searcher_of
 from bridgegen.campaign.settings import Settings
 from bridgegen.errors import InputError, Interrupted, StorageError, WorkersError
 from bridgegen.odd.adversary import adversarial
@@ -116,6 +117,7 @@ def run_search(given: SearchArguments) -> Run:
     effort(given.triage)
     given = _with_algorithm(given, catalogue, budget)
     method = toolkit.get(given.algorithm)
+    require_asynchronous(given, method)
     columns = columns_of(method, given.objectives)
     spec = chosen_objective(catalogue.objective, given, columns)
     logical = as_judged(replace(catalogue, objective=spec), spec.rule)
@@ -232,6 +234,7 @@ def resume(
         callbacks.workers(pool)
         run = Run.of(store)
         check_named(run.settings.algorithm, algorithm, "algorithm", run.folder, "resume")
+        require_asynchronous(run.settings, toolkit.get(run.settings.algorithm))
         pipeline = pipeline_of(
             run, "resume", ego=ego, worse_than=worse_than, compares=True, causes=True,
             simulator=simulator, workers=pool,
@@ -265,9 +268,12 @@ def _go(
             failing.after_batch(progress)
 
     try:
-        result = run_loop(
-            algorithm, pipeline.space.decode, pipeline.evaluate, store, settings.budget, on_batch
-        )
+        evaluating = pipeline.stream() if settings.ahead else nullcontext(pipeline.evaluate)
+        with evaluating as evaluate:
+            result = run_loop(
+                algorithm, pipeline.space.decode, evaluate, store, settings.budget, on_batch,
+                ahead=settings.ahead or 0,
+            )  # fmt: skip
     except WorkersError as error:
         raise _workers_lost(error, store) from error
     store.require_there()

@@ -1,16 +1,21 @@
 """The loop of a campaign: ask → decode → evaluate → record → tell.
 
 Resume is its replay, from the start or from the state that the algorithm was saved in.
+
+A search may run ahead of its results: it asks for more rows while some that it asked for before are
+evaluated. Which results it has by then is fixed by the number of rows that it may be ahead, never
+by what has ended, so the rows that it asks for do not depend on how long any of them takes.
 """
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
+from typing import Protocol, Self
 
 import numpy as np
 
-from bridgegen.arrays import Float, as_float
+from bridgegen.arrays import Bool, Float, Int, as_float
 from bridgegen.campaign.known_rows import KnownRows
 from bridgegen.campaign.result_log import ResultLog
 from bridgegen.errors import InputError, StorageError
@@ -78,14 +83,40 @@ class LoopResult:
     seconds: float
 
 
+class Stream(Protocol):
+    """Evaluates rows while the loop goes on."""
+
+    def submit(self, X: Float) -> None:
+        """Add rows of X."""
+
+    def take(self, n: int) -> Evaluated:
+        """Wait for the results of the next n rows, in the order in which they were added."""
+
+
+class _Direct:
+    """A `Stream` that evaluates rows when their results are taken, all of them at once."""
+
+    def __init__(self, evaluate: Callable[[Float], Evaluated]) -> None:
+        self._evaluate, self._waiting = evaluate, list[Float]()
+
+    def submit(self, X: Float) -> None:
+        self._waiting += list(X)
+
+    def take(self, n: int) -> Evaluated:
+        rows, self._waiting = self._waiting[:n], self._waiting[n:]
+        return self._evaluate(np.array(rows))
+
+
 def run_loop(
     algorithm: Algorithm,
     decode: Callable[[Float], Float],
-    evaluate: Callable[[Float], Evaluated],
+    evaluate: Callable[[Float], Evaluated] | Stream,
     store: Store,
     budget: int,
     on_batch: Callable[[Progress], None] | None = None,
     stop: Callable[[], bool] | None = None,
+    *,
+    ahead: int = 0,
 ) -> LoopResult:
     """Search until the budget is spent: exactly ``budget`` evaluations, never one more.
 
@@ -100,18 +131,28 @@ def run_loop(
 
     An algorithm that is `Restorable` is saved after each batch. It resumes from there, and asks
     again only for the rows recorded since: at most the batch whose results it had not yet got when
-    the run was killed.
+    the run was killed. A search that runs ahead is not saved: its state does not say which rows are
+    being evaluated.
+
+    With ``ahead``, the rows that the algorithm asks for are told in the same order, later: it is
+    asked for the next batch as soon as all but ``ahead`` of its rows are told. The first batch is
+    told as a whole before the second is asked for, so that no search learns from a part of its
+    first sample. Rows are recorded as they are told; those that are being evaluated when the loop
+    is interrupted are evaluated again.
 
     Args:
         algorithm: new, made with the run's seed and settings.
         decode: ``(n, n_var)`` unit-cube rows → X ``(n, len(store.parameters))``; each row's
             result depends on that row alone.
-        evaluate: X → metrics, F, critical and status of its rows; may contain NaN and ±inf.
+        evaluate: X → metrics, F, critical and status of its rows; may contain NaN and ±inf. Or a
+            stream of rows, which evaluates them while the algorithm is asked for more.
         store: open for writing.
         budget: evaluations in the store at the end.
         on_batch: called after each batch with new evaluations, recorded or replayed; those that a
             restored algorithm knows come a few thousand at a time.
         stop: called before each batch; True ends the loop.
+        ahead: rows whose results the algorithm need not have when it is asked for a batch, ≥ 0;
+            0 unless it is `asynchronous`.
 
     Returns:
         The end of the loop. Ctrl-C ends it, too; finished batches are in the store by then.
@@ -120,7 +161,8 @@ def run_loop(
         StorageError: the store cannot be written, or was made by another version or other inputs.
     """
     n_before = len(store)
-    session = _Session(algorithm, decode, evaluate, store, budget, on_batch)
+    stream = _Direct(evaluate) if callable(evaluate) else evaluate
+    session = _Session(algorithm, decode, stream, store, budget, on_batch, ahead)
     reason: Reason | None = Reason.BUDGET if n_before >= budget else None
     try:
         if reason is None:
@@ -142,26 +184,67 @@ def run_loop(
     )
 
 
+@dataclass(frozen=True)
+class _Untold:
+    """Rows that an algorithm has asked for and has no results of, in its order.
+
+    Attributes:
+        U: ``(n, n_var)`` float64.
+        X: ``(n, len(store.parameters))`` float64.
+        ids: ``(n,)`` int64, see `KnownRows.add`.
+        fresh: ``(n,)`` bool, whether it was asked for the first time.
+    """
+
+    U: Float
+    X: Float
+    ids: Int
+    fresh: Bool
+
+    def __len__(self) -> int:
+        return len(self.ids)
+
+    @classmethod
+    def none(cls, n_var: int, n_parameters: int) -> Self:
+        """Return no rows."""
+        nothing = np.empty(0, np.int64)
+        return cls(np.empty((0, n_var)), np.empty((0, n_parameters)), nothing, nothing > 0)
+
+    def followed_by(self, U: Float, X: Float, ids: Int, fresh: Sequence[int]) -> "_Untold":
+        """Return these rows and more; ``fresh`` are the positions of new ones among these."""
+        return _Untold(
+            np.concatenate([self.U, U]),
+            np.concatenate([self.X, X]),
+            np.concatenate([self.ids, ids]),
+            np.concatenate([self.fresh, np.isin(np.arange(len(ids)), fresh)]),
+        )
+
+    def take(self, rows: slice) -> "_Untold":
+        """Return some of the rows."""
+        return _Untold(self.U[rows], self.X[rows], self.ids[rows], self.fresh[rows])
+
+
 class _Session:
-    """One call of the loop: the known rows, and its progress."""
+    """One call of the loop: the known rows, those that are not told, and its progress."""
 
     def __init__(
         self,
         algorithm: Algorithm,
         decode: Callable[[Float], Float],
-        evaluate: Callable[[Float], Evaluated],
+        stream: Stream,
         store: Store,
         budget: int,
         on_batch: Callable[[Progress], None] | None,
+        ahead: int,
     ) -> None:
         self.batches = self.repeated = 0
-        self._algorithm, self._decode, self._evaluate = algorithm, decode, evaluate
+        self._algorithm, self._decode, self._stream = algorithm, decode, stream
         self._store, self._budget, self._on_batch = store, budget, on_batch
         self._recorded, self._seconds_before = len(store), store.seconds
         self._began: float | None = None
         self._known = KnownRows()
         self._log = ResultLog(store.n_obj, len(store.metrics))
-        self._idle = 0
+        self._ahead, self._idle = ahead, 0
+        self._untold = _Untold.none(store.columns.n_var, len(store.parameters))
 
     @property
     def seconds(self) -> float:
@@ -191,39 +274,64 @@ class _Session:
 
     def batch(self) -> Reason | None:
         """Do one batch; return the reason if it was the last one."""
-        done = len(self._known)
-        if done >= self._recorded:
+        if len(self._known) >= self._recorded:
             self._start_clock()
         U = self._ask()
         if len(U) == 0:
+            if len(self._untold):  # their results may lead to more rows
+                self._tell(len(self._untold))
+                return None
             return self._nothing_new(Reason.EXHAUSTED)
         # No −0.0: SQLite would lose its sign, and a row is simulated as it is recorded.
         X = as_float("X", self._decode(U), (len(U), len(self._store.parameters))) + 0.0
         ids, fresh = self._known.add(X, self._budget)
-        old = fresh[: max(0, self._recorded - done)]
-        for rows, take in ((old, self._replay), (fresh[len(old) :], self._simulate)):
-            if rows:
-                self._log.add(take(U[rows], X[rows], int(ids[rows[0]])))
+        self._submit(X[[k for k in fresh if ids[k] >= self._recorded]])
+        self._untold = self._untold.followed_by(U, X, ids, fresh)
         self.batches += 1
         self.repeated += int(np.count_nonzero(ids >= 0)) - len(fresh)
         if len(self._known) >= self._budget:
             # The budget may have cut this batch short, and it is the last one.
-            if isinstance(self._algorithm, TakesNotes):
-                self._algorithm.tell(U, self._log.results(ids))
+            self._tell(len(self._untold), last=True)
             return Reason.BUDGET
 
-        self._algorithm.tell(U, self._log.results(ids))
         self._idle = 0 if fresh else self._idle + 1
-        if len(self._known) >= self._recorded:
+        converged = self._idle >= PATIENCE
+        may_wait = 0 if converged or self.batches == 1 else self._ahead
+        self._tell(len(self._untold) - may_wait)
+        return self._nothing_new(Reason.CONVERGED) if converged else None
+
+    def _submit(self, X: Float) -> None:
+        """Have new rows evaluated."""
+        if len(X):
+            self._start_clock()
+            self._stream.submit(X)
+
+    def _tell(self, n: int, *, last: bool = False) -> None:
+        """Record the results of the first n rows that are not told, if n > 0, and tell them.
+
+        Args:
+            n: at most all of them.
+            last: whether nothing more is asked for; only who takes notes is told then.
+        """
+        if n <= 0:
+            return
+        told, self._untold = self._untold.take(slice(n)), self._untold.take(slice(n, None))
+        new = told.ids >= self._recorded
+        for rows, take in ((told.fresh & ~new, self._replay), (told.fresh & new, self._simulate)):
+            if rows.any():
+                self._log.add(take(told.U[rows], told.X[rows], int(told.ids[rows][0])))
+        if last and not isinstance(self._algorithm, TakesNotes):
+            return
+        self._algorithm.tell(told.U, self._log.results(told.ids))
+        if not last and not self._ahead and len(self._known) >= self._recorded:
             self._save()
-        return self._nothing_new(Reason.CONVERGED) if self._idle >= PATIENCE else None
 
     def keep_notes(self) -> None:
         """Record the algorithm's notes, once it has got all results of the store."""
         if (
             isinstance(self._algorithm, TakesNotes)
             and self.batches
-            and len(self._known) >= self._recorded
+            and len(self._log) >= self._recorded
         ):
             self._store.keep_notes(self._algorithm.notes())
 
@@ -260,9 +368,8 @@ class _Session:
             raise self._other(f"evaluation {start + k}: {detail}")
 
     def _simulate(self, U: Float, X: Float, start: int) -> Evaluated:
-        """Evaluate new rows and record them."""
-        self._start_clock()
-        result = self._evaluate(X)
+        """Wait for the results of new rows and record them."""
+        result = self._stream.take(len(U))
         self._store.append(U, X, result, self.seconds)
         self._report(start + len(U), result, replayed=False)
         return result

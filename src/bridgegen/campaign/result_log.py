@@ -18,6 +18,10 @@ class ResultLog:
         self._F, self._metrics = array("d"), array("d")
         self._ok, self._critical, self._cause = array("b"), array("b"), array("b")
 
+    def __len__(self) -> int:
+        """The number of rows."""
+        return len(self._ok)
+
     def add(self, result: Evaluated) -> None:
         """Append the results of the next rows."""
         # SQLite keeps neither the sign of zero nor the bits of NaN.

@@ -5,8 +5,10 @@ from collections.abc import Callable
 from bridgegen import search as toolkit
 from bridgegen.campaign.screening import Screen, screen_of
 from bridgegen.campaign.settings import Settings
+from bridgegen.errors import InputError
+from bridgegen.options import SearchOptions
 from bridgegen.pipeline import Pipeline
-from bridgegen.search.algorithm import Arena, Problem, resolve
+from bridgegen.search.algorithm import Arena, Problem, asynchronous, resolve
 from bridgegen.search.screened import Screened
 
 
@@ -32,6 +34,28 @@ def searcher_of(
         batch=settings.screen_batch,
         say=warn,
     )
+
+
+def require_asynchronous(given: SearchOptions, algorithm: type[toolkit.Algorithm]) -> None:
+    """Check that a search can run ahead of its results, if it is to.
+
+    Args:
+        given: the options of the search.
+        algorithm: of that name.
+
+    Raises:
+        InputError: it cannot.
+    """
+    if given.ahead is None:
+        return
+    if given.screen is not None:
+        raise InputError(f"--ahead is for a search without a screen (--screen), got {given.ahead}")
+    if not asynchronous(algorithm):
+        able = ", ".join(name for name, one in toolkit.ALGORITHMS.items() if asynchronous(one))
+        raise InputError(
+            f"--ahead {given.ahead}: {given.algorithm} needs the results of all its rows before it "
+            f"asks for more; these algorithms do not: {able}"
+        )
 
 
 def _problem(pipeline: Pipeline, arena: Arena | None = None) -> Problem:

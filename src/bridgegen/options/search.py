@@ -31,6 +31,7 @@ from bridgegen.simulation.vehicles import KINEMATIC
 MAX_BUDGET = 10**7
 MAX_SEED = 2**32 - 1
 MAX_KEEP = 1000
+MAX_AHEAD = 10_000
 
 _CAUSES = option(
     FLAG,
@@ -354,6 +355,19 @@ class SearchOptions(CommonOptions):
             "Seed of all random numbers: the same seed gives the same result.",
             shown="0, or a distribution's",
             limits=(0, MAX_SEED),
+            group=SEARCH,
+        ),
+    )
+    ahead: int | None = field(
+        default=None,
+        metadata=option(
+            WHOLE,
+            "Number of evaluations whose results the algorithm need not have when it is asked for "
+            "more: no worker then waits for the slowest one.",
+            hint="For slow simulators; the result depends on it.",
+            shown="0",
+            limits=(1, MAX_AHEAD),
+            before=None,
             group=SEARCH,
         ),
     )

@@ -146,8 +146,9 @@ class Algorithm(Protocol):
     """A search algorithm over the unit cube; every objective is minimised.
 
     ``ask`` and ``tell`` alternate: each ``tell`` has the results of the last ``ask``, all of them,
-    in its order. An algorithm draws random numbers only from its own generator, so that one seed
-    gives one sequence of rows, bit for bit; resuming a run replays it and relies on that.
+    in its order; unless the algorithm is `asynchronous`. An algorithm draws random numbers only
+    from its own generator, so that one seed gives one sequence of rows, bit for bit; resuming a run
+    replays it and relies on that.
 
     It may name an ``extra`` that must be installed, see `bridgegen.extras`. It may also have
     ``notes``, see `TakesNotes`; ``state`` and ``restore``, see `Restorable`.
@@ -195,6 +196,17 @@ class Algorithm(Protocol):
             U: ``(n, n_var)`` float64, the rows of the last ``ask``.
             results: of these rows; must not be changed.
         """
+
+
+def asynchronous(algorithm: "type[Algorithm]") -> bool:
+    """Return whether an algorithm may be asked again before all of its rows are told.
+
+    Its class says so by ``asynchronous: ClassVar[bool] = True``. After the first batch, which is
+    told as a whole, each ``tell`` then has the next rows that are not told yet, in the order in
+    which they were asked for, some of an earlier ``ask`` and fewer of the last one; there may be
+    any number of ``ask`` between two ``tell``.
+    """
+    return bool(getattr(algorithm, "asynchronous", False))
 
 
 @runtime_checkable

@@ -33,6 +33,7 @@ class ES(Evolved):
         "restart_within": RESTART_WITHIN,
     }
     objectives: ClassVar[Arity] = "one"
+    asynchronous: ClassVar[bool] = True
 
     def _build(self) -> Any:
         from pymoo.algorithms.soo.nonconvex import es

@@ -5,7 +5,15 @@ from collections.abc import Mapping
 from typing import Any, ClassVar
 
 from bridgegen.arrays import Float
-from bridgegen.search.algorithm import Arity, Problem, Results, Setting, Value, resolve
+from bridgegen.search.algorithm import (
+    Arity,
+    Problem,
+    Results,
+    Setting,
+    Value,
+    asynchronous,
+    resolve,
+)
 
 
 class Evolved(ABC):
@@ -27,7 +35,10 @@ class Evolved(ABC):
 
         self._values = resolve(type(self), problem, seed, settings)
         within = self._values["restart_within"]
-        self._search = Generations(self._build, problem, seed, within, scaled=self.scaled)
+        self._search = Generations(
+            self._build, problem, seed, within, scaled=self.scaled,
+            asynchronous=asynchronous(type(self)),
+        )  # fmt: skip
 
     @abstractmethod
     def _build(self) -> Any:
@@ -41,6 +52,6 @@ class Evolved(ABC):
         """Select the survivors, or the next moves, by the rows' results.
 
         Raises:
-            ValueError: U is not the result of the last ``ask``.
+            ValueError: U are not the first rows that were asked for and are not told.
         """
         self._search.tell(U, results)

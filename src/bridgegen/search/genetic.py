@@ -18,6 +18,7 @@ class Genetic(Evolved):
     Source: Deb and Agrawal (1995), "Simulated binary crossover for continuous search space".
     """
 
+    asynchronous: ClassVar[bool] = True
     settings: ClassVar[Mapping[str, Setting]] = {
         "population": Setting(40, "individuals, and rows per batch", low=4, high=100_000),
         "crossover": Setting(0.9, "probability that two parents are crossed", 0.0, 1.0),

@@ -34,6 +34,7 @@ class Grid:
         "levels": Setting(3, "values per parameter, at the centres of equal bins", 2, 1000),
     }
     objectives: ClassVar[Arity] = "any"
+    asynchronous: ClassVar[bool] = True
 
     def __init__(self, problem: Problem, seed: int, **settings: Value) -> None:
         self._levels: int = resolve(Grid, problem, seed, settings)["levels"]

@@ -56,6 +56,7 @@ class MAPElites:
         "line": Setting(1.0, "that of its step along the line, per distance", 0.0, 2.0),
     }
     objectives: ClassVar[Arity] = "one"
+    asynchronous: ClassVar[bool] = True
 
     def __init__(self, problem: Problem, seed: int, **settings: Value) -> None:
         self._values = resolve(MAPElites, problem, seed, settings)

@@ -32,6 +32,7 @@ class Pairwise:
         "levels": Setting(5, "values per parameter, at the centres of equal bins", 2, 100),
     }
     objectives: ClassVar[Arity] = "any"
+    asynchronous: ClassVar[bool] = True
 
     def __init__(self, problem: Problem, seed: int, **settings: Value) -> None:
         self._levels: int = resolve(Pairwise, problem, seed, settings)["levels"]

@@ -25,6 +25,7 @@ class Sobol:
         "population": Setting(40, "rows per batch", low=1, high=1_000_000),
     }
     objectives: ClassVar[Arity] = "any"
+    asynchronous: ClassVar[bool] = True
 
     def __init__(self, problem: Problem, seed: int, **settings: Value) -> None:
         self._population = resolve(Sobol, problem, seed, settings)["population"]

@@ -46,9 +46,9 @@ class Surrogate(Saved):
     The more critical rows are known, the more rows a batch has, so that a row costs less; a tenth
     of all rows counts as critical for this.
 
-    All of them keep a distance from distinct critical rows and from one another, so that what is
-    found are other scenarios, not the first one again. Where no candidate is left that far away,
-    the distance is halved.
+    The last two keep a distance from distinct critical rows, from one another and from rows whose
+    results are not known yet, so that what is found are other scenarios, not the first one again.
+    Where no candidate is left that far away, the distance is halved.
 
     With many rows, the processes are fitted to 300 of them: half are the best, or the critical
     ones; the others are spread over the rest (`telling`).
@@ -77,6 +77,7 @@ class Surrogate(Saved):
         ),
     }  # fmt: skip
     objectives: ClassVar[Arity] = "one"
+    asynchronous: ClassVar[bool] = True
 
     def __init__(self, problem: Problem, seed: int, **settings: Value) -> None:
         self._values = resolve(type(self), problem, seed, settings)
@@ -88,6 +89,12 @@ class Surrogate(Saved):
 
     def ask(self) -> Float:
         """Return a sample of the cube at first, then batches; none where all rows are known."""
+        rows = self._next()
+        self._known.expect(rows)
+        return rows
+
+    def _next(self) -> Float:
+        """Return the next rows."""
         known, rng = self._known, self._rng
         many = max(int(known.critical.sum()), len(known) // 10)
         n = max(self._values["batch"], int(self._values["growth"] * many))
@@ -143,7 +150,9 @@ class Surrogate(Saved):
     def _joined(self, batch: Float, rows: Float, points: Float, paths: Float) -> Float:
         """Return a batch and, for each path, the row where it is least that is far enough away."""
         known, apart = self._known, self._values["apart"]
-        others = np.concatenate([known.points[known.distinct], known.columns.points(batch)])
+        others = np.concatenate(
+            [known.points[known.distinct], known.pending, known.columns.points(batch)]
+        )
         off = distances(points, others)
         taken: list[int] = []
         for path in paths:

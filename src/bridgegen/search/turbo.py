@@ -1,6 +1,6 @@
 """TuRBO: several trust regions, each with a Gaussian process of its own."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -59,6 +59,8 @@ class TuRBO(Saved):
     process is least, the paths of all regions competing. A region that has shrunk to a point
     restarts elsewhere.
 
+    Where the first rows of the only region are not told yet, rows are drawn anywhere.
+
     It differs from the source:
 
     - objectives are learnt by their logarithmic distances from the median (`compressed`);
@@ -91,6 +93,7 @@ class TuRBO(Saved):
         ),
     }  # fmt: skip
     objectives: ClassVar[Arity] = "one"
+    asynchronous: ClassVar[bool] = True
 
     def __init__(self, problem: Problem, seed: int, **settings: Value) -> None:
         self._values = resolve(type(self), problem, seed, settings)
@@ -99,23 +102,35 @@ class TuRBO(Saved):
         self._known = Known(problem, self._values["avoid"])
         self._rng = np.random.Generator(np.random.PCG64(seed))
         self._regions = [self._begun() for _ in range(self._values["regions"])]
-        self._asked = np.empty(0, np.int64)
+        self._asked: list[_Region | None] = []  # of each row that is not told
 
     def _begun(self) -> _Region:
         return _Region(self._values["length"], len(self._known.distinct), self._values["initial"])
 
     def ask(self) -> Float:
         """Return the first rows of regions that begin, else a batch of all regions'."""
-        if self._known.exhausted:
-            return np.empty((0, self._n_var))
-        waiting = [k for k, one in enumerate(self._regions) if one.pending]
-        if waiting:
-            counts = [self._regions[k].pending for k in waiting]
-            self._asked = self._rng.permutation(np.repeat(waiting, counts))
-            rows = latin_hypercube(self._rng, len(self._asked), self._n_var)
-            return self._known.columns.snapped(self._away(rows))
-        rows, self._asked = self._batch()
+        rows, regions = self._next()
+        self._known.expect(rows)
+        self._asked += regions
         return rows
+
+    def _next(self) -> "tuple[Float, Sequence[_Region | None]]":
+        """Return the next rows and the region of each; None for a row that is of no region."""
+        if self._known.exhausted:
+            return np.empty((0, self._n_var)), []
+        waiting = [
+            one for one in self._regions if one.pending and not any(one is r for r in self._asked)
+        ]
+        if waiting:
+            counts = [one.pending for one in waiting]
+            asked = self._rng.permutation(np.repeat(np.arange(len(waiting)), counts))
+            rows = latin_hypercube(self._rng, len(asked), self._n_var)
+            return self._known.columns.snapped(self._away(rows)), [waiting[k] for k in asked]
+        ready = [one for one in self._regions if not one.pending]
+        if ready:
+            return self._batch(ready)
+        rows = self._known.anywhere(self._values["batch"], self._rng)
+        return rows, [None] * len(rows)
 
     def _away(self, rows: Float) -> Float:
         """Return first rows, those near a known critical row moved to anywhere else."""
@@ -129,13 +144,13 @@ class TuRBO(Saved):
         known = self._known
         return distances(known.columns.points(rows), known.points[known.distinct[:k]])
 
-    def _batch(self) -> tuple[Float, Int]:
-        """Return a batch, and the region of each row."""
+    def _batch(self, ready: Sequence[_Region]) -> tuple[Float, Sequence[_Region]]:
+        """Return a batch of regions whose first rows are told, and the region of each row."""
         n, scores = self._values["batch"], self._known.scores()
-        found = [self._candidates(region) for region in self._regions]
+        found = [self._candidates(region) for region in ready]
         paths = [
             self._model(region, scores).sample(self._known.columns.points(rows), n, self._rng)
-            for region, rows in zip(self._regions, found, strict=True)
+            for region, rows in zip(ready, found, strict=True)
         ]
         rows, values = np.concatenate(found), np.concatenate(paths, axis=1)
         regions = np.repeat(np.arange(len(found)), [len(one) for one in found])
@@ -145,7 +160,7 @@ class TuRBO(Saved):
         for path in values[: len(rows)]:
             path[taken] = np.inf
             taken.append(int(path.argmin()))
-        return rows[taken], regions[taken]
+        return rows[taken], [ready[k] for k in regions[taken]]
 
     def _centre(self, region: _Region) -> int:
         """Return the place of a region's best row, the first of equal ones."""
@@ -184,12 +199,14 @@ class TuRBO(Saved):
         """Grow or shrink the regions; restart those that have shrunk to a point."""
         first = len(self._known)
         self._known.add(U, results.F[:, 0], results.ok, results.critical)
+        told, self._asked = self._asked[: len(U)], self._asked[len(U) :]
         for k, region in enumerate(self._regions):
-            own = first + np.flatnonzero(self._asked == k)
+            own = first + np.flatnonzero([one is region for one in told])
             if not len(own):
                 continue
             if region.pending:
-                region.pending, region.own = 0, own
+                region.pending -= len(own)
+                region.own = np.concatenate([region.own, own])
                 continue
             self._judge(region, own)
             if region.length < self._values["shortest"]:

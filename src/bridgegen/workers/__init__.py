@@ -10,7 +10,7 @@ from bridgegen.workers.carried import CarriedDriver
 from bridgegen.workers.choice import Choice, open_workers, read_choice
 from bridgegen.workers.recipe import Recipe
 from bridgegen.workers.threads import Threads
-from bridgegen.workers.workers import Lost, Part, Workers
+from bridgegen.workers.workers import Lost, Part, Stream, Workers
 
 __all__ = [
     "CarriedDriver",
@@ -18,6 +18,7 @@ __all__ = [
     "Lost",
     "Part",
     "Recipe",
+    "Stream",
     "Threads",
     "Workers",
     "open_workers",

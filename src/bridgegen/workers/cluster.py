@@ -11,7 +11,7 @@ from typing import IO, Any
 from bridgegen.arrays import Float
 from bridgegen.errors import InputError, WorkersError
 from bridgegen.extras import require
-from bridgegen.workers.pool import WorkerPool
+from bridgegen.workers.pool import PoolStream, WorkerPool
 from bridgegen.workers.process import Process, Said
 from bridgegen.workers.ray_bridge import RayBridge
 from bridgegen.workers.recipe import Recipe
@@ -57,11 +57,18 @@ class Cluster(WorkerPool[int]):
         *args: *Args,
     ) -> list[Part[Result]]:
         """See `Workers`."""
-        if self._bridge is None or portable.device != self._device:
-            self.close()
-            self._device = portable.device
-            self._join()
+        self._join(portable.device)
         return super().map(portable, work, X, *args)
+
+    def stream(
+        self,
+        portable: Evaluator,
+        work: Callable[[Evaluator, Float, *Args], Result],
+        *args: *Args,
+    ) -> PoolStream[Result]:
+        """See `Workers`."""
+        self._join(portable.device)
+        return super().stream(portable, work, *args)
 
     def close(self) -> None:
         """See `Workers`; the actors, which campaigns share, end when they have been idle."""
@@ -74,12 +81,16 @@ class Cluster(WorkerPool[int]):
             self._log.close()
             self._log = None
 
-    def _join(self) -> None:
-        """Connect to the cluster.
+    def _join(self, device: str) -> None:
+        """Connect to the cluster, unless that has been done for workers with such a device.
 
         Raises:
             WorkersError: no cluster is there, or it has no room for a worker.
         """
+        if self._bridge is not None and device == self._device:
+            return
+        self.close()
+        self._device = device
         self._log = tempfile.TemporaryFile()  # noqa: SIM115 (``close`` does)
         self._bridge = Process(self._said, "bridgegen.workers.ray_bridge", self._log)
         self._bridge.ask(self._address, self._device)
@@ -92,8 +103,8 @@ class Cluster(WorkerPool[int]):
             self.close()
             raise
 
-    def _receive_from_bridge(self) -> tuple[int, tuple[Any, ...]] | None:
-        """Wait for the bridge's next message; return it if it is a worker's, else None."""
+    def _receive_from_bridge(self) -> tuple[int | None, tuple[Any, ...]] | None:
+        """Wait for the bridge's next message; return it if it is a worker's or `wake`'s."""
         bridge, (kind, *rest) = self._said.get()
         if bridge is not self._bridge:
             return None  # the last message of an earlier bridge
@@ -109,16 +120,24 @@ class Cluster(WorkerPool[int]):
             raise WorkersError(f"{self._where} cannot be reached: {rest[0]}{hint}")
         elif kind == "died":
             raise WorkersError(f"{self._where} is lost: {self._last_error()}")
+        elif kind == "wake":
+            return None, (kind,)
         elif kind != "started":
             return kind, rest[0]
         return None
 
-    def _receive(self) -> tuple[int, tuple[Any, ...]]:
+    def wake(self) -> None:
+        """See `WorkerPool`."""
+        self._said.put((self._bridge, ("wake",)))
+
+    def _receive(self) -> tuple[int | None, tuple[Any, ...]]:
         while True:
             received = self._receive_from_bridge()
             if received is None:
                 continue
             number, message = received
+            if number is None:
+                return received
             if message[0] == "started" and message[1] != version("bridgegen"):
                 raise InputError(
                     f"{self._where} must have bridgegen {version('bridgegen')}, as this machine "

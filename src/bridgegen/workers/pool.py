@@ -7,11 +7,14 @@ A machine that fails takes all its workers with it, including idle ones whose en
 noticed yet. So a chunk is blamed only if its worker answered a ping just before it got the chunk.
 """
 
+import threading
 from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any, Generic, TypeVar
+
+import numpy as np
 
 from bridgegen.arrays import Float
 from bridgegen.errors import WorkersError
@@ -94,6 +97,27 @@ class WorkerState(Generic[WorkerHandle]):
         return self.started and self.preparing is None and self.chunk is None
 
 
+@dataclass
+class Job:
+    """A function that workers call for chunks of rows.
+
+    Attributes:
+        recipe: builds what the rows are evaluated with.
+        work: the function.
+        args: its further arguments.
+        rows: returns the rows of a chunk.
+        waiting: chunks that no worker has.
+        done: results, by the first row of their chunk.
+    """
+
+    recipe: Recipe
+    work: Work
+    args: tuple[Any, ...]
+    rows: Callable[[Chunk], Float]
+    waiting: deque[Chunk] = field(default_factory=deque)
+    done: dict[int, Part[Any]] = field(default_factory=dict)
+
+
 class WorkerPool(ABC, Generic[WorkerHandle]):
     """`Workers` that each run in a process of their own, on this machine or another."""
 
@@ -125,8 +149,12 @@ class WorkerPool(ABC, Generic[WorkerHandle]):
         """Have a worker evaluate rows; it sends their result or an exception."""
 
     @abstractmethod
-    def _receive(self) -> tuple[WorkerHandle, tuple[Any, ...]]:
-        """Wait for the next message of a worker: see `bridgegen.workers.process`."""
+    def _receive(self) -> tuple[WorkerHandle | None, tuple[Any, ...]]:
+        """Wait for the next message of a worker, see `bridgegen.workers.process`; or for `wake`."""
+
+    @abstractmethod
+    def wake(self) -> None:
+        """Have ``_receive`` return in the thread that waits in it; called by another one."""
 
     @abstractmethod
     def _release(self, worker: WorkerHandle) -> str:
@@ -140,37 +168,50 @@ class WorkerPool(ABC, Generic[WorkerHandle]):
         *args: *Args,
     ) -> list[Part[Result]]:
         """See `Workers`."""
-        recipe, done = portable.recipe, dict[int, Part[Result]]()
+        job = Job(portable.recipe, work, args, lambda chunk: X[chunk.start : chunk.stop])
         bounds = cut(len(X), self.count, portable.rows_at_once)
-        waiting = deque(Chunk(start, stop) for start, stop in bounds)
+        job.waiting.extend(Chunk(start, stop) for start, stop in bounds)
         try:
-            while waiting or any(state.chunk for state in self._workers.values()):
-                self._assign(waiting, recipe, work, X, args)
-                worker, (kind, *rest) = self._receive()
-                state = self._workers.get(worker)
-                if state is None:  # it has been released
-                    continue
-                if kind == "started" or (kind == "answer" and not state.started):
-                    state.started = state.pinged = True
-                elif kind == "died":
-                    self._on_worker_died(state, waiting, done)
-                elif kind == "raised" and isinstance(rest[0], NotPrepared) and state.chunk:
-                    state.prepared.clear()
-                    waiting.appendleft(state.chunk)
-                    state.chunk, state.pinged = None, False
-                elif kind == "raised":
-                    raise rest[0]
-                elif state.preparing is not None:
-                    self._start_failures = 0
-                    state.prepared.add(state.preparing)
-                    state.preparing = None
-                elif state.chunk is not None:
-                    done[state.chunk.start] = Part(state.chunk.rows, rest[0])
-                    state.chunk, state.pinged = None, False
+            while job.waiting or any(state.chunk for state in self._workers.values()):
+                self.step(job)
         except BaseException:
             self.close()  # stops the chunks that are being evaluated
             raise
-        return [done[start] for start in sorted(done)]
+        return [job.done[start] for start in sorted(job.done)]
+
+    def stream(
+        self,
+        portable: Evaluator,
+        work: Callable[[Evaluator, Float, *Args], Result],
+        *args: *Args,
+    ) -> "PoolStream[Result]":
+        """See `Workers`."""
+        return PoolStream(self, portable.recipe, work, args)
+
+    def step(self, job: Job) -> None:
+        """Give idle workers something to do, then wait for a worker's message and process it."""
+        self._assign(job)
+        worker, (kind, *rest) = self._receive()
+        state = None if worker is None else self._workers.get(worker)
+        if state is None:  # it has been released; or nobody says anything
+            return
+        if kind == "started" or (kind == "answer" and not state.started):
+            state.started = state.pinged = True
+        elif kind == "died":
+            self._on_worker_died(state, job)
+        elif kind == "raised" and isinstance(rest[0], NotPrepared) and state.chunk:
+            state.prepared.clear()
+            job.waiting.appendleft(state.chunk)
+            state.chunk, state.pinged = None, False
+        elif kind == "raised":
+            raise rest[0]
+        elif state.preparing is not None:
+            self._start_failures = 0
+            state.prepared.add(state.preparing)
+            state.preparing = None
+        elif state.chunk is not None:
+            job.done[state.chunk.start] = Part(state.chunk.rows, rest[0])
+            state.chunk, state.pinged = None, False
 
     def close(self) -> None:
         """See `Workers`."""
@@ -183,37 +224,26 @@ class WorkerPool(ABC, Generic[WorkerHandle]):
         free = sum(state.chunk is None for state in self._workers.values())
         return min(min(self.count, chunks) - free, self.count - len(self._workers))
 
-    def _assign(
-        self,
-        waiting: deque[Chunk],
-        recipe: Recipe,
-        work: Work,
-        X: Float,
-        args: tuple[Any, ...],
-    ) -> None:
+    def _assign(self, job: Job) -> None:
         """Start missing workers, and give each idle worker a chunk or what must precede it."""
-        for _ in range(self._missing(len(waiting))):
+        for _ in range(self._missing(len(job.waiting))):
             worker = self._start_worker()
             self._workers[worker] = WorkerState(worker)
         for state in [state for state in self._workers.values() if state.is_idle]:
-            if not waiting:
+            if not job.waiting:
                 return
-            if recipe.key not in state.prepared:
-                state.preparing = recipe.key
-                self._prepare(state.handle, recipe)
-            elif waiting[0].doubted and not state.pinged:
+            if job.recipe.key not in state.prepared:
+                state.preparing = job.recipe.key
+                self._prepare(state.handle, job.recipe)
+            elif job.waiting[0].doubted and not state.pinged:
                 state.started = False
                 self._ping(state.handle)
             else:
-                state.chunk = chunk = waiting.popleft()
-                self._run(state.handle, recipe.key, work, X[chunk.start : chunk.stop], args)
+                state.chunk = job.waiting.popleft()
+                rows = job.rows(state.chunk)
+                self._run(state.handle, job.recipe.key, job.work, rows, job.args)
 
-    def _on_worker_died(
-        self,
-        state: WorkerState[WorkerHandle],
-        waiting: deque[Chunk],
-        done: dict[int, Part[Result]],
-    ) -> None:
+    def _on_worker_died(self, state: WorkerState[WorkerHandle], job: Job) -> None:
         """Remove a worker that has ended, and queue its chunk again or record its row as lost."""
         del self._workers[state.handle]
         reason, chunk = self._release(state.handle), state.chunk
@@ -226,6 +256,82 @@ class WorkerPool(ABC, Generic[WorkerHandle]):
                 )
             return
         remaining = chunk.after_end(was_alive=state.pinged)
-        waiting.extendleft(reversed(remaining))
+        job.waiting.extendleft(reversed(remaining))
         if not remaining:
-            done[chunk.start] = Part(chunk.rows, Lost(reason))
+            job.done[chunk.start] = Part(chunk.rows, Lost(reason))
+
+
+class PoolStream(Generic[Result]):
+    """A `Stream` of a pool. A thread gives rows to workers while the caller is busy.
+
+    Args:
+        pool: evaluates the rows.
+        recipe: see `Job`.
+        work: see `Job`.
+        args: see `Job`.
+    """
+
+    def __init__(
+        self, pool: WorkerPool[Any], recipe: Recipe, work: Work, args: tuple[Any, ...]
+    ) -> None:
+        self._pool, self._X = pool, dict[int, Float]()
+        self._job = Job(recipe, work, args, lambda chunk: self._X[chunk.start])
+        self._submitted = self._taken = 0
+        self._is_closed = False
+        self._error: BaseException | None = None
+        self._changed = threading.Condition()
+        self._thread = self._started()
+
+    def _started(self) -> threading.Thread:
+        """Return the thread that gives rows to workers, started."""
+        thread = threading.Thread(target=self._run, daemon=True)
+        thread.start()
+        return thread
+
+    def submit(self, X: Float) -> None:
+        """See `Stream`."""
+        for row in X:
+            self._X[self._submitted] = row[np.newaxis]
+            self._job.waiting.append(Chunk(self._submitted, self._submitted + 1))
+            self._submitted += 1
+        self._pool.wake()
+
+    def take(self, n: int) -> list[Part[Result]]:
+        """See `Stream`."""
+        return [self._next() for _ in range(n)]
+
+    def close(self) -> None:
+        """See `Stream`; workers whose rows are abandoned are stopped."""
+        self._is_closed = True
+        self._pool.wake()
+        self._thread.join()
+        if self._taken < self._submitted:
+            self._pool.close()
+
+    def _next(self) -> Part[Result]:
+        """Wait for the result of the next row."""
+        k = self._taken
+        with self._changed:
+            while k not in self._job.done:
+                if self._error is not None:
+                    raise self._error
+                self._wait()
+        self._taken += 1
+        del self._X[k]
+        return self._job.done.pop(k)
+
+    def _wait(self) -> None:
+        """Wait until the thread has processed another message of a worker."""
+        self._changed.wait()
+
+    def _run(self) -> None:
+        """Evaluate rows until the stream is closed or a row's work raises."""
+        while not self._is_closed and self._error is None:
+            error = None
+            try:
+                self._pool.step(self._job)
+            except BaseException as one:
+                error = one
+            with self._changed:
+                self._error = error
+                self._changed.notify_all()

@@ -8,9 +8,10 @@ from typing import IO, Any
 
 from bridgegen.child import ONE_THREAD, Child
 
-Said = queue.SimpleQueue[tuple["Process", tuple[Any, ...]]]
+Said = queue.SimpleQueue[tuple["Process | None", tuple[Any, ...]]]
 """Messages of processes: ("started",), ("answer", result), ("raised", exception), ("died",) when
-the process has ended, and the messages of functions that are called with ``tells``."""
+the process has ended, and the messages of functions that are called with ``tells``; those of no
+process end the wait for one."""
 
 
 def cores() -> int:

@@ -48,8 +48,12 @@ class Processes(WorkerPool[Process]):
     def _run(self, worker: Process, key: str, work: Work, X: Float, args: tuple[Any, ...]) -> None:
         worker.call(_run, key, work, X, args)
 
-    def _receive(self) -> tuple[Process, tuple[Any, ...]]:
+    def _receive(self) -> tuple[Process | None, tuple[Any, ...]]:
         return self._said.get()
+
+    def wake(self) -> None:
+        """See `WorkerPool`."""
+        self._said.put((None, ("wake",)))
 
     def _release(self, worker: Process) -> str:
         return ending(worker.end())

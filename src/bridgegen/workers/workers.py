@@ -61,6 +61,30 @@ class Part(Generic[Result]):
     result: Result | Lost
 
 
+class Stream(Protocol[Result]):
+    """Rows that workers evaluate, each by itself, while their caller does something else.
+
+    A worker that is free gets the next row, so that rows may take unevenly long.
+    """
+
+    def submit(self, X: Float) -> None:
+        """Add rows, ``(n, …)`` float64, after those that were added before."""
+
+    def take(self, n: int) -> list[Part[Result]]:
+        """Wait for the results of the next n rows, in the order in which they were added.
+
+        Args:
+            n: as many rows as have been added and not taken, at most.
+
+        Raises:
+            Exception: raised by the work.
+            WorkersError: no workers are available, or the connection to them is lost.
+        """
+
+    def close(self) -> None:
+        """End the stream; rows that have not been taken are abandoned."""
+
+
 class Workers(Protocol):
     """Threads, processes or a cluster that share the rows of a batch."""
 
@@ -95,6 +119,20 @@ class Workers(Protocol):
             Exception: raised by the work.
             WorkersError: no workers are available, or the connection to them is lost.
             KeyboardInterrupt: Ctrl-C; all workers have stopped.
+        """
+
+    def stream(
+        self,
+        portable: Evaluator,
+        work: Callable[[Evaluator, Float, *Args], Result],
+        *args: *Args,
+    ) -> Stream[Result]:
+        """Open a stream of rows; until it is closed, the workers evaluate nothing else.
+
+        Args:
+            portable: see ``map``.
+            work: see ``map``; called once for each row.
+            args: see ``map``.
         """
 
     def close(self) -> None:

@@ -42,6 +42,21 @@ class Doubler:
             os._exit(3)
         return 2.0 * X
 
+    def mark(self, X: np.ndarray, folder: Path) -> np.ndarray:
+        """Leave a file for each call."""
+        (folder / str(X[0, 0])).touch()
+        return X
+
+    def double_last(self, X: np.ndarray, folder: Path) -> np.ndarray:
+        """Return the double of row 0 when rows 1 to 19 have been evaluated."""
+        end = time.monotonic() + 60.0
+        while X[0, 0] == 0.0 and len(list(folder.iterdir())) < 19:
+            if time.monotonic() > end:
+                raise TimeoutError
+            time.sleep(0.01)
+        self.mark(X, folder)
+        return 2.0 * X
+
     def slowly(self, X: np.ndarray, folder: Path) -> np.ndarray:
         (folder / str(os.getpid())).touch()
         time.sleep(60.0)

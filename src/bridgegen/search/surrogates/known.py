@@ -14,6 +14,8 @@ FEW = 100_000
 class Known:
     """Rows with their results; a failed row counts as one of the greatest objective.
 
+    Rows that have been asked for and not told are no new ones either.
+
     Attributes:
         columns: what the columns of U are.
         U: ``(n, n_var)`` float64.
@@ -22,6 +24,8 @@ class Known:
         critical: ``(n,)`` bool, False in failed rows.
         distinct: places of critical rows, each ``apart`` or more from the others in root mean
             square, ascending.
+        pending: ``(m, n_var)`` float64, what a model sees of rows that are not told, in the order
+            in which they were asked for.
 
     Args:
         problem: the search problem.
@@ -33,6 +37,7 @@ class Known:
         self.columns = Columns(n_var, problem.levels)
         self._apart = apart
         self.U, self.points, self.F = np.empty((0, n_var)), np.empty((0, n_var)), np.empty(0)
+        self.pending = np.empty((0, n_var))
         self.critical, self.distinct = np.empty(0, np.bool_), np.empty(0, np.int64)
         self._rows: set[bytes] = set()
 
@@ -41,8 +46,13 @@ class Known:
 
     @property
     def exhausted(self) -> bool:
-        """Whether all rows there are have been told."""
+        """Whether all rows there are have been told, or asked for."""
         return 0 < self.columns.count <= len(self._rows)
+
+    def expect(self, U: Float) -> None:
+        """Note that rows ``(n, n_var)`` are asked for; they are added in this order."""
+        self.pending = np.concatenate([self.pending, self.columns.points(U)])
+        self._rows.update(_keys(self.columns.snapped(U)))
 
     def add(self, U: Float, F: Float, ok: Bool, critical: Bool) -> None:
         """Add rows and their results.
@@ -54,6 +64,7 @@ class Known:
             critical: ``(n,)`` bool.
         """
         points, before = self.columns.points(U), len(self)
+        self.pending = self.pending[len(U) :]
         self.U, self.points = np.concatenate([self.U, U]), np.concatenate([self.points, points])
         self.F = np.concatenate([self.F, np.where(ok & ~np.isnan(F), F, np.inf)])
         self.critical = np.concatenate([self.critical, ok & critical])
