@@ -1,7 +1,7 @@
 """BridgeGen: safety-critical scenarios for the validation of automated vehicles.
 
 import bridgegen as bg
-run = bg.run_search("crossroads-s4", algorithm="pso", budget=1000, seed=0, out="runs/s4")
+run = bg.run_search("crossroads-s4", budget=1000, seed=0, out="runs/s4")
 run.frame().query("critical").sort_values("d_min").head()
 """
 
