@@ -23,7 +23,8 @@ def test_the_ego_strikes_a_rear(track, meeting, course):
         "The ego's front struck the rear of 'bv' at 19.9 m/s closing speed; the ego is "
         "responsible: it did not keep a safe distance to the vehicle ahead (RSS (Shalev-Shwartz et "
         "al., 2017), definition 1; StVO § 4 (1)); the risk arose 4.0 s before, and a driver who "
-        "brakes 0.75 s later with 0.774 g (UN R157, Annex 3) would have avoided it."
+        "brakes 0.75 s later with 0.774 g, or as hard as the road allows (UN R157, Annex 3), would "
+        "have avoided it."
     )
 
 
@@ -48,15 +49,18 @@ def test_a_pedestrian_steps_out(track, meeting):
     boxes = [(4.0, 2.0, 0.0), (0.5, 0.5, 0.0)]
     text = of(meeting(ego, walker, kinds=[CAR, PEDESTRIAN], boxes=boxes))
     assert "'bv' is responsible: it came into the path when stopping was no longer" in text
-    judged = "and a driver who brakes 0.75 s later with 0.774 g (UN R157, Annex 3) would not have"
-    assert text.endswith(f"{judged} avoided it.")
+    assert text.endswith(
+        "and a driver who brakes 0.75 s later with 0.774 g, or as hard as the road allows (UN R157, "
+        "Annex 3), would not have avoided it."
+    )
 
 
 def test_what_stands_far_ahead_is_no_risk_for_so_long(track, meeting):
     text = of(meeting(track(v=10.0, t=9.0), track(x=84.0, t=9.0)))
     assert text.endswith(
         "; it stood there, hidden by no other participant, for the last 8.0 s, and a driver "
-        "who brakes 0.75 s later with 0.774 g (UN R157, Annex 3) would have avoided it."
+        "who brakes 0.75 s later with 0.774 g, or as hard as the road allows (UN R157, Annex 3), "
+        "would have avoided it."
     )
     near = of(meeting(track(v=10.0), track(x=34.0)))
     assert "; the risk arose 3.0 s before, and a driver who brakes" in near
@@ -78,7 +82,8 @@ def test_one_that_came_on_the_wrong_side_and_stopped(track, meeting):
     assert (
         "'bv' is responsible: it drove on the wrong side of the road, towards the ego (Vienna "
         "Convention, Art. 10; StVO § 2 (1), (2)); the risk arose 4.0 s before, and a driver who "
-        "brakes 0.75 s later with 0.774 g (UN R157, Annex 3) would have avoided it."
+        "brakes 0.75 s later with 0.774 g, or as hard as the road allows (UN R157, Annex 3), would "
+        "have avoided it."
     ) in met(1.0)
 
 

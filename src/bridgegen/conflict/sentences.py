@@ -16,8 +16,8 @@ _BEARS = {
 }
 
 _BRAKING = (
-    f"a driver who brakes {CAREFUL_REACTION:g} s later with {CAREFUL_BRAKING_G:g} g "
-    "(UN R157, Annex 3)"
+    f"a driver who brakes {CAREFUL_REACTION:g} s later with {CAREFUL_BRAKING_G:g} g, or as hard as "
+    "the road allows (UN R157, Annex 3),"
 )
 
 _BY_NEITHER = {
