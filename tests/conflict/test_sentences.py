@@ -50,8 +50,8 @@ def test_a_pedestrian_steps_out(track, meeting):
     text = of(meeting(ego, walker, kinds=[CAR, PEDESTRIAN], boxes=boxes))
     assert "'bv' is responsible: it came into the path when stopping was no longer" in text
     assert text.endswith(
-        "and a driver who brakes 0.75 s later with 0.774 g, or as hard as the road allows (UN R157, "
-        "Annex 3), would not have avoided it."
+        "and a driver who brakes 0.75 s later with 0.774 g, or as hard as the road allows (UN "
+        "R157, Annex 3), would not have avoided it."
     )
 
 
