@@ -94,7 +94,7 @@ def problems() -> ModuleType:
 
 
 def coverage(repeats: int, budget: int, methods: list[str]) -> None:
-    """Print how often intervals hold the truth."""
+    """Print how often intervals hold the truth, and estimates, of the results that are believed."""
     made = problems()
     cases = {
         "RP22": made.bent, "four branches": made.branches,
@@ -114,12 +114,12 @@ def coverage(repeats: int, budget: int, methods: list[str]) -> None:
             for seed in range(repeats):
                 found = estimate(method, make(), Aim(0.0, 0.0, budget, 0.0), seed, None).weighted
                 p = found.probability(0.0)
-                ratios.append(p.estimate / truth)
                 if not found.doubts:
+                    ratios.append(p.estimate / truth)
                     believed += 1
                     below += p.high < truth
                     above += p.low > truth
-            mean, spread = float(np.mean(ratios)), float(np.std(ratios))
+            mean, spread = (float(np.mean(ratios)), float(np.std(ratios))) if ratios else (0.0, 0.0)
             share = [f"{one / believed:.1%}" if believed else "–" for one in (below, above)]
             print(
                 f"| {method} | {name} | {truth:.3g} | {mean:.3f} | {spread:.3f} | "
