@@ -59,8 +59,8 @@ def double(monkeypatch):
 def finished(tmp_path_factory):
     place = tmp_path_factory.mktemp("runs") / "s4"
     bg.run_search(
-        "crossroads-s4", budget=150, ego="route-follower", keep=4, causes=False, triage="short",
-        out=place,
+        "crossroads-s4", algorithm="pso", budget=150, ego="route-follower", keep=4, causes=False,
+        triage="short", out=place,
     )  # fmt: skip
     return place
 

@@ -304,7 +304,7 @@ def test_too_few_hits_of_strata_are_not_believed(tmp_path):
 
 def test_the_check_counts_other_rows(tmp_path):
     """Where auto counts, too."""
-    given = GIVEN | {"method": "auto", "budget": 4000, "check": 1000}
+    given = GIVEN | {"method": "auto", "budget": 4000, "check": 1000, "precision": 0.5}
     found = estimate_risk(SCENARIO, out=tmp_path / "check", **given)
     assert found.estimated.method == "mc"
     same = np.isin(found.check.Z[:, 0], found.weighted.Z[:, 0])

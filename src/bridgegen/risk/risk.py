@@ -41,6 +41,8 @@ from bridgegen.workers import CarriedDriver, Choice, open_workers
 LEAST_EVALUATIONS, MOST_EVALUATIONS = 20, 10**10
 MOST_ELSEWHERE = 10**6  # rows in another simulator
 OTHER_ROWS = 2  # added to the seed: no method counts rows of that one
+FAR = 4.0
+"""Normal scores beyond which a row of a search is moved: those of a range's ends are infinite."""
 
 
 @dataclass(frozen=True)
@@ -282,6 +284,8 @@ def _fit_of(
 def _points_of(run: Path, exposure: Exposure, harm: float) -> Float:
     """Return the points that a search's rows stand for, of those with so much harm.
 
+    Rows at an end of a range stand for points near it.
+
     Raises:
         StorageError: it is no run.
         InputError: it is one of another scenario, or found none.
@@ -299,7 +303,7 @@ def _points_of(run: Path, exposure: Exposure, harm: float) -> Float:
     X = X[np.isfinite(exposure.log_density(X))] if len(X) else X
     if not len(X):
         raise InputError(f"{run}: found no row with harm of {harm:g} that the exposure allows")
-    return exposure.to_normal(X)
+    return np.clip(exposure.to_normal(X), -FAR, FAR)
 
 
 def _digest(exposure: Exposure) -> str:

@@ -159,3 +159,18 @@ def partly_hidden():
         return np.where(Z[:, 1] > 4.2, 0.1, Z[:, 0] - 4.5)
 
     return Analytic(3, score, shown + rest - shown * rest)
+
+
+def noisy():
+    """A half space, and single points anywhere: one of 10,000, by the bits of the point."""
+
+    def score(Z):
+        bits = np.ascontiguousarray(Z).view(np.uint64)
+        mixed = bits[:, 0] ^ (bits[:, 1] * np.uint64(0x9E3779B97F4A7C15))
+        mixed = (mixed ^ (mixed >> np.uint64(29))) * np.uint64(0xBF58476D1CE4E5B9)
+        mixed = (mixed ^ (mixed >> np.uint64(32))) * np.uint64(0x94D049BB133111EB)
+        chance = (mixed >> np.uint64(11)) / 2.0**53
+        return np.where(chance < 1e-4, 0.1, Z[:, 0] - 3.5)
+
+    half = normal.sf(3.5)
+    return Analytic(3, score, half + 1e-4 * (1.0 - half))

@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
+import scipy.special
 
 from bridgegen.arrays import Float
 from bridgegen.risk.estimators import exploration, subset
@@ -25,6 +26,11 @@ STRANGE = 0.25
 """Of the first proposals at most are around spread points, beside those of levels."""
 SINGLE = 50
 """Spread points at most that rows are drawn around where they are too few for more."""
+TRIED, COPIES, BESIDE = 128, 8, 0.01
+"""Points of the event around which copies are evaluated, and how far away these are, as a share of
+the narrow kernels."""
+ROUGH = 0.02
+"""The share of points without any copy in the event, from which on proposals do not cover it."""
 FEWEST_ROWS = 100  # of a round
 BLOCK, FIRST = 16_384, 1024
 MOST_UNSEEN = 0.9  # of the probability in regions that nobody has seen: no upper end to speak of
@@ -49,7 +55,7 @@ def estimate(problem: Problem, aim: Aim, seed: int, start: Float | None = None) 
     check = min(int(CHECKED * left), levels.evaluations)
     rest = replace(aim, budget=int(EXPLORED * left) if levels.doubts else check)
     spread = exploration.explore(problem, rest, seed)
-    Z, weights = _points(levels, spread, aim)
+    Z, weights = seen = _points(levels, spread, aim)
     if start is not None and len(start):
         more = (weights.sum() if len(Z) else 1.0) / len(start)  # half of the rows look there
         Z, weights = np.concatenate([Z, start]), np.append(weights, np.full(len(start), more))
@@ -62,6 +68,15 @@ def estimate(problem: Problem, aim: Aim, seed: int, start: Float | None = None) 
     proposals = Proposals.of(Z, weights, size, random)
     if spread.doubts and not levels.doubts:
         proposals = proposals.also_around(_heaviest_points(spread, aim))
+    rough, copies = _rough(problem, aim, seed, proposals, seen)
+    spent += copies
+    if rough > ROUGH:
+        doubt = (
+            f"{rough:.0%} of the harmful rows are single ones, with none beside them, as noise "
+            "makes them: only mc sees them all"
+        )
+        known, facts = spread if levels.doubts else levels, {"single": rough, "reached": 0.0}
+        return replace(known, evaluations=spent, doubts=(doubt, *known.doubts), facts=facts)
     rows = min(OF_ROUND, (aim.budget - spent) // (4 * ROUNDS))
     for _ in range(ROUNDS if rows >= FEWEST_ROWS else 0):
         Z, weights = proposals.draw(rows, random)
@@ -74,7 +89,35 @@ def estimate(problem: Problem, aim: Aim, seed: int, start: Float | None = None) 
             size = float(weights.sum() ** 2 / np.sum(weights * weights))
             found = Proposals.of(Z[inside], weights, size, random)
             proposals = replace(found, kernels=proposals.kernels)
-    return _drawn(problem, aim, seed, proposals, spent, (levels, spread), helped)
+    return _drawn(problem, aim, seed, proposals, spent, (levels, spread), helped, rough)
+
+
+def _rough(
+    problem: Problem, aim: Aim, seed: int, proposals: Proposals, points: tuple[Float, Float]
+) -> tuple[float, int]:
+    """Return the share of weighted points of the event without any other close to them.
+
+    Where harm has noise of its own, as that of perception, it happens at single points; rows drawn
+    around them meet the event no more often than elsewhere.
+
+    Returns:
+        The share; and the number of evaluations that it took.
+    """
+    Z, weights = points
+    tried = min(TRIED, aim.budget // (10 * COPIES)) if len(Z) else 0
+    if tried < 1:
+        return 0.0, 0
+    random = block_of(seed, 0, 3)
+    d = Z.shape[1]
+    chosen = Z[random.choice(len(Z), tried, p=weights / weights.sum())]
+    moves = BESIDE * random.standard_normal((tried, COPIES, d)) @ proposals.kernels.factor.T
+    copies = (chosen[:, np.newaxis] + moves).reshape(-1, d)
+    good = problem.feasible(copies)
+    inside = np.zeros(len(copies), np.bool_)
+    inside[good] = problem.evaluate(copies[good], aim.least)[:, SCORE] >= aim.threshold
+    has_copies = good.reshape(tried, COPIES).any(axis=1)
+    single = has_copies & ~inside.reshape(tried, COPIES).any(axis=1)
+    return float(single.sum() / max(has_copies.sum(), 1)), int(good.sum())
 
 
 def _points(levels: Weighted, spread: Weighted, aim: Aim) -> tuple[Float, Float]:
@@ -106,6 +149,7 @@ def _drawn(
     spent: int,
     before: tuple[Weighted, Weighted],
     helped: bool,
+    rough: float,
 ) -> Weighted:
     kept: list[tuple[Float, Float, Float]] = []
     drawn = used = block = 0
@@ -122,16 +166,22 @@ def _drawn(
         kept.append((Z[good][hit], found[hit], weights[good][hit]))
         if drawn == check:
             check *= 2
-            result = _judged(_result(problem, kept, drawn, spent + used), aim, before, helped)
+            result = _judged(
+                _result(problem, kept, drawn, spent + used), aim, before, helped, rough
+            )
             if not result.doubts and result.probability(aim.threshold).precision <= aim.precision:
                 break
-    result = _judged(_result(problem, kept, drawn, spent + used), aim, before, helped)
+    result = _judged(_result(problem, kept, drawn, spent + used), aim, before, helped, rough)
     components = float(len(proposals.fitted.weights))
     return replace(result, facts={"components": components, **result.facts})
 
 
 def _judged(
-    result: Weighted, aim: Aim, before: tuple[Weighted, Weighted], helped: bool
+    result: Weighted,
+    aim: Aim,
+    before: tuple[Weighted, Weighted],
+    helped: bool,
+    rough: float,
 ) -> Weighted:
     """Return a result with its doubts, its facts, and what regions nobody has seen may add.
 
@@ -140,21 +190,22 @@ def _judged(
     """
     levels, spread = before
     sure = [one for one in before if not one.doubts]
-    found = [_beside(result, aim, known, helped) for known in sure]
+    found = [_beside(result, aim, known, helped, rough) for known in sure]
     if not found:
         known = spread if len(spread.Z) and not helped else levels
-        found = [_beside(result, aim, known, helped)]
+        found = [_beside(result, aim, known, helped, rough)]
     best = next((one for one in found if not one.doubts), found[0])
     return replace(best, facts={**best.facts, "spread": float(spread.rows)})
 
 
-def _beside(result: Weighted, aim: Aim, known: Weighted, helped: bool) -> Weighted:
+def _beside(result: Weighted, aim: Aim, known: Weighted, helped: bool, rough: float) -> Weighted:
     """Return a result with the doubts and facts that it has beside what was known before."""
     low, share, high = result.share
-    result = replace(result, share=(low, share, high / (1.0 - _unseen(known, aim))))
+    result = replace(result, share=(low, share, high / (1.0 - _unseen(known, aim, rough))))
     facts = {
         "effective_hits": _hits(result, aim),
         "heaviest": _heaviest(result, aim),
+        "single": rough,
         "reached": known.facts.get("reached", 1.0),
     }
     if "explored_hits" in known.facts:
@@ -201,21 +252,26 @@ def _doubts(result: Weighted, aim: Aim, known: Weighted, helped: bool) -> Iterat
         )
 
 
-def _unseen(known: Weighted, aim: Aim) -> float:
-    """Return the share of the event's probability that regions may have which nobody has seen.
+def _unseen(known: Weighted, aim: Aim, rough: float) -> float:
+    """Return the share of the event's probability that proposals may not cover.
 
     Subset simulation that knows the probability to a relative standard error c has seen as much of
-    it as 1 / c² independent harmful rows show; exploration, as much as its effective harmful rows
-    do. A region that n of them all miss has less than 3 / n of the probability, with 95 %
-    confidence.
+    it as n = 1 / c² independent harmful rows show; exploration, as much as its effective harmful
+    rows do. Of n rows none is in a region that nobody has seen, and the share ``rough`` at single
+    points: the upper end of the exact interval (Clopper and Pearson, 95 %), 3 / n if it is 0.
     """
-    if not known.repetitions:
-        return min(3.0 / max(_hits(known, aim), 1e-9), MOST_UNSEEN)
-    sums = known.sums(known.there(aim.threshold))
-    if len(sums) < 2 or not sums.mean() > 0.0:
+    if known.repetitions:
+        sums = known.sums(known.there(aim.threshold))
+        if len(sums) < 2 or not sums.mean() > 0.0:
+            return MOST_UNSEEN
+        error = float(sums.std(ddof=1) / sums.mean())
+        n = len(sums) / max(error * error, 1e-12)
+    else:
+        n = _hits(known, aim)
+    missed = min(rough * n, n)
+    if n - missed <= 0.0:
         return MOST_UNSEEN
-    error = float(sums.std(ddof=1) / sums.mean())
-    return min(3.0 * error * error / len(sums), MOST_UNSEEN)
+    return min(float(scipy.special.betaincinv(missed + 1.0, n - missed, 0.95)), MOST_UNSEEN)
 
 
 def _result(
