@@ -215,13 +215,15 @@ def test_runs_are_filtered_sorted_and_two_of_them_play_side_by_side(browser, run
     for k in (0, 1):
         page.locator("#runs tbody input").nth(k).check()
     page.click("#compare")
+    page.wait_for_url(re.compile("/pair"))
     page.wait_for_function("document.querySelectorAll('iframe').length === 2")
-    page.wait_for_load_state()
     for frame in page.frames[1:]:
         frame.wait_for_function("window.bridgegen?.state()?.playing")
     assert len(page.frames) == 3
     page.click("text=All runs")
+    page.wait_for_url(server.url)
     page.click("text=week 2/again")
+    page.wait_for_url(re.compile("/run/"))
     page.wait_for_function("bridgegen.state() !== null")
     assert complaints == []
     page.close()
