@@ -291,7 +291,9 @@ def test_what_is_in_doubt_is_not_stated(tmp_path):
     assert all(one.probability is None for one in found.findings.values())
     assert all(one.probability is None for one in found.by_mode.values())
     assert found.parameters == ()
-    assert "is not known" in (found.folder / "risk.html").read_text()
+    page = (found.folder / "risk.html").read_text()
+    assert "is not known" in page
+    assert "Method mc assumes nothing." in page
 
 
 def test_too_few_hits_of_strata_are_not_believed(tmp_path):

@@ -25,7 +25,7 @@ def sentence(risk: Risk) -> str:
         what = f"{what} that the ego is responsible for or could have prevented"
     if p is None:
         reason = risk.findings[risk.event].doubt
-        return f"How likely {what} is, is not known: {reason}."
+        return f"How likely {what} is, is not known: {reason}. {_advice(risk)}."
     if p.estimate == 0.0:
         return (
             f"Of {risk.weighted.rows:,} encounters none was {what}: with 95 % confidence the "
@@ -35,6 +35,14 @@ def sentence(risk: Risk) -> str:
         f"The probability of {what} is {number(p.estimate)} per encounter (95 %: {number(p.low)} "
         f"to {number(p.high)})."
     )
+
+
+def _advice(risk: Risk) -> str:
+    """Return what to do where a risk is not known; mc always knows one."""
+    return {
+        "subset": "Method importance looks elsewhere, too; mc assumes nothing",
+        "stratified": "Method importance is for rarer harm; mc assumes nothing",
+    }.get(risk.estimated.method, "Method mc assumes nothing")
 
 
 def data_sentence(band: DataBand) -> str:

@@ -138,6 +138,16 @@ def test_harm_at_single_points_is_counted():
     assert counted >= 4
 
 
+def test_subset_simulation_is_in_doubt_where_it_met_noise():
+    """And not where the same harm has none."""
+    doubted = 0
+    for seed in range(6):
+        found = run("subset", problems.noisy(), seed, 100_000, precision=0.2)
+        doubted += any("single ones" in one for one in found.doubts)
+        assert not run("subset", problems.linear(3, 3.5), seed, 20_000).doubts
+    assert doubted >= 4
+
+
 def test_auto_falls_back_on_counting():
     problem = problems.Analytic(3, lambda Z: np.where(Z[:, 0] > 12.0, 0.1, -1.0), 0.0)
     found = estimate("auto", problem, Aim(0.0, 0.0, 20_000, 0.2), 0, None)

@@ -16,6 +16,8 @@ import numpy as np
 
 from bridgegen.arrays import Bool, Float, Int
 from bridgegen.risk.estimators.problem import SCORE, Aim, Problem, block_of
+from bridgegen.risk.estimators.proposals import OF_CHAIN, Proposals
+from bridgegen.risk.estimators.single_points import SinglePoints, most_evaluations
 from bridgegen.risk.estimators.weighted import Weighted
 
 PASSING = 0.1
@@ -229,6 +231,26 @@ def repeat(
 
 
 def estimate(problem: Problem, aim: Aim, seed: int) -> Weighted:
+    """Simulate subsets, and look for single points among those of the event that were found.
+
+    The pilot chooses levels, then repetitions until the precision or the budget is reached.
+    """
+    found = simulate(problem, replace(aim, budget=aim.budget - most_evaluations(aim)), seed)
+    if found.doubts:
+        return found
+    there = found.scores >= aim.threshold
+    Z, weights = found.Z[there], found.weights[there]
+    around = Proposals.of(Z, weights, len(Z) / OF_CHAIN, block_of(seed, 0, 4)).kernels
+    single = SinglePoints.of(problem, aim, seed, Z, weights, around)
+    return replace(
+        found,
+        evaluations=found.evaluations + single.evaluations,
+        doubts=(single.doubt,) if single.doubt else (),
+        facts={**found.facts, "single": single.share},
+    )
+
+
+def simulate(problem: Problem, aim: Aim, seed: int) -> Weighted:
     """Run the pilot, then repetitions until the precision or the budget is reached."""
     first = pilot(problem, aim, seed)
     spent, rounds = first.evaluations, 0
@@ -271,7 +293,7 @@ def _doubts(first: Pilot, aim: Aim, sums: Float, facts: dict[str, float]) -> Ite
         last = first.levels[-1].score if first.levels else 0.0
         yield (
             f"the levels end at a score of {last:.4g}, below {aim.threshold:g}: hardly any row "
-            "comes nearer; use importance, which looks elsewhere, too, or mc"
+            "comes nearer"
         )
     elif (reaching := int(np.sum(sums > 0.0))) < FEWEST_REPETITIONS:
         yield (

@@ -1,0 +1,81 @@
+"""Whether an event happens at single points, with none of it close by, as noise makes it happen.
+
+Harm that has noise of its own, as that of perception, happens here and there. What is learnt of
+such a point says nothing of the points around it: proposals around it meet the event no more often
+than elsewhere, and chains meet it by chance. Only Monte Carlo sees it all.
+"""
+
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+
+from bridgegen.arrays import Float
+from bridgegen.risk.estimators.mixture import Kernels
+from bridgegen.risk.estimators.problem import SCORE, Aim, Problem, block_of
+
+TRIED, COPIES = 128, 8
+"""Points of the event around which copies are evaluated, and how many of each."""
+OF_BUDGET = 10  # of which copies take one part at most
+BESIDE = 0.01
+"""How far away copies are, as a share of kernels that proposals would have around the points."""
+ROUGH = 0.02
+"""The share of single points, of which an estimate from other points than all is in doubt."""
+_STREAM = 3  # of random numbers
+
+
+@dataclass(frozen=True)
+class SinglePoints:
+    """What was seen of single points.
+
+    Attributes:
+        share: of weighted points of the event, those of which no copy is in it.
+        evaluations: that it took.
+    """
+
+    share: float = 0.0
+    evaluations: int = 0
+
+    @classmethod
+    def of(
+        cls, problem: Problem, aim: Aim, seed: int, Z: Float, weights: Float, kernels: Kernels
+    ) -> Self:
+        """Evaluate copies of points of the event.
+
+        Args:
+            problem: the experiment.
+            aim: the event; a tenth of its budget is spent at most (`most_evaluations`).
+            seed: of all random numbers.
+            Z: ``(M, d)`` points of the event.
+            weights: ``(M,)``, positive.
+            kernels: as wide as proposals around the points would be.
+        """
+        tried = most_evaluations(aim) // COPIES if len(Z) else 0
+        if tried < 1:
+            return cls()
+        random = block_of(seed, 0, _STREAM)
+        d = Z.shape[1]
+        chosen = Z[random.choice(len(Z), tried, p=weights / weights.sum())]
+        moves = BESIDE * random.standard_normal((tried, COPIES, d)) @ kernels.factor.T
+        copies = (chosen[:, np.newaxis] + moves).reshape(-1, d)
+        good = problem.feasible(copies)
+        inside = np.zeros(len(copies), np.bool_)
+        inside[good] = problem.evaluate(copies[good], aim.least)[:, SCORE] >= aim.threshold
+        has_copies = good.reshape(tried, COPIES).any(axis=1)
+        single = has_copies & ~inside.reshape(tried, COPIES).any(axis=1)
+        return cls(float(single.sum() / max(has_copies.sum(), 1)), int(good.sum()))
+
+    @property
+    def doubt(self) -> str:
+        """Why an estimate is not believed; empty where hardly any point is single."""
+        if self.share <= ROUGH:
+            return ""
+        return (
+            f"{self.share:.0%} of the harmful rows are single ones, with none beside them, as "
+            "noise makes them"
+        )
+
+
+def most_evaluations(aim: Aim) -> int:
+    """Return how many evaluations looking for single points takes at most."""
+    return COPIES * min(TRIED, aim.budget // (OF_BUDGET * COPIES))
