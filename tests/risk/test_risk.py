@@ -82,13 +82,31 @@ def test_it_counts_what_its_table_holds(risk):
     assert max(one["distance"] for one in found["parameters"].values()) > 0.2
 
 
-def test_its_most_likely_encounter_is_harmful(risk):
+def test_the_most_likely_encounter_of_each_failure_mode_is_one(risk):
     exposure = risk.exposure
     pipeline = Pipeline(exposure.scenario, exposure.space, PipelineOptions(ego=DRIVER))
-    worst = risk.most_likely
-    assert outcomes(pipeline, worst[np.newaxis], "ego").values[0, Column.SCORE] >= 0.6
-    again = bg.simulate_file(risk.folder / "most-likely.xosc")
-    assert again.metrics["harm"] >= 0.6
+    assert [one.mode for one in risk.most_likely] == list(risk.by_mode)[:5]
+    assert len(risk.most_likely) > 1
+    for one, said_of in zip(risk.most_likely, said(risk.folder)["most_likely"], strict=True):
+        found = outcomes(pipeline, one.x[np.newaxis], "ego")
+        assert found.values[0, Column.SCORE] >= 0.6
+        assert found.modes == (one.mode,)
+        assert bg.simulate_file(risk.folder / f"{said_of['files']}.xosc").metrics["harm"] >= 0.6
+        assert said_of["values"] == exposure.space.values(one.x)
+
+
+def test_none_of_its_failure_mode_was_drawn_that_is_likelier(tmp_path):
+    found = estimate_risk(
+        "cut-in", ego="route-follower", exposure=EXAMPLE, event="conflict", method="mc",
+        precision=0.0, budget=3000, out=tmp_path / "likely",
+    )  # fmt: skip
+    outcome, exposure = found.weighted.outcomes, found.exposure
+    X = exposure.from_normal(found.weighted.Z)
+    assert found.most_likely
+    for one in found.most_likely:
+        same = outcome[:, Column.MODE] == found.modes.index(one.mode)
+        drawn = exposure.log_density(X[same & (outcome[:, Column.SCORE] >= NEAR_MISS)])
+        assert exposure.log_density(one.x[np.newaxis])[0] >= drawn.max()
 
 
 def test_the_page_says_it_without_scripts(risk):
@@ -169,9 +187,6 @@ def test_all_conflicts_are_those_that_count_and_the_others(tmp_path):
         "cut-in", ego="careful", exposure=EXAMPLE, event="conflict", count="any", method="mc",
         precision=0.0, budget=3000, out=tmp_path / "any",
     )  # fmt: skip
-    density = found.exposure.log_density
-    drawn = found.exposure.from_normal(found.weighted.Z)
-    assert density(found.most_likely[np.newaxis])[0] >= density(drawn).max()
     every, own = found.probability("conflict"), found.preventable.probability
     assert 0.0 <= own.estimate < every.estimate
     met = found.exposure.encounters
@@ -227,7 +242,7 @@ def test_folders_of_others_are_left_alone(risk, tmp_path):
 
 def test_a_scenario_file_of_openscenario_is_refused(risk, tmp_path):
     with pytest.raises(InputError, match="logical scenario"):
-        estimate_risk(risk.folder / "most-likely.xosc", exposure="uniform", out=tmp_path / "x")
+        estimate_risk(risk.folder / "most-likely-1.xosc", exposure="uniform", out=tmp_path / "x")
 
 
 def test_the_command_judges_and_prints(cli, tmp_path):

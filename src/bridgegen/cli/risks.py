@@ -132,7 +132,7 @@ def risk(
     """Estimate how likely harm is per encounter, with an interval.
 
     And per hour and kilometre, where the exposure says how often the scenario is met. Writes a
-    record, a page, the harmful rows, and the most likely one as a scenario.
+    record, a page, the harmful rows, and the most likely one of each failure mode as a scenario.
     """
     from bridgegen.risk import estimate_risk
     from bridgegen.screen.risk import RiskScreen, print_risk

@@ -22,7 +22,8 @@ from bridgegen.store.claimed import claim
 SETTINGS = "settings.json"
 BATCHES = "batches"
 RESULTS = ("risk.json", "risk.html", "harmful.csv")
-SCENARIO = "most-likely."
+SCENARIO = "most-likely-"
+"""Scenario files begin so, and go on with a number."""
 ELSEWHERE = "elsewhere-"
 """The folder of what another simulator says begins so, and goes on with the simulator's name."""
 _LONGEST_MODE = 400

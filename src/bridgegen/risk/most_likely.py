@@ -1,11 +1,12 @@
-"""The most likely harmful row: found, written as a scenario, and shown as a moving picture."""
+"""The most likely harmful encounter of each failure mode: found, written, and shown moving."""
 
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from bridgegen.arrays import Float
+from bridgegen.arrays import Bool, Float
 from bridgegen.campaign.scenario_files import write_scenario
 from bridgegen.conflict.analysis import analyse
 from bridgegen.conflict.harm import Count, decisive
@@ -18,18 +19,21 @@ from bridgegen.risk.estimators import design_point
 from bridgegen.risk.estimators.problem import block_of
 from bridgegen.risk.estimators.weighted import Weighted
 from bridgegen.risk.experiment import Experiment
-from bridgegen.risk.result import MOST_LIKELY
+from bridgegen.risk.ledger import SCENARIO
+from bridgegen.risk.outcomes import Column
+from bridgegen.risk.result import Likely
 from bridgegen.simulation.rollout import Rollout
 
 _STREAM = 4  # of random numbers, beside those of estimators
+MOST_MODES = 5
 BEFORE, AFTER = 4.0, 2.0  # s, of the picture, around the conflict's most urgent instant
 
 
 def find_most_likely(
     experiment: Experiment, exposure: Exposure, known: Weighted, threshold: float, budget: int,
     seed: int,
-) -> Float | None:  # fmt: skip
-    """Return the harmful row that is most likely on the road; None if none is known.
+) -> dict[str, Float]:  # fmt: skip
+    """Return the harmful row of each failure mode that is most likely on the road.
 
     Args:
         experiment: simulates rows.
@@ -38,46 +42,62 @@ def find_most_likely(
         threshold: of the score, from which a row is harmful.
         budget: the estimate's; a tenth of it is simulated at most.
         seed: of all random numbers.
+
+    Returns:
+        By the words of the failure mode, the likeliest first, `MOST_MODES` at most.
     """
     at = known.there(threshold) > 0.0
-    if not at.any():
-        return None
+    Z, numbers = known.Z[at], known.outcomes[at, Column.MODE].astype(np.int64)
+    sums = np.bincount(numbers, known.weights[at], len(experiment.modes))
+    chosen = [int(k) for k in np.argsort(-sums, kind="stable")[:MOST_MODES] if sums[k] > 0.0]
 
     def log_density(Z: Float) -> Float:
         return exposure.log_density(exposure.from_normal(Z))
 
-    evaluations = min(design_point.EVALUATIONS, budget // 10)
-    random = block_of(seed, 0, _STREAM)
-    z = design_point.find(experiment, log_density, known.Z[at], threshold, evaluations, random)
-    row: Float = exposure.from_normal(z[np.newaxis])[0]
-    return row
+    evaluations = min(design_point.EVALUATIONS, budget // (10 * max(len(chosen), 1)))
+    words = list(experiment.modes)
+    found = {}
+    for mode in chosen:
+        random = block_of(seed, 0, _STREAM, mode)
+
+        def happens(outcomes: Float, mode: int = mode) -> Bool:
+            same = outcomes[:, Column.MODE] == mode
+            inside: Bool = same & (outcomes[:, Column.SCORE] >= threshold)
+            return inside
+
+        z = design_point.find(
+            experiment, log_density, Z[numbers == mode], happens, evaluations, random
+        )
+        found[words[mode]] = exposure.from_normal(z[np.newaxis])[0]
+    return found
 
 
-def write_most_likely(pipeline: Pipeline, x: Float, count: Count, folder: Path) -> str:
-    """Write the most likely harmful row as a scenario; return its moving picture.
+def write_most_likely(
+    pipeline: Pipeline, rows: Mapping[str, Float], count: Count, folder: Path
+) -> tuple[Likely, ...]:
+    """Write the most likely harmful row of each failure mode as a scenario, and picture it.
 
     Raises:
-        StorageError: it cannot be written.
+        StorageError: they cannot be written.
     """
-    rollout = pipeline.rollout(x[np.newaxis])
-    conflicts = analyse(rollout)
-    try:
-        write_scenario(
-            pipeline,
-            x,
-            folder,
-            MOST_LIKELY,
-            rollout=rollout,
-            conflict=summarise(conflicts, count=count),
-        )
-    except OSError as error:
-        raise StorageError(f"{folder}: cannot be written: {error.strerror}") from None
-    other = int(decisive(conflicts, count)[0][0])
-    instant, step = int(conflicts.instant[0, other]), rollout.time_step
-    first = max(instant - round(BEFORE / step), 0)
-    shown = _between(rollout, first, instant + round(AFTER / step) + 1)
-    when = (instant - first) * step
-    return moving_picture(shown, other, when, "the most likely harmful encounter, from above")
+    found = []
+    for number, (mode, x) in enumerate(rows.items(), 1):
+        name = f"{SCENARIO}{number}"
+        rollout = pipeline.rollout(x[np.newaxis])
+        conflicts = analyse(rollout)
+        conflict = summarise(conflicts, count=count)
+        try:
+            write_scenario(pipeline, x, folder, name, rollout=rollout, conflict=conflict)
+        except OSError as error:
+            raise StorageError(f"{folder}: cannot be written: {error.strerror}") from None
+        other = int(decisive(conflicts, count)[0][0])
+        instant, step = int(conflicts.instant[0, other]), rollout.time_step
+        first = max(instant - round(BEFORE / step), 0)
+        shown = _between(rollout, first, instant + round(AFTER / step) + 1)
+        caption = f"the most likely harmful encounter ({mode}), from above"
+        picture = moving_picture(shown, other, (instant - first) * step, caption)
+        found.append(Likely(mode, x, name, picture))
+    return tuple(found)
 
 
 def _between(rollout: Rollout, first: int, last: int) -> Rollout:

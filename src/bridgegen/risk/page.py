@@ -12,7 +12,7 @@ from bridgegen.disk import write_whole
 from bridgegen.odd.parameters import Parameter
 from bridgegen.risk.estimators.weighted import Probability
 from bridgegen.risk.events import EVENTS, WORDS
-from bridgegen.risk.result import BINS, Finding, ParameterShare, Risk
+from bridgegen.risk.result import BINS, Finding, Likely, ParameterShare, Risk
 from bridgegen.risk.text import data_sentence, elsewhere_sentence, number, sentence
 
 _WIDTH, _ROW, _LEFT, _RIGHT = 900, 30, 330, 30
@@ -229,23 +229,28 @@ def _parameter(one: ParameterShare) -> str:
 
 
 def _likely(risk: Risk) -> str:
-    worst = risk.most_likely
-    if worst is None:
+    if not risk.most_likely:
         return ""
+    shown = "".join(_encounter(risk, one) for one in risk.most_likely)
+    return (
+        "<section><h2>The most likely harmful encounter of each failure mode</h2><p class='muted'>"
+        "The ego is blue, the one it meets orange; outlines stand where the conflict is most "
+        f"urgent.</p>{shown}</section>"
+    )
+
+
+def _encounter(risk: Risk, one: Likely) -> str:
     space = risk.exposure.space
-    values = space.values(worst)
+    values = space.values(one.x)
     rows = "".join(
         f"<tr><th>{escape(name)}</th><td>{escape(text)}</td></tr>"
         for name in risk.exposure.marginals
         if (text := _value(space.parameters[name], values[name]))
     )
     return (
-        "<section><h2>The harmful encounter that is most likely on the road</h2><div class='card'>"
-        f"<div class='motion'>{risk.picture}</div><p class='muted'>The ego is blue, the one it "
-        "meets orange; outlines stand where the conflict is most urgent. Its files: "
-        "most-likely.xosc, .xodr and .owl.</p>"
+        f"<div class='card'><h3>{escape(one.mode)}</h3><div class='motion'>{one.picture}</div>"
+        f"<p class='muted'>Its files: {one.name}.xosc, .xodr and .owl.</p>"
         f"<div class='wide'><table class='values'><tbody>{rows}</tbody></table></div></div>"
-        "</section>"
     )
 
 

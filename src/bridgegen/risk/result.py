@@ -24,7 +24,6 @@ from bridgegen.risk.methods import Estimated
 from bridgegen.risk.outcomes import Column
 
 RECORD, PAGE, TABLE = "risk.json", "risk.html", "harmful.csv"
-MOST_LIKELY = "most-likely"
 MOST_ROWS = 100_000  # of the table
 BINS = 10  # equally likely classes of a parameter
 COMPARED = 20_000  # rows of the exposure, which harmful ones are compared with
@@ -68,6 +67,23 @@ class ParameterShare:
 
 
 @dataclass(frozen=True)
+class Likely:
+    """The harmful encounter of a failure mode that is most likely on the road.
+
+    Attributes:
+        mode: the failure mode's words.
+        x: its row, ``(len(space.names),)``.
+        name: of its scenario's files, without suffix.
+        picture: it as a moving picture, SVG.
+    """
+
+    mode: str
+    x: Float
+    name: str
+    picture: str
+
+
+@dataclass(frozen=True)
 class Risk:
     """How likely harm is in a scenario, for one driver.
 
@@ -85,9 +101,8 @@ class Risk:
         check: the same event by Monte Carlo, if that was asked for.
         data: how much few data leave open, if the events of the exposure are known.
         elsewhere: the event in another simulator, if that was asked for.
-        most_likely: the harmful row that is most likely on the road, ``(len(space.names),)``; None
-            if none was found.
-        picture: it as a moving picture; empty without one.
+        most_likely: the most likely harmful encounters, of each failure mode one, the likeliest
+            failure mode first.
         command: makes it again.
         folder: of its files.
     """
@@ -105,8 +120,7 @@ class Risk:
     check: Weighted | None
     data: DataBand | None
     elsewhere: Elsewhere | None
-    most_likely: Float | None
-    picture: str
+    most_likely: tuple[Likely, ...]
     command: str
     folder: Path
 
@@ -194,7 +208,6 @@ class Risk:
         """Return what ``risk.json`` says."""
         exposure, weighted = self.exposure, self.weighted
         share = exposure.feasible_share
-        worst = self.most_likely
         return {
             "scenario": exposure.scenario.name,
             "driver": self.driver,
@@ -222,7 +235,10 @@ class Risk:
                 }
                 for one in self.parameters
             },
-            "most_likely": None if worst is None else exposure.space.values(worst),
+            "most_likely": [
+                {"mode": one.mode, "files": one.name, "values": exposure.space.values(one.x)}
+                for one in self.most_likely
+            ],
             "diagnostics": weighted.facts,
             "check": None
             if self.check is None

@@ -97,8 +97,8 @@ def estimate_risk(
         method: one of `methods.METHODS`.
         precision: half of the 95 % interval over the estimate, at which it stops; 0: use the whole
             budget.
-        budget: evaluations of the estimate, at most; a tenth more, 2,048 at most, look for the most
-            likely harmful row.
+        budget: evaluations of the estimate, at most; a tenth more, 2,048 at most for each failure
+            mode, look for its most likely harmful row.
         seed: where all chance comes from, at least 0.
         start: a search's run, whose harmful rows importance sampling may use.
         check: evaluations of Monte Carlo beside, to compare with; 0 for none.
@@ -189,7 +189,7 @@ def estimate_risk(
             if check:
                 plain = Aim(aimed.harm, LEAST, check, 0.0)
                 beside = monte_carlo.estimate(experiment, plain, seed + OTHER_ROWS)
-            worst = find_most_likely(experiment, met, found.weighted, aimed.harm, budget, seed)
+            likely = find_most_likely(experiment, met, found.weighted, aimed.harm, budget, seed)
             other = None
             if there is not None and elsewhere is not None:
                 kept = kept_elsewhere(folder, elsewhere, settings)
@@ -206,10 +206,10 @@ def estimate_risk(
         data = None
         if fitted is not None and not found.weighted.doubts:
             data = data_band(met, found.weighted, aimed.harm, fitted)
-        picture = "" if worst is None else write_most_likely(pipeline, worst, whose, folder)
+        shown = write_most_likely(pipeline, likely, whose, folder)
     result = Risk(
         met, pipeline.driver.label, event, count, found, seed, budget, tuple(experiment.modes),
-        failed, implausible, beside, data, other, worst, picture, command, folder,
+        failed, implausible, beside, data, other, shown, command, folder,
     )  # fmt: skip
     result.write()
     return result

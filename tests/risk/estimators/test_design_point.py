@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from bridgegen.risk.estimators import design_point
-from bridgegen.risk.estimators.problem import block_of
+from bridgegen.risk.estimators.problem import SCORE, block_of
 
 from .problems import Analytic, bent, linear, product, two_sides
 
@@ -13,8 +13,12 @@ def normal(Z):
     return -0.5 * np.sum(Z * Z, axis=1)
 
 
+def happens(outcomes):
+    return outcomes[:, SCORE] >= 0.0
+
+
 def found(problem, Z, evaluations=design_point.EVALUATIONS, density=normal, seed=1):
-    return design_point.find(problem, density, Z, 0.0, evaluations, block_of(seed, 0))
+    return design_point.find(problem, density, Z, happens, evaluations, block_of(seed, 0))
 
 
 def event(problem, count=400, seed=0):

@@ -11,8 +11,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from bridgegen.arrays import Float
-from bridgegen.risk.estimators.problem import SCORE, Problem
+from bridgegen.arrays import Bool, Float
+from bridgegen.risk.estimators.problem import Problem
 
 STARTS, CHILDREN = 8, 8
 EVALUATIONS = 2048
@@ -26,7 +26,7 @@ def find(
     problem: Problem,
     log_density: Callable[[Float], Float],
     Z: Float,
-    threshold: float,
+    happens: Callable[[Float], Bool],
     evaluations: int,
     random: np.random.Generator,
 ) -> Float:
@@ -36,7 +36,7 @@ def find(
         problem: the experiment.
         log_density: of N points, ``(N,)``; what is likely by it need not be so in normal space.
         Z: ``(M, d)`` points of the event, M ≥ 1.
-        threshold: the event happens from this score on.
+        happens: which of N outcomes ``(N, columns)`` are the event, ``(N,)``.
         evaluations: at most.
         random: all random numbers.
 
@@ -62,7 +62,7 @@ def find(
         children += 0.3 * scale * random.standard_normal(shape)
         ours = likely(children)
         good = np.flatnonzero(problem.feasible(children) & (ours > merit[parent]))
-        harmful = problem.evaluate(children[good])[:, SCORE] >= threshold
+        harmful = happens(problem.evaluate(children[good]))
         good = good[harmful]
         better = np.zeros(count, np.bool_)
         for k in good[np.argsort(ours[good], kind="stable")]:  # the best of each is the last
