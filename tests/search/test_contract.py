@@ -30,7 +30,7 @@ SMALL = {
     "ddpg": {"epochs": 1, "width": 8, "memory": 200, "noise": 1.0},
     "ppo": {"epochs": 4, "width": 8, "lr_actor": 0.03},
     "ppo-adversary": {"epochs": 2, "width": 8, "lr_actor": 0.03, "minibatch": 16},
-    "turbo": {"length": 0.4, "successes": 2, "failures": 3, "shortest": 0.4},
+    "turbo": {"length": 0.4, "successes": 2, "failures": 3, "shortest": 0.15},
 }
 """Other defaults: networks that are trained in no time, settings that show in a few batches."""
 

@@ -1,5 +1,7 @@
 import numpy as np
+import pytest
 
+from bridgegen.errors import InputError
 from bridgegen.search import Problem, Results
 from bridgegen.search.turbo import TuRBO
 
@@ -60,3 +62,8 @@ def test_several_regions_share_a_batch():
     assert len(U) == 20
     search.tell(U, Results.of_F(U[:, :1]))
     assert len(search.ask()) == 12
+
+
+def test_a_region_that_begins_too_short_is_refused():
+    with pytest.raises(InputError, match=r"shortest <= length must hold, got 0.3 and 0.1"):
+        TuRBO(Problem.unnamed(2), 0, length=0.1, shortest=0.3)

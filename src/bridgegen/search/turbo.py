@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from bridgegen.arrays import Float, Int
+from bridgegen.errors import InputError
 from bridgegen.search.algorithm import Arity, Problem, Results, Setting, Value, resolve
 from bridgegen.search.space_filling import latin_hypercube, sobol_rows
 from bridgegen.search.surrogates.known import Known, distances
@@ -97,6 +98,11 @@ class TuRBO(Saved):
 
     def __init__(self, problem: Problem, seed: int, **settings: Value) -> None:
         self._values = resolve(type(self), problem, seed, settings)
+        if not self._values["shortest"] <= self._values["length"]:
+            raise InputError(
+                f"turbo: shortest <= length must hold, got {self._values['shortest']:g} and "
+                f"{self._values['length']:g}"
+            )
         self._n_var = problem.n_var
         self._patience = self._values["failures"] or max(5, problem.n_var)
         self._known = Known(problem, self._values["avoid"])
