@@ -58,6 +58,19 @@ def test_repetitions_that_agree_leave_nothing_open():
     assert (none.estimate, none.high) == (0.0, 1.0)
 
 
+@pytest.mark.parametrize(("repetitions", "variation"), [(20, 0.3), (40, 1.0), (160, 1.5)])
+def test_intervals_of_skewed_repetitions_hold_the_mean(repetitions, variation):
+    """Lognormal ones of mean 1; the upper end misses it in at most as many cases as it should."""
+    spread = np.sqrt(np.log(1.0 + variation**2))
+    random = np.random.default_rng(3)
+    sums = random.lognormal(-0.5 * spread**2, spread, (3000, repetitions))
+    found = [of_repetitions(one) for one in sums]
+    most = scipy.stats.binom.ppf(0.999, len(sums), 0.025)
+    assert sum(one.low > 1.0 for one in found) <= most
+    assert sum(one.high < 1.0 for one in found) <= most
+    assert sum(one.upper < 1.0 for one in found) <= scipy.stats.binom.ppf(0.999, len(sums), 0.05)
+
+
 def test_an_unsure_factor_widens_the_interval():
     sure = weighted([1.0] * 40, [1e-3] * 40, 1000)
     unsure = weighted([1.0] * 40, [2e-3] * 40, 1000, share=(1.6, 2.0, 2.5))

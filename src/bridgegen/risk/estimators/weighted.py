@@ -172,18 +172,25 @@ def of_weights(parts: Float) -> Probability:
 def of_repetitions(sums: Float) -> Probability:
     """Return the interval of a mean of independent repetitions.
 
-    Student's, of the logarithm of the mean: repetitions are skewed to the right.
+    Student's, of the logarithm of the mean, for repetitions are skewed to the right; and since the
+    largest one may be missing among few, upper ends are those with one more like the largest.
 
     Args:
-        sums: ``(R,)`` the estimate of each.
+        sums: ``(R,)`` the estimate of each, R ≥ 2.
     """
-    count, mean = len(sums), float(sums.mean())
+    mean = float(sums.mean())
     if not mean > 0.0:
         return Probability(0.0, 0.0, 1.0, 1.0)
-    spread = float(sums.std(ddof=1)) / np.sqrt(count) / mean
-
-    def end(confidence: float) -> float:
-        return mean * float(np.exp(scipy.stats.t.ppf(confidence, count - 1) * spread))
-
+    more = np.append(sums, sums.max())
     tail = 0.5 * (1.0 - LEVEL)
-    return Probability(mean, end(tail), min(end(1.0 - tail), 1.0), min(end(LEVEL), 1.0))
+    return Probability(
+        mean, _quantile(sums, tail), min(_quantile(more, 1.0 - tail), 1.0),
+        min(_quantile(more, LEVEL), 1.0),
+    )  # fmt: skip
+
+
+def _quantile(sums: Float, confidence: float) -> float:
+    """Return what the mean of repetitions is below with a confidence."""
+    count, mean = len(sums), float(sums.mean())
+    spread = float(sums.std(ddof=1)) / np.sqrt(count) / mean
+    return mean * float(np.exp(scipy.stats.t.ppf(confidence, count - 1) * spread))
