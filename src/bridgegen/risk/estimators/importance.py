@@ -1,8 +1,8 @@
 """Importance sampling: rows are drawn where the event happens, and weighted by how likely they are.
 
 Where it happens, subset simulation says, and rows that are spread over the ranges: they also find
-what its levels do not lead to (`exploration`). For what rows are drawn from, see `proposals`; for
-whether the result is believed, `evidence`.
+what its levels do not lead to (`exploration`). For what rows are drawn from, see `proposals` and
+`learning`; for whether the result is believed, `evidence`.
 """
 
 from dataclasses import replace
@@ -12,13 +12,12 @@ import numpy as np
 from bridgegen.arrays import Float
 from bridgegen.risk.estimators import exploration, subset
 from bridgegen.risk.estimators.evidence import Evidence
+from bridgegen.risk.estimators.learning import learn
 from bridgegen.risk.estimators.problem import SCORE, Aim, Problem, block_of
 from bridgegen.risk.estimators.proposals import DEFENSIVE, OF_CHAIN, Proposals
 from bridgegen.risk.estimators.single_points import SinglePoints
 from bridgegen.risk.estimators.weighted import Weighted
 
-ROUNDS, OF_ROUND = 2, 2000
-"""How often proposals are fitted again, and to how many rows."""
 PREPARED, FOUND = 0.6, 0.5
 """The share of the budget that subset simulation may take, and the precision at which it stops."""
 EXPLORED, CHECKED = 0.5, 0.1
@@ -27,7 +26,6 @@ STRANGE = 0.25
 """Of the first proposals at most are around spread points, beside those of levels."""
 FEW = 50
 """Spread points at most that rows are drawn around where they are too few for more."""
-FEWEST_ROWS = 100  # of a round
 BLOCK, FIRST = 16_384, 1024
 
 
@@ -68,18 +66,8 @@ def estimate(problem: Problem, aim: Aim, seed: int, start: Float | None = None) 
         known, facts = spread if levels.doubts else levels, {"single": single.share, "reached": 0.0}
         doubts = (single.doubt, *known.doubts)
         return replace(known, evaluations=spent, doubts=doubts, facts=facts)
-    rows = min(OF_ROUND, (aim.budget - spent) // (4 * ROUNDS))
-    for _ in range(ROUNDS if rows >= FEWEST_ROWS else 0):
-        Z, weights = proposals.draw(rows, random)
-        good = problem.feasible(Z)
-        Z, weights = Z[good], weights[good]
-        inside = problem.evaluate(Z, aim.least)[:, SCORE] >= aim.threshold
-        spent += len(Z)
-        if inside.any():
-            weights = weights[inside]
-            size = float(weights.sum() ** 2 / np.sum(weights * weights))
-            found = Proposals.of(Z[inside], weights, size, random)
-            proposals = replace(found, kernels=proposals.kernels)
+    proposals, took = learn(problem, aim, proposals, aim.budget - spent, random)
+    spent += took
     evidence = Evidence(levels, spread, helped, single.share)
     return _drawn(problem, aim, seed, proposals, spent, evidence)
 
