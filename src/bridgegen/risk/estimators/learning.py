@@ -15,12 +15,13 @@ from bridgegen.arrays import Float
 from bridgegen.risk.estimators.problem import SCORE, Aim, Problem
 from bridgegen.risk.estimators.proposals import Proposals
 
-MOST_ROUNDS, OF_ROUND = 10, 2000
-"""How often proposals are fitted again at most, and to how many rows more each time."""
+OF_ROUND, FEWEST_ROWS = 2000, 100
+"""Rows of a round at most, and at least."""
+ROUNDS, MOST_ROUNDS = 10, 20
+"""So many rounds take a quarter of a small budget at most; more of them are for a large one."""
+OF_BUDGET = 4
 ENOUGH = 400.0
 """Effective number of points of the event, from which on no further round is needed."""
-OF_BUDGET = 4  # of which all rounds take one part at most
-FEWEST_ROWS = 100  # of a round
 
 
 def learn(
@@ -35,11 +36,13 @@ def learn(
         budget: evaluations that are left.
         random: all random numbers.
     """
-    rows = min(OF_ROUND, budget // (OF_BUDGET * MOST_ROUNDS))
+    most = budget // OF_BUDGET
+    rows = min(OF_ROUND, most // ROUNDS)
+    rounds = min(MOST_ROUNDS, most // rows) if rows >= FEWEST_ROWS else 0
     proposals, spent = first, 0
     drawn: list[Proposals] = []
     found: list[Float] = []
-    for _ in range(MOST_ROUNDS if rows >= FEWEST_ROWS else 0):
+    for _ in range(rounds):
         Z, _ = proposals.draw(rows, random)
         Z = Z[problem.feasible(Z)]
         drawn.append(proposals)

@@ -24,7 +24,7 @@ BESIDE, CLOSE = 0.01, 1e-4
 """How far away copies are, as a share of kernels that proposals would have around the points."""
 AGAIN = 16  # points that seem single, at most, are looked at from close by
 ROUGH = 0.02
-"""The share of single points, of which an estimate from other points than all is in doubt."""
+"""The share of single points beyond which an estimate is in doubt."""
 _STREAM = 3  # of random numbers
 
 
