@@ -425,7 +425,7 @@ def test_a_run_says_how_far_it_was_ahead(undisturbed):
             "--ahead 12: pso needs the results of all its rows before it asks for more; these "
             "algorithms do not: random, ",
         ),
-        ({"ahead": 0}, "1 <= ahead <= 10000 must hold, got 0"),
+        ({"ahead": -1}, "0 <= ahead <= 10000 must hold, got -1"),
         (
             {
                 "screen": bg.SimulatorChoice("embedded", {}),
@@ -448,3 +448,12 @@ def test_the_page_names_the_algorithms_that_can_run_ahead():
     assert set(re.findall(r"`([\w-]+)`", able)) == {
         name for name, one in ALGORITHMS.items() if asynchronous(one)
     }
+
+
+def test_ahead_by_none_is_a_plain_search(tmp_path, same_rows):
+    """Also of an algorithm that cannot run ahead."""
+    plain = SEARCH | {"algorithm": "pso", "ahead": None}
+    run = bg.run_search(**plain, out=tmp_path / "plain")
+    again = bg.run_search(**plain | {"ahead": 0}, out=tmp_path / "zero")
+    assert same_rows(run.folder, again.folder)
+    bg.resume(again.folder)

@@ -46,7 +46,7 @@ def require_asynchronous(given: SearchOptions, algorithm: type[toolkit.Algorithm
     Raises:
         InputError: it cannot.
     """
-    if given.ahead is None:
+    if not given.ahead:
         return
     if given.screen is not None:
         raise InputError(f"--ahead is for a search without a screen (--screen), got {given.ahead}")

@@ -366,7 +366,7 @@ class SearchOptions(CommonOptions):
             "more: no worker then waits for the slowest one.",
             hint="For slow simulators; the result depends on it.",
             shown="0",
-            limits=(1, MAX_AHEAD),
+            limits=(0, MAX_AHEAD),
             before=None,
             group=SEARCH,
         ),
