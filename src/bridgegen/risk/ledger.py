@@ -22,8 +22,8 @@ from bridgegen.store.claimed import claim
 SETTINGS = "settings.json"
 BATCHES = "batches"
 RESULTS = ("risk.json", "risk.html", "harmful.csv")
-SCENARIO = "most-likely-"
-"""Scenario files begin so, and go on with a number."""
+MOST_LIKELY = "most-likely-"
+"""Prefix of the names of scenario files; a number follows."""
 ELSEWHERE = "elsewhere-"
 """The folder of what another simulator says begins so, and goes on with the simulator's name."""
 _LONGEST_MODE = 400
@@ -107,7 +107,7 @@ class Ledger:
 
 
 def _is_result(name: str) -> bool:
-    return name in RESULTS or name.startswith((SCENARIO, ELSEWHERE))
+    return name in RESULTS or name.startswith((MOST_LIKELY, ELSEWHERE))
 
 
 def _digest(Z: Float, least: float) -> str:

@@ -1,4 +1,4 @@
-"""The most likely harmful encounter of each failure mode: found, written, and shown moving."""
+"""Finds, writes and pictures the most likely harmful encounter of each failure mode."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -19,7 +19,7 @@ from bridgegen.risk.estimators import design_point
 from bridgegen.risk.estimators.problem import block_of
 from bridgegen.risk.estimators.weighted import Weighted
 from bridgegen.risk.experiment import Experiment
-from bridgegen.risk.ledger import SCENARIO
+from bridgegen.risk.ledger import MOST_LIKELY
 from bridgegen.risk.outcomes import Column
 from bridgegen.risk.result import Likely
 from bridgegen.simulation.rollout import Rollout
@@ -82,7 +82,7 @@ def write_most_likely(
     """
     found = []
     for number, (mode, x) in enumerate(rows.items(), 1):
-        name = f"{SCENARIO}{number}"
+        name = f"{MOST_LIKELY}{number}"
         rollout = pipeline.rollout(x[np.newaxis])
         conflicts = analyse(rollout)
         conflict = summarise(conflicts, count=count)

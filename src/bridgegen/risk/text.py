@@ -38,7 +38,7 @@ def sentence(risk: Risk) -> str:
 
 
 def _advice(risk: Risk) -> str:
-    """Return what to do where a risk is not known; mc always knows one."""
+    """Return what to do if a risk is not known; mc always states one."""
     return {
         "subset": "Method importance looks elsewhere, too; mc assumes nothing",
         "stratified": "Method importance is for rarer harm; mc assumes nothing",

@@ -1,6 +1,7 @@
-"""Whether importance sampling is believed beside what is known otherwise, and how high it may be.
+"""Compares importance sampling with subset simulation and exploration, and states its doubts.
 
-What found the event also bounds what it has not seen: a region that proposals do not cover.
+These two found the event first. How many independent harmful rows they saw bounds the probability
+of a harmful region that they missed, and that the proposals do not cover.
 """
 
 from collections.abc import Iterator
@@ -11,20 +12,22 @@ import scipy.special
 from bridgegen.risk.estimators.problem import Aim
 from bridgegen.risk.estimators.weighted import FEWEST_HITS, Weighted
 
-MOST_UNSEEN = 0.9  # of the probability in regions that nobody has seen: no upper end to speak of
+MOST_UNSEEN = 0.9
+"""Maximum share of the probability in regions that were not found; the upper end is ten times the
+sampled one then, and says little."""
 HEAVIEST = 0.2
-"""Of the estimate at most may come from one row."""
+"""Maximum share of the estimate that may come from one row."""
 
 
 @dataclass(frozen=True)
 class Evidence:
-    """What is known of an event before rows of proposals are drawn.
+    """What is known of an event before rows are drawn from the proposals.
 
     Attributes:
-        levels: what subset simulation found.
-        spread: what rows found that are spread over the ranges.
-        helped: whether further points of the event were given, of a search say.
-        single: the share of the event's probability at single points.
+        levels: result of subset simulation.
+        spread: result of exploration, by rows that are spread over the ranges.
+        helped: whether further points of the event were given, for example by a search.
+        single: share of the event's probability at single points.
     """
 
     levels: Weighted
@@ -33,19 +36,20 @@ class Evidence:
     single: float
 
     def judge(self, result: Weighted, aim: Aim) -> Weighted:
-        """Return a result with its doubts, its facts, and what regions nobody has seen may add.
+        """Return a result of importance sampling with its doubts, facts and final upper end.
 
-        Subset simulation and exploration are heard in this order; who is not in doubt and agrees
-        with the result bounds what it has not seen.
+        It is compared with subset simulation and then with exploration, unless these are in doubt.
+        The first one that agrees raises the upper end by what it may have missed.
         """
-        heard = [one for one in (self.levels, self.spread) if not one.doubts]
-        if not heard:
-            heard = [self.spread if len(self.spread.Z) and not self.helped else self.levels]
-        found = [self._beside(known, result, aim) for known in heard]
+        believed = [one for one in (self.levels, self.spread) if not one.doubts]
+        if not believed:
+            believed = [self.spread if len(self.spread.Z) and not self.helped else self.levels]
+        found = [self._compared(result, known, aim) for known in believed]
         best = next((one for one in found if not one.doubts), found[0])
         return replace(best, facts={**best.facts, "spread": float(self.spread.rows)})
 
-    def _beside(self, known: Weighted, result: Weighted, aim: Aim) -> Weighted:
+    def _compared(self, result: Weighted, known: Weighted, aim: Aim) -> Weighted:
+        """Return a result with the doubts, facts and upper end that one known result implies."""
         low, share, high = result.share
         result = replace(result, share=(low, share, high / (1.0 - self._unseen(known, aim))))
         facts = {
@@ -56,9 +60,10 @@ class Evidence:
         }
         if "explored_hits" in known.facts:
             facts["explored_hits"] = known.facts["explored_hits"]
-        return replace(result, doubts=tuple(self._doubts(known, result, aim)), facts=facts)
+        return replace(result, doubts=tuple(self._doubts(result, known, aim)), facts=facts)
 
-    def _doubts(self, known: Weighted, result: Weighted, aim: Aim) -> Iterator[str]:
+    def _doubts(self, result: Weighted, known: Weighted, aim: Aim) -> Iterator[str]:
+        """Yield why a result is not believed, a sentence each."""
         if known.doubts and self.helped:
             yield (
                 f"subset simulation is in doubt ({known.doubts[0]}), so harm other than what the "
@@ -85,13 +90,13 @@ class Evidence:
             )
 
     def _unseen(self, known: Weighted, aim: Aim) -> float:
-        """Return the share of the event's probability that proposals may not cover.
+        """Return an upper bound of the event's probability that proposals do not cover, a share.
 
-        Subset simulation that knows the probability to a relative standard error c has seen as much
-        of it as n = 1 / c² independent harmful rows show; exploration, as much as its effective
-        harmful rows do. Of n rows none is in a region that nobody has seen, and the share of single
-        points at these: the upper end of the exact interval (Clopper and Pearson, 95 %), 3 / n if
-        that share is 0.
+        A known result is worth n independent harmful rows. For subset simulation n = 1 / c², where
+        c is the relative standard error; for exploration n is its effective number of harmful rows.
+        None of the n rows lies in a region that was not found, and the share `single` of them is at
+        single points. The bound is the upper end of the exact interval for that share (Clopper and
+        Pearson, one-sided, 95 %): about 3 / n without single points.
         """
         there = known.there(aim.threshold)
         if known.repetitions:

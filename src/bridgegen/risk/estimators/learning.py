@@ -1,7 +1,8 @@
-"""Proposals learnt from what they draw themselves, round by round.
+"""Fits proposals again and again, to the points of the event that they draw themselves.
 
-Each round's points of the event are weighted by all proposals so far together, so that a point that
-the first ones hardly reached does not outweigh all others. Rows of a result are drawn afterwards.
+A point's weight is its density on the road over the mean density of all proposals so far. A point
+that the first proposals seldom draw therefore does not outweigh all others. Rows of the result are
+drawn afterwards, so learning does not bias it.
 
 Source: Cornuet, Marin, Mira and Robert, Scandinavian Journal of Statistics 39 (2012) 798-812
 (adaptive multiple importance sampling).
@@ -18,23 +19,24 @@ from bridgegen.risk.estimators.proposals import Proposals
 OF_ROUND, FEWEST_ROWS = 2000, 100
 """Rows of a round at most, and at least."""
 ROUNDS, MOST_ROUNDS = 10, 20
-"""So many rounds take a quarter of a small budget at most; more of them are for a large one."""
+"""Number of rounds that a small budget is divided into, and maximum number of rounds."""
 OF_BUDGET = 4
+"""All rounds together take at most this part of the budget: a quarter."""
 ENOUGH = 400.0
-"""Effective number of points of the event, from which on no further round is needed."""
+"""Effective number of points of the event at which learning ends."""
 
 
 def learn(
     problem: Problem, aim: Aim, first: Proposals, budget: int, random: np.random.Generator
 ) -> tuple[Proposals, int]:
-    """Return better proposals, and how many evaluations they took.
+    """Return fitted proposals, and the number of evaluations spent.
 
     Args:
         problem: the experiment.
         aim: the event.
-        first: the proposals to begin with; their kernels stay, so that no region is lost.
-        budget: evaluations that are left.
-        random: all random numbers.
+        first: initial proposals; their kernels are kept, so that no known region is lost.
+        budget: remaining evaluations.
+        random: source of all random numbers.
     """
     most = budget // OF_BUDGET
     rows = min(OF_ROUND, most // ROUNDS)

@@ -1,11 +1,11 @@
-"""Whether an event happens at single points, with none of it close by, as noise makes it happen.
+"""Detects events at single points: points of the event whose neighbours are not in the event.
 
-Harm that has noise of its own, as that of perception, happens here and there. What is learnt of
-such a point says nothing of the points around it: proposals around it meet the event no more often
-than elsewhere, and chains meet it by chance. Only Monte Carlo sees it all.
+Noise of perception is a function of the row, so a row beside a harmful one has other noise and may
+be harmless. Proposals around such a row then draw harmful rows no more often than elsewhere, and
+chains reach them by chance. Only Monte Carlo samples all of them without bias.
 
-Points of a thin region look so, too, until copies are close enough; so some of the points that seem
-single are looked at again, from closer by.
+Points of a thin region look single as well, if their copies are too far away. So some of the points
+that look single are tested again with copies that are much closer.
 """
 
 from dataclasses import dataclass
@@ -19,10 +19,12 @@ from bridgegen.risk.estimators.problem import SCORE, Aim, Problem, block_of
 
 TRIED, COPIES = 128, 8
 """Points of the event around which copies are evaluated, and how many of each."""
-OF_BUDGET = 10  # of which the first copies take one part at most
+OF_BUDGET = 10
+"""The first copies take at most this part of the budget: a tenth."""
 BESIDE, CLOSE = 0.01, 1e-4
-"""How far away copies are, as a share of kernels that proposals would have around the points."""
-AGAIN = 16  # points that seem single, at most, are looked at from close by
+"""Distance of copies in the first and in the second test, as a share of the kernels' width."""
+AGAIN = 16
+"""Maximum number of points that are tested again."""
 ROUGH = 0.02
 """The share of single points beyond which an estimate is in doubt."""
 _STREAM = 3  # of random numbers
@@ -30,11 +32,11 @@ _STREAM = 3  # of random numbers
 
 @dataclass(frozen=True)
 class SinglePoints:
-    """What was seen of single points.
+    """Result of the test.
 
     Attributes:
-        share: of weighted points of the event, those of which no copy is in it.
-        evaluations: that it took.
+        share: weighted share of the points of the event that are single.
+        evaluations: number of evaluations spent.
     """
 
     share: float = 0.0
@@ -61,7 +63,10 @@ class SinglePoints:
         points = Z[random.choice(len(Z), tried, p=weights / weights.sum())]
 
         def alone(points: Float, distance: float) -> tuple[Bool, int, int]:
-            """Return whether each is alone, how many have copies, and how many copies these are."""
+            """Return which points are single, how many have feasible copies, and how many copies.
+
+            A point without a feasible copy counts as not single.
+            """
             noise = random.standard_normal((len(points), COPIES, Z.shape[1]))
             moves = distance * noise @ kernels.factor.T
             copies = (points[:, np.newaxis] + moves).reshape(-1, Z.shape[1])
@@ -72,16 +77,16 @@ class SinglePoints:
             met = inside.reshape(-1, COPIES).any(axis=1)
             return np.asarray(has_copies & ~met), int(has_copies.sum()), int(good.sum())
 
-        seems, of, evaluations = alone(points, BESIDE)
-        if not seems.any():
+        looks, tested, evaluations = alone(points, BESIDE)
+        if not looks.any():
             return cls(0.0, evaluations)
-        single, looked, more = alone(points[seems][:AGAIN], CLOSE)
-        share = float(seems.sum() / of * single.sum() / max(looked, 1))
+        single, again, more = alone(points[looks][:AGAIN], CLOSE)
+        share = float(looks.sum() / tested * single.sum() / max(again, 1))
         return cls(share, evaluations + more)
 
     @property
     def doubt(self) -> str:
-        """Why an estimate is not believed; empty where hardly any point is single."""
+        """Why an estimate is not believed; empty if at most `ROUGH` of the points are single."""
         if self.share <= ROUGH:
             return ""
         return (
@@ -91,7 +96,7 @@ class SinglePoints:
 
 
 def most_evaluations(aim: Aim) -> int:
-    """Return how many evaluations looking for single points takes at most."""
+    """Return the maximum number of evaluations of the test."""
     tried = _tried(aim)
     return COPIES * (tried + min(AGAIN, tried))
 

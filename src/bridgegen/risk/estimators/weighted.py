@@ -172,8 +172,9 @@ def of_weights(parts: Float) -> Probability:
 def of_repetitions(sums: Float) -> Probability:
     """Return the interval of a mean of independent repetitions.
 
-    Student's, of the logarithm of the mean, for repetitions are skewed to the right; and since the
-    largest one may be missing among few, upper ends are those with one more like the largest.
+    Student's interval of the logarithm of the mean, because repetitions are skewed to the right.
+    Few repetitions may lack a large one, so upper ends are computed with one more repetition that
+    equals the largest.
 
     Args:
         sums: ``(R,)`` the estimate of each, R ≥ 2.
