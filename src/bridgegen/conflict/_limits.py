@@ -119,6 +119,9 @@ came into the way of the other. Ours."""
 ASIDE = 0.7
 """[m] A body that has moved farther across its route within ``JUST_NOW`` has changed its course.
 Ours: about the room to the marking."""
+OFF_LANE = 1.75
+"""[m] A body whose reference point is farther from its route has left its lane: half of a lane of
+3.5 m. Ours."""
 ALIKE = 0.7
 """[1] Least cosine, in size, between two approaches of the same road. Ours: 45°."""
 AHEAD_TIME, AHEAD = 2.0, 10.0

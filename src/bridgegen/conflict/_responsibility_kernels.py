@@ -47,6 +47,7 @@ from bridgegen.conflict._codes import (
     NEITHER,
     OBJECT,
     OTHER,
+    PASSED_TOO_CLOSE,
     PREVENTABLE,
     REAR,
     REAR_DISTANCE,
@@ -82,8 +83,11 @@ from bridgegen.conflict._limits import (
     HARD,
     HORIZON,
     JUST_NOW,
+    LATELY,
     MARGIN,
     MARGIN_ON_FOOT,
+    MOVES,
+    OFF_LANE,
     STANDS,
     STOOD,
     TURN_TIME,
@@ -109,7 +113,8 @@ def judge(scene, e, k, at, kind, own, own_part, appears, whole, real):
         since = max(risk, min(stands, k - int(HORIZON / scene.dt)))
     seen = since
     if kind in (CROSSING, TURNING) or IS_CYCLE[scene.kinds[e]]:
-        seen = min(since, evident_since(scene, e, k, entry))
+        early = evident_since(scene, e, k, entry)
+        seen = min(since, early) if early < entry else since
     level = braked(scene, 0, e, seen, seen, BRAKING)
     avoidable = real[STOOD_EGO] <= 0.0 and level == CLEAR and not appears
     if kind == HEAD_ON and not scene.near and avoidable:  # standing does not avoid oncoming traffic
@@ -196,7 +201,7 @@ def decide(
                 return SHARED, RED_LIGHT
             return (EGO if mine >= 0 else OTHER), RED_LIGHT
     if kind in (VRU_BY_FRONT, VRU_INTO_SIDE):
-        return of_vulnerable(scene, e, k, kind, avoidable, whole)
+        return of_vulnerable(scene, e, k, kind, own, since, avoidable, whole)
     if kind == REAR_END_STRUCK:
         return of_struck(scene, e, k, whole)
     if kind == OBJECT and scene.v[e, k] > STANDS and not strikes_with_front(own, own_part):
@@ -233,7 +238,7 @@ def rule_of(claim):
 
 
 @kernel
-def of_vulnerable(scene, e, k, kind, avoidable, whole):
+def of_vulnerable(scene, e, k, kind, own, since, avoidable, whole):
     """Decide where the ego and a pedestrian, a cyclist or an animal meet."""
     what = scene.kinds[e]
     if IS_PEDESTRIAN[what]:
@@ -259,13 +264,30 @@ def of_vulnerable(scene, e, k, kind, avoidable, whole):
         mine, _ = turns(scene.c, scene.s, e, scene.first, scene.n, k, scene.dt)
         if mine:
             return EGO, TURNING_GIVES_WAY
+    if leaves_route(scene, k):
+        return EGO, LEFT_ITS_LANE
     if kind == VRU_INTO_SIDE:
+        if (
+            avoidable
+            and IS_CYCLE[what]
+            and same_road(scene, e, k)
+            and runs_into(scene, e, own, since)
+        ):
+            return EGO, PASSED_TOO_CLOSE
         if not IS_ANIMAL[what] and ego_moved(scene, k, side_of(scene, e, k)):
             return EGO, LEFT_ITS_LANE
         return (NEITHER if IS_ANIMAL[what] else OTHER), INTO_THE_SIDE
     if avoidable:
         return EGO, COULD_HAVE_STOPPED
     return (NEITHER if IS_ANIMAL[what] else OTHER), STEPPED_OUT
+
+
+@kernel
+def leaves_route(scene, k):
+    """Return whether the ego is on its way off its lane: sliding, or cutting a bend."""
+    before = max(k - int(LATELY / scene.dt), 0)
+    aside = abs(scene.offset[0, k])
+    return scene.routed and aside > OFF_LANE and aside - abs(scene.offset[0, before]) > ASIDE
 
 
 @kernel
@@ -325,6 +347,8 @@ def of_striking(scene, e, k, risk, since, side, late, stands, avoidable, whole):
         return NEITHER, BRAKED_HARD_AHEAD
     # had it time to open the gap before the other braked, since that was ahead of it?
     kept = braked(scene, 0, e, risk, start, BRAKING) == CLEAR
+    if avoidable and v[0, start] > v[e, start] + MOVES:  # it drove up to one that was slower
+        return EGO, REAR_DISTANCE
     whole[DECIDED], whole[PREVENTABLE] = start, kept
     if kept or moved:
         return EGO, REAR_DISTANCE
