@@ -38,6 +38,9 @@ from bridgegen.conflict._codes import (
     EGO_STANDING,
     EMERGENCY_VEHICLE,
     FROM_OFF_ROAD,
+    FRONT,
+    FRONT_LEFT,
+    FRONT_RIGHT,
     HEAD_ON,
     INTO_THE_SIDE,
     JUNCTION_OCCUPIED,
@@ -215,7 +218,7 @@ def decide(
         return EGO, STANDING_AHEAD
     if kind in (SIDE_SWIPE, HEAD_ON):
         return of_leaving(scene, e, k, kind, own, since, avoidable)
-    return of_crossing(scene, e, k, since, whole)
+    return of_crossing(scene, e, k, own, since, avoidable, whole)
 
 
 @kernel
@@ -395,7 +398,7 @@ def of_leaving(scene, e, k, kind, own, since, avoidable):
 
 
 @kernel
-def of_crossing(scene, e, k, risk, whole):
+def of_crossing(scene, e, k, own, risk, avoidable, whole):
     """Decide where two paths cross, or one turns into the other's."""
     since, _ = entered(scene, e, 0, k, 0.0)
     it_could = braked(scene, e, 0, since, since, COMFORT) != COLLIDES
@@ -408,6 +411,8 @@ def of_crossing(scene, e, k, risk, whole):
     claim = scene.claims[e]
     if claim == -SIREN:
         return of_siren(scene, e, k, whole)
+    if claim < 0 and not avoidable and own not in (FRONT, FRONT_LEFT, FRONT_RIGHT):
+        return NEITHER, REVEALED_LATE  # struck as it had all but passed, by one that sped up
     if claim != 0:
         return (OTHER if claim > 0 else EGO), rule_of(claim)
     mine, its = turns(scene.c, scene.s, e, scene.first, scene.n, k, scene.dt)
