@@ -287,10 +287,16 @@ def of_vulnerable(scene, e, k, kind, own, since, avoidable, whole):
 
 @kernel
 def leaves_route(scene, k):
-    """Return whether the ego is on its way off its lane: sliding, or cutting a bend."""
+    """Return whether the ego is on its way off its lane: sliding, or cutting a bend.
+
+    Unknown of recordings, which state no friction: their offset may be from the road that the ego
+    leaves when it turns off.
+    """
+    if scene.friction == math.inf:
+        return False
     before = max(k - int(LATELY / scene.dt), 0)
     aside = abs(scene.offset[0, k])
-    return scene.routed and aside > OFF_LANE and aside - abs(scene.offset[0, before]) > ASIDE
+    return aside > OFF_LANE and aside - abs(scene.offset[0, before]) > ASIDE
 
 
 @kernel

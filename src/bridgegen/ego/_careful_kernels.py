@@ -104,6 +104,9 @@ def drive_careful(
         if what == LEADER and known_for >= EVALUATION + CAREFUL_REACTION:
             wanted = min(wanted, follow(gap, v, along, slowing))
     if not risk:
+        if wanted < -COMFORT_DECELERATION:  # beyond comfort, the brake takes time to build up
+            held = min(attention[0, ASKED], -COMFORT_DECELERATION)
+            wanted = max(wanted, held - CAREFUL_JERK * dt)
         attention[0, RISK], attention[0, BRAKES], attention[0, ASKED] = 0.0, 0.0, wanted
         return wanted
     if attention[0, RISK] == 0.0:
