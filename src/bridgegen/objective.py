@@ -171,7 +171,16 @@ class Objective:
                 resolved = tuple(entropy_weights((x - least) / extent).tolist())
         given = thresholds or Thresholds()
         return cls(
-            names, resolved, scale, objectives, given, low, span, rule, count, tuple(criteria),
+            names,
+            resolved,
+            scale,
+            objectives,
+            given,
+            low,
+            span,
+            rule,
+            count,
+            tuple(criteria),
             gated,
         )
 

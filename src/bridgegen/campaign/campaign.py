@@ -29,7 +29,7 @@ from bridgegen.odd.scenario import LogicalScenario, SearchedScenario
 from bridgegen.openx.opendrive.road_map import RoadMap
 from bridgegen.openx.opendrive.site_adapted import adapted
 from bridgegen.openx.opendrive.site_fit import ALL
-from bridgegen.options import SearchOptions, called_with, range_problems
+from bridgegen.options import SearchOptions, called_with, checked, range_problems
 from bridgegen.pipeline import Pipeline
 from bridgegen.report.data import WHOLE
 from bridgegen.search.algorithm import Problem, resolve
@@ -196,6 +196,7 @@ def run_search(given: SearchArguments) -> Run:
             return _go(pipeline, searcher, store, made_with, callbacks, given.deliver)
 
 
+@checked
 def resume(
     folder: Path | str,
     *,

@@ -4,7 +4,7 @@ from dataclasses import replace
 from typing import Any, cast, get_args
 
 from bridgegen.conflict.harm import Count
-from bridgegen.conflict.quantities import HARM
+from bridgegen.conflict.quantities import HARM, QUANTITIES
 from bridgegen.errors import InputError, UnknownNameError
 from bridgegen.objective import RULES, Objectives
 from bridgegen.odd.criteria import PREFIX
@@ -88,10 +88,13 @@ def chosen_objective(
 
     Raises:
         InputError: weights that nothing uses; ``paper`` among other metrics.
-        UnknownNameError: no such choice of whose conflicts count.
+        UnknownNameError: no such metric, or choice of whose conflicts count.
     """
     metrics, weights, scale = options.objective, options.weights, options.scale
     count = counted(options.count)
+    for name in metrics or ():
+        if name not in (*QUANTITIES, PAPER) and not name.startswith(PREFIX):
+            raise UnknownNameError("metric", name, (*QUANTITIES, PAPER))
     if metrics is not None and PAPER in metrics:
         if len(metrics) > 1 or metrics[PAPER] is not None:
             raise InputError(f"the objective '{PAPER}' stands alone, without a weight")

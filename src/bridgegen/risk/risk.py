@@ -23,7 +23,7 @@ from bridgegen.exposure.chosen import UNIFORM, chosen_exposure
 from bridgegen.exposure.fit import Fit, fit_exposure
 from bridgegen.exposure.tables import read_header
 from bridgegen.odd.scenario import LogicalScenario
-from bridgegen.options import PipelineOptions
+from bridgegen.options import PipelineOptions, checked
 from bridgegen.pipeline import Pipeline
 from bridgegen.risk import methods
 from bridgegen.risk.data import data_band
@@ -62,6 +62,7 @@ class RiskCallbacks:
     elsewhere: Callable[[int, int], None] = field(default=lambda done, total: None)
 
 
+@checked
 def estimate_risk(
     scenario: str | Path,
     *,
