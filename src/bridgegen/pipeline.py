@@ -362,6 +362,7 @@ class Pipeline:
                 rule=spec.rule,
                 count=spec.count,
                 criteria=self._margins_that_count(spec.criteria) if spec.rule == "criteria" else (),
+                gated=spec.gated,
                 sample=sample,
             )
         self.objective = objective

@@ -29,7 +29,7 @@ from bridgegen.odd.scenario import LogicalScenario, SearchedScenario
 from bridgegen.openx.opendrive.road_map import RoadMap
 from bridgegen.openx.opendrive.site_adapted import adapted
 from bridgegen.openx.opendrive.site_fit import ALL
-from bridgegen.options import SearchOptions, called_with, range_problems
+from bridgegen.options import SearchOptions, called_with, checked, range_problems
 from bridgegen.pipeline import Pipeline
 from bridgegen.report.data import WHOLE
 from bridgegen.search.algorithm import Problem, resolve
@@ -120,7 +120,7 @@ def run_search(given: SearchArguments) -> Run:
     require_asynchronous(given, method)
     columns = columns_of(method, given.objectives)
     spec = chosen_objective(catalogue.objective, given, columns)
-    logical = as_judged(replace(catalogue, objective=spec), spec.rule)
+    logical = as_judged(replace(catalogue, objective=spec), spec.gated)
     judged = logical
     logical, roads = placed(logical, given.road_map, given.junction)
     if roads is not None and isinstance(judged, LogicalScenario):
@@ -196,6 +196,7 @@ def run_search(given: SearchArguments) -> Run:
             return _go(pipeline, searcher, store, made_with, callbacks, given.deliver)
 
 
+@checked
 def resume(
     folder: Path | str,
     *,
@@ -311,9 +312,10 @@ def _finish(
     callbacks.stage("triage")
     rows, record = Recorded(store, whole=(*WHOLE, *pipeline.monitor.names)), None
     best, rule = np.zeros(0, dtype=np.int64), pipeline.objective.rule
-    if rule == "criteria":
+    records_harm = pipeline.objective.harm in pipeline.metrics  # not in runs of earlier versions
+    if rule == "criteria" or not records_harm:
         best = _critical_by_objective(rows, settings.keep)
-    if pipeline.objective.harm in pipeline.metrics:  # runs of earlier versions did not record it
+    if records_harm:
         triaged = triage(
             pipeline, rows, algorithm=settings.algorithm, seed=settings.seed, keep=settings.keep,
             chosen=best.tolist() if rule == "criteria" else None, effort=effort(settings.triage),
@@ -322,10 +324,6 @@ def _finish(
         if rule != "criteria":
             best = np.array(triaged.exports, dtype=np.int64)
         write_record(store.folder, record)
-    if rule == "thresholds" and len(best) < settings.keep:
-        # Fill up with what the paper calls critical, in the paper's order.
-        more = _critical_by_objective(rows, settings.keep)
-        best = np.concatenate([best, more[~np.isin(more, best)]])[: settings.keep]
     callbacks.stage("export")
     chosen = rows.take(best)
     # One simulation, for the files and the playback.

@@ -101,7 +101,7 @@ def print_summary(run: "Run", seconds: float) -> None:
         ("v_d", f"best {s.v_d_best:.2f} m/s, median {s.v_d_median:.2f} m/s"),
         *((f"criterion {one.criterion.id}", one.sentence) for one in run.criteria),
         ("wall time", f"{seconds:.2f} s, of which {s.seconds:.2f} s search"),
-        ("scenarios", f"{len(run.scenarios)} in {run.folder / 'critical'}{_minimal(run)}"),
+        ("scenarios", _exported(run)),
     ]
     rows += [
         ("not exported", f"{one.name}, evaluation {one.evaluation + 1}: {'; '.join(one.problems)}")
@@ -170,9 +170,11 @@ def _print_modes(found: "Triage") -> None:
         print(f"     and {more} more")
 
 
-def _minimal(run: "Run") -> str:
-    n = len(run.minimal_scenarios)
-    return f", and {n} minimal" if n else ""
+def _exported(run: "Run") -> str:
+    n, minimal = len(run.scenarios), len(run.minimal_scenarios)
+    if not (n or minimal or run.not_exported) and run.settings.keep:
+        return "none exported: no failure found"
+    return f"{n} in {run.folder / 'critical'}" + (f", and {minimal} minimal" if minimal else "")
 
 
 def _worse(settings: "Settings") -> str:
