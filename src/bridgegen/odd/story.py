@@ -132,12 +132,15 @@ class Change:
         time: [s].
         distance: [m] travelled meanwhile.
         shape: of the value over time (or distance).
+        jerk: [m/s³] with which an acceleration up to the rate builds up and is released; None: at
+            once.
     """
 
     rate: Quantity | None = None
     time: Quantity | None = None
     distance: Quantity | None = None
     shape: Literal["linear", "cubic", "sinusoidal"] = "linear"
+    jerk: float | None = None
 
     def __str__(self) -> str:
         """Return how long it takes, to be said after what changes."""

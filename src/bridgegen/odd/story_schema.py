@@ -216,6 +216,8 @@ class EventSection(ShapedSection):
     """It takes up this speed [m/s]; a vehicle reverses below 0."""
     rate: Acceleration | None = None
     """At this rate [m/s²]."""
+    jerk: Annotated[Number, Field(gt=0)] | None = None
+    """The acceleration, at most the rate, builds up and is released so fast [m/s³]."""
     time: Duration | None = None
     """Within so long [s]."""
     distance: Length | None = None

@@ -351,11 +351,11 @@ class Storyboard:
             actor = self._acting.get(str(given.participant))
             slowest = _slowest(actor.name, actor.type) if actor else 0.0
             self._check(given.speed, "m/s", (*path, "speed"), low=slowest)
-            yield SpeedChange(
-                given.speed,
-                self._change(given.rate, given.time, given.distance, given.shape, path),
-            )
-        elif any(one is not None for one in (given.rate, given.time, given.distance)):
+            if given.jerk is not None and (given.rate is None or given.shape != "linear"):
+                self._report("a jerk is for a change at a rate, without a shape", (*path, "jerk"))
+            change = self._change(given.rate, given.time, given.distance, given.shape, path)
+            yield SpeedChange(given.speed, replace(change, jerk=given.jerk))
+        elif any(one is not None for one in (given.rate, given.jerk, given.time, given.distance)):
             self._report(f"{name} has a change of speed without its target (speed)", path)
         if given.lane_change is not None:
             one = given.lane_change

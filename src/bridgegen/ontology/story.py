@@ -296,6 +296,8 @@ def _add_change(builder: Builder, node: ox.NamedNode, change: Change) -> None:
     ):
         if value is not None:
             builder.quantity(node, name, value)
+    if change.jerk is not None:
+        builder.put(node, "has_max_jerk", change.jerk)
     if change.shape != "linear":
         builder.put(node, "has_dynamics_shape", change.shape)
 
