@@ -35,7 +35,7 @@ def weather():
 
 @pytest.mark.parametrize("name", PAPERS)
 def test_scenario_is_the_papers(name):
-    scenario = load(name)
+    scenario = load(f"paper/{name}")
     after = 0.1 if name == "crossroads-s2" else 40.0  # the reason stands in the file
     ego_start, ego_end, ego_speed, bv_start, bv_end, bv_speed = TABLE[name]
     ego, bv = scenario.participants
@@ -64,7 +64,7 @@ def test_scenario_is_the_papers(name):
             ),
         ),
     )  # fmt: skip
-    assert (scenario.name, scenario.duration, scenario.time_step) == (name, 20.0, 0.05)
+    assert (scenario.name, scenario.duration, scenario.time_step) == (f"paper-{name}", 20.0, 0.05)
     assert scenario.axes == (Axis.PARTICIPANTS, Axis.WEATHER)
     terms = {term.metric: term.weight for term in scenario.objective.terms}
     assert terms == {"d_min": 0.8297, "v_d": 0.1703}
