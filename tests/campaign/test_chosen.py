@@ -6,11 +6,11 @@ GIVEN = {"algorithm": "random", "budget": 60, "seed": 0, "keep": 2}
 
 
 def test_by_harm_nobody_stops_dead_where_the_road_ends(tmp_path):
-    """crossroads-s3 has `road_end: stand`, which the paper's evaluation needs."""
+    """The paper's S3 has `road_end: stand`, which the paper's evaluation needs."""
     harm = bg.run_search(
-        "crossroads-s3", **GIVEN, objective={"harm": None}, triage="short", out=tmp_path / "a"
+        "paper/crossroads-s3", **GIVEN, objective={"harm": None}, triage="short", out=tmp_path / "a"
     )
-    paper = bg.run_search("crossroads-s3", **GIVEN, triage="short", out=tmp_path / "b")
+    paper = bg.run_search("paper/crossroads-s3", **GIVEN, triage="short", out=tmp_path / "b")
     assert harm.frame()["implausible"].isna().all()
     stops = paper.frame()["implausible"] == "deceleration beyond the body's"
     assert stops.any()

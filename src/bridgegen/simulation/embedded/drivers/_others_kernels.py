@@ -14,7 +14,7 @@ from bridgegen.compiled import kernel
 from bridgegen.ego._attentive_kernels import ASKED, LOOK, look, react, see
 from bridgegen.ego._following_kernels import COMFORT_ACCELERATION
 from bridgegen.ego._weather_columns import FRICTION
-from bridgegen.ego.drivers import ATTENTIVE
+from bridgegen.ego.drivers import SCRIPTED
 from bridgegen.physics import CAREFUL_JERK
 from bridgegen.simulation.embedded._codes import DOES, KEEP_ASIDE
 from bridgegen.simulation.embedded._memory_kernels import STOPS
@@ -40,7 +40,7 @@ def heed(k, plan, roads, state, record):
         )
     for e in range(1, record.x.shape[0]):
         state.allowed[e] = math.inf
-        if plan.others[e] != ATTENTIVE:
+        if plan.others[e] == SCRIPTED:
             continue
         p, mind = state.on[e], state.minds[e]
         if not state.present[e] or state.placed[e] or p < 0 or state.follow[e] >= 0:
