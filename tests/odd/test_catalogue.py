@@ -287,7 +287,7 @@ def test_the_traffic_of_random_rows_drives_as_drivers_do(name, ego):
             if e == 0 or rollout.kinds[e] in (PEDESTRIAN, ANIMAL, OTHER):
                 continue
             touched = np.flatnonzero((rollout.distance[i, 1:] <= 0.0).any(axis=0))
-            end = int(min(touched[:1].tolist() + [rollout.n_steps[i]]))
+            end = int(min([*touched[:1].tolist(), rollout.n_steps[i]]))
             if len(rollout.present):
                 end = min([end, *np.flatnonzero(~rollout.present[i, e])[:1].tolist()])
             v, h = rollout.v[i, e, :end], rollout.h[i, e, :end]

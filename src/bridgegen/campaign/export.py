@@ -8,6 +8,8 @@ from functools import partial
 from importlib.resources import files as resources
 from pathlib import Path
 
+import numpy as np
+
 from bridgegen.campaign.exported import FOLDER, MINIMAL
 from bridgegen.campaign.run import Run
 from bridgegen.campaign.scenario_files import keyed
@@ -108,7 +110,7 @@ def _ignored_drivers(path: Path, flavour: str) -> list[str]:
     if not names:
         return []
     codes = {code: name for name, code in CODES.items()}
-    driver = "' or '".join(codes[code] for code in sorted({*program.others[program.attends].tolist()}))
+    driver = "' or '".join(codes[code] for code in np.unique(program.others[program.attends]))
     what = (
         f"other tools than BridgeGen ignore their driver '{driver}' and move them as the "
         f"storyboard says; --flavour {RECORDED} has them move as they did"

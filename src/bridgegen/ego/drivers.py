@@ -44,7 +44,7 @@ OTHERS = {
     "attentive": "Follows its script unless another participant is in its way: keeps its distance, "
     f"gives way, brakes after {CAREFUL_REACTION:g} s by up to {CAREFUL_BRAKING_G:g} g, waits for a "
     "gap to change lane.",
-    "insistent": "As attentive towards what is ahead of it and stands in its way; gives way to none "
+    "insistent": "As attentive to what is ahead and stands in its way; gives way to none "
     "that crosses, and passes red lights and stop signs.",
     "scripted": "Does what its script says, whatever happens.",
 }

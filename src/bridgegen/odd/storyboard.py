@@ -423,8 +423,8 @@ class Storyboard:
                 self._report(f"{key} is to another participant, got '{other}' twice", (*path, key))
             if actor is not None and actor.driver in LOOKING:
                 self._report(
-                    f"{actor.name} is {actor.driver}, its driver keeps the distance; {key} is for one "
-                    "that is scripted",
+                    f"{actor.name} is {actor.driver}, its driver keeps the distance; {key} is for "
+                    "one that is scripted",
                     (*path, key),
                 )
         if keeps is not None:
