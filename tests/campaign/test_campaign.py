@@ -81,7 +81,7 @@ def test_a_run_of_the_first_version_opens_resumes_and_is_reported(tmp_path, monk
     with monkeypatch.context() as patch:
         patch.setattr("bridgegen.pipeline.metrics_of", lambda *_, **__: FIRST_SEVEN)
         patch.setattr("bridgegen.campaign.campaign._finish", lambda *_: None)
-        bg.run_search("crossroads-s4", algorithm="pso", budget=80, out=tmp_path / "run")
+        bg.run_search("paper/crossroads-s4", algorithm="pso", budget=80, out=tmp_path / "run")
     with sqlite3.connect(tmp_path / "run" / "run.sqlite") as connection:
         ((text,),) = connection.execute("SELECT value FROM run WHERE key = 'settings'")
         settings = json.loads(text)
