@@ -187,7 +187,7 @@ def test_what_the_reference_does_not_see_in_thick_fog_is_perception_s_fault():
 
 def test_the_reference_s_harm_has_every_cause():
     found = set()
-    for name in ("jam-tail-in-fog", "crossroads-s3"):
+    for name in ("jam-tail-in-fog", "paper/crossroads-s3"):
         scenario = load(name)
         pipeline = Pipeline(
             scenario, scenario.space(), PipelineOptions(ego="reference", causes=True)

@@ -169,7 +169,8 @@ def test_simulate_with_another_driver(cli, finished):
 def test_ask(cli, finished):
     owl = finished.scenarios[0].with_suffix(".owl")
     code, out, _ = cli("ask", owl, "driver", "--json")
-    assert (code, json.loads(out)) == (0, [{"participant": "ego", "driver": "route-follower"}])
+    drivers = {one["participant"]: one["driver"] for one in json.loads(out)}
+    assert (code, drivers) == (0, {"bv": "insistent", "ego": "route-follower"})
     code, out, _ = cli("ask", owl)
     assert code == 0
     assert "What is the weather?" in out

@@ -14,6 +14,11 @@ Source: Wong, Theory of Ground Vehicles, table 1.3."""
 GRIP = DRY_FRICTION * GRAVITY
 """[m/s²] What a tyre gives on a dry road, in any direction."""
 
+MOST_LATERAL = 4.0
+"""[m/s²] Lateral acceleration that drivers rarely exceed.
+
+Source: Mitschke and Wallentowitz, Dynamik der Kraftfahrzeuge."""
+
 HARD_BRAKING = 4.9
 """[m/s²] Deceleration from which on braking is hard. Source: paper, Table I."""
 

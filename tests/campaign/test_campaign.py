@@ -87,10 +87,8 @@ def test_a_run_of_the_first_version_opens_resumes_and_is_reported(tmp_path, monk
     with monkeypatch.context() as patch:
         patch.setattr("bridgegen.pipeline.metrics_of", lambda *_, **__: FIRST_SEVEN)
         patch.setattr("bridgegen.campaign.campaign._finish", lambda *_: None)
-        bg.run_search(
-            "crossroads-s4", algorithm="pso", budget=80, objective="paper", out=tmp_path / "run"
-        )
-    first = replace(load("crossroads-s4"), objective=PAPERS)  # by default, then
+        bg.run_search("paper/crossroads-s4", algorithm="pso", budget=80, out=tmp_path / "run")
+    first = load("paper/crossroads-s4")
     with sqlite3.connect(tmp_path / "run" / "run.sqlite") as connection:
         ((text,),) = connection.execute("SELECT value FROM run WHERE key = 'settings'")
         settings = json.loads(text)
@@ -114,12 +112,10 @@ def test_a_run_of_the_first_version_opens_resumes_and_is_reported(tmp_path, monk
     assert run.scenarios
     assert run.report.exists()
     again = bg.run_search(
-        "crossroads-s4", algorithm="pso", budget=80, objective="paper", deliver=False,
-        out=tmp_path / "again",
-    )  # fmt: skip
+        "paper/crossroads-s4", algorithm="pso", budget=80, deliver=False, out=tmp_path / "again"
+    )
     assert (run.rows().X == again.rows().X).all()
     assert (run.rows().critical == again.rows().critical).all()
-    assert "--objective paper" in run.settings.command(tmp_path / "b")
 
 
 def test_metrics_that_are_asked_for_are_recorded_and_in_the_command(tmp_path):

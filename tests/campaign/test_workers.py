@@ -22,7 +22,7 @@ from bridgegen.workers.processes import Processes
 DRIVERS = Path(__file__).parents[1] / "ego" / "drivers.py"
 DOUBLES = Path(__file__).parents[1] / "workers" / "doubles"
 SEARCH = {
-    "scenario": "crossroads-s4", "algorithm": "pso", "budget": 160, "seed": 5, "keep": 0,
+    "scenario": "paper/crossroads-s4", "algorithm": "pso", "budget": 160, "seed": 5, "keep": 0,
     "triage": "none", "ego": "reference", "weights": "entropy",
     "objective": {"d_min": None, "v_d": None},
 }  # fmt: skip

@@ -5,11 +5,15 @@ import math
 import numpy as np
 import pytest
 
+from bridgegen.conflict.plausibility import plausibility
+from bridgegen.ego.kinds import ANIMAL, OTHER, PEDESTRIAN
 from bridgegen.errors import UnknownNameError
 from bridgegen.odd.parameters import Axis
 from bridgegen.odd.reader import load, names
 from bridgegen.odd.scenario import ObjectiveSpec, SearchedScenario, Term
 from bridgegen.odd.story import Change, ConditionSpec, EventSpec, SpeedChange, Waypoint
+from bridgegen.options import PipelineOptions
+from bridgegen.pipeline import Pipeline
 
 PAPERS = ("crossroads-s1", "crossroads-s2", "crossroads-s3", "crossroads-s4")
 
@@ -35,7 +39,7 @@ def weather():
 
 @pytest.mark.parametrize("name", PAPERS)
 def test_scenario_is_the_papers(name):
-    scenario = load(name)
+    scenario = load(f"paper/{name}")
     after = 0.1 if name == "crossroads-s2" else 40.0  # the reason stands in the file
     ego_start, ego_end, ego_speed, bv_start, bv_end, bv_speed = TABLE[name]
     ego, bv = scenario.participants
@@ -64,7 +68,7 @@ def test_scenario_is_the_papers(name):
             ),
         ),
     )  # fmt: skip
-    assert (scenario.name, scenario.duration, scenario.time_step) == (name, 20.0, 0.05)
+    assert (scenario.name, scenario.duration, scenario.time_step) == (f"paper-{name}", 20.0, 0.05)
     assert scenario.axes == (Axis.PARTICIPANTS, Axis.WEATHER)
     terms = {term.metric: term.weight for term in scenario.objective.terms}
     assert terms == {"d_min": 0.8297, "v_d": 0.1703}
@@ -261,3 +265,34 @@ def test_table_lists_every_parameter_with_its_rules():
     assert lines["fog_distance"].bounds == "fog_distance = 100 - fog_density"
     assert lines["ego_speed"].bounds.count("<=") == 1
     assert math.isclose(lines["lane_width"].low, 2.75)
+
+
+@pytest.mark.parametrize("ego", ["route-follower", "reference"])
+@pytest.mark.parametrize("name", names())
+def test_the_traffic_of_random_rows_drives_as_drivers_do(name, ego):
+    """Until the ego's first contact, the vehicles and bicycles besides it.
+
+    4 m/s² in bends (Mitschke and Wallentowitz), 8.1 m/s² of braking (dry asphalt) and 12.65 m/s³
+    (UN R157) but where they stop or contacts begin; 0.1 s between measured accelerations.
+    """
+    scenario = load(name)
+    space = scenario.space()
+    X = space.decode(np.random.default_rng(11).random((64, space.n_var)))
+    pipeline = Pipeline(scenario, space, PipelineOptions(ego=ego))
+    for rollout in (one.rollout(X[at]) for at, one in pipeline.by_variant(X)):
+        assert (rollout.status == 0).all()
+        assert set(plausibility(rollout).labels) == {""}
+        dt = rollout.time_step
+        for i, e in np.ndindex(rollout.shape[0], rollout.shape[1]):
+            if e == 0 or rollout.kinds[e] in (PEDESTRIAN, ANIMAL, OTHER):
+                continue
+            touched = np.flatnonzero((rollout.distance[i, 1:] <= 0.0).any(axis=0))
+            end = int(min([*touched[:1].tolist(), rollout.n_steps[i]]))
+            if len(rollout.present):
+                end = min([end, *np.flatnonzero(~rollout.present[i, e])[:1].tolist()])
+            v, h = rollout.v[i, e, :end], rollout.h[i, e, :end]
+            assert (np.abs(h[5:] - h[:-5]) / (5 * dt) * 0.5 * np.abs(v[5:] + v[:-5])).max() < 4.1
+            a = np.diff(v) / dt
+            assert a.min() > -8.1
+            stands = np.convolve(np.abs(v) < 0.05, np.ones(4), "valid") > 0.0
+            assert (np.abs(a[2:] - a[:-2]) / (2 * dt))[~stands].max(initial=0.0) < 20.0

@@ -158,6 +158,24 @@ MISTAKES = [
         "rate: .inf",
     ),
     (
+        "    rate: 3.0 # m/s²\n",
+        "",
+        "a jerk is for a rate, without a shape",
+        "jerk: 5.0",
+    ),
+    (
+        "jerk: 5.0",
+        "jerk: 0",
+        "events.bv_sets_off.jerk [m/s³] must be greater than 0 and finite, got 0",
+        "jerk: 0",
+    ),
+    (
+        "jerk: 5.0",
+        "jerk: 5.0\n    shape: cubic",
+        "a jerk is for a rate, without a shape",
+        "jerk: 5.0",
+    ),
+    (
         "rate: 3.0",
         "rate: [3]",
         "events.bv_sets_off.rate must be a number or the name of a parameter, got [3]",

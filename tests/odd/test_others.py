@@ -16,13 +16,20 @@ def drivers(scenario):
 
 
 CARELESS = {
-    "red-light-runner": ["runner"], "wrong-way-driver": ["ghost"], "bus-pulls-out": ["bus"],
-    "cyclist-swings-out": ["cyclist"], "emergency-vehicle-on-red": ["ambulance"],
+    "wrong-way-driver": ["ghost"], "bus-pulls-out": ["bus"], "cyclist-swings-out": ["cyclist"],
 }  # fmt: skip
 """Who does not look, for that is what the scenario is about."""
 
+INSISTENT = {
+    "red-light-runner": ["runner"], "emergency-vehicle-on-red": ["ambulance"],
+    **{name: ["bv"] for name in PAPERS},
+}  # fmt: skip
+"""Who gives way to none, likewise, and stops for what stands in its way."""
 
-def test_the_catalogues_vehicles_are_attentive_but_for_the_papers():
+
+def test_vehicles_look_ahead_but_for_those_of_the_paper():
+    for name in PAPERS:
+        assert drivers(load(f"paper/{name}")) == {"bv": "scripted"}
     for name in names():
         scenario = load(name)
         moving = {
@@ -32,10 +39,11 @@ def test_the_catalogues_vehicles_are_attentive_but_for_the_papers():
             and one.conduct in ("vehicle", "bicycle", "pedestrian")
             and (one.speed != 0.0 or one.name in {event.participant for event in scenario.events})
         }
-        wanted = "scripted" if name in PAPERS else "attentive"
-        assert drivers(scenario) == dict.fromkeys(moving, wanted) | {
-            one: "scripted" for one in moving if one in CARELESS.get(name, ())
-        }
+        assert drivers(scenario) == (
+            dict.fromkeys(moving, "attentive")
+            | dict.fromkeys(CARELESS.get(name, ()), "scripted")
+            | dict.fromkeys(INSISTENT.get(name, ()), "insistent")
+        )
 
 
 def text_of(tmp_path, *changes):
@@ -63,14 +71,14 @@ def test_a_participants_own_driver_goes_before_that_of_all(tmp_path):
         (
             "    speed: bv_speed\n",
             "    speed: bv_speed\n    driver: attentiv\n",
-            "the driver of bv must be one of attentive, scripted (others are for the ego), got "
-            "'attentiv'; did you mean 'attentive'?",
+            "the driver of bv must be one of attentive, insistent, scripted (others are for the "
+            "ego), got 'attentiv'; did you mean 'attentive'?",
         ),
         (
             "    speed: bv_speed\n",
             "    speed: bv_speed\n    driver: reference\n",
-            "the driver of bv must be one of attentive, scripted (others are for the ego), got "
-            "'reference'",
+            "the driver of bv must be one of attentive, insistent, scripted (others are for the "
+            "ego), got 'reference'",
         ),
         (
             "    speed: ego_speed\n",

@@ -147,6 +147,7 @@ def test_a_rate_must_stay_above_zero(refuse, write, s4_text):
         "{axis: participants, unit: m/s², low: 0, high: 4, default: 3, description: d, source: s}"
     )
     text = s4_text.replace("rate: 3.0", "rate: bv_rate")
+    text = re.sub("    jerk: .*\\n", "", text)
     text = text.replace("\nparameters:\n", f"\nparameters:\n  bv_rate: {entry}\n")
     (problem,) = refuse(text)
     assert problem.startswith(

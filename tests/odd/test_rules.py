@@ -1,6 +1,7 @@
 """Constraints between the layers, each against what is worked by hand from its source."""
 
 import math
+from dataclasses import replace
 
 import pytest
 
@@ -155,9 +156,17 @@ def limits(found, name, **values):
 
 def test_tyres_hold_0_85_g_on_a_dry_road():
     """v² = 0.85 · 9.81 m/s² · 15 m = 125.0775 m²/s²: 11.1838 m/s (Wong, table 1.3)."""
-    found = demanded(usual("roundabout", radius=15.0), Story((car(),)), "bv_speed")
-    assert limits(found, "bv_speed") == pytest.approx([13.9, 11.183805], rel=1e-6)
+    hurried = replace(car(), exceeds_limit="late")
+    found = demanded(usual("roundabout", radius=15.0), Story((hurried,)), "bv_speed")
+    assert limits(found, "bv_speed") == pytest.approx([11.183805], rel=1e-6)
     # a quarter of the friction, half of the speed
+    assert limits(found, "bv_speed", friction=0.25) == pytest.approx([5.5919027], rel=1e-6)
+
+
+def test_without_a_reason_no_vehicle_turns_at_more_than_4_m_s2():
+    """v² = 4 m/s² · 15 m: 7.74597 m/s; on ice the tyres hold less, 0.25 · 0.85 g."""
+    found = demanded(usual("roundabout", radius=15.0), Story((car(),)), "bv_speed")
+    assert limits(found, "bv_speed") == pytest.approx([13.9, 7.7459667], rel=1e-6)
     assert limits(found, "bv_speed", friction=0.25)[1] == pytest.approx(5.5919027, rel=1e-6)
 
 

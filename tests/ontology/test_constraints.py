@@ -174,7 +174,7 @@ BREACHES = [
      "walker (Pedestrian)", "body-speed", "4 at most, the most that it can do, got 5: Nobody is"),
     ("1 to 4: too fast for a left turn", "crossroads-s2",
      [("bv_sets_off_action", "has_target_speed", 13.0)],
-     "bv (Car)", "bend-of-junction", "got 13: Nobody drives through a bend faster"),
+     "bv (Car)", "bend-of-junction", "got 13: A vehicle drives through a bend no faster"),
     ("1 to 4: too fast for a bend", "stopped-after-curve",
      [("leg_main_segment_3", "has_start_curvature", 0.1)],
      "oncoming (Car)", "bend-of-road", "in a bend of R = 10 m with friction = "),

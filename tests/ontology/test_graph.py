@@ -257,5 +257,6 @@ def test_a_number_keeps_every_bit(value):
 
 
 def test_the_store_answers_sparql(individuals):
-    query = f"SELECT ?d WHERE {{ ?c a <{BG}Controller> ; <{BG}has_driver> ?d }}"
-    assert [row["d"].value for row in individuals.store.query(query)] == ["route-follower"]
+    query = f"SELECT ?d WHERE {{ ?c a <{BG}Controller> ; <{BG}has_driver> ?d }} ORDER BY ?d"
+    drivers = ["insistent", "route-follower"]
+    assert [row["d"].value for row in individuals.store.query(query)] == drivers

@@ -21,7 +21,7 @@ def made(seeds: int, ahead: float) -> Results:
         for group, methods in GROUPS.items()
         for one in methods
     }
-    return Results("crossroads-s4", samples, 50)
+    return Results("paper-crossroads-s4", samples, 50)
 
 
 def fronts(results: Results) -> dict:
@@ -52,7 +52,7 @@ def test_how_many_seeds_can_show_anything():
 def test_a_method_without_runs_has_no_verdict():
     results = made(10, 1.0)
     samples = {key: one for key, one in results.samples.items() if key[1] != "ppo"}
-    verdicts = judge(Results("crossroads-s4", samples, 50), fronts(results))
+    verdicts = judge(Results("paper-crossroads-s4", samples, 50), fronts(results))
     for claim, one in zip(CLAIMS, verdicts, strict=True):
         assert one.word == ("–" if "ppo" in (claim.ahead, claim.behind) else "holds")
 

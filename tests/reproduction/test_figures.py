@@ -63,8 +63,8 @@ def test_violins_show_median_and_the_paper_s(theme):
 
 def test_bars_are_the_shares_of_the_causes():
     counts = {"random": (1, 2, 3, 4), "ppo": (0, 0, 0, 7), "pso": (5, 0, 1, 0)}
-    found = [Causes("crossroads-s3", name, 100, by, (0.1,)) for name, by in counts.items()]
-    found.append(Causes("crossroads-s4", "random", 100, (0, 0, 0, 0), (0.0,)))
+    found = [Causes("paper-crossroads-s3", name, 100, by, (0.1,)) for name, by in counts.items()]
+    found.append(Causes("paper-crossroads-s4", "random", 100, (0, 0, 0, 0), (0.0,)))
     figure = causes(found, LIGHT)
     bars = [patch for patch in figure.axes[0].patches if patch.get_width() > 0]
     assert sum(bar.get_width() for bar in bars) == pytest.approx(100.0 * len(counts))
@@ -74,7 +74,7 @@ def test_bars_are_the_shares_of_the_causes():
 
 
 def test_the_ontology_shows_every_individual_in_its_layer():
-    picture = picture_of(load("crossroads-s4"))
+    picture = picture_of(load("paper/crossroads-s4"))
     columns = blocks(picture)
     drawn = {one: number for number, column in enumerate(columns, 1) for b in column
              for one in b.ids}  # fmt: skip

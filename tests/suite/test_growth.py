@@ -37,7 +37,7 @@ class Blind:
 def run(tmp_path_factory):
     place = tmp_path_factory.mktemp("runs") / "s4"
     return bg.run_search(
-        "crossroads-s3", algorithm="random", budget=100, seed=0, ego="route-follower", keep=1,
+        "paper/crossroads-s3", algorithm="random", budget=100, seed=0, ego="route-follower", keep=1,
         objective={"harm": None}, out=place, criteria=[FAST],
     )  # fmt: skip
 

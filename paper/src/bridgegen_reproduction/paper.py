@@ -7,10 +7,13 @@ Safety-Critical Scenario Generation in Automated Vehicle Validation", Tables II 
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-MAIN = "crossroads-s4"
+PACK = "paper"
+"""The pack that holds the scenarios as the paper has them; the catalogue's are changed since."""
+
+MAIN = f"{PACK}-crossroads-s4"
 """The scenario that Section V examines in detail."""
 
-SCENARIOS = (MAIN, "crossroads-s1", "crossroads-s2", "crossroads-s3")
+SCENARIOS = (MAIN, *(f"{PACK}-crossroads-s{number}" for number in (1, 2, 3)))
 
 ITERATIONS, POPULATION = 25, 40
 """Tables IV and V."""
@@ -45,12 +48,23 @@ class Design:
 
 
 DESIGNS = {
-    "crossroads-s1": Design(("P5", "P2"), 6.9, ("P3", "P8"), 1.8, "C1"),
-    "crossroads-s2": Design(("P5", "P2"), 6.9, ("P1", "P4"), 1.8, "C2"),
-    "crossroads-s3": Design(("P1", "P6"), 6.9, ("P7", "P2"), 5.5, "C3"),
-    "crossroads-s4": Design(("P5", "P8"), 6.9, ("P3", "P8"), 1.8, "C4"),
+    f"{PACK}-crossroads-s1": Design(("P5", "P2"), 6.9, ("P3", "P8"), 1.8, "C1"),
+    f"{PACK}-crossroads-s2": Design(("P5", "P2"), 6.9, ("P1", "P4"), 1.8, "C2"),
+    f"{PACK}-crossroads-s3": Design(("P1", "P6"), 6.9, ("P7", "P2"), 5.5, "C3"),
+    f"{PACK}-crossroads-s4": Design(("P5", "P8"), 6.9, ("P3", "P8"), 1.8, "C4"),
 }
 """Table II."""
+
+
+def shipped(scenario: str) -> str:
+    """Return the name by which `bridgegen` knows one of `SCENARIOS`."""
+    return f"{PACK}/{short(scenario)}"
+
+
+def short(scenario: str) -> str:
+    """Return what the user calls one of `SCENARIOS`."""
+    return scenario.removeprefix(f"{PACK}-")
+
 
 THRESHOLDS = {"n_collision_above": 0.0, "d_min_below": 2.0, "v_d_at_least": 1.0}
 """Table III; printed without units."""

@@ -123,7 +123,7 @@ def _places(found: Found) -> Iterator[tuple[str, str, Draw]]:
             "first contact, of all methods’ critical scenarios; lines are their routes.",
             partial(collision_points, crossings),
         )
-    main = load(paper.MAIN)
+    main = load(paper.shipped(paper.MAIN))
     assert isinstance(main, LogicalScenario)
     picture = picture_of(main)
     yield (

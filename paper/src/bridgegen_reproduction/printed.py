@@ -23,7 +23,7 @@ def table_2(scenarios: Sequence[str]) -> Table:
     """Return the logical scenarios: where who drives, how fast, and what is searched of it."""
     rows = []
     for name in sorted(scenarios):
-        printed, ours = paper.DESIGNS[name], load(name)
+        printed, ours = paper.DESIGNS[name], load(paper.shipped(name))
         ego, bv = ours.ego, next(one for one in ours.participants if one is not ours.ego)
         ego_speed, bv_speed = ours.parameters["ego_speed"], ours.parameters["bv_speed"]
         title = f"S{name[-1]}"
@@ -49,7 +49,7 @@ def table_2(scenarios: Sequence[str]) -> Table:
             "Ours: the default, and the range that is searched. The paper prints no ranges but "
             "the ±2 m/s as which we read its sentence about the ego’s speed.",
             "Where the background vehicle (BV) starts, when it sets off, and the weather are "
-            "searched, too; “bridgegen list parameters crossroads-s4” tells all of it.",
+            "searched, too; “bridgegen list parameters paper/crossroads-s4” tells all of it.",
         ),
         texts=9,
     )

@@ -9,7 +9,17 @@ from typing import Any
 
 from bridgegen.comparison.plan import MAX_SEEDS, RUNS, Cell
 from bridgegen.errors import InputError
-from bridgegen_reproduction.paper import ITERATIONS, MAIN, METHODS, POPULATION, PPO, RS, SCENARIOS
+from bridgegen_reproduction.paper import (
+    ITERATIONS,
+    MAIN,
+    METHODS,
+    POPULATION,
+    PPO,
+    RS,
+    SCENARIOS,
+    shipped,
+    short,
+)
 
 NEEDED_BY_PPO = ("torch", "stable_baselines3", "gymnasium")
 
@@ -104,7 +114,7 @@ class Protocol:
     def arguments(self, part: Part) -> dict[str, Any]:
         """Return the arguments of ``compare`` that make one part's runs."""
         return {
-            "scenarios": self.scenarios,
+            "scenarios": tuple(map(shipped, self.scenarios)),
             "algorithms": self.algorithms_of(part),
             "seeds": self.seeds,
             "budget": self.budget,
@@ -123,7 +133,7 @@ class Protocol:
         if self.iterations != ITERATIONS:
             words += ["--iterations", str(self.iterations)]
         if self.scenarios != SCENARIOS:
-            words += ["--scenarios", ",".join(self.scenarios)]
+            words += ["--scenarios", ",".join(map(short, self.scenarios))]
         if self.road_map:
             words += ["--map", str(self.road_map)]
         if self.junction:
@@ -154,21 +164,22 @@ def make_protocol(
         )
         if not 1 <= value <= high
     ]
-    if strange := [name for name in scenarios if name not in SCENARIOS]:
+    known = [short(name) for name in SCENARIOS]
+    if strange := [name for name in scenarios if name not in known]:
         problems.append(
-            f"Section V has the scenarios {', '.join(sorted(SCENARIOS))}, got {', '.join(strange)}"
+            f"Section V has the scenarios {', '.join(sorted(known))}, got {', '.join(strange)}"
         )
     if len(set(scenarios)) < len(scenarios):
         problems.append(f"each scenario must be named once, got {', '.join(scenarios)}")
-    if MAIN not in scenarios:
-        problems.append(f"{MAIN} must be among the scenarios: the paper's numbers are of it")
+    if short(MAIN) not in scenarios:
+        problems.append(f"{short(MAIN)} must be among the scenarios: the paper's numbers are of it")
     if problems:
         raise InputError(*problems)
     return Protocol(
         out=out,
         seeds=seeds,
         iterations=iterations,
-        scenarios=tuple(name for name in SCENARIOS if name in scenarios),
+        scenarios=tuple(name for name in SCENARIOS if short(name) in scenarios),
         algorithms=available(),
         road_map=road_map,
         junction=junction,

@@ -89,7 +89,7 @@ def reproduce(
     *,
     seeds: int = 10,
     iterations: int = paper.ITERATIONS,
-    scenarios: Iterable[str] = paper.SCENARIOS,
+    scenarios: Iterable[str] = tuple(map(paper.short, paper.SCENARIOS)),
     out: Path | str = "reproduction",
     workers: int | str | None = None,
     road_map: Path | str | None = None,
@@ -106,7 +106,7 @@ def reproduce(
     Args:
         seeds: runs of each method in each scenario, with the seeds 0, 1, 2 …
         iterations: of each run, of 40 evaluations; the paper's are 25.
-        scenarios: of ``paper.SCENARIOS``; S4 must be among them.
+        scenarios: of crossroads-s1 to -s4; S4 must be among them.
         out: the folder.
         workers: who makes the runs, see ``compare``. No result depends on it.
         road_map: a map to run on, CARLA's Town05 as in the paper, say; a generated crossroads by

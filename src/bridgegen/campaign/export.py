@@ -8,9 +8,12 @@ from functools import partial
 from importlib.resources import files as resources
 from pathlib import Path
 
+import numpy as np
+
 from bridgegen.campaign.exported import FOLDER, MINIMAL
 from bridgegen.campaign.run import Run
 from bridgegen.campaign.scenario_files import keyed
+from bridgegen.ego.drivers import CODES
 from bridgegen.ego.noise import noise_key
 from bridgegen.errors import (
     FileFormatError,
@@ -106,13 +109,15 @@ def _ignored_drivers(path: Path, flavour: str) -> list[str]:
     names = ", ".join(f"'{program.names[e]}'" for e in program.attends.tolist())
     if not names:
         return []
+    codes = {code: name for name, code in CODES.items()}
+    driver = "' or '".join(codes[code] for code in np.unique(program.others[program.attends]))
     what = (
-        "other tools than BridgeGen ignore their driver 'attentive' and move them as the "
+        f"other tools than BridgeGen ignore their driver '{driver}' and move them as the "
         f"storyboard says; --flavour {RECORDED} has them move as they did"
     )
     if flavour == CARLA:
         what = (
-            "they repeat the motion that their driver 'attentive' gave them when the exported ego "
+            f"they repeat the motion that their driver '{driver}' gave them when the exported ego "
             "drove; they do not react to another one"
         )
     return [f"{path}: participants {names}: {what}"]

@@ -6,7 +6,7 @@ from typing import NoReturn
 from bridgegen.errors import InputError
 from bridgegen.odd import reader
 from bridgegen.odd.criteria import joined, read_criterion
-from bridgegen.odd.others import ATTENTIVE, require, with_others
+from bridgegen.odd.others import require, with_others
 from bridgegen.odd.scenario import LogicalScenario, SearchedScenario
 from bridgegen.openx.file_scenario import FileScenario, load_file_scenario, with_triggers
 from bridgegen.openx.file_scenario import with_others as drive_file_by
@@ -71,7 +71,7 @@ def driven_by(scenario: SearchedScenario, others: str | None) -> SearchedScenari
 
     Args:
         scenario: of any kind.
-        others: "attentive" or "scripted"; None leaves it to the scenario.
+        others: of `bridgegen.odd.others.DRIVERS`; None leaves it to the scenario.
 
     Raises:
         UnknownNameError: no such driver.
@@ -84,8 +84,8 @@ def driven_by(scenario: SearchedScenario, others: str | None) -> SearchedScenari
         return with_others(scenario, others)
     if isinstance(scenario, FileScenario):
         program = compile_storyboard(scenario.storyboard, scenario.place, others=others)
-        attentive = (program.names[e] for e in program.attends.tolist())
-        return drive_file_by(scenario, dict.fromkeys(attentive, ATTENTIVE))
+        able = (program.names[e] for e in program.attends.tolist())
+        return drive_file_by(scenario, dict.fromkeys(able, others))
     return scenario
 
 

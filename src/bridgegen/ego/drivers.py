@@ -34,13 +34,18 @@ TIME_LIMIT = 10.0
 """Default time limit of one call of a user's driver [s]."""
 
 
-SCRIPTED, ATTENTIVE = 0, 1
+SCRIPTED, ATTENTIVE, INSISTENT = 0, 1, 2
 """Codes of the drivers of participants other than the ego."""
+
+CODES = {"scripted": SCRIPTED, "attentive": ATTENTIVE, "insistent": INSISTENT}
+"""Those codes by name."""
 
 OTHERS = {
     "attentive": "Follows its script unless another participant is in its way: keeps its distance, "
     f"gives way, brakes after {CAREFUL_REACTION:g} s by up to {CAREFUL_BRAKING_G:g} g, waits for a "
     "gap to change lane.",
+    "insistent": "As attentive to what is ahead and stands in its way; gives way to none "
+    "that crosses, and passes red lights and stop signs.",
     "scripted": "Does what its script says, whatever happens.",
 }
 """The drivers of participants other than the ego: name and description."""

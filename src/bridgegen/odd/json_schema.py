@@ -168,8 +168,10 @@ def _between_keys(sections: dict[str, Any]) -> None:
             {"anyOf": [{"required": ["participant"]}, {"required": ["weather"]}]},
             _if_there("weather", {"participant": _NULL}),
             _if_there("rate", {"time": _NULL, "distance": _NULL}),
+            _if_there("jerk", {"rate": {"not": _NULL}, "shape": {"const": "linear"}}),
             _if_there("time", {"distance": _NULL}),
         ],
+        "dependencies": {"jerk": ["rate"]},
     }
     condition = sections["ConditionSection"]
     condition["properties"]["kind"]["description"] = "; ".join(

@@ -1,4 +1,4 @@
-"""Drivers of participants other than the ego: their script alone, or the attentive driver."""
+"""Drivers of participants other than the ego: their script alone, or one that looks ahead."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
@@ -7,9 +7,12 @@ from bridgegen.errors import UnknownNameError
 from bridgegen.odd.scenario import LogicalScenario
 from bridgegen.odd.story import EventSpec, Participant
 
-ATTENTIVE, SCRIPTED = "attentive", "scripted"
+ATTENTIVE, INSISTENT, SCRIPTED = "attentive", "insistent", "scripted"
 
-DRIVERS = (ATTENTIVE, SCRIPTED)
+LOOKING = (ATTENTIVE, INSISTENT)
+"""Those that limit the script by what is in the way."""
+
+DRIVERS = (*LOOKING, SCRIPTED)
 """What a participant other than the ego may have as its driver."""
 
 EGO = "ego"
@@ -52,7 +55,7 @@ def with_others(scenario: LogicalScenario, others: str) -> LogicalScenario:
 
     Args:
         scenario: of five layers.
-        others: "attentive" or "scripted", instead of the scenario's. A participant that an
+        others: of `DRIVERS`, instead of the scenario's. A participant that an
             adversary drives keeps it.
 
     Raises:

@@ -10,7 +10,7 @@ from bridgegen.odd.expression import parse
 from bridgegen.odd.parameters import Bound, Parameter
 from bridgegen.odd.roads import Quantity, RoadsSpec
 from bridgegen.odd.story import KeepDistance, Participant, SpeedChange, Story
-from bridgegen.physics import DRY_FRICTION, GRAVITY
+from bridgegen.physics import DRY_FRICTION, GRAVITY, MOST_LATERAL
 
 GRIP_FORMULA = f"{DRY_FRICTION}*{GRAVITY}"
 """Greatest lateral acceleration of a tyre on a dry road [m/s²], as a part of a formula."""
@@ -23,10 +23,12 @@ _SPEED_SOURCE = (
     "Paper, Section III-B (road and weather constrain participants); speed_limit of the road, "
     "speed_factor of the weather."
 )
-_BEND_WHY = "Nobody drives through a bend faster than the tyres hold."
+_BEND_WHY = "A vehicle drives through a bend no faster than drivers do, and than the tyres hold."
 _BEND_SOURCE = (
     "Paper, Section III-B (the road constrains participants' speed and path); v² <= μ·g·R with "
-    f"{DRY_FRICTION} on a dry road, Wong, Theory of Ground Vehicles, table 1.3."
+    f"{DRY_FRICTION} on a dry road, Wong, Theory of Ground Vehicles, table 1.3; at most "
+    f"{MOST_LATERAL} m/s² without a reason (exceeds_limit), Mitschke and Wallentowitz, Dynamik der "
+    "Kraftfahrzeuge."
 )
 _CLOSED_WHY = "The road that the scenario takes place on is closed in such weather."
 _CLOSED_SOURCE = "Paper, Section III-B (heavy fog or rain restricts roads); the road's own limit."
@@ -86,7 +88,10 @@ def bend_bounds(
 ) -> Iterator[Bound]:
     """Yield what the tightest bend on a participant's way demands, by the formula of its radius."""
     friction = _least([f"{prefix}friction" for prefix in ("", *prefixes)])
-    hi = parse(f"sqrt({GRIP_FORMULA} * {friction} * ({radius}))")
+    most = f"{GRIP_FORMULA} * {friction}"
+    if not one.exceeds_limit:
+        most = f"min({most}, {MOST_LATERAL})"
+    hi = parse(f"sqrt({most} * ({radius}))")
     for name in sorted(_speeds_of(one, story) & parameters.keys()):
         yield Bound(name, None, hi, _BEND_WHY, _BEND_SOURCE, place)
 

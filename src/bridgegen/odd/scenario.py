@@ -234,7 +234,8 @@ class LogicalScenario(SearchedScenario):
     def fingerprint(self) -> str:
         """See `SearchedScenario`; what a scenario does without has no part in it."""
         content = content_of(self)
-        drivers = {one.name: one.driver for one in self.participants if one.driver == "attentive"}
+        bare = ("", "scripted")
+        drivers = {one.name: one.driver for one in self.participants if one.driver not in bare}
         headings = {one.name: one.heading for one in self.participants if one.heading != 0.0}
         lifted = {one.name: one.exceeds_limit for one in self.participants if one.exceeds_limit}
         sirens = [one.name for one in self.participants if one.siren]

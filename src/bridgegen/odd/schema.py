@@ -173,7 +173,7 @@ class ScenarioFile(ShapedSection):
     """Its measures."""
     driver: Word = "route-follower"
     """Default driver of the ego (see --ego and 'bridgegen list drivers')."""
-    others: Literal["attentive", "scripted"] = "scripted"
+    others: Literal["attentive", "insistent", "scripted"] = "scripted"
     """Default driver of the other participants (see --others, and their ``driver``)."""
     duration: Seconds
     """Of the simulation [s]."""

@@ -68,7 +68,8 @@ class Participant:
         end: where its route ends; None: it continues along its lane, or along its path.
         speed: [m/s] at time 0; of the ego also its target.
         path: the points of its own way, ``start`` first; empty: it keeps to lanes.
-        driver: of a participant other than the ego "attentive" or "scripted"; empty: as scripted.
+        driver: of a participant other than the ego one of `bridgegen.odd.others.DRIVERS`; empty: as
+            scripted.
         heading: turned from its lane's direction of travel [deg], left positive; who moves at 180
             drives against the traffic.
         type_by: the category that gives its type or model in each evaluation; empty: it is always
@@ -132,12 +133,15 @@ class Change:
         time: [s].
         distance: [m] travelled meanwhile.
         shape: of the value over time (or distance).
+        jerk: [m/s³] with which an acceleration up to the rate builds up and is released; None: at
+            once.
     """
 
     rate: Quantity | None = None
     time: Quantity | None = None
     distance: Quantity | None = None
     shape: Literal["linear", "cubic", "sinusoidal"] = "linear"
+    jerk: float | None = None
 
     def __str__(self) -> str:
         """Return how long it takes, to be said after what changes."""

@@ -108,7 +108,7 @@ class ParticipantSection(ShapedSection):
     siren: Annotated[bool, Field(strict=True)] = False
     """Of an emergency vehicle: blue light and siren are on, and all give way to it."""
     driver: Word | None = None
-    """attentive or scripted, instead of ``others``; not of the ego."""
+    """attentive, insistent or scripted, instead of ``others``; not of the ego."""
 
 
 class ConditionSection(ShapedSection):
@@ -216,6 +216,8 @@ class EventSection(ShapedSection):
     """It takes up this speed [m/s]; a vehicle reverses below 0."""
     rate: Acceleration | None = None
     """At this rate [m/s²]."""
+    jerk: Number | None = None
+    """The acceleration, at most the rate, builds up and is released so fast [m/s³]."""
     time: Duration | None = None
     """Within so long [s]."""
     distance: Length | None = None

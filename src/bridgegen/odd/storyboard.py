@@ -5,7 +5,7 @@ from dataclasses import replace
 
 from bridgegen.named_models import MODELS, body_of
 from bridgegen.odd.choices import Choices
-from bridgegen.odd.others import ATTENTIVE, DRIVERS
+from bridgegen.odd.others import DRIVERS, LOOKING
 from bridgegen.odd.parameters import nearest
 from bridgegen.odd.places import Places
 from bridgegen.odd.plain_yaml import Path, entries
@@ -156,9 +156,9 @@ class Storyboard:
         elif given.type not in _OFF_LANES:
             kinds = ", ".join(_OFF_LANES)
             self._report(f"a path is for {kinds}; {name} is of type {given.type}", path)
-        elif given.driver == ATTENTIVE and PARTICIPANTS[given.type].seen_as.conduct == "vehicle":
+        elif given.driver in LOOKING and PARTICIPANTS[given.type].seen_as.conduct == "vehicle":
             self._report(
-                f"an attentive driver keeps to lanes, {name} has a path: it is scripted", path
+                f"an {given.driver} driver keeps to lanes, {name} has a path: it is scripted", path
             )
         if given.type == "pedestrian":
             self._places.check_crossing(name, points, path)
@@ -276,7 +276,7 @@ class Storyboard:
                 f"ego), got '{driver}'{hint}",
                 place,
             )
-        elif driver == ATTENTIVE and PARTICIPANTS[given.type].seen_as.conduct == "obstacle":
+        elif driver in LOOKING and PARTICIPANTS[given.type].seen_as.conduct == "obstacle":
             self._report(f"{name} is an obstacle, which has no driver; got '{driver}'", place)
 
     def _check_route(
@@ -351,11 +351,13 @@ class Storyboard:
             actor = self._acting.get(str(given.participant))
             slowest = _slowest(actor.name, actor.type) if actor else 0.0
             self._check(given.speed, "m/s", (*path, "speed"), low=slowest)
-            yield SpeedChange(
-                given.speed,
-                self._change(given.rate, given.time, given.distance, given.shape, path),
-            )
-        elif any(one is not None for one in (given.rate, given.time, given.distance)):
+            if given.jerk is not None:
+                self._check(given.jerk, "m/s³", (*path, "jerk"), above=True)
+                if given.rate is None or given.shape != "linear":
+                    self._report("a jerk is for a rate, without a shape", (*path, "jerk"))
+            change = self._change(given.rate, given.time, given.distance, given.shape, path)
+            yield SpeedChange(given.speed, replace(change, jerk=given.jerk))
+        elif any(one is not None for one in (given.rate, given.jerk, given.time, given.distance)):
             self._report(f"{name} has a change of speed without its target (speed)", path)
         if given.lane_change is not None:
             one = given.lane_change
@@ -419,10 +421,10 @@ class Storyboard:
             self._check_participant(other, (*path, key))
             if other == given.participant:
                 self._report(f"{key} is to another participant, got '{other}' twice", (*path, key))
-            if actor is not None and (actor.driver == ATTENTIVE):
+            if actor is not None and actor.driver in LOOKING:
                 self._report(
-                    f"{actor.name} is attentive, its driver keeps the distance; {key} is for one "
-                    "that is scripted",
+                    f"{actor.name} is {actor.driver}, its driver keeps the distance; {key} is for "
+                    "one that is scripted",
                     (*path, key),
                 )
         if keeps is not None:

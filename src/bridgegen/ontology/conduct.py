@@ -10,11 +10,11 @@ from bridgegen.odd.kinds import TOLERANCE
 from bridgegen.odd.rules import STRAIGHT
 from bridgegen.ontology.rule import Rule, about, called, is_a, shown, slack, with_unit
 from bridgegen.ontology.sparql import binds, literal
-from bridgegen.physics import DRY_FRICTION, GRAVITY, GRIP
+from bridgegen.physics import DRY_FRICTION, GRAVITY, GRIP, MOST_LATERAL
 
 _PAPER = "BridgeGen paper, Section III-B"
 _SLACK = literal(TOLERANCE)
-_GRIP = literal(GRIP)
+_GRIP, _MOST = literal(GRIP), literal(MOST_LATERAL)
 _PARTICIPANT = "$this bg:has_participant ?value ."
 _DOES = "(bg:has_init_action|^bg:has_who/bg:has_what)"
 _ROUTE = "bg:has_route/(bg:has_start|bg:has_destination)"
@@ -178,7 +178,10 @@ def _speeds() -> Iterator[Rule]:
 
 
 def _bends() -> Iterator[Rule]:
-    """Yield the rules of a bend: v² <= μ·g·R; the ego's driver is under test, so not of the ego."""
+    """Yield the rules of a bend: v² <= μ·g·R, and what drivers do unless there is a reason.
+
+    The ego's driver is under test, so not of the ego.
+    """
     start = f"?value bg:has_init_action/bg:has_position/bg:on_lane ?lane . ?lane {_ROAD} ?road ."
     yield _bend(
         "bend-of-road",
@@ -213,22 +216,26 @@ def _bends() -> Iterator[Rule]:
 def _bend(key: str, curvature: str, needs: tuple[str, ...]) -> Rule:
     """Return the rule for a curvature [1/m], which the pattern leaves in ``?sharp``."""
     grip = f"({_GRIP} * COALESCE(MIN(?friction), 1.0e0))"
+    least = f"IF({grip} < {_MOST} || COUNT(?reason) > 0, {grip}, {_MOST})"
     slower = "(?speed - (1.0e0 + ?speed) * " + _SLACK + ")"
     return about(
         key, "Scenario", "has_target_speed",
         f"must keep v² <= {DRY_FRICTION}·{GRAVITY}·friction·R in a bend of R = {{?radius}} m with "
-        "friction = {?mu}, got {?got}",
-        "Nobody drives through a bend faster than the tyres hold.",
+        f"friction = {{?mu}}, and v² <= {MOST_LATERAL}·R unless it has a reason to exceed, got "
+        "{?got}",
+        "A vehicle drives through a bend no faster than drivers do, and than the tyres hold.",
         f"{_PAPER} (the road constrains participants' speed and path); {DRY_FRICTION} on a dry "
-        "road, Wong, Theory of Ground Vehicles, table 1.3",
+        f"road, Wong, Theory of Ground Vehicles, table 1.3; {MOST_LATERAL} m/s², Mitschke and "
+        "Wallentowitz, Dynamik der Kraftfahrzeuge",
         f"SELECT $this ?value ({shown('MAX(?speed)')} AS ?got) "
         f"({shown('1.0e0 / MAX(?sharp)')} AS ?radius) "
         f"({shown('COALESCE(MIN(?friction), 1.0e0)')} AS ?mu) "
         f"WHERE {{ {_PARTICIPANT} {is_a('?value', 'Vehicle')} "
         f'FILTER NOT EXISTS {{ ?value bg:has_name "ego" }} {curvature} '
         f"?value {_DOES}/bg:has_target_speed ?speed . "
-        f"OPTIONAL {{ $this {_WEATHERS}/bg:has_road_state/bg:has_friction ?friction }} }} "
-        f"GROUP BY $this ?value HAVING(MAX({slower} * {slower}) * MAX(?sharp) > {grip})",
+        f"OPTIONAL {{ $this {_WEATHERS}/bg:has_road_state/bg:has_friction ?friction }} "
+        "OPTIONAL { ?value bg:has_reason_to_exceed ?reason } } "
+        f"GROUP BY $this ?value HAVING(MAX({slower} * {slower}) * MAX(?sharp) > {least})",
         needs,
     )  # fmt: skip
 

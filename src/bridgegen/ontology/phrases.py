@@ -138,7 +138,7 @@ def _change(speaker: _Speaker, node: Subject) -> str:
         f" {word} {speaker.value(node, name)}"
         for name, word in (
             ("has_rate", "at"), ("has_transition_time", "within"),
-            ("has_transition_distance", "over"),
+            ("has_transition_distance", "over"), ("has_max_jerk", "with"),
         )
         if speaker.has(node, name)
     )  # fmt: skip

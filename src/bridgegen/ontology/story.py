@@ -6,7 +6,7 @@ from typing import NamedTuple
 import pyoxigraph as ox
 
 from bridgegen.errors import OntologyError
-from bridgegen.odd.others import ATTENTIVE
+from bridgegen.odd.others import LOOKING
 from bridgegen.odd.story import (
     Action,
     Arrival,
@@ -85,7 +85,7 @@ def add_participant(
         put(node, "has_reason_to_exceed", one.exceeds_limit)
     _add_body(builder, node, one.body)
     driver = driver if name == EGO else one.driver
-    if name == EGO or driver == ATTENTIVE:
+    if name == EGO or driver in LOOKING:
         controller = builder.node(f"{name}_controller", "Controller")
         put(controller, "has_name", f"{name}_driver")
         put(controller, "has_driver", driver)
@@ -296,6 +296,8 @@ def _add_change(builder: Builder, node: ox.NamedNode, change: Change) -> None:
     ):
         if value is not None:
             builder.quantity(node, name, value)
+    if change.jerk is not None:
+        builder.put(node, "has_max_jerk", change.jerk)
     if change.shape != "linear":
         builder.put(node, "has_dynamics_shape", change.shape)
 

@@ -69,8 +69,8 @@ def map_preventability(
         models: the drivers that decide whether a collision is preventable.
         fixed: other parameters to hold at a value; at their defaults otherwise.
         vehicle: how the egos move, those of the models too; see `bridgegen.simulation.vehicles`.
-        others: driver of the other participants: "attentive" or "scripted"; the scenario's choice
-            by default.
+        others: driver of the other participants: "attentive", "insistent" or "scripted"; the
+            scenario's choice by default.
         workers: a number of processes, ``"ray"``, ``"ray://HOST:PORT"``, or open workers; threads
             by default.
         out: the map's folder; ``preventability/SCENARIO`` by default.

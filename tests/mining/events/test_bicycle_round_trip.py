@@ -71,7 +71,9 @@ def test_parameters_come_back(name):
     assert min(found.precision, found.recall) >= 0.99
     for key, error in found.errors().items():
         assert len(error) >= (FEW if key == "trigger_distance" else 0.99 * len(found.found)), key
-        assert np.quantile(error, 0.95) <= 0.01, key
+        # the ramp that is fitted to a change of pace begins a/(2·j) = 0.1 s later
+        most = 0.1 if key == "trigger_distance" else 0.01
+        assert np.quantile(error, 0.95) <= most, key
 
 
 @pytest.mark.parametrize("name", CASES)

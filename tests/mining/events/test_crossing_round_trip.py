@@ -58,7 +58,7 @@ def runs_red(P, rollout, passes, name):
 
 
 CASES = {
-    "crossroads-s1": (260, "bv", encounter(53.35)),
+    "crossroads-s1": (400, "bv", encounter(53.35)),
     "crossroads-s3": (220, "bv", encounter(48.23)),
     "left-across-path": (120, "bv", hidden_car),
     "pedestrian-behind-parked": (120, "walker", behind_parked),
@@ -66,6 +66,9 @@ CASES = {
                                                      speed="walker_speed")),
     "red-light-runner": (160, "runner", runs_red),
 }  # fmt: skip
+SMALL = {("red-light-runner", "trigger_distance"): 0.03}
+"""Errors by reason of small changes of pace, which build up no full rate: their ramps begin less
+than 0.3 s later."""
 NOISY = ("crossroads-s1", "pedestrian-behind-parked", "red-light-runner")
 
 
@@ -79,7 +82,7 @@ def round_trip(name, noise, dropped, most, count=None, seed=1, observe=observed)
     surely, maybe, P = what(P, rollout, passes, other)
     gap, first = np.abs(passes[0] - passes[1]), passes.min(axis=0)
     closest = pet(rollout)
-    surely = surely & (gap < 5.9) & (first > 1.3) & (closest > 0.2)
+    surely = surely & (gap < 5.5) & (first > 1.3) & (closest > 0.2)
     maybe = maybe & (gap < 6.1) & (first > 0.7)
     if scenario.recorded.event == "vru-crossing":
         surely, maybe = (
@@ -100,7 +103,7 @@ def test_parameters_come_back(name):
     assert min(found.precision, found.recall) >= 0.99
     for key, error in found.errors().items():
         assert len(error) >= 0.8 * len(found.found)
-        assert np.quantile(error, 0.95) <= 0.01, key
+        assert np.quantile(error, 0.95) <= SMALL.get((name, key), 0.01), key
 
 
 @pytest.mark.parametrize("name", NOISY)

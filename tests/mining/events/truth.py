@@ -58,7 +58,9 @@ def encounter(own, other="bv", trigger="bv_trigger", speed="bv_speed"):
             f"{trigger}_time": go, f"{trigger}_distance": apart_at(rollout, e, go),
             speed: at_time(rollout, "v", e, passes[1]),
         }  # fmt: skip
-        return (go > 1.5) & (rest > 0.5), (go > 0.3) & (rest > -0.5), P | happens
+        # events take a change of speed as a ramp, which begins up to a/(2·j) = 0.3 s later
+        surely = (go > 1.5) & (rest > 0.5 + 0.3 * P["ego_speed"])
+        return surely, (go > 0.3) & (rest > -0.5), P | happens
 
     return what
 

@@ -125,6 +125,7 @@ def on_lane(lane: str, distance: float, offset: float | None = None) -> Thing:
 ACTIONS: tuple[Thing, ...] = (
     ("SpeedAction", {"has_target_speed": 3.0}),
     ("SpeedAction", {"has_target_speed": 3.5, "has_rate": 2.0}),
+    ("SpeedAction", {"has_target_speed": 3.5, "has_rate": 2.0, "has_max_jerk": 5.0}),
     ("SpeedAction", {"has_target_speed": 0.1, "has_transition_time": 2.0,
                      "has_dynamics_shape": "cubic"}),
     ("LaneChangeAction", {"has_lane_count": -1, "has_transition_distance": 30.0,

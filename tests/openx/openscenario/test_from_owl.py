@@ -113,7 +113,8 @@ def test_who_takes_part(individuals):
     (driver,) = ego.object_controllers
     assert driver.controller.name == "ego_driver"
     assert driver.controller.properties.get("driver") == "route-follower"
-    assert bv.object_controllers == ()
+    (driver,) = bv.object_controllers
+    assert driver.controller.properties.get("driver") == "insistent"
     box = ego.entity_object.bounding_box
     assert (box.center.x, box.dimensions.length, box.dimensions.width) == (1.4, 4.6, 1.9)
 
@@ -132,8 +133,9 @@ def test_the_event_fires_at_the_earlier_of_two_conditions_even_from_the_start(in
     assert relative.value == osc.ParameterRef("$bv_trigger_distance")
     assert (relative.entity_ref, relative.freespace, relative.rule) == ("ego", False, "lessOrEqual")
     action = event.actions[0].action.action.action
-    assert action.dynamics == osc.TransitionDynamics("linear", "rate", 3.0)
-    assert action.speed_action_target.target.value == osc.ParameterRef("$bv_speed")
+    assert action.entries == (osc.SpeedProfileEntry(osc.ParameterRef("$bv_speed")),)
+    assert action.following_mode is osc.FollowingMode.FOLLOW
+    assert action.dynamic_constraints == osc.DynamicConstraints(3.0, 3.0, None, 5.0, 5.0)
 
 
 def test_it_ends_after_the_duration_or_on_arrival(individuals):

@@ -108,3 +108,44 @@ def test_a_change_of_lane_waits_until_the_gap_is_free():
     assert np.abs(x - first).max() == pytest.approx(3.5, abs=0.05)
     at_once = int(np.flatnonzero(np.abs(scripted.x[0, 1] - first) > 0.01)[0])
     assert at_once < begins
+
+
+@given(speed=st.floats(1.0, 20.0), gap=st.floats(0.5, 60.0), leader=st.floats(0.0, 10.0))
+@settings(max_examples=40, deadline=None)
+def test_it_builds_up_and_releases_an_acceleration_as_the_regulation_s_driver(speed, gap, leader):
+    """12.65 m/s³, in all that lies between two standstills."""
+    places = southbound("other", 20.0, leader) + southbound("bv", 20.0 + 4.0 + gap, speed)
+    rollout = run(scenario(("ego", "bv", "other"), AWAY + places), None, others="attentive")
+    v = rollout.v[0, 1, : rollout.n_steps[0]]
+    drives = np.convolve(v > 0.0, np.ones(3), "valid") == 3.0
+    jerk = np.abs(np.diff(v, 2)) / STEP**2
+    assert jerk[drives].max(initial=0.0) <= JERK + 1e-6
+
+
+EASTBOUND = start("bv", lane(2, 1, 40.0), 6.0, lane(2, 1, 40.0), lane(4, -1, 90.0))
+
+
+def test_an_insistent_driver_gives_way_to_none_that_crosses():
+    """An attentive one gives way to the one from its right (StVO § 8)."""
+    right = start("other", lane(1, 1, 35.0), 6.0, lane(1, 1, 35.0), lane(3, -1, 90.0))
+    text = scenario(("ego", "bv", "other"), AWAY + EASTBOUND + right)
+    scripted, insistent, attentive = (
+        run(text, None, others=one).v[0, 1] for one in ("scripted", "insistent", "attentive")
+    )
+    assert np.array_equal(scripted, insistent)
+    assert attentive.min() < 4.0
+
+
+def test_an_insistent_driver_stops_for_what_stands_in_its_way():
+    """The other one stops in the middle of the junction, 4.9 s after the start."""
+    script = events(("stops", "other", speeding(0.0, "linear time 2.0"), after(2.9)))
+    text = scenario(
+        ("ego", "bv", "other"), AWAY + EASTBOUND + southbound("other", 10.0, 6.0), script
+    )
+    scripted, insistent = (run(text, None, others=one) for one in ("scripted", "insistent"))
+    assert insistent.v[0, 2, -1] == 0.0
+    assert insistent.v[0, 1, -1] < 0.5
+    front = insistent.x[0, 1, -1] + 1.4 + 2.0
+    side = insistent.x[0, 2, -1] - 1.0
+    assert 1.0 < side - front < 4.0
+    assert scripted.x[0, 1, -1] > side, "the other one does not stand in the way"

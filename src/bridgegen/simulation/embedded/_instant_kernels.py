@@ -6,7 +6,7 @@
 import math
 
 from bridgegen.compiled import inlined_kernel, kernel, run_kernel_at
-from bridgegen.ego.drivers import ATTENTIVE
+from bridgegen.ego.drivers import SCRIPTED
 from bridgegen.simulation.embedded._codes import LATERALLY, LONGITUDINALLY
 from bridgegen.simulation.embedded._collision_kernels import collides
 from bridgegen.simulation.embedded._memory_kernels import (
@@ -104,7 +104,7 @@ def after_driver(k, demanded, curvature, plan, roads, state, record):
             command_by_pedals(e, k, plan, roads, state, record)
         if plan.moves_laid and state.laid_count[e] > 0:
             run_kernel_at(plan.moves_laid, (e, k, plan, roads, state, record))
-        elif plan.attends and plan.others[e] == ATTENTIVE:
+        elif plan.attends and plan.others[e] != SCRIPTED:
             move_heeding(e, before, k, plan, roads, state, record)
         else:
             move_along_path(e, k, plan, roads, state, record)

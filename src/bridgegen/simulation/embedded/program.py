@@ -15,7 +15,7 @@ import numpy.typing as npt
 from bridgegen.arrays import Float, Int
 from bridgegen.ego import STORYBOARD, Driver
 from bridgegen.ego._weather_columns import FRICTION_SCALE
-from bridgegen.ego.drivers import ATTENTIVE
+from bridgegen.ego.drivers import SCRIPTED
 from bridgegen.errors import InputError
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.values import Expr, Value
@@ -277,7 +277,7 @@ class Program:
         vehicle: how its body moves, one of `bridgegen.simulation.vehicles.VEHICLES`.
         chassis: of a vehicle with dynamics, see ``_chassis_columns`` and ``_multi_body_columns``;
             else empty.
-        others: ``(E,)`` who drives each of the others, ``SCRIPTED`` or ``ATTENTIVE`` of
+        others: ``(E,)`` who drives each of the others, a code of
             `bridgegen.ego.drivers`; the ego's is not looked at.
         time_step: [s].
         n_steps: recorded instants at most.
@@ -357,8 +357,8 @@ class Program:
 
     @property
     def attends(self) -> Int:
-        """The numbers of the participants that an attentive driver drives."""
-        return np.flatnonzero(self.others == ATTENTIVE)
+        """The numbers of the participants whose driver looks ahead."""
+        return np.flatnonzero(self.others != SCRIPTED)
 
     @property
     def actors(self) -> list[frozenset[int]]:

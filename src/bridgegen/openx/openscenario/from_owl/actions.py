@@ -123,9 +123,20 @@ class Actions:
         return osc.PrivateAction(osc.TeleportAction(position))
 
     def _speed(self, actor: str, node: Subject) -> osc.PrivateAction:
-        """Return a speed action: by rate [m/s²], time [s] or distance [m], or at once."""
+        """Return a change of speed: by rate [m/s²], time [s] or distance [m], or at once.
+
+        With a maximum jerk [m/s³] it is a speed profile of one entry, which can state that.
+        """
         del actor
         speed = self._quantities.get(node, "has_target_speed")
+        if self._individuals.optional_number(node, "has_max_jerk") is not None:
+            rate, jerk = (self._quantities.get(node, name) for name in ("has_rate", "has_max_jerk"))
+            limits = osc.DynamicConstraints(rate, rate, None, jerk, jerk)
+            entries = (osc.SpeedProfileEntry(speed),)
+            profile = osc.SpeedProfileAction(
+                osc.FollowingMode.FOLLOW, entries, dynamic_constraints=limits
+            )
+            return osc.PrivateAction(osc.LongitudinalAction(profile))
         target = osc.SpeedActionTarget(osc.AbsoluteTargetSpeed(speed))
         return osc.PrivateAction(
             osc.LongitudinalAction(osc.SpeedAction(self._dynamics(node), target))

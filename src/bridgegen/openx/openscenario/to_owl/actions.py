@@ -89,6 +89,8 @@ def _action(
     elif isinstance(inner, osc.SpeedAction):
         node = builder.node(name, "SpeedAction")
         put_speed(builder, node, inner)
+    elif isinstance(inner, osc.SpeedProfileAction):
+        node = _change_with_jerk(builder, name, inner)
     elif isinstance(inner, osc.LaneChangeAction | osc.LaneOffsetAction):
         node = _lateral(builder, name, actors, inner)
     elif isinstance(inner, osc.FollowTrajectoryAction):
@@ -120,6 +122,35 @@ def put_speed(builder: StoryBuilder, node: ox.NamedNode, action: osc.SpeedAction
         raise UnsayableError(target, "RelativeTargetSpeed")
     builder.number(node, "has_target_speed", target.value, target)
     _put_change(builder, node, action.dynamics)
+
+
+def _change_with_jerk(
+    builder: StoryBuilder, name: str, action: osc.SpeedProfileAction
+) -> ox.NamedNode:
+    """Add a change to one speed within limits of acceleration and jerk, the same both ways.
+
+    Raises:
+        UnsayableError: another speed profile.
+    """
+    limits = action.dynamic_constraints or osc.DynamicConstraints()
+    rate, jerk = limits.max_acceleration, limits.max_acceleration_rate
+    (one, *more) = action.entries
+    if (
+        more
+        or one.time is not None
+        or action.entity_ref is not None
+        or rate is None
+        or jerk is None
+        or limits.max_speed is not None
+        or (rate, jerk) != (limits.max_deceleration, limits.max_deceleration_rate)
+        or builder.choice(osc.FollowingMode, action.following_mode) is not osc.FollowingMode.FOLLOW
+    ):
+        raise UnsayableError(action, "SpeedProfileAction")
+    node = builder.node(name, "SpeedAction")
+    builder.number(node, "has_target_speed", one.speed, one)
+    builder.number(node, "has_rate", rate, limits)
+    builder.number(node, "has_max_jerk", jerk, limits)
+    return node
 
 
 def _put_change(builder: StoryBuilder, node: ox.NamedNode, how: osc.TransitionDynamics) -> None:

@@ -7,7 +7,7 @@ import numpy as np
 from bridgegen.arrays import Float, Int
 from bridgegen.ego import STORYBOARD, Driver
 from bridgegen.ego._kind_tables import IS_VEHICLE
-from bridgegen.ego.drivers import ATTENTIVE, SCRIPTED
+from bridgegen.ego.drivers import CODES, SCRIPTED
 from bridgegen.ego.kinds import NAMES
 from bridgegen.errors import InputError, UnsupportedError
 from bridgegen.openx.openscenario import model as osc
@@ -70,8 +70,8 @@ def compile_storyboard(
         place: its name, for messages.
         driver: who drives the ego, whatever the file says.
         ideal: its stages that are ideal, whatever the driver or the file says.
-        others: "attentive" or "scripted": who drives all other participants, whatever the file
-            says; attentive are those that can be.
+        others: a name of `bridgegen.ego.drivers.OTHERS`: who drives all other participants,
+            whatever the file says; those that cannot look ahead are scripted.
         vehicle: how the ego moves, whatever the file says; see `bridgegen.simulation.vehicles`.
         time_step: [s], whatever the file says.
         skipped: takes a sentence for each thing that the rollout cannot do, which is left out then
@@ -305,13 +305,13 @@ class _Compiler:
             said = declared.other_driver(self.controllers, self.place, e, name)
             lacks = self._lacks_for_attention(e, body)
             if others is not None:
-                found[e] = ATTENTIVE if others == "attentive" and not lacks else SCRIPTED
-            elif said == ATTENTIVE and lacks:
+                found[e] = SCRIPTED if lacks else CODES[others]
+            elif said not in (None, "scripted") and lacks:
                 self.tables.problems.append(
-                    f"{self.place}: '{name}' cannot have the driver 'attentive': {lacks}"
+                    f"{self.place}: '{name}' cannot have the driver '{said}': {lacks}"
                 )
             elif said is not None:
-                found[e] = said
+                found[e] = CODES[said]
         return found
 
     def _lacks_for_attention(self, e: int, body: Body) -> str:

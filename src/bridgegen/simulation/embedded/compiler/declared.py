@@ -12,7 +12,7 @@ from bridgegen.ego import (
     is_spec,
     split,
 )
-from bridgegen.ego.drivers import ATTENTIVE, OTHERS, SCRIPTED
+from bridgegen.ego.drivers import OTHERS
 from bridgegen.errors import InputError, UnknownNameError, UnsupportedError
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.declarations import (
@@ -113,8 +113,8 @@ def _refuse_two(controllers: Controllers, place: str) -> None:
         found = found if value is None else str(value)
 
 
-def other_driver(controllers: Controllers, place: str, entity: int, name: str) -> int | None:
-    """Return the code of the driver that an entity's controllers name, None if none does.
+def other_driver(controllers: Controllers, place: str, entity: int, name: str) -> str | None:
+    """Return the driver that an entity's controllers name, None if none does.
 
     Raises:
         UnsupportedError: it is no driver of participants other than the ego, or there are two.
@@ -138,7 +138,7 @@ def other_driver(controllers: Controllers, place: str, entity: int, name: str) -
         found[str(value)] = controller
     if not found:
         return None
-    return ATTENTIVE if "attentive" in found else SCRIPTED
+    return next(iter(found))
 
 
 def vehicle(controllers: Controllers, place: str, asked: str | None, *, has_driver: bool) -> str:

@@ -14,7 +14,8 @@ from bridgegen.compiled import kernel
 from bridgegen.ego._attentive_kernels import ASKED, LOOK, look, react, see
 from bridgegen.ego._following_kernels import COMFORT_ACCELERATION
 from bridgegen.ego._weather_columns import FRICTION
-from bridgegen.ego.drivers import ATTENTIVE
+from bridgegen.ego.drivers import SCRIPTED
+from bridgegen.physics import CAREFUL_JERK
 from bridgegen.simulation.embedded._codes import DOES, KEEP_ASIDE
 from bridgegen.simulation.embedded._memory_kernels import STOPS
 from bridgegen.simulation.embedded._motion_kernels import SAME_SPEED
@@ -25,6 +26,8 @@ from bridgegen.simulation.embedded.motion import (
     move_along_path,
 )
 from bridgegen.simulation.embedded.places._slope_kernels import slope
+
+SETTLES = 2.0  # m/s³, with which it releases the accelerator as it catches up with its script; ours
 
 
 @kernel
@@ -37,7 +40,7 @@ def heed(k, plan, roads, state, record):
         )
     for e in range(1, record.x.shape[0]):
         state.allowed[e] = math.inf
-        if plan.others[e] != ATTENTIVE:
+        if plan.others[e] == SCRIPTED:
             continue
         p, mind = state.on[e], state.minds[e]
         if not state.present[e] or state.placed[e] or p < 0 or state.follow[e] >= 0:
@@ -79,13 +82,18 @@ def move_heeding(e, before, k, plan, roads, state, record):
     """Move an entity on from instant k as its driver allows; see ``_travel_kernels``.
 
     ``before`` [m/s] is the command of the instant before. An entity behind its script catches up at
-    a comfortable acceleration at most, and never exceeds the commanded speed.
+    a comfortable acceleration at most, and never exceeds the commanded speed. Its acceleration
+    changes by `CAREFUL_JERK` at most.
     """
     most, v, body = state.allowed[e], record.v[e, k], plan.bodies[e]
     if v < before - SAME_SPEED:
-        most = min(most, COMFORT_ACCELERATION)
+        most = min(most, COMFORT_ACCELERATION, math.sqrt(2.0 * SETTLES * (before - v)))
     asked = state.command[e]
     if most < math.inf:
+        change = CAREFUL_JERK * plan.dt  # it builds up and releases pedals no faster
+        now = (v - record.v[e, k - 1]) / plan.dt if k > 0 else 0.0
+        now = min(max(now, -body[5]), body[4])  # it may have been put here just now
+        most = min(max(most, now - change), now + change)
         uphill, _, press = slope(e, roads, state)
         most = max(most, -min(body[5], press * state.weather[FRICTION]) - uphill)
         state.command[e] = min(asked, max(v + most * plan.dt, 0.0))

@@ -11,7 +11,7 @@ from bridgegen.ego._attentive_kernels import gap_is_free
 from bridgegen.ego._conflict_kernels import LEAST_PACE
 from bridgegen.ego._path_kernels import project
 from bridgegen.ego._weather_columns import FRICTION
-from bridgegen.ego.drivers import ATTENTIVE
+from bridgegen.ego.drivers import SCRIPTED
 from bridgegen.simulation.embedded._codes import DIMENSION, LASTS, ROW, SHAPE, TARGET, WHOM
 from bridgegen.simulation.embedded._memory_kernels import NO_LANE
 from bridgegen.simulation.embedded._motion_kernels import DISTANCE, nearest
@@ -127,7 +127,7 @@ def begin_lane_change(j, k, plan, roads, state, record):
     if p < 0:
         return
     station = station_of(roads.spans[p], roads.span_counts[p], target, s)
-    if plan.attends and plan.others[e] == ATTENTIVE:
+    if plan.attends and plan.others[e] != SCRIPTED:
         if _waits(j, k, p, station, way, plan, roads, state, record):
             return
         state.waits[e] = -1

@@ -6,6 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from bridgegen.arrays import Float, Int
+from bridgegen.ego.drivers import ATTENTIVE
 from bridgegen.ego.scene import stop_lines, stop_signs
 from bridgegen.openx.opendrive.model import OpenDrive
 from bridgegen.simulation.embedded.places.ways import Ways
@@ -44,7 +45,7 @@ def meetings(program: Program, models: Sequence[OpenDrive], ways: Sequence[Ways]
     zones, lines = np.full((p, e, e, ZONE), np.inf), np.full((p, e, lights), np.inf)
     signs: dict[tuple[int, int], list[float]] = {}
     for number, (model, known) in enumerate(zip(models, ways, strict=True)):
-        for one in program.attends.tolist():
+        for one in np.flatnonzero(program.others == ATTENTIVE).tolist():
             _find_zones(zones[number, one], one, program, known)
             route = known.routes[one]
             if route is None:
