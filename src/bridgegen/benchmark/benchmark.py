@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from bridgegen import search as toolkit
-from bridgegen.benchmark.domain import domain_of
+from bridgegen.campaign.domain import domain_of
 from bridgegen.benchmark.estimate import measured, seconds_of
 from bridgegen.benchmark.page import write_page
 from bridgegen.benchmark.plan import (

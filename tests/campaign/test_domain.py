@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from bridgegen.benchmark.domain import domain_of, in_words, needed
+from bridgegen.campaign.domain import domain_of, in_words, needed
 from bridgegen.ego.planners.planner import DOMAINS
 from bridgegen.odd.reader import load
 from bridgegen.openx.opendrive.from_owl.network import opendrive_from_owl
