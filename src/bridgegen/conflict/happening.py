@@ -107,9 +107,9 @@ def stuck(rollout: Rollout) -> tuple[Int, Int]:
     An ego is stuck if it stands until the end of the scenario without a contact, and more than
     `WITHOUT_REASON` seconds of that time have no reason. Reasons are: a stop line just ahead whose
     light is not green; someone on foot on a crosswalk just ahead; any participant that comes
-    nearer and could be at the ego within `GAP_TIME`; and what stands in the way just ahead, unless it is a
-    vehicle or an object that never moves and has no other standing just ahead of it, as in a jam:
-    that one is parked, and is to be passed.
+    nearer and could be at the ego within `GAP_TIME`; and what stands in the way just ahead, unless
+    it is a vehicle or an object that never moves and has no other standing just ahead of it, as in
+    a jam: that one is parked, and is to be passed.
 
     Args:
         rollout: of N scenarios, with ``progress``.
@@ -218,7 +218,7 @@ class Share:
 
     @property
     def value(self) -> float:
-        """rows / of."""
+        """Rows / of."""
         return self.rows / self.of
 
 

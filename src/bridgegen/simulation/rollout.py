@@ -108,8 +108,8 @@ class Rollout:
             ``(0,)`` where unknown.
         towed_by: ``(E,)`` int64, which entity tows each at any time; -1: none. Empty where there
             are no trailers. Coupled entities do not collide.
-        progress: ``(N, 2)`` float64 [m], how far the ego's driver drove, and how far it was then from
-            the end of its route; ``(0, 2)`` where unknown.
+        progress: ``(N, 2)`` float64 [m], how far the ego's driver drove, and how far it then was
+            from the end of its route; ``(0, 2)`` where unknown.
         messages: details of failures, by row.
         incidents: by row, those that the simulator itself reported.
         derived: intermediate results that several metrics share; see `metrics.metric.shared`.

@@ -309,7 +309,6 @@ class Batch:
             messages=self._messages,
         )  # fmt: skip
 
-
     def _progress(self) -> Float:
         """Return `Rollout.progress`; no rows where the storyboard moves the ego."""
         if self._program.driver == STORYBOARD:
