@@ -10,10 +10,11 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from statistics import median
-from typing import Any, Self
+from typing import Any, Literal, Self
 
 import numpy as np
 import numpy.typing as npt
+from pydantic import BaseModel
 
 from bridgegen.arrays import Bool, Float, Int
 from bridgegen.ego._kind_tables import IS_OBSTACLE, IS_ON_FOOT
@@ -202,6 +203,23 @@ def _crossed(one: Rollout, distance: Float) -> Bool:
     return found
 
 
+class _Stuck(BaseModel, extra="forbid", strict=True):
+    """Where an ego is stuck; see `happened`."""
+
+    behind: str | None
+    driven: int
+    left: int
+
+
+class _Text(BaseModel, extra="forbid", strict=True):
+    """A text of `happened`."""
+
+    began: dict[str, bool]
+    near: dict[str, bool]
+    end: bool | None = None
+    stuck: _Stuck | Literal[False] | None = None
+
+
 @dataclass(frozen=True)
 class Share:
     """In how many evaluations something happened.
@@ -250,22 +268,26 @@ class Happening:
 
     @classmethod
     def of(cls, texts: Iterable[str], domain: str = "") -> Self:
-        """Return what happened, from the texts of `happened`."""
+        """Return what happened, from the texts of `happened`.
+
+        Raises:
+            ValueError: a text is something else.
+        """
         counts = Counter(text for text in texts if text)
-        found = [(json.loads(text), rows) for text, rows in counts.items()]
-        ends = [(one["end"], rows) for one, rows in found if "end" in one]
-        stuck = [(one["stuck"], rows) for one, rows in found if one.get("stuck")]
+        found = [(_Text.model_validate_json(text), rows) for text, rows in counts.items()]
+        ends = [(one.end, rows) for one, rows in found if one.end is not None]
+        stuck = [(one.stuck, rows) for one, rows in found if one.stuck]
         behind = Counter[str]()
-        driven, left = list[float](), list[float]()
+        driven, left = list[int](), list[int]()
         for one, rows in stuck:
-            behind[one["behind"] or ""] += rows
-            driven += [one["driven"]] * rows
-            left += [one["left"]] * rows
+            behind[one.behind or ""] += rows
+            driven += [one.driven] * rows
+            left += [one.left] * rows
         who, most = behind.most_common(1)[0] if stuck else ("", 0)
         return cls(
             rows=sum(counts.values()),
-            events=_shares("began", found),
-            near=_shares("near", found),
+            events=_shares([(one.began, rows) for one, rows in found]),
+            near=_shares([(one.near, rows) for one, rows in found]),
             end=_share("end", ends) if ends else None,
             stuck=len(driven) if ends else None,
             behind=who if 2 * most > len(driven) else "",
@@ -330,9 +352,8 @@ def _share(name: str, found: Iterable[tuple[bool, int]]) -> Share:
     return Share(name, sum(rows for yes, rows in known if yes), sum(rows for _, rows in known))
 
 
-def _shares(key: str, found: Sequence[tuple[dict[str, Any], int]]) -> tuple[Share, ...]:
-    names = dict.fromkeys(name for one, _ in found for name in one[key])
+def _shares(found: Sequence[tuple[dict[str, bool], int]]) -> tuple[Share, ...]:
+    names = dict.fromkeys(name for one, _ in found for name in one)
     return tuple(
-        _share(name, ((one[key][name], rows) for one, rows in found if name in one[key]))
-        for name in names
+        _share(name, ((one[name], rows) for one, rows in found if name in one)) for name in names
     )
