@@ -7,7 +7,7 @@ occurs. Docs: docs/conflicts.md, "Did it happen?".
 import json
 from collections import Counter
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from statistics import median
 from typing import Any, Literal, Self
@@ -30,6 +30,9 @@ STANDS = 0.5
 WITHOUT_REASON = 5.0
 """[s] that an ego may stand for no reason; the first driver at a green light takes about 2 s
 (Highway Capacity Manual, start-up lost time)."""
+
+SAMPLED = 0.25
+"""[s] between two instants at which reasons are looked for."""
 
 GAP_TIME = 7.5
 """[s] For what arrives within this time a driver may wait: the gap that cars accept for a left turn
@@ -118,25 +121,20 @@ def stuck(rollout: Rollout) -> tuple[Int, Int]:
     Returns:
         The rows ``(K,)``, ascending; and by row the entity that the ego stands behind, 0 if none.
     """
-    n, _, t = rollout.shape
-    least = WITHOUT_REASON / rollout.time_step
-    last = rollout.n_steps - 1
-    rows = np.flatnonzero(
-        (rollout.status == 0)
-        & (rollout.progress[:, 1] > 0.0)
-        & (np.abs(rollout.v[np.arange(n), 0, last]) < STANDS)
-        & (last >= least)
-    )
+    every = max(round(SAMPLED / rollout.time_step), 1)
+    least = WITHOUT_REASON / (every * rollout.time_step)
+    last = (rollout.n_steps - 1) // every
+    v = rollout.v[:, 0, ::every]
+    at = np.arange(v.shape[1])
+    there = at <= last[:, np.newaxis]
+    idle = there & (at > np.where(there & (np.abs(v) >= STANDS), at, -1).max(axis=1, keepdims=True))
+    waits = (rollout.status == 0) & (rollout.progress[:, 1] > 0.0) & (idle.sum(axis=1) > least)
+    rows = np.flatnonzero(waits)
     if not rows.size:
         return rows, rows
-    some, last = rollout.take(rows), last[rows]
-    at = np.arange(t)
-    there = at <= last[:, np.newaxis]
-    moves = there & (np.abs(some.v[:, 0]) >= STANDS)
-    since = np.where(moves, at, -1).max(axis=1)
-    idle = there & (at > since[:, np.newaxis])
-    distance = rollout.distance[rows]
-    idle[(distance <= 0.0).any(axis=(1, 2))] = False
+    some, idle, there, last = _sampled(rollout, rows, every), idle[rows], there[rows], last[rows]
+    distance = rollout.distance[:, :, ::every][rows]
+    idle[(rollout.distance[rows] <= 0.0).any(axis=(1, 2))] = False
     ahead, aside = _from_ego(some, some.x, some.y)  # (K, E, T)
     width = 0.5 * (some.box[:, 1] + some.box[0, 1])[:, np.newaxis] + SIDE
     blocks = (ahead > 0.0) & (np.abs(aside) <= width) & (distance <= IN_THE_WAY)
@@ -155,6 +153,16 @@ def stuck(rollout: Rollout) -> tuple[Int, Int]:
     gap = np.where(blocks, distance, np.inf)[np.arange(len(rows)), :, last]
     behind = np.where(np.isfinite(gap).any(axis=1), gap.argmin(axis=1), 0)
     return rows[found], behind[found]
+
+
+def _sampled(rollout: Rollout, rows: Int, every: int) -> Rollout:
+    """Return what `stuck` looks at of some rows, at every k-th instant."""
+    names = ["x", "y", "h", "v", *(["lights"] if len(rollout.lights) else [])]
+    parts: dict[str, Any] = {name: getattr(rollout, name)[:, :, ::every][rows] for name in names}
+    for name in ("stop_lines", "crosswalks"):
+        if len(array := getattr(rollout, name)):
+            parts[name] = array[rows]
+    return replace(rollout, **parts)
 
 
 def _from_ego(one: Rollout, x: Float, y: Float) -> tuple[Float, Float]:
