@@ -10,7 +10,9 @@ def test_by_harm_nobody_stops_dead_where_the_road_ends(tmp_path):
     harm, paper, thresholds = (
         bg.run_search("paper/crossroads-s3", **GIVEN, **how, triage="short", out=tmp_path / name)
         for name, how in (
-            ("a", {"objective": "harm"}), ("b", {}), ("c", {"objective": "harm", "critical": "thresholds"})
+            ("a", {"objective": "harm"}),
+            ("b", {}),
+            ("c", {"objective": "harm", "critical": "thresholds"}),
         )
     )  # fmt: skip
     assert harm.frame()["implausible"].isna().all()

@@ -704,7 +704,9 @@ def test_a_vehicle_that_pulls_out_ahead_is_followed(track, meeting, v, fault):
     rollout = meeting(track(v=v, t=8.0), other, boxes=[(4.0, 2.0, 0.0), bus], claims=[0])
     found = analyse(rollout)
     assert found.type[0, 1] == ConflictType.SIDE_SWIPE
-    assert verdict(rollout) == ((EGO, Rule.CUT_IN_PREVENTABLE) if fault else (BV, Rule.LEFT_ITS_LANE))
+    assert verdict(rollout) == (
+        (EGO, Rule.CUT_IN_PREVENTABLE) if fault else (BV, Rule.LEFT_ITS_LANE)
+    )
     assert at_fault(rollout) == fault
 
 

@@ -12,6 +12,7 @@ from bridgegen import search as toolkit
 from bridgegen.arrays import Int
 from bridgegen.campaign.chosen import as_judged, chosen_objective, columns_of
 from bridgegen.campaign.critical import export_critical, most_critical
+from bridgegen.campaign.domain import outside
 from bridgegen.campaign.exportable import require_exportable
 from bridgegen.campaign.failing_driver import FailingDriver
 from bridgegen.campaign.loop import Progress, Reason, run_loop
@@ -162,6 +163,8 @@ def run_search(given: SearchArguments) -> Run:
         )
         for note in (*logical.notes, *pipeline.notes):
             callbacks.warning(note)
+        if domain := outside(pipeline):
+            callbacks.warning(domain)
         callbacks.stage("compile")
         pipeline.warm_up()
         require_exportable(pipeline)
@@ -191,7 +194,7 @@ def run_search(given: SearchArguments) -> Run:
         searcher = searcher_of(pipeline, made_with, callbacks.warning)  # it may refuse
         with Store.create(
             folder, made_with.to_dict(), space.names, pipeline.metrics,
-            n_var=space.n_var, n_obj=chosen.n_obj, labels=space.labels,
+            n_var=space.n_var, n_obj=chosen.n_obj, labels=space.labels, domain=domain,
         ) as store:  # fmt: skip
             return _go(pipeline, searcher, store, made_with, callbacks, given.deliver)
 

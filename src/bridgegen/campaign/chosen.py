@@ -100,7 +100,7 @@ def chosen_objective(
             raise InputError(f"the objective '{PAPER}' stands alone, without a weight")
         spec, metrics = replace(PAPERS, critical=spec.critical), None
     if metrics is not None and HARM in metrics:
-        spec = replace(spec, rule="harm", weights="fixed")
+        spec = replace(spec, rule="harm", weights="fixed", gated=True)
         if len(metrics) == 1:
             metrics = {HARM: 1.0 if columns == "one" and weights != "entropy" else None}
     if metrics and all(name.startswith(PREFIX) for name in metrics):

@@ -17,6 +17,7 @@ from bridgegen.campaign.exported import (
     not_exported,
 )
 from bridgegen.campaign.settings import Settings
+from bridgegen.conflict.happening import Happening
 from bridgegen.criteria import CriterionSummary, summarise_criteria
 from bridgegen.errors import StorageError
 from bridgegen.odd.criteria import read_criterion
@@ -70,6 +71,7 @@ class Run:
         self._take(store)
         if rows is not None:
             self.summary, self.failures = _summary(store, rows), _failures(store, rows)
+            self.happening = _happening(store, rows)
         return self
 
     def _take(self, store: Store) -> None:
@@ -88,6 +90,16 @@ class Run:
         """The key figures."""
         with Store.open(self.folder) as store:
             return _summary(store, Recorded(store, whole=("d_min", "v_d")))
+
+    @cached_property
+    def happening(self) -> Happening:
+        """What happened: which events began, who came near the ego, whether the ego got along.
+
+        Raises:
+            StorageError: the database is damaged.
+        """
+        with Store.open(self.folder) as store:
+            return _happening(store, Recorded(store))
 
     @cached_property
     def failures(self) -> Counter[str]:
@@ -208,6 +220,11 @@ def _summary(store: Store, rows: Rows | Recorded) -> Summary:
         rows.metrics[:, metric("d_min")], rows.metrics[:, metric("v_d")], rows.cause,
         store.seconds,
     )  # fmt: skip
+
+
+def _happening(store: Store, rows: Rows | Recorded) -> Happening:
+    with store.damage():
+        return Happening.of(rows.findings.happened, store.domain)
 
 
 def _failures(store: Store, rows: Rows | Recorded) -> Counter[str]:

@@ -100,6 +100,7 @@ def print_summary(run: "Run", seconds: float) -> None:
         ("d_min", f"best {s.d_min_best:.2f} m, median {s.d_min_median:.2f} m"),
         ("v_d", f"best {s.v_d_best:.2f} m/s, median {s.v_d_median:.2f} m/s"),
         *((f"criterion {one.criterion.id}", one.sentence) for one in run.criteria),
+        *([("what happened", said)] if (said := run.happening.sentence) else []),
         ("wall time", f"{seconds:.2f} s, of which {s.seconds:.2f} s search"),
         ("scenarios", _exported(run)),
     ]
@@ -142,6 +143,8 @@ def conclusion(run: "Run") -> list[tuple[str, str]]:
             rows = [("verdict", text), ("harm", rows[0][1])]
         else:
             rows.append(("criteria", text))
+    if stuck := run.happening.stuck_in_words:
+        rows.append(("progress", stuck))
     if found is not None and found.modes:
         worst = max(found.modes, key=lambda one: (one.severity, one.harm))
         rows.append(("worst", shortly(worst)))

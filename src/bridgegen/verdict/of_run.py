@@ -46,13 +46,14 @@ FIGURES = {
     "d_min_median": "the median of d_min [m]",
     "v_d_best": "the largest v_d [m/s]",
     "v_d_median": "the median of v_d [m/s]",
+    "stuck": "evaluations whose ego stands for no reason before the end of its route",
     "seconds": "duration of the search without compilation [s]",
     **dict.fromkeys(_CAUSES, "critical scenarios of this cause (quick: one replay)"),
     **_TRIAGE,
 }
 """The figures of a run that ``--fail-if`` accepts."""
 
-_OF_THE_RUN = ("evaluations", "failed", "seconds", "harmful.upper")
+_OF_THE_RUN = ("evaluations", "failed", "stuck", "seconds", "harmful.upper")
 """Figures to which no single critical scenario contributes."""
 
 
@@ -146,6 +147,7 @@ def figures_of(run: Run) -> dict[str, float]:
         "d_min_median": s.d_min_median,
         "v_d_best": s.v_d_best,
         "v_d_median": s.v_d_median,
+        "stuck": float("nan") if (stuck := run.happening.stuck) is None else stuck,
         **{n: s.causes.get(one, 0) if sought else nan for n, one in _CAUSES.items()},
         **_of_triage(run),
     }
