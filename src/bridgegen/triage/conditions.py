@@ -260,8 +260,8 @@ class Conditions:
         at = self._random.random(OUTSIDE) * widths.sum()
         which = np.minimum(np.searchsorted(np.cumsum(widths), at, "right"), len(widths) - 1)
         start = np.concatenate([[0.0], np.cumsum(widths)])[which]
-        lows: Float = np.array([low for low, _ in intervals])[which]
-        return lows + at - start
+        values: Float = np.array([low for low, _ in intervals])[which] + at - start
+        return values
 
     def _condition(self, i: int, confirmed: tuple[_Span, Probes] | None) -> Condition:
         name, v, nominal = self._space.variables[i], float(self._v[i]), float(self._nominal[i])

@@ -2,7 +2,9 @@
 
 from collections.abc import Sequence
 
-from bridgegen.arrays import Bool, Float
+import numpy as np
+
+from bridgegen.arrays import Bool, Numbers
 from bridgegen.odd.space import SearchSpace
 from bridgegen.triage.moves import searched
 from bridgegen.triage.record import Influence
@@ -16,11 +18,16 @@ AT_END = 0.25
 LEAST_ROWS = 5
 """… and at least so many rows fail, and so many do not."""
 
+MOST_OTHERS = 50_000
+"""Other rows that are compared; of more, evenly chosen ones."""
+
 SIGNIFICANT = 0.01
 """Probability of a distance by chance, times the number of parameters, below which it counts."""
 
 
-def influences(space: SearchSpace, X: Float, fails: Bool, ok: Bool) -> tuple[Influence, ...]:
+def influences(
+    space: SearchSpace, X: Numbers, fails: Bool, ok: Bool
+) -> tuple[Influence, ...]:
     """Return the parameters whose values differ between failures and other rows, most first.
 
     The difference is the Kolmogorov-Smirnov distance of the two samples, which is 0 where they are
@@ -35,7 +42,8 @@ def influences(space: SearchSpace, X: Float, fails: Bool, ok: Bool) -> tuple[Inf
 
     Source: N. Smirnov, Ann. Math. Stat. 19 (1948), 279-281; Bonferroni's correction.
     """
-    bad, good = X[fails], X[ok & ~fails]
+    others = np.flatnonzero(ok & ~fails)
+    bad, good = X[fails], X[others[:: max(1, -(-len(others) // MOST_OTHERS))]]
     if min(len(bad), len(good)) < LEAST_ROWS:
         return ()
     from scipy.stats import ks_2samp

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from bridgegen.arrays import Float, Numbers
+from bridgegen.arrays import Float
 from bridgegen.conflict.findings import Findings
 from bridgegen.evaluation import CODES, EVENT, MEASURES
 
@@ -32,7 +32,7 @@ def of_events(event: Float) -> Float:
     return _coordinates(measures, least, [event[:, EVENT.index(name)] for name in CODES])
 
 
-def of_results(metrics: Numbers, findings: Findings) -> Float:
+def of_results(metrics: Float, findings: Findings) -> Float:
     """Return coordinates of N rows by their recorded results, where events are not known.
 
     Args:
@@ -40,7 +40,7 @@ def of_results(metrics: Numbers, findings: Findings) -> Float:
         findings: of the rows.
     """
     texts = (findings.conflict, findings.conflict_type, findings.partner)
-    return _coordinates(np.asarray(metrics, dtype=np.float64), np.zeros(metrics.shape[1]), texts)
+    return _coordinates(metrics, np.zeros(metrics.shape[1]), texts)
 
 
 def _coordinates(numbers: Float, least: Float, labels: Sequence[npt.NDArray[np.generic]]) -> Float:
