@@ -7,6 +7,7 @@ from bridgegen.arrays import Bool
 from bridgegen.conflict.findings import Findings
 from bridgegen.report.playback import Conflict
 from bridgegen.triage.record import Minimal, Mode, Neighbourhood, Treatment, Triage
+from bridgegen.triage.words import parameters_in_words
 
 FINDING_FIELDS = ("conflict", "conflict_type", "responsible", "rule", "partner")
 """The fields of a row's finding, in the page's order."""
@@ -47,6 +48,7 @@ def conflict_payload(one: Conflict) -> dict[str, Any]:
     numbers = {name: value for name, value in facts.items() if isinstance(value, dict)}
     return {
         **{name: value for name, value in facts.items() if name not in numbers},
+        "bare": one.summary.bare,
         "numbers": {
             name: [None if v["value"] is None else float(f"{v['value']:.4g}"), v["unit"]]
             for name, v in numbers.items()
@@ -69,6 +71,8 @@ def triage_payload(found: Triage) -> dict[str, Any]:
         "neighbours": found.neighbours,
         "radius": found.radius,
         "untested": found.untested,
+        "matters": parameters_in_words(found),
+        "judged": {one.evaluation: one.judgement for one in found.neighbourhoods if one.judgement},
         "bound": {
             "sentence": found.bound.sentence,
             "evaluations": found.bound.evaluations,
@@ -83,13 +87,14 @@ def _mode(one: Mode, tested: Neighbourhood | None) -> dict[str, Any]:
     facts = one.model_dump(
         include={
             "number", "title", "conflict", "conflict_type", "responsible", "rule", "partner",
-            "place", "cause", "tested", "count", "harm", "severity", "shown", "worst",
+            "place", "cause", "judgement", "tested", "count", "harm", "severity", "shown", "worst",
             "robustness", "space",
         }
     )  # fmt: skip
     return facts | {
         "knife_edge": one.knife_edge,
         "exports": list(one.exports[:5]),
+        "rules": [rule for rule, _ in one.rules] or [one.rule],
         "rows": tested.rows if tested else 0,
         "harmful": tested.harmful if tested else 0,
         "fix": _fix(tested.fix) if tested else None,

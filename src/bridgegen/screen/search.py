@@ -161,7 +161,7 @@ def _print_rows(rows: list[tuple[str, str]]) -> None:
 
 def _print_modes(found: "Triage") -> None:
     """Print the failure modes, with their simplest scenarios."""
-    from bridgegen.triage.words import mode_in_words
+    from bridgegen.triage.words import mode_in_words, parameters_in_words
 
     for one in found.modes[:MOST_MODES]:
         print(mode_in_words(one, found))
@@ -171,6 +171,8 @@ def _print_modes(found: "Triage") -> None:
     more = len(found.modes[MOST_MODES:]) + found.unrecorded_modes
     if more:
         print(f"     and {more} more")
+    if matter := parameters_in_words(found):
+        print(f"what matters most: {matter}")
 
 
 def _exported(run: "Run") -> str:
