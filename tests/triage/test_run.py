@@ -192,25 +192,41 @@ def test_a_driver_without_failures_leaves_an_empty_export_and_a_bound(tmp_path, 
     assert figures_of(run)["modes"] == 0
 
 
-def test_with_the_paper_s_rule_its_scenarios_are_kept_behind_the_failures(tmp_path, capsys):
+def test_only_failures_are_exported_also_with_the_paper_s_rule(tmp_path, capsys):
     from bridgegen.screen.search import print_summary
 
     run = bg.run_search(
         "crossroads-s3", ego="route-follower", algorithm="random", budget=100, keep=8,
-        out=tmp_path / "run",
+        objective="paper", out=tmp_path / "run",
     )  # fmt: skip
     frame, found = run.frame(), [facts(path) for path in run.scenarios]
     assert len(found) == 8
     assert all(one["critical"] for one in found)
     assert run.settings.optimised["rule"] == "thresholds"
-    harmful = [bool(frame.loc[one["row"], "harm"] >= NEAR_MISS) for one in found]
-    assert harmful == sorted(harmful, reverse=True)
+    assert all(frame.loc[one["row"], "harm"] >= NEAR_MISS for one in found)
+    assert all(one["implausible"] is None for one in found)
     shown = {one.shown for one in run.modes if frame.loc[one.shown, "critical"]}
     assert shown <= {one["row"] for one in found}
     print_summary(run, 1.0)
     out = capsys.readouterr().out
     assert out.startswith("scenario")
     assert run.triage.bound.sentence in out
+
+
+def test_a_run_without_failures_exports_none_and_says_so(tmp_path, capsys):
+    from bridgegen.screen.search import print_summary
+
+    run = bg.run_search(
+        "crossroads-s2", ego="reference", algorithm="random", budget=60, objective="paper",
+        triage="none", out=tmp_path / "run",
+    )  # fmt: skip
+    assert run.summary.critical  # by the paper's thresholds
+    assert not list((run.folder / "critical").iterdir())
+    print_summary(run, 1.0)
+    out = capsys.readouterr().out
+    assert "scenarios             none exported: no failure found" in out
+    assert "No failure found in 60 evaluations" in out
+    assert "No scenario is exported: only failures are." in run.report.read_text("utf-8")
 
 
 def test_neighbours_of_a_noisy_driver_have_its_random_numbers():
