@@ -6,6 +6,7 @@ from typing import Any
 from bridgegen.arrays import Bool
 from bridgegen.conflict.findings import Findings
 from bridgegen.report.playback import Conflict
+from bridgegen.triage.judgement import judgement
 from bridgegen.triage.record import Minimal, Mode, Neighbourhood, Treatment, Triage
 from bridgegen.triage.words import parameters_in_words
 
@@ -42,9 +43,19 @@ def implausible_payload(findings: Findings | None) -> dict[str, Any]:
     }
 
 
-def conflict_payload(one: Conflict) -> dict[str, Any]:
-    """Return a scenario's conflict; numbers are rounded to what a page can show."""
-    facts = one.summary.to_dict()
+def conflict_payload(one: Conflict, cause: str = "") -> dict[str, Any]:
+    """Return a scenario's conflict; numbers are rounded to what a page can show.
+
+    Args:
+        one: the conflict.
+        cause: the quick label of its cause, with which its sentence is reconciled.
+    """
+    said = one.summary
+    if said.happened:
+        said = said.reconciled(
+            judgement(cause, None, preventable=said.preventable, responsible=said.responsible)
+        )
+    facts = said.to_dict()
     numbers = {name: value for name, value in facts.items() if isinstance(value, dict)}
     return {
         **{name: value for name, value in facts.items() if name not in numbers},

@@ -25,9 +25,7 @@ SIGNIFICANT = 0.01
 """Probability of a distance by chance, times the number of parameters, below which it counts."""
 
 
-def influences(
-    space: SearchSpace, X: Numbers, fails: Bool, ok: Bool
-) -> tuple[Influence, ...]:
+def influences(space: SearchSpace, X: Numbers, fails: Bool, ok: Bool) -> tuple[Influence, ...]:
     """Return the parameters whose values differ between failures and other rows, most first.
 
     The difference is the Kolmogorov-Smirnov distance of the two samples, which is 0 where they are
