@@ -25,7 +25,14 @@ from bridgegen.search.screened import Agreement
 from bridgegen.simulation.rollout import STATUS_MESSAGES
 from bridgegen.store import Recorded, Rows, Store
 from bridgegen.store.summary import Summary, summarise
-from bridgegen.triage.record import JSON_FILE, Mode, Triage, read_record
+from bridgegen.triage.record import (
+    JSON_FILE,
+    NOT_JUDGED,
+    Mode,
+    Triage,
+    Verdict,
+    read_record,
+)
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -153,6 +160,18 @@ class Run:
         """How its evaluations meet its pass criteria, in their order."""
         with Store.open(self.folder) as store:
             return judged(store, self.settings)
+
+    @property
+    def verdict(self) -> Verdict:
+        """Whether its driver "fails", "no failure" was "found", or the run was "not judged".
+
+        It fails by harm, or by a pass criterion. It is not judged before it has ended.
+        """
+        if any(one.violated for one in self.criteria):
+            return "fails"
+        if self.triage is None or not self.triage.bound.judged:
+            return NOT_JUDGED
+        return "fails" if self.triage.bound.harmful else "no failure found"
 
     @property
     def modes(self) -> tuple[Mode, ...]:

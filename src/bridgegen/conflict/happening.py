@@ -80,7 +80,9 @@ def happened(rollout: Rollout) -> npt.NDArray[np.object_]:
         near[:, k] = (rollout.distance[:, e] <= reach).any(axis=1)
     code = np.full((n, 4), -1, np.int64)  # at its end; behind whom, metres driven and left
     if known := bool(len(rollout.progress)):
-        code[:, 0] = rollout.progress[:, 1] <= 0.0
+        # A storyboard may end where the ego arrives, before the end of the lane there.
+        arrived = (rollout.n_steps < rollout.shape[2]) & ~(rollout.distance <= 0.0).any(axis=(1, 2))
+        code[:, 0] = (rollout.progress[:, 1] <= 0.0) | arrived
         rows, behind = stuck(rollout)
         code[rows, 1] = behind
         code[rows, 2:] = np.rint(rollout.progress[rows])
@@ -346,7 +348,7 @@ class Happening:
             parts.append("began: " + ", ".join(map(_in_words, self.events)))
         if self.near:
             parts.append("came near the ego: " + ", ".join(map(_in_words, self.near)))
-        if self.end is not None:
+        if self.end is not None and (self.end.rows or self.stuck):
             parts.append(f"the ego reached its end in {self.end.value:.0%}")
         return "; ".join(filter(None, [*parts, self.stuck_in_words, self.domain]))
 

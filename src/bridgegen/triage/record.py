@@ -33,6 +33,10 @@ Drawn = Literal["random", "sobol", "fresh", ""]
 """Where rows come from whose share is an estimate: the run's own, drawn at random or from a Sobol
 sequence; fresh random ones; "" where there are none and nothing is estimated."""
 
+Verdict = Literal["fails", "no failure found", "not judged"]
+"""What a run says of its driver."""
+NOT_JUDGED: Verdict = "not judged"
+
 CauseLabel = Literal[
     "perception", "planning", "vehicle dynamics", "control", "unavoidable", "sensitive",
     "not known", "",
@@ -353,6 +357,10 @@ class Bound(_Model):
         harmful: of them.
         space: the harmful share of the search space.
         least: the smallest margins reached.
+        verdict: "fails"; "no failure found"; or "not judged", where too few evaluations could be
+            judged, or the scenario did not happen. "" in records of earlier versions.
+        not_counted: the collisions, near misses and evaluations that do not count as failures,
+            with their reasons; "" where there are none.
         sentence: in words.
     """
 
@@ -362,7 +370,15 @@ class Bound(_Model):
     harmful: Count
     space: Estimate
     least: Annotated[tuple[Least, ...], Field(max_length=20)]
+    verdict: Verdict | Literal[""] = ""
+    not_counted: Text = ""
     sentence: Text
+
+    @property
+    def judged(self) -> bool:
+        """Whether the run supports a statement on its driver."""
+        known = self.evaluations - self.failed - self.implausible
+        return self.verdict != NOT_JUDGED if self.verdict else known > 0
 
 
 class Triage(_Model):

@@ -10,13 +10,14 @@ import numpy.typing as npt
 from bridgegen.arrays import Bool, Float, Numbers
 from bridgegen.cause import Cause
 from bridgegen.conflict.findings import Findings
+from bridgegen.conflict.happening import Happening
 from bridgegen.conflict.harm import NEAR_MISS
 from bridgegen.conflict.quantities import HARM
 from bridgegen.criteria import OF_BASELINE
 from bridgegen.evaluation import EVENT
 from bridgegen.pipeline import Pipeline
 from bridgegen.store import Recorded, Rows
-from bridgegen.triage.bound import UNBIASED, bound, estimate, least_margins
+from bridgegen.triage.bound import UNBIASED, NotCounted, bound, estimate, least_margins
 from bridgegen.triage.distinct import COPY, apart, distinct
 from bridgegen.triage.effort import FULL, Effort
 from bridgegen.triage.influence import influences
@@ -380,8 +381,10 @@ class _Triage:
             results=rows.digest(), seed=self._seed,
             neighbours=NEIGHBOURS if self._tests else 0, radius=RADIUS, sampled=len(sample),
             bound=bound(
-                evaluations=len(ok), failed=int((~ok).sum()),
-                implausible=int((ok & implausible).sum()), harmful=len(self._at), space=space,
+                evaluations=len(ok),
+                besides=NotCounted.of(rows.findings.take(slice(None)), self._harm, ok),
+                happening=Happening.of(rows.findings.happened),
+                harmful=len(self._at), space=space,
                 least=least_margins(
                     rows.metrics, pipeline.metrics, self._harm, rows.id, ok & ~implausible,
                 ),
