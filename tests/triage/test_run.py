@@ -265,3 +265,17 @@ def test_a_minimal_file_of_a_noisy_driver_gives_the_recorded_metrics_to_the_last
         assert {"d_min", "v_d", "n_collision"} <= both
         for name in both:
             assert told["metrics"][name]["value"] in (result.metrics[name], None)
+
+
+def test_a_minimal_scenario_that_is_not_harmful_as_exported_is_not_exported(tmp_path):
+    from bridgegen.campaign.critical import _write_minimal
+
+    run = bg.run_search("crossroads-s4", **GIVEN, workers=2, out=tmp_path / "s4")
+    pipeline = pipeline_of(run, "resume", causes=True)
+    mode = next(one for one in run.modes if one.minimal and one.minimal.conditions)
+    assert _write_minimal(pipeline, mode, mode.minimal, tmp_path) == ()
+    nominal = tuple(pipeline.space.row({}).tolist())
+    harmless = mode.minimal.model_copy(update={"x": nominal, "name": "minimal-99"})
+    (problem,) = _write_minimal(pipeline, mode, harmless, tmp_path)
+    assert problem.startswith("it is not harmful as it is exported: harm ")
+    assert not list(tmp_path.glob("minimal-99*"))

@@ -41,7 +41,8 @@ def shortly(mode: Mode) -> str:
     """Return a failure mode in few words: what happens, how often, how severe, its cause."""
     often = f"{mode.count} evaluation" + "s" * (mode.count != 1)
     severe = f"MAIS3+ {percent(mode.severity)}" if mode.conflict == "contact" else ""
-    return f"{mode.title}: {', '.join(one for one in (often, severe, mode.cause) if one)}"
+    cause = mode.judgement.partition(":")[0] or mode.cause
+    return f"{mode.title}: {', '.join(one for one in (often, severe, cause) if one)}"
 
 
 def robustness_in_words(mode: Mode, found: Triage) -> str:
