@@ -2,7 +2,7 @@
 
     .venv/bin/python benchmarks/long_run.py [ROWS ...]        # 1e4, 1e5 and 1e6 by default
 
-The run is `crossroads-s4` (objective harm) by random search, with the real loop, store, triage, export and report.
+The run is `crossroads-s4` by random search, with the real loop, store, triage, export and report.
 Only its evaluations are not simulated: rows take, in turn, the results of some that were, of which
 `CRITICAL` are critical, as in a search that finds what it looks for. Each step has a process of its
 own, whose peak of resident memory [MiB] and seconds are printed. A million rows take four minutes.
