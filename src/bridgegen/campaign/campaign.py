@@ -1,6 +1,9 @@
 """A campaign from start to finish: search, triage, export, report; and resuming one."""
 
 import hashlib
+import itertools
+import os
+import re
 from collections.abc import Callable
 from contextlib import nullcontext
 from dataclasses import dataclass, field, replace
@@ -23,6 +26,7 @@ from bridgegen.campaign.scenarios import driven_by, is_file, load, refuse_stands
 from bridgegen.campaign.screening import BATCH, require_screen, screen_budget
 from bridgegen.campaign.searcher import require_asynchronous, searcher_of
 from bridgegen.campaign.settings import Settings
+from bridgegen.ego import STORYBOARD
 from bridgegen.errors import InputError, Interrupted, StorageError, WorkersError
 from bridgegen.odd.adversary import adversarial
 from bridgegen.odd.parameters import Axis
@@ -72,7 +76,7 @@ class SearchArguments(SearchOptions):
     )
     out: Path | str | None = field(
         default=None,
-        metadata={"help": "Folder of the run, new; runs/SCENARIO-ALGORITHM-SEED by default."},
+        metadata={"help": "Folder of the run, new; runs/SCENARIO-DRIVER by default, or -2, -3 …."},
     )
     deliver: bool = field(
         default=True,
@@ -151,8 +155,8 @@ def run_search(given: SearchArguments) -> Run:
             f"population {population} is greater than the budget, {rows} evaluations: the search "
             "ends within its first, random batch"
         )
-    name = f"{logical.name}-{given.algorithm}-{seed}"
-    folder = Path(given.out) if given.out is not None else Path("runs") / name
+    driver = given.ego or logical.driver or STORYBOARD.name
+    folder = Path(given.out) if given.out is not None else _new_folder(logical.name, driver)
     refuse_used(folder)
     if given.cause is not None and not given.causes:
         raise InputError(f"to search for the cause '{given.cause}', causes must be sought")
@@ -366,6 +370,15 @@ def _junction(given: SearchArguments, roads: RoadMap | None) -> str | None:
     if roads is None or given.junction == ALL:
         return given.junction
     return roads.site.place_id
+
+
+def _new_folder(scenario: str, driver: str) -> Path:
+    """Return a folder of that scenario and driver in ``runs`` that does not exist yet."""
+    short = driver.rpartition(":")[2] if ":" in driver else Path(driver).stem
+    word = re.sub(r"[^\w-]+", "-", short)[:40]
+    name = f"{scenario}-{word}"
+    numbers = itertools.chain([""], (f"-{n}" for n in itertools.count(2)))
+    return next(path for n in numbers if not os.path.lexists(path := Path("runs") / f"{name}{n}"))
 
 
 def _absolute(path: Path | str | None) -> str | None:

@@ -57,7 +57,7 @@ def search(
         Path | None,
         typer.Option(
             help="Folder of the run, new.",
-            show_default="runs/SCENARIO-ALGORITHM-SEED",
+            show_default="runs/SCENARIO-DRIVER, or -2, -3 …",
             rich_help_panel=OUTPUT,
         ),
     ] = None,

@@ -141,7 +141,7 @@ def screen_rows(run: "Run") -> list[tuple[str, str]]:
 WORDS = {"fails": "FAILS", "no failure found": "NO FAILURE FOUND", "not judged": "NOT JUDGED"}
 """The verdicts on the terminal."""
 
-WIDTH, BAR = 100, 7
+WIDTH, BAR = 100, 5
 """Characters of a mode's line at most, and of its bar."""
 
 
@@ -179,6 +179,8 @@ def verdict_lines(run: "Run", seconds: float) -> list[str]:
 
 def conclusion(run: "Run") -> str:
     """Return a run's verdict in a line: the word, the driver, the scenario, and why."""
+    from bridgegen.triage.record import NOT_JUDGED
+
     settings, found = run.settings, run.triage
     name = f"{settings.ego} in {Path(settings.scenario).stem}{_worse(settings)}"
     word = WORDS[run.verdict]
@@ -192,21 +194,21 @@ def conclusion(run: "Run") -> str:
     if run.verdict == "fails":
         violated = [one.criterion.id for one in run.criteria if one.violated]
         return f"{word}  {name}: violates {', '.join(violated)}"
-    text = bound.sentence.removeprefix("Not judged: ").removesuffix(".")
-    return f"{word}  {name}: {text[:1].lower()}{text[1:]}"
+    _, _, why = bound.sentence.rstrip(".").partition(": ")
+    return f"{word}  {name}: {why if run.verdict == NOT_JUDGED else why.partition(';')[0]}"
 
 
 def _mode_lines(found: "Triage") -> list[str]:
     """Return a line for each failure mode: its bar, count, event, rule, severity and cause."""
     modes = found.modes[:MOST_MODES]
     most = max((one.count for one in modes), default=1)
-    lines = []
+    lines = ["         count  event · rule · worst MAIS3+ · root cause"] if modes else []
     for one in modes:
         bar = "█" * max(round(BAR * one.count / most), 1)
         what, _, _ = one.title.partition(" (")
-        worst = f"MAIS3+ {percent(one.severity)}" if one.conflict == "contact" else "near miss"
+        worst = percent(one.severity) if one.conflict == "contact" else "near miss"
         about = " · ".join(filter(None, [one.rule, worst, one.cause]))
-        head = f"{one.number:>3} {bar:<{BAR}} {one.count:>6,}  "
+        head = f"{one.number:>2} {bar:<{BAR}} {one.count:>5,}  "
         room = max(WIDTH - len(head) - len(about) - 3, 12)
         short = what if len(what) <= room else f"{what[: room - 1]}…"
         lines.append(f"{head}{short} · {about}"[:WIDTH])

@@ -161,7 +161,8 @@ def _unjudged(evaluations: int, besides: NotCounted, happening: Happening) -> st
     left_out = besides.failed + sum(besides.implausible.values()) + besides.unsafe
     judged = evaluations - left_out
     if judged < JUDGED * evaluations or not judged:
-        return f"only {judged} of {evaluations} evaluations could be judged"
+        some = f"only {judged}" if judged else "none"
+        return f"{some} of {evaluations} evaluations could be judged"
     if not happening.happened:
         return "the scenario did not happen: " + "; ".join(happening.reasons)
     return ""
