@@ -128,7 +128,8 @@ def test_near_is_five_metres_and_two_seconds():
 
 def test_everything_is_recorded_and_a_failed_scenario_has_nothing():
     one = scene(parked(), parked(400.0), kinds=[CAR, CAR, CAR])
-    one = replace(one, event_names=("first", "second"), began=np.array([[0, -1]]))
+    names = ("first", "second", "first")  # as two manoeuvres of a file may name theirs
+    one = replace(one, event_names=names, began=np.array([[0, -1, -1]]))
     failed = replace(one, status=np.ones(1, np.int8))
     arrived = replace(one, progress=np.array([[20.0, 0.0]]))
     three = joined([(np.array([k]), each) for k, each in enumerate((one, failed, arrived))])

@@ -88,12 +88,14 @@ def happened(rollout: Rollout) -> npt.NDArray[np.object_]:
         code[rows, 2:] = np.rint(rollout.progress[rows])
     keys, which = np.unique(np.hstack([began, near, code]), axis=0, return_inverse=True)
     names, v = [rollout.names[e] for e in others], began.shape[1]
-    events = rollout.event_names if v else ()
+    events: dict[str, list[int]] = {}  # several may have one name
+    for i, name in enumerate(rollout.event_names[:v]):
+        events.setdefault(name, []).append(i)
 
     def text(key: Sequence[int]) -> str:
         end, behind, driven, left = key[-4:]
         found: dict[str, Any] = {
-            "began": dict(zip(events, map(bool, key[:v]), strict=True)),
+            "began": {name: any(key[i] for i in at) for name, at in events.items()},
             "near": dict(zip(names, map(bool, key[v:-4]), strict=True)),
         }
         if known:
@@ -102,7 +104,8 @@ def happened(rollout: Rollout) -> npt.NDArray[np.object_]:
             found |= {"end": bool(end), "stuck": where if behind >= 0 else False}
         return json.dumps(found, ensure_ascii=False, separators=(",", ":"))
 
-    texts = np.array([text(key) for key in keys.tolist()], dtype=object)[which.reshape(-1)]
+    different = np.array([text(key) for key in keys.tolist()], dtype=object)
+    texts: npt.NDArray[np.object_] = different[which.reshape(-1)]
     texts[rollout.status != 0] = ""
     return texts
 
@@ -142,7 +145,7 @@ def stuck(rollout: Rollout) -> tuple[Int, Int]:
     blocks = (ahead > 0.0) & (np.abs(aside) <= width) & (distance <= IN_THE_WAY)
     speed = np.abs(some.v)
     still = (speed < STANDS) | ~there[:, np.newaxis]
-    never = still.all(axis=2)
+    never: Bool = np.all(still, axis=2)
     comes = ~still & (distance <= NEAR + GAP_TIME * speed)
     with np.errstate(invalid="ignore"):  # who is absent is infinitely far
         comes[:, :, 1:] &= ~(np.diff(distance, axis=2) >= 0.0)
@@ -182,7 +185,7 @@ def _in_jam(one: Rollout, never: Bool, last: Int) -> Bool:
     cosine, sine = np.cos(h)[:, :, np.newaxis], np.sin(h)[:, :, np.newaxis]
     ahead, aside = dx * cosine + dy * sine, np.abs(dy * cosine - dx * sine)
     follows = (ahead > 0.0) & (ahead <= OF_A_JAM) & (aside <= 0.5 * one.box[:, 1, np.newaxis])
-    found: Bool = (follows & never[:, np.newaxis]).any(axis=2)
+    found: Bool = np.any(follows & never[:, np.newaxis], axis=2)
     return found
 
 
