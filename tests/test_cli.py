@@ -41,7 +41,7 @@ def refused(result: tuple[int, str, str], *parts: str) -> None:
 
 def test_search_prints_the_run_s_figures(cli, tmp_path):
     code, out, _ = cli(
-        "search", "crossroads-s4", "--budget", 80, "--keep", 1, "--out", tmp_path / "r"
+        "search", "crossroads-s4", "--budget", 80, "--keep", 1, "-v", "--out", tmp_path / "r"
     )
     assert code == 0
     for label in (
