@@ -127,7 +127,9 @@ def test_the_algorithm_of_the_documentation_is_found_and_searches(tmp_path, monk
     monkeypatch.setattr("importlib.metadata.entry_points", entry_points)
     chosen = {"seed": 1, "deliver": False, "causes": False, "ego": "route-follower"}
     whole, chance = (
-        bg.run_search("paper/crossroads-s1", algorithm=name, budget=160, out=tmp_path / name, **chosen)
+        bg.run_search(
+            "paper/crossroads-s1", algorithm=name, budget=160, out=tmp_path / name, **chosen
+        )
         for name in ("neighbours", "random")
     )
     assert whole.summary.critical > 2 * chance.summary.critical

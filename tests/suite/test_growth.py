@@ -66,7 +66,11 @@ def test_each_mode_is_kept_once_and_fails_there_to_the_bit(run, tmp_path):
     assert {bool(mode.exports) for mode in run.modes} == {True, False}
     for mode in run.modes:
         (kept,) = [one for one in failures.values() if one.rule == mode.rule]
-        assert (kept.partner, kept.place, kept.scenario) == ("car", mode.place, "crossroads-s3")
+        assert (kept.partner, kept.place, kept.scenario) == (
+            "car",
+            mode.place,
+            "paper-crossroads-s3",
+        )
         assert (kept.status, kept.driver, kept.seed) == ("new", "route-follower", 0)
         assert (kept.cause, kept.minimal) == (mode.cause, mode.minimal.sentence)
         again = [simulate_file(to / name).metrics for name in kept.files]  # without the suite
@@ -173,7 +177,7 @@ def test_what_fails_otherwise_in_its_new_place_is_refused(run, tmp_path, monkeyp
     (made,) = add_failures([source / "0001.xosc"], tmp_path / "mine")
     assert (made.outcome, made.is_same) == ("added", True)
     assert "without its minimal form: it fails otherwise" in made.reason
-    assert [one.suffix for one in sorted((tmp_path / "mine").iterdir())] == [
+    assert sorted(one.suffix for one in (tmp_path / "mine").iterdir()) == [
         ".xodr", ".xosc", ".yaml",
     ]  # fmt: skip
 
