@@ -77,6 +77,31 @@ def test_validate_notes_a_name_that_is_not_the_file_s(cli, tmp_path):
     assert "its key 'scenario' is 'mine'" in err
 
 
+def test_validate_notes_texts_of_the_template_and_indicators_that_mislead(cli, tmp_path):
+    from bridgegen.odd.starter import start_scenario
+
+    path = start_scenario("mine", folder=tmp_path)
+    _, _, err = cli("validate", path)
+    assert "texts of the template that its author is to replace: 6" in err
+    assert "indicates" not in err
+    text = path.read_text("utf-8").replace(
+        "events:\n", "events:\n  shows:\n    participant: other\n    indicate: left\n"
+        "    when: [{kind: time, value: 1.0}]\n"
+    )  # fmt: skip
+    path.write_text(text, "utf-8")
+    _, _, err = cli("validate", path)
+    assert "other indicates to the left and changes lane to the right" in err
+
+
+def test_a_map_without_a_place_of_the_kind_says_so(cli, tmp_path):
+    from tests.campaign.braking import write_pair
+
+    write_pair(tmp_path)
+    status, out, _ = cli("places", tmp_path / "roads" / "straight.xodr", "crossroads-s4")
+    assert status == 0
+    assert "nothing of the kind of place that crossroads-s4 needs" in out
+
+
 def test_an_error_is_the_first_line(tmp_path):
     done = subprocess.run(
         [*CALL, "search", "no-such-scenario"], capture_output=True, text=True, cwd=tmp_path,

@@ -40,6 +40,7 @@ VALUES = {
     "ideal": st.lists(NAMES, max_size=3),
     "metrics": st.lists(NAMES, max_size=3),
     "algorithm": NAMES,
+    "triage": NAMES,
     "criteria": st.lists(
         st.builds(
             lambda name, more: {"id": name, "formula": "always(ego.v > 2 m/s)"} | more,

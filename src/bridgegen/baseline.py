@@ -71,7 +71,8 @@ def difference_of_trials(found: Trials, baseline: Trials) -> Trials:
     """Return trials in which only what the baseline's driver avoids is harmful."""
     ok: Bool = found.ok & baseline.ok
     harm = np.where(ok & ~baseline.harmful, found.harm, 0.0)
-    return replace(found, harm=harm, ok=ok)
+    until = np.where(ok & baseline.harmful, np.inf, found.harmless_until)
+    return replace(found, harm=harm, ok=ok, harmless_until=until)
 
 
 def _usable(one: Evaluation, gated: bool) -> Bool:

@@ -8,7 +8,7 @@ import numpy.typing as npt
 
 from bridgegen.arrays import Bool, Float, Int
 from bridgegen.conflict import quantities
-from bridgegen.conflict.analysis import analyse
+from bridgegen.conflict.analysis import NO_CONFLICT, Conflicts, analyse
 from bridgegen.conflict.findings import KINDS, Findings
 from bridgegen.conflict.harm import NEAR_MISS, Count, decisive
 from bridgegen.conflict.place import place_on_route
@@ -80,6 +80,12 @@ class Evaluation:
         )  # fmt: skip
 
 
+MEASURES = ("time", "x", "y", "v_ego", "v_other", "closing_normal", "closing_tangential", "ttc")
+CODES = ("kind", "type", "zone_ego", "zone_other", "partner")
+EVENT = (*MEASURES, *CODES)
+"""The columns of ``Trials.event``: numbers in s, m, m/s and s; then codes of `Conflicts`."""
+
+
 @dataclass(frozen=True)
 class Trials:
     """The results of N rows that are simulated to test whether harm persists.
@@ -91,6 +97,12 @@ class Trials:
         findings: the decisive conflict of each row.
         place: ``(N,)`` texts, the place of the ego's front on its route at that conflict; see
             `bridgegen.conflict.place`.
+        event: ``(N, len(EVENT))`` float64, what happened in that conflict: when, where the ego's
+            front was, speeds, which parts of whom met; 0 where there is none.
+        preventable: ``(N,)`` bool, the careful driver of UN R157 would have avoided it by braking.
+        harmless_until: ``(N,)`` float64 [s], up to when a row is known to be harmless: the time of
+            the conflict of a harmful one; of a harmless one infinity, or the first implausible
+            motion; −inf where it is not known.
     """
 
     harm: Float
@@ -98,6 +110,9 @@ class Trials:
     ok: Bool
     findings: Findings
     place: npt.NDArray[np.object_]
+    event: Float
+    preventable: Bool
+    harmless_until: Float
 
     def __len__(self) -> int:
         return len(self.harm)
@@ -122,11 +137,13 @@ class Trials:
         n = rollout.shape[0]
         conflicts = analyse(rollout)
         values = quantities.evaluate(rollout, [harm, "severity"])
-        findings = Findings.of(conflicts, plausibility(rollout).labels, count)
+        gate = plausibility(rollout)
+        findings = Findings.of(conflicts, gate.labels, count)
         ok: Bool = (rollout.status == 0) & (findings.implausible == "")
         place = np.full(n, "", dtype=object)
         rows = np.arange(n)
-        instant = conflicts.instant[rows, decisive(conflicts, count)[0]]
+        other = decisive(conflicts, count)[0]
+        instant = conflicts.instant[rows, other]
         front = rollout.box[0, 2] + 0.5 * rollout.box[0, 0]
         h = rollout.h[rows, 0, instant]
         x = rollout.x[rows, 0, instant] + front * np.cos(h)
@@ -138,14 +155,21 @@ class Trials:
             way, junctions = roads.way(p, 0), roads.in_junctions(p)
             place[at] = place_on_route(way, step, junctions, x[at], y[at])
         worth, severity = (np.where(ok, values[:, k], 0.0) for k in range(2))
-        return cls(worth, severity, ok, findings, place)
+        bad = values[:, 0] >= NEAR_MISS
+        until = np.where(bad, instant, np.where(gate.instant < 0, np.inf, gate.instant))
+        until = np.where((rollout.status != 0) | (bad & ~ok), -np.inf, until * rollout.time_step)
+        event = _event(conflicts, other, x, y)
+        return cls(
+            worth, severity, ok, findings, place, event, conflicts.preventable[rows, other], until
+        )
 
     @classmethod
     def none(cls, n: int) -> "Trials":
         """Return N rows without a result."""
-        nothing = np.zeros(n)
-        texts = np.full(n, "", dtype=object)
-        return cls(nothing, nothing, np.zeros(n, np.bool_), Findings.none(n), texts)
+        nothing, no = np.zeros(n), np.zeros(n, np.bool_)
+        texts, event = np.full(n, "", dtype=object), np.zeros((n, len(EVENT)))
+        unknown = np.full(n, -np.inf)
+        return cls(nothing, nothing, no, Findings.none(n), texts, event, no, unknown)
 
     @classmethod
     def join(cls, parts: Sequence["Trials"]) -> "Trials":
@@ -156,13 +180,27 @@ class Trials:
             np.concatenate([one.ok for one in parts]),
             Findings.join([one.findings for one in parts]),
             np.concatenate([one.place for one in parts]),
+            np.concatenate([one.event for one in parts]),
+            np.concatenate([one.preventable for one in parts]),
+            np.concatenate([one.harmless_until for one in parts]),
         )
 
     def take(self, at: Int | Bool) -> "Trials":
         """Return those of some rows."""
         return Trials(
-            self.harm[at], self.severity[at], self.ok[at], self.findings.take(at), self.place[at]
-        )
+            self.harm[at], self.severity[at], self.ok[at], self.findings.take(at), self.place[at],
+            self.event[at], self.preventable[at], self.harmless_until[at],
+        )  # fmt: skip
+
+
+def _event(conflicts: Conflicts, other: Int, x: Float, y: Float) -> Float:
+    """Return what happened in the conflicts with some participants; see ``Trials.event``."""
+    rows = np.arange(len(other))
+    codes = [getattr(conflicts, name)[rows, other] for name in CODES[:-1]]
+    measures = [getattr(conflicts, name)[rows, other] for name in MEASURES[3:]]
+    time = conflicts.instant[rows, other] * conflicts.time_step
+    found = np.stack([time, x, y, *measures, *codes, other], axis=1)
+    return np.where((codes[0] == NO_CONFLICT)[:, np.newaxis], 0.0, np.nan_to_num(found))
 
 
 @dataclass(frozen=True)

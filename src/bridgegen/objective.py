@@ -2,7 +2,7 @@
 
 The paper's fitness grows with criticality, so F = −fitness. Its single objective is a weighted sum
 of metrics; the weights are fixed, or come from the entropy of a random sample (Eqs. 4 to 7). The
-default of all scenarios but the paper's is ``harm`` (`bridgegen.conflict.harm`).
+default is ``harm`` (`bridgegen.conflict.harm`).
 """
 
 from collections.abc import Mapping, Sequence
@@ -58,13 +58,15 @@ class Objective:
         thresholds: when a scenario is critical by the rule "thresholds".
         rule: what makes a scenario critical: "harm", a collision or near miss of the ego's (see
             `bridgegen.conflict.harm`), "thresholds", or "criteria", a violation of one of
-            ``criteria``. Implausible scenarios are neither critical nor fit, but by "thresholds".
+            ``criteria``.
         count: whose conflicts count as harm: "ego", those that the ego is responsible for or could
             have prevented; or "any".
         low: the sample's least x' per term; empty on the raw scale.
         span: the sample's range of x' per term, > 0; empty on the raw scale.
         criteria: the names of the margins that make a scenario critical below 0 by the rule
             "criteria"; else empty.
+        gated: whether implausible scenarios are neither critical nor fit. Only the paper's
+            evaluation counts them, as printed.
     """
 
     names: tuple[str, ...]
@@ -77,6 +79,7 @@ class Objective:
     rule: Rule = "thresholds"
     count: Count = "ego"
     criteria: tuple[str, ...] = ()
+    gated: bool = True
 
     def __post_init__(self) -> None:
         for name in self.names:
@@ -115,6 +118,7 @@ class Objective:
         rule: Rule = "thresholds",
         count: Count = "ego",
         criteria: Sequence[str] = (),
+        gated: bool = True,
         sample: tuple[npt.ArrayLike, Sequence[str]] | None = None,
     ) -> Self:
         """Return the objective, its weights and scale taken from a random sample where asked to.
@@ -128,6 +132,7 @@ class Objective:
             thresholds: when a scenario is critical; the paper's by default.
             rule: "harm", "thresholds" or "criteria".
             criteria: the margins that count by the rule "criteria".
+            gated: whether implausible scenarios are neither critical nor fit.
             count: whose conflicts count as harm: "ego" or "any". With "any", the term ``harm``
                 means ``harm_any``.
             sample: metrics ``(m, M)`` of m random scenarios and the M columns' names; failed rows
@@ -166,7 +171,17 @@ class Objective:
                 resolved = tuple(entropy_weights((x - least) / extent).tolist())
         given = thresholds or Thresholds()
         return cls(
-            names, resolved, scale, objectives, given, low, span, rule, count, tuple(criteria)
+            names,
+            resolved,
+            scale,
+            objectives,
+            given,
+            low,
+            span,
+            rule,
+            count,
+            tuple(criteria),
+            gated,
         )
 
     @property
@@ -185,11 +200,6 @@ class Objective:
         if self.rule == "criteria":
             return self.criteria
         return (self.harm,) if self.rule == "harm" else CLASSIFYING
-
-    @property
-    def gated(self) -> bool:
-        """Whether implausible scenarios are no results."""
-        return self.rule != "thresholds"
 
     @property
     def needed_metrics(self) -> tuple[str, ...]:
@@ -264,6 +274,7 @@ class Objective:
             raise InputError(f"not an objective: {data!r}")
         # Earlier versions had no others.
         data = {"rule": "thresholds", "count": "ego", "criteria": [], **data}
+        data = {"gated": data["rule"] != "thresholds", **data}
         if odd := set(data) ^ {field.name for field in fields(cls)}:
             raise InputError(f"unknown or missing keys of an objective: {sorted(odd)}")
         try:

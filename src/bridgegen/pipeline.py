@@ -22,6 +22,7 @@ from bridgegen.cause import Cause, Counterfactual, causes, counterfactuals, requ
 from bridgegen.conflict import quantities
 from bridgegen.conflict.analysis import analyse
 from bridgegen.conflict.findings import Findings
+from bridgegen.conflict.happening import happened
 from bridgegen.conflict.harm import Count
 from bridgegen.conflict.plausibility import Implausible, plausibility
 from bridgegen.criteria import OF_BASELINE, Monitor, quantity
@@ -362,6 +363,7 @@ class Pipeline:
                 rule=spec.rule,
                 count=spec.count,
                 criteria=self._margins_that_count(spec.criteria) if spec.rule == "criteria" else (),
+                gated=spec.gated,
                 sample=sample,
             )
         self.objective = objective
@@ -457,7 +459,7 @@ class Pipeline:
         rollout = self._run(roads, rows, X)
         metrics = self.measure(rollout)
         gate = plausibility(rollout)
-        findings = Findings.of(analyse(rollout), gate.labels, objective.count)
+        findings = Findings.of(analyse(rollout), gate.labels, objective.count, happened(rollout))
         fit = gate.code == Implausible.NONE if objective.gated else True
         F, ok = objective.F(metrics, self.metrics, fit)
         critical = objective.critical(metrics, self.metrics) & ok

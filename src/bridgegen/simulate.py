@@ -24,6 +24,7 @@ from bridgegen.openx.openscenario.model import OpenScenario
 from bridgegen.openx.openscenario.read import read as read_scenario
 from bridgegen.openx.openscenario.stated_criteria import stated_criteria
 from bridgegen.openx.prepared import prepared
+from bridgegen.options import checked
 from bridgegen.simulation.choice import EMBEDDED, SimulatorChoice
 from bridgegen.simulation.embedded.simulator import EmbeddedSimulator
 from bridgegen.simulation.rollout import STATUS_MESSAGES, Incident, Rollout
@@ -65,6 +66,7 @@ class FileResult:
         return self.rollout.incidents.get(0, ())
 
 
+@checked
 def simulate_file(
     path: Path | str,
     *,

@@ -19,6 +19,7 @@ from bridgegen.cli import main
 from bridgegen.conflict.findings import COLUMNS
 from bridgegen.errors import InputError, StorageError, UnknownNameError
 from bridgegen.metrics import METRICS
+from bridgegen.odd.reader import load
 from bridgegen.openx.convert import import_file
 from bridgegen.store import Store
 
@@ -39,7 +40,8 @@ def same(a, b) -> bool:
 
 def variants():
     yield pytest.param({"scenario": "crossroads-s4"}, id="s4")
-    yield pytest.param({"scenario": "crossroads-s2", "ego": "reference"}, id="reference")
+    near = {"criteria": ["R-1: min(gap to any) > 5 m"], "critical": "criteria"}
+    yield pytest.param({"scenario": "crossroads-s2", "ego": "reference", **near}, id="reference")
     yield pytest.param({"scenario": "crossroads-s3", "algorithm": "random"}, id="random")
     yield pytest.param(
         {"scenario": "crossroads-s2", "axes": ["static", "participants", "weather"]}, id="static"
@@ -66,11 +68,13 @@ def test_a_handed_over_file_gives_the_store_s_metrics_to_the_last_bit(tmp_path, 
         facts = json.loads(path.with_suffix(".json").read_text("utf-8"))
         result = bg.simulate_file(path)
         recorded = rows.metrics[facts["row"]]
-        assert [result.metrics[name] for name in facts["metrics"]] == recorded.tolist()
+        measured = [result.metrics[one] for one in facts["metrics"] if "criterion" not in one]
+        assert measured == recorded.tolist()[: len(measured)]
+        assert len(facts["metrics"]) - len(measured) == len(run.criteria)
         assert result.driver == run.settings.ego
         assert facts["critical"]
-        for name, one in facts["metrics"].items():
-            assert one["value"] in (result.metrics[name], None)
+        for name, value in zip(facts["metrics"], measured, strict=False):
+            assert facts["metrics"][name]["value"] in (value, None)
 
 
 FIRST_SEVEN = ("n_collision", "ttc", "d_min", "v_d", "l_offset", "a_change", "n_brake")
@@ -82,10 +86,14 @@ def test_a_run_of_the_first_version_opens_resumes_and_is_reported(tmp_path, monk
         patch.setattr("bridgegen.pipeline.metrics_of", lambda *_, **__: FIRST_SEVEN)
         patch.setattr("bridgegen.campaign.campaign._finish", lambda *_: None)
         bg.run_search("paper/crossroads-s4", algorithm="pso", budget=80, out=tmp_path / "run")
+    first = load("paper/crossroads-s4")
     with sqlite3.connect(tmp_path / "run" / "run.sqlite") as connection:
         ((text,),) = connection.execute("SELECT value FROM run WHERE key = 'settings'")
         settings = json.loads(text)
         del settings["chosen"]["metrics"]
+        settings["chosen"]["objective"] = None
+        del settings["objective"]["gated"]
+        settings["fingerprint"] = first.fingerprint
         for later in ("distribution", "ideal", "causes", "cause", "others"):
             del settings[later]
         connection.execute(
@@ -101,6 +109,11 @@ def test_a_run_of_the_first_version_opens_resumes_and_is_reported(tmp_path, monk
     assert "r_red" not in run.frame().columns
     assert run.scenarios
     assert run.report.exists()
+    again = bg.run_search(
+        "paper/crossroads-s4", algorithm="pso", budget=80, deliver=False, out=tmp_path / "again"
+    )
+    assert (run.rows().X == again.rows().X).all()
+    assert (run.rows().critical == again.rows().critical).all()
 
 
 def test_metrics_that_are_asked_for_are_recorded_and_in_the_command(tmp_path):
@@ -235,9 +248,10 @@ def test_near_copies_do_not_crowd_out_what_is_different():
 
 def test_many_objectives_are_recorded_handed_over_and_reported(tmp_path):
     run = bg.run_search(
-        "crossroads-s2",
+        "crossroads-s3",
         algorithm="random",
         objectives="many",
+        objective="paper",
         budget=60,
         out=tmp_path / "a",
         keep=2,
@@ -387,7 +401,7 @@ def test_an_imported_map_is_searched_like_the_map(tmp_path, scenario, junction):
     road_map.write_bytes(TOWN05.read_bytes())
     owl, _ = import_file(road_map)
     settings = {"algorithm": "random", "budget": 60, "keep": 1, "triage": "none"}
-    settings["junction"] = junction
+    settings |= {"junction": junction, "objective": "paper"}  # by which some are critical
     one = bg.run_search(scenario, road_map=road_map, out=tmp_path / "one", **settings)
     other = bg.run_search(scenario, road_map=owl, out=tmp_path / "other", **settings)
     assert same(rows_of(one.folder), rows_of(other.folder))
@@ -448,7 +462,7 @@ def test_what_an_algorithm_learnt_is_kept_and_shown(tmp_path):
     small = {"initial": 20, "population": 10, "generations": 1, "min_rows": 5}
     run = bg.run_search(
         "crossroads-s2", algorithm="nsga2-dt", budget=60, seed=1, settings=small, keep=0,
-        causes=False, triage="none", out=tmp_path / "run",
+        causes=False, triage="none", objective="paper", out=tmp_path / "run",
     )  # fmt: skip
     trees, boxes = run.notes["decision trees"], run.notes["critical boxes"]
     assert trees[0]["evaluations"] == 20

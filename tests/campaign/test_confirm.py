@@ -60,7 +60,7 @@ def finished(tmp_path_factory):
     place = tmp_path_factory.mktemp("runs") / "s4"
     bg.run_search(
         "crossroads-s4", algorithm="pso", budget=150, ego="route-follower", keep=4, causes=False,
-        triage="short", out=place,
+        triage="short", objective="paper", out=place,
     )  # fmt: skip
     return place
 
@@ -354,7 +354,7 @@ def test_a_run_of_another_simulator_is_confirmed_in_ours(tmp_path, double):
     double.disturb = shifted(0.9)
     place = tmp_path / "run"
     bg.run_search(
-        "crossroads-s2", algorithm="random", budget=30, seed=2, ego="route-follower", keep=2,
+        "crossroads-s1", algorithm="random", budget=30, seed=2, ego="route-follower", keep=2,
         causes=False, triage="none", simulator=elsewhere(), out=place,
     )  # fmt: skip
     with pytest.raises(InputError, match="was searched in the simulator double"):
@@ -370,8 +370,8 @@ def test_a_run_of_another_simulator_is_confirmed_in_ours(tmp_path, double):
 def test_harm_counts_by_the_thresholds_whatever_its_cause(tmp_path, double):
     place = tmp_path / "run"
     bg.run_search(
-        "crossroads-s2", algorithm="random", budget=60, seed=2, ego="route-follower", keep=2,
-        cause="planning", triage="none", out=place,
+        "crossroads-s3", algorithm="random", budget=200, seed=2, ego="route-follower", keep=2,
+        objective="paper", cause="planning", triage="none", out=place,
     )  # fmt: skip
     found = confirm(place, elsewhere())
     assert (found.summary.scenarios, found.summary.confirmed) == (2, 2)
@@ -383,7 +383,7 @@ def test_a_run_with_several_objectives_has_a_difference_for_each(tmp_path, doubl
     place = tmp_path / "run"
     bg.run_search(
         "crossroads-s2", algorithm="random", objectives="many", budget=60, seed=2, keep=2,
-        ego="route-follower", causes=False, triage="none", out=place,
+        objective="paper", ego="route-follower", causes=False, triage="none", out=place,
     )  # fmt: skip
     found = confirm(place, elsewhere())
     assert found.record.objectives == ("d_min", "v_d")

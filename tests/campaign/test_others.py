@@ -22,7 +22,7 @@ def settings_of(folder):
 def run(tmp_path_factory):
     folder = tmp_path_factory.mktemp("others") / "run"
     return bg.run_search(
-        "crossroads-s2",
+        "crossroads-s3",
         others="attentive",
         budget=200,
         keep=3,
@@ -35,7 +35,7 @@ def run(tmp_path_factory):
 def test_the_file_that_is_searched_is_the_file_that_is_handed_over(run):
     settings, rows = settings_of(run.folder)
     assert settings.others == "attentive"
-    files = sorted((run.folder / "critical").glob("*.xosc"))
+    files = run.scenarios
     assert files
     for path in files:
         assert 'value="attentive"' in path.read_text(encoding="utf-8")

@@ -8,13 +8,15 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from bridgegen.conflict import quantities
+from bridgegen.conflict import severity as injury
 from bridgegen.conflict._codes import CONTACT, COURSE, NEAR_MISS, NO_CONFLICT
 from bridgegen.conflict._conflict_kernels import urgency
 from bridgegen.conflict._limits import HORIZON
 from bridgegen.conflict.analysis import Conflicts, Responsible, Zone, analyse
-from bridgegen.conflict.harm import COLLISION, decisive, harm_of_pairs
 from bridgegen.conflict.harm import NEAR_MISS as CRITICAL
+from bridgegen.conflict.harm import closeness_of_pairs, decisive, harm_of_pairs
 from bridgegen.conflict.plausibility import plausibility
+from bridgegen.ego.kinds import CAR, PEDESTRIAN
 from bridgegen.simulation.rollout import Rollout
 
 DT = 0.05
@@ -285,9 +287,13 @@ def test_harm_is_between_0_and_1_and_ordered(seed):
     assert (whoever >= own).all()
     assert (decisive(found, "any")[1] >= decisive(found)[1]).all()
     near, contact = found.kind == NEAR_MISS, found.kind == CONTACT
-    assert (whoever[contact] >= COLLISION).all()
-    assert ((whoever[near] >= CRITICAL) & (whoever[near] < COLLISION)).all()
+    assert (whoever[near | contact] >= CRITICAL).all()
     assert (whoever[~near & ~contact] < CRITICAL).all()
+    close = closeness_of_pairs(found, "any")
+    np.testing.assert_array_equal(close >= 0.6, contact & (whoever > 0.0))
+    np.testing.assert_array_equal(close >= CRITICAL, whoever >= CRITICAL)
+    np.testing.assert_array_equal(found.severity[contact], found.potential[contact])
+    assert not found.severity[~contact].any()
     others = (found.responsible == Responsible.OTHER) & ~found.preventable
     assert not own[others & (near | contact)].any()
     critical = own >= CRITICAL
@@ -295,8 +301,8 @@ def test_harm_is_between_0_and_1_and_ordered(seed):
     assert not (critical & (found.stood_ego > 0.0)).any()
 
 
-def pair(**values):
-    """The conflicts of one pair with values given; the ego is responsible."""
+def pair(of=harm_of_pairs, **values):
+    """Return what one pair is worth with values given; the ego is responsible."""
     whole = {field.name: np.zeros((1, 2)) for field in fields(Conflicts)}
     for name in ("kind", "type", "responsible", "rule", "instant", "decided", "zone_ego",
                  "zone_other"):  # fmt: skip
@@ -306,34 +312,75 @@ def pair(**values):
     whole |= {"names": ("ego", "bv"), "time_step": DT, "ok": np.ones(1, np.bool_)}
     for name, value in values.items():
         whole[name][0, 1] = value
-    return harm_of_pairs(Conflicts(**whole))[0, 1]
+    return of(Conflicts(**whole), "ego")[0, 1]
 
 
 TIMES, DECELERATIONS = st.floats(0.0, 4.0), st.floats(0.0, 60.0)
 
 
 @given(st.floats(0.0, 1.0), st.floats(0.0, 1.0), TIMES, DECELERATIONS)
-def test_any_collision_ranks_above_any_near_miss_and_by_severity(one, other, ttc, needed):
-    collision = pair(kind=CONTACT, severity=one)
-    assert collision >= pair(kind=NEAR_MISS, ttc=ttc, needed=needed)
+def test_a_collision_ranks_by_severity_and_above_the_near_miss_of_it(one, other, ttc, needed):
+    collision = pair(kind=CONTACT, potential=one)
+    near = pair(kind=NEAR_MISS, potential=one, ttc=ttc, needed=needed)
+    assert collision > near if one > 1e-12 else collision == pytest.approx(near)
     if one > other + 1e-12:
-        assert collision > pair(kind=CONTACT, severity=other)
+        assert collision > pair(kind=CONTACT, potential=other)
+
+
+def severity(kind, speed):
+    """Return the severity of a car's front against the rear of another body."""
+    return float(injury.severity(CAR, kind, speed, 0.0, injury.FRONT, injury.REAR))
+
+
+def test_a_touch_ranks_below_a_serious_near_miss_and_collisions_spread():
+    touch = pair(kind=CONTACT, potential=severity(CAR, 0.23))
+    nearly = pair(kind=NEAR_MISS, ttc=0.2, needed=13.0 / 0.4, potential=severity(PEDESTRIAN, 13.0))
+    crashes = [pair(kind=CONTACT, potential=severity(CAR, v)) for v in (1.0, 5.0, 10.0, 20.0, 30.0)]
+    assert CRITICAL < touch < crashes[0] < nearly < crashes[2]
+    assert np.diff(crashes).min() > 0.08
+    assert pair(kind=CONTACT, potential=severity(PEDESTRIAN, 13.0)) > crashes[3]
+    # a severity of 1 %: 0.3 + 0.7 ln(101) / ln(10001) = 0.3 + 0.7 x 4.615121 / 9.210440
+    assert pair(kind=CONTACT, potential=0.01) == pytest.approx(0.650752, abs=1e-6)
+    assert pair(kind=CONTACT, potential=1.0) == 1.0
+    assert pair(kind=CONTACT, potential=0.0) == CRITICAL
+
+
+def test_a_near_miss_has_the_severity_of_the_collision_that_it_nearly_is():
+    """Two cars, the ego 6 m behind one that stands, at 10 m/s, then gone: a near miss."""
+    still, moving = np.zeros((1, 40)), np.full((1, 40), 10.0)
+    x = np.stack([np.cumsum(DT * moving, axis=1), still + 10.5 + 0.5], axis=1)
+    stops = np.minimum(x, x[:, :1, 9:10])  # it halts at once after half a second
+    stops[:, 1] = x[:, 1]
+    v = np.stack([np.where(np.arange(40) < 10, moving, 0.0), still], axis=1)
+    rollout = Rollout(
+        time_step=DT, names=("ego", "bv"), box=np.array([[4.5, 1.8, 0.0]] * 2), x=stops,
+        y=np.zeros((1, 2, 40)), h=np.zeros((1, 2, 40)), v=v, a=np.zeros((1, 2, 40)),
+        offset=np.zeros((1, 2, 40)), status=np.zeros(1, np.int8),
+        n_steps=np.full(1, 40), kinds=np.array([CAR, CAR]),
+    )  # fmt: skip
+    found = analyse(rollout)
+    assert found.kind[0, 1] == NEAR_MISS
+    assert found.closing_normal[0, 1] == pytest.approx(10.0)
+    assert found.potential[0, 1] == pytest.approx(severity(CAR, 10.0))
+    assert found.severity[0, 1] == found.delta_v_ego[0, 1] == 0.0
 
 
 @given(TIMES, TIMES, DECELERATIONS, DECELERATIONS, st.sampled_from([COURSE, NEAR_MISS]))
 def test_a_near_miss_grows_as_time_falls_and_deceleration_rises(t1, t2, d1, d2, kind):
-    nearer = pair(kind=kind, ttc=min(t1, t2), needed=max(d1, d2))
-    assert nearer >= pair(kind=kind, ttc=max(t1, t2), needed=min(d1, d2))
+    nearer = pair(kind=kind, ttc=min(t1, t2), needed=max(d1, d2), potential=0.2)
+    assert nearer >= pair(kind=kind, ttc=max(t1, t2), needed=min(d1, d2), potential=0.2)
 
 
 @given(st.sampled_from([COURSE, NEAR_MISS, CONTACT]), st.floats(0, 50), st.floats(0, 50))
 def test_no_speed_enters_by_itself(kind, v, w):
-    same_course = {"kind": kind, "ttc": 1.0, "needed": 5.0, "severity": 0.2}
+    same_course = {"kind": kind, "ttc": 1.0, "needed": 5.0, "potential": 0.2}
     assert pair(v_ego=v, v_other=w, closing_normal=v, **same_course) == pair(**same_course)
 
 
 @given(TIMES, DECELERATIONS)
 def test_the_kernels_urgency_is_that_of_harm(ttc, needed):
-    harm = pair(kind=NEAR_MISS, ttc=ttc, needed=needed)
-    assert harm == pytest.approx(CRITICAL + (COLLISION - CRITICAL) * urgency(ttc, needed))
+    close = pair(closeness_of_pairs, kind=NEAR_MISS, ttc=ttc, needed=needed)
+    assert close == pytest.approx(0.3 + 0.3 * urgency(ttc, needed))
+    course = pair(kind=COURSE, ttc=ttc, needed=needed)
+    assert course == pytest.approx(0.1 + 0.2 * urgency(ttc, needed))
     assert urgency(HORIZON, needed) == 0.0

@@ -98,6 +98,20 @@ def test_what_comes_after_the_ego_s_contact_does_not_matter():
     assert found(comes, stands, target, ego=late)[0] is Implausible.OTHERS_COLLIDE
 
 
+def test_what_comes_long_after_a_near_miss_does_not_matter():
+    """The ego brakes 6 m before a car, at 1 s; another stops at once from 10 m/s, then or later."""
+    steps = np.arange(61)
+    ego = drives(np.maximum(10.0 - 9.0 * DT * np.maximum(steps - 20, 0), 0.0), x=-200.0)
+    target = Body(-200.0 + 10.0 + 4.6 + 6.0, 0.0)
+
+    def stops(at):
+        return drives(np.where(steps < at, 10.0, 0.0), y=50.0)
+
+    assert found(stops(30), target, ego=ego)[0] is Implausible.DECELERATION
+    assert found(stops(50), target, ego=ego) == PLAUSIBLE
+    assert found(stops(50), Body(-100.0, 9.0), ego=ego)[0] is Implausible.DECELERATION
+
+
 def test_the_ego_s_own_motion_is_not_judged():
     slides = Body(50.0, 5.0 * DT * np.arange(61), 0.0, 5.0)
     assert found(Body(), ego=slides) == PLAUSIBLE

@@ -2,6 +2,7 @@
 
 import json
 
+import numpy as np
 import pytest
 
 from bridgegen.conflict.recorded import NO_KINDS, NO_MAP, NO_OFFSET, measure_recording
@@ -49,7 +50,8 @@ def test_driving_into_a_standing_car_by_hand(crash):
     assert one.ttc == 0.0
     assert "parked" in one.sentence
     assert measured.metrics["severity"] == one.severity
-    assert measured.metrics["harm"] == one.harm == pytest.approx(0.6 + 0.4 * one.severity)
+    worth = 0.3 + 0.7 * np.log1p(one.severity / 1e-4) / np.log1p(1e4)
+    assert measured.metrics["harm"] == one.harm == pytest.approx(worth)
 
 
 def test_what_a_recording_does_not_say_is_assumed(crash):

@@ -68,20 +68,58 @@ def test_the_careful_driver_brakes_no_harder_than_the_tyres_allow(track, meeting
 
 
 def test_what_a_bend_takes_from_the_tyres_is_not_left_to_brake(track, meeting):
-    """At 20 m/s on 100 m radius 4 of 5 m/s² hold the car: 3 are left at first."""
-    radius, v = 100.0, 20.0
+    """At 17 m/s on 100 m radius 2.9 of 5 m/s² hold the car: 4.1 are left at first."""
+    radius, v = 100.0, 17.0
     way = np.arange(161) * DT * v
     bend = {
         "x": radius * np.sin(way / radius), "y": radius * (1 - np.cos(way / radius)),
         "h": way / radius, "v": np.full(161, v),
     }  # fmt: skip
-    distance = 4.0 + stopping_distance(v, 5.0) + 4.0
+    distance = 4.0 + stopping_distance(v, 5.0) + 1.0
     at = distance / radius
     x, y = radius * np.sin(at), radius * (1 - np.cos(at))
     stands = {"x": np.full(161, x), "y": np.full(161, y), "h": np.full(161, at)}
     rollout = meeting({**track(t=8.0), **bend}, {**track(t=8.0), **stands})
     assert analyse(replace(rollout, friction=np.array([9.0]))).preventable[0, 1]
     assert not analyse(replace(rollout, friction=np.array([5.0]))).preventable[0, 1]
+
+
+@pytest.mark.parametrize(("friction", "slow"), [(5.0, 17.3), (9.0, 20.0)])
+def test_a_careful_driver_is_slower_before_a_bend(track, meeting, friction, slow):
+    """It takes 60 % of the grip: on 100 m radius sqrt(0.6 · 5 · 100) = 17.3 m/s, on a dry road 20.
+
+    A car stands where 17.3 m/s still stop (27 m on a dry road, 45 m on a wet one), 20 m/s do not.
+    """
+    radius, v = 100.0, 20.0
+    way = np.arange(161) * DT * v
+    bend = {
+        "x": radius * np.sin(way / radius), "y": radius * (1 - np.cos(way / radius)),
+        "h": way / radius, "v": np.full(161, v),
+    }  # fmt: skip
+    at = (4.0 + stopping_distance(slow, friction) + 6.0) / radius
+    stands = {
+        "x": np.full(161, radius * np.sin(at)), "y": np.full(161, radius * (1 - np.cos(at))),
+        "h": np.full(161, at),
+    }  # fmt: skip
+    rollout = meeting({**track(t=8.0), **bend}, {**track(t=8.0), **stands})
+    assert 4.0 + stopping_distance(v, 5.0) > radius * at or friction > 5.0
+    assert analyse(replace(rollout, friction=np.array([friction]))).preventable[0, 1]
+
+
+def test_a_pedestrian_beside_the_lane_is_not_to_blame_for_an_ego_that_leaves_it(track, meeting):
+    """The ego slides 9 m off its lane, 3 m of them within the last second, into one who runs there.
+
+    The pedestrian comes at 3 m/s, so that a careful driver could not stop.
+    """
+    ego, at = track(v=15.0, h=0.2), 60
+    walker = track(x=ego["x"][at] + 2.0, y=ego["y"][at] + 9.0, v=3.0, h=-RIGHT_ANGLE)
+    kinds = [CAR, PEDESTRIAN]
+    rollout = meeting(ego, walker, kinds=kinds, boxes=[(4.0, 2.0, 0.0), MAN], claims=[0])
+    rollout = replace(rollout, friction=np.array([5.0]))
+    assert verdict(rollout) == (BV, Rule.STEPPED_OUT)
+    offset = rollout.offset.copy()
+    offset[0, 0] = rollout.y[0, 0]
+    assert verdict(replace(rollout, offset=offset)) == (EGO, Rule.LEFT_ITS_LANE)
 
 
 def test_a_barrier_ahead_is_the_egos(track, meeting):
@@ -455,7 +493,9 @@ def test_who_runs_a_red_light_is_responsible(track, meeting):
     red = with_line(plain, 0.0, -9.8, RIGHT_ANGLE, 1, RED)
     assert verdict(red) == (BV, Rule.RED_LIGHT)
     found = analyse(red)
-    assert found.decided[0, 1] == 37  # its front, 2 m ahead, passes the line after 18.2 m
+    # its front, 2 m ahead, passes the line with instant 37, after 18.5 m; at 10 m/s it needs
+    # 10² / (2 · 3) = 16.7 m to stop in comfort, which it has up to 1.8 m: a danger from 2.0 m on
+    assert found.decided[0, 1] == 4
 
 
 def test_all_give_way_to_an_emergency_vehicle(track, meeting):
@@ -622,3 +662,94 @@ def test_offsets_of_another_road_are_no_lane_change(track, meeting, course):
     rollout = meeting(ego, walker, kinds=[CAR, PEDESTRIAN], boxes=box, claims=[0])
     assert analyse(rollout).type[0, 1] == ConflictType.VRU_INTO_SIDE
     assert verdict(rollout)[1] != Rule.LEFT_ITS_LANE
+
+
+def test_one_that_must_give_way_is_a_danger_once_it_cannot_stop_in_comfort(track, meeting):
+    """At 10 m/s, 3 m/s² stop within 16.7 m; its front is in the ego's way after 26.5 m.
+
+    So it is a danger from 9.8 m on, 1 s after the start. One to which the ego must give way is a
+    danger as soon as both are on a collision course, 4 s at most before they meet.
+    """
+    trusted = analyse(crossing(track, meeting, BY_SIGNS))
+    assert trusted.decided[0, 1] * DT == pytest.approx(1.0, abs=0.15)
+    assert not trusted.preventable[0, 1]
+    feared = analyse(crossing(track, meeting, -BY_SIGNS))
+    assert feared.decided[0, 1] == pytest.approx(0, abs=1)
+    assert feared.preventable[0, 1]
+
+
+def test_the_slower_runner_of_a_red_light_is_avoided(track, meeting):
+    """At 5 m/s it could stop within 4.2 m, so it is a danger late, but leaves the ego more time."""
+    late = track(y=-30.0, h=RIGHT_ANGLE, v=10.0)
+    early = meeting(track(x=-60.0, v=20.0), late)
+    line = with_line(early, 0.0, -25.0, RIGHT_ANGLE, 1, RED)
+    assert verdict(line) == (BV, Rule.RED_LIGHT)
+    assert at_fault(line)  # 2.8 s from its line to the ego's way: time to brake from 20 m/s
+    near = with_line(early, 0.0, -4.5, RIGHT_ANGLE, 1, RED)
+    assert verdict(near) == (BV, Rule.RED_LIGHT)
+    assert not at_fault(near)
+
+
+@pytest.mark.parametrize(("v", "fault"), [(10.0, True), (4.0, False)])
+def test_a_vehicle_that_pulls_out_ahead_is_followed(track, meeting, v, fault):
+    """A bus pulls out over seconds, 40 m ahead, and the ego strikes its flank with a corner.
+
+    Driving up to it is the ego's failure; one that comes from behind and drives at the ego's flank
+    is the other's.
+    """
+    bus = (12.0, 2.5, 0.0)
+    angle = 0.1
+    ahead = 40.0 if fault else -10.0
+    other = track(x=ahead, y=-5.0 if fault else -3.4, h=angle, v=4.0 if fault else 9.0, t=8.0)
+    rollout = meeting(track(v=v, t=8.0), other, boxes=[(4.0, 2.0, 0.0), bus], claims=[0])
+    found = analyse(rollout)
+    assert found.type[0, 1] == ConflictType.SIDE_SWIPE
+    assert verdict(rollout) == (
+        (EGO, Rule.CUT_IN_PREVENTABLE) if fault else (BV, Rule.LEFT_ITS_LANE)
+    )
+    assert at_fault(rollout) == fault
+
+
+@pytest.mark.parametrize("faster", [True, False])
+def test_a_cyclist_who_swings_out_is_passed_with_room(track, meeting, course, faster):
+    """The ego passes 0.5 m beside it, or it catches the ego up and rides into its flank."""
+    kinds, boxes = [CAR, BICYCLE], [(4.0, 2.0, 0.0), (1.8, 0.6, 0.0)]
+    meet = 2.5 if faster else 1.0
+    swings = course((0, 0), (meet, 0), (meet + 0.1, 0.8), (6, 0.8))
+    other = track(x=24.0 if faster else -9.0, y=-1.8, v=4.0 if faster else 10.0, slide=swings)
+    rollout = meeting(track(v=12.0 if faster else 4.0), other, kinds=kinds, boxes=boxes, claims=[0])
+    assert analyse(rollout).type[0, 1] == ConflictType.VRU_INTO_SIDE
+    expected = (EGO, Rule.PASSED_TOO_CLOSE) if faster else (BV, Rule.INTO_THE_SIDE)
+    assert verdict(rollout) == expected
+
+
+def test_a_slower_vehicle_that_brakes_at_last_had_long_been_too_near(track, meeting, course):
+    """The ego drives up to one that is 6 m/s slower for 6 s; that it then brakes excuses nothing."""
+    brakes = course((0, 10), (5.5, 10), (7, 5))
+    rollout = meeting(track(v=16.0, t=7.0), track(x=42.0, v=brakes, t=7.0))
+    assert verdict(rollout) == (EGO, Rule.REAR_DISTANCE)
+    at_once = course((0, 16), (2, 0), (7, 0))
+    near = meeting(track(v=16.0, t=7.0), track(x=6.0, v=at_once, t=7.0))
+    assert verdict(near)[0] == NEITHER
+
+
+@pytest.mark.parametrize(("braking", "kind"), [(4.0, ConflictType.EGO_STANDING), (0.5, None)])
+def test_an_ego_that_all_but_stands_and_brakes_is_run_into(track, meeting, braking, kind):
+    """At 0.45 m/s it stops within 0.1 s; with little braking it drives on, and turns up in front."""
+    v = np.maximum(0.45 + braking * (2.0 - DT * np.arange(121)), 0.0)
+    ego = track(v=v)
+    at = 41  # the other's front, 2 m ahead of its centre, is then beside the ego's right edge
+    other = track(x=ego["x"][at] + 2.9, y=-3.0 - 9.0 * DT * at, h=RIGHT_ANGLE, v=9.0)
+    rollout = meeting(ego, other, claims=[-BY_SIGNS])
+    found = analyse(rollout).type[0, 1]
+    assert (found == ConflictType.EGO_STANDING) == (kind == ConflictType.EGO_STANDING)
+
+
+def test_an_ego_struck_in_the_flank_by_one_that_sped_up_is_not_to_blame(track, meeting, course):
+    """From the right, it stands until the ego is 0.8 s before it, and speeds up by 8 m/s²."""
+    starts = course((0, 0), (2.0, 0), (4.0, 16), (6, 16))
+    other = track(y=-9.0, h=RIGHT_ANGLE, v=starts)
+    rollout = meeting(track(x=-31.0, v=10.0), other, claims=[-FROM_THE_RIGHT])
+    found = analyse(rollout)
+    assert not found.leads_ego[0, 1]
+    assert verdict(rollout) == (NEITHER, Rule.REVEALED_LATE)

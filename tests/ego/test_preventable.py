@@ -18,6 +18,10 @@ from bridgegen.ego.preventable import (
     avoids_deceleration,
 )
 from bridgegen.errors import InputError, UnknownNameError
+from bridgegen.metrics import evaluate
+from bridgegen.odd.reader import load, shipped_text
+from bridgegen.options import PipelineOptions
+from bridgegen.pipeline import Pipeline
 
 BRAKING, JERK = 0.774 * 9.81, 12.65
 
@@ -52,6 +56,43 @@ def crashes(ego: float, other: float, driver: str) -> int:
 @pytest.mark.parametrize(("pair", "counts"), COUNTS.items())
 def test_it_counts_the_crashes_that_the_commissions_code_counts(pair, counts):
     assert tuple(crashes(*pair, driver) for driver in MODELS) == counts
+
+
+@pytest.mark.parametrize("driver", MODELS)
+def test_drivers_in_a_storyboard_crash_where_the_regulations_models_do(driver, tmp_path):
+    """In the simulator a car that changes lane turns; the Commission's code moves it sideways.
+
+    Turned by an angle, its front corner is farther across the way, so that the bodies overlap
+    earlier, and its rear corner is nearer along it. The model is asked for these distances. (Asked
+    for those of a car that does not turn, it agrees in 93 and 97 %.)
+    """
+    text = shipped_text("r157/cut-in").decode("utf-8")
+    for old, new in (
+        ("shape: sinusoidal", "shape: linear"), ("time_step: 0.1", "time_step: 0.05"),
+        ("duration: 16.0", "duration: 30.0"), ("length: 900.0", "length: 1200.0"),
+    ):  # fmt: skip
+        assert old in text
+        text = text.replace(old, new)
+    path = tmp_path / "r157-cut-in.yaml"
+    path.write_text(text, "utf-8")
+    scenario = load(path)
+    space = scenario.space()
+    X = space.decode(np.random.default_rng(3).random((1000, space.n_var)))
+    pipeline = Pipeline(scenario, space, PipelineOptions(ego=driver))
+    rollout = pipeline.rollout(X)
+    crashed = evaluate(rollout, ["n_collision"])[:, 0] > 0.0
+    v, slower, gap, lateral = (
+        X[:, space.index(name)] for name in ("ego_speed", "relative_speed", "gap", "lateral_speed")
+    )
+    length, width, centre = rollout.box[1]
+    turn = np.arctan2(lateral, v - slower)
+    corner = (0.5 * length + centre) * np.sin(turn) + 0.5 * width * np.cos(turn)
+    expected = ~avoids_cut_in(
+        v, v - slower, np.maximum(gap - 0.5 * width * np.sin(turn), 0.0), lateral,
+        lateral_gap=np.maximum(3.5 - 0.5 * width - corner, 0.01), driver=driver,
+    )  # fmt: skip
+    assert 80 < expected.sum() < 300
+    assert (crashed == expected).mean() >= 0.99
 
 
 @pytest.mark.parametrize(("pair", "count"), RSS_COUNTS.items())

@@ -80,3 +80,22 @@ def s4_text() -> str:
     import bridgegen.catalogue as catalogue
 
     return (Path(catalogue.__file__).parent / "crossroads-s4.yaml").read_text("utf-8")
+
+
+@pytest.fixture(scope="session")
+def papers_text(s4_text: str) -> str:
+    """crossroads-s4 with the paper's objective and thresholds written out."""
+    return s4_text[: s4_text.index("objective:")] + PAPERS_OBJECTIVE
+
+
+PAPERS_OBJECTIVE = """objective: # the fitness of the paper, Section V-A
+  terms:
+    - {metric: d_min, weight: 0.8297}
+    - {metric: v_d, weight: 0.1703}
+  weights: fixed
+  scale: raw
+  critical: # paper, Table III
+    n_collision_above: 0
+    d_min_below: 2.0 # m
+    v_d_at_least: 1.0 # m/s
+"""

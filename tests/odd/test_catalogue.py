@@ -8,6 +8,7 @@ import pytest
 from bridgegen.conflict.plausibility import plausibility
 from bridgegen.ego.kinds import ANIMAL, OTHER, PEDESTRIAN
 from bridgegen.errors import UnknownNameError
+from bridgegen.odd import objectives
 from bridgegen.odd.parameters import Axis
 from bridgegen.odd.reader import load, names
 from bridgegen.odd.scenario import ObjectiveSpec, SearchedScenario, Term
@@ -70,9 +71,12 @@ def test_scenario_is_the_papers(name):
     )  # fmt: skip
     assert (scenario.name, scenario.duration, scenario.time_step) == (f"paper-{name}", 20.0, 0.05)
     assert scenario.axes == (Axis.PARTICIPANTS, Axis.WEATHER)
-    terms = {term.metric: term.weight for term in scenario.objective.terms}
+    assert scenario.objective == objectives.PAPERS
+    papers = objectives.PAPERS
+    terms = {term.metric: term.weight for term in papers.terms}
     assert terms == {"d_min": 0.8297, "v_d": 0.1703}
-    critical = scenario.objective.critical
+    assert (papers.weights, papers.scale, papers.rule) == ("fixed", "raw", "thresholds")
+    critical = papers.critical
     assert (critical.n_collision_above, critical.d_min_below, critical.v_d_at_least) == (0, 2, 1)
 
 

@@ -385,9 +385,9 @@ MISTAKES = [
 
 
 @pytest.mark.parametrize(("old", "new", "message", "line"), MISTAKES)
-def test_mistake_is_named_with_its_place(tmp_path, s4_text, old, new, message, line):
-    assert old in s4_text
-    text = s4_text.replace(old, new, 1)
+def test_mistake_is_named_with_its_place(tmp_path, papers_text, old, new, message, line):
+    assert old in papers_text
+    text = papers_text.replace(old, new, 1)
     path = tmp_path / "mine.yaml"
     path.write_text(text, "utf-8")
     with pytest.raises(ScenarioError) as caught:

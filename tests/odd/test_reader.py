@@ -1,6 +1,7 @@
 """Scenario files by path: what is read, and every mistake with its file and line."""
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -8,6 +9,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from bridgegen.errors import FileFormatError, InputError, ScenarioError, UnknownNameError
+from bridgegen.odd.objectives import PAPERS
 from bridgegen.odd.parameters import Axis
 from bridgegen.odd.reader import load
 from bridgegen.odd.story import Change, SpeedChange
@@ -68,14 +70,16 @@ def test_a_users_fragment_and_extension_axis(write, s4_text):
     assert scenario.parameters["tread"].place.endswith("tyres.yaml, line 4")
 
 
-def test_entropy_weights_and_own_thresholds(write, s4_text):
-    text = s4_text.replace("weights: fixed", "weights: entropy")
+def test_entropy_weights_and_own_thresholds(write, papers_text):
+    text = papers_text.replace("weights: fixed", "weights: entropy")
     text = text.replace("scale: raw", "scale: standardised")
     text = re.sub(r", weight: [0-9.]+", "", text).replace("d_min_below: 2.0", "d_min_below: 1.5")
     objective = load(write(text)).objective
     assert (objective.weights, objective.scale) == ("entropy", "standardised")
     assert [term.weight for term in objective.terms] == [None, None]
     assert objective.critical == Thresholds(d_min_below=1.5)
+    assert (objective.rule, objective.gated) == ("thresholds", True)
+    assert load(write(papers_text)).objective == replace(PAPERS, gated=True)
 
 
 def test_all_mistakes_of_a_file_and_its_fragment_at_once(refuse, write, s4_text):

@@ -5,6 +5,7 @@ import shlex
 import sys
 from dataclasses import fields, replace
 
+import numpy as np
 import pytest
 
 import bridgegen as bg
@@ -13,6 +14,7 @@ from bridgegen.errors import InputError
 from bridgegen.options import CommonOptions, PipelineOptions, SearchOptions, options_of
 from bridgegen.options.forms import read_names, read_numbers, read_settings, read_terms
 from bridgegen.simulation.choice import SimulatorChoice
+from bridgegen.suite.suite import run_suite
 
 DECLARED = {one.name: one for one in options_of(SearchOptions)}
 
@@ -47,9 +49,73 @@ def test_keywords_are_those_of_the_options():
         ]
 
 
-def test_a_keyword_that_there_is_not_is_refused():
-    with pytest.raises(TypeError, match="bugdet"):
-        bg.run_search("crossroads-s4", bugdet=10)
+@pytest.mark.parametrize(
+    ("function", "given", "named", "said"),
+    [
+        (bg.run_search, ("cut-in",), {"bugdet": 10}, "'bugdet'; did you mean 'budget'?"),
+        (bg.run_search, (), {}, "run_search: missing a required argument: 'scenario'"),
+        (bg.run_search, ("cut-in", 3), {}, "run_search: too many positional arguments"),
+        (bg.run_search, (5,), {}, "scenario must be str | pathlib.Path, got 5"),
+        (bg.compare, ("cut-in",), {"sedes": 3}, "'sedes'; did you mean 'seeds'?"),
+        (bg.compare, ("cut-in",), {"seeds": "x"}, "seeds must be int, got 'x'"),
+        (run_suite, ("cut-in",), {"options": {}}, "options must be .*CommonOptions, got {}"),
+        (bg.resume, ("runs/a",), {"eog": "x"}, "'eog'; did you mean 'ego'?"),
+        (bg.confirm, ("runs/a",), {}, "confirm: missing a required argument: 'simulator'"),
+        (bg.estimate_risk, ("cut-in",), {"evnet": "x"}, "'evnet'; did you mean 'event'?"),
+        (bg.map_preventability, ("cut-in",), {"gird": 3}, "argument of map_preventability 'gird'"),
+        (bg.simulate_file, ("a.xosc",), {"eog": "x"}, "'eog'; did you mean 'ego'?"),
+    ],
+)
+def test_a_wrong_argument_is_an_error_of_input(function, given, named, said):
+    with pytest.raises(InputError, match=said):
+        function(*given, **named)
+
+
+@pytest.mark.parametrize(
+    ("named", "said"),
+    [
+        ({"budget": "many"}, "budget must be a whole number, got 'many'"),
+        ({"seed": 1.5}, "seed must be a whole number, got 1.5"),
+        ({"keep": None}, "keep must be a whole number, got None"),
+        ({"time_limit": "1"}, "time_limit must be a number, got '1'"),
+        ({"causes": "no"}, "causes must be True or False, got 'no'"),
+        ({"ego": 5}, "ego must be a text, got 5"),
+        ({"axes": 3}, "axes must be names, got 3"),
+        ({"metrics": [3]}, r"metrics must be names, got \[3\]"),
+        ({"fixed": "fog_density"}, "fixed must read NAME=VALUE, got 'fog_density'"),
+        ({"fixed": [1]}, r"fixed must be values by name, got \[1\]"),
+        ({"objective": {"d_min": "x"}}, "objective must be a name, or metrics and their weights"),
+        ({"objective": "d_min=x"}, "objective must read NAME=NUMBER, got 'd_min=x'"),
+        ({"objective": "harmm"}, "unknown metric 'harmm'; did you mean 'harm'?"),
+        ({"objective": "papre"}, "unknown metric 'papre'; did you mean 'paper'?"),
+        ({"criteria": 3}, "criteria must be criteria, got 3"),
+        ({"simulator": "esmni"}, "unknown simulator 'esmni'; did you mean 'esmini'?"),
+    ],
+)
+def test_a_wrong_value_is_an_error_of_input(named, said, tmp_path):
+    with pytest.raises(InputError, match=said):
+        bg.run_search("cut-in", **named, out=tmp_path / "run")
+    assert not (tmp_path / "run").exists()
+
+
+def test_all_wrong_values_are_named_at_once():
+    with pytest.raises(InputError) as error:
+        bg.run_search("cut-in", budget="x", seed="y")
+    assert [one.split()[0] for one in error.value.problems] == ["budget", "seed"]
+
+
+def test_texts_are_read_as_on_the_command_line():
+    given = SearchOptions(
+        axes="participants,weather", fixed="fog_density=80", objective="d_min=0.5,ttc",
+        criteria="R-1: min(gap to any) > 1 m", settings="w=0.5", simulator="esmini", budget=7,
+    )  # fmt: skip
+    assert given == SearchOptions(
+        axes=("participants", "weather"), fixed={"fog_density": 80.0},
+        objective={"d_min": 0.5, "ttc": None}, criteria=["R-1: min(gap to any) > 1 m"],
+        settings={"w": 0.5}, simulator=SimulatorChoice("esmini"), budget=np.int64(7),
+    )  # fmt: skip
+    assert SearchOptions(objective=["d_min", "ttc"]).objective == {"d_min": None, "ttc": None}
+    assert SearchOptions(objective="harm").objective == {"harm": None}
 
 
 def test_the_command_line_has_them_all():

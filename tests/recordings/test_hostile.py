@@ -196,3 +196,19 @@ def test_texts_where_a_history_has_numbers_are_refused(tmp_path):
     base.close()
     with pytest.raises(FileFormatError, match="speed in Trajectory must be a number, got 'fast'"):
         list(read(path))
+
+
+@pytest.mark.parametrize("name", ["valid", "position", "velocity", "heading", "length"])
+@pytest.mark.parametrize("wrong", [3.0, True, None, "x", [], [[[1.0]]], np.float64(2.0)])
+def test_columns_of_scenarionet_have_the_dimensions_that_they_must(tmp_path, name, wrong):
+    """A number, a text, an empty list, or an array of three dimensions in place of a column."""
+    path = w.write_scenarionet(tmp_path)
+    whole = pickle.loads(path.read_bytes())
+    next(iter(whole["tracks"].values()))["state"][name] = wrong
+    path.write_bytes(pickle.dumps(whole))
+    try:
+        found = list(read(path))
+    except FileFormatError as error:
+        assert name in str(error) or "must" in str(error)
+    else:
+        assert found

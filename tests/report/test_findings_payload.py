@@ -198,6 +198,10 @@ def test_a_scenario_s_conflict_has_its_instants_and_zones():
     assert told["numbers"]["severity"] == [0.12, "1"]
     assert told["numbers"]["needed_deceleration"] == [None, "m/s²"]
     assert told["rule_source"] == "StVO § 8"
+    assert told["sentence"] == conflict().summary.sentence
+    judged = conflict_payload(conflict(), "planning")
+    assert "root cause planning: " in judged["sentence"]
+    assert judged["sentence"].startswith(judged["bare"])
 
 
 def test_what_is_critical_in_words():

@@ -54,26 +54,27 @@ def test_outcomes_are_those_of_a_search(risk):
     severity = searched.metrics[:, pipeline.metrics.index("severity")]
     ok = found.values[:, Column.RESULT] == 1.0
     assert ok.all()
-    assert np.array_equal(found.values[:, Column.HARM], harm)
+    assert np.array_equal(found.values[:, Column.OWN] >= NEAR_MISS, harm >= NEAR_MISS)
     harmful = harm >= NEAR_MISS
     assert harmful.any()
     assert not harmful.all()
-    assert np.array_equal(found.values[harmful, Column.SCORE], harm[harmful])
+    collides = searched.findings.conflict[harmful] == "contact"
+    assert np.array_equal(found.values[harmful, Column.SCORE] >= 0.6, collides)
     assert (found.values[~harmful, Column.SCORE] < NEAR_MISS).all()
     assert np.array_equal(found.values[harmful, Column.SEVERITY], severity[harmful])
     words = [found.modes[int(k)] for k in found.values[harmful, Column.MODE]]
     rules = searched.findings.rule[harmful]
     assert all(rule in one for rule, one in zip(rules, words, strict=True))
     every = outcomes(pipeline, X, "any").values[:, Column.SCORE]
-    assert (every[harmful] >= harm[harmful]).all()
+    assert (every >= found.values[:, Column.SCORE]).all()
 
 
 def test_it_counts_what_its_table_holds(risk):
     found = said(risk.folder)
     lines = (risk.folder / "harmful.csv").read_text().splitlines()
-    harms = [float(row["harm"]) for row in csv.DictReader(lines)]
-    assert found["per_encounter"]["conflict"]["estimate"] == pytest.approx(len(harms) / 1200)
-    collisions = sum(harm >= 0.6 for harm in harms)
+    kinds = [row["conflict"] for row in csv.DictReader(lines)]
+    assert found["per_encounter"]["conflict"]["estimate"] == pytest.approx(len(kinds) / 1200)
+    collisions = kinds.count("collision")
     assert found["per_encounter"]["collision"]["estimate"] == pytest.approx(collisions / 1200)
     modes = sum(one["estimate"] for one in found["by_mode"].values())
     assert modes == pytest.approx(found["per_encounter"]["collision"]["estimate"])
@@ -91,7 +92,9 @@ def test_the_most_likely_encounter_of_each_failure_mode_is_one(risk):
         found = outcomes(pipeline, one.x[np.newaxis], "ego")
         assert found.values[0, Column.SCORE] >= 0.6
         assert found.modes == (one.mode,)
-        assert bg.simulate_file(risk.folder / f"{said_of['files']}.xosc").metrics["harm"] >= 0.6
+        again = bg.simulate_file(risk.folder / f"{said_of['files']}.xosc")
+        assert again.metrics["n_collision"] == 1.0
+        assert again.metrics["harm"] >= NEAR_MISS
         assert said_of["values"] == exposure.space.values(one.x)
 
 

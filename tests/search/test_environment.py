@@ -60,7 +60,7 @@ def test_a_row_as_an_action(pipeline):
 
 def test_it_ends_at_harm_only_if_it_is_to(pipeline):
     rng = np.random.default_rng(0)
-    U = rng.random((40, 10))
+    U = rng.random((400, 10))
     critical = U[pipeline.evaluate(pipeline.space.decode(U)).critical][0]
     stay = np.zeros(10, np.float32)
     for until, ends in ((False, False), (True, True)):
@@ -182,6 +182,6 @@ def test_the_documented_agent_learns(pipeline):
     my_agent = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(my_agent)
     forty = ScenarioVectorEnv(pipeline, action="row", horizon=1000)
-    shares = my_agent.cross_entropy(forty, 10)
-    assert shares[0] < 0.7  # random sampling has a half
-    assert np.mean(shares[-3:]) > 0.9
+    shares = my_agent.cross_entropy(forty, 15)
+    assert shares[0] < 0.1  # random sampling has 1.4 %
+    assert np.mean(shares[-3:]) > 0.7

@@ -144,7 +144,7 @@ def change(folder, sql, *values):
 @pytest.mark.parametrize(
     ("sql", "values", "message"),
     [
-        ("UPDATE run SET value = ? WHERE key = 'schema'", ["4"], "schema must be at most 3, got 4"),
+        ("UPDATE run SET value = ? WHERE key = 'schema'", ["5"], "schema must be at most 4, got 5"),
         ("DELETE FROM run WHERE key = 'schema'", [], "damaged: bad or missing 'schema'"),
         ("DELETE FROM run WHERE key = 'settings'", [], "damaged: no settings"),
         ("UPDATE run SET value = '{' WHERE key = 'settings'", [], "damaged: bad or missing"),

@@ -10,7 +10,7 @@ from hypothesis.extra import numpy as hnp
 
 from bridgegen.conflict.findings import COLUMNS, Findings
 from bridgegen.errors import InputError, StorageError
-from bridgegen.store import Store
+from bridgegen.store import Recorded, Store
 from bridgegen.store.rows import Columns, quoted
 
 PARAMETERS, METRICS = ["ego_speed", "fog_density"], ["d_min", "v_d", "ttc"]
@@ -193,6 +193,25 @@ def test_a_run_of_the_second_schema_has_no_findings_and_is_resumed(tmp_path):
         assert not {*COLUMNS} & {*store.frame()}
 
 
+def test_a_run_of_the_third_schema_keeps_its_digest_and_is_resumed(tmp_path):
+    """What happened is not part of the digest, which the records beside a run repeat."""
+    with create(tmp_path / "run") as store:
+        U, X, result = batch(4)
+        result.findings = replace(Findings.none(4), happened=np.array(["{}"] * 4, dtype=object))
+        store.append(U, X, result, 1.0)
+        digest = store.read().digest()
+    db = sqlite3.connect(tmp_path / "run" / "run.sqlite")
+    db.execute("ALTER TABLE evaluations DROP COLUMN happened")
+    db.execute("UPDATE run SET value = '3' WHERE key = 'schema'")
+    db.commit()
+    db.close()
+    with Store.open(tmp_path / "run", write=True) as store:
+        assert store.read().digest() == digest
+        assert Recorded(store).digest() == digest
+        store.append(*batch(2, seed=1), seconds=2.0)
+        assert store.read().findings.happened.tolist() == [""] * 6
+
+
 def test_findings_come_back_and_are_part_of_the_digest(tmp_path):
     U, X, result = batch(3)
     texts = [
@@ -202,6 +221,7 @@ def test_findings_come_back_and_are_part_of_the_digest(tmp_path):
         ["signs", "", "left its lane"],
         ["bv", "", "bv"],
         ["", "others collide", ""],
+        ['{"began":{}}', "", ""],
     ]
     result.findings = Findings(*(np.array(one, dtype=object) for one in texts))
     with create(tmp_path / "run") as store:
@@ -213,7 +233,7 @@ def test_findings_come_back_and_are_part_of_the_digest(tmp_path):
     assert changed.digest() != rows.digest()
     assert rows.take(np.array([2])).findings.row(0) == {
         "conflict": "contact", "conflict_type": "head-on", "responsible": "other",
-        "rule": "left its lane", "partner": "bv", "implausible": None,
+        "rule": "left its lane", "partner": "bv", "implausible": None, "happened": None,
     }  # fmt: skip
 
 
@@ -277,12 +297,14 @@ def test_any_name_is_a_column(tmp_path):
 
 
 def test_each_schema_has_its_last_columns():
-    """The first had no causes, the second no findings; a new run has all."""
-    named = [Columns.named(1, ["a"], ["m"], 1, schema=k).last for k in (1, 2, 3)]
+    """The first had no causes, the second no findings, the third not what happened."""
+    named = [Columns.named(1, ["a"], ["m"], 1, schema=k).last for k in (1, 2, 3, 4)]
     assert named[0] == ("status", "critical")
     assert named[1] == ("status", "critical", "cause")
-    assert named[2] == ("status", "critical", "cause", *COLUMNS)
-    assert Columns.named(1, ["a"], ["m"], 1).last == named[2]
+    assert named[3] == ("status", "critical", "cause", *COLUMNS)
+    assert named[2] == named[3][:-1]
+    assert named[3][-1] == "happened"
+    assert Columns.named(1, ["a"], ["m"], 1).last == named[3]
 
 
 def test_a_run_of_the_second_schema_has_its_causes():

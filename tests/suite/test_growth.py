@@ -37,7 +37,7 @@ class Blind:
 def run(tmp_path_factory):
     place = tmp_path_factory.mktemp("runs") / "s4"
     return bg.run_search(
-        "paper/crossroads-s3", algorithm="random", budget=100, seed=0, ego="route-follower", keep=1,
+        "crossroads-s2", algorithm="random", budget=300, seed=5, ego="route-follower", keep=1,
         objective={"harm": None}, out=place, criteria=[FAST],
     )  # fmt: skip
 
@@ -65,13 +65,9 @@ def test_each_mode_is_kept_once_and_fails_there_to_the_bit(run, tmp_path):
     assert {one.id for one in made} == failures.keys()
     assert {bool(mode.exports) for mode in run.modes} == {True, False}
     for mode in run.modes:
-        (kept,) = [one for one in failures.values() if one.rule == mode.rule]
-        assert (kept.partner, kept.place, kept.scenario) == (
-            "car",
-            mode.place,
-            "paper-crossroads-s3",
-        )
-        assert (kept.status, kept.driver, kept.seed) == ("new", "route-follower", 0)
+        (kept,) = [one for one in failures.values() if one.responsible == mode.responsible]
+        assert (kept.partner, kept.place, kept.scenario) == ("car", mode.place, "crossroads-s2")
+        assert (kept.status, kept.driver, kept.seed) == ("new", "route-follower", 5)
         assert (kept.cause, kept.minimal) == (mode.cause, mode.minimal.sentence)
         again = [simulate_file(to / name).metrics for name in kept.files]  # without the suite
         assert again[-1]["harm"] == mode.minimal.harm
@@ -145,13 +141,14 @@ def test_what_does_not_fail_there_is_refused_and_named(copied, tmp_path):
 def test_what_fails_otherwise_than_it_was_found_is_refused(copied, tmp_path):
     path = copied / "triage.json"
     data = json.loads(path.read_text("utf-8"))
-    rules = [one["rule"] for one in data["modes"]]
-    data["modes"][0]["rule"] = "rear distance"
+    places = [one["place"] for one in data["modes"]]
+    data["modes"][0]["place"] = "between junctions"
     path.write_text(json.dumps(data), "utf-8")
     made = add_failures([copied], tmp_path / "mine")
-    assert outcomes(made) == ["refused", *["added"] * (len(rules) - 1)]
+    assert outcomes(made) == ["refused", *["added"] * (len(places) - 1)]
     assert made[0].reason == (
-        f"it fails otherwise than where it was found: rule '{rules[0]}' instead of 'rear distance'"
+        f"it fails otherwise than where it was found: place '{places[0]}' instead of "
+        "'between junctions'"
     )
 
 
@@ -171,13 +168,13 @@ def test_what_fails_otherwise_in_its_new_place_is_refused(run, tmp_path, monkeyp
     monkeypatch.setattr(growth, "write_scenario", written)
     (made,) = add_failures([source / "0001.xosc"], tmp_path / "mine")
     assert made.outcome == "refused"
-    assert f"fails otherwise in {tmp_path / 'mine'}: rule" in made.reason
+    assert f"fails otherwise in {tmp_path / 'mine'}: responsible" in made.reason
     assert [*(tmp_path / "mine").iterdir()] == []
     wrong = "minimal"
     (made,) = add_failures([source / "0001.xosc"], tmp_path / "mine")
     assert (made.outcome, made.is_same) == ("added", True)
     assert "without its minimal form: it fails otherwise" in made.reason
-    assert sorted(one.suffix for one in (tmp_path / "mine").iterdir()) == [
+    assert [one.suffix for one in sorted((tmp_path / "mine").iterdir())] == [
         ".xodr", ".xosc", ".yaml",
     ]  # fmt: skip
 

@@ -8,7 +8,7 @@ import pytest
 
 from bridgegen.cause import Cause
 from bridgegen.conflict.findings import Findings
-from bridgegen.evaluation import Trials
+from bridgegen.evaluation import EVENT, Trials
 from bridgegen.odd.parameters import Axis
 from bridgegen.odd.reader import load
 from bridgegen.odd.space import SearchSpace
@@ -40,12 +40,16 @@ def fix(cause, name, dry=False):
 
 
 class World:
-    """A pipeline whose harm is ``harm(values, fix)`` of the rows; ``label`` names their rule."""
+    """A pipeline whose harm is ``harm(values, fix)`` of the rows; ``label`` names their type."""
 
     cause, baseline, seeks_causes, tries, metrics = None, None, True, True, METRICS
+    preventable = True
 
-    def __init__(self, space, harm, fixes=(), label=None, fails=None):
+    def __init__(
+        self, space, harm, fixes=(), label=None, fails=None, seen=(), spoiled=None, rule=None
+    ):
         self.space, self._harm, self.fixes, self._label = space, harm, tuple(fixes), label
+        self._seen, self._spoiled, self._rule = seen, spoiled, rule
         self._fails, self.kinds = fails, {"ego": "car", "bv": "truck"}
         self.scenario = SimpleNamespace(name="planted")
         self.driver = SimpleNamespace(label="driver")
@@ -60,15 +64,26 @@ class World:
         fix = np.full(n, -1) if fix is None else fix
         self.asked.append((X, fix, noise))
         v = self.values(X)
-        ok = np.ones(n, bool) if self._fails is None else ~self._fails(v)
+        ok = np.ones(n, bool)
+        if self._fails is not None:
+            ok = ~(self._fails(v) if self._spoiled is None else self._fails(v, fix))
         harm = np.where(ok, self._harm(v, fix), 0.0)
-        rule = np.full(n, "rear distance", object)
+        kind = np.full(n, "front-to-rear striking", object)
         if self._label is not None:
-            rule = np.asarray(self._label(v), object)
-        texts = [np.full(n, one, object) for one in
-                 ("contact", "front-to-rear striking", "ego", "bv", "")]  # fmt: skip
-        findings = Findings(*texts[:3], rule, *texts[3:])
-        return Trials(harm, 0.1 * harm, ok, findings, np.full(n, "", object))
+            kind = np.asarray(self._label(v), object)
+        texts = [np.full(n, one, object) for one in ("contact", "ego", "rear distance", "bv", "")]
+        if self._rule is not None:
+            texts[2] = np.asarray(self._rule(v), object)
+        findings = Findings(texts[0], kind, *texts[1:])
+        # What happens follows from the parameters that are seen.
+        event = np.zeros((n, len(EVENT)))
+        for k, name in enumerate(self._seen or self.space.variables):
+            event[:, k % 7] += v[name]
+        until = np.where(ok, np.where(harm >= 0.3, 2.0, np.inf), -np.inf)
+        if self._spoiled is not None:
+            until = np.where(ok, until, self._spoiled)
+        return Trials(harm, 0.1 * harm, ok, findings, np.full(n, "", object), event,
+                      np.full(n, self.preventable), until)  # fmt: skip
 
     def noise_keys(self, X):
         return (1e6 * np.abs(X).sum(axis=1)).astype(np.uint64)

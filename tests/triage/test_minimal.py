@@ -1,13 +1,17 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from bridgegen.triage.minimal import Minimiser, sentence
+from bridgegen.triage.conditions import INSIDE, sentence
+from bridgegen.triage.effort import FULL
+from bridgegen.triage.minimal import Minimiser
 from bridgegen.triage.modes import Key
 from bridgegen.triage.moves import nearest, ranges, searched
 from bridgegen.triage.neighbours import RADIUS
-from bridgegen.triage.record import Condition
+from bridgegen.triage.record import Condition, Probes
 
-WAY = Key("contact", "front-to-rear striking", "ego", "rear distance", "truck", "")
+WAY = Key("contact", "front-to-rear striking", "ego", "truck", "")
 
 
 def planted(v, fix):
@@ -36,9 +40,11 @@ def test_only_what_is_needed_differs_from_nominal(space, world, far):
     assert 7.9 <= speed.limit < 7.9 + 0.1
     assert 8.5 - 0.45 < start.limit <= 8.5
     assert found.sentence == (
-        f"needs ego_speed >= {speed.limit:.3g} m/s and bv_start <= {start.limit:.3g} m; "
-        "all else nominal"
+        f"fails if ego_speed ≥ {speed.limit:.4g} m/s and bv_start ≤ {start.limit:.4g} m, "
+        "other parameters at default"
     )
+    assert found.inside == Probes(rows=INSIDE, harmful=INSIDE)
+    assert all(one.outside.rows > 20 and not one.outside.harmful for one in found.conditions)
 
 
 def test_one_step_further_removes_the_harm_and_the_limit_does_not(space, world, far):
@@ -73,20 +79,76 @@ def test_a_knife_s_edge_cannot_be_made_robust_and_says_so(space, world):
 def test_harm_everywhere_needs_nothing(space, world, far):
     found = minimal(world(space, lambda v, fix: np.full(len(v["ego_speed"]), 0.7)), far)
     assert found.conditions == ()
-    assert found.sentence == "the nominal scenario itself"
+    assert found.sentence == "fails already with all parameters at their defaults"
     assert (np.array(found.x) == space.row({})).all()
 
 
 def test_it_stays_in_its_mode(space, world, far):
-    """Below 8.4 m/s another rule decides: that is another failure."""
+    """Below 8.4 m/s the conflict is another one: that is another failure, yet a failure."""
 
     def label(v):
-        return np.where(v["ego_speed"] >= 8.4, "rear distance", "cut in")
+        return np.where(v["ego_speed"] >= 8.4, "front-to-rear striking", "crossing")
+
+    pipeline = world(space, planted, label=label)
+    found = minimal(pipeline, far)
+    assert dict(zip(space.names, found.x, strict=True))["ego_speed"] >= 8.4
+    (speed,) = [one for one in found.conditions if one.name == "ego_speed"]
+    assert 7.9 <= speed.limit < 7.9 + 0.1  # what is needed to fail, in whatever way
+    assert minimal(pipeline, far, WAY._replace(conflict_type="crossing")) is None
+
+
+def test_what_only_the_mode_needs_is_an_example(space, world, far):
+    """With nominal bv_speed the driver fails all the same, in another mode: it is not needed."""
+
+    def label(v):
+        return np.where(v["bv_speed"] >= 2.0, "front-to-rear striking", "crossing")
 
     found = minimal(world(space, planted, label=label), far)
-    (speed,) = [one for one in found.conditions if one.name == "ego_speed"]
-    assert 8.4 <= speed.limit < 8.4 + 0.1
-    assert minimal(world(space, planted, label=label), far, WAY._replace(rule="cut in")) is None
+    of = {one.name: one for one in found.conditions}
+    assert not of["bv_speed"].confirmed
+    assert of["ego_speed"].confirmed
+    assert of["bv_start"].confirmed
+    assert found.sentence.startswith("with bv_speed = 2")
+    assert ", for example, fails if ego_speed ≥ " in found.sentence
+
+
+def test_harm_that_ends_again_has_two_bounds(space, world):
+    def band(v, fix):
+        return np.where((v["ego_speed"] >= 7.9) & (v["ego_speed"] <= 8.45), 0.7, 0.0)
+
+    found = minimal(world(space, band), space.row({"ego_speed": 8.2}))
+    (speed,) = found.conditions
+    assert 7.9 <= speed.limit < 7.95
+    assert 8.4 < speed.until <= 8.45
+    assert speed.confirmed
+    assert found.sentence == (
+        f"fails if ego_speed from {speed.limit:.4g} to {speed.until:.4g} m/s, "
+        "other parameters at default"
+    )
+
+
+def test_a_slanted_region_is_not_said_to_be_a_box(space, world):
+    """The sum decides: no box about the scenario is harmful throughout and harmless outside."""
+
+    def slanted(v, fix):
+        total = (v["ego_speed"] - 6.9) / 2.0 + (v["bv_speed"] - 1.8) / 1.8
+        return np.where(total >= 1.2, 0.7, 0.0)
+
+    pipeline = world(space, slanted)
+    found = minimal(pipeline, space.row({"ego_speed": 8.7, "bv_speed": 3.4}))
+    confirmed = [one for one in found.conditions if one.confirmed]
+    assert {one.name for one in found.conditions} == {"ego_speed", "bv_speed"}
+    assert len(confirmed) < 2
+    assert "for example" in found.sentence
+
+
+def test_without_simulations_left_all_are_examples(space, world, far):
+    pipeline = world(space, planted)
+    few = Minimiser(pipeline, 0, replace(FULL, probes=30))
+    (found,) = few.find(far[np.newaxis], [WAY], ["minimal-01"])
+    assert found.conditions
+    assert not any(one.confirmed for one in found.conditions)
+    assert found.sentence.startswith("fails, for example, with ")
 
 
 def test_modes_are_minimised_together_as_alone(space, world, far):
@@ -113,9 +175,12 @@ def test_parameters_that_limit_each_other_and_whole_numbers(every, world):
         assert "fog_density" in [one.name for one in found.conditions]
 
 
-@pytest.mark.parametrize(("limit", "said"), [(4.19e-9, "0"), (-1e-5, "0"), (0.25, "0.25")])
-def test_what_is_next_to_nothing_is_said_as_0(limit, said):
-    one = Condition(
-        name="delay", unit="s", sign="<=", limit=limit, step=0.1, value=limit, nominal=3.0
+def test_examples_stand_before_what_is_needed():
+    made = {"unit": "s", "sign": "<=", "limit": 1.0, "step": 0.1, "value": 1.0, "nominal": 3.0}
+    one = Condition(name="delay", needs="≤ 1 s", outside=Probes(rows=22, harmful=0), **made)
+    other = Condition(name="gap", needs="= 1 s", **made)
+    assert sentence([one]) == "fails if delay ≤ 1 s, other parameters at default"
+    assert sentence([other]) == "fails, for example, with gap = 1 s, other parameters at default"
+    assert sentence([one, other]) == (
+        "with gap = 1 s, for example, fails if delay ≤ 1 s, other parameters at default"
     )
-    assert sentence([one]) == f"needs delay <= {said} s; all else nominal"

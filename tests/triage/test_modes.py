@@ -1,10 +1,11 @@
 import numpy as np
 import pytest
 
+from bridgegen.conflict.findings import Findings
 from bridgegen.conflict.types import RULES, ConflictType
-from bridgegen.triage.modes import Key, clusters, group, rekeyed, title
+from bridgegen.triage.modes import Key, by_frequency, clusters, group, keys_of, rekeyed, title
 
-CAR = Key("contact", "front-to-rear striking", "ego", "rear distance", "car", "", "planning")
+CAR = Key("contact", "front-to-rear striking", "ego", "car", "", "planning")
 
 
 def test_rows_that_agree_in_all_keys_are_one_mode_the_worst_first():
@@ -65,27 +66,45 @@ def test_modes_whose_tested_cause_is_the_same_are_one():
 
 
 def test_titles_are_in_words():
-    assert title(CAR) == (
+    assert title(CAR, ["rear distance"]) == (
         "runs into the rear of a car (ego responsible: did not keep a safe distance to the vehicle "
         "ahead)"
     )
     near = CAR._replace(conflict="near miss", partner="pedestrian", place="in the junction",
-                        conflict_type=ConflictType.VRU_BY_FRONT.label, responsible="other",
-                        rule="stepped out")  # fmt: skip
-    assert title(near).startswith(
+                        conflict_type=ConflictType.VRU_BY_FRONT.label,
+                        responsible="other")  # fmt: skip
+    assert title(near, ["stepped out"]).startswith(
         "nearly hits a pedestrian with its front in the junction (other responsible, preventable "
     )
     for kind in ConflictType:
         for rule in RULES:
             for conflict in ("contact", "near miss"):
-                key = Key(conflict, kind.label, "shared", rule.label, "animal", "", "")
-                assert "{" not in title(key)
+                key = Key(conflict, kind.label, "shared", "animal", "", "")
+                assert "{" not in title(key, [rule.label])
 
 
 def test_a_title_names_the_emergency_vehicle_to_which_the_ego_did_not_give_way():
-    key = Key("contact", "crossing", "ego", "emergency vehicle", "car", "in the junction")
-    assert title(key) == (
+    key = Key("contact", "crossing", "ego", "car", "in the junction")
+    rules = ["emergency vehicle"]
+    assert title(key, rules) == (
         "hits an emergency vehicle that crosses in the junction (ego responsible: did not give way "
         "to an emergency vehicle with blue light and siren)"
     )
-    assert title(key._replace(responsible="other")).startswith("hits a car that crosses")
+    assert title(key._replace(responsible="other"), rules).startswith("hits a car that crosses")
+
+
+def test_a_title_names_all_rules_that_occur_the_most_frequent_first():
+    rules = by_frequency(["junction occupied", "right before left", "right before left"])
+    assert rules == (("right before left", 2), ("junction occupied", 1))
+    key = Key("contact", "crossing", "ego", "car", "in the junction")
+    text = title(key, [one for one, _ in rules])
+    assert text.startswith("hits a car that crosses in the junction (ego responsible: did not give")
+    assert text.count("; or ") == 1
+    assert text.index("from the right") < text.index("; or drove on")
+
+
+def test_the_rule_s_name_alone_makes_no_other_mode():
+    findings = Findings.none(2)
+    findings.rule[:] = ["junction occupied", "right before left"]
+    one, other = keys_of(findings, {}, ["", ""], ["", ""])
+    assert one == other

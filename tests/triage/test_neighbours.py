@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from bridgegen.triage.neighbours import NEIGHBOURS, PLACEBO, neighbourhoods
+from bridgegen.triage.neighbours import NEIGHBOURS, PLACEBO, cause_of, neighbourhoods
 from bridgegen.triage.record import Treatment
 
 
@@ -107,3 +107,36 @@ def test_a_fix_must_beat_the_placebo_in_both_counts():
     assert made(10, 0).exceeds(made(9, 0))
     assert not made(10, 0).exceeds(made(10, 4))  # as many are helped
     assert not made(10, 6).exceeds(made(9, 0))  # and others harmed
+
+
+def spoiled_after(time):
+    """With the fix the harm is gone, and the traffic is implausible from some time on."""
+    return {"fails": lambda v, fix: fix == 1, "spoiled": time}
+
+
+def test_a_fix_that_removes_the_conflict_counts_though_what_follows_is_implausible(
+    space, world, fixed
+):
+    """The conflict is at 2 s. By the earlier rule no neighbour was known: "unavoidable"."""
+    pipeline = world(space, fast(6.0), fixed, **spoiled_after(9.0))
+    found = one(pipeline, at(space, ego_speed=7.5))
+    _, planning, _ = found.fixes
+    assert (planning.rows, planning.before, planning.gone) == (32, 32, 32)
+    assert found.cause == "planning"
+
+
+def test_what_is_implausible_before_the_conflict_says_nothing(space, world, fixed):
+    pipeline = world(space, fast(6.0), fixed, **spoiled_after(1.0))
+    found = one(pipeline, at(space, ego_speed=7.5))
+    assert found.fixes[1].rows == 0
+    assert found.cause == "not known"
+    assert found.fix is None
+
+
+def test_unavoidable_needs_enough_neighbours_with_each_fix(space, world, fixed):
+    found = one(world(space, lambda v, fix: np.full(len(fix), 0.7), fixed), at(space))
+    assert found.cause == "unavoidable"
+    few = [each.model_copy(update={"rows": 15}) for each in found.fixes]
+    assert cause_of(32, 32, few, found.placebo) == "not known"
+    enough = [each.model_copy(update={"rows": 16}) for each in found.fixes]
+    assert cause_of(32, 32, enough, found.placebo) == "unavoidable"

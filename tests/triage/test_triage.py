@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from bridgegen.triage.effort import FULL, NONE, SHORT
+from bridgegen.triage.influence import ends_in_words, in_words
 from bridgegen.triage.triage import harmful_rows, triage
 from bridgegen.triage.words import headline, mode_in_words
 
@@ -16,7 +17,10 @@ def two_ways(v, fix):
 
 
 def label(v):
-    return np.where(v["ego_speed"] >= 7.0, "rear distance", "cut in")
+    return np.where(v["ego_speed"] >= 7.0, "front-to-rear striking", "side-swipe")
+
+
+TYPES = ["side-swipe", "front-to-rear striking"]
 
 
 @pytest.fixture(scope="module")
@@ -30,15 +34,18 @@ def test_robust_modes_come_before_those_on_a_knife_s_edge(made):
     """The knife-edge mode has the worse harm, and ranks behind all the same."""
     _, rows, (found) = made
     robust, edge = found.record.modes
-    assert (robust.rule, robust.cause, robust.tested) == ("rear distance", "planning", True)
+    assert robust.conflict_type == "front-to-rear striking"
+    assert (robust.cause, robust.tested) == ("planning", True)
     assert robust.robustness >= 0.5
-    assert (edge.rule, edge.cause) == ("cut in", "sensitive")
+    assert (edge.conflict_type, edge.cause) == ("side-swipe", "sensitive")
     assert edge.knife_edge
     assert edge.harm > robust.harm
     assert found.record.robust == 1
     assert robust.count + edge.count == rows.critical.sum()
     assert "knife-edge" in mode_in_words(edge, found.record)
-    assert "planning: −100 if un-r157 drives" in mode_in_words(robust, found.record)
+    words = mode_in_words(robust, found.record)
+    assert "also fails in all 32 nearby scenarios; root cause planning: a careful driver " in words
+    assert "(un-r157) prevents it in 32 of 32 nearby scenarios" in words
 
 
 def test_each_mode_is_exported_robust_rows_first_then_the_most_harmful(made):
@@ -135,7 +142,7 @@ def test_in_another_simulator_modes_are_found_and_nothing_is_tested(made, monkey
     monkeypatch.setattr(pipeline, "tries", False, raising=False)
     monkeypatch.setattr(pipeline, "try_all", None)
     found = triage(pipeline, rows, algorithm="pso", seed=0, keep=6)
-    assert [one.rule for one in found.record.modes] == ["cut in", "rear distance"]
+    assert [one.conflict_type for one in found.record.modes] == TYPES
     assert [one.robustness for one in found.record.modes] == [None, None]
     assert found.record.neighbours == 0
     assert "embedded" in found.record.untested
@@ -156,7 +163,54 @@ def test_many_harmful_rows_are_placed_by_the_nearest(made):
     pipeline, rows, found = made
     effort = replace(FULL, placed=10)
     few = triage(pipeline, rows, algorithm="random", seed=0, keep=6, effort=effort)
-    assert few.record == found.record  # there is one place
+    assert [one.place for one in few.record.modes] == [one.place for one in found.record.modes]
+    assert [one.count for one in few.record.modes] == [one.count for one in found.record.modes]
+
+
+def test_one_event_in_several_weathers_is_exported_once(every, world, fixed):
+    """Harm and motion follow from one parameter that takes few values: so many events there are."""
+
+    def harm(v, fix):
+        return np.where(v["lanes_per_direction"] >= 2.0, 0.7, 0.0)
+
+    pipeline = world(every, harm, fixed, seen=("lanes_per_direction",))
+    rows = pipeline.rows(300)
+    found = triage(pipeline, rows, algorithm="random", seed=0, keep=10)
+    lanes = pipeline.values(rows.X)["lanes_per_direction"]
+    kept = lanes[list(found.exports)].tolist()
+    assert len(kept) == len(set(kept)) == len(set(lanes[lanes >= 2.0].tolist()))
+
+
+def test_rules_of_a_mode_are_counted(space, world, fixed):
+    def rule(v):
+        return np.where(v["bv_speed"] >= 1.0, "rear distance", "cut in")
+
+    pipeline = world(space, lambda v, fix: np.where(v["ego_speed"] >= 7.9, 0.7, 0), rule=rule)
+    rows = pipeline.rows(400)
+    (mode,) = triage(pipeline, rows, algorithm="random", seed=0, keep=2).record.modes
+    bad = rows.findings.rule[rows.critical]
+    assert mode.rules == tuple(
+        (one, int((bad == one).sum())) for one in ("rear distance", "cut in")
+    )
+    assert mode.rule == "rear distance"
+    assert "; or " in mode.title
+
+
+def test_it_says_which_parameters_matter_and_where_failures_end_with_the_range(space, world):
+    """Harm from 80 % of ego_speed on: its distance is 1, and 1/8 of the failures are at its end."""
+    pipeline = world(space, lambda v, fix: np.where(v["ego_speed"] >= 8.1, 0.7, 0.0))
+    rows = pipeline.rows(2000)
+    record = triage(pipeline, rows, algorithm="random", seed=0, keep=1, effort=NONE).record
+    (first, *others) = record.influences
+    assert (first.name, first.distance) == ("ego_speed", 1.0)
+    assert others == []
+    assert first.failures == record.bound.harmful
+    assert first.at_low == 0
+    assert first.at_high / first.failures == pytest.approx(0.125, abs=0.04)
+    assert in_words(record.influences) == "ego_speed (1.00)"
+    assert ends_in_words(record.influences) == []
+    many = first.model_copy(update={"at_high": 622, "failures": 717})
+    assert ends_in_words([many]) == ["622 of 717 failures lie at the upper end of ego_speed"]
 
 
 def counted(pipeline, monkeypatch, effort):
@@ -176,7 +230,7 @@ def test_a_short_triage_finds_the_same_modes_by_fewer_simulations(made, monkeypa
     full, of_full = counted(made[0], monkeypatch, FULL)
     short, of_short = counted(made[0], monkeypatch, SHORT)
     assert of_short < 0.5 * of_full
-    assert {one.rule for one in short.modes} == {one.rule for one in full.modes}
+    assert {one.conflict_type for one in short.modes} == {one.conflict_type for one in full.modes}
     assert all(one.robustness is not None and one.minimal for one in short.modes)
     assert (short.sampled, short.fresh, short.untested) == (0, None, "")
 
@@ -184,7 +238,7 @@ def test_a_short_triage_finds_the_same_modes_by_fewer_simulations(made, monkeypa
 def test_no_triage_finds_modes_and_simulates_nothing(made, monkeypatch):
     none, simulated = counted(made[0], monkeypatch, NONE)
     assert simulated == 0
-    assert [one.rule for one in none.modes] == ["cut in", "rear distance"]
+    assert [one.conflict_type for one in none.modes] == TYPES
     assert all(one.robustness is None and one.minimal is None for one in none.modes)
     assert none.untested == "neighbours were not simulated (--triage none)"
 

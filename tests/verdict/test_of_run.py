@@ -21,7 +21,7 @@ def run(tmp_path_factory) -> "bg.Run":
 
 def test_every_figure_of_the_summary_can_be_named():
     figures = {one.name for one in fields(Summary)} - {"causes"}
-    triage = {"modes", "robust", "worst_severity", "harmful.upper"}
+    triage = {"modes", "robust", "worst_severity", "harmful.upper", "stuck"}
     assert {*FIGURES} == figures | triage | {one.label.replace(" ", "_") for one in CAUSES}
 
 

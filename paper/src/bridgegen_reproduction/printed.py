@@ -6,6 +6,7 @@ import numpy as np
 
 from bridgegen import search as toolkit
 from bridgegen.objective import Objective
+from bridgegen.odd.objectives import PAPERS
 from bridgegen.odd.reader import load
 from bridgegen.odd.story import Participant
 from bridgegen_reproduction import paper
@@ -64,8 +65,7 @@ def _ends(one: Participant) -> tuple[str, str]:
 
 def table_3(runs: Runs) -> Table:
     """Return what counts as critical, and the weights of the fitness."""
-    scenario = load(paper.shipped(paper.MAIN))
-    limits = scenario.objective.critical
+    limits = PAPERS.critical
     known = [
         ("n_collision", ">", paper.THRESHOLDS["n_collision_above"], limits.n_collision_above, ""),
         ("d_min", "<", paper.THRESHOLDS["d_min_below"], limits.d_min_below, " m"),
@@ -75,7 +75,7 @@ def table_3(runs: Runs) -> Table:
         (f"threshold of {name}", f"{sign} {printed:g}", f"{sign} {ours:g}{unit}", "")
         for name, sign, printed, ours, unit in known
     ]
-    weights = {term.metric: term.weight for term in scenario.objective.terms}
+    weights = {term.metric: term.weight for term in PAPERS.terms}
     entropy = entropy_weights(runs)
     for name, symbol, column in (("d_min", "a1", 0), ("v_d", "a2", 1)):
         found = [one[column] for one in entropy]

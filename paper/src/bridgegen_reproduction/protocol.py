@@ -121,6 +121,7 @@ class Protocol:
             "ego": part.ego,
             "ideal": part.ideal,
             "causes": part.causes,
+            "objective": {"paper": None},
             "road_map": self.road_map,
             "junction": self.junction,
             "out": self.folder(part),

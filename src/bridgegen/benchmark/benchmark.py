@@ -5,7 +5,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from bridgegen import search as toolkit
-from bridgegen.benchmark.domain import domain_of
 from bridgegen.benchmark.estimate import measured, seconds_of
 from bridgegen.benchmark.page import write_page
 from bridgegen.benchmark.plan import (
@@ -37,6 +36,7 @@ from bridgegen.benchmark.work import (
     searches,
     task_of,
 )
+from bridgegen.campaign.domain import domain_of
 from bridgegen.comparison.plan import claim
 from bridgegen.comparison.runs import RunCallbacks
 from bridgegen.comparison.workers import run_all

@@ -57,8 +57,8 @@ class Failures:
 
     Attributes:
         rows: ``(K,)`` positions of the harmful rows for which the ego is responsible.
-        ways: of each, what distinguishes ways of failing that a store knows: conflict, type, rule
-            and the other participant.
+        ways: of each, what distinguishes ways of failing that a store knows: conflict, type and
+            the other participant.
         severity: ``(K,)`` float64, probability of MAIS3+.
         others: number of further harmful rows: preventable, but others are responsible.
     """
@@ -81,7 +81,7 @@ def failures_of(run: Run, rows: Rows) -> Failures:
     own: Bool = harmful & np.isin(rows.findings.responsible.astype(str), sorted(RESPONSIBLE))
     at = np.flatnonzero(own)
     found = rows.findings.take(at)
-    columns = (found.conflict, found.conflict_type, found.rule, found.partner)
+    columns = (found.conflict, found.conflict_type, found.partner)
     severity = rows.metrics[at, run.metrics.index("severity")]
     return Failures(
         at,

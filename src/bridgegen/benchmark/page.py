@@ -7,10 +7,10 @@ from importlib.metadata import version
 from importlib.resources import files
 from pathlib import Path
 
-from bridgegen.benchmark.domain import in_words
 from bridgegen.benchmark.failures import CAREFUL
 from bridgegen.benchmark.plan import COLUMNS, PERFECT, SENSED, Entrant, Plan
 from bridgegen.benchmark.results import Outcome, Standing, Way
+from bridgegen.campaign.domain import in_words
 from bridgegen.comparison.words import number
 from bridgegen.disk import write_whole
 from bridgegen.ego.listed import available

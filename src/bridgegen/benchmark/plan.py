@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from bridgegen import ego as egos
-from bridgegen.benchmark.domain import in_words
+from bridgegen.campaign.domain import in_words
 from bridgegen.campaign.scenarios import is_file, load
 from bridgegen.comparison.plan import MAX_SEEDS, RUNS
 from bridgegen.ego.drivers import DRIVERS, Driver

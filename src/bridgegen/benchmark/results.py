@@ -207,7 +207,7 @@ def _ways(modes: Iterable[tuple[Cell, Run, Mode]]) -> tuple[Way, ...]:
     groups: dict[tuple[str, ...], list[tuple[Cell, Run, Mode]]] = {}
     for cell, run, one in modes:
         key = (
-            one.conflict, one.conflict_type, one.responsible, one.rule, one.partner, one.place,
+            one.conflict, one.conflict_type, one.responsible, one.partner, one.place,
         )  # fmt: skip
         groups.setdefault(key, []).append((cell, run, one))
     found = [_way(some) for some in groups.values()]

@@ -1,6 +1,9 @@
 """A campaign from start to finish: search, triage, export, report; and resuming one."""
 
 import hashlib
+import itertools
+import os
+import re
 from collections.abc import Callable
 from contextlib import nullcontext
 from dataclasses import dataclass, field, replace
@@ -12,6 +15,7 @@ from bridgegen import search as toolkit
 from bridgegen.arrays import Int
 from bridgegen.campaign.chosen import as_judged, chosen_objective, columns_of
 from bridgegen.campaign.critical import export_critical, most_critical
+from bridgegen.campaign.domain import outside
 from bridgegen.campaign.exportable import require_exportable
 from bridgegen.campaign.failing_driver import FailingDriver
 from bridgegen.campaign.loop import Progress, Reason, run_loop
@@ -22,6 +26,7 @@ from bridgegen.campaign.scenarios import driven_by, is_file, load, refuse_stands
 from bridgegen.campaign.screening import BATCH, require_screen, screen_budget
 from bridgegen.campaign.searcher import require_asynchronous, searcher_of
 from bridgegen.campaign.settings import Settings
+from bridgegen.ego import STORYBOARD
 from bridgegen.errors import InputError, Interrupted, StorageError, WorkersError
 from bridgegen.odd.adversary import adversarial
 from bridgegen.odd.parameters import Axis
@@ -29,7 +34,7 @@ from bridgegen.odd.scenario import LogicalScenario, SearchedScenario
 from bridgegen.openx.opendrive.road_map import RoadMap
 from bridgegen.openx.opendrive.site_adapted import adapted
 from bridgegen.openx.opendrive.site_fit import ALL
-from bridgegen.options import SearchOptions, called_with, range_problems
+from bridgegen.options import SearchOptions, called_with, checked, range_problems
 from bridgegen.pipeline import Pipeline
 from bridgegen.report.data import WHOLE
 from bridgegen.search.algorithm import Problem, resolve
@@ -71,7 +76,7 @@ class SearchArguments(SearchOptions):
     )
     out: Path | str | None = field(
         default=None,
-        metadata={"help": "Folder of the run, new; runs/SCENARIO-ALGORITHM-SEED by default."},
+        metadata={"help": "Folder of the run, new; runs/SCENARIO-DRIVER by default, or -2, -3 …."},
     )
     deliver: bool = field(
         default=True,
@@ -120,7 +125,7 @@ def run_search(given: SearchArguments) -> Run:
     require_asynchronous(given, method)
     columns = columns_of(method, given.objectives)
     spec = chosen_objective(catalogue.objective, given, columns)
-    logical = as_judged(replace(catalogue, objective=spec), spec.rule)
+    logical = as_judged(replace(catalogue, objective=spec), spec.gated)
     judged = logical
     logical, roads = placed(logical, given.road_map, given.junction)
     if roads is not None and isinstance(judged, LogicalScenario):
@@ -150,8 +155,8 @@ def run_search(given: SearchArguments) -> Run:
             f"population {population} is greater than the budget, {rows} evaluations: the search "
             "ends within its first, random batch"
         )
-    name = f"{logical.name}-{given.algorithm}-{seed}"
-    folder = Path(given.out) if given.out is not None else Path("runs") / name
+    driver = given.ego or logical.driver or STORYBOARD.name
+    folder = Path(given.out) if given.out is not None else _new_folder(logical.name, driver)
     refuse_used(folder)
     if given.cause is not None and not given.causes:
         raise InputError(f"to search for the cause '{given.cause}', causes must be sought")
@@ -162,6 +167,8 @@ def run_search(given: SearchArguments) -> Run:
         )
         for note in (*logical.notes, *pipeline.notes):
             callbacks.warning(note)
+        if domain := outside(pipeline):
+            callbacks.warning(domain)
         callbacks.stage("compile")
         pipeline.warm_up()
         require_exportable(pipeline)
@@ -191,11 +198,12 @@ def run_search(given: SearchArguments) -> Run:
         searcher = searcher_of(pipeline, made_with, callbacks.warning)  # it may refuse
         with Store.create(
             folder, made_with.to_dict(), space.names, pipeline.metrics,
-            n_var=space.n_var, n_obj=chosen.n_obj, labels=space.labels,
+            n_var=space.n_var, n_obj=chosen.n_obj, labels=space.labels, domain=domain,
         ) as store:  # fmt: skip
             return _go(pipeline, searcher, store, made_with, callbacks, given.deliver)
 
 
+@checked
 def resume(
     folder: Path | str,
     *,
@@ -311,9 +319,10 @@ def _finish(
     callbacks.stage("triage")
     rows, record = Recorded(store, whole=(*WHOLE, *pipeline.monitor.names)), None
     best, rule = np.zeros(0, dtype=np.int64), pipeline.objective.rule
-    if rule == "criteria":
+    records_harm = pipeline.objective.harm in pipeline.metrics  # not in runs of earlier versions
+    if rule == "criteria" or not records_harm:
         best = _critical_by_objective(rows, settings.keep)
-    if pipeline.objective.harm in pipeline.metrics:  # runs of earlier versions did not record it
+    if records_harm:
         triaged = triage(
             pipeline, rows, algorithm=settings.algorithm, seed=settings.seed, keep=settings.keep,
             chosen=best.tolist() if rule == "criteria" else None, effort=effort(settings.triage),
@@ -322,10 +331,6 @@ def _finish(
         if rule != "criteria":
             best = np.array(triaged.exports, dtype=np.int64)
         write_record(store.folder, record)
-    if rule == "thresholds" and len(best) < settings.keep:
-        # Fill up with what the paper calls critical, in the paper's order.
-        more = _critical_by_objective(rows, settings.keep)
-        best = np.concatenate([best, more[~np.isin(more, best)]])[: settings.keep]
     callbacks.stage("export")
     chosen = rows.take(best)
     # One simulation, for the files and the playback.
@@ -365,6 +370,15 @@ def _junction(given: SearchArguments, roads: RoadMap | None) -> str | None:
     if roads is None or given.junction == ALL:
         return given.junction
     return roads.site.place_id
+
+
+def _new_folder(scenario: str, driver: str) -> Path:
+    """Return a folder of that scenario and driver in ``runs`` that does not exist yet."""
+    short = driver.rpartition(":")[2] if ":" in driver else Path(driver).stem
+    word = re.sub(r"[^\w-]+", "-", short)[:40]
+    name = f"{scenario}-{word}"
+    numbers = itertools.chain([""], (f"-{n}" for n in itertools.count(2)))
+    return next(path for n in numbers if not os.path.lexists(path := Path("runs") / f"{name}{n}"))
 
 
 def _absolute(path: Path | str | None) -> str | None:

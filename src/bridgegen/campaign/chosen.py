@@ -4,7 +4,7 @@ from dataclasses import replace
 from typing import Any, cast, get_args
 
 from bridgegen.conflict.harm import Count
-from bridgegen.conflict.quantities import HARM
+from bridgegen.conflict.quantities import HARM, QUANTITIES
 from bridgegen.errors import InputError, UnknownNameError
 from bridgegen.objective import RULES, Objectives
 from bridgegen.odd.criteria import PREFIX
@@ -45,14 +45,14 @@ def counted(count: str | None) -> Count | None:
     return None
 
 
-def as_judged(scenario: SearchedScenario, rule: str | None) -> SearchedScenario:
-    """Return a scenario adapted to the criticality rule.
+def as_judged(scenario: SearchedScenario, gated: bool) -> SearchedScenario:
+    """Return a scenario adapted to whether implausible traffic counts (``Objective.gated``).
 
-    Vehicles that stop dead at the end of a road are implausible and would not count: with the rules
-    "harm" and "criteria" they drive on and leave there, whatever the scenario says for the paper's
-    evaluation. A scenario file stays as it is.
+    Vehicles that stop dead at the end of a road are implausible. Where they would not count, they
+    drive on and leave there, whatever the scenario says for the paper's evaluation. A scenario file
+    stays as it is.
     """
-    if rule in ("harm", "criteria") and isinstance(scenario, LogicalScenario):
+    if gated and isinstance(scenario, LogicalScenario):
         return replace(scenario, road_end="leave")
     return scenario
 
@@ -67,10 +67,11 @@ def _judged_by(spec: ObjectiveSpec, critical: str | None) -> ObjectiveSpec:
         return spec
     names = tuple(read_names(critical))
     if names and all(name.startswith(PREFIX) for name in names):
-        return replace(spec, rule="criteria", criteria=names)
+        return replace(spec, rule="criteria", criteria=names, gated=True)
     for known in RULES:
         if critical == known:
-            return replace(spec, rule=known, criteria=())
+            gated = spec.gated or known != "thresholds"
+            return replace(spec, rule=known, criteria=(), gated=gated)
     raise UnknownNameError("choice of what is critical", critical, (*RULES, f"{PREFIX}ID"))
 
 
@@ -87,16 +88,19 @@ def chosen_objective(
 
     Raises:
         InputError: weights that nothing uses; ``paper`` among other metrics.
-        UnknownNameError: no such choice of whose conflicts count.
+        UnknownNameError: no such metric, or choice of whose conflicts count.
     """
     metrics, weights, scale = options.objective, options.weights, options.scale
     count = counted(options.count)
+    for name in metrics or ():
+        if name not in (*QUANTITIES, PAPER) and not name.startswith(PREFIX):
+            raise UnknownNameError("metric", name, (*QUANTITIES, PAPER))
     if metrics is not None and PAPER in metrics:
         if len(metrics) > 1 or metrics[PAPER] is not None:
             raise InputError(f"the objective '{PAPER}' stands alone, without a weight")
         spec, metrics = replace(PAPERS, critical=spec.critical), None
     if metrics is not None and HARM in metrics:
-        spec = replace(spec, rule="harm", weights="fixed")
+        spec = replace(spec, rule="harm", weights="fixed", gated=True)
         if len(metrics) == 1:
             metrics = {HARM: 1.0 if columns == "one" and weights != "entropy" else None}
     if metrics and all(name.startswith(PREFIX) for name in metrics):

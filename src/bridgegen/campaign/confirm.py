@@ -21,6 +21,7 @@ from bridgegen.confirmation.record import (
 from bridgegen.confirmation.schema import Record, Scenario
 from bridgegen.confirmation.summary import ConfirmationSummary, summarise
 from bridgegen.errors import InputError, Interrupted
+from bridgegen.options import checked
 from bridgegen.pipeline import Pipeline
 from bridgegen.search.dominance import by_merit
 from bridgegen.simulation.choice import SimulatorChoice
@@ -63,6 +64,7 @@ class RunConfirmation:
         return summarise(self.scenarios)
 
 
+@checked
 def confirm(
     folder: Path | str,
     simulator: SimulatorChoice | str,

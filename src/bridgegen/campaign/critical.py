@@ -13,7 +13,7 @@ from bridgegen.campaign.exported import FOLDER, NOT_EXPORTED, Exported, Refused
 from bridgegen.campaign.scenario_files import write_scenario
 from bridgegen.cause import Cause
 from bridgegen.conflict.analysis import analyse
-from bridgegen.conflict.harm import Count
+from bridgegen.conflict.harm import NEAR_MISS, Count
 from bridgegen.conflict.summary import ConflictSummary, summarise
 from bridgegen.errors import OntologyError, StorageError
 from bridgegen.evaluation import Replays
@@ -22,6 +22,7 @@ from bridgegen.search.dominance import by_merit
 from bridgegen.simulation.rollout import Rollout
 from bridgegen.store import Rows
 from bridgegen.triage.distinct import distinct
+from bridgegen.triage.judgement import judgement
 from bridgegen.triage.record import Minimal, Mode, Neighbourhood, Triage
 
 
@@ -77,7 +78,13 @@ def export_critical(
                 tested = triage.neighbourhood(int(rows.id[i]))
                 if tested is not None and pipeline.cause is not None:  # the run counts quick causes
                     tested = tested.model_copy(update={"cause": ""})
-            quick = Cause(rows.cause[i])
+            quick, judged = Cause(rows.cause[i]), ""
+            if conflict is not None and conflict.happened:
+                judged = judgement(
+                    tested.cause if tested is not None and tested.cause else quick.label, tested,
+                    preventable=conflict.preventable, responsible=conflict.responsible,
+                )  # fmt: skip
+                conflict = conflict.reconciled(judged)
             try:
                 files = write_scenario(
                     pipeline, rows.X[i], fresh, name, _cause(quick, tested),
@@ -90,6 +97,7 @@ def export_critical(
             facts = (
                 _facts(pipeline, rows, i, name)
                 | _triaged(name, quick, tested, triage)
+                | {"judgement": judged or None}
                 | {"conflict": None if conflict is None else conflict.to_dict()}
             )
             files[-1].write_text(_json(facts), encoding="utf-8")
@@ -100,9 +108,11 @@ def export_critical(
         for mode in triage.modes if triage else ():
             if mode.minimal is not None:
                 try:
-                    _write_minimal(pipeline, mode, mode.minimal, fresh)
+                    problems = _write_minimal(pipeline, mode, mode.minimal, fresh)
                 except OntologyError as error:
-                    refused.append(Refused(mode.minimal.name, mode.worst, error.problems))
+                    problems = error.problems
+                if problems:
+                    refused.append(Refused(mode.minimal.name, mode.worst, problems))
         shutil.rmtree(target, ignore_errors=True)
         fresh.rename(target)
         _write_refused(refused, folder / NOT_EXPORTED)
@@ -139,7 +149,8 @@ def _cause(quick: Cause, tested: Neighbourhood | None) -> Cause:
     """Return the cause that a scenario's files state: that of its neighbours, where tested."""
     if tested is None or not tested.cause:
         return quick
-    return Cause.NONE if tested.cause == "sensitive" else Cause.named(tested.cause)
+    unknown = tested.cause in ("sensitive", "not known")
+    return Cause.NONE if unknown else Cause.named(tested.cause)
 
 
 def _triaged(
@@ -156,12 +167,24 @@ def _triaged(
     }
 
 
-def _write_minimal(pipeline: Pipeline, mode: Mode, minimal: Minimal, folder: Path) -> None:
-    """Write a mode's minimal scenario; its metrics are those of its own rollout."""
+def _write_minimal(
+    pipeline: Pipeline, mode: Mode, minimal: Minimal, folder: Path
+) -> tuple[str, ...]:
+    """Write a mode's minimal scenario; its metrics are those of its own rollout.
+
+    Returns:
+        Why it is not written; empty if it is. Without a baseline it must be harmful itself.
+
+    Raises:
+        OntologyError: its individuals break a rule.
+    """
     X = np.array([minimal.x])
     rollout = pipeline.rollout_again(X, np.array([minimal.noise_key], dtype=np.uint64))
     conflict = summarise(analyse(rollout), 0, pipeline.objective.count)
     metrics = pipeline.measure(rollout)
+    harm = float(metrics[0, pipeline.metrics.index(pipeline.objective.harm)])
+    if not harm >= NEAR_MISS:
+        return (f"it is not harmful as it is exported: harm {harm:.2g} of {NEAR_MISS:g}",)
     critical = pipeline.objective.critical(metrics, pipeline.metrics)
     noise = minimal.noise_key if pipeline.driver.stages else None  # others have no noise
     write_scenario(
@@ -175,6 +198,7 @@ def _write_minimal(pipeline: Pipeline, mode: Mode, minimal: Minimal, folder: Pat
         "title": mode.title,
         "sentence": minimal.sentence,
         "conditions": [one.model_dump() for one in minimal.conditions],
+        "inside": minimal.inside.model_dump(),
         "critical": bool(critical[0]),
         "noise_key": minimal.noise_key,
         "robustness": minimal.robustness,
@@ -187,6 +211,7 @@ def _write_minimal(pipeline: Pipeline, mode: Mode, minimal: Minimal, folder: Pat
         "F": pipeline.objective.F(metrics, pipeline.metrics)[0][0].tolist(),
     }
     (folder / f"{minimal.name}.json").write_text(_json(facts), encoding="utf-8")
+    return ()
 
 
 def _json(facts: Mapping[str, object]) -> str:

@@ -108,7 +108,7 @@ def run_data(
         confirmations=read_records(folder, rows.X, rows.metrics), coverage=coverage,
         hashes=_hashes(settings, results), triage=_triage(folder, results),
         minimal_files=minimal_files(folder),
-        files=files, more=more,
+        files=files, more=more, happening=run.happening,
     )  # fmt: skip
 
 

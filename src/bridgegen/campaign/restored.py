@@ -13,6 +13,7 @@ from bridgegen.ego import STORYBOARD, is_spec
 from bridgegen.errors import InputError, StorageError
 from bridgegen.objective import Objective
 from bridgegen.odd.adversary import adversarial
+from bridgegen.odd.objectives import PAPERS
 from bridgegen.odd.scenario import LogicalScenario, SearchedScenario
 from bridgegen.odd.space import SearchSpace
 from bridgegen.openx.on_map import on_map, searchable
@@ -139,13 +140,15 @@ def searched(run: Run) -> tuple[SearchedScenario, SearchSpace, RoadMap | None]:
     settings, folder = run.settings, run.folder
     read = load(settings.scenario, settings.distribution, settings.empty_trigger)
     logical = driven_by(read, settings.others)
-    if logical.fingerprint != settings.fingerprint:
+    # The scenarios of the paper had its objective by default; a run's own is in its settings.
+    earlier = replace(logical, objective=PAPERS)
+    if settings.fingerprint not in (logical.fingerprint, earlier.fingerprint):
         what = " or its distribution" if settings.distribution else ""
         raise StorageError(
             f"{folder}: scenario {settings.scenario}{what} is not what it was when the run began; "
             "its results can still be read"
         )
-    logical = as_judged(logical, settings.optimised.get("rule"))
+    logical = as_judged(logical, Objective.from_dict(settings.optimised).gated)
     there, roads = placed(logical, settings.road_map, settings.junction)
     if roads and hashlib.sha256(roads.data).hexdigest() != settings.map_digest:
         raise StorageError(

@@ -17,6 +17,7 @@ from bridgegen.campaign.exported import (
     not_exported,
 )
 from bridgegen.campaign.settings import Settings
+from bridgegen.conflict.happening import Happening
 from bridgegen.criteria import CriterionSummary, summarise_criteria
 from bridgegen.errors import StorageError
 from bridgegen.odd.criteria import read_criterion
@@ -24,7 +25,14 @@ from bridgegen.search.screened import Agreement
 from bridgegen.simulation.rollout import STATUS_MESSAGES
 from bridgegen.store import Recorded, Rows, Store
 from bridgegen.store.summary import Summary, summarise
-from bridgegen.triage.record import JSON_FILE, Mode, Triage, read_record
+from bridgegen.triage.record import (
+    JSON_FILE,
+    NOT_JUDGED,
+    Mode,
+    Triage,
+    Verdict,
+    read_record,
+)
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -70,6 +78,7 @@ class Run:
         self._take(store)
         if rows is not None:
             self.summary, self.failures = _summary(store, rows), _failures(store, rows)
+            self.happening = _happening(store, rows)
         return self
 
     def _take(self, store: Store) -> None:
@@ -88,6 +97,16 @@ class Run:
         """The key figures."""
         with Store.open(self.folder) as store:
             return _summary(store, Recorded(store, whole=("d_min", "v_d")))
+
+    @cached_property
+    def happening(self) -> Happening:
+        """What happened: which events began, who came near the ego, whether the ego got along.
+
+        Raises:
+            StorageError: the database is damaged.
+        """
+        with Store.open(self.folder) as store:
+            return _happening(store, Recorded(store))
 
     @cached_property
     def failures(self) -> Counter[str]:
@@ -141,6 +160,18 @@ class Run:
         """How its evaluations meet its pass criteria, in their order."""
         with Store.open(self.folder) as store:
             return judged(store, self.settings)
+
+    @property
+    def verdict(self) -> Verdict:
+        """Whether its driver "fails", "no failure" was "found", or the run was "not judged".
+
+        It fails by harm, or by a pass criterion. It is not judged before it has ended.
+        """
+        if any(one.violated for one in self.criteria):
+            return "fails"
+        if self.triage is None or not self.triage.bound.judged:
+            return NOT_JUDGED
+        return "fails" if self.triage.bound.harmful else "no failure found"
 
     @property
     def modes(self) -> tuple[Mode, ...]:
@@ -208,6 +239,11 @@ def _summary(store: Store, rows: Rows | Recorded) -> Summary:
         rows.metrics[:, metric("d_min")], rows.metrics[:, metric("v_d")], rows.cause,
         store.seconds,
     )  # fmt: skip
+
+
+def _happening(store: Store, rows: Rows | Recorded) -> Happening:
+    with store.damage():
+        return Happening.of(rows.findings.happened, store.domain)
 
 
 def _failures(store: Store, rows: Rows | Recorded) -> Counter[str]:

@@ -2,14 +2,17 @@
 
 import shlex
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any, Self, get_type_hints
 
 from pydantic import ConfigDict, TypeAdapter, ValidationError
 
+from bridgegen.campaign.chosen import PAPER
+from bridgegen.campaign.scenarios import is_file
 from bridgegen.ego import STORYBOARD
 from bridgegen.errors import InputError, StorageError
+from bridgegen.odd.objectives import PAPERS
 from bridgegen.options import SearchOptions, options_of, range_problems
 from bridgegen.options.option import ALWAYS
 from bridgegen.simulation.choice import SimulatorChoice, Value
@@ -107,7 +110,15 @@ class Settings(SearchOptions):
             raise StorageError(f"{place}: the run's settings are damaged: {what}") from None
         except (InputError, TypeError, ValueError) as error:
             raise StorageError(f"{place}: the run's settings are damaged: {error}") from None
+        if found.objective is None and found._has_papers_terms:
+            return replace(found, objective={PAPER: None})
         return found  # as recorded: an integer stays one
+
+    @property
+    def _has_papers_terms(self) -> bool:
+        """Whether a catalogue scenario had the paper's objective, once the default of four."""
+        terms = [term.metric for term in PAPERS.terms]
+        return not is_file(self.scenario) and self.optimised.get("names") == terms
 
     def command(self, folder: Path) -> str:
         """Return the command line that repeats the run."""

@@ -3,13 +3,26 @@
 Each kind of file imports what checks it: a map needs neither the simulator nor the ontology.
 """
 
+import re
+from collections.abc import Iterator, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from bridgegen.errors import BridgeGenError, InputError
 from bridgegen.ontology import reasoner
 from bridgegen.ontology.graph import Individuals
 from bridgegen.openx.opendrive import read as opendrive_read
 from bridgegen.openx.opendrive import validate as opendrive_validate
+
+if TYPE_CHECKING:
+    from bridgegen.odd.story import EventSpec
+
+PLACEHOLDERS = (
+    "What happens, in a sentence or two.",
+    "Where it comes from: a standard, an accident database, a drive.",
+    "Why these limits?",
+)
+"""Texts of the template (odd/starter.yaml) that say nothing about a scenario."""
 
 
 def validate_file(
@@ -51,23 +64,46 @@ def validate_file(
         return [_placed(path, problem) for problem in error.problems]
 
 
-def name_note(path: Path) -> str | None:
-    """Return what is odd about a valid scenario file's name; None where nothing is."""
+def notes_on(path: Path) -> list[str]:
+    """Return what is odd about a valid scenario file; empty for a file of another kind.
+
+    That its name is not the scenario's, that texts of the template still stand in it, and that a
+    participant indicates to one side only and changes lane to the other only.
+    """
     if path.suffix.lower() not in (".yaml", ".yml"):
-        return None
+        return []
     from bridgegen.exposure.reader import is_exposure
     from bridgegen.odd.reader import load as load_scenario
     from bridgegen.odd.reader import read_document
 
     if is_exposure(read_document(path)):
-        return None
-    name = load_scenario(path).name
-    if name == path.stem:
-        return None
-    return (
-        f"{path}: its key 'scenario' is '{name}', which names its runs; the file is called "
-        f"'{path.stem}'"
-    )
+        return []
+    scenario = load_scenario(path)
+    notes = []
+    if scenario.name != path.stem:
+        notes.append(
+            f"its key 'scenario' is '{scenario.name}', which names its runs; the file is called "
+            f"'{path.stem}'"
+        )
+    if count := len(re.findall("|".join(map(re.escape, PLACEHOLDERS)), path.read_text("utf-8"))):
+        notes.append(
+            f"texts of the template that its author is to replace: {count} (description, source)"
+        )
+    return [f"{path}: {one}" for one in (*notes, *_misleading_indicators(scenario.events))]
+
+
+def _misleading_indicators(events: "Sequence[EventSpec]") -> Iterator[str]:
+    """Yield a note for each participant whose indicators contradict its lane changes."""
+    from bridgegen.odd.story import Indication, LaneChange
+
+    for actor in dict.fromkeys(one.participant for one in events):
+        actions = [act for one in events if one.participant == actor for act in one.actions]
+        shown = {act.side for act in actions if isinstance(act, Indication)} & {"left", "right"}
+        taken = {
+            "left" if act.lanes > 0 else "right" for act in actions if isinstance(act, LaneChange)
+        }
+        if shown and taken and not shown & taken:
+            yield f"{actor} indicates to the {shown.pop()} and changes lane to the {taken.pop()}"
 
 
 def _placed(path: Path, problem: str) -> str:

@@ -152,7 +152,7 @@ def validate(
     The exit status is 2 if one breaks any. A map that can be imported and searched although
     something is odd about it is valid, with warnings.
     """
-    from bridgegen.campaign.validate import name_note, validate_file
+    from bridgegen.campaign.validate import notes_on, validate_file
 
     broken: list[str] = []
     for file in files:
@@ -164,7 +164,7 @@ def validate(
         if not problems:
             count = "1 warning" if len(warnings) == 1 else f"{len(warnings)} warnings"
             print(f"{file}: valid{f', {count}' if warnings else ''}")
-            if note := name_note(file):
+            for note in notes_on(file):
                 print(f"bridgegen: note: {note}", file=sys.stderr)
     if broken:
         raise InputError(*broken)

@@ -49,7 +49,12 @@ def places(
     found, model, warnings = places_of(road_map, load(scenario) if scenario else None)
     for warning in warnings:
         print(f"bridgegen: warning: {warning}", file=sys.stderr)
-    if scenario:
+    if scenario and not found and not as_json:
+        print(
+            f"{road_map}: nothing of the kind of place that {scenario} needs; "
+            f"'bridgegen places {road_map}' lists what there is"
+        )
+    elif scenario:
         print_table(
             ("place", "what there is", "fits", "where, or what is missing"),
             [

@@ -18,6 +18,14 @@ Json = Annotated[
     bool, typer.Option("--json", help="Print JSON for machines.", rich_help_panel=OUTPUT)
 ]
 
+Verbose = Annotated[
+    bool,
+    typer.Option(
+        "--verbose", "-v", help="Print all figures, too, and each failure mode in full.",
+        rich_help_panel=OUTPUT,
+    ),
+]  # fmt: skip
+
 OwnEgo = Annotated[
     str | None,
     typer.Option("--ego", help="The run's driver, if it is your own.", rich_help_panel=DRIVER),

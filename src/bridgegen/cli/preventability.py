@@ -24,9 +24,10 @@ def preventability(
     ],
     *,
     ego: Annotated[
-        str,
+        list[str],
         typer.Option(
-            help="Driver under test; several, separated by commas, are compared.",
+            help="Driver under test; may be repeated, or several separated by commas: these are "
+            "compared.",
             rich_help_panel=DRIVER,
             autocompletion=completing("driver"),
         ),
@@ -91,7 +92,7 @@ def preventability(
     with MapScreen() as screen:
         result = map_preventability(
             scenario,
-            read_names(ego),
+            read_names(",".join(ego)),
             grid=grid,
             models=read_names(models),
             fixed=read_fixed(fix, "--fix"),

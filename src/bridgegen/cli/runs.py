@@ -57,12 +57,13 @@ def search(
         Path | None,
         typer.Option(
             help="Folder of the run, new.",
-            show_default="runs/SCENARIO-ALGORITHM-SEED",
+            show_default="runs/SCENARIO-DRIVER, or -2, -3 …",
             rich_help_panel=OUTPUT,
         ),
     ] = None,
     fail_if: common.FailIf = None,
     junit: common.Junit = None,
+    verbose: common.Verbose = False,
     save: Annotated[
         Path | None,
         typer.Option(
@@ -91,7 +92,7 @@ def search(
         run = campaign.run_search(
             scenario, **vars(options), out=out, workers=workers, callbacks=shown.callbacks
         )
-    print_summary(run, shown.seconds)
+    print_summary(run, shown.seconds, verbose=verbose)
     _end(criteria.judge(run))
 
 
@@ -133,6 +134,7 @@ def resume(
     workers: common.Workers = None,
     fail_if: common.FailIf = None,
     junit: common.Junit = None,
+    verbose: common.Verbose = False,
 ) -> None:
     """Resume an interrupted run.
 
@@ -153,7 +155,7 @@ def resume(
             workers=workers,
             callbacks=screen.callbacks,
         )
-    print_summary(run, screen.seconds)
+    print_summary(run, screen.seconds, verbose=verbose)
     _end(criteria.judge(run))
 
 

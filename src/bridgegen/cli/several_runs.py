@@ -59,7 +59,7 @@ def search_all(
                 print(f"bridgegen: error: {one.name}: {problem}", file=sys.stderr)
             status, ends[one.name] = 2, f"failed: {error.problems[0]}"
             continue
-        ends[one.name] = f"{conclusion(Run(out))[0][1].partition(';')[0]} ({out})"
+        ends[one.name] = f"{conclusion(Run(out))} ({out})"
     print()
     for name, end in ends.items():
         print(f"{name:<{max(map(len, ends)) + 2}}{end}")

@@ -14,6 +14,7 @@ from bridgegen.compiled import kernel
 from bridgegen.conflict._geometry_kernels import pose_on
 from bridgegen.conflict._limits import (
     AHEAD_BY,
+    BEND_SHARE,
     BRAKES_FOR,
     HEADWAY,
     HEADWAY_RISE,
@@ -45,18 +46,40 @@ def gains(speed, other, ca, sa, cb, sb):
 
 
 @kernel
+def bend_at(scene, a, i):
+    """Return the curvature of body a's track at instant i [1/m]."""
+    gone = scene.gone[a]
+    length = gone[i + 1] - gone[i] if i + 1 < scene.n else 0.0
+    if length <= 0.0:
+        return 0.0
+    c, s = scene.c[a], scene.s[a]
+    return (c[i] * s[i + 1] - s[i] * c[i + 1]) / length
+
+
+@kernel
+def careful_speed(scene, a, i, speed):
+    """Return the speed of a careful driver at instant i of body a's track, ``speed`` at most [m/s].
+
+    It drives no faster than body a did there (which had slowed down before the bend, or given way),
+    and takes a bend with `BEND_SHARE` of the grip.
+    """
+    recorded, bend = scene.v[a, i], abs(bend_at(scene, a, i))
+    if MOVES < recorded < speed:
+        speed = recorded
+    if bend > 0.0 and speed * speed * bend > BEND_SHARE * scene.friction:
+        speed = math.sqrt(BEND_SHARE * scene.friction / bend)
+    return speed
+
+
+@kernel
 def gives(scene, a, i, speed):
     """Return the greatest deceleration of body a at instant i of its track at a speed [m/s²].
 
     The friction circle applies: grip used in a bend is not available for braking.
     """
-    gone = scene.gone[a]
-    length = gone[i + 1] - gone[i] if i + 1 < scene.n else 0.0
-    if length <= 0.0 or scene.friction == math.inf:
+    if scene.friction == math.inf:
         return scene.friction
-    c, s = scene.c[a], scene.s[a]
-    bend = (c[i] * s[i + 1] - s[i] * c[i + 1]) / length
-    across = speed * speed * bend
+    across = speed * speed * bend_at(scene, a, i)
     return math.sqrt(max(scene.friction * scene.friction - across * across, 0.0))
 
 
@@ -74,7 +97,8 @@ def follows(gap, speed, its):
 def braked(scene, a, b, k, start, braking):
     """Return the outcome for body a on its own track if it brakes from instant ``start`` on.
 
-    From instant k to ``start`` it increases its gap to b as drivers do, see `follows`.
+    From instant k to ``start`` it increases its gap to b as drivers do, see `follows`. It is never
+    faster than `careful_speed`.
 
     It keeps its motion for ``REACTION``; then its deceleration rises by ``JERK`` up to ``braking``
     [m/s²], or as far as the tyres allow. b moves as recorded up to ``scene.until``, then keeps its
@@ -104,6 +128,7 @@ def braked(scene, a, b, k, start, braking):
             at += 0.5 * (speed + after) * dt
             speed = after
         i, xa, ya = pose_on(x[a], y[a], c[a], s[a], gone[a], n, i, at)
+        speed = careful_speed(scene, a, i, speed)
         way = gone[b, m] if m <= until else gone[b, until] + v[b, until] * (m - until) * dt
         j, xb, yb = pose_on(x[b], y[b], c[b], s[b], gone[b], n, j, way)
         if m <= until:  # a body that moves without a path: sideways, or on the spot

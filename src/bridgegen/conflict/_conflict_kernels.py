@@ -48,6 +48,8 @@ from bridgegen.conflict._geometry_kernels import (
     zones,
 )
 from bridgegen.conflict._limits import (
+    COMFORT,
+    CREEPS,
     GUIDANCE,
     GUIDANCE_STEP,
     HORIZON,
@@ -229,6 +231,8 @@ def analyse_pair(
     if not contact and not near:
         return
     stood = stood_for(v[0], 0, k, dt)
+    if stood == 0.0 and v[0, k] <= CREEPS and a[0, k] <= -COMFORT:
+        stood = dt
     kind = type_of(e, first, until, k, dt, kinds, c, s, own, its, own_part, stood)
     scene = Scene(
         half, kinds, x, y, c, s, v, a, offset, distance, gone, claims, crosswalks, friction,

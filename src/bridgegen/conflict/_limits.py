@@ -43,6 +43,10 @@ FLUSH = math.sin(math.radians(8.0))
 """[1] Edges at a smaller angle meet flush; at a larger one a corner meets an edge. Ours."""
 STANDS = 0.1
 """[m/s] A slower body stands. Ours: below the resolution of recorded speeds, 0.36 km/h."""
+CREEPS = 0.5
+"""[m/s] A body that brakes at ``COMFORT`` or harder and is slower has all but stopped: it does not
+drive into another one. Ours: it stops within 0.2 s and 4 cm.
+"""
 STOOD = 0.5
 """[s] A body that has stood for longer has not stopped because of the conflict. Ours."""
 SAME_WAY = math.cos(math.radians(35.0))
@@ -77,6 +81,17 @@ OPENING = 0.4
 other comes: with the foot off the accelerator. Source: European Commission, JRC-FSM."""
 OPENS_TO = 0.8
 """[1] … until it drives at this share of the speed of the vehicle ahead. Ours."""
+BEND_SHARE = 0.6
+"""[1] Of the grip, how much a careful driver uses in a bend; four fifths remain for braking (the
+friction circle). Ours: a wet road (5 m/s²) leaves 3 m/s² across, at which drivers take junctions.
+"""
+EVIDENT_EVERY = 0.1
+"""[s] Between two instants at which it is asked whether two bodies are on a collision course. Ours.
+"""
+UNSURE = 0.5
+"""[s] For so long a collision course that grazes may seem none. Ours: a corner that would touch for
+less than a step of the prediction, or a body that speeds up.
+"""
 AHEAD_BY = 0.01
 """[m] A body that brakes and is farther ahead than without braking, by more, has not avoided the
 other by braking. Ours: rounding."""
@@ -104,6 +119,9 @@ came into the way of the other. Ours."""
 ASIDE = 0.7
 """[m] A body that has moved farther across its route within ``JUST_NOW`` has changed its course.
 Ours: about the room to the marking."""
+OFF_LANE = 1.75
+"""[m] A body whose reference point is farther from its route has left its lane: half of a lane of
+3.5 m. Ours."""
 ALIKE = 0.7
 """[1] Least cosine, in size, between two approaches of the same road. Ours: 45°."""
 AHEAD_TIME, AHEAD = 2.0, 10.0

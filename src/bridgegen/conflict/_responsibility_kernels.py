@@ -7,6 +7,8 @@ on its own path? See ``_careful_driver_kernels``.
 # mypy: allow-untyped-defs
 # Numba infers what kernels take; their wrappers are typed.
 
+import math
+
 from bridgegen.compiled import kernel
 from bridgegen.conflict._careful_driver_kernels import CLEAR, COLLIDES, COMES_NEAR, braked
 from bridgegen.conflict._circumstances_kernels import (
@@ -27,6 +29,7 @@ from bridgegen.conflict._codes import (
     BRAKED_HARD_AHEAD,
     BRAKED_WITHOUT_REASON,
     COULD_HAVE_STOPPED,
+    CROSSING,
     CROSSWALK,
     CUT_IN,
     CUT_IN_PREVENTABLE,
@@ -35,6 +38,9 @@ from bridgegen.conflict._codes import (
     EGO_STANDING,
     EMERGENCY_VEHICLE,
     FROM_OFF_ROAD,
+    FRONT,
+    FRONT_LEFT,
+    FRONT_RIGHT,
     HEAD_ON,
     INTO_THE_SIDE,
     JUNCTION_OCCUPIED,
@@ -44,10 +50,14 @@ from bridgegen.conflict._codes import (
     NEITHER,
     OBJECT,
     OTHER,
+    PASSED_TOO_CLOSE,
     PREVENTABLE,
+    REAR,
     REAR_DISTANCE,
     REAR_END_STRIKING,
     REAR_END_STRUCK,
+    REAR_LEFT,
+    REAR_RIGHT,
     RED_LIGHT,
     RESPONSIBLE,
     REVEALED_LATE,
@@ -60,25 +70,31 @@ from bridgegen.conflict._codes import (
     STOOD_OTHER,
     STRUCK_STANDING,
     TTC,
+    TURNING,
     TURNING_GIVES_WAY,
     UNSAFE_START,
     VRU_BY_FRONT,
     VRU_INTO_SIDE,
     WRONG_SIDE,
 )
-from bridgegen.conflict._geometry_kernels import entered, visible_from
+from bridgegen.conflict._geometry_kernels import entered, hidden, time_along_paths, visible_from
 from bridgegen.conflict._limits import (
     ASIDE,
     BRAKING,
     COMFORT,
+    EVIDENT_EVERY,
     HARD,
     HORIZON,
     JUST_NOW,
+    LATELY,
     MARGIN,
     MARGIN_ON_FOOT,
+    MOVES,
+    OFF_LANE,
     STANDS,
     STOOD,
     TURN_TIME,
+    UNSURE,
 )
 from bridgegen.conflict._type_kernels import strikes_with_front, turns
 from bridgegen.ego._claims import SIREN
@@ -98,11 +114,15 @@ def judge(scene, e, k, at, kind, own, own_part, appears, whole, real):
     since, stands = risk, still_since(scene.v[e], scene.first, k)
     if stands > risk + 1:  # a moving body is a risk only once the two are near in time, or it stops
         since = max(risk, min(stands, k - int(HORIZON / scene.dt)))
-    level = braked(scene, 0, e, since, since, BRAKING)
+    seen = since
+    if kind in (CROSSING, TURNING) or IS_CYCLE[scene.kinds[e]]:
+        early = evident_since(scene, e, k, entry)
+        seen = min(since, early) if early < entry else since
+    level = braked(scene, 0, e, seen, seen, BRAKING)
     avoidable = real[STOOD_EGO] <= 0.0 and level == CLEAR and not appears
     if kind == HEAD_ON and not scene.near and avoidable:  # standing does not avoid oncoming traffic
         avoidable = abs(scene.v[e, k]) <= STANDS
-    whole[DECIDED], whole[PREVENTABLE] = since, avoidable
+    whole[DECIDED], whole[PREVENTABLE] = seen, avoidable
     if appears:
         whole[RESPONSIBLE], whole[RULE] = NEITHER, UNSAFE_START
     else:
@@ -126,6 +146,42 @@ def judge(scene, e, k, at, kind, own, own_part, appears, whole, real):
 
 
 @kernel
+def evident_since(scene, e, k, entry):
+    """Return the instant since which body e, in sight, is on a collision course along the routes.
+
+    Both drive on at their speeds, each on its own track, and touch within `HORIZON`; without a
+    break of more than `UNSURE` up to ``entry``, when e comes into the ego's way (``entry`` if they
+    do not before). From
+    one that must give way, or that runs a red light, the ego may expect that it stops, before the
+    ego's way or at its line: it is a danger once that would take more than `COMFORT`.
+
+    Source: of the trust in others: StVO § 1 and the case law on it (Vertrauensgrundsatz); IEEE
+    2846-2022, reasonably foreseeable behaviour.
+    """
+    line = ran_red(scene, e, k, k)
+    expected = scene.claims[e] > 0 or line >= 0
+    stops_at = scene.gone[e, entry if line < 0 else min(line, entry)]
+    every = max(int(EVIDENT_EVERY / scene.dt + 0.5), 1)
+    begin = max(entry - int(HORIZON / scene.dt), scene.first)
+    since, i = entry, entry - every
+    while i >= begin:
+        v = scene.v[e, i]
+        left = stops_at - scene.gone[e, i]
+        if (expected and v * v <= 2.0 * COMFORT * left) or hidden(scene, e, i):
+            break
+        time = time_along_paths(
+            scene.half, scene.x, scene.y, scene.c, scene.s, scene.v, scene.gone, e, i, scene.n,
+            scene.n, HORIZON,
+        )  # fmt: skip
+        if time < math.inf:
+            since = i
+        elif (since - i) * scene.dt > UNSURE:
+            break
+        i -= every
+    return since
+
+
+@kernel
 def decide(
     scene, e, k, kind, own, own_part, risk, since, side, late, stands, avoidable, whole, real
 ):  # fmt: skip
@@ -142,12 +198,13 @@ def decide(
         if scene.claims[e] == -SIREN:
             its = -1  # with due regard, it may
         if mine >= 0 or its >= 0:
-            whole[DECIDED] = min(max(mine, its), k)
+            if mine >= 0:
+                whole[DECIDED] = min(max(mine, its), k)
             if mine >= 0 and its >= 0:
                 return SHARED, RED_LIGHT
             return (EGO if mine >= 0 else OTHER), RED_LIGHT
     if kind in (VRU_BY_FRONT, VRU_INTO_SIDE):
-        return of_vulnerable(scene, e, k, kind, avoidable, whole)
+        return of_vulnerable(scene, e, k, kind, own, since, avoidable, whole)
     if kind == REAR_END_STRUCK:
         return of_struck(scene, e, k, whole)
     if kind == OBJECT and scene.v[e, k] > STANDS and not strikes_with_front(own, own_part):
@@ -160,8 +217,8 @@ def decide(
         whole[PREVENTABLE] = True
         return EGO, STANDING_AHEAD
     if kind in (SIDE_SWIPE, HEAD_ON):
-        return of_leaving(scene, e, k, kind, own, own_part, avoidable)
-    return of_crossing(scene, e, k, since, whole)
+        return of_leaving(scene, e, k, kind, own, since, avoidable)
+    return of_crossing(scene, e, k, own, since, avoidable, whole)
 
 
 @kernel
@@ -184,7 +241,7 @@ def rule_of(claim):
 
 
 @kernel
-def of_vulnerable(scene, e, k, kind, avoidable, whole):
+def of_vulnerable(scene, e, k, kind, own, since, avoidable, whole):
     """Decide where the ego and a pedestrian, a cyclist or an animal meet."""
     what = scene.kinds[e]
     if IS_PEDESTRIAN[what]:
@@ -210,13 +267,36 @@ def of_vulnerable(scene, e, k, kind, avoidable, whole):
         mine, _ = turns(scene.c, scene.s, e, scene.first, scene.n, k, scene.dt)
         if mine:
             return EGO, TURNING_GIVES_WAY
+    if leaves_route(scene, k):
+        return EGO, LEFT_ITS_LANE
     if kind == VRU_INTO_SIDE:
+        if (
+            avoidable
+            and IS_CYCLE[what]
+            and same_road(scene, e, k)
+            and runs_into(scene, e, own, since)
+        ):
+            return EGO, PASSED_TOO_CLOSE
         if not IS_ANIMAL[what] and ego_moved(scene, k, side_of(scene, e, k)):
             return EGO, LEFT_ITS_LANE
         return (NEITHER if IS_ANIMAL[what] else OTHER), INTO_THE_SIDE
     if avoidable:
         return EGO, COULD_HAVE_STOPPED
     return (NEITHER if IS_ANIMAL[what] else OTHER), STEPPED_OUT
+
+
+@kernel
+def leaves_route(scene, k):
+    """Return whether the ego is on its way off its lane: sliding, or cutting a bend.
+
+    Unknown of recordings, which state no friction: their offset may be from the road that the ego
+    leaves when it turns off.
+    """
+    if scene.friction == math.inf:
+        return False
+    before = max(k - int(LATELY / scene.dt), 0)
+    aside = abs(scene.offset[0, k])
+    return aside > OFF_LANE and aside - abs(scene.offset[0, before]) > ASIDE
 
 
 @kernel
@@ -276,6 +356,8 @@ def of_striking(scene, e, k, risk, since, side, late, stands, avoidable, whole):
         return NEITHER, BRAKED_HARD_AHEAD
     # had it time to open the gap before the other braked, since that was ahead of it?
     kept = braked(scene, 0, e, risk, start, BRAKING) == CLEAR
+    if avoidable and v[0, start] > v[e, start] + MOVES:  # it drove up to one that was slower
+        return EGO, REAR_DISTANCE
     whole[DECIDED], whole[PREVENTABLE] = start, kept
     if kept or moved:
         return EGO, REAR_DISTANCE
@@ -283,23 +365,37 @@ def of_striking(scene, e, k, risk, since, side, late, stands, avoidable, whole):
 
 
 @kernel
-def of_leaving(scene, e, k, kind, own, own_part, avoidable):
+def runs_into(scene, e, own, since):
+    """Return whether the ego has driven up to a slower body that was ahead and in its way.
+
+    Ahead: its rear was beyond the ego's front at the instant ``since``, when it was in the way. One
+    that drives into the ego's rear has come from behind meanwhile.
+    """
+    c, s, half = scene.c, scene.s, scene.half
+    along = scene.v[e, since] * (c[e, since] * c[0, since] + s[e, since] * s[0, since])
+    if own in (REAR, REAR_LEFT, REAR_RIGHT) or scene.v[0, since] <= along:
+        return False
+    dx, dy = scene.x[e, since] - scene.x[0, since], scene.y[e, since] - scene.y[0, since]
+    return dx * c[0, since] + dy * s[0, since] >= half[0, 0] + half[e, 0]
+
+
+@kernel
+def of_leaving(scene, e, k, kind, own, since, avoidable):
     """Decide where two meet side by side, or head on: which one has left its lane?"""
-    v, c, s = scene.v, scene.c, scene.s
     if ego_came_over(scene, e, k, side_of(scene, e, k)):
         return EGO, LEFT_ITS_LANE
-    claim = scene.claims[e]
+    claim, late = scene.claims[e], kind == SIDE_SWIPE and avoidable
+    late = late and runs_into(scene, e, own, since)
     if claim != 0:
-        return (OTHER if claim > 0 else EGO), rule_of(claim)
+        return (SHARED if late else OTHER) if claim > 0 else EGO, rule_of(claim)
+    if late:
+        return EGO, CUT_IN_PREVENTABLE
     if not scene.routed:
         mine, its = steering(scene, e, k, JUST_NOW)
         if max(mine, its) < ASIDE:
             return NEITHER, LEFT_ITS_LANE
         if mine > its:
             return EGO, LEFT_ITS_LANE
-    along = v[e, k] * (c[e, k] * c[0, k] + s[e, k] * s[0, k])
-    if kind == SIDE_SWIPE and strikes_with_front(own, own_part) and v[0, k] > along and avoidable:
-        return EGO, CUT_IN_PREVENTABLE
     if kind == HEAD_ON and scene.routed:
         _, its = steering(scene, e, k, JUST_NOW)
         if its < ASIDE:  # it has come this way all the time
@@ -308,7 +404,7 @@ def of_leaving(scene, e, k, kind, own, own_part, avoidable):
 
 
 @kernel
-def of_crossing(scene, e, k, risk, whole):
+def of_crossing(scene, e, k, own, risk, avoidable, whole):
     """Decide where two paths cross, or one turns into the other's."""
     since, _ = entered(scene, e, 0, k, 0.0)
     it_could = braked(scene, e, 0, since, since, COMFORT) != COLLIDES
@@ -321,6 +417,8 @@ def of_crossing(scene, e, k, risk, whole):
     claim = scene.claims[e]
     if claim == -SIREN:
         return of_siren(scene, e, k, whole)
+    if claim < 0 and not avoidable and own not in (FRONT, FRONT_LEFT, FRONT_RIGHT):
+        return NEITHER, REVEALED_LATE  # struck as it had all but passed, by one that sped up
     if claim != 0:
         return (OTHER if claim > 0 else EGO), rule_of(claim)
     mine, its = turns(scene.c, scene.s, e, scene.first, scene.n, k, scene.dt)

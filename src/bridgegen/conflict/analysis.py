@@ -78,6 +78,7 @@ class Conflicts:
             ``_conflict_kernels.nearness``.
         severity: ``(N, E)`` probability of MAIS3+ of the party at the higher risk; 0 unless they
             touch.
+        potential: ``(N, E)`` likewise, of a near miss too, as if they had touched as predicted.
         delta_v_ego: ``(N, E)`` [m/s], change of the ego's velocity; 0 unless they touch.
         delta_v_other: ``(N, E)`` [m/s], of the other's.
         ok: ``(N,)`` bool, False where the scenario failed; its rows are empty.
@@ -108,6 +109,7 @@ class Conflicts:
     left: Float
     nearness: Float
     severity: Float
+    potential: Float
     delta_v_ego: Float
     delta_v_other: Float
     ok: Bool
@@ -205,14 +207,14 @@ def _of_one_body(rollout: Rollout) -> Conflicts:
     real[:, :1, codes.TTC] = np.inf
     own, other = np.broadcast_arrays(kinds[0], kinds)
     touched = whole[:, :, codes.KIND] == CONTACT
-    rows, entities = np.nonzero(touched)
-    harm, dv_ego, dv_other = (np.zeros((n, e)) for _ in range(3))
+    rows, entities = np.nonzero(whole[:, :, codes.KIND] >= NEAR_MISS)
+    potential, dv_ego, dv_other = (np.zeros((n, e)) for _ in range(3))
     if len(rows):
         kind_a, kind_b = own[entities], other[entities]
         normal = real[rows, entities, codes.ACROSS]
         tangential = real[rows, entities, codes.ALONG]
         fixed = np.array(IS_OBSTACLE)[kind_b] & _never_moves(rollout)[rows, entities]
-        harm[rows, entities] = injury.severity(
+        potential[rows, entities] = injury.severity(
             kind_a, kind_b, normal, tangential,
             _DIRECTION[whole[rows, entities, codes.ZONE_EGO]],
             _DIRECTION[whole[rows, entities, codes.ZONE_OTHER]], True, ~fixed,
@@ -237,7 +239,9 @@ def _of_one_body(rollout: Rollout) -> Conflicts:
         names=rollout.names, time_step=rollout.time_step, **found,
         leads_ego=np.isin(leads_ego, _FRONT),
         preventable=whole[:, :, codes.PREVENTABLE] > 0,
-        severity=harm, delta_v_ego=dv_ego, delta_v_other=dv_other, ok=ok,
+        severity=np.where(touched, potential, 0.0), potential=potential,
+        delta_v_ego=np.where(touched, dv_ego, 0.0), delta_v_other=np.where(touched, dv_other, 0.0),
+        ok=ok,
         body=np.zeros((n, e), np.int64),
     )  # fmt: skip
 

@@ -1,7 +1,7 @@
 """Findings of the conflict analysis for each row, as texts of a table."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from sys import intern
 from typing import Any, Self
 
@@ -28,6 +28,8 @@ class Findings:
         rule: ``(N,)`` of `Rule`'s labels.
         partner: ``(N,)`` name of the other participant.
         implausible: ``(N,)`` why the row's traffic could not happen.
+        happened: ``(N,)`` of the texts of `bridgegen.conflict.happening.happened`; empty ones where
+            it was not recorded.
     """
 
     conflict: npt.NDArray[np.object_]
@@ -36,6 +38,12 @@ class Findings:
     rule: npt.NDArray[np.object_]
     partner: npt.NDArray[np.object_]
     implausible: npt.NDArray[np.object_]
+    happened: npt.NDArray[np.object_] = field(default_factory=lambda: np.zeros(0, dtype=object))
+
+    def __post_init__(self) -> None:
+        if not len(self.happened):
+            blank = np.full(len(self.conflict), "", dtype=object)
+            object.__setattr__(self, "happened", blank)
 
     def __len__(self) -> int:
         return len(self.conflict)
@@ -46,13 +54,20 @@ class Findings:
         return cls(*(np.full(n, "", dtype=object) for _ in fields(cls)))
 
     @classmethod
-    def of(cls, conflicts: Conflicts, implausible: Sequence[str], count: Count = "ego") -> Self:
+    def of(
+        cls,
+        conflicts: Conflicts,
+        implausible: Sequence[str],
+        count: Count = "ego",
+        happened: npt.NDArray[np.object_] | None = None,
+    ) -> Self:
         """Return the findings of a rollout's conflicts.
 
         Args:
             conflicts: of N rows.
             implausible: ``(N,)`` why the row's traffic could not happen; "" where it could.
             count: whose conflicts decide; see `harm.decisive`.
+            happened: ``(N,)`` texts, if it is to be recorded.
         """
         other, _ = decisive(conflicts, count)
         rows = np.arange(len(other))
@@ -69,6 +84,7 @@ class Findings:
             words(conflicts.rule, [one.label for one in Rule]),
             np.where(conflicts.kind[rows, other] >= COURSE, names[other], ""),
             np.array(implausible, dtype=object).reshape(len(other)),
+            np.zeros(0, dtype=object) if happened is None else happened,
         )
 
     @classmethod

@@ -5,13 +5,14 @@
                                           could not have prevented
 0 to ``COURSE`` (0.1)                     no collision course: how near they come
 ``COURSE`` to ``NEAR_MISS`` (0.3)         a collision course that leaves time to act
-``NEAR_MISS`` to ``COLLISION`` (0.6)      a near miss of the ego's
-``COLLISION`` to 1                        a collision of the ego's, by severity
+``NEAR_MISS`` to 1                        a collision or a near miss of the ego's, by severity
 ========================================  ==================================================
 
-The harm of a collision course, and of a near miss, grows as its time to collision falls and as the
-deceleration that it needs rises; that of a collision grows with its severity alone. No speed enters
-by itself. ``_limits`` has the limits of a near miss and their sources.
+The harm of a collision course grows as its time to collision falls and as the deceleration that it
+needs rises. That of a collision grows with its severity s, the probability of MAIS3+: ``NEAR_MISS +
+(1 - NEAR_MISS) log(1 + s / LIGHT) / log(1 + 1 / LIGHT)``. A near miss of urgency u has the harm of
+a collision of severity ``NEARLY u s``, where s is the severity that it would have had, and thus
+less than that collision. ``_limits`` has the limits of a near miss and their sources.
 """
 
 from typing import Literal
@@ -26,40 +27,74 @@ from bridgegen.conflict.analysis import Conflicts
 Count = Literal["ego", "any"]
 """Which conflicts count: those that the ego is responsible for or could prevent, or all."""
 
-COURSE, NEAR_MISS, COLLISION = 0.1, 0.3, 0.6
-"""The least harm of each; see the table above. Critical rows have ``NEAR_MISS`` or more."""
+COURSE, NEAR_MISS = 0.1, 0.3
+"""The least harm of a collision course, and of a near miss or collision. Critical rows have
+``NEAR_MISS`` or more; whether one is a collision, `Conflicts.kind` says."""
+
+LIGHT = 1e-4
+"""Severity [1] below which collisions hardly differ. Ours: that of two cars that close at walking
+pace, 1.2 m/s. From there on, each factor of ten adds about 0.175 to harm."""
+
+NEARLY = 0.01
+"""Severity of the most urgent near miss, as a share [1] of that of the collision that it nearly
+was. Ours: a pedestrian that is nearly hit at 13 m/s ranks with two cars that collide at 7 m/s."""
+
+
+def urgency(conflicts: Conflicts) -> Float:
+    """Return how urgent each collision course is, ``(N, E)`` in [0, 1]; 0 without one."""
+    ttc = np.minimum(conflicts.ttc, HORIZON)
+    needed = 1.0 - np.exp(-conflicts.needed / SERIOUS_DECELERATION)
+    return (1.0 - ttc / HORIZON) * needed
 
 
 def harm_of_pairs(conflicts: Conflicts, count: Count = "ego") -> Float:
     """Return the harm of each pair, ``(N, E)`` in [0, 1]; 0 in the ego's own column."""
-    contact, near = conflicts.kind == analysis.CONTACT, conflicts.kind == analysis.NEAR_MISS
-    ttc = np.minimum(conflicts.ttc, HORIZON)
-    closeness = (1.0 - ttc / HORIZON) * (1.0 - np.exp(-conflicts.needed / SERIOUS_DECELERATION))
-    harm = np.select(
-        [contact, near, conflicts.kind == analysis.COURSE],
-        [
-            COLLISION + (1.0 - COLLISION) * conflicts.severity,
-            NEAR_MISS + (COLLISION - NEAR_MISS) * closeness,
-            COURSE + (NEAR_MISS - COURSE) * closeness,
-        ],
+    share = np.where(conflicts.kind == analysis.CONTACT, 1.0, NEARLY * urgency(conflicts))
+    severe = np.log1p(share * conflicts.potential / LIGHT) / np.log1p(1.0 / LIGHT)
+    worth = NEAR_MISS + (1.0 - NEAR_MISS) * severe
+    return _of_kinds(conflicts, count, contact=worth, near=worth)
+
+
+def closeness_of_pairs(conflicts: Conflicts, count: Count) -> Float:
+    """Return how close each pair comes to a collision, ``(N, E)`` in [0, 1], by kind.
+
+    As harm below a near miss; near misses from ``NEAR_MISS`` to ``2 NEAR_MISS`` by urgency; and
+    collisions from there on by severity. Estimators of rare events climb it.
+    """
+    least = 2.0 * NEAR_MISS
+    return _of_kinds(
+        conflicts, count, contact=least + (1.0 - least) * conflicts.severity,
+        near=NEAR_MISS + (least - NEAR_MISS) * urgency(conflicts),
+    )  # fmt: skip
+
+
+def _of_kinds(conflicts: Conflicts, count: Count, contact: Float, near: Float) -> Float:
+    """Return values by the kind of each pair, ``(N, E)``; 0 where a conflict does not count."""
+    touches, nearly = (conflicts.kind == one for one in (analysis.CONTACT, analysis.NEAR_MISS))
+    value = np.select(
+        [touches, nearly, conflicts.kind == analysis.COURSE],
+        [contact, near, COURSE + (NEAR_MISS - COURSE) * urgency(conflicts)],
         COURSE * conflicts.nearness,
     )
     if count == "ego":
-        harm[(contact | near) & ~conflicts.at_fault] = 0.0
-    harm[:, 0] = 0.0
-    harm[~conflicts.ok] = 0.0
-    return harm
+        value[(touches | nearly) & ~conflicts.at_fault] = 0.0
+    value[:, 0] = 0.0
+    value[~conflicts.ok] = 0.0
+    return value
 
 
 def decisive(conflicts: Conflicts, count: Count = "ego") -> tuple[Int, Float]:
-    """Return the participant of each row's decisive conflict, ``(N,)``, and its harm, ``(N,)``.
+    """Return the participant of each row's decisive conflict, ``(N,)``, and the harm, ``(N,)``.
 
-    The conflict of the largest harm is decisive; if all are below that of a collision course, a
-    contact takes precedence, then a near miss. The participant is 0 if there is no other.
+    A collision that counts is decisive; else the conflict of the largest harm; if all are below
+    that of a collision course, a contact takes precedence, then a near miss. The participant is 0
+    if there is no other. The harm is the row's: the largest of all pairs, even where a near miss
+    before a light collision outranks it.
     """
     harm = harm_of_pairs(conflicts, count)
     happened = harm >= COURSE
     order = harm + np.where(happened, 4.0, conflicts.kind.astype(np.float64))
+    order += happened & (conflicts.kind == analysis.CONTACT)
     order[:, 0] = -1.0
     other = np.argmax(order, axis=1)
     return other.astype(np.int64), harm.max(axis=1)

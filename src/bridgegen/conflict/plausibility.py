@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from bridgegen.arrays import Float, Int
+from bridgegen.conflict.analysis import COURSE, NEAR_MISS, analyse
 from bridgegen.ego.kinds import OTHER
 from bridgegen.metrics.metric import distance, recorded, steps
 from bridgegen.participants import OBJECT_CLASSES
@@ -27,6 +28,9 @@ WINDOW = 0.25
 Brakes of cars take 0.2 s to 0.4 s to build up: Breuer and Bill, Bremsenhandbuch (2017). So a change
 that is done within less, as scripts do, differs little from one that a body can do.
 """
+
+AFTER = 1.0
+"""[s] Motion that long after a near miss still belongs to it: its outcome. Ours."""
 
 LIMITS: Float = np.array(
     [
@@ -161,10 +165,21 @@ class Plausibility:
         return f"{name} {does} at {when}; {most} is possible"
 
 
+def _last_conflict(rollout: Rollout) -> Int:
+    """Return the instant up to which each row's motion belongs to its conflicts, ``(N,)``."""
+    found = analyse(rollout)
+    worst = np.where(found.kind >= NEAR_MISS, NEAR_MISS, found.kind)
+    counts = (worst == worst.max(axis=1, keepdims=True)) & (worst >= COURSE)
+    after = round(AFTER / rollout.time_step)
+    last: Int = np.where(counts, found.instant + after, -1).max(axis=1)
+    return np.where(last < 0, rollout.shape[2], last)
+
+
 def plausibility(rollout: Rollout) -> Plausibility:
     """Return the first implausible motion in each row.
 
-    Participants other than the ego are judged up to the ego's first contact: later events do not
+    Participants other than the ego are judged up to the ego's first contact, or up to ``AFTER`` its
+    last near miss (its last collision course, if there is no near miss): later events do not
     matter. They must not collide with each other, and must move within the limits of their kind,
     see `LIMITS`. No two bodies, the ego's included, may overlap where they start or appear. Of two
     that never move only the start counts, and props (cones, barriers, signs) may overlap, as the
@@ -179,6 +194,7 @@ def plausibility(rollout: Rollout) -> Plausibility:
     from bridgegen.conflict import _plausibility_kernels
 
     n, e, _ = rollout.shape
+    until = np.minimum(steps(rollout) - 1, _last_conflict(rollout))
     kinds = rollout.kinds if len(rollout.kinds) else np.full(e, OTHER, np.int64)
     limits = LIMITS[kinds]
     if not len(rollout.kinds):
@@ -190,7 +206,7 @@ def plausibility(rollout: Rollout) -> Plausibility:
     _plausibility_kernels.judge(
         rollout.box, limits, *(recorded(rollout, name) for name in "xyhv"), cosine, sine,
         distance(rollout), np.ascontiguousarray(rollout.present),
-        rollout.towed_by if len(rollout.towed_by) else np.full(e, -1, np.int64), steps(rollout),
+        rollout.towed_by if len(rollout.towed_by) else np.full(e, -1, np.int64), until + 1,
         np.asarray(rollout.status) != 0, rollout.time_step,
         max(1, round(WINDOW / rollout.time_step)), code, instant, entity, other, value, limit,
     )  # fmt: skip

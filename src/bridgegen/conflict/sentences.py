@@ -66,6 +66,14 @@ def sentence(conflicts: Conflicts, row: int, other: int) -> str:
     return "; ".join(part for part in parts if part) + "."
 
 
+def avoidance(conflicts: Conflicts, row: int, other: int) -> str:
+    """Return the end of `sentence` that says whether braking would have helped; "" without one."""
+    if conflicts.kind[row, other] < NEAR_MISS:
+        return ""
+    _, _, said = _time_left(conflicts, row, other).partition(", and ")
+    return f", and {said}" if said else ""
+
+
 def _event(conflicts: Conflicts, row: int, other: int, name: str) -> str:
     """Return the event, with the edges that meet and the speed."""
     closing = conflicts.closing_normal[row, other]

@@ -1,14 +1,14 @@
 """The decisive conflict of one scenario, with all its figures."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import isfinite
-from typing import Any
+from typing import Any, Self
 
 from bridgegen.conflict.analysis import CONTACT, COURSE, NEAR_MISS, Conflicts
 from bridgegen.conflict.findings import KINDS
 from bridgegen.conflict.harm import Count, decisive, harm_of_pairs
-from bridgegen.conflict.sentences import sentence
+from bridgegen.conflict.sentences import avoidance, sentence
 from bridgegen.conflict.types import RULES, ConflictType, Responsible, Rule, Zone
 from bridgegen.physics import CAREFUL_BRAKING_G, CAREFUL_REACTION
 
@@ -59,6 +59,7 @@ class ConflictSummary:
         delta_v_other: change of the other's velocity [m/s].
         severity: probability of a MAIS3+ injury.
         harm: in [0, 1], as the row's, but of this conflict alone.
+        avoidance: the end of ``sentence`` that says whether braking would have avoided it.
     """
 
     conflict: str
@@ -89,6 +90,22 @@ class ConflictSummary:
     delta_v_other: float
     severity: float
     harm: float
+    avoidance: str = ""
+
+    @property
+    def bare(self) -> str:
+        """The sentence without its end on braking."""
+        return self.sentence.removesuffix(f"{self.avoidance}.").removesuffix(".")
+
+    def reconciled(self, judgement: str) -> Self:
+        """Return the same with the judgement of its finding in place of the end on braking.
+
+        Args:
+            judgement: a clause, see `bridgegen.triage.judgement`; "" changes nothing.
+        """
+        if not judgement:
+            return self
+        return replace(self, sentence=f"{self.bare}; {judgement}.", avoidance=f"; {judgement}")
 
     @property
     def happened(self) -> bool:
@@ -156,6 +173,7 @@ def of_pair(conflicts: Conflicts, row: int, other: int, count: Count = "ego") ->
     return ConflictSummary(
         conflict=KINDS[kind],
         sentence=sentence(conflicts, row, other),
+        avoidance=avoidance(conflicts, row, other),
         partner=conflicts.names[other],
         type=sort.label,
         type_source=sort.source,

@@ -131,6 +131,7 @@ class Rule(IntEnum):
     EMERGENCY_VEHICLE = _codes.EMERGENCY_VEHICLE
     FROM_OFF_ROAD = _codes.FROM_OFF_ROAD
     WRONG_SIDE = _codes.WRONG_SIDE
+    PASSED_TOO_CLOSE = _codes.PASSED_TOO_CLOSE
 
     @property
     def label(self) -> str:
@@ -231,6 +232,10 @@ RULES = {
     Rule.WRONG_SIDE: (
         "drove on the wrong side of the road, towards the other",
         "Vienna Convention, Art. 10; StVO § 2 (1), (2)",
+    ),
+    Rule.PASSED_TOO_CLOSE: (
+        "overtook a cyclist without enough room to the side",
+        "StVO § 5 (4): 1.5 m at least in towns, 2 m outside them",
     ),
     Rule.BRAKED_HARD_AHEAD: (
         "the vehicle ahead braked so hard that a careful driver would have come as near",

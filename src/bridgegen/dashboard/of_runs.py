@@ -75,7 +75,7 @@ def _failures(line: RunLine, scenario: str, driver: Driver) -> Iterator[Failure]
     held: dict[ModeKey, list[Mode]] = {}
     for one in line.modes:
         key = ModeKey(
-            scenario, driver.name, one.conflict, one.conflict_type, one.responsible, one.rule,
+            scenario, driver.name, one.conflict, one.conflict_type, one.responsible,
             one.partner, one.place,
         )  # fmt: skip
         held.setdefault(key, []).append(one)

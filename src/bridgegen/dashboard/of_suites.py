@@ -152,7 +152,7 @@ def _failures(one: EntryResult, scenario: str, driver: str) -> Iterator[Failure]
 def _title(row: RowResult) -> str:
     if row.conflict in _NO_CONFLICT:
         return "is critical without a conflict"
-    key = Key(row.conflict, row.conflict_type, row.responsible, "", "", "")
+    key = Key(row.conflict, row.conflict_type, row.responsible, "", "")
     return title(key).replace("another participant", f"'{row.partner}'")
 
 

@@ -17,16 +17,15 @@ Kind = Literal["run", "difference", "suite"]
 class ModeKey:
     """What makes two failures of different results the same: the triage's key without the cause.
 
-    A suite records neither rule nor place, and the other participant by its name; so its modes are
+    A suite records no place, and the other participant by its name; so its modes are
     its own. The violation of a requirement is a mode, too.
 
     Attributes:
         scenario: in which the driver fails.
         driver: without its version.
-        conflict: see `bridgegen.triage.modes.Key`, as the next five.
+        conflict: see `bridgegen.triage.modes.Key`, as the next four.
         conflict_type: its type.
         responsible: the responsible party.
-        rule: that decides on it.
         partner: the other participant.
         place: on the ego's route.
         requirement: the id of the pass criterion that is violated, or "".
@@ -37,7 +36,6 @@ class ModeKey:
     conflict: str = ""
     conflict_type: str = ""
     responsible: str = ""
-    rule: str = ""
     partner: str = ""
     place: str = ""
     requirement: str = ""

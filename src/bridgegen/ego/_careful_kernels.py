@@ -15,7 +15,8 @@ Its extensions:
   braking;
 - the driver brakes until no meeting is predicted within 4 s;
 - without a risk, it keeps the speed that its path allows, and follows known leaders by the
-  intelligent driver model, with at most comfortable braking.
+  intelligent driver model; where comfortable braking would not do, also because the leader brakes,
+  as hard as needed.
 
 The driver sees all bodies. ``attention`` has a row of three per body: where it is beside the ego's
 way (``_conflict_kernels``), and the instant since when it is known, counted from 1, 0 if it is not;
@@ -40,8 +41,9 @@ from bridgegen.ego._conflict_kernels import (
     foresee,
 )
 from bridgegen.ego._cruise_kernels import cruise
-from bridgegen.ego._following_kernels import COMFORT_ACCELERATION, COMFORT_DECELERATION, idm
+from bridgegen.ego._following_kernels import COMFORT_ACCELERATION, COMFORT_DECELERATION
 from bridgegen.ego._route_follower_kernels import hold_speed, keep_to_route
+from bridgegen.ego._un_r157_kernels import follow
 from bridgegen.physics import CAREFUL_BRAKING, CAREFUL_JERK, CAREFUL_REACTION
 
 EVALUATION = 0.4  # s, until the risk is perceived
@@ -100,8 +102,11 @@ def drive_careful(
             left = max(gap - (0.0 if brakes else closing * CAREFUL_REACTION), 0.1)
             risk = risk or closing * closing / (2.0 * left) > hard
         if what == LEADER and known_for >= EVALUATION + CAREFUL_REACTION:
-            wanted = min(wanted, max(idm(gap, v, along), -COMFORT_DECELERATION))
+            wanted = min(wanted, follow(gap, v, along, slowing))
     if not risk:
+        if wanted < -COMFORT_DECELERATION:  # beyond comfort, the brake takes time to build up
+            held = min(attention[0, ASKED], -COMFORT_DECELERATION)
+            wanted = max(wanted, held - CAREFUL_JERK * dt)
         attention[0, RISK], attention[0, BRAKES], attention[0, ASKED] = 0.0, 0.0, wanted
         return wanted
     if attention[0, RISK] == 0.0:

@@ -187,7 +187,12 @@ def mine(
                 kept = _most_critical(kept, cleaned.traffic, clock, conflicts, keep)
         except FileFormatError as error:
             if not lenient:
-                raise
+                if len(files) == 1:
+                    raise
+                raise FileFormatError(
+                    *error.problems,
+                    "--lenient leaves out files that cannot be read, and lists them",
+                ) from None
             skipped.append((file, error.problems))
     progress(len(files), len(files))
     if not found:

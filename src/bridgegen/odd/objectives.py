@@ -9,8 +9,8 @@ from bridgegen.odd.scenario import ObjectiveSpec, Term
 from bridgegen.odd.schema import ObjectiveSection
 from bridgegen.odd.thresholds import Thresholds
 
-PAPERS = ObjectiveSpec((Term("d_min", 0.8297), Term("v_d", 0.1703)), "fixed", "raw")
-"""The paper's objective and thresholds (Section V, Table III)."""
+PAPERS = ObjectiveSpec((Term("d_min", 0.8297), Term("v_d", 0.1703)), "fixed", "raw", gated=False)
+"""The paper's objective and thresholds (Section V, Table III), which count implausible traffic."""
 
 HARM = ObjectiveSpec((Term("harm", 1.0),), "fixed", "raw", rule="harm")
 """The default: how much a scenario is a failure of the ego; see `bridgegen.conflict.harm`."""

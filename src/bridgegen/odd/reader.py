@@ -17,7 +17,7 @@ from bridgegen.odd.criteria import read_criteria_in, unknown_entities
 from bridgegen.odd.expression import Expression, parse
 from bridgegen.odd.kinds import KEYS, KINDS
 from bridgegen.odd.matrix import read_matrix
-from bridgegen.odd.objectives import HARM, read_objective
+from bridgegen.odd.objectives import HARM, PAPERS, read_objective
 from bridgegen.odd.others import DRIVERS, SCRIPTED, driven
 from bridgegen.odd.parameters import Axis, Bound, Derived, Parameter, at, nearest, read_axes
 from bridgegen.odd.plain_yaml import MAX_BYTES, Document, entries, read_plain_yaml
@@ -455,8 +455,8 @@ def build(document: Document, folder: Path | None) -> LogicalScenario:
 
 def _objective(data: Any, quantities: Quantities) -> ObjectiveSpec | None:
     """Return what the file optimises; None if that is not of the right shape."""
-    if data == "harm":
-        return HARM
+    if data in ("harm", "paper"):
+        return HARM if data == "harm" else PAPERS
     raw = section(ObjectiveSection, data)
     return None if raw is None else read_objective(raw, quantities.report)
 

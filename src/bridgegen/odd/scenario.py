@@ -52,6 +52,7 @@ class ObjectiveSpec:
         count: whose conflicts are harm: "ego", those that the ego is responsible for or could have
             prevented; or "any".
         criteria: the margins that count by the rule "criteria"; empty: all.
+        gated: whether implausible scenarios are neither critical nor fit.
     """
 
     terms: tuple[Term, ...]
@@ -61,6 +62,7 @@ class ObjectiveSpec:
     rule: Literal["harm", "thresholds", "criteria"] = "thresholds"
     count: Literal["ego", "any"] = "ego"
     criteria: tuple[str, ...] = field(default=(), repr=False)
+    gated: bool = field(default=True, repr=False)
 
 
 @dataclass(frozen=True)

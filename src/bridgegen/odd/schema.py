@@ -211,9 +211,10 @@ class ScenarioFile(ShapedSection):
     """Clauses of a regulation or protocol, which a suite judges."""
     recorded: RecordedSection | None = None
     """Which recorded events are this scenario, and its parameters in them: 'bridgegen mine'."""
-    objective: Annotated[ObjectiveSection | Literal["harm"], OrWord(ObjectiveSection, "harm")] = (
-        "harm"
-    )
-    """What is optimised, and what counts as critical; harm: see docs/conflicts.md."""
+    objective: Annotated[
+        ObjectiveSection | Literal["harm", "paper"], OrWord(ObjectiveSection, "harm", "paper")
+    ] = "harm"
+    """What is optimised, and what counts as critical; harm: see docs/conflicts.md; paper: the
+    fitness and the thresholds of the paper."""
     exposure: ExposureSection | None = None
     """How often it is met, and with which values; no part of a search."""

@@ -5,7 +5,7 @@ command that reproduces a run are all derived from these declarations. Imports n
 command line needs it to start.
 """
 
-from bridgegen.options.keywords import called_with
+from bridgegen.options.keywords import called_with, checked
 from bridgegen.options.option import Option, options_of, range_problems
 from bridgegen.options.search import CommonOptions, PipelineOptions, SearchOptions
 
@@ -15,6 +15,7 @@ __all__ = [
     "PipelineOptions",
     "SearchOptions",
     "called_with",
+    "checked",
     "options_of",
     "range_problems",
 ]

@@ -3,6 +3,8 @@
 import json
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
+from numbers import Integral, Real
+from os import PathLike
 from pathlib import Path
 from typing import Any
 
@@ -32,6 +34,8 @@ class Form:
         words: the words of a command line that give an option a value.
         keep: the value as an option's field keeps it, of any that Python code may give.
         in_file: how it is written in a run file.
+        valid: whether a value that ``keep`` returns is one.
+        must: what a value must be, in words.
     """
 
     kind: Any
@@ -39,6 +43,32 @@ class Form:
     words: Words = lambda spelling, value: [spelling, str(value)]
     keep: Callable[[Any], Any] = lambda value: value
     in_file: FileForm = file_forms.TEXT
+    valid: Callable[[Any], bool] = lambda value: isinstance(value, str | PathLike)
+    must: str = "a text"
+
+    def taken(self, value: Any, name: str, default: Any = None) -> Any:
+        """Return a value that Python code gives as an option's field keeps it.
+
+        A text is read as on the command line.
+
+        Args:
+            value: of any type.
+            name: of the option, for messages.
+            default: of the option; where it is None, so may the value be.
+
+        Raises:
+            InputError: no such value.
+        """
+        try:
+            kept = value
+            if isinstance(value, str) and self.kind in (str, list[str]):
+                kept = self.read(value if self.kind is str else [value], name)
+            kept = self.keep(kept)
+            if self.valid(kept) or (kept is None and default is None):
+                return kept
+        except (TypeError, ValueError):
+            pass
+        raise InputError(f"{name} must be {self.must}, got {value!r}")
 
 
 def read_names(text: str | None) -> list[str]:
@@ -149,6 +179,22 @@ def _kept_criteria(
     return tuple(one.to_dict() for one in joined(found))
 
 
+def _kept_terms(terms: Mapping[str, float | None] | Iterable[str] | None) -> Any:
+    if terms is None or isinstance(terms, Mapping):
+        return None if terms is None else dict(terms)
+    return dict.fromkeys(terms)
+
+
+def _is_mapping(values: Any, *kinds: type) -> bool:
+    return isinstance(values, dict) and all(
+        isinstance(name, str) and isinstance(value, kinds) for name, value in values.items()
+    )
+
+
+def _is_number(value: Any, kind: type = Real) -> bool:
+    return isinstance(value, kind) and not isinstance(value, bool)
+
+
 def _flag_words(spelling: str, value: bool) -> list[str]:
     return [spelling if value else f"--no-{spelling.removeprefix('--')}"]
 
@@ -158,18 +204,38 @@ def _simulator_words(_: str, choice: SimulatorChoice) -> list[str]:
     return named + _repeated(_setting_texts)("--simulator-set", choice.settings)
 
 
+def _kept_simulator(choice: SimulatorChoice | str | None) -> SimulatorChoice | None:
+    return SimulatorChoice(choice) if isinstance(choice, str) else choice
+
+
 def _screen_words(_: str, choice: SimulatorChoice) -> list[str]:
     return ["--screen", choice.name, *_repeated(_setting_texts)("--screen-set", choice.settings)]
 
 
 TEXT = Form(str)
-WHOLE = Form(int, in_file=file_forms.WHOLE)
-NUMBER = Form(
-    float, words=lambda spelling, value: [spelling, repr(value)], in_file=file_forms.NUMBER
+WHOLE = Form(
+    int,
+    keep=lambda value: int(value) if _is_number(value, Integral) else value,
+    in_file=file_forms.WHOLE,
+    valid=lambda value: _is_number(value, int),
+    must="a whole number",
 )
-PATH = Form(Path)
+NUMBER = Form(
+    float,
+    words=lambda spelling, value: [spelling, repr(value)],
+    in_file=file_forms.NUMBER,
+    valid=_is_number,
+    must="a number",
+)
+PATH = Form(Path, must="a path")
 
-FLAG = Form(bool, words=_flag_words, in_file=file_forms.FLAG)
+FLAG = Form(
+    bool,
+    words=_flag_words,
+    in_file=file_forms.FLAG,
+    valid=lambda value: isinstance(value, bool),
+    must="True or False",
+)
 """On or off: ``--name``, ``--no-name``."""
 
 NAMES = Form(
@@ -178,6 +244,8 @@ NAMES = Form(
     _repeated(lambda names: [",".join(names)] if names else []),
     lambda names: None if names is None else tuple(names),
     file_forms.NAMES,
+    lambda names: isinstance(names, tuple) and all(isinstance(one, str) for one in names),
+    "names",
 )
 """``name,name``."""
 
@@ -187,6 +255,8 @@ FIXED = Form(
     _repeated(_fixed_texts),
     lambda values: dict(values or {}),
     file_forms.FIXED,
+    lambda values: _is_mapping(values, Real, str),
+    "values by name",
 )
 """``name=number`` or ``name=name``, repeated."""
 
@@ -196,6 +266,8 @@ SETTINGS = Form(
     _repeated(_setting_texts),
     lambda values: dict(values or {}),
     file_forms.SETTINGS,
+    lambda values: _is_mapping(values, Real, str),
+    "values by name",
 )
 """``name=value``, repeated."""
 
@@ -203,8 +275,10 @@ TERMS = Form(
     str,
     read_terms,
     _repeated(_term_texts),
-    lambda terms: None if terms is None else dict(terms),
+    _kept_terms,
     file_forms.TERMS,
+    lambda terms: _is_mapping(terms, Real, type(None)),
+    "a name, or metrics and their weights",
 )
 """``metric=weight,metric``."""
 
@@ -214,11 +288,25 @@ CRITERIA = Form(
     _repeated(lambda given: [in_words(read_criterion(one)) for one in given]),
     lambda given: _kept_criteria(given or ()),
     file_forms.CRITERIA,
+    lambda given: isinstance(given, tuple),
+    "criteria",
 )
 """``ID: FORMULA``, a mapping in braces, or the path of a file; repeated."""
 
-SIMULATOR = Form(None, words=_simulator_words, keep=lambda choice: choice or EMBEDDED)
+SIMULATOR = Form(
+    None,
+    words=_simulator_words,
+    keep=lambda choice: _kept_simulator(choice) or EMBEDDED,
+    valid=lambda choice: isinstance(choice, SimulatorChoice),
+    must="a simulator",
+)
 """Its name and its settings. Where it is on this machine belongs to no run's command."""
 
-SCREEN = Form(None, words=_screen_words)
+SCREEN = Form(
+    None,
+    words=_screen_words,
+    keep=lambda choice: _kept_simulator(choice),
+    valid=lambda choice: isinstance(choice, SimulatorChoice),
+    must="a simulator",
+)
 """Likewise, or none."""

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any, Self
 
+from bridgegen.errors import InputError
 from bridgegen.options.forms import (
     CRITERIA,
     FIXED,
@@ -144,8 +145,15 @@ class PipelineOptions:
     )
 
     def __post_init__(self) -> None:
+        problems: list[str] = []
         for one in options_of(type(self)):
-            object.__setattr__(self, one.name, one.form.keep(getattr(self, one.name)))
+            try:
+                kept = one.form.taken(getattr(self, one.name), one.name, one.default)
+                object.__setattr__(self, one.name, kept)
+            except InputError as error:
+                problems += error.problems
+        if problems:
+            raise InputError(*problems)
 
     @classmethod
     def of(cls, options: "PipelineOptions", **changes: Any) -> Self:

@@ -14,7 +14,7 @@ from bridgegen.arrays import Bool, Float
 from bridgegen.campaign.scenarios import driven_by, is_file, load
 from bridgegen.errors import InputError, Interrupted
 from bridgegen.odd.scenario import SearchedScenario
-from bridgegen.options import PipelineOptions
+from bridgegen.options import PipelineOptions, checked
 from bridgegen.pipeline import Pipeline
 from bridgegen.preventability import arithmetic
 from bridgegen.preventability.chunks import ChunkStore
@@ -41,6 +41,7 @@ class MapCallbacks:
     cells: Callable[[int, int], None] = field(default=lambda done, total: None)
 
 
+@checked
 def map_preventability(
     scenario: str | Path,
     ego: str | Sequence[str],

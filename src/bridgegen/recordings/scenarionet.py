@@ -144,13 +144,15 @@ def _track(
     if not isinstance(state, dict):
         raise FileFormatError(f"{place}: must have a state")
     valid = _column(place, state, "valid").astype(np.bool_)
+    if valid.ndim != 1:
+        raise FileFormatError(f"{place}: valid must be of one dimension, got {valid.ndim}")
     n = len(valid)
     position, velocity = (_column(place, state, name) for name in ("position", "velocity"))
     heading = _column(place, state, "heading").reshape(-1)
     for name, array in (("position", position), ("velocity", velocity)):
         if array.ndim != 2 or len(array) != n or array.shape[1] < 2:
             raise FileFormatError(f"{place}: {name} must be of shape ({n}, 2 or more)")
-    if len(heading) != n or n > len(times) or valid.ndim != 1:
+    if len(heading) != n or n > len(times):
         raise FileFormatError(f"{place}: must have a heading for each of {n} instants")
     steps = np.flatnonzero(valid)
     columns = (steps, times[:n], position[:, 0], position[:, 1], heading, *velocity.T[:2])
@@ -168,9 +170,12 @@ def _column(place: str, holder: Any, name: str) -> npt.NDArray[np.float64]:
     value = holder.get(name)
     try:
         array = value.array() if isinstance(value, PickledArray) else np.array(value)
-        return array.astype(np.float64)
+        numbers = array.astype(np.float64)
     except (ValueError, TypeError) as error:
         raise FileFormatError(f"{place}: {name} must be an array of numbers: {error}") from None
+    if not numbers.ndim:
+        raise FileFormatError(f"{place}: {name} must be an array of numbers, got {value!r:.40}")
+    return numbers
 
 
 FORMAT = Format(

@@ -10,6 +10,7 @@ import numpy as np
 from bridgegen.arrays import Taken
 from bridgegen.cause import Cause
 from bridgegen.confirmation.schema import Record
+from bridgegen.conflict.happening import Happening
 from bridgegen.conflict.harm import NEAR_MISS, Count
 from bridgegen.criteria import by_gravity, quantity, summarise_criteria
 from bridgegen.errors import ScenarioError
@@ -72,6 +73,7 @@ def build_report(
     more: bool = True,
     triage: Triage | None = None,
     minimal_files: Sequence[str] = (),
+    happening: Happening | None = None,
 ) -> ReportData:
     """Return all that the page shows.
 
@@ -98,6 +100,7 @@ def build_report(
         more: whether the page includes the motion of more scenarios than ``kept``.
         triage: failure modes and bound of the run, if they are known.
         minimal_files: of the minimal scenarios, by their paths relative to the page.
+        happening: which events began, and who came near the ego, if it is known.
     """
     scenario, limits = pipeline.scenario, pipeline.objective.thresholds
     terms, rule = pipeline.objective.names, pipeline.objective.rule
@@ -169,6 +172,7 @@ def build_report(
         minimal=_minimal(pipeline, modes, minimal_files),
         criteria=judged,
         screened=screened_payload(notes, pipeline.space),
+        happening=happening,
     )
 
 

@@ -14,6 +14,7 @@ import numpy.typing as npt
 from bridgegen.arrays import Bool, Float, Int, Numbers, as_float
 from bridgegen.confirmation.schema import Record
 from bridgegen.conflict.findings import Findings
+from bridgegen.conflict.happening import Happening
 from bridgegen.criteria import CriterionSummary
 from bridgegen.odd.coverage import CoverageMap
 from bridgegen.report.notes import NoteTable
@@ -254,6 +255,7 @@ class ReportData:
         minimal: the minimal scenarios of failure modes; ``evaluation`` is the mode's ``shown``.
         criteria: how the evaluations meet the pass criteria, whose margins are metrics.
         screened: how far the run's screen agrees, as `screened_payload` returns it.
+        happening: which events began, and who came near the ego, if the run recorded it.
     """
 
     summary: RunSummary
@@ -269,6 +271,7 @@ class ReportData:
     minimal: tuple[Playback, ...] = ()
     criteria: tuple[CriterionSummary, ...] = ()
     screened: Mapping[str, Any] | None = None
+    happening: Happening | None = None
 
     def __post_init__(self) -> None:
         n = self.evaluations.iteration.size

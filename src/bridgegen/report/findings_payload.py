@@ -6,7 +6,9 @@ from typing import Any
 from bridgegen.arrays import Bool
 from bridgegen.conflict.findings import Findings
 from bridgegen.report.playback import Conflict
+from bridgegen.triage.judgement import judgement
 from bridgegen.triage.record import Minimal, Mode, Neighbourhood, Treatment, Triage
+from bridgegen.triage.words import parameters_in_words
 
 FINDING_FIELDS = ("conflict", "conflict_type", "responsible", "rule", "partner")
 """The fields of a row's finding, in the page's order."""
@@ -41,12 +43,23 @@ def implausible_payload(findings: Findings | None) -> dict[str, Any]:
     }
 
 
-def conflict_payload(one: Conflict) -> dict[str, Any]:
-    """Return a scenario's conflict; numbers are rounded to what a page can show."""
-    facts = one.summary.to_dict()
+def conflict_payload(one: Conflict, cause: str = "") -> dict[str, Any]:
+    """Return a scenario's conflict; numbers are rounded to what a page can show.
+
+    Args:
+        one: the conflict.
+        cause: the quick label of its cause, with which its sentence is reconciled.
+    """
+    said = one.summary
+    if said.happened:
+        said = said.reconciled(
+            judgement(cause, None, preventable=said.preventable, responsible=said.responsible)
+        )
+    facts = said.to_dict()
     numbers = {name: value for name, value in facts.items() if isinstance(value, dict)}
     return {
         **{name: value for name, value in facts.items() if name not in numbers},
+        "bare": one.summary.bare,
         "numbers": {
             name: [None if v["value"] is None else float(f"{v['value']:.4g}"), v["unit"]]
             for name, v in numbers.items()
@@ -69,6 +82,8 @@ def triage_payload(found: Triage) -> dict[str, Any]:
         "neighbours": found.neighbours,
         "radius": found.radius,
         "untested": found.untested,
+        "matters": parameters_in_words(found),
+        "judged": {one.evaluation: one.judgement for one in found.neighbourhoods if one.judgement},
         "bound": {
             "sentence": found.bound.sentence,
             "evaluations": found.bound.evaluations,
@@ -83,13 +98,14 @@ def _mode(one: Mode, tested: Neighbourhood | None) -> dict[str, Any]:
     facts = one.model_dump(
         include={
             "number", "title", "conflict", "conflict_type", "responsible", "rule", "partner",
-            "place", "cause", "tested", "count", "harm", "severity", "shown", "worst",
+            "place", "cause", "judgement", "tested", "count", "harm", "severity", "shown", "worst",
             "robustness", "space",
         }
     )  # fmt: skip
     return facts | {
         "knife_edge": one.knife_edge,
         "exports": list(one.exports[:5]),
+        "rules": [rule for rule, _ in one.rules] or [one.rule],
         "rows": tested.rows if tested else 0,
         "harmful": tested.harmful if tested else 0,
         "fix": _fix(tested.fix) if tested else None,

@@ -64,7 +64,7 @@ def playback_payload(p: Playback, road: int, picture: int | None) -> dict[str, A
         "evaluation": int(p.evaluation),
         "critical": bool(p.critical),
         "cause": p.cause,
-        "conflict": None if p.conflict is None else conflict_payload(p.conflict),
+        "conflict": None if p.conflict is None else conflict_payload(p.conflict, p.cause),
         "parameters": {name: number(value) for name, value in p.parameters.items()},
         "metrics": {name: number(value) for name, value in p.metrics.items()},
         "files": list(p.files),

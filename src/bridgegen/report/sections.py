@@ -5,10 +5,11 @@ beside it, a function here that returns its data, and its line in `SECTIONS`.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from bridgegen.arrays import Bool
+from bridgegen.conflict.happening import Happening, Share
 from bridgegen.report.batches_payload import TRENDS, TRENDS_OF_HARM, batches_payload
 from bridgegen.report.causes_payload import causes_payload
 from bridgegen.report.confirmation_payload import confirmations_payload
@@ -67,6 +68,31 @@ def _coverage(data: ReportData, _shown: Bool) -> Any:
     return coverage_payload(data.coverage) if data.coverage else None
 
 
+def _happening(data: ReportData, _shown: Bool) -> Any:
+    found = data.happening
+    if found is None or not found.rows:
+        return None
+    groups = [("Events that began", found.events), ("Who came near the ego", found.near)]
+    if found.end is not None and found.stuck is not None:
+        whole = (replace(found.end, name="the end of its route"),)
+        groups.append(("What the ego reached", whole))
+        groups.append(("Stuck", (Share("the ego stands for no reason", found.stuck, found.rows),)))
+    return {
+        "lead": [one for one in (_verdict(found), found.stuck_in_words, found.domain) if one],
+        "groups": [
+            {"title": title, "shares": [vars(one) for one in shares]}
+            for title, shares in groups
+            if shares
+        ],
+    }
+
+
+def _verdict(found: Happening) -> str:
+    if found.happened:
+        return ""
+    return f"The scenario did not happen: {'; '.join(found.reasons)}."
+
+
 def _screened(data: ReportData, _shown: Bool) -> Any:
     return data.screened
 
@@ -81,6 +107,7 @@ SECTIONS = (
     Section("causes.js", "causes", _causes, grows=True),
     Section("elsewhere.js", "confirmations", _confirmations, grows=True),
     Section("screened.js", "screened", _screened),
+    Section("happening.js", "happening", _happening, grows=True),
     Section("trends.js", "batches", _batches, grows=True),
     Section("regions.js", "regions", _regions, grows=True),
     Section("scatter.js"),

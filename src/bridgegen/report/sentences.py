@@ -50,7 +50,7 @@ def _sentences(data: ReportData) -> list[str]:
     if s.n_critical == 0:
         none = "It is not" if s.n_evaluations == 1 else "None of them is"
         words.append(f"{none} critical (critical means {s.critical_rule}).")
-        return [*words, *([data.triage.bound.sentence] if data.triage else [])]
+        return [*words, *(_not_exported(data) or _bound(data))]
     found = f"{s.n_critical:,} of them ({share(s.r_critic)}) "
     found += f"{'is' if s.n_critical == 1 else 'are'} critical ({s.critical_rule})"
     if s.first_critical is not None:
@@ -60,7 +60,19 @@ def _sentences(data: ReportData) -> list[str]:
     words.append(found + ".")
     confirmed = [verdicts(one.label, one.scenarios)[0] for one in data.confirmations]
     worst = _worst_harm(data) if s.harm else _worst(data)
-    return [*words, *filter(None, (_modes(data), _causes(data), worst)), *confirmed]
+    findings = filter(None, (_modes(data), _causes(data), worst))
+    return [*words, *findings, *_not_exported(data), *confirmed]
+
+
+def _bound(data: ReportData) -> list[str]:
+    return [data.triage.bound.sentence] if data.triage else []
+
+
+def _not_exported(data: ReportData) -> list[str]:
+    """Return that nothing is exported and why, where no failure was found."""
+    if not data.summary.finished or data.kept or data.triage is None or data.triage.modes:
+        return []
+    return [*_bound(data), "No scenario is exported: only failures are."]
 
 
 def summary_table(data: ReportData) -> list[tuple[str, str]]:

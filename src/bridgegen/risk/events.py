@@ -3,11 +3,11 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from bridgegen.conflict.harm import COLLISION, NEAR_MISS
+from bridgegen.conflict.harm import NEAR_MISS
 from bridgegen.errors import UnknownNameError
 
 LEAST = NEAR_MISS
-"""The harm from which outcomes are kept."""
+"""The score from which outcomes are kept."""
 
 INJURY = "mais3"
 """A serious injury: the mean probability of MAIS3+ in collisions, and no event of its own."""
@@ -18,17 +18,17 @@ class Event:
     """An event.
 
     Attributes:
-        harm: it happens from this harm on.
+        score: it happens from this score on; see `outcomes.Column`.
         description: in words.
     """
 
-    harm: float
+    score: float
     description: str
 
 
 EVENTS: Mapping[str, Event] = {
     "conflict": Event(NEAR_MISS, "a near miss or a collision"),
-    "collision": Event(COLLISION, "a collision"),
+    "collision": Event(2.0 * NEAR_MISS, "a collision"),
 }
 """By name; the last one is the default aim."""
 

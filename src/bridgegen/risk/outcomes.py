@@ -1,4 +1,4 @@
-"""What becomes of rows: how harmful each is, in numbers that an estimator sums up."""
+"""What becomes of rows: how close each comes to harm, in numbers that an estimator sums up."""
 
 from dataclasses import dataclass
 from enum import IntEnum
@@ -10,7 +10,7 @@ import numpy.typing as npt
 from bridgegen.arrays import Float
 from bridgegen.conflict.analysis import analyse
 from bridgegen.conflict.findings import Findings
-from bridgegen.conflict.harm import NEAR_MISS, Count, decisive
+from bridgegen.conflict.harm import NEAR_MISS, Count, closeness_of_pairs, decisive
 from bridgegen.conflict.plausibility import Implausible, plausibility
 from bridgegen.pipeline import Pipeline
 
@@ -21,11 +21,12 @@ class Column(IntEnum):
     """The columns of an outcome; the first is what `estimators` call the score."""
 
     SCORE = 0
-    """``harm``, from that of a near miss on; below, how near the row comes to any conflict.
-
-    Where all conflicts count, ``harm_any`` is that harm. 0 of a row without a result.
+    """`conflict.harm.closeness_of_pairs` of the worst pair, from a near miss on; below, how near
+    the row comes to any conflict, whether it counts or not. 0 of a row without a result.
     """
-    HARM = 1
+    OWN = 1
+    """Likewise, where only conflicts count that the ego is responsible for or could prevent.
+    """
     SEVERITY = 2
     """Probability of a MAIS3+ injury in the ego's collision."""
     RESULT = 3
@@ -91,14 +92,15 @@ def _outcomes(pipeline: Pipeline, X: Float, count: Count) -> tuple[Float, npt.ND
     rollout = pipeline.rollout(X)
     conflicts = analyse(rollout)
     gate = plausibility(rollout)
-    other, score = decisive(conflicts, count)
-    _, harm = decisive(conflicts)
+    other, _ = decisive(conflicts, count)
+    score, own, near = (
+        closeness_of_pairs(conflicts, of).max(axis=1) for of in (count, "ego", "any")
+    )
     rows = np.arange(len(X))
     values = np.zeros((len(X), len(Column)))
     ok = (rollout.status == 0) & (gate.code == Implausible.NONE)
-    _, near = decisive(conflicts, "any")
     led = np.where(score >= NEAR_MISS, score, ALMOST * np.minimum(near, NEAR_MISS))
-    values[ok, Column.SCORE], values[ok, Column.HARM] = led[ok], harm[ok]
+    values[ok, Column.SCORE], values[ok, Column.OWN] = led[ok], own[ok]
     values[ok, Column.SEVERITY] = conflicts.severity[rows, other][ok]
     values[:, Column.RESULT] = np.where(rollout.status != 0, 0.0, np.where(ok, 1.0, -1.0))
     found = Findings.of(conflicts, gate.labels, count)

@@ -146,7 +146,7 @@ def _intervals(risk: Risk) -> str:
         if one.probability is not None
     ]
     if risk.check is not None:
-        p = risk.check.probability(EVENTS[risk.event].harm)
+        p = risk.check.probability(EVENTS[risk.event].score)
         lines.append(("check", f"{WORDS[risk.event]}, by Monte Carlo", p))
     lines = [one for one in lines if one[2].high > 0.0 and (one[2].estimate > 0.0)]
     if not lines:

@@ -148,7 +148,7 @@ class Risk:
         """The event where the ego is responsible or could prevent it; None if only those count."""
         if self.count == "ego":
             return None
-        own = self.weighted.outcomes[:, Column.HARM] >= EVENTS[self.event].harm
+        own = self.weighted.outcomes[:, Column.OWN] >= EVENTS[self.event].score
         return self._finding(self._values(self.event) * own)
 
     @cached_property
@@ -243,7 +243,7 @@ class Risk:
             "check": None
             if self.check is None
             else {
-                **vars(self.check.probability(EVENTS[self.event].harm)),
+                **vars(self.check.probability(EVENTS[self.event].score)),
                 "evaluations": self.check.evaluations,
             },
             "data": None if self.data is None else vars(self.data),
@@ -269,23 +269,22 @@ class Risk:
         text = io.StringIO()
         out = writer(text, lineterminator="\n")
         names = self.exposure.space.names
-        out.writerow([*names, "harm", "severity", "mode", "weight"])
+        out.writerow([*names, "conflict", "severity", "mode", "weight"])
         Z, found = self.weighted.Z[:MOST_ROWS], self.weighted.outcomes[:MOST_ROWS]
         X = self.exposure.from_normal(Z) if len(Z) else np.empty((0, len(names)))
         for x, one, weight in zip(X, found, self.weighted.weights[:MOST_ROWS], strict=True):
             number = int(one[Column.MODE])
             mode = self.modes[number] if number >= 0 else ""
-            score, severity = float(one[Column.SCORE]), float(one[Column.SEVERITY])
-            out.writerow(
-                [*map(repr, x.tolist()), repr(score), repr(severity), mode, repr(float(weight))]
-            )
+            kind = "collision" if one[Column.SCORE] >= EVENTS["collision"].score else "near miss"
+            severity = repr(float(one[Column.SEVERITY]))
+            out.writerow([*map(repr, x.tolist()), kind, severity, mode, repr(float(weight))])
         return text.getvalue()
 
     def _values(self, name: str) -> Float:
         """Return what an event's probability is the mean of, ``(M,)``."""
         if name == INJURY:
             return self.weighted.outcomes[:, Column.SEVERITY] * self._values("collision")
-        return self.weighted.there(EVENTS[name].harm)
+        return self.weighted.there(EVENTS[name].score)
 
     def _rows(self, name: str) -> Float:
         Z = self.weighted.Z[self._values(name) > 0.0]

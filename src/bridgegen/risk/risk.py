@@ -14,14 +14,16 @@ from bridgegen import ego as egos
 from bridgegen.arrays import Float
 from bridgegen.campaign.run import Run
 from bridgegen.campaign.scenarios import driven_by, is_file, load
-from bridgegen.conflict.harm import Count
+from bridgegen.conflict.analysis import CONTACT
+from bridgegen.conflict.findings import KINDS
+from bridgegen.conflict.harm import NEAR_MISS, Count
 from bridgegen.errors import InputError, Interrupted, UnknownNameError
 from bridgegen.exposure import Exposure
 from bridgegen.exposure.chosen import UNIFORM, chosen_exposure
 from bridgegen.exposure.fit import Fit, fit_exposure
 from bridgegen.exposure.tables import read_header
 from bridgegen.odd.scenario import LogicalScenario
-from bridgegen.options import PipelineOptions
+from bridgegen.options import PipelineOptions, checked
 from bridgegen.pipeline import Pipeline
 from bridgegen.risk import methods
 from bridgegen.risk.data import data_band
@@ -60,6 +62,7 @@ class RiskCallbacks:
     elsewhere: Callable[[int, int], None] = field(default=lambda done, total: None)
 
 
+@checked
 def estimate_risk(
     scenario: str | Path,
     *,
@@ -148,7 +151,7 @@ def estimate_risk(
         options = PipelineOptions(ego=ego, vehicle=vehicle)
         pipeline = Pipeline(driven, met.space, options, workers=hands)
         name = pipeline.driver.name
-        Z = None if start is None else _points_of(Path(start), met, aimed.harm)
+        Z = None if start is None else _points_of(Path(start), met, event)
         settings = {
             "version": version("bridgegen"),
             "scenario": driven.name,
@@ -182,14 +185,14 @@ def estimate_risk(
             pipeline, met, hands, whose, ledger, lambda done: say.evaluations(done, total)
         )
         try:
-            aim = Aim(aimed.harm, LEAST, budget, precision)
+            aim = Aim(aimed.score, LEAST, budget, precision)
             found = methods.estimate(method, experiment, aim, seed, Z)
             failed, implausible = experiment.failed, experiment.implausible
             beside = None
             if check:
-                plain = Aim(aimed.harm, LEAST, check, 0.0)
+                plain = Aim(aimed.score, LEAST, check, 0.0)
                 beside = monte_carlo.estimate(experiment, plain, seed + OTHER_ROWS)
-            likely = find_most_likely(experiment, met, found.weighted, aimed.harm, budget, seed)
+            likely = find_most_likely(experiment, met, found.weighted, aimed.score, budget, seed)
             other = None
             if there is not None and elsewhere is not None:
                 kept = kept_elsewhere(folder, elsewhere, settings)
@@ -198,14 +201,14 @@ def estimate_risk(
                     lambda done: say.elsewhere(done, simulator_rows),
                 )  # fmt: skip
                 other = look_elsewhere(
-                    experiment, beyond, elsewhere.name, found.weighted, aimed.harm,
+                    experiment, beyond, elsewhere.name, found.weighted, aimed.score,
                     simulator_rows, seed,
                 )  # fmt: skip
         except KeyboardInterrupt:
             raise Interrupted(folder, experiment.evaluations, total, command=command) from None
         data = None
         if fitted is not None and not found.weighted.doubts:
-            data = data_band(met, found.weighted, aimed.harm, fitted)
+            data = data_band(met, found.weighted, aimed.score, fitted)
         shown = write_most_likely(pipeline, likely, whose, folder)
     result = Risk(
         met, pipeline.driver.label, event, count, found, seed, budget, tuple(experiment.modes),
@@ -281,8 +284,8 @@ def _fit_of(
     )
 
 
-def _points_of(run: Path, exposure: Exposure, harm: float) -> Float:
-    """Return the points that a search's rows stand for, of those with so much harm.
+def _points_of(run: Path, exposure: Exposure, event: str) -> Float:
+    """Return the points that a search's rows stand for, of those in which the event happens.
 
     Rows at an end of a range stand for points near it.
 
@@ -298,11 +301,14 @@ def _points_of(run: Path, exposure: Exposure, harm: float) -> Float:
         raise InputError(f"{run}: a run of another scenario than {exposure.scenario.name}, or axes")
     if "harm" not in found.metrics:
         raise InputError(f"{run}: does not record harm")
-    good = (rows.metrics[:, found.metrics.index("harm")] >= harm) & exposure.feasible(rows.X)
+    happens = rows.metrics[:, found.metrics.index("harm")] >= NEAR_MISS
+    if event == "collision":
+        happens &= rows.findings.conflict == KINDS[CONTACT]
+    good = happens & exposure.feasible(rows.X)
     X = rows.X[good]
     X = X[np.isfinite(exposure.log_density(X))] if len(X) else X
     if not len(X):
-        raise InputError(f"{run}: found no row with harm of {harm:g} that the exposure allows")
+        raise InputError(f"{run}: found no {event} that the exposure allows")
     return np.clip(exposure.to_normal(X), -FAR, FAR)
 
 

@@ -86,6 +86,14 @@ class RunArgument(Part):
 
     def _space(self) -> None:
         at, space = f"{self._at}.4", self._facts.triage.bound.space
+        if not self._facts.triage.bound.judged:
+            self._strategy.add(
+                "Goal", at,
+                "The harmful share of the searched space is bounded. The run was not judged, so "
+                "its rows bound nothing.",
+                undeveloped=True, link="failure-modes.md",
+            )  # fmt: skip
+            return
         if "share" not in self._numbers:
             self._strategy.add(
                 "Goal", at,

@@ -91,7 +91,7 @@ def read_facts(folder: Path) -> Facts:
     wanted = (harm_name(triage), "d_min", "n_collision", "severity")
     scenario, space, _ = searched(run)
     with Store.open(folder) as store:
-        if store.columns.last[-1] != "implausible" or wanted[0] not in store.metrics:
+        if "implausible" not in store.columns.last or wanted[0] not in store.metrics:
             raise InputError(
                 f"{folder}: must be a run that records the harm of its evaluations, as all by "
                 f"BridgeGen 0.1.0 and later do; it was made by BridgeGen {run.version}: search "

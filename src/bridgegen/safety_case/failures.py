@@ -37,11 +37,12 @@ class Failures(Part):
     def build(self) -> None:
         """Add the goal, and its support or what defeats it."""
         at, bound = f"{self._at}.3", self._facts.triage.bound
-        if not self._known():
+        if not bound.judged:
+            why = "too few evaluations could be judged, or the scenario did not happen."
             self._strategy.add(
                 "Goal", at,
-                f"No failure of {self._ego} was found. None of {self._n('evaluations')} "
-                f"evaluations has a result in plausible traffic.",
+                f"No failure of {self._ego} was found in {self._n('evaluations')} evaluations. The "
+                f"run was not judged: {why}",
                 undeveloped=True, link="failure-modes.md",
             )  # fmt: skip
             return
@@ -75,11 +76,6 @@ class Failures(Part):
         )  # fmt: skip
         for mode in self._facts.triage.modes[:MOST_SHOWN]:
             self._mode(counter, mode)
-
-    def _known(self) -> int:
-        """Return how many evaluations have a result in plausible traffic."""
-        bound = self._facts.triage.bound
-        return bound.evaluations - bound.failed - bound.implausible
 
     def _kinds(self) -> str:
         """Return how many failure modes there are, as a clause."""

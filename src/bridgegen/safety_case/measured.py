@@ -25,7 +25,8 @@ def ways(facts: Facts) -> dict[Way, int]:
     """Return the number of harmful evaluations of each way to fail, the most frequent first."""
     counts: Counter[Way] = Counter()
     for mode in facts.triage.modes:
-        counts[way_of(mode)] += mode.count
+        for rule, count in mode.rules or ((mode.rule, mode.count),):
+            counts[*way_of(mode)[:3], rule] += count
     return dict(counts.most_common())
 
 

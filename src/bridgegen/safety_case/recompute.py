@@ -20,7 +20,7 @@ from typing import Any
 
 ROUND = {"percent": ROUND_HALF_EVEN, "percent_up": ROUND_CEILING, "percent_down": ROUND_FLOOR}
 FIT = "status = 0 AND implausible IS NULL"  # has a result, and traffic that could happen
-HARMFUL = FIT + " AND {harm} >= 0.3"  # a near miss has a harm of 0.3, a collision of 0.6
+HARMFUL = FIT + " AND {harm} >= 0.3"  # a near miss or a collision
 WAY = "conflict || '|' || conflict_type || '|' || responsible || '|' || coalesce(rule, '')"
 COUNTS = {
     "evaluations": "1",

@@ -56,7 +56,7 @@ def print_risk(result: "Risk", seconds: float, *, as_json: bool) -> None:
         print(f"\ndoubt       {doubt}")
     print(f"\n{'method':<12}{result.estimated.method}: {result.estimated.why}")
     if result.check is not None:
-        p = result.check.probability(EVENTS[result.event].harm)
+        p = result.check.probability(EVENTS[result.event].score)
         values = interval(p)
         print(f"{'check':<12}{values[0]} ({values[1]}) in {result.check.evaluations:,} by mc")
     if result.data is not None:

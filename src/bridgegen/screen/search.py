@@ -3,6 +3,7 @@
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from bridgegen.regions.words import percent
 from bridgegen.screen.live import Live
 
 if TYPE_CHECKING:
@@ -84,8 +85,21 @@ class SearchScreen(Live):
         )
 
 
-def print_summary(run: "Run", seconds: float) -> None:
-    """Print a run's figures, the total time [s], its failure modes; last, what matters most."""
+def print_summary(run: "Run", seconds: float, *, verbose: bool = False) -> None:
+    """Print a run's verdict, its failure modes, how common they are, and what to do next.
+
+    Args:
+        run: the run.
+        seconds: total time [s].
+        verbose: its figures and each mode in full first.
+    """
+    if verbose:
+        _print_figures(run, seconds)
+    print("\n".join(verdict_lines(run, seconds)))
+
+
+def _print_figures(run: "Run", seconds: float) -> None:
+    """Print a run's figures, and its failure modes with all that was measured of them."""
     s, settings, found = run.summary, run.settings, run.triage
     quick = "quick causes" if found is not None else "causes"
     rows = [
@@ -100,8 +114,9 @@ def print_summary(run: "Run", seconds: float) -> None:
         ("d_min", f"best {s.d_min_best:.2f} m, median {s.d_min_median:.2f} m"),
         ("v_d", f"best {s.v_d_best:.2f} m/s, median {s.v_d_median:.2f} m/s"),
         *((f"criterion {one.criterion.id}", one.sentence) for one in run.criteria),
+        *([("what happened", said)] if (said := run.happening.sentence) else []),
         ("wall time", f"{seconds:.2f} s, of which {s.seconds:.2f} s search"),
-        ("scenarios", f"{len(run.scenarios)} in {run.folder / 'critical'}{_minimal(run)}"),
+        ("scenarios", _exported(run)),
     ]
     rows += [
         ("not exported", f"{one.name}, evaluation {one.evaluation + 1}: {'; '.join(one.problems)}")
@@ -114,7 +129,6 @@ def print_summary(run: "Run", seconds: float) -> None:
         print()
         _print_modes(found)
     print()
-    _print_rows(conclusion(run))
 
 
 def screen_rows(run: "Run") -> list[tuple[str, str]]:
@@ -124,31 +138,107 @@ def screen_rows(run: "Run") -> list[tuple[str, str]]:
     return [] if run.screened is None else [("screen", in_a_line(run.screened))]
 
 
-def conclusion(run: "Run") -> list[tuple[str, str]]:
-    """Return what matters of a run: the verdict, the worst failure, where it is; and its page."""
-    from bridgegen.criteria import headline as judged
-    from bridgegen.triage.words import headline, shortly
+WORDS = {"fails": "FAILS", "no failure found": "NO FAILURE FOUND", "not judged": "NOT JUDGED"}
+"""The verdicts on the terminal."""
 
-    s, found = run.summary, run.triage
-    critical = f"{s.critical} of {s.evaluations} evaluations are critical"
-    succeeded = s.evaluations - s.failed
-    if s.evaluations and not succeeded:
-        rows = [("verdict", "no verdict: all evaluations failed")]
-    else:
-        failed = f"; {s.failed} of {s.evaluations} evaluations failed" if s.failed else ""
-        rows = [("verdict", (headline(found) if found is not None else critical) + failed)]
-    if text := judged(run.settings.ego, run.criteria):
-        if any(one.violated for one in run.criteria):
-            rows = [("verdict", text), ("harm", rows[0][1])]
-        else:
-            rows.append(("criteria", text))
-    if found is not None and found.modes:
-        worst = max(found.modes, key=lambda one: (one.severity, one.harm))
-        rows.append(("worst", shortly(worst)))
-        where = worst.minimal.sentence if worst.minimal is not None else worst.place
-        if where:
-            rows.append(("where", where))
-    return [*rows, ("page", str(run.report))]
+WIDTH, BAR = 100, 5
+"""Characters of a mode's line at most, and of its bar."""
+
+
+def verdict_lines(run: "Run", seconds: float) -> list[str]:
+    """Return the verdict on the first line; then the modes, and what matters most of the run."""
+    from bridgegen.criteria import headline as judged
+
+    s, settings, found = run.summary, run.settings, run.triage
+    lines = [conclusion(run) + f" ({s.evaluations:,} evaluations, {seconds:.0f} s)"]
+    if text := judged(settings.ego, run.criteria):
+        lines.append(f"Criteria: {text}")
+    if found is not None:
+        lines += _mode_lines(found)
+        lines += ["", *_found_lines(found)]
+    if not run.happening.happened or run.happening.stuck:
+        lines.append(f"What happened: {run.happening.sentence}")
+    elif run.happening.domain:
+        lines.append(f"Domain: {run.happening.domain}")
+    if s.failed:
+        reasons = ", ".join(f"{n} × {why}" for why, n in run.failures.most_common(MOST_REASONS))
+        lines.append(f"Without a result: {reasons}")
+    lines += [
+        f"Not exported: {one.name}, evaluation {one.evaluation + 1}: {'; '.join(one.problems)}"
+        for one in run.not_exported
+    ]
+    folder = run.folder
+    lines.append(f"Report: {run.report} (-v prints all figures)")
+    if run.scenarios:
+        lines.append(
+            f"Keep: bridgegen suite add {folder} --to SUITE · compare drivers: bridgegen diff "
+            f"SUITE --ego {settings.ego} --ego OTHER"
+        )
+    return lines
+
+
+def conclusion(run: "Run") -> str:
+    """Return a run's verdict in a line: the word, the driver, the scenario, and why."""
+    from bridgegen.triage.record import NOT_JUDGED
+
+    settings, found = run.settings, run.triage
+    name = f"{settings.ego} in {Path(settings.scenario).stem}{_worse(settings)}"
+    word = WORDS[run.verdict]
+    if found is None:
+        return f"{word}  {name}: the run has not ended"
+    bound = found.bound
+    if run.verdict == "fails" and found.modes:
+        modes = len(found.modes) + found.unrecorded_modes
+        ways = f"{modes} failure mode" + "s" * (modes != 1)
+        return f"{word}  {name}: {ways}, {bound.harmful:,} of {bound.evaluations:,} evaluations"
+    if run.verdict == "fails":
+        violated = [one.criterion.id for one in run.criteria if one.violated]
+        return f"{word}  {name}: violates {', '.join(violated)}"
+    _, _, why = bound.sentence.rstrip(".").partition(": ")
+    return f"{word}  {name}: {why if run.verdict == NOT_JUDGED else why.partition(';')[0]}"
+
+
+def _mode_lines(found: "Triage") -> list[str]:
+    """Return a line for each failure mode: its bar, count, event, rule, severity and cause."""
+    modes = found.modes[:MOST_MODES]
+    most = max((one.count for one in modes), default=1)
+    lines = ["         count  event · rule · worst MAIS3+ · root cause"] if modes else []
+    for one in modes:
+        bar = "█" * max(round(BAR * one.count / most), 1)
+        what, _, _ = one.title.partition(" (")
+        worst = percent(one.severity) if one.conflict == "contact" else "near miss"
+        about = " · ".join(filter(None, [one.rule, worst, one.cause]))
+        head = f"{one.number:>2} {bar:<{BAR}} {one.count:>5,}  "
+        room = max(WIDTH - len(head) - len(about) - 3, 12)
+        short = what if len(what) <= room else f"{what[: room - 1]}…"
+        lines.append(f"{head}{short} · {about}"[:WIDTH])
+    more = len(found.modes[MOST_MODES:]) + found.unrecorded_modes
+    return [*lines, f"    and {more} more"] if more else lines
+
+
+def _found_lines(found: "Triage") -> list[str]:
+    """Return how common failures are, the simplest one, what matters, and what does not count."""
+    from bridgegen.triage.words import parameters_in_words
+
+    space, lines = found.bound.space, []
+    if found.bound.judged and space.drawn and space.rows:
+        share = (
+            f"{percent(space.share or 0.0)} of random scenarios fail ({percent(space.low)} to "
+            f"{percent(space.high)})"
+            if space.harmful
+            else f"at most {percent(space.high)} of random scenarios fail"
+        )
+        lines.append(
+            f"How common: {share}; uniform over the ranges, 95 % confidence; not a rate on roads"
+        )
+    simplest = [one.minimal for one in found.modes if one.minimal is not None]
+    if simplest:
+        lines.append(f"Simplest: {simplest[0].sentence}")
+    if found.modes and (text := parameters_in_words(found)):
+        lines.append(f"What matters most: {text}")
+    if found.bound.not_counted:
+        lines.append(f"N{found.bound.not_counted[1:]}")
+    return lines
 
 
 def _print_rows(rows: list[tuple[str, str]]) -> None:
@@ -158,7 +248,7 @@ def _print_rows(rows: list[tuple[str, str]]) -> None:
 
 def _print_modes(found: "Triage") -> None:
     """Print the failure modes, with their simplest scenarios."""
-    from bridgegen.triage.words import mode_in_words
+    from bridgegen.triage.words import mode_in_words, parameters_in_words
 
     for one in found.modes[:MOST_MODES]:
         print(mode_in_words(one, found))
@@ -168,11 +258,15 @@ def _print_modes(found: "Triage") -> None:
     more = len(found.modes[MOST_MODES:]) + found.unrecorded_modes
     if more:
         print(f"     and {more} more")
+    if matter := parameters_in_words(found):
+        print(f"what matters most: {matter}")
 
 
-def _minimal(run: "Run") -> str:
-    n = len(run.minimal_scenarios)
-    return f", and {n} minimal" if n else ""
+def _exported(run: "Run") -> str:
+    n, minimal = len(run.scenarios), len(run.minimal_scenarios)
+    if not (n or minimal or run.not_exported) and run.settings.keep:
+        return "none exported: no failure found"
+    return f"{n} in {run.folder / 'critical'}" + (f", and {minimal} minimal" if minimal else "")
 
 
 def _worse(settings: "Settings") -> str:

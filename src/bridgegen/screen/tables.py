@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from dataclasses import asdict
 from typing import TYPE_CHECKING
 
+from rich.cells import cell_len
 from rich.console import Console
 from rich.padding import Padding
 from rich.table import Table
@@ -12,18 +13,55 @@ from rich.table import Table
 if TYPE_CHECKING:
     from bridgegen.odd.scenario import ParameterLine
 
+LEAST = 24
+"""The fewest characters that a line of a wrapped column holds."""
+
 
 def print_table(head: Sequence[str], rows: Sequence[Sequence[object]], *, as_json: bool) -> None:
-    """Print rows as a table, or as a JSON list of objects."""
+    """Print rows as a table, or as a JSON list of objects.
+
+    In a file or a pipe no text is wrapped. On a terminal only the widest column is; where not even
+    that leaves it ``LEAST`` characters, each row is a block of lines, one for each of its texts.
+    """
     if as_json:
         print(json.dumps([dict(zip(head, row, strict=True)) for row in rows], indent=2))
         return
-    table = Table(box=None, pad_edge=False, header_style="bold")
-    for name in head:
-        table.add_column(name, overflow="fold")  # a narrow terminal cuts nothing
-    for row in rows:
-        table.add_row(*("" if value is None else _shown(value) for value in row))
-    Console(markup=False, emoji=False).print(table)
+    texts = [["" if value is None else _shown(value) for value in row] for row in rows]
+    widths = [max(map(cell_len, column)) for column in zip(head, *texts, strict=True)]
+    whole, widest = sum(widths) + 2 * (len(head) - 1), max(range(len(head)), key=widths.__getitem__)
+    console = Console(markup=False, emoji=False, highlight=False)
+    if not console.is_terminal:
+        for row in (head, *texts):
+            cells = [
+                text + " " * (width - cell_len(text))
+                for text, width in zip(row, widths, strict=True)
+            ]
+            print("  ".join(cells).rstrip())
+        return
+    if whole - widths[widest] + LEAST > console.width:
+        _print_blocks(console, head, texts)
+        return
+    table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0), header_style="bold")
+    for column, name in enumerate(head):
+        table.add_column(name, overflow="fold", no_wrap=column != widest)
+    for row in texts:
+        table.add_row(*row)
+    console.print(table)
+
+
+def _print_blocks(console: Console, head: Sequence[str], texts: Sequence[Sequence[str]]) -> None:
+    """Print each row as lines of a name and a text, which continues below itself."""
+    indent = max(map(cell_len, head)) + 2
+    for number, row in enumerate(texts):
+        if number:
+            console.print()
+        grid = Table.grid(padding=0)
+        grid.add_column(width=indent, no_wrap=True)
+        grid.add_column(overflow="fold")
+        for name, text in zip(head, row, strict=True):
+            if text:
+                grid.add_row(name, text)
+        console.print(grid)
 
 
 def _shown(value: object) -> str:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from bridgegen.verdict.fail_if import Outcome
 
-_WORDS = {"passed": "passed", "failed": "FAILED", "unknown": "FAILED, cannot be judged"}
+_WORDS = {"passed": "passed", "failed": "FAILED", "unknown": "NOT JUDGED"}
 
 
 def print_outcomes(outcomes: "Sequence[Outcome]") -> bool:

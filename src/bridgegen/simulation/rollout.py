@@ -108,6 +108,8 @@ class Rollout:
             ``(0,)`` where unknown.
         towed_by: ``(E,)`` int64, which entity tows each at any time; -1: none. Empty where there
             are no trailers. Coupled entities do not collide.
+        progress: ``(N, 2)`` float64 [m], how far the ego's driver drove, and how far it then was
+            from the end of its route; ``(0, 2)`` where unknown.
         messages: details of failures, by row.
         incidents: by row, those that the simulator itself reported.
         derived: intermediate results that several metrics share; see `metrics.metric.shared`.
@@ -139,6 +141,7 @@ class Rollout:
     crosswalks: Float = field(default_factory=lambda: np.zeros((0, 0, 5)))
     friction: Float = field(default_factory=lambda: np.zeros(0))
     towed_by: Int = field(default_factory=lambda: np.zeros(0, np.int64))
+    progress: Float = field(default_factory=lambda: np.zeros((0, 2)))
     messages: Mapping[int, str] = field(default_factory=dict)
     incidents: Mapping[int, tuple[Incident, ...]] = field(default_factory=dict)
     derived: dict[Any, Any] = field(default_factory=dict, init=False, repr=False, compare=False)
@@ -212,7 +215,7 @@ class Rollout:
 
 _BY_ROW = (
     "x", "y", "h", "v", "a", "offset", "n_steps", "status", "lights", "began", "detections",
-    "stop_lines", "present", "lamps", "claims", "crosswalks", "friction",
+    "stop_lines", "present", "lamps", "claims", "crosswalks", "friction", "progress",
 )  # fmt: skip
 
 _BY_INSTANT = ("x", "y", "h", "v", "a", "offset", "lights", "present", "lamps", "detections")

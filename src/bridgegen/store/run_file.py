@@ -14,7 +14,7 @@ from bridgegen.store.rows import FIRST, LAST_OF_SCHEMA, Columns
 from bridgegen.store.schema import NEEDED, RUN, check_columns, tables_of
 from bridgegen.store.sqlite import storage_errors, transaction
 
-SCHEMA = 3
+SCHEMA = 4
 READABLE = tuple(LAST_OF_SCHEMA)
 """The schemas that can be read and resumed."""
 
@@ -77,7 +77,7 @@ def refuse_used(folder: Path) -> None:
 
 def write_run(folder: Path, columns: Columns, run: Mapping[str, Any]) -> None:
     """Create the run's file atomically."""
-    keys = [key for key in (*KEYS, "labels") if key in run]
+    keys = [key for key in (*KEYS, "labels", "domain") if key in run]
     values = [(key, json.dumps(run[key], allow_nan=False)) for key in keys]
     draft = folder / DRAFT
     draft.unlink(missing_ok=True)
@@ -157,6 +157,7 @@ def _check_values(run: Mapping[str, Any], n_columns: int) -> None:
     """
     kinds = {
         "version": str,
+        "domain": str,
         "settings": dict,
         "notes": dict,
         "labels": dict,

@@ -63,6 +63,7 @@ class Store:
         columns: their names in the table.
         labels: how to read the values of parameters that are not plain numbers, by name
             (`bridgegen.odd.kinds.Kind.labels`).
+        domain: a note on the domain of the ego's driver; "" without one.
     """
 
     def __init__(
@@ -75,6 +76,7 @@ class Store:
         self.version: str = run["version"]
         self.columns = columns_of(run)
         self.labels: dict[str, dict[str, Any]] = run.get("labels", {})
+        self.domain: str = run.get("domain", "")
         self._connection = connection
         self._lock = lock
         self._finished: str | None = run.get("finished")
@@ -91,6 +93,7 @@ class Store:
         n_var: int,
         n_obj: int,
         labels: Mapping[str, Any] | None = None,
+        domain: str = "",
     ) -> Self:
         """Create a run in a new or empty folder, and open it for writing.
 
@@ -102,6 +105,7 @@ class Store:
             n_var: searched parameters, the width of U.
             n_obj: objectives.
             labels: how to read the values of parameters that are not plain numbers, by name.
+            domain: a note on the domain of the ego's driver, if there is one.
 
         Raises:
             StorageError: the folder contains a run or other files, or is not writable.
@@ -119,6 +123,8 @@ class Store:
         }
         if labels:
             run["labels"] = labels
+        if domain:
+            run["domain"] = domain
         columns = columns_of(run)
         refuse_used(folder)
         with storage_errors(folder, "made"):

@@ -118,7 +118,7 @@ def pipeline_of(job: Job) -> Pipeline:
         count=job.options.count or entry.count,
     )
     spec = chosen_objective(scenario.objective, options, "one")
-    scenario = as_judged(replace(scenario, objective=spec), spec.rule)
+    scenario = as_judged(replace(scenario, objective=spec), spec.gated)
     pipeline = Pipeline(
         scenario, scenario.space(), options, simulator=job.simulator, workers=Threads(1)
     )

@@ -170,8 +170,7 @@ def _of_mode(
     None if only another scenario is asked for.
     """
     key = Key(
-        mode.conflict, mode.conflict_type, mode.responsible, mode.rule, mode.partner, mode.place,
-        mode.cause,
+        mode.conflict, mode.conflict_type, mode.responsible, mode.partner, mode.place, mode.cause,
     )  # fmt: skip
     kept = [name for name in mode.exports if name in exported]
     minimal = mode.minimal

@@ -187,7 +187,7 @@ def _kept(found: Failing, way: Way, id: str, to: Path) -> tuple[Failure, str, bo
     failure = Failure(
         title=_cut(way.title), scenario=_cut(found.scenario),
         conflict=key.conflict, type=key.conflict_type,
-        responsible=key.responsible, rule=key.rule, partner=key.partner, place=key.place,
+        responsible=key.responsible, rule=way.rule, partner=key.partner, place=key.place,
         cause=key.cause, minimal=_cut(needs),
         violates=[CriterionSection.model_validate(one) for one in way.violates],
         count="any" if found.job.options.count == "any" else "ego", driver=_cut(way.driver),

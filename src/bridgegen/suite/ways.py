@@ -15,7 +15,7 @@ from bridgegen.simulation.rollout import STATUS_MESSAGES
 from bridgegen.suite.evaluate import Job
 from bridgegen.triage.modes import Key, keys_of, title
 
-NO_KEY = Key("", "", "", "", "", "")
+NO_KEY = Key("", "", "", "", "")
 """Of a scenario that is no failure by its conflict, but violates pass criteria."""
 
 
@@ -25,6 +25,7 @@ class Way:
 
     Attributes:
         key: of its mode; NO_KEY where it only violates criteria.
+        rule: label of the rule that decides on the responsibility; "" likewise.
         violates: the criteria that it violates, as `Criterion.to_dict` gives them.
         metrics: by name, all that are recorded.
         harm: that counts.
@@ -34,6 +35,7 @@ class Way:
     """
 
     key: Key
+    rule: str
     violates: tuple[Mapping[str, Any], ...]
     metrics: Mapping[str, float]
     harm: float
@@ -63,19 +65,21 @@ def ways(pipeline: Pipeline, X: Float) -> list[Way]:
             for one, margin in zip(pipeline.monitor, margins[i], strict=True)
             if margin < 0.0
         )
-        problem = ""
+        problem, rule = "", str(found.findings.rule[i])
         if found.status[i]:
             text = STATUS_MESSAGES[int(found.status[i])]
             problem = ": ".join(filter(None, (text, found.messages.get(i, ""))))
         elif harm < NEAR_MISS or found.findings.implausible[i]:
-            key = NO_KEY
+            key, rule = NO_KEY, ""
             if not violates:
                 why = found.findings.implausible[i]
                 problem = f"it is no failure of the ego: harm {harm:.2g} of {NEAR_MISS:g}"
                 problem = f"its traffic is implausible: {why}" if why else problem
         ids = ", ".join(one["id"] for one in violates)
-        words = title(key, pipeline.objective.count) if key is not NO_KEY else f"violates {ids}"
-        made.append(Way(key, violates, metrics, harm, words, pipeline.driver.label, problem))
+        words = f"violates {ids}"
+        if key is not NO_KEY:
+            words = title(key, [rule], pipeline.objective.count)
+        made.append(Way(key, rule, violates, metrics, harm, words, pipeline.driver.label, problem))
     return made
 
 

@@ -1,16 +1,23 @@
 """Bounds of a run for the whole space: its least margins, and the harmful share."""
 
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from decimal import ROUND_CEILING, Context, Decimal
+from typing import Self
 
 import numpy as np
 
 from bridgegen.arrays import Bool, Float, Int, Numbers
+from bridgegen.conflict import analysis
+from bridgegen.conflict.findings import KINDS, Findings
+from bridgegen.conflict.happening import Happening
 from bridgegen.conflict.harm import COURSE, NEAR_MISS
 from bridgegen.conflict.quantities import QUANTITIES
+from bridgegen.conflict.types import Rule
 from bridgegen.regions.evidence import clopper_pearson
 from bridgegen.regions.words import percent
-from bridgegen.triage.record import Bound, Drawn, Estimate, Least
+from bridgegen.triage.record import NOT_JUDGED, Bound, Drawn, Estimate, Least, Verdict
 
 UNBIASED = ("random", "sobol")
 """The algorithms whose rows do not depend on results."""
@@ -25,7 +32,7 @@ _DRAWN = {
 
 
 _MARGIN = {
-    "harm": f"harm {{:.2f}} of {NEAR_MISS:g}",
+    "harm": f"harm {{:.2f}}, failures start at {NEAR_MISS:g}",
     "course_ttc": "{:.2f} s to collision",
     "course_braking": "{:.2f} m/s² needed",
 }
@@ -82,11 +89,90 @@ def _least(name: str, column: Float, counts: Bool, ids: Int) -> Least:
     )  # fmt: skip
 
 
+@dataclass(frozen=True)
+class NotCounted:
+    """What a run has seen and does not count as a failure.
+
+    Attributes:
+        conflicts: by ("contact" or "near miss", rule that excuses the ego) the number of rows.
+        implausible: by reason the number of rows whose traffic could not happen.
+        collisions: rows of implausible traffic in which the ego collides.
+        failed: rows without a result.
+    """
+
+    conflicts: Mapping[tuple[str, str], int]
+    implausible: Mapping[str, int]
+    collisions: int
+    failed: int
+
+    @classmethod
+    def of(cls, findings: Findings, harm: Float, ok: Bool) -> Self:
+        """Return what N rows hold, by their findings, harm and whether they have a result."""
+        plausible = np.array(findings.implausible == "", dtype=np.bool_).reshape(len(ok))
+        contact = np.array(findings.conflict == CONTACT, dtype=np.bool_).reshape(len(ok))
+        near = np.array(findings.conflict == NEAR, dtype=np.bool_).reshape(len(ok))
+        excused = ok & plausible & (contact | near) & (harm < NEAR_MISS)
+        odd = ok & ~plausible
+        pairs = zip(findings.conflict[excused], findings.rule[excused], strict=True)
+        return cls(
+            Counter(pairs), Counter(findings.implausible[odd].tolist()),
+            int((odd & contact).sum()), int((~ok).sum()),
+        )  # fmt: skip
+
+    @property
+    def unsafe(self) -> int:
+        """Rows in which there was no time to act from the start on: nothing can be said of them."""
+        return sum(n for (_, rule), n in self.conflicts.items() if rule == Rule.UNSAFE_START.label)
+
+    @property
+    def sentence(self) -> str:
+        """In words; "" if all counts."""
+        parts = []
+        for kind, (one, many) in _KIND.items():
+            rules = {rule: n for (what, rule), n in self.conflicts.items() if what == kind}
+            if rules:
+                total = sum(rules.values())
+                parts.append(f"{total} {one if total == 1 else many} ({_listed(rules)})")
+        if self.implausible:
+            total = sum(self.implausible.values())
+            also = f"; {self.collisions} of them collisions" if self.collisions else ""
+            traffic = f"{total} with implausible traffic ({_listed(self.implausible)}{also})"
+            parts.append(traffic)
+        if self.failed:
+            parts.append(f"{self.failed} without a result")
+        return "not counted: " + ", ".join(parts) if parts else ""
+
+
+CONTACT, NEAR = KINDS[analysis.CONTACT], KINDS[analysis.NEAR_MISS]
+_KIND = {CONTACT: ("collision", "collisions"), NEAR: ("near miss", "near misses")}
+
+JUDGED = 0.5
+"""Share of a run's evaluations that must be judged, so that no failure among them says anything."""
+
+
+def _listed(counts: Mapping[str, int]) -> str:
+    """Return numbers by name, the largest first."""
+    ordered = sorted(counts.items(), key=lambda one: (-one[1], one[0]))
+    return ", ".join(f"{name or 'no rule'} {n}" for name, n in ordered)
+
+
+def _unjudged(evaluations: int, besides: NotCounted, happening: Happening) -> str:
+    """Return why a run without failures says nothing of its driver; "" if it does."""
+    left_out = besides.failed + sum(besides.implausible.values()) + besides.unsafe
+    judged = evaluations - left_out
+    if judged < JUDGED * evaluations or not judged:
+        some = f"only {judged}" if judged else "none"
+        return f"{some} of {evaluations} evaluations could be judged"
+    if not happening.happened:
+        return "the scenario did not happen: " + "; ".join(happening.reasons)
+    return ""
+
+
 def bound(
     *,
     evaluations: int,
-    failed: int,
-    implausible: int,
+    besides: NotCounted,
+    happening: Happening,
     harmful: int,
     space: Estimate,
     least: tuple[Least, ...],
@@ -98,33 +184,36 @@ def bound(
     fails = f"{ego} fails, and {baseline} does not," if baseline else f"{ego} fails"
     such = "harmful with it alone" if baseline else "harmful"
     none = f"No scenario in which {fails} was found" if baseline else "No failure found"
-    if evaluations == failed:
-        text = f"No evaluation has a result, so nothing is known of {ego}."
-    elif harmful:
+    failed, implausible = besides.failed, sum(besides.implausible.values())
+    verdict: Verdict = "no failure found"
+    if harmful:
+        verdict = "fails"
         text = (
             f"{fails} in {modes} way{'s' * (modes != 1)}: {harmful} of {evaluations} "
             f"evaluations; {_of_the_space(space, such)}."
         )
+    elif evaluations == failed:
+        verdict, text = NOT_JUDGED, f"Not judged: no evaluation of {ego} has a result."
+    elif why := _unjudged(evaluations, besides, happening):
+        verdict, text = NOT_JUDGED, f"Not judged: {why}."
     else:
-        besides = ""
+        fresh = ""
         if space.drawn == "fresh" and space.harmful:
-            besides = f", but in {space.harmful} of {space.rows} fresh random draws"
+            fresh = f", but in {space.harmful} of {space.rows} fresh random draws"
         text = (
-            f"{none} in {evaluations} evaluations{besides}: {_margin(least)}; "
+            f"{none} in {evaluations} evaluations{fresh}: {_margin(least)}; "
             f"{_of_the_space(space, such)}."
         )
     return Bound(
         evaluations=evaluations, failed=failed, implausible=implausible, harmful=harmful,
-        space=space, least=least, sentence=text,
+        space=space, least=least, verdict=verdict, not_counted=besides.sentence, sentence=text,
     )  # fmt: skip
 
 
 def _of_the_space(space: Estimate, such: str) -> str:
     """Return the share of the space that is such, with its interval."""
     if not space.drawn or not space.rows:
-        return (
-            f"the share of the space that is {such} is not estimated, for the search chose its rows"
-        )
+        return f"how much of the space is {such} is unknown: the search chose its rows on purpose"
     by = _DRAWN[space.drawn].format(space.rows)
     if not space.harmful:
         return f"with 95 % confidence at most {_at_most(space.high)} of the space is {such} ({by})"
@@ -141,7 +230,7 @@ def _margin(least: Sequence[Least]) -> str:
         one = of.get(name)
         if one is not None and one.value is not None and one.evaluation is not None:
             parts.append(f"{words.format(one.value)} (evaluation {one.evaluation + 1})")
-    return "least margin " + ", ".join(parts) if parts else "no margin is known"
+    return "closest: " + ", ".join(parts) if parts else "no margin is known"
 
 
 def _at_most(share: float) -> str:

@@ -7,8 +7,12 @@ import numpy as np
 from bridgegen.arrays import Float, Int
 
 DISTINCT = (0.2, 0.1)
-"""Two kept scenarios differ by at least this much: root mean square over the searched parameters,
-each scaled to 0..1. The second distance counts where too few differ by the first."""
+"""Two kept scenarios differ by at least this much: root mean square over what happened in them, or
+over the searched parameters, each scaled to 0..1. The second distance counts where too few differ
+by the first."""
+
+COPY = 1e-3
+"""Rows that are nearer to each other are the same."""
 
 
 def apart(U: Float, u: Float) -> Float:
@@ -23,7 +27,7 @@ def distinct(U: Float, order: Int, keep: int, kept: Sequence[int] = ()) -> list[
     """Return the first rows of an order that differ from each other, and from those kept already.
 
     Args:
-        U: ``(N, n_var)`` unit-cube rows.
+        U: ``(N, n)`` coordinates, scaled to 0..1.
         order: positions in U, the best first.
         keep: how many at most, those kept already included.
         kept: positions of rows that are kept in any case.

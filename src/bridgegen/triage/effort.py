@@ -17,6 +17,7 @@ class Effort:
             rows get the place of the nearest of these with an otherwise equal key.
         tested: modes with a tested cause, besides those of the exported scenarios.
         minimal: modes with a minimal scenario.
+        probes: of each minimal scenario, simulations that confirm its conditions.
         descends_robustly: whether a minimal scenario that is not robust is sought anew, by steps
             that each leave it robust.
         sampled: random harmful rows, besides the exported ones, whose neighbours are tested.
@@ -28,6 +29,7 @@ class Effort:
     placed: int
     tested: int
     minimal: int
+    probes: int
     descends_robustly: bool
     sampled: int
     fresh: int
@@ -39,15 +41,23 @@ class Effort:
 
 
 FULL = Effort(
-    per_mode=3, spare=2, placed=4096, tested=20, minimal=10, descends_robustly=True, sampled=8,
-    fresh=256,
+    per_mode=3, spare=2, placed=4096, tested=20, minimal=10, probes=500, descends_robustly=True,
+    sampled=8, fresh=256,
 )  # fmt: skip
 SHORT = Effort(
-    per_mode=1, spare=0, placed=64, tested=0, minimal=3, descends_robustly=False, sampled=0,
-    fresh=0,
+    per_mode=1, spare=0, placed=64, tested=0, minimal=3, probes=250, descends_robustly=False,
+    sampled=0, fresh=0,
 )  # fmt: skip
 NONE = Effort(
-    per_mode=0, spare=0, placed=0, tested=0, minimal=0, descends_robustly=False, sampled=0, fresh=0
+    per_mode=0,
+    spare=0,
+    placed=0,
+    tested=0,
+    minimal=0,
+    probes=0,
+    descends_robustly=False,
+    sampled=0,
+    fresh=0,
 )
 EFFORTS: Mapping[str, Effort] = {"full": FULL, "short": SHORT, "none": NONE}
 

@@ -6,14 +6,13 @@ an eighth, or one step, if the scenario then still fails in the same mode; the s
 parameters of all modes are tried in one batch, then combinations of the permitted ones. When no
 jump is left, the parameters that are not nominal move back by the fewest steps that make the
 scenario robust. If no such move does, the descent starts again with jumps by all steps or a half,
-each of which must leave half of the neighbours harmful. The limit of each parameter is then found
-by moving it alone. All scenarios use the random numbers of the original row, so that the limits are
-limits of parameters only.
+each of which must leave half of the neighbours harmful. What the scenario then needs of each
+parameter is stated as far as probes confirm it, see `bridgegen.triage.conditions`. All scenarios
+use the random numbers of the original row, so that the limits are limits of parameters only.
 """
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 
@@ -21,11 +20,12 @@ from bridgegen.arrays import Bool, Float, Int
 from bridgegen.evaluation import Trials
 from bridgegen.odd.space import SearchSpace
 from bridgegen.pipeline import Pipeline
+from bridgegen.triage.conditions import Conditions, sentence
 from bridgegen.triage.effort import FULL, Effort
 from bridgegen.triage.modes import Key, keys_of
 from bridgegen.triage.moves import around, nearest, ranges, searched
 from bridgegen.triage.neighbours import NEIGHBOURS, RADIUS, ROBUST
-from bridgegen.triage.record import Condition, Minimal
+from bridgegen.triage.record import Minimal
 
 BACK = (0, 1, 2, 4, 8)
 """Steps by which the parameters that are not nominal move back to make the scenario robust."""
@@ -36,11 +36,8 @@ SHARES, MOST_ROUNDS = (1, 2, 4, 8, 10_000_000), 40
 ROBUST_SHARES, MOST_ROBUST_ROUNDS = (1, 2), 6
 """The same if each jump must leave the scenario robust."""
 
-_AHEAD = 6  # steps tried at a time to find the limit of a parameter
 Holds = Callable[[Sequence["Ladder"], Sequence[Key], Sequence[Int]], list[Bool]]
 """From ladders and keys of modes and rungs ``(n, n_var)`` of each: where harm persists."""
-
-_UNITLESS = ("1", "count", "?")
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,8 +112,8 @@ class Minimiser:
         self._descend(
             ladders, ways, here, frail, ROBUST_SHARES, MOST_ROBUST_ROUNDS, self._holds_robustly
         )
-        limits = self._limits(ladders, ways, here, modes)
-        return self._described(ladders, here, limits, modes, names)
+        self._put_to_nominal(ladders, ways, here, modes)
+        return self._described(ladders, here, modes, names)
 
     def _descend(
         self,
@@ -194,48 +191,26 @@ class Minimiser:
             frail = [m for m in frail if best[m] < ROBUST]
         return frail
 
-    def _limits(
+    def _put_to_nominal(
         self, ladders: Sequence[Ladder], ways: Sequence[Key], here: list[Int], modes: Sequence[int]
-    ) -> dict[int, dict[int, int]]:
-        """Return per mode and parameter the last rung at which harm persists, all else as it is.
-
-        A parameter of which nothing is needed after all is put to nominal.
-        """
-        found: dict[int, dict[int, int]] = {m: {} for m in modes}
-        ends = {m: {i: int(here[m][i]) for i in _needed(ladders[m], here[m])} for m in modes}
-        while any(ends.values()):
-            asked = {m: [(i, end) for i, end in each.items()] for m, each in ends.items()}
+    ) -> None:
+        """Put parameters to nominal of which nothing is needed after all, one after the other."""
+        active = list(modes)
+        while active:
+            needed = {m: _needed(ladders[m], here[m]) for m in active}
             tried: list[Int] = [np.empty((0, self._space.n_var), np.int64) for _ in ladders]
-            for m, each in asked.items():
-                rows = [
-                    _put(here[m], i, min(end + j, int(ladders[m].rungs[i])))
-                    for i, end in each
-                    for j in range(1, _AHEAD + 1)
-                ]
-                if rows:
-                    tried[m] = np.array(rows, dtype=np.int64)
+            for m, each in needed.items():
+                rows = [_put(here[m], i, int(ladders[m].rungs[i])) for i in each]
+                tried[m] = np.array(rows, dtype=np.int64).reshape(len(rows), self._space.n_var)
             fine = self._holds(ladders, ways, tried)
-            for m, each in asked.items():
-                for k, (i, end) in enumerate(each):
-                    ahead = fine[m][k * _AHEAD : (k + 1) * _AHEAD]
-                    reached = _AHEAD if ahead.all() else int(np.argmin(ahead))
-                    last = int(ladders[m].rungs[i])
-                    if end + reached >= last:  # nominal will do: begin anew with that
-                        here[m] = _put(here[m], i, last)
-                        found[m] = {}
-                        ends[m] = {j: int(here[m][j]) for j in _needed(ladders[m], here[m])}
-                        break
-                    ends[m][i] = end + reached
-                    if reached < _AHEAD:
-                        found[m][i] = end + reached
-                        del ends[m][i]
-        return found
+            active = [m for m in active if fine[m].any()]
+            for m in active:
+                here[m] = tried[m][int(np.argmax(fine[m]))]
 
     def _described(
         self,
         ladders: Sequence[Ladder],
         here: Sequence[Int],
-        limits: dict[int, dict[int, int]],
         modes: Sequence[int],
         names: Sequence[str],
     ) -> list[Minimal | None]:
@@ -247,9 +222,12 @@ class Minimiser:
         tried = self._pipeline.try_all(X, noise=self._bases[list(modes)])
         noise = self._pipeline.noise_keys(self._bases[list(modes)])
         for k, m in enumerate(modes):
-            conditions = [
-                _condition(space, ladders[m], here[m], i, limit) for i, limit in limits[m].items()
-            ]
+            if not tried.harmful[k]:
+                continue
+            conditions, inside = Conditions(
+                self._pipeline, X[k], self._bases[m], ladders[m].step, int(noise[k]), self._seed,
+                self._effort.probes,
+            ).find(_needed(ladders[m], here[m]))  # fmt: skip
             width = dict(zip(space.variables, ranges(space).tolist(), strict=True))
             conditions.sort(
                 key=lambda one: (-abs(one.value - one.nominal) / width[one.name], one.name)
@@ -260,7 +238,7 @@ class Minimiser:
                 values=self._pipeline.facts(X[k]),
                 conditions=tuple(conditions), sentence=sentence(conditions),
                 rows=rows, harmful=hits, robustness=share if rows else None,
-                harm=float(tried.harm[k]), severity=float(tried.severity[k]),
+                harm=float(tried.harm[k]), severity=float(tried.severity[k]), inside=inside,
             )  # fmt: skip
         return found
 
@@ -312,27 +290,6 @@ class Minimiser:
         return [(int(h) / max(int(n), 1), int(h), int(n)) for h, n in zip(hits, ok, strict=True)]
 
 
-def sentence(conditions: Sequence[Condition]) -> str:
-    """Return what a minimal scenario needs, in words."""
-    if not conditions:
-        return "the nominal scenario itself"
-    said = [
-        f"{one.name} {one.needs or f'{one.sign} {_in_steps(one):.3g}'}"
-        + ("" if one.unit in _UNITLESS else f" {one.unit}")
-        for one in conditions
-    ]
-    return f"needs {_listed(said)}; all else nominal"
-
-
-def _in_steps(one: Condition) -> float:
-    """Return a condition's limit; 0 where it is less than a thousandth of a step from that."""
-    return one.limit if abs(one.limit) >= 1e-3 * one.step else 0.0
-
-
-def _listed(texts: Sequence[str]) -> str:
-    return texts[0] if len(texts) == 1 else f"{', '.join(texts[:-1])} and {texts[-1]}"
-
-
 def _needed(ladder: Ladder, at: Int) -> list[int]:
     return np.flatnonzero(at < ladder.rungs).tolist()
 
@@ -348,16 +305,3 @@ def _put(at: Int, i: int, rung: int) -> Int:
     there = at.copy()
     there[i] = rung
     return there
-
-
-def _condition(space: SearchSpace, ladder: Ladder, at: Int, i: int, limit: int) -> Condition:
-    name = space.variables[i]
-    one = space.parameters[name]
-    values, last = ladder.values(at), ladder.values(_put(at, i, limit))
-    sign: Literal[">=", "<="] = ">=" if values[i] > ladder.nominal[i] else "<="
-    needs = one.kind.need_text(sign, float(last[i]), one.low, one.high, "{:.3g}".format)
-    return Condition(
-        name=name, unit=one.unit, sign=sign, needs=needs,
-        limit=float(last[i]), step=float(ladder.step[i]), value=float(values[i]),
-        nominal=float(ladder.nominal[i]),
-    )  # fmt: skip

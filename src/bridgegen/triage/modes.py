@@ -1,11 +1,13 @@
 """Failure modes: harmful rows that fail in the same way, by interpretable keys, then by distance.
 
-Rows of one mode agree in conflict (contact or near miss), conflict type, responsibility, rule,
-cause, the other participant's kind, and place on the route. Such a group is divided further only
+Rows of one mode agree in conflict (contact or near miss), conflict type, responsibility, cause, the
+other participant's kind, and place on the route. The rule that decides on the responsibility may
+differ: it names a breach, and does not change what happens. Such a group is divided further only
 where its rows form clusters in the space of parameters that are clearly apart.
 """
 
-from collections.abc import Mapping, Sequence
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -35,7 +37,6 @@ class Key(NamedTuple):
         conflict: "contact" or "near miss".
         conflict_type: see `ConflictType`.
         responsible: see `Responsible`.
-        rule: see `Rule`.
         partner: kind of the other participant.
         place: on the ego's route.
         cause: quick, or tested by neighbours.
@@ -44,7 +45,6 @@ class Key(NamedTuple):
     conflict: str
     conflict_type: str
     responsible: str
-    rule: str
     partner: str
     place: str
     cause: str = ""
@@ -82,7 +82,7 @@ def keys_of(
         cause: ``(N,)``.
     """
     partner = [kinds.get(name, "") for name in findings.partner.tolist()]
-    texts = (findings.conflict, findings.conflict_type, findings.responsible, findings.rule)
+    texts = (findings.conflict, findings.conflict_type, findings.responsible)
     columns = zip(*(one.tolist() for one in texts), partner, place, cause, strict=True)
     known: dict[tuple[str, ...], Key] = {}
     return [known.setdefault(one, Key(*one)) for one in columns]
@@ -191,23 +191,31 @@ _RESPONSIBLE = {
 }
 
 
-def title(key: Key, count: str = "ego") -> str:
+def by_frequency(rules: Iterable[str]) -> tuple[tuple[str, int], ...]:
+    """Return rules with their numbers, the most frequent first; equal ones by name."""
+    counts = Counter(rules)
+    return tuple(sorted(counts.items(), key=lambda one: (-one[1], one[0])))
+
+
+def title(key: Key, rules: Sequence[str] = (), count: str = "ego") -> str:
     """Return a mode's key in words, without its cause.
 
     Args:
         key: of the mode.
+        rules: labels of the rules that occur, the most frequent first; see `Rule`.
         count: whose conflicts count, "ego" or "any": with the latter the ego need not be able to
             prevent them.
     """
     kinds = {one.label: one for one in ConflictType}
     contact, near = _TITLES[kinds.get(key.conflict_type, ConflictType.NONE)]
     partner = _ARTICLES.get(key.partner, f"a {key.partner}")
-    if (key.rule, key.responsible) == (Rule.EMERGENCY_VEHICLE.label, "ego"):  # a car by its kind
+    if (*rules[:1], key.responsible) == (Rule.EMERGENCY_VEHICLE.label, "ego"):  # a car by its kind
         partner = "an emergency vehicle"
     text = (contact if key.conflict == "contact" else near).format(partner)
     if key.place:
         text += f" {key.place}"
-    reason = {rule.label: words for rule, (words, _) in RULES.items()}.get(key.rule, key.rule)
+    known = {rule.label: words for rule, (words, _) in RULES.items()}
+    reason = "; or ".join(known.get(one, one) for one in rules if one)
     responsible = _RESPONSIBLE.get(key.responsible, key.responsible)
     if count == "any":
         responsible = responsible.removesuffix(", preventable by the ego")
@@ -233,5 +241,5 @@ def where(U: Float, others: Float, names: Sequence[str]) -> tuple[int, float, fl
     return k, float(U[:, k].min()), float(U[:, k].max())
 
 
-__all__ = ["Group", "Key", "by_harm", "clusters", "group", "keys_of", "rekeyed", "title",
-           "where"]  # fmt: skip
+__all__ = ["Group", "Key", "by_frequency", "by_harm", "clusters", "group", "keys_of", "rekeyed",
+           "title", "where"]  # fmt: skip

@@ -27,11 +27,17 @@ ROBUST = 0.5
 """A finding with a lower share of harmful neighbours is knife-edge."""
 
 PLACEBO = "random move"
+UNKNOWN = "not known"
+"""The cause where too few neighbours have a result with some fix."""
+
 _AS_IS, _MOVED = -1, -2
 
+ENOUGH = NEIGHBOURS // 2
+"""So many neighbours must have a result with each fix to say that no fix helps."""
 
-AsIs = dict[int, tuple[Bool, Bool]]
-"""By evaluation: which unchanged neighbours are harmful, and which have a result."""
+AsIs = dict[int, tuple[Bool, Bool, Float]]
+"""By evaluation: which unchanged neighbours are harmful, which have a result, and up to when each
+is known to be harmless [s]."""
 
 
 def neighbourhoods(
@@ -58,29 +64,39 @@ def neighbourhoods(
     known: AsIs = {} if as_is is None else as_is
     ids = evaluations.tolist()
     new = np.array([k for k, one in enumerate(ids) if one not in known], dtype=np.int64)
-    harmful, ok = _simulate(pipeline, X[new], evaluations[new], seed, [_AS_IS])
-    known |= {ids[k]: (harmful[j, :, 0], ok[j, :, 0]) for j, k in enumerate(new.tolist())}
+    harmful, ok, until = _simulate(pipeline, X[new], evaluations[new], seed, [_AS_IS])
+    known |= {
+        ids[k]: (harmful[j, :, 0], ok[j, :, 0], until[j, :, 0]) for j, k in enumerate(new.tolist())
+    }
     tried = pipeline.fixes if fixes else ()
     variants = [_MOVED, *range(len(tried))] if tried else []
-    harmful, ok = _simulate(pipeline, X, evaluations, seed, variants)
-    return [
-        _neighbourhood(
-            one,
-            np.concatenate([known[one][0][:, np.newaxis], harmful[k]], axis=1),
-            np.concatenate([known[one][1][:, np.newaxis], ok[k]], axis=1),
-            tried, sampled,
-        )
-        for k, one in enumerate(ids)
-    ]  # fmt: skip
+    harmful, ok, until = _simulate(pipeline, X, evaluations, seed, variants)
+    made = []
+    for k, one in enumerate(ids):
+        before, has, when = known[one]
+        # With the conflict, what followed is gone: harmless up to its time is enough.
+        ok[k] |= (before & has)[:, np.newaxis] & (until[k] >= when[:, np.newaxis])
+        made.append(
+            _neighbourhood(
+                one,
+                np.concatenate([before[:, np.newaxis], harmful[k]], axis=1),
+                np.concatenate([has[:, np.newaxis], ok[k]], axis=1),
+                tried, sampled,
+            )
+        )  # fmt: skip
+    return made
 
 
 def _simulate(
     pipeline: Pipeline, X: Float, evaluations: Int, seed: int, variants: Sequence[int]
-) -> tuple[Bool, Bool]:
-    """Return which neighbours are harmful, and have a result, ``(K, NEIGHBOURS, variants)``."""
+) -> tuple[Bool, Bool, Float]:
+    """Return which neighbours are harmful, have a result, and up to when each is harmless.
+
+    All are ``(K, NEIGHBOURS, variants)``; see ``Trials.harmless_until``.
+    """
     space, shape = pipeline.space, (len(X), NEIGHBOURS, len(variants))
     if not len(X) or not variants:
-        return np.zeros(shape, np.bool_), np.zeros(shape, np.bool_)
+        return np.zeros(shape, np.bool_), np.zeros(shape, np.bool_), np.zeros(shape)
     near = np.array(
         [
             around(space, x, seed, i, NEIGHBOURS, RADIUS)
@@ -93,7 +109,11 @@ def _simulate(
     fix = np.broadcast_to(np.maximum(variants, _AS_IS), shape)
     n = len(space.names)
     trials = pipeline.try_all(rows.reshape(-1, n), fix.reshape(-1), noise.reshape(-1, n))
-    return trials.harmful.reshape(shape), trials.ok.reshape(shape)
+    return (
+        trials.harmful.reshape(shape),
+        trials.ok.reshape(shape),
+        trials.harmless_until.reshape(shape),
+    )
 
 
 def _neighbourhood(
@@ -133,8 +153,9 @@ def treatment(name: str, cause: str, harmful: Bool, ok: Bool) -> Treatment:
     both, n = int((before & after).sum()), int(known.sum())
     drop, low, high = paired_drop(both, gone, new, n - both - gone - new)
     return Treatment(
-        name=name, cause=cause, rows=n, gone=gone, new=new, drop=drop, low=low, high=high
-    )
+        name=name, cause=cause, rows=n, gone=gone, new=new, drop=drop, low=low, high=high,
+        before=both + gone,
+    )  # fmt: skip
 
 
 def cause_of(harmful: int, rows: int, fixes: Sequence[Treatment], placebo: Treatment | None) -> str:
@@ -146,6 +167,8 @@ def cause_of(harmful: int, rows: int, fixes: Sequence[Treatment], placebo: Treat
     for one in fixes:
         if one.works and one.exceeds(placebo):
             return one.cause
+    if any(one.rows < ENOUGH for one in fixes):
+        return UNKNOWN
     return Cause.UNAVOIDABLE.label
 
 

@@ -33,11 +33,17 @@ Drawn = Literal["random", "sobol", "fresh", ""]
 """Where rows come from whose share is an estimate: the run's own, drawn at random or from a Sobol
 sequence; fresh random ones; "" where there are none and nothing is estimated."""
 
+Verdict = Literal["fails", "no failure found", "not judged"]
+"""What a run says of its driver."""
+NOT_JUDGED: Verdict = "not judged"
+
 CauseLabel = Literal[
-    "perception", "planning", "vehicle dynamics", "control", "unavoidable", "sensitive", ""
-]
+    "perception", "planning", "vehicle dynamics", "control", "unavoidable", "sensitive",
+    "not known", "",
+]  # fmt: skip
 """Labels of `bridgegen.cause.Cause`; "sensitive": a small change of the parameters alone makes
-most of the harm vanish, so that no fix can be credited; "" where it is not known."""
+most of the harm vanish, so that no fix can be credited; "not known": too few neighbours have a
+result with some fix; "" where none was tried."""
 
 
 class _Model(BaseModel):
@@ -83,7 +89,9 @@ class Treatment(_Model):
         name: "perception is ideal", "un-r157 drives", "the road is dry", …; "random move" is the
             placebo.
         cause: that the change stands for; "" for the placebo.
-        rows: neighbours that have a result with and without the change.
+        rows: neighbours that have a result with and without the change. Where the change removes
+            the conflict, harmless up to its time is enough: what would follow is gone.
+        before: of them, those that are harmful unchanged; None in records of earlier versions.
         gone: neighbours that are harmful unchanged and harmless with the change.
         new: neighbours that are harmless unchanged and harmful with the change.
         drop: (gone - new) / rows.
@@ -99,6 +107,7 @@ class Treatment(_Model):
     drop: Change
     low: Change
     high: Change
+    before: Count | None = None
 
     @property
     def works(self) -> bool:
@@ -121,11 +130,13 @@ class Neighbourhood(_Model):
         low: lower end of its 95 % interval (Wilson).
         high: its upper end.
         cause: the first fix whose drop is significantly above zero and exceeds the placebo's;
-            "unavoidable" where no fix has one; "sensitive" of a knife-edge row; "" where no fix
-            was tried.
+            "unavoidable" where no fix has one; "not known" where fewer than half of the neighbours
+            have a result with some fix; "sensitive" of a knife-edge row; "" where no fix was tried.
         fixes: in the order in which causes are sought; empty where they were not tried.
         placebo: one more random move of the same size for each neighbour.
         sampled: whether the row was drawn at random from those that are not exported.
+        judgement: what caused it, and what would have avoided it, in one clause; "" where no fix
+            was tried, and in records of earlier versions.
     """
 
     evaluation: Count
@@ -138,6 +149,7 @@ class Neighbourhood(_Model):
     fixes: Annotated[tuple[Treatment, ...], Field(max_length=20)] = ()
     placebo: Treatment | None = None
     sampled: bool = False
+    judgement: Text = ""
 
     @property
     def knife_edge(self) -> bool:
@@ -147,14 +159,28 @@ class Neighbourhood(_Model):
     @property
     def fix(self) -> Treatment | None:
         """The fix that the cause was found by, if one was."""
-        if self.placebo is None or self.cause in ("sensitive", "unavoidable", ""):
+        if self.placebo is None or self.cause in ("sensitive", "unavoidable", "not known", ""):
             return None
         works = (one for one in self.fixes if one.works and one.exceeds(self.placebo))
         return next(works, None)
 
 
+class Probes(_Model):
+    """Scenarios that were simulated to check a statement.
+
+    Attributes:
+        rows: how many.
+        harmful: of them.
+    """
+
+    rows: Count
+    harmful: Count
+
+
 class Condition(_Model):
     """What a minimal scenario needs of one parameter.
+
+    Where probes did not confirm that it needs it, its value is an example: limit and value agree.
 
     Attributes:
         name: of the parameter.
@@ -162,10 +188,14 @@ class Condition(_Model):
         sign: ">=" where the parameter lies above its nominal value, "<=" below it.
         limit: the harm persists as far as here when this parameter alone is moved on towards its
             nominal value, and not one step further.
+        until: likewise away from its nominal value; None where the harm persists to the end of its
+            range.
         step: of that parameter.
         value: in the minimal scenario.
         nominal: value of the parameter in the nominal scenario.
-        needs: sign and limit as people read them, of a category or an angle; "" of others.
+        needs: the values as people read them: "≥ 3.4 m/s", "from 3.4 to 7 m/s", "= rain".
+        outside: the probes that confirm it: with values outside, the other conditions met; None
+            where it is not confirmed, and in records of earlier versions.
     """
 
     name: Text
@@ -176,6 +206,13 @@ class Condition(_Model):
     value: Number
     nominal: Number
     needs: Text = ""
+    until: Number | None = None
+    outside: Probes | None = None
+
+    @property
+    def confirmed(self) -> bool:
+        """Whether the scenario needs it: probes outside are harmless."""
+        return self.outside is not None
 
 
 class Minimal(_Model):
@@ -188,6 +225,7 @@ class Minimal(_Model):
         values: the parameters that its scenario depends on, by name.
         conditions: the parameters that must differ from nominal, those furthest from it first.
         sentence: they in words.
+        inside: random probes that meet all confirmed conditions, all else as in the scenario.
         rows: neighbours that have a result.
         harmful: of them.
         robustness: harmful / rows.
@@ -206,6 +244,7 @@ class Minimal(_Model):
     robustness: Share | None
     harm: Share
     severity: Share
+    inside: Probes = Probes(rows=0, harmful=0)
 
     @property
     def knife_edge(self) -> bool:
@@ -222,7 +261,10 @@ class Mode(_Model):
         conflict: "contact" or "near miss".
         conflict_type: label of `ConflictType`.
         responsible: label of `Responsible`.
-        rule: label of `Rule`.
+        rule: label of the `Rule` that decides on it most often.
+        rules: all that occur with their numbers, the most frequent first; empty in records of
+            earlier versions.
+        judgement: of ``shown``, see `Neighbourhood`; by the quick cause where it was not tested.
         cause: tested by the neighbours of ``shown``; else the quick one of the rows.
         tested: whether the neighbours gave the cause.
         partner: kind of the other participant: "car", "pedestrian", …; "" if there is none.
@@ -260,11 +302,33 @@ class Mode(_Model):
     examples: Annotated[tuple[Count, ...], Field(max_length=MOST_EXAMPLES)]
     exports: Annotated[tuple[Text, ...], Field(max_length=1000)] = ()
     minimal: Minimal | None = None
+    rules: Annotated[tuple[tuple[Text, Count], ...], Field(max_length=100)] = ()
+    judgement: Text = ""
 
     @property
     def knife_edge(self) -> bool:
         """Whether fewer than half of the neighbours of ``shown`` are harmful."""
         return self.robustness is not None and self.robustness < 0.5
+
+
+class Influence(_Model):
+    """How differently a parameter is distributed in the failures of a run and in its other rows.
+
+    Attributes:
+        name: of the parameter.
+        distance: the Kolmogorov-Smirnov distance of the two.
+        p: the probability of such a distance by chance, with Bonferroni's correction.
+        failures: harmful rows that are compared.
+        at_low: of them, those in the lowest 2.5 % of the parameter's range.
+        at_high: likewise in the highest.
+    """
+
+    name: Text
+    distance: Share
+    p: Share
+    failures: Count
+    at_low: Count
+    at_high: Count
 
 
 class Least(_Model):
@@ -293,6 +357,10 @@ class Bound(_Model):
         harmful: of them.
         space: the harmful share of the search space.
         least: the smallest margins reached.
+        verdict: "fails"; "no failure found"; or "not judged", where too few evaluations could be
+            judged, or the scenario did not happen. "" in records of earlier versions.
+        not_counted: the collisions, near misses and evaluations that do not count as failures,
+            with their reasons; "" where there are none.
         sentence: in words.
     """
 
@@ -302,7 +370,15 @@ class Bound(_Model):
     harmful: Count
     space: Estimate
     least: Annotated[tuple[Least, ...], Field(max_length=20)]
+    verdict: Verdict | Literal[""] = ""
+    not_counted: Text = ""
     sentence: Text
+
+    @property
+    def judged(self) -> bool:
+        """Whether the run supports a statement on its driver."""
+        known = self.evaluations - self.failed - self.implausible
+        return self.verdict != NOT_JUDGED if self.verdict else known > 0
 
 
 class Triage(_Model):
@@ -325,6 +401,7 @@ class Triage(_Model):
         unrecorded_modes: further modes.
         neighbourhoods: of the exported rows, in their order, then of the others.
         untested: why no neighbours were tested; "" where they were.
+        influences: the parameters that matter for failure significantly, the most important first.
         fresh: the fresh random rows; None where none were drawn, and in records of earlier
             versions.
     """
@@ -344,6 +421,7 @@ class Triage(_Model):
     unrecorded_modes: Count = 0
     neighbourhoods: Annotated[tuple[Neighbourhood, ...], Field(max_length=MOST_NEIGHBOURHOODS)]
     untested: Text = ""
+    influences: Annotated[tuple[Influence, ...], Field(max_length=1000)] = ()
     fresh: FreshRows | None = None
 
     @model_validator(mode="after")

@@ -10,16 +10,30 @@ import numpy.typing as npt
 from bridgegen.arrays import Bool, Float, Numbers
 from bridgegen.cause import Cause
 from bridgegen.conflict.findings import Findings
+from bridgegen.conflict.happening import Happening
 from bridgegen.conflict.harm import NEAR_MISS
 from bridgegen.conflict.quantities import HARM
 from bridgegen.criteria import OF_BASELINE
+from bridgegen.evaluation import EVENT
 from bridgegen.pipeline import Pipeline
 from bridgegen.store import Recorded, Rows
-from bridgegen.triage.bound import UNBIASED, bound, estimate, least_margins
-from bridgegen.triage.distinct import distinct
+from bridgegen.triage.bound import UNBIASED, NotCounted, bound, estimate, least_margins
+from bridgegen.triage.distinct import COPY, apart, distinct
 from bridgegen.triage.effort import FULL, Effort
+from bridgegen.triage.influence import influences
+from bridgegen.triage.judgement import judgement
 from bridgegen.triage.minimal import Minimiser
-from bridgegen.triage.modes import Group, Key, by_harm, group, keys_of, rekeyed, title, where
+from bridgegen.triage.modes import (
+    Group,
+    Key,
+    by_frequency,
+    by_harm,
+    group,
+    keys_of,
+    rekeyed,
+    title,
+    where,
+)
 from bridgegen.triage.moves import searched
 from bridgegen.triage.neighbours import NEIGHBOURS, RADIUS, AsIs, neighbourhoods
 from bridgegen.triage.record import (
@@ -33,6 +47,7 @@ from bridgegen.triage.record import (
     Neighbourhood,
     Triage,
 )
+from bridgegen.triage.what_happened import of_events, of_results
 
 _SAMPLE, _FRESH = 18, 19  # streams of random numbers, apart from others of the same seed
 
@@ -129,6 +144,8 @@ class _Triage:
         self._found: dict[int, Neighbourhood] = {}
         self._as_is: AsIs = {}
         self._unrecorded = 0
+        self._preventable: dict[int, bool] = {}
+        self._event: Float = np.zeros((0, len(EVENT)))
 
     def run(self) -> Triaged:
         """Run the stages."""
@@ -160,12 +177,16 @@ class _Triage:
     # Stages; positions are those among the harmful rows.
 
     def _places(self, U: Float) -> list[str]:
-        """Return where on its route each harmful row fails."""
+        """Return where on its route each harmful row fails; keep what happened in it."""
         order = by_harm(self._harm[self._at], U)
         first, rest = np.split(order, [self._effort.placed])
         place = np.full(len(order), "", dtype=object)
-        place[first] = self._pipeline.try_all(self._rows.X[self._at[first]]).place
-        if len(rest):
+        trials = self._pipeline.try_all(self._rows.X[self._at[first]])
+        place[first] = trials.place
+        self._preventable = dict(zip(first.tolist(), trials.preventable.tolist(), strict=True))
+        if not len(rest):
+            self._event = trials.event[np.argsort(first)]
+        else:
             from scipy.spatial import cKDTree
 
             findings = self._rows.findings.take(self._at)
@@ -180,11 +201,19 @@ class _Triage:
                     place[i] = place[known[keys[i]][int(trees[keys[i]].query(U[i])[1])]]
         return place.tolist()
 
+    def _happened(self) -> Float:
+        """Return coordinates in which rows are near if the same happened in them."""
+        if len(self._event) == len(self._at):
+            return of_events(self._event)
+        at = self._at
+        return of_results(self._rows.metrics[at], self._rows.findings.take(at))
+
     def _test_robustness(self, groups: Sequence[Group], U: Float, harm: Float) -> list[int]:
         """Simulate neighbours of the worst rows; return the row that represents each mode."""
-        worst = [distinct(U, one.rows, self._effort.per_mode) for one in groups]
+        events = self._happened()
+        worst = [distinct(events, one.rows, self._effort.per_mode) for one in groups]
         every = by_harm(harm, U)
-        several = distinct(U, every, self._effort.spare * max(self._keep, 1))
+        several = distinct(events, every, self._effort.spare * max(self._keep, 1))
         self._simulate(dict.fromkeys(i for some in (*worst, several) for i in some), fixes=False)
         return [min(some, key=lambda i: (self._is_knife_edge(i), some.index(i))) for some in worst]
 
@@ -195,14 +224,16 @@ class _Triage:
             return [known[at] for at in self._chosen if at in known]
         critical = self._rows.critical[self._at]
         first = sorted((i for i in shown if critical[i]), key=lambda i: self._rank(i, harm))
+        events = self._happened()
+        first = [i for k, i in enumerate(first) if not _is_copy(events, i, first[:k])]
         first = first[: self._keep]
         every = by_harm(harm, U)
         tried = [i for i in every.tolist() if i in self._found and critical[i]]
         tried.sort(key=lambda i: self._rank(i, harm))
-        more = distinct(U, np.array(tried, dtype=np.int64), self._keep, first)
+        more = distinct(events, np.array(tried, dtype=np.int64), self._keep, first)
         if len(first) + len(more) < self._keep:  # rows of unknown robustness
             kept = [*first, *more]
-            more += distinct(U, every[critical[every]], self._keep, kept)
+            more += distinct(events, every[critical[every]], self._keep, kept)
             self._simulate([i for i in more if self._tests and i not in self._found], fixes=False)
         return sorted([*first, *more], key=lambda i: self._rank(i, harm))
 
@@ -313,16 +344,19 @@ class _Triage:
         space, shares, fresh = self._shares(groups)
         ids = rows.id[self._at]
         order = self._at[exports].tolist() if self._chosen is None else list(self._chosen)
+        self._judge([*tested, *sample, *shown])
         names = {i: f"{order.index(self._at[i]) + 1:04d}" for i in exports}
         modes = []
         for k, (one, i) in enumerate(zip(groups, shown, strict=True), start=1):
             members = np.isin(exports, one.rows).tolist()
             kept = [names[j] for j, has in zip(exports, members, strict=True) if has and j != i]
             near = self._found.get(i)
+            rules = by_frequency(rows.findings.rule[self._at[one.rows]].tolist())
             modes.append(
                 Mode(
-                    number=k, title=self._title(one, groups),
-                    **one.key._asdict(),
+                    number=k, title=self._title(one, groups, [rule for rule, _ in rules]),
+                    **one.key._asdict(), rule=rules[0][0], rules=rules,
+                    judgement=self._judgement(i, one.key.cause),
                     tested=near is not None and near.cause != "",
                     count=len(one.rows), space=shares[k - 1],
                     harm=float(self._harm[self._at[one.rows]].max()),
@@ -347,15 +381,38 @@ class _Triage:
             results=rows.digest(), seed=self._seed,
             neighbours=NEIGHBOURS if self._tests else 0, radius=RADIUS, sampled=len(sample),
             bound=bound(
-                evaluations=len(ok), failed=int((~ok).sum()),
-                implausible=int((ok & implausible).sum()), harmful=len(self._at), space=space,
+                evaluations=len(ok),
+                besides=NotCounted.of(rows.findings.take(slice(None)), self._harm, ok),
+                happening=Happening.of(rows.findings.happened),
+                harmful=len(self._at), space=space,
                 least=least_margins(
                     rows.metrics, pipeline.metrics, self._harm, rows.id, ok & ~implausible,
                 ),
                 modes=len(modes), ego=pipeline.driver.label, baseline=baseline,
             ),
             modes=tuple(modes), unrecorded_modes=self._unrecorded,
-            neighbourhoods=tuple(known), untested=untested, fresh=fresh,
+            neighbourhoods=tuple(known),
+            influences=influences(
+                self._space, rows.X, np.isin(np.arange(len(ok)), self._at), ok & ~implausible
+            ),
+            untested=untested, fresh=fresh,
+        )  # fmt: skip
+
+    def _judge(self, at: Sequence[int]) -> None:
+        """Put the judgement of some rows on record, for which each is simulated once more."""
+        rest = [i for i in dict.fromkeys(at) if i not in self._preventable] if self._tests else []
+        if rest:
+            trials = self._pipeline.try_all(self._rows.X[self._at[rest]])
+            self._preventable |= dict(zip(rest, trials.preventable.tolist(), strict=True))
+        for i, near in self._found.items():
+            if near.cause:
+                text = self._judgement(i, near.cause)
+                self._found[i] = near.model_copy(update={"judgement": text})
+
+    def _judgement(self, i: int, cause: str) -> str:
+        return judgement(
+            cause, self._found.get(i), preventable=self._preventable.get(i),
+            responsible=str(self._rows.findings.responsible[self._at[i]]),
         )  # fmt: skip
 
     def _severity(self, one: Group) -> float:
@@ -365,9 +422,9 @@ class _Triage:
         column = self._rows.metrics[self._at[one.rows], names.index("severity")]
         return float(np.nan_to_num(column, nan=0.0).max())
 
-    def _title(self, one: Group, groups: Sequence[Group]) -> str:
+    def _title(self, one: Group, groups: Sequence[Group], rules: Sequence[str]) -> str:
         """Return a mode in words; a cluster also with the parameter that separates it."""
-        text = title(one.key, self._pipeline.objective.count)
+        text = title(one.key, rules, self._pipeline.objective.count)
         others = [g.rows for g in groups if g is not one and g.key == one.key]
         if not one.part or not others:
             return text
@@ -390,6 +447,11 @@ def _baseline_fails(pipeline: Pipeline, rows: Rows | Recorded) -> Bool:
     column = rows.metrics[:, pipeline.metrics.index(f"{OF_BASELINE}{HARM}")]
     fails: Bool = ~(np.nan_to_num(column, nan=1.0) < NEAR_MISS)
     return fails | ~rows.critical if pipeline.objective.rule == "harm" else fails
+
+
+def _is_copy(events: Float, i: int, others: Sequence[int]) -> bool:
+    """Return whether the same happened in a row as in one of some others."""
+    return bool((apart(events[list(others)], events[i]) < COPY).any())
 
 
 def _implausible(rows: Rows | Recorded) -> Bool:

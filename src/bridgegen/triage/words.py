@@ -1,6 +1,7 @@
 """A run's triage in lines of text, for the terminal."""
 
 from bridgegen.regions.words import percent
+from bridgegen.triage.influence import ends_in_words, in_words
 from bridgegen.triage.record import Mode, Triage
 
 
@@ -10,16 +11,17 @@ def headline(found: Triage) -> str:
 
 
 def mode_in_words(mode: Mode, found: Triage) -> str:
-    """Return a failure mode in one line: count, title, worst severity, robustness, cause, share."""
+    """Return a failure mode in one line: count, title, worst severity, robustness, cause, share.
+
+    The cause is one judgement, see `bridgegen.triage.judgement`.
+    """
     parts = [f"{mode.count:>5} × {mode.title}"]
     if mode.conflict == "contact":
         parts.append(f"MAIS3+ {percent(mode.severity)}")
     else:
         parts.append(f"harm {mode.harm:.2f}")
-    if mode.robustness is not None:
-        robust = "knife-edge" if mode.knife_edge else "robust"
-        parts.append(f"{robust} ({percent(mode.robustness)} of its neighbours)")
-    parts.append(cause_in_words(mode, found))
+    parts.append(robustness_in_words(mode, found))
+    parts.append(mode.judgement or mode.cause)
     if mode.space.drawn and mode.space.share is not None:
         low, high = percent(mode.space.low), percent(mode.space.high)
         seen = f"{percent(mode.space.share)} of the space ({low} to {high})"
@@ -27,36 +29,30 @@ def mode_in_words(mode: Mode, found: Triage) -> str:
     return "; ".join(part for part in parts if part)
 
 
+def parameters_in_words(found: Triage) -> str:
+    """Return which parameters matter most, and at the end of whose range failures lie, if any."""
+    text, ends = in_words(found.influences), ends_in_words(found.influences)
+    if text:
+        text = f"{text}: distance of failures from other rows, 0 to 1"
+    return "; ".join([*([text] if text else []), *(f"{one}: widen the range?" for one in ends[:1])])
+
+
 def shortly(mode: Mode) -> str:
     """Return a failure mode in few words: what happens, how often, how severe, its cause."""
     often = f"{mode.count} evaluation" + "s" * (mode.count != 1)
     severe = f"MAIS3+ {percent(mode.severity)}" if mode.conflict == "contact" else ""
-    return f"{mode.title}: {', '.join(one for one in (often, severe, mode.cause) if one)}"
+    cause = mode.judgement.partition(":")[0] or mode.cause
+    return f"{mode.title}: {', '.join(one for one in (often, severe, cause) if one)}"
 
 
-def cause_in_words(mode: Mode, found: Triage) -> str:
-    """Return a mode's cause, with the fix that shows it and by how much it lowers harm.
-
-    The drop is that of the harmful share of the neighbours, with its 95 % interval, beside the
-    drop by a random move of the same size, the placebo.
-    """
+def robustness_in_words(mode: Mode, found: Triage) -> str:
+    """Return how many neighbours of the evaluation that stands for a mode fail, too."""
     near = found.neighbourhood(mode.shown)
-    if not mode.cause:
+    if mode.robustness is None:
         return ""
-    if not mode.tested or near is None or near.placebo is None:
-        return f"{mode.cause} (quick)"
-    if mode.cause == "sensitive":
-        return "sensitive: a small change alone removes the harm"
-    fix = near.fix
-    if fix is None:
-        return "unavoidable: no fix removes it"
-    return (
-        f"{mode.cause}: {_drop(fix.drop)} if {fix.name} ({_drop(fix.low)} to {_drop(fix.high)}; "
-        f"placebo {_drop(near.placebo.drop)})"
-    )
-
-
-def _drop(share: float) -> str:
-    """Return the change of a share in percentage points: −50 for a drop by one half."""
-    points = round(-100.0 * share)
-    return f"{'−' if points < 0 else '+' if points > 0 else '±'}{abs(points)}"
+    if near is None or not near.rows:
+        return f"also fails in {percent(mode.robustness)} of its nearby scenarios"
+    if mode.knife_edge:
+        return f"knife-edge: fails in only {near.harmful} of {near.rows} nearby scenarios"
+    share = "all " if near.harmful == near.rows else f"{near.harmful} of "
+    return f"also fails in {share}{near.rows} nearby scenarios"

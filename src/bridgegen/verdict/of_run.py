@@ -15,6 +15,7 @@ from bridgegen.criteria import CriterionSummary
 from bridgegen.ego import STORYBOARD
 from bridgegen.errors import InputError, StorageError
 from bridgegen.odd.criteria import PREFIX, read_criterion
+from bridgegen.triage.record import NOT_JUDGED
 from bridgegen.triage.words import mode_in_words
 from bridgegen.verdict.fail_if import (
     FailCondition,
@@ -46,13 +47,14 @@ FIGURES = {
     "d_min_median": "the median of d_min [m]",
     "v_d_best": "the largest v_d [m/s]",
     "v_d_median": "the median of v_d [m/s]",
+    "stuck": "evaluations whose ego stands for no reason before the end of its route",
     "seconds": "duration of the search without compilation [s]",
     **dict.fromkeys(_CAUSES, "critical scenarios of this cause (quick: one replay)"),
     **_TRIAGE,
 }
 """The figures of a run that ``--fail-if`` accepts."""
 
-_OF_THE_RUN = ("evaluations", "failed", "seconds", "harmful.upper")
+_OF_THE_RUN = ("evaluations", "failed", "stuck", "seconds", "harmful.upper")
 """Figures to which no single critical scenario contributes."""
 
 
@@ -117,11 +119,11 @@ class PassFailCriteria:
     def judge(self, run: Run) -> tuple[Outcome, ...]:
         """Apply the criteria to a run, and write the JUnit XML if requested.
 
-        Without criteria and JUnit XML there are no outcomes. Otherwise the first outcome is
-        whether the search has results.
+        The first outcome is whether the run supports a verdict; without criteria and JUnit XML
+        there is none but that, and it only where the run was not judged.
         """
         if not self.conditions and self.junit is None:
-            return ()
+            return () if run.verdict != NOT_JUDGED else (_searched(run),)
         figures = figures_of(run)
         outcomes = (
             _searched(run),
@@ -146,6 +148,7 @@ def figures_of(run: Run) -> dict[str, float]:
         "d_min_median": s.d_min_median,
         "v_d_best": s.v_d_best,
         "v_d_median": s.v_d_median,
+        "stuck": float("nan") if (stuck := run.happening.stuck) is None else stuck,
         **{n: s.causes.get(one, 0) if sought else nan for n, one in _CAUSES.items()},
         **_of_triage(run),
     }
@@ -182,9 +185,13 @@ def _searched(run: Run) -> Outcome:
     details = f"{s.evaluations} evaluations, {s.critical} critical, {s.failed} failed"
     if reasons := run.failures.most_common(3):
         details += "; " + "; ".join(f"{count} x {reason}" for reason, count in reasons)
-    return Outcome(
-        "the search has results", "unknown" if s.failed == s.evaluations else "passed", details
-    )
+    found = run.triage
+    if found is not None and found.bound.not_counted:
+        details += f"; {found.bound.not_counted}"
+    if run.verdict != NOT_JUDGED:
+        return Outcome("the search has results", "passed", details)
+    why = found.bound.sentence.rstrip(".") if found is not None else "the run has not ended"
+    return Outcome("the search has results", "unknown", f"{why}; {details}")
 
 
 def _suites(run: Run, outcomes: Sequence[Outcome]) -> list[Suite]:

@@ -161,9 +161,10 @@ def _default_junction(model: OpenDrive, stem: str, count: int) -> str:
     if len(fitting) == 1:
         return fitting[0]
     rule = f"a scenario takes place at a junction of {count} legs"
-    listed = ", ".join(f"{name} ({legs} legs)" for name, legs in counts.items()) or "none"
+    listed = ", ".join(f"{name} ({legs} legs)" for name, legs in counts.items())
     if not fitting:
-        raise UnsupportedError(f"{rule}; {stem} has none such: {listed}")
+        has = f"has none of that kind: {listed}" if counts else "has no junctions"
+        raise UnsupportedError(f"{rule}; {stem} {has}")
     raise InputError(
         f"{rule}; {stem} has {len(fitting)} such, one of them must be named, or best: {listed}"
     )

@@ -2,6 +2,7 @@
 
 import { palette } from "./colours.js";
 import { $, element } from "./common.js";
+import { data } from "./data.js";
 import { conflictWord } from "./findings.js";
 import { boxCentre, isPlaced } from "./geometry.js";
 import { quantity, shareText } from "./numbers.js";
@@ -22,7 +23,8 @@ export function fillConflict(kept) {
   $("to-decided").hidden = !found || !ZONED.includes(found.conflict);
   $("ticks").replaceChildren();
   if (!found) return;
-  words.replaceChildren(found.sentence);
+  const judged = data.triage?.judged?.[kept.evaluation]; // by its neighbours: in place of the end on braking
+  words.replaceChildren(judged ? `${found.bare}; ${judged}.` : found.sentence);
   const last = Math.max(1, kept.n_steps - 1);
   const tick = (k, name, kind) => {
     const mark = element("i", { class: kind, title: `${name} at ${(k * kept.time_step).toFixed(2)} s` });
@@ -43,7 +45,7 @@ export function conflictLines(found) {
     lines.push(
       line("type", found.type, found.type_source), line("partner", found.partner), line("responsible", found.responsible, found.rule_says ?? ""),
       line("rule", found.rule ?? "–", `${found.rule_says ?? ""} (${found.rule_source ?? ""})`), line("decided at", figure("decided")),
-      line("preventable (UN R157)", found.preventable ? "yes" : "no", "whether the careful driver of UN R157 would have avoided it"),
+      line("avoidable by braking (UN R157)", found.preventable ? "yes" : "no", "whether the careful driver of UN R157, who brakes after the risk arose, would have avoided it"),
       line("where the ego is met", found.zone_ego), line(`where ${found.partner} is met`, found.zone_other),
     );
   }

@@ -14,7 +14,7 @@ export function isInMode(i, k) {
   const mode = data.triage?.modes.find((one) => one.number === k), finding = findingOf(i);
   if (!mode || !finding) return false;
   const [conflict, type, responsible, rule] = finding;
-  return conflict === mode.conflict && type === mode.conflict_type && responsible === mode.responsible && rule === mode.rule && Boolean(rows.critical[i]);
+  return conflict === mode.conflict && type === mode.conflict_type && responsible === mode.responsible && mode.rules.includes(rule ?? "") && Boolean(rows.critical[i]);
 }
 
 // The page has one word for it: collision.

@@ -36,6 +36,7 @@ class Modes {
     const notes = [], nearest = nearestToHarm();
     if (nearest !== null && !anyViolated()) notes.push(`Evaluation ${number(nearest + 1)}, which came nearest to harm, is shown below.`);
     if (n) notes.push(found.untested || `Robustness: share of ${number(found.neighbours)} neighbours, each parameter moved by at most ${number(100 * found.radius, 2)}${NARROW}% of its range, that are harmful, too.`);
+    if (found.matters) notes.push(`What matters most: ${found.matters}${found.matters.endsWith("?") ? "" : "."}`);
     if (found.more) notes.push(`${number(found.more)} more not shown.`);
     $("modes-note").textContent = notes.join(" ");
   }
@@ -85,6 +86,7 @@ class Modes {
   cause(mode) {
     const words = element("p", { class: "mode-cause" }, element("span", { class: "name" }, mode.tested ? "Cause: " : "Cause (quick label, not tested): "));
     words.append(element("b", {}, CAUSES_SAID[mode.cause] ?? "not known"));
+    if (mode.judgement) words.replaceChildren(capital(mode.judgement));
     const { fix, placebo } = mode;
     if (fix) {
       const points = (value) => number(Math.round(100 * value));

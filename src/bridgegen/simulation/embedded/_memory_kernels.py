@@ -399,5 +399,12 @@ def _declared() -> tuple[tuple[str, Any, tuple[Any, ...]], ...]:
     found = []
     for name, declared in get_type_hints(State, include_extras=True).items():
         array, *axes = get_args(declared)
-        found.append((name, get_args(get_args(array)[1])[0], tuple(axes)))
+        found.append((name, NUMBERS[array], tuple(axes)))
     return tuple(found)
+
+
+NUMBERS: dict[Any, Any] = {
+    npt.NDArray[one]: one for one in (np.float64, np.int64, np.bool_, np.int8, np.uint64)
+}
+"""The type of number of each type of array. Looked up, since the alias `NDArray` is made otherwise
+in each version of NumPy."""

@@ -303,10 +303,19 @@ class Batch:
             towed_by=_towed_by(program),
             crosswalks=roads.crosswalks[self._rows],
             friction=self.state.weather[:, FRICTION].copy(),
+            progress=self._progress(),
             n_steps=self.state.ending[:, memory.N_STEPS].copy(),
             status=self.state.ending[:, memory.STATUS].astype(np.int8),
             messages=self._messages,
         )  # fmt: skip
+
+    def _progress(self) -> Float:
+        """Return `Rollout.progress`; no rows where the storyboard moves the ego."""
+        if self._program.driver == STORYBOARD:
+            return NO_PROGRESS
+        state, tables, on = self.state, self._roads.tables, self.state.on[:, 0]
+        end = (tables.counts[self._rows, on] - 1) * tables.steps[self._rows, on]
+        return np.stack([state.travelled[:, 0], end - state.station[:, 0]], axis=1)
 
 
 FAR_APART = 1000.0  # [m]
@@ -316,6 +325,8 @@ ALIGNED = 64  # bytes, a line of the processor's cache
 NO_DETECTIONS = np.zeros((0, 0, 0, DETECTION))
 
 NO_PRESENCE = np.zeros((0, 0, 0), dtype=np.bool_)
+
+NO_PROGRESS = np.zeros((0, 2))
 
 NO_LAMPS = np.zeros((0, 0, 0), dtype=np.int8)
 

@@ -5,7 +5,7 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from bridgegen.arrays import Float
+from bridgegen.arrays import Bool, Float
 from bridgegen.campaign.scenarios import load
 from bridgegen.ego.planners.planner import DOMAINS
 from bridgegen.openx.opendrive.geometry import reference_pose
@@ -41,14 +41,46 @@ def domain_of(scenario: str) -> frozenset[str]:
     """
     logical = load(scenario)
     options = PipelineOptions(ego="route-follower")
-    pipeline = Pipeline(logical, logical.space(), options, workers=Threads(1))
-    nominal = pipeline.space.row({})
-    _, one = next(pipeline.by_variant(nominal[np.newaxis]))
-    model = one.source.roads(one.space.values(nominal))
-    ahead = one.simulator.embedded.roads([model]).roads_ahead(0)
-    headings = one.rollout(nominal[np.newaxis]).h[0, :, 0]
+    return _needed_by(Pipeline(logical, logical.space(), options, workers=Threads(1)))[0]
+
+
+def outside(pipeline: Pipeline) -> str:
+    """Return a sentence if the ego's driver says that it is not made for the scenario; else "".
+
+    A driver for motorways may also follow a road on which there are lanes, but at first nobody,
+    the other way.
+    """
+    domain = pipeline.driver.domain
+    if not domain:
+        return ""
+    needs, is_met = _needed_by(pipeline)
+    odd = needs - domain
+    if "motorway" in domain and not is_met:
+        odd -= {"road"}
+    if not odd:
+        return ""
+    there = " and ".join(what for word, what in DOMAINS.items() if word in odd)
+    return (
+        f"outside the domain of {pipeline.driver.name} ({in_words(domain)}): "
+        f"{pipeline.scenario.name} has {there}"
+    )
+
+
+def _needed_by(pipeline: Pipeline) -> tuple[frozenset[str], bool]:
+    """Return what the nominal scenario needs, and whether another starts against the ego."""
+    nominal = pipeline.space.row({})[np.newaxis]
+    _, one = next(pipeline.by_variant(nominal))
+    model = one.source.roads(one.space.values(nominal[0]))
+    embedded = one.simulator.embedded
+    roads = embedded.roads([model])
+    names = [(i, name) for i, name in enumerate(one.space.names) if name not in one.simulator.fixed]
+    columns = {name: nominal[:, i] for i, name in names}
+    batch = embedded.batch(roads, np.zeros(1, np.int64), columns)
+    batch.start()
+    headings = batch.record.h[0, :, 0]
     kinds = [kind for text in pipeline.kinds.values() for kind in text.split(" or ")]
-    return needed(model, ahead, headings, kinds)
+    against = _against(headings)
+    return needed(model, roads.roads_ahead(0), headings, kinds), bool(against.any())
 
 
 def needed(
@@ -73,7 +105,7 @@ def needed(
         return frozenset(needs | {"junction"})
     if any(_has_opposite_lanes(one) for one in own):
         return frozenset(needs | {"road"})
-    if (np.abs(_wrapped(headings[1:] - headings[0])) > AGAINST).any():
+    if _against(headings).any():
         needs.add("oncoming")
     return frozenset(needs | {"motorway"})
 
@@ -93,6 +125,12 @@ def _crosses(model: OpenDrive, junction: str) -> bool:
                 return True
     angles = np.array(ends)
     return bool((np.abs(_wrapped(angles[:, np.newaxis] - angles)) > CROSSES).any())
+
+
+def _against(headings: Float) -> Bool:
+    """Return which of the others start against the ego's direction, ``(E - 1,)``."""
+    against: Bool = np.abs(_wrapped(headings[1:] - headings[0])) > AGAINST
+    return against
 
 
 def _has_opposite_lanes(road: Road) -> bool:

@@ -3,11 +3,14 @@
 import numpy as np
 import pytest
 
-from bridgegen.benchmark.domain import domain_of, in_words, needed
+from bridgegen.campaign.domain import domain_of, in_words, needed, outside
 from bridgegen.ego.planners.planner import DOMAINS
 from bridgegen.odd.reader import load
 from bridgegen.openx.opendrive.from_owl.network import opendrive_from_owl
 from bridgegen.openx.source import build_static
+from bridgegen.options import PipelineOptions
+from bridgegen.pipeline import Pipeline
+from bridgegen.workers import Threads
 
 
 @pytest.mark.parametrize(
@@ -44,3 +47,23 @@ def test_each_needs_one_place_and_its_actors():
 def test_words_are_in_the_order_of_their_definition():
     assert in_words({"vulnerable", "road"}) == "road, vulnerable"
     assert in_words(DOMAINS) == "motorway, road, junction, oncoming, vulnerable"
+
+
+@pytest.mark.parametrize(
+    ("scenario", "ego", "said"),
+    [
+        ("crossroads-s4", "un-r157", "junctions, where others cross or turn"),
+        ("wrong-way-driver", "fsm", "a vehicle that drives the wrong way"),
+        ("cyclist-swings-out", "un-r157", "pedestrians and cyclists"),
+        ("cut-in", "un-r157", ""),
+        ("lead-brakes", "un-r157", ""),  # there is a lane the other way, and nobody on it
+        ("crossroads-s4", "careful", ""),  # it states no domain
+    ],
+)
+def test_a_driver_outside_its_domain_is_named(scenario, ego, said):
+    logical = load(scenario)
+    pipeline = Pipeline(logical, logical.space(), PipelineOptions(ego=ego), workers=Threads(1))
+    found = outside(pipeline)
+    assert bool(found) == bool(said)
+    assert said in found
+    assert not found or found.startswith(f"outside the domain of {ego} (motorway): {scenario} has")

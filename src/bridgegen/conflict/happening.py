@@ -1,0 +1,372 @@
+"""Did it happen? Which events began, who came near the ego, and whether the ego got along.
+
+A search that finds no failure says nothing if the situation that its scenario is about never
+occurs. Docs: docs/conflicts.md, "Did it happen?".
+"""
+
+import json
+from collections import Counter
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from statistics import median
+from typing import Any, Literal, Self
+
+import numpy as np
+import numpy.typing as npt
+from pydantic import BaseModel
+
+from bridgegen.arrays import Bool, Float, Int
+from bridgegen.ego._kind_tables import IS_OBSTACLE, IS_ON_FOOT
+from bridgegen.simulation.rollout import Rollout
+
+NEAR, NEAR_TIME = 5.0, 2.0
+"""Another is near if the gap to it is at most 5 m and what the ego drives in 2 s: the distance that
+drivers are taught to keep."""
+
+STANDS = 0.5
+"""[m/s] Below this the ego stands; people walk at 1.4 m/s."""
+
+WITHOUT_REASON = 5.0
+"""[s] that an ego may stand for no reason; the first driver at a green light takes about 2 s
+(Highway Capacity Manual, start-up lost time)."""
+
+SAMPLED = 0.25
+"""[s] between two instants at which reasons are looked for."""
+
+GAP_TIME = 7.5
+"""[s] For what arrives within this time a driver may wait: the gap that cars accept for a left turn
+from a stop (AASHTO, A Policy on Geometric Design, case B1)."""
+
+IN_THE_WAY = 10.0
+"""[m] Gap to what stands ahead, up to which the ego may stand because of it."""
+
+OF_A_JAM = 15.0
+"""[m] between the centres of two vehicles that stand in a row: one is in traffic, not parked. A
+truck and a gap are about as long."""
+
+SIDE = 0.5
+"""[m] beside the ego's body, within which what is ahead is in its way."""
+
+LIGHT_AHEAD = 20.0
+"""[m] to a stop line or a crosswalk ahead, up to which the ego may stand because of it."""
+
+_GREEN = 4
+_OFF = 0
+
+SELDOM = 0.02
+"""Share of the evaluations below which an event, or an encounter, did not happen in a run."""
+
+MOSTLY = 0.5
+"""Share of stuck evaluations above which the scenario did not happen: the ego did not get there."""
+
+
+def happened(rollout: Rollout) -> npt.NDArray[np.object_]:
+    """Return what happened in each of N scenarios, as a JSON text; "" of a failed one.
+
+    Keys: ``began``, by event whether it began; ``near``, by participant whether the ego came near
+    it; ``end``, whether the ego is at the end of its route; ``stuck``, see `stuck`: false, or an
+    object with ``behind`` (a participant, or null), and ``driven`` and ``left`` [m], rounded. What
+    a simulator does not know is absent.
+    """
+    n = rollout.shape[0]
+    others = [e for e in range(1, rollout.shape[1]) if not rollout.is_ego_s(e)]
+    if rollout.kinds.size:  # cones and barriers take no part
+        others = [e for e in others if not IS_OBSTACLE[rollout.kinds[e]]]
+    began = rollout.began >= 0 if len(rollout.began) else np.zeros((n, 0), np.bool_)
+    near = np.zeros((n, len(others)), np.bool_)
+    reach = NEAR + NEAR_TIME * np.abs(rollout.v[:, 0])
+    for k, e in enumerate(others):
+        near[:, k] = (rollout.distance[:, e] <= reach).any(axis=1)
+    code = np.full((n, 4), -1, np.int64)  # at its end; behind whom, metres driven and left
+    if known := bool(len(rollout.progress)):
+        # A storyboard may end where the ego arrives, before the end of the lane there.
+        arrived = (rollout.n_steps < rollout.shape[2]) & ~(rollout.distance <= 0.0).any(axis=(1, 2))
+        code[:, 0] = (rollout.progress[:, 1] <= 0.0) | arrived
+        rows, behind = stuck(rollout)
+        code[rows, 1] = behind
+        code[rows, 2:] = np.rint(rollout.progress[rows])
+    keys, which = np.unique(np.hstack([began, near, code]), axis=0, return_inverse=True)
+    names, v = [rollout.names[e] for e in others], began.shape[1]
+    events: dict[str, list[int]] = {}  # several may have one name
+    for i, name in enumerate(rollout.event_names[:v]):
+        events.setdefault(name, []).append(i)
+
+    def text(key: Sequence[int]) -> str:
+        end, behind, driven, left = key[-4:]
+        found: dict[str, Any] = {
+            "began": {name: any(key[i] for i in at) for name, at in events.items()},
+            "near": dict(zip(names, map(bool, key[v:-4]), strict=True)),
+        }
+        if known:
+            who = rollout.names[behind] if behind > 0 else None
+            where = {"behind": who, "driven": driven, "left": left}
+            found |= {"end": bool(end), "stuck": where if behind >= 0 else False}
+        return json.dumps(found, ensure_ascii=False, separators=(",", ":"))
+
+    different = np.array([text(key) for key in keys.tolist()], dtype=object)
+    texts: npt.NDArray[np.object_] = different[which.reshape(-1)]
+    texts[rollout.status != 0] = ""
+    return texts
+
+
+def stuck(rollout: Rollout) -> tuple[Int, Int]:
+    """Return which egos stand at the end of their scenarios, for no reason, before their routes'.
+
+    An ego is stuck if it stands until the end of the scenario without a contact, and more than
+    `WITHOUT_REASON` seconds of that time have no reason. Reasons are: a stop line just ahead whose
+    light is not green; someone on foot on a crosswalk just ahead; any participant that comes
+    nearer and could be at the ego within `GAP_TIME`; and what stands in the way just ahead, unless
+    it is a vehicle or an object that never moves and has no other standing just ahead of it, as in
+    a jam: that one is parked, and is to be passed.
+
+    Args:
+        rollout: of N scenarios, with ``progress``.
+
+    Returns:
+        The rows ``(K,)``, ascending; and by row the entity that the ego stands behind, 0 if none.
+    """
+    every = max(round(SAMPLED / rollout.time_step), 1)
+    least = WITHOUT_REASON / (every * rollout.time_step)
+    last = (rollout.n_steps - 1) // every
+    v = rollout.v[:, 0, ::every]
+    at = np.arange(v.shape[1])
+    there = at <= last[:, np.newaxis]
+    idle = there & (at > np.where(there & (np.abs(v) >= STANDS), at, -1).max(axis=1, keepdims=True))
+    waits = (rollout.status == 0) & (rollout.progress[:, 1] > 0.0) & (idle.sum(axis=1) > least)
+    rows = np.flatnonzero(waits)
+    if not rows.size:
+        return rows, rows
+    some, idle, there, last = _sampled(rollout, rows, every), idle[rows], there[rows], last[rows]
+    distance = rollout.distance[:, :, ::every][rows]
+    idle[(rollout.distance[rows] <= 0.0).any(axis=(1, 2))] = False
+    ahead, aside = _from_ego(some, some.x, some.y)  # (K, E, T)
+    width = 0.5 * (some.box[:, 1] + some.box[0, 1])[:, np.newaxis] + SIDE
+    blocks = (ahead > 0.0) & (np.abs(aside) <= width) & (distance <= IN_THE_WAY)
+    speed = np.abs(some.v)
+    still = (speed < STANDS) | ~there[:, np.newaxis]
+    never: Bool = np.all(still, axis=2)
+    comes = ~still & (distance <= NEAR + GAP_TIME * speed)
+    with np.errstate(invalid="ignore"):  # who is absent is infinitely far
+        comes[:, :, 1:] &= ~(np.diff(distance, axis=2) >= 0.0)
+    parked = never & ~_in_jam(some, never, last)
+    if some.kinds.size:
+        parked &= ~np.array(IS_ON_FOOT)[some.kinds]
+    reason = (comes | (blocks & ~parked[:, :, np.newaxis])).any(axis=1)
+    idle &= ~(reason | _red(some) | _crossed(some, distance))
+    found = idle.sum(axis=1) > least
+    gap = np.where(blocks, distance, np.inf)[np.arange(len(rows)), :, last]
+    behind = np.where(np.isfinite(gap).any(axis=1), gap.argmin(axis=1), 0)
+    return rows[found], behind[found]
+
+
+def _sampled(rollout: Rollout, rows: Int, every: int) -> Rollout:
+    """Return what `stuck` looks at of some rows, at every k-th instant."""
+    names = ["x", "y", "h", "v", *(["lights"] if len(rollout.lights) else [])]
+    parts: dict[str, Any] = {name: getattr(rollout, name)[:, :, ::every][rows] for name in names}
+    for name in ("stop_lines", "crosswalks"):
+        if len(array := getattr(rollout, name)):
+            parts[name] = array[rows]
+    return replace(rollout, **parts)
+
+
+def _from_ego(one: Rollout, x: Float, y: Float) -> tuple[Float, Float]:
+    """Return points ``(K, ·, T)`` as the ego sees them: how far ahead and to the left [m]."""
+    cosine, sine = np.cos(one.h[:, :1]), np.sin(one.h[:, :1])
+    dx, dy = x - one.x[:, :1], y - one.y[:, :1]
+    return dx * cosine + dy * sine, dy * cosine - dx * sine
+
+
+def _in_jam(one: Rollout, never: Bool, last: Int) -> Bool:
+    """Return ``(K, E)``: who has another that never moves just ahead of it in its lane."""
+    rows = np.arange(len(last))
+    x, y, h = (values[rows, :, last] for values in (one.x, one.y, one.h))
+    dx, dy = x[:, np.newaxis] - x[:, :, np.newaxis], y[:, np.newaxis] - y[:, :, np.newaxis]
+    cosine, sine = np.cos(h)[:, :, np.newaxis], np.sin(h)[:, :, np.newaxis]
+    ahead, aside = dx * cosine + dy * sine, np.abs(dy * cosine - dx * sine)
+    follows = (ahead > 0.0) & (ahead <= OF_A_JAM) & (aside <= 0.5 * one.box[:, 1, np.newaxis])
+    found: Bool = np.any(follows & never[:, np.newaxis], axis=2)
+    return found
+
+
+def _red(one: Rollout) -> Bool:
+    """Return ``(K, T)``: a stop line of the ego's is just ahead, and its light is not green."""
+    found = np.zeros((one.shape[0], one.shape[2]), np.bool_)
+    for k in np.flatnonzero(one.stop_entities == 0).tolist():
+        x, y = (one.stop_lines[:, k, axis, np.newaxis, np.newaxis] for axis in range(2))
+        ahead, aside = (values[:, 0] for values in _from_ego(one, x, y))
+        state = one.lights[:, one.stop_lights[k]]
+        close = (ahead > 0.0) & (ahead <= LIGHT_AHEAD) & (np.abs(aside) <= LIGHT_AHEAD)
+        found |= close & (state != _GREEN) & (state != _OFF)
+    return found
+
+
+def _crossed(one: Rollout, distance: Float) -> Bool:
+    """Return ``(K, T)``: someone on foot is on a crosswalk of the ego's, just ahead of it."""
+    found = np.zeros((one.shape[0], one.shape[2]), np.bool_)
+    if not (one.crosswalks.size and one.kinds.size):
+        return found
+    for e in np.flatnonzero(np.array(IS_ON_FOOT)[one.kinds]).tolist():
+        for c in range(one.crosswalks.shape[1]):
+            x, y, h, along, across = one.crosswalks[:, c].T[:, :, np.newaxis]
+            dx, dy = one.x[:, e] - x, one.y[:, e] - y
+            on = np.abs(dx * np.cos(h) + dy * np.sin(h)) <= along
+            on &= np.abs(dy * np.cos(h) - dx * np.sin(h)) <= across
+            found |= on & (distance[:, e] <= LIGHT_AHEAD)
+    return found
+
+
+class _Stuck(BaseModel, extra="forbid", strict=True):
+    """Where an ego is stuck; see `happened`."""
+
+    behind: str | None
+    driven: int
+    left: int
+
+
+class _Text(BaseModel, extra="forbid", strict=True):
+    """A text of `happened`."""
+
+    began: dict[str, bool]
+    near: dict[str, bool]
+    end: bool | None = None
+    stuck: _Stuck | Literal[False] | None = None
+
+
+@dataclass(frozen=True)
+class Share:
+    """In how many evaluations something happened.
+
+    Attributes:
+        name: of the event, or the participant.
+        rows: evaluations in which it happened.
+        of: those of which it is known.
+    """
+
+    name: str
+    rows: int
+    of: int
+
+    @property
+    def value(self) -> float:
+        """Rows / of."""
+        return self.rows / self.of
+
+
+@dataclass(frozen=True)
+class Happening:
+    """What happened in the evaluations of a run that have a result.
+
+    Attributes:
+        rows: how many these are; 0 of a run that recorded nothing of it.
+        events: of the storyboard: where each began.
+        near: the participants: where the ego came near each.
+        end: where the ego reached the end of its route; None where this is unknown.
+        stuck: how many egos are stuck; None where this is unknown.
+        behind: whom most of these stand behind; "" if nobody.
+        driven: [m] that they drove, the median; NaN without any.
+        left: [m] that was left of their routes.
+        domain: a sentence if the ego's driver says that it is not made for this scenario, else "".
+    """
+
+    rows: int
+    events: tuple[Share, ...] = ()
+    near: tuple[Share, ...] = ()
+    end: Share | None = None
+    stuck: int | None = None
+    behind: str = ""
+    driven: float = float("nan")
+    left: float = float("nan")
+    domain: str = ""
+
+    @classmethod
+    def of(cls, texts: Iterable[str], domain: str = "") -> Self:
+        """Return what happened, from the texts of `happened`.
+
+        Raises:
+            ValueError: a text is something else.
+        """
+        counts = Counter(text for text in texts if text)
+        found = [(_Text.model_validate_json(text), rows) for text, rows in counts.items()]
+        ends = [(one.end, rows) for one, rows in found if one.end is not None]
+        stuck = [(one.stuck, rows) for one, rows in found if one.stuck]
+        behind = Counter[str]()
+        driven, left = list[int](), list[int]()
+        for one, rows in stuck:
+            behind[one.behind or ""] += rows
+            driven += [one.driven] * rows
+            left += [one.left] * rows
+        who, most = behind.most_common(1)[0] if stuck else ("", 0)
+        return cls(
+            rows=sum(counts.values()),
+            events=_shares([(one.began, rows) for one, rows in found]),
+            near=_shares([(one.near, rows) for one, rows in found]),
+            end=_share("end", ends) if ends else None,
+            stuck=len(driven) if ends else None,
+            behind=who if 2 * most > len(driven) else "",
+            driven=median(driven) if stuck else float("nan"),
+            left=median(left) if stuck else float("nan"),
+            domain=domain,
+        )
+
+    @property
+    def happened(self) -> bool:
+        """Whether what the scenario is about happened; True where nothing is known."""
+        return not self.reasons
+
+    @cached_property
+    def reasons(self) -> tuple[str, ...]:
+        """Why it did not happen, a clause each."""
+        found = [
+            f"the event {one.name} began in {one.rows} of {one.of} evaluations"
+            for one in self.events
+            if one.value < SELDOM
+        ]
+        if self.near and all(one.value < SELDOM for one in self.near):
+            most = max(self.near, key=lambda one: one.rows)
+            found.append(f"nobody came near the ego but in {most.rows} of {most.of} evaluations")
+        if self.stuck is not None and self.stuck > MOSTLY * self.rows:
+            found.append(self.stuck_in_words)
+        return tuple(found)
+
+    @property
+    def stuck_in_words(self) -> str:
+        """How many egos are stuck, where and how far they got; "" without any."""
+        if not self.stuck:
+            return ""
+        behind = f"stands behind {self.behind}, " if self.behind else ""
+        way = f"{self.driven:.0f} m of {self.driven + self.left:.0f} m driven"
+        return f"stuck in {self.stuck} of {self.rows}: {behind}{way}"
+
+    @property
+    def sentence(self) -> str:
+        """All of it in a sentence; "" where nothing is known."""
+        if not self.rows:
+            return self.domain
+        if not self.happened:
+            why = "did not happen: " + "; ".join(self.reasons)
+            return "; ".join(filter(None, [why, self.domain]))
+        parts = []
+        if self.events:
+            parts.append("began: " + ", ".join(map(_in_words, self.events)))
+        if self.near:
+            parts.append("came near the ego: " + ", ".join(map(_in_words, self.near)))
+        if self.end is not None and (self.end.rows or self.stuck):
+            parts.append(f"the ego reached its end in {self.end.value:.0%}")
+        return "; ".join(filter(None, [*parts, self.stuck_in_words, self.domain]))
+
+
+def _in_words(one: Share) -> str:
+    return f"{one.name} {one.value:.0%}"
+
+
+def _share(name: str, found: Iterable[tuple[bool, int]]) -> Share:
+    known = list(found)
+    return Share(name, sum(rows for yes, rows in known if yes), sum(rows for _, rows in known))
+
+
+def _shares(found: Sequence[tuple[dict[str, bool], int]]) -> tuple[Share, ...]:
+    names = dict.fromkeys(name for one, _ in found for name in one)
+    return tuple(
+        _share(name, ((one[name], rows) for one, rows in found if name in one)) for name in names
+    )

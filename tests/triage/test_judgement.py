@@ -1,0 +1,69 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from bridgegen.conflict.summary import ConflictSummary
+from bridgegen.triage.judgement import judgement
+from bridgegen.triage.neighbours import neighbourhoods
+
+BRAKING = "braking 0.75 s after the risk arose"
+
+
+def near(space, world, fixed, harm):
+    """The neighbours of a row of which all are harmful unless a fix helps."""
+    (found,) = neighbourhoods(world(space, harm, fixed), space.row({})[np.newaxis],
+                              np.array([3]), 0)  # fmt: skip
+    return found
+
+
+def by(fix):
+    return lambda v, at: np.where(at != fix, 0.7, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("fix", "preventable", "said"),
+    [
+        (1, True, "root cause planning: a careful driver (un-r157) prevents it in 32 of 32 nearby "
+         "scenarios"),
+        (1, False, f"root cause planning: {BRAKING} would not have avoided it; a driver that "
+         "yields earlier (un-r157) does, in 32 of 32 nearby scenarios"),
+        (0, None, "root cause perception: ideal perception prevents it in 32 of 32 nearby "
+         "scenarios"),
+        (0, False, f"root cause perception: {BRAKING} would not have avoided it; ideal perception "
+         "does, in 32 of 32 nearby scenarios"),
+        (9, False, "unavoidable: the ego is responsible, but no fix prevents it in nearby "
+         f"scenarios, nor would {BRAKING}"),
+        (9, True, f"root cause not found: {BRAKING} would have avoided it, but no fix does in "
+         "nearby scenarios"),
+    ],
+)  # fmt: skip
+def test_where_judges_differ_the_sentence_says_which_says_what(
+    space, world, fixed, fix, preventable, said
+):
+    tested = near(space, world, fixed, by(fix))
+    assert judgement(tested.cause, tested, preventable=preventable, responsible="ego") == said
+
+
+def test_what_one_replay_says_is_no_more(space):
+    text = judgement("planning", None, preventable=False, responsible="ego")
+    assert text.endswith("a driver that yields earlier does, in one replay")
+    assert judgement("", None, preventable=True, responsible="ego") == ""
+
+
+def test_one_that_is_not_known_names_no_cause(space, world, fixed):
+    text = judgement("not known", None, preventable=False, responsible="ego")
+    assert text == "root cause not known: too few nearby scenarios have a result with each fix"
+
+
+def test_a_sentence_on_braking_is_replaced_by_the_judgement():
+    texts = dict.fromkeys(ConflictSummary.__dataclass_fields__, "")
+    one = ConflictSummary(**texts)
+    end = ", and a driver who brakes 0.75 s later would not have avoided it"
+    said = replace(one, sentence=f"It struck; the risk arose 1.4 s before{end}.", avoidance=end)
+    new = said.reconciled("root cause planning: careful does")
+    assert new.sentence == (
+        "It struck; the risk arose 1.4 s before; root cause planning: careful does."
+    )
+    assert new.bare == "It struck; the risk arose 1.4 s before"
+    assert said.reconciled("") == said
