@@ -260,8 +260,8 @@ def test_neighbours_of_a_noisy_driver_have_its_random_numbers():
 def test_a_minimal_file_of_a_noisy_driver_gives_the_recorded_metrics_to_the_last_bit(tmp_path):
     """Its storyboard states the key of the random numbers that it was found with."""
     run = bg.run_search(
-        "paper/crossroads-s3", ego="reference", objective={"harm": None}, budget=200, keep=1, seed=2,
-        out=tmp_path / "run",
+        "paper/crossroads-s3", ego="reference", objective={"harm": None}, budget=200, keep=1,
+        seed=2, out=tmp_path / "run",
     )  # fmt: skip
     assert run.minimal_scenarios
     for path in run.minimal_scenarios:
