@@ -55,7 +55,8 @@ def test_what_does_not_count_is_named_with_its_reasons():
     """A failure, two excused contacts, a near miss, two implausible rows, one without a result."""
     rows = [
         ("contact", "rear distance", ""), ("contact", "cut in", ""),
-        ("contact", "unsafe start", ""), ("near miss", "cut in", ""), ("contact", "cut in", "jump"), ("", "", "jump"), ("", "", ""),
+        ("contact", "unsafe start", ""), ("near miss", "cut in", ""),
+        ("contact", "cut in", "jump"), ("", "", "jump"), ("", "", ""),
         ("collision course", "", ""),
     ]  # fmt: skip
     columns = [np.array(column, dtype=object) for column in zip(*rows, strict=True)]
@@ -107,8 +108,8 @@ def test_where_an_algorithm_chose_the_rows_no_share_is_stated():
     assert (space.share, space.low, space.high) == (None, 0.0, 1.0)
     said = text(space=space, harmful=3, modes=2)
     assert said == (
-        "reference fails in 2 ways: 3 of 1000 evaluations; the share of the space that is "
-        "harmful is not estimated, for the search chose its rows."
+        "reference fails in 2 ways: 3 of 1000 evaluations; how much of the space is "
+        "harmful is unknown: the search chose its rows on purpose."
     )
 
 
