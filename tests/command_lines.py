@@ -1,6 +1,7 @@
 """Command lines as the application takes them apart."""
 
-from collections.abc import Iterator
+import re
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 from typer.main import get_command
@@ -28,3 +29,17 @@ def commands(command: Any, name: str = "") -> Iterator[tuple[str, Any]]:
             yield from commands(one, words)
         else:
             yield words, one
+
+
+def missing_lines(shown: str, printed: Sequence[str]) -> list[str]:
+    """Return the lines of a text block that an output does not have, in the order shown."""
+    rest, missing = iter(printed), []
+    for line in shown.splitlines():
+        if line.strip() in ("", "…"):
+            continue
+        words = re.sub(r"[\d.,]+(?= m?s\b)", "0", " ".join(line.split()))
+        wanted = re.compile(".*".join(map(re.escape, words.split("…"))))
+        if not any(wanted.fullmatch(re.sub(r"[\d.,]+(?= m?s\b)", "0", " ".join(one.split())))
+                   for one in rest):  # fmt: skip
+            missing.append(line)
+    return missing

@@ -16,7 +16,7 @@ import bridgegen as bg
 def finished(tmp_path_factory) -> "bg.Run":
     folder = tmp_path_factory.mktemp("runs") / "s4"
     return bg.run_search(
-        "crossroads-s4", algorithm="pso", budget=120, keep=2, triage="short", out=folder
+        "crossroads-s4", algorithm="pso", budget=300, keep=2, triage="short", out=folder
     )
 
 
@@ -41,7 +41,7 @@ def refused(result: tuple[int, str, str], *parts: str) -> None:
 
 def test_search_prints_the_run_s_figures(cli, tmp_path):
     code, out, _ = cli(
-        "search", "crossroads-s4", "--budget", 80, "--keep", 1, "--out", tmp_path / "r"
+        "search", "crossroads-s4", "--budget", 80, "--keep", 1, "-v", "--out", tmp_path / "r"
     )
     assert code == 0
     for label in (
@@ -267,7 +267,7 @@ def test_coverage_counts_what_the_store_holds(cli, finished):
     facts = json.loads(out)
     frame = finished.frame()
     assert code == 0
-    assert (facts["evaluations"], facts["critical"]) == (120, int(frame.critical.sum()))
+    assert (facts["evaluations"], facts["critical"]) == (300, int(frame.critical.sum()))
     assert [way["strength"] for way in facts["ways"]] == [1, 2]
     assert facts["ways"][1]["total"] == 45 * 16
     (speed,) = [one for one in facts["parameters"] if one["name"] == "ego_speed"]

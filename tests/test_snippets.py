@@ -21,7 +21,6 @@ import shutil
 import subprocess
 import sys
 import tomllib
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
@@ -29,7 +28,7 @@ from xml.etree import ElementTree
 
 import pytest
 import yaml
-from tests.command_lines import must_parse
+from tests.command_lines import missing_lines, must_parse
 
 from bridgegen.campaign import driver_contract
 from bridgegen.campaign.exported import NOT_EXPORTED
@@ -231,20 +230,6 @@ class Page:
     def text(self, block: Block) -> None:
         if self.as_printed and self.ran:
             assert missing_lines(block.text, self.output) == [], "\n".join(self.output)
-
-
-def missing_lines(shown: str, printed: Sequence[str]) -> list[str]:
-    """Return the lines of a text block that an output does not have, in the order shown."""
-    rest, missing = iter(printed), []
-    for line in shown.splitlines():
-        if line.strip() in ("", "…"):
-            continue
-        words = re.sub(r"[\d.,]+(?= m?s\b)", "0", " ".join(line.split()))
-        wanted = re.compile(".*".join(map(re.escape, words.split("…"))))
-        if not any(wanted.fullmatch(re.sub(r"[\d.,]+(?= m?s\b)", "0", " ".join(one.split())))
-                   for one in rest):  # fmt: skip
-            missing.append(line)
-    return missing
 
 
 @lru_cache

@@ -252,7 +252,7 @@ def test_a_run_on_a_town_names_the_town(catalogue, tmp_path):
     run = bg.run_search(
         "crossroads-s4",
         algorithm="random",
-        budget=60,
+        budget=400,
         keep=1,
         road_map=town,
         triage="short",

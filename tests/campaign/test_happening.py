@@ -41,7 +41,8 @@ def test_stuck_is_a_figure_and_not_a_harm(stuck_run):
     assert figures_of(stuck_run)["stuck"] == stuck_run.happening.stuck
     assert stuck_run.summary.critical == 0
     outcomes = PassFailCriteria.read(["stuck > 0"], None).judge(stuck_run)
-    assert [one.verdict for one in outcomes] == ["passed", "failed"]
+    assert [one.verdict for one in outcomes] == ["unknown", "failed"]
+    assert stuck_run.verdict == "not judged"
 
 
 def test_the_report_has_it(stuck_run):

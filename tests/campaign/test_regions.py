@@ -21,6 +21,7 @@ def folder(tmp_path_factory):
     place = tmp_path_factory.mktemp("runs") / "s3"
     bg.run_search(
         "crossroads-s3", algorithm="random", budget=400, seed=1, ego="route-follower", keep=0,
+        objective="paper",
         causes=False, deliver=False, out=place,
     )  # fmt: skip
     return place
@@ -187,8 +188,8 @@ def test_where_one_cause_counts_it_counts_here_too(tmp_path):
     """Harm that planning would have avoided: all other harm is as good as none."""
     place = tmp_path / "run"
     run = bg.run_search(
-        "crossroads-s2", algorithm="random", budget=150, seed=2, ego="route-follower", keep=0,
-        cause="planning", deliver=False, out=place,
+        "crossroads-s2", algorithm="random", budget=150, seed=2, objective="paper",
+        ego="route-follower", keep=0, cause="planning", deliver=False, out=place,
     )  # fmt: skip
     counted = int(run.frame().critical.sum())
     found = regions_of(place, samples=60, at_least=0.3)

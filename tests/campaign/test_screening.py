@@ -168,7 +168,8 @@ def test_the_page_and_the_command_line_show_the_agreement(tmp_path, capsys, monk
     words = [
         "bridgegen", "search", "crossroads-s4", "--ego", "route-follower", "--objective", "harm",
         "--simulator", "biased", "--screen", "embedded", "--budget", "24", "--keep", "1",
-        "--triage", "none", "--no-causes", "--algorithm", "es", "--out", str(tmp_path / "run"),
+        "--triage", "none", "--no-causes", "--algorithm", "es", "-v",
+        "--out", str(tmp_path / "run"),
     ]  # fmt: skip
     monkeypatch.setattr("sys.argv", words)
     with suppress(SystemExit):

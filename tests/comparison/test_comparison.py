@@ -26,7 +26,8 @@ from bridgegen.search.random import Random
 from bridgegen.search.registry import ALGORITHMS
 from bridgegen.store import Store
 
-GRID = {"algorithms": ["random", "pso"], "seeds": 2, "budget": 120, "baseline": "random"}
+GRID = {"algorithms": ["random", "pso"], "seeds": 2, "budget": 120, "baseline": "random",
+        "objective": {"paper": None}}  # fmt: skip
 SETTLED = (
     "runs.csv", "summary.csv",
     *(f"figures/crossroads-s4-{name}.png" for name in FIGURE_NAMES),
@@ -201,7 +202,7 @@ def test_stopped_it_says_how_to_go_on_and_then_it_may_grow(done, tmp_path):
             "crossroads-s4", **small, workers=1, out=out, callbacks=ComparisonCallbacks(batch=stop)
         )
     assert "stopped after 1 of 2 runs; resume with 'bridgegen compare" in str(caught.value)
-    assert f"--seeds 1 --budget 120 --out {out}'" in str(caught.value)
+    assert f"--seeds 1 --budget 120 --objective paper --out {out}'" in str(caught.value)
     assert finished(out) == 1
     assert len(rows_of(out / "runs" / "crossroads-s4-pso-0")) == 80
     assert not (out / "runs.csv").exists()

@@ -8,7 +8,9 @@ from bridgegen.comparison.workers import run_all
 from bridgegen.options import SearchOptions
 
 
-class Bomb:
+class Bomb(str):
+    __slots__ = ()
+
     """Whoever unpickles it is gone."""
 
     def __reduce__(self):

@@ -724,7 +724,7 @@ def test_a_cyclist_who_swings_out_is_passed_with_room(track, meeting, course, fa
 
 
 def test_a_slower_vehicle_that_brakes_at_last_had_long_been_too_near(track, meeting, course):
-    """The ego drives up to one that is 6 m/s slower for 6 s; that it then brakes excuses nothing."""
+    """The ego drives up to one that is 6 m/s slower for 6 s; its braking then excuses nothing."""
     brakes = course((0, 10), (5.5, 10), (7, 5))
     rollout = meeting(track(v=16.0, t=7.0), track(x=42.0, v=brakes, t=7.0))
     assert verdict(rollout) == (EGO, Rule.REAR_DISTANCE)
@@ -735,7 +735,7 @@ def test_a_slower_vehicle_that_brakes_at_last_had_long_been_too_near(track, meet
 
 @pytest.mark.parametrize(("braking", "kind"), [(4.0, ConflictType.EGO_STANDING), (0.5, None)])
 def test_an_ego_that_all_but_stands_and_brakes_is_run_into(track, meeting, braking, kind):
-    """At 0.45 m/s it stops within 0.1 s; with little braking it drives on, and turns up in front."""
+    """At 0.45 m/s it stops within 0.1 s; with little braking it drives on, in front."""
     v = np.maximum(0.45 + braking * (2.0 - DT * np.arange(121)), 0.0)
     ego = track(v=v)
     at = 41  # the other's front, 2 m ahead of its centre, is then beside the ego's right edge

@@ -71,7 +71,7 @@ def test_scenario_is_the_papers(name):
     )  # fmt: skip
     assert (scenario.name, scenario.duration, scenario.time_step) == (f"paper-{name}", 20.0, 0.05)
     assert scenario.axes == (Axis.PARTICIPANTS, Axis.WEATHER)
-    assert scenario.objective == objectives.HARM  # the paper's: --objective paper
+    assert scenario.objective == objectives.PAPERS
     papers = objectives.PAPERS
     terms = {term.metric: term.weight for term in papers.terms}
     assert terms == {"d_min": 0.8297, "v_d": 0.1703}

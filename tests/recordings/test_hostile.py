@@ -1,5 +1,6 @@
 """Files of strangers: whatever they hold, there is one clear error, and nothing of them is run."""
 
+import contextlib
 import os
 import pickle
 import sqlite3
@@ -206,9 +207,9 @@ def test_columns_of_scenarionet_have_the_dimensions_that_they_must(tmp_path, nam
     whole = pickle.loads(path.read_bytes())
     next(iter(whole["tracks"].values()))["state"][name] = wrong
     path.write_bytes(pickle.dumps(whole))
-    try:
-        found = list(read(path))
-    except FileFormatError as error:
-        assert name in str(error) or "must" in str(error)
+    if name == "length" or (name == "heading" and np.size(wrong) == 0):
+        with contextlib.suppress(FileFormatError):  # a length may be left out
+            assert list(read(path))
     else:
-        assert found
+        with pytest.raises(FileFormatError, match="must"):
+            list(read(path))

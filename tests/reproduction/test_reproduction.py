@@ -308,7 +308,8 @@ def test_the_last_spread_is_the_run_s(done):
     protocol = result.found.protocol
     arguments = {**protocol.arguments(PRINTED), "out": folder / "as-printed"}
     told = result.found.commands["as-printed"]
-    assert "--algorithms random,pso,nsga2-dt --seeds 2 --budget 120 --ego route-follower" in told
+    assert "--algorithms random,pso,nsga2-dt --seeds 2 --budget 120 --objective paper" in told
+    assert "--ego route-follower" in told
     comparison = bg.compare(**arguments, workers=1, deliver=False)
     measured = comparison.measured["paper-crossroads-s4"]
     for cell, values in measured.values.items():

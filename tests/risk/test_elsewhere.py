@@ -20,7 +20,7 @@ from bridgegen.risk.outcomes import Column
 from bridgegen.risk.risk import RiskCallbacks, estimate_risk
 from bridgegen.simulation import choice
 
-SCENARIO, DRIVER = "crossroads-s1", "route-follower"
+SCENARIO, DRIVER = "paper/crossroads-s1", "route-follower"
 GIVEN = {
     "ego": DRIVER, "exposure": "uniform", "method": "mc", "event": "conflict", "precision": 0.0,
     "budget": 1200,

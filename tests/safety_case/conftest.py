@@ -11,7 +11,10 @@ import pytest
 import bridgegen as bg
 
 SEARCHES = {
-    "fails": ("crossroads-s4", {"ego": "route-follower", "objective": {"harm": None}, "seed": 3}),
+    "fails": (
+        "paper/crossroads-s4",
+        {"ego": "route-follower", "objective": {"harm": None}, "seed": 3},
+    ),
     "unlucky": (  # the search finds nothing, the fresh draws do
         "crossroads-s4",
         {"ego": "route-follower", "objective": {"harm": None}, "budget": 10},

@@ -2,13 +2,75 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from bridgegen.triage.bound import bound, estimate, least_margins
+from bridgegen.conflict.findings import Findings
+from bridgegen.conflict.happening import Happening, Share
+from bridgegen.triage.bound import NotCounted, bound, estimate, least_margins
+
+ALL_COUNT = NotCounted({}, {}, 0, 0)
+
+
+def bounded(**given):
+    nothing = {"evaluations": 1000, "besides": ALL_COUNT, "happening": Happening(0), "harmful": 0,
+               "modes": 0, "space": estimate("random", 0, 1000), "least": (),
+               "ego": "reference"}  # fmt: skip
+    return bound(**nothing | given)
 
 
 def text(**given):
-    nothing = {"evaluations": 1000, "failed": 0, "implausible": 0, "harmful": 0, "modes": 0,
-               "space": estimate("random", 0, 1000), "least": (), "ego": "reference"}  # fmt: skip
-    return bound(**nothing | given).sentence
+    return bounded(**given).sentence
+
+
+UNSAFE = ("contact", "unsafe start")
+
+
+@pytest.mark.parametrize(
+    ("besides", "verdict", "why"),
+    [
+        (ALL_COUNT, "no failure found", ""),
+        (NotCounted({("contact", "cut in"): 900}, {}, 0, 0), "no failure found", ""),
+        (NotCounted({}, {"jump": 500}, 0, 0), "no failure found", ""),
+        (NotCounted({}, {"jump": 501}, 30, 0), "not judged", "only 499 of 1000"),
+        (NotCounted({}, {"jump": 300}, 0, 201), "not judged", "only 499 of 1000"),
+        (NotCounted({UNSAFE: 501}, {}, 0, 0), "not judged", "only 499 of 1000"),
+        (NotCounted({}, {}, 0, 1000), "not judged", "no evaluation of reference has a result"),
+    ],
+)
+def test_half_of_the_evaluations_must_be_judged(besides, verdict, why):
+    found = bounded(besides=besides)
+    assert (found.verdict, found.judged) == (verdict, verdict != "not judged")
+    assert why in found.sentence
+    assert found.sentence.startswith("Not judged: ") == (verdict == "not judged")
+    if besides.failed < 1000:  # a failure is one, however little else could be judged
+        assert bounded(besides=besides, harmful=1, modes=1).verdict == "fails"
+
+
+def test_a_scenario_that_did_not_happen_is_not_judged():
+    never = Happening(1000, events=(Share("cuts_in", 3, 1000),))
+    assert bounded(happening=never).verdict == "not judged"
+    assert "the event cuts_in began in 3 of 1000 evaluations" in text(happening=never)
+    assert bounded(happening=never, harmful=1, modes=1).verdict == "fails"
+
+
+def test_what_does_not_count_is_named_with_its_reasons():
+    """A failure, two excused contacts, a near miss, two implausible rows, one without a result."""
+    rows = [
+        ("contact", "rear distance", ""), ("contact", "cut in", ""),
+        ("contact", "unsafe start", ""), ("near miss", "cut in", ""),
+        ("contact", "cut in", "jump"), ("", "", "jump"), ("", "", ""),
+        ("collision course", "", ""),
+    ]  # fmt: skip
+    columns = [np.array(column, dtype=object) for column in zip(*rows, strict=True)]
+    blank = np.full(len(rows), "", dtype=object)
+    findings = Findings(columns[0], blank, blank, columns[1], blank, columns[2])
+    harm = np.array([0.7, 0.0, 0.0, 0.0, 0.8, 0.0, 0.0, 0.2])
+    ok = np.arange(len(rows)) != 6
+    found = NotCounted.of(findings, harm, ok)
+    assert found.unsafe == 1
+    assert found.sentence == (
+        "not counted: 2 collisions (cut in 1, unsafe start 1), 1 near miss (cut in 1), "
+        "2 with implausible traffic (jump 2; 1 of them collisions), 1 without a result"
+    )
+    assert ALL_COUNT.sentence == ""
 
 
 def test_nothing_in_a_thousand_draws_bounds_the_share_by_0_37_per_cent():
@@ -46,8 +108,8 @@ def test_where_an_algorithm_chose_the_rows_no_share_is_stated():
     assert (space.share, space.low, space.high) == (None, 0.0, 1.0)
     said = text(space=space, harmful=3, modes=2)
     assert said == (
-        "reference fails in 2 ways: 3 of 1000 evaluations; the share of the space that is "
-        "harmful is not estimated, for the search chose its rows."
+        "reference fails in 2 ways: 3 of 1000 evaluations; how much of the space is "
+        "harmful is unknown: the search chose its rows on purpose."
     )
 
 
@@ -56,8 +118,8 @@ def test_sobol_points_are_named_so():
 
 
 def test_nothing_is_known_where_every_evaluation_failed():
-    assert text(evaluations=7, failed=7) == (
-        "No evaluation has a result, so nothing is known of reference."
+    assert text(evaluations=7, besides=NotCounted({}, {}, 0, 7)) == (
+        "Not judged: no evaluation of reference has a result."
     )
 
 
@@ -74,7 +136,7 @@ def test_least_margins_are_those_of_conflicts_that_count():
         "harm": (0.2, 12), "course_ttc": (1.2, 13), "course_braking": (2.5, 12),
     }  # fmt: skip
     said = text(least=tuple(found.values()))
-    assert "least margin harm 0.20 of 0.3 (evaluation 13), 1.20 s to collision" in said
+    assert "closest: harm 0.20, failures start at 0.3 (evaluation 13), 1.20 s to collision" in said
     nobody = least_margins(metrics[:1], NAMES, harm[:1], ids[:1], fit[:1])
     assert [one.value for one in nobody] == [0.05, None, None]
     failed = least_margins(metrics, NAMES, harm, ids, np.zeros(4, bool))

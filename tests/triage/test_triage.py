@@ -122,7 +122,7 @@ def test_a_driver_without_failures_exports_nothing_and_has_a_bound(space, world,
     assert found.record.neighbourhoods == ()
     assert found.record.bound.space.high == pytest.approx(1.0 - 0.025 ** (1 / 200))
     assert found.record.bound.least[0].evaluation == int(np.argmax(rows.metrics[:, 0]))
-    assert headline(found.record).startswith("No failure found in 200 evaluations: least margin")
+    assert headline(found.record).startswith("No failure found in 200 evaluations: closest")
 
 
 def test_implausible_and_failed_rows_are_no_failures(made):

@@ -12,7 +12,7 @@ import typer
 from bridgegen.cli.app import app
 from bridgegen.cli.groups import SEARCH
 
-SCENARIO, DRIVER, ALGORITHM, BUDGET = "cyclist-right-turn", "un-r157", "nsga2", 600
+SCENARIO, DRIVER, ALGORITHM, BUDGET = "cyclist-right-turn", "route-follower", "nsga2", 600
 """UN R157's driver brakes for what is on its lane, and for nothing that crosses it."""
 
 

@@ -58,6 +58,7 @@ def read_run(project: Path, folder: Path, sceneries: Sceneries) -> Result:
         judged,
         seen[0],
         worse_than="" if other is None else driver_of(other, project, line.version).label,
+        unjudged=bound is not None and not bound.judged,
     )
 
 

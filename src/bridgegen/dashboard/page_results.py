@@ -102,8 +102,10 @@ def _run(one: Result, base: str) -> list[str]:
         text(one.driver.label)
         + (f"<small>worse than {text(one.worse_than)}</small>" if one.worse_than else ""),
         f"{one.evaluations:,}",
-        f"{one.failed:,}" if space or one.worse_than else "–",
-        span(space.share or 0.0, space.low, space.high) if space and known else "–",
+        "not judged" if one.unjudged else f"{one.failed:,}" if space or one.worse_than else "–",
+        span(space.share or 0.0, space.low, space.high)
+        if space and known and not one.unjudged
+        else "–",
         when(one.time),
     ]
 

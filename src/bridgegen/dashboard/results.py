@@ -139,6 +139,7 @@ class Result:
         seen: which values were evaluated; None where the scenario cannot be read any more.
         entry: of the suite, by name.
         worse_than: the driver that a difference is of, as people call it; else "".
+        unjudged: whether it says nothing of the driver, see `bridgegen.triage.record.Bound.judged`.
     """
 
     kind: Kind
@@ -157,6 +158,7 @@ class Result:
     seen: Seen | None = field(default=None, repr=False, compare=False)
     entry: str = ""
     worse_than: str = ""
+    unjudged: bool = False
 
 
 def in_order(results: Iterable[Result]) -> list[Result]:

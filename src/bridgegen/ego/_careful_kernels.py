@@ -105,8 +105,8 @@ def drive_careful(
             wanted = min(wanted, follow(gap, v, along, slowing))
     if not risk:
         if wanted < -COMFORT_DECELERATION:  # beyond comfort, the brake takes time to build up
-            held = min(attention[0, ASKED], -COMFORT_DECELERATION)
-            wanted = max(wanted, held - CAREFUL_JERK * dt)
+            held = attention[0, ASKED] - CAREFUL_JERK * dt
+            wanted = max(wanted, min(held, -COMFORT_DECELERATION))
         attention[0, RISK], attention[0, BRAKES], attention[0, ASKED] = 0.0, 0.0, wanted
         return wanted
     if attention[0, RISK] == 0.0:

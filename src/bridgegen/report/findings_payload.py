@@ -85,7 +85,7 @@ def triage_payload(found: Triage) -> dict[str, Any]:
         "matters": parameters_in_words(found),
         "judged": {one.evaluation: one.judgement for one in found.neighbourhoods if one.judgement},
         "bound": {
-            "sentence": found.bound.sentence,
+            "sentence": found.bound.in_full,
             "evaluations": found.bound.evaluations,
             "failed": found.bound.failed,
             "implausible": found.bound.implausible,

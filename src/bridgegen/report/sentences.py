@@ -68,7 +68,7 @@ def _sentences(data: ReportData) -> list[str]:
 
 
 def _bound(data: ReportData) -> list[str]:
-    return [data.triage.bound.sentence] if data.triage else []
+    return [data.triage.bound.in_full] if data.triage else []
 
 
 def _not_exported(data: ReportData) -> list[str]:

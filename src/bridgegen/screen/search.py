@@ -150,7 +150,7 @@ def verdict_lines(run: "Run", seconds: float) -> list[str]:
     from bridgegen.criteria import headline as judged
 
     s, settings, found = run.summary, run.settings, run.triage
-    lines = [conclusion(run) + f" ({s.evaluations:,} evaluations, {seconds:.0f} s)"]
+    lines = [f"{conclusion(run)} ({seconds:.0f} s)"]
     if text := judged(settings.ego, run.criteria):
         lines.append(f"Criteria: {text}")
     if found is not None:
@@ -190,12 +190,14 @@ def conclusion(run: "Run") -> str:
     if run.verdict == "fails" and found.modes:
         modes = len(found.modes) + found.unrecorded_modes
         ways = f"{modes} failure mode" + "s" * (modes != 1)
-        return f"{word}  {name}: {ways}, {bound.harmful:,} of {bound.evaluations:,} evaluations"
+        return f"{word}  {name}: {ways} in {bound.harmful:,} of {bound.evaluations:,} evaluations"
     if run.verdict == "fails":
         violated = [one.criterion.id for one in run.criteria if one.violated]
         return f"{word}  {name}: violates {', '.join(violated)}"
     _, _, why = bound.sentence.rstrip(".").partition(": ")
-    return f"{word}  {name}: {why if run.verdict == NOT_JUDGED else why.partition(';')[0]}"
+    if run.verdict == NOT_JUDGED:
+        return f"{word}  {name}: {why}"
+    return f"{word}  {name}: in {bound.evaluations:,} evaluations; {why.partition(';')[0]}"
 
 
 def _mode_lines(found: "Triage") -> list[str]:

@@ -375,6 +375,11 @@ class Bound(_Model):
     sentence: Text
 
     @property
+    def in_full(self) -> str:
+        """The sentence, and what does not count."""
+        return f"{self.sentence} N{self.not_counted[1:]}." if self.not_counted else self.sentence
+
+    @property
     def judged(self) -> bool:
         """Whether the run supports a statement on its driver."""
         known = self.evaluations - self.failed - self.implausible

@@ -83,6 +83,7 @@ def _facts(number: int, line: RunLine) -> Mapping[str, Any]:
         "judged": headline(line.ego, line.criteria),
         "violated": any(one.violated for one in line.criteria),
         "failures": bound.harmful if bound else None,
+        "unjudged": bound is not None and not bound.judged,
         "share": bound.space.share if bound else None,
         "low": bound.space.low if bound else None,
         "high": bound.space.high if bound else None,
@@ -115,9 +116,15 @@ def _pair(*runs: tuple[int, RunLine]) -> Iterator[str]:
     yield "</div>"
 
 
+def _failures(line: RunLine) -> str:
+    if line.triage is None:
+        return "–"
+    return f"{line.triage.bound.harmful:,}" if line.triage.bound.judged else "not judged"
+
+
 def _share(line: RunLine) -> str:
     space = line.triage.bound.space if line.triage else None
-    if space is None or space.share is None:
+    if line.triage is None or space is None or space.share is None or not line.triage.bound.judged:
         return "–"
     return f"{share(space.share)} (95{NARROW}%: {share(space.low)} to {share(space.high)})"
 
@@ -128,7 +135,7 @@ _FIGURES: dict[str, Callable[[RunLine], str]] = {
     "algorithm": lambda one: f"{one.algorithm}, seed {one.seed}",
     "evaluations": lambda one: f"{one.evaluations:,}" + ("" if one.finished else ", not finished"),
     "pass criteria": lambda one: headline(one.ego, one.criteria) or "–",
-    "failures": lambda one: f"{one.triage.bound.harmful:,}" if one.triage else "–",
+    "failures": lambda one: _failures(one),
     "failure modes": lambda one: f"{len(one.modes):,}" if one.triage else "–",
     "harmful share of the space": _share,
     "worst severity (MAIS3+)": lambda one: (

@@ -10,7 +10,7 @@ from bridgegen.errors import InputError
 def folder(tmp_path_factory):
     place = tmp_path_factory.mktemp("runs") / "s2"
     bg.run_search(
-        "crossroads-s2", algorithm="random", budget=20, seed=2, ego="route-follower", keep=2,
+        "crossroads-s2", algorithm="random", budget=200, seed=2, ego="route-follower", keep=2,
         causes=False, deliver=False, out=place,
     )  # fmt: skip
     return place

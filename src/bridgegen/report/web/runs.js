@@ -21,7 +21,10 @@ function nameCell(run) {
 }
 
 const shareCell = ({ share, low, high }) => (share === null ? ["–"] : [perCent(share), element("small", {}, `${perCent(low)} to ${perCent(high)}`)]);
-const noneFound = ({ finished, problem, judged }) => (finished && !problem ? (judged ? "no harm found" : "no failure found") : "");
+const noneFound = ({ finished, problem, judged, unjudged }) => {
+  if (!finished || problem) return "";
+  return unjudged ? "not judged" : judged ? "no harm found" : "no failure found";
+};
 const judgedCell = ({ judged, violated }) => (judged ? [element("small", { class: violated ? "problem" : "" }, judged)] : []);
 const modesCell = (run) => [run.worst || noneFound(run), ...judgedCell(run), run.modes > 1 ? element("small", {}, `the worst of ${plain(run.modes)} ways`) : ""];
 
