@@ -218,6 +218,7 @@ def test_clearance_to_whom_the_ego_passes(track, meeting, clearance, town, failu
         ({"ego": 1.5}, False),  # at walking pace
         ({"kind": CAR}, False),
         ({"x": 1.0}, False),  # beside it from the start on
+        ({"x": 24.0}, False),  # level after (24 - 2.9) / 7 = 3.01 s; slowing takes 3.08 s
     ],
 )
 def test_whom_the_law_means(track, meeting, change, counts):
@@ -230,6 +231,16 @@ def test_whom_the_law_means(track, meeting, change, counts):
         **corridor(lanes=(HALF, change.get("right", HALF))),
     )  # fmt: skip
     assert (analyse(rollout).type[0, 1] == ConflictType.CLOSE_PASS) == counts
+
+
+def test_who_draws_level_and_stays_behind_does_not_pass(track, meeting, course):
+    """It gains 22.5 m on who is 25 m ahead: the fronts are 1.4 m apart then."""
+    rollout = meeting(
+        track(v=course((0.0, 8.0), (4.0, 8.0), (5.0, 3.0), (6.0, 3.0))),
+        track(x=25.0, y=-1.7, v=3.0), kinds=[CAR, BICYCLE],
+        boxes=[(4.0, 2.0, 0.0), (1.8, 0.6, 0.0)], **corridor(),
+    )  # fmt: skip
+    assert (analyse(rollout).kind[0] != VIOLATION).all()
 
 
 @pytest.mark.parametrize("who", ["the other", "the ego"])

@@ -7,10 +7,12 @@ import math
 
 from bridgegen.compiled import kernel
 from bridgegen.conflict._limits import (
+    COMFORT,
     CREEPS,
     EDGE_MARGIN,
     LINE_MARGIN,
     PASSES,
+    REACTION,
     SAME_WAY,
     WALKING_PACE,
 )
@@ -114,35 +116,37 @@ def leaving(corridor, x, y, c, s, v, half_width, begin, until, whole, real):
 
 
 @kernel
-def passing(corridor, half, kinds, e, x, y, c, s, v, distance, until, whole, real):
+def passing(corridor, half, kinds, e, x, y, c, s, v, distance, dt, until, whole, real):
     """Find the ego's pass of body e, which rides, drives or walks on the lanes of its way.
 
-    ``real`` becomes the clearance [m] that is the ego's: the least one, or that with which it drew
-    level where the other moved over then; and the speed by which the ego was faster [m/s].
-    ``x``, ``y`` are centres.
+    It passes once its front is ahead of the other's. Not counted is whom it drew level with before
+    it could have slowed down. ``real`` becomes the clearance [m] that is the ego's: the least one,
+    or that with which it drew level where the other moved over then; and the speed by which the ego
+    was faster [m/s]. ``x``, ``y`` are centres.
     """
-    n, level, entry, own = samples(corridor), -1, 0.0, 0.0
+    n, level, entry, own, early = samples(corridor), -1, 0.0, 0.0, False
     reach = half[0, 0] + half[e, 0]
-    for k in range(until):
+    for k in range(until if n else 0):
         dx, dy = x[e, k] - x[0, k], y[e, k] - y[0, k]
-        ahead = abs(dx * c[0, k] + dy * s[0, k])
-        cosine = c[0, k] * c[e, k] + s[0, k] * s[e, k]
-        faster = v[0, k] - v[e, k] * cosine
-        if ahead > reach or cosine < SAME_WAY or not distance[k] < math.inf:
+        ahead = dx * c[0, k] + dy * s[0, k]
+        if abs(ahead) > reach or not distance[k] < math.inf:
             level = -1
-            continue
-        if faster < PASSES or v[0, k] < WALKING_PACE or n == 0:
-            continue
-        if IS_PEDESTRIAN[kinds[e]] and v[e, k] < CREEPS:
             continue
         i = nearest(corridor, n, x[e, k], y[e, k], -1)
         its = beside(corridor, i, x[e, k], y[e, k])
+        cosine = c[0, k] * c[e, k] + s[0, k] * s[e, k]
+        faster = v[0, k] - v[e, k] * cosine
+        if level < 0:
+            level, entry, own = k, distance[k], its
+            early = k * dt < REACTION + max(faster, 0.0) / COMFORT
+        if early or cosine < SAME_WAY or ahead > half[0, 0] - half[e, 0]:
+            continue
+        if faster < PASSES or v[0, k] < WALKING_PACE:
+            continue
+        if IS_PEDESTRIAN[kinds[e]] and v[e, k] < CREEPS:
+            continue
         if its > corridor[i, _TO_LANES] or -its > corridor[i, _TO_LANES + 1]:
             continue
-        if level < 0:
-            if k == 0:  # beside it from the start on
-                return
-            level, entry, own = k, distance[k], its
         clearance = distance[k]
         if abs(its - own) > 0.5 * abs(entry - clearance):
             clearance = max(clearance, entry)  # it was the other that came near
@@ -153,8 +157,8 @@ def passing(corridor, half, kinds, e, x, y, c, s, v, distance, until, whole, rea
 
 @kernel
 def find_rows(
-    rows, corridors, corridor_of, half, kinds, rear_x, rear_y, x, y, c, s, v, distance, begins,
-    until, leavings, over, passings, clearances,
+    rows, corridors, corridor_of, half, kinds, rear_x, rear_y, x, y, c, s, v, distance, dt,
+    begins, until, leavings, over, passings, clearances,
 ):  # fmt: skip
     """Fill the departures ``(N, LEAVINGS)`` and passes ``(N, E, PASSINGS)`` of some rows.
 
@@ -169,6 +173,6 @@ def find_rows(
         for e in range(1, x.shape[1]):
             if NEEDS_ROOM[kinds[e]]:
                 passing(
-                    corridor, half, kinds, e, x[i], y[i], c[i], s[i], v[i], distance[i, e],
+                    corridor, half, kinds, e, x[i], y[i], c[i], s[i], v[i], distance[i, e], dt,
                     until[i], passings[i, e], clearances[i, e],
                 )  # fmt: skip

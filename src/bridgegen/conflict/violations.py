@@ -56,8 +56,9 @@ def with_violations(rollout: Rollout, found: Conflicts) -> Conflicts:
     while rows.size:
         kernels.find_rows(
             rows, rollout.corridors, rollout.corridor_of, moving.half, kinds, rollout.x, rollout.y,
-            moving.x, moving.y, moving.cosine, moving.sine, moving.v, moving.distance, begins,
-            np.minimum(touch, moving.n_steps), leavings, over, passings, beside,
+            moving.x, moving.y, moving.cosine, moving.sine, moving.v, moving.distance,
+            rollout.time_step, begins, np.minimum(touch, moving.n_steps), leavings, over, passings,
+            beside,
         )  # fmt: skip
         # What comes after a departure that is excused is looked at, too.
         left = rows[(leavings[rows, kernels.AT] >= 0) & found.ok[rows]].tolist()
