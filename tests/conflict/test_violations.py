@@ -41,7 +41,12 @@ def corridor(edges=(FAR, HALF), lanes=(HALF, HALF), town=1.0):
 def aside(track, course, metres, v=10.0, **more):
     """An ego that moves to its left by so much from 2 s to 3 s, and stays there."""
     ego = track(v=v, **more)
-    ego["y"] = ego["y"] + course((0.0, 0.0), (2.0, 0.0), (3.0, metres), (6.0, metres))
+    return led(ego, course((0.0, 0.0), (2.0, 0.0), (3.0, metres), (6.0, metres)))
+
+
+def led(ego, y):
+    """An ego at y of the route, which its offset says."""
+    ego["y"] = ego["offset"] = y
     return ego
 
 
@@ -57,7 +62,7 @@ def turned(rollout, angle, mirrored=False):
     y = side * rollout.y
     return replace(
         rollout, x=c * rollout.x - s * y, y=s * rollout.x + c * y, h=side * rollout.h + angle,
-        corridors=table,
+        offset=side * rollout.offset, corridors=table,
     )  # fmt: skip
 
 
@@ -146,17 +151,15 @@ def test_lanes_of_one_way_and_the_room_of_a_junction(track, meeting, course):
 )
 def test_passing_what_is_in_the_lane_is_no_departure(track, meeting, course, x, y, v, excused):
     ego = track(v=10.0)
-    ego["y"] = course((0.0, 0.0), (2.0, 0.0), (3.0, 2.5), (6.0, 2.5))
+    led(ego, course((0.0, 0.0), (2.0, 0.0), (3.0, 2.5), (6.0, 2.5)))
     found = analyse(meeting(ego, track(x=x, y=y, v=v), **corridor()))
     assert (found.kind[0, 0] == 0) == excused
 
 
 def test_after_an_excused_departure_the_next_one_counts(track, meeting, course):
     ego = track(v=10.0, t=9.0)
-    ego["y"] = course(
-        (0.0, 0.0), (1.0, 0.0), (2.0, 2.5), (4.0, 2.5), (5.0, 0.0), (7.0, 0.0), (8.0, 2.5),
-        (9.0, 2.5),
-    )  # fmt: skip
+    led(ego, course((0.0, 0.0), (1.0, 0.0), (2.0, 2.5), (4.0, 2.5), (5.0, 0.0), (7.0, 0.0),
+                    (8.0, 2.5), (9.0, 2.5)))  # fmt: skip
     found = analyse(meeting(ego, track(x=30.0, y=-1.0, t=9.0), **corridor()))
     assert found.type[0, 0] == ConflictType.LANE_DEPARTURE
     assert found.decided[0, 0] * found.time_step > 7.0
