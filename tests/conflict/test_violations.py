@@ -25,6 +25,9 @@ from bridgegen.conflict.sentences import sentence
 from bridgegen.conflict.severity import FRONT, severity
 from bridgegen.conflict.summary import summarise
 from bridgegen.ego.kinds import BICYCLE, CAR, OTHER, PEDESTRIAN
+from bridgegen.odd.reader import load
+from bridgegen.options import PipelineOptions
+from bridgegen.pipeline import Pipeline
 
 HALF, FAR = 1.75, 5.25  # m, from the route to the border of the ego's lane; to the left edge
 
@@ -305,3 +308,43 @@ def test_parts_of_a_batch_keep_their_own_corridors(track, meeting, course):
 def test_an_obstacle_is_no_party(track, meeting):
     rollout = meeting(track(v=8.0), track(x=25.0, y=-1.7), kinds=[CAR, OTHER], **corridor())
     assert (analyse(rollout).kind != VIOLATION).all()
+
+
+# Widths of lanes and shoulders are those of the scenarios' files; right-hand traffic.
+@pytest.mark.parametrize(
+    ("name", "expected"),
+    [
+        # two lanes of 3.75 m between shoulders of 2.5 m; the ego is on the right lane; 130 km/h
+        ("cut-in", {(5.625, 1.875, 8.125, 4.375, 0.0)}),
+        # one lane of 3.5 m each way, shoulders of 2.3 m; 50 km/h
+        ("cyclist-swings-out", {(1.75, 1.75, 7.55, 4.05, 1.0)}),
+        # the inner of two lanes of 3.5 m on each leg, and one through the junction
+        ("left-across-path", {(1.75, 5.25, 8.75, 5.25, 1.0), (1.75, 1.75, np.inf, np.inf, 1.0)}),
+    ],
+)
+def test_the_room_beside_routes_of_the_catalogue(name, expected):
+    scenario = load(name)
+    pipeline = Pipeline(scenario, scenario.space(), PipelineOptions(ego="route-follower"))
+    fixed = {"lane_width": 3.75 if name == "cut-in" else 3.5}
+    middle = pipeline.space.decode(np.full((1, pipeline.space.n_var), 0.5))[0]
+    x = [fixed.get(one, value) for one, value in zip(pipeline.space.names, middle, strict=True)]
+    roads, _ = pipeline._roads_of(np.array([x]))
+    table = roads.corridors([0])[0]
+    assert {tuple(row) for row in table[:, 3:].round(6).tolist()} == expected
+
+
+def test_slides_are_found_and_lane_changes_are_none():
+    """Where the bend behind the junction is slid through, harm is 0.3 or more in each row."""
+    rng = np.random.default_rng(5)
+    for name, ego in (("pedestrian-at-night", "route-follower"), ("cut-out", "reference")):
+        scenario = load(name)
+        pipeline = Pipeline(scenario, scenario.space(), PipelineOptions(ego=ego))
+        rollout = pipeline.rollout(pipeline.space.decode(rng.random((60, pipeline.space.n_var))))
+        there = np.arange(rollout.shape[2]) < rollout.n_steps[:, np.newaxis]
+        off = np.abs(np.where(there, rollout.offset[:, 0], 0.0)).max(axis=1) > 1.75
+        found = analyse(rollout)
+        assert off.sum() > 10
+        if ego == "reference":
+            assert (found.kind[:, 0] == 0).all()
+        else:
+            assert (decisive(found)[1][off] >= NEAR_MISS).all()

@@ -30,7 +30,7 @@ from bridgegen.metrics.motion import Motion, motion
 from bridgegen.simulation.rollout import Rollout
 
 _CHANGED = (
-    "kind", "type", "responsible", "rule", "instant", "decided", "preventable", "v_ego", "v_other",
+    "kind", "type", "responsible", "rule", "instant", "decided", "v_ego", "v_other",
     "aside", "breach", "potential",
 )  # fmt: skip
 
@@ -112,7 +112,7 @@ def with_violations(rollout: Rollout, found: Conflicts) -> Conflicts:
 
 def _put(arrays: dict[str, Any], at: tuple[Int, Int], **values: Any) -> None:
     """Set the ego's violations at some rows and columns."""
-    values |= {"kind": VIOLATION, "responsible": Responsible.EGO, "preventable": True}
+    values |= {"kind": VIOLATION, "responsible": Responsible.EGO}
     for name, value in values.items():
         arrays[name][at] = value
 
