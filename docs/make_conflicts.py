@@ -30,6 +30,11 @@ def man(x: float, y: float, heading: float, arrow: float = 26.0) -> Body:
     return Body(x, y, heading, arrow, 10.0, 10.0)
 
 
+def line(y: float) -> Body:
+    """A border of the lane, or the edge of the road."""
+    return Body(105, y, 0, 0, 190, 3)
+
+
 PICTURES: dict[ConflictType, tuple[Body, Body]] = {
     ConflictType.REAR_END_STRIKING: (Body(46, 56, 0, 40), Body(140, 56, 0, 14)),
     ConflictType.REAR_END_STRUCK: (Body(140, 56, 0, 14), Body(46, 56, 0, 40)),
@@ -41,6 +46,9 @@ PICTURES: dict[ConflictType, tuple[Body, Body]] = {
     ConflictType.VRU_BY_FRONT: (Body(64, 44, 0, 32), man(130, 76, 90, 30)),
     ConflictType.VRU_INTO_SIDE: (Body(100, 40, 0, 40), man(96, 92, 90, 32)),
     ConflictType.OBJECT: (Body(60, 56, 0, 40), Body(150, 56, 0, 0, 14, 34)),
+    ConflictType.LANE_DEPARTURE: (Body(88, 56, 18, 40), line(58)),
+    ConflictType.ROAD_DEPARTURE: (Body(88, 62, -18, 40), line(66)),
+    ConflictType.CLOSE_PASS: (Body(84, 50, 0, 44), Body(96, 70, 0, 26, 24, 8)),
 }
 
 

@@ -112,7 +112,7 @@ def test_who_moves_sideways(track, meeting):
     assert "'bv' is responsible: it moved sideways into the way of the ego (RSS" in text
 
 
-@pytest.mark.parametrize(("row", "other"), [(0, 0), (0, 2), (1, 1), (-1, 1)])
+@pytest.mark.parametrize(("row", "other"), [(0, -1), (0, 2), (1, 1), (-1, 1)])
 def test_no_such_pair(track, meeting, row, other):
-    with pytest.raises(IndexError, match=r"row must be 0 to 0 and other 1 to 1"):
+    with pytest.raises(IndexError, match=r"row must be 0 to 0 and other 0 to 1"):
         sentence(analyse(meeting(track(), track(x=9.0))), row, other)

@@ -13,6 +13,7 @@ from bridgegen.confirmation.differences import (
     Parting,
 )
 from bridgegen.confirmation.schema import Differences, Margin, Outcome
+from bridgegen.conflict.findings import with_whom
 from bridgegen.conflict.harm import NEAR_MISS
 from bridgegen.criteria import margin_in_words
 from bridgegen.objective import Rule
@@ -84,7 +85,7 @@ def _less_harm(here: Outcome, there: Outcome) -> str:
     """Return why a scenario is not critical there by harm."""
     if there.d_min is None:
         return "The ego is alone there."
-    conflict = f"{there.conflict} with {there.partner}"
+    conflict = with_whom(there.conflict, there.partner)
     if there.conflict_type:
         conflict += f" ({there.conflict_type})"
     if not there.conflict:

@@ -5,13 +5,13 @@ append, never renumber. The module is private because compiled code is rebuilt w
 changes (``bridgegen.compiled``).
 """
 
-NO_CONFLICT, COURSE, NEAR_MISS, CONTACT = range(4)
-"""Kinds of conflicts."""
+NO_CONFLICT, COURSE, NEAR_MISS, CONTACT, VIOLATION = range(5)
+"""Kinds of conflicts; a violation needs no one near, see ``violations``."""
 
 (
     NONE, REAR_END_STRIKING, REAR_END_STRUCK, CROSSING, TURNING, SIDE_SWIPE, HEAD_ON, EGO_STANDING,
-    VRU_BY_FRONT, VRU_INTO_SIDE, OBJECT,
-) = range(11)  # fmt: skip
+    VRU_BY_FRONT, VRU_INTO_SIDE, OBJECT, LANE_DEPARTURE, ROAD_DEPARTURE, CLOSE_PASS,
+) = range(14)  # fmt: skip
 """Types of conflicts."""
 
 (
@@ -28,8 +28,8 @@ NEITHER, EGO, OTHER, SHARED = range(4)
     TURNING_GIVES_WAY, JUNCTION_OCCUPIED, LEFT_ITS_LANE, CROSSWALK, STEPPED_OUT,
     COULD_HAVE_STOPPED, INTO_THE_SIDE, STANDING_AHEAD, ASSUMED_RIGHT_BEFORE_LEFT, UNSAFE_START,
     BRAKED_HARD_AHEAD, EMERGENCY_VEHICLE, FROM_OFF_ROAD, WRONG_SIDE,
-    PASSED_TOO_CLOSE,
-) = range(27)  # fmt: skip
+    PASSED_TOO_CLOSE, DID_NOT_KEEP_LANE, LEFT_THE_ROAD,
+) = range(29)  # fmt: skip
 """Rules of responsibility. The four from MAP_PRIORITY on are in the order of the claims of
 `bridgegen.ego._claims`; EMERGENCY_VEHICLE and FROM_OFF_ROAD are those of a siren and of who comes
 from off the road."""

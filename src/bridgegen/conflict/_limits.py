@@ -7,6 +7,8 @@ Those that other stages share come from ``bridgegen.physics``.
 
 import math
 
+import numpy as np
+
 from bridgegen.physics import CAREFUL_BRAKING, CAREFUL_JERK, CAREFUL_REACTION
 
 # --- Collision course and near miss -------------------------------------------------------------
@@ -144,3 +146,28 @@ CROSSWALK_MARGIN = 0.5
 """[m] Extension of crosswalks along the route. Ours."""
 KERB = 1.0
 """[m] Extension of crosswalks across the route: pedestrians waiting at the kerb. Ours."""
+
+# --- Lane and road, passing ----------------------------------------------------------------------
+
+LINE_MARGIN = 0.5
+"""[m] A wheel of the rear axle that is farther beyond the border of its lanes has left them."""
+EDGE_MARGIN = 0.2
+"""[m] Likewise beyond the edge of the road."""
+WALKING_PACE = 7.0 / 3.6
+"""[m/s] An ego that is slower may pass closer. Source: StVO § 5 (4) has no such speed; the case law
+on walking pace (Schrittgeschwindigkeit) says 4 to 7 km/h."""
+PASSES = 0.5
+"""[m/s] An ego that is faster by less does not pass. Ours."""
+PASSED_AHEAD = 40.0
+"""[m] From so far on before what is in its lane, a driver moves aside to pass it. Ours: a lane
+change at 50 km/h takes 3 s."""
+PASSED_BESIDE = np.array([2.0, 1.5])
+"""[m] Least clearance to who is passed, outside towns and in them. Source: StVO § 5 (4)."""
+PASSED_BESIDE.setflags(write=False)
+CLOSE, CLOSE_TIME = 0.5, 0.03
+"""[m], [s] A clearance of less than 0.5 m, and 0.03 m more per m/s by which the ego is faster, is
+a failure; up to ``PASSED_BESIDE``, it is noted only. 1 m at 60 km/h is what Queensland asks for up
+to there (Transport Operations (Road Use Management) Regulation, 144A); the 0.5 m are ours."""
+CLEAR_ZONE = 4.5
+"""[m] Beyond the edge of the road, at which a solid obstacle is taken to stand: what is nearer is
+protected (RPS 2009). A car brakes up to there. That there is one is ours."""

@@ -10,7 +10,7 @@ import numpy.typing as npt
 from bridgegen.arrays import Bool, Float, Int
 from bridgegen.conflict import _codes as codes
 from bridgegen.conflict import severity as injury
-from bridgegen.conflict._codes import CONTACT, COURSE, NEAR_MISS, NO_CONFLICT
+from bridgegen.conflict._codes import CONTACT, COURSE, NEAR_MISS, NO_CONFLICT, VIOLATION
 from bridgegen.conflict.types import ConflictType, Responsible, Rule, Zone
 from bridgegen.ego._kind_tables import IS_OBSTACLE
 from bridgegen.metrics.metric import recorded, shared
@@ -36,7 +36,9 @@ _BY_OTHERS = (
 
 @dataclass(frozen=True)
 class Conflicts:
-    """The conflicts of N scenarios, pair by pair; the ego is entity 0, whose own column is empty.
+    """The conflicts of N scenarios, pair by pair; the ego is entity 0.
+
+    Its own column has departures from its lane or from the road, which need no other participant.
 
     Only events up to the ego's first contact count. Two bodies are on a collision course if two
     predictions agree that they touch within 4 s: constant velocity, and constant speed along the
@@ -49,7 +51,7 @@ class Conflicts:
     Attributes:
         names: E participants.
         time_step: [s].
-        kind: ``(N, E)`` NO_CONFLICT, COURSE, NEAR_MISS or CONTACT.
+        kind: ``(N, E)`` NO_CONFLICT, COURSE, NEAR_MISS, CONTACT or VIOLATION.
         type: ``(N, E)`` of `ConflictType`.
         responsible: ``(N, E)`` of `Responsible`.
         rule: ``(N, E)`` of `Rule`.
@@ -82,6 +84,10 @@ class Conflicts:
         delta_v_ego: ``(N, E)`` [m/s], change of the ego's velocity; 0 unless they touch.
         delta_v_other: ``(N, E)`` [m/s], of the other's.
         ok: ``(N,)`` bool, False where the scenario failed; its rows are empty.
+        aside: ``(N, E)`` [m], of a departure how far the rear axle was beyond the border of its
+            lanes, or the edge of the road, at most, left positive; of a close pass the clearance;
+            else 0.
+        breach: ``(N, E)`` in [0, 1], of a violation: 1 where it is a failure; else 0.
         body: ``(N, E)`` which of the ego's bodies it is, 0 or a trailer of its own.
     """
 
@@ -114,6 +120,8 @@ class Conflicts:
     delta_v_other: Float
     ok: Bool
     body: Int
+    aside: Float
+    breach: Float
 
     @cached_property
     def at_fault(self) -> Bool:
@@ -133,7 +141,18 @@ def analyse(rollout: Rollout) -> Conflicts:
 
     Source: Najm et al., DOT HS 810 767 (types); docs/conflicts.md describes the rules.
     """
+    return shared(rollout, _with_violations)
+
+
+def encounters(rollout: Rollout) -> Conflicts:
+    """Return the same without violations: what the ego and another are involved in."""
     return shared(rollout, _analyse)
+
+
+def _with_violations(rollout: Rollout) -> Conflicts:
+    from bridgegen.conflict.violations import with_violations  # which imports this module
+
+    return with_violations(rollout, encounters(rollout))
 
 
 def _analyse(rollout: Rollout) -> Conflicts:
@@ -242,7 +261,7 @@ def _of_one_body(rollout: Rollout) -> Conflicts:
         severity=np.where(touched, potential, 0.0), potential=potential,
         delta_v_ego=np.where(touched, dv_ego, 0.0), delta_v_other=np.where(touched, dv_other, 0.0),
         ok=ok,
-        body=np.zeros((n, e), np.int64),
+        body=np.zeros((n, e), np.int64), aside=np.zeros((n, e)), breach=np.zeros((n, e)),
     )  # fmt: skip
 
 
@@ -271,6 +290,16 @@ def _never_moves(rollout: Rollout) -> Bool:
 
 
 __all__ = [
-    "CONTACT", "COURSE", "NEAR_MISS", "NO_CONFLICT", "ConflictType", "Conflicts", "Responsible",
-    "Rule", "Zone", "analyse",
+    "CONTACT",
+    "COURSE",
+    "NEAR_MISS",
+    "NO_CONFLICT",
+    "VIOLATION",
+    "ConflictType",
+    "Conflicts",
+    "Responsible",
+    "Rule",
+    "Zone",
+    "analyse",
+    "encounters",
 ]  # fmt: skip

@@ -9,12 +9,22 @@ import numpy as np
 import numpy.typing as npt
 
 from bridgegen.arrays import Bool, Int
-from bridgegen.conflict.analysis import CONTACT, COURSE, NEAR_MISS, Conflicts
+from bridgegen.conflict.analysis import CONTACT, COURSE, NEAR_MISS, VIOLATION, Conflicts
 from bridgegen.conflict.harm import Count, decisive
 from bridgegen.conflict.types import ConflictType, Responsible, Rule
 
-KINDS = {COURSE: "collision course", NEAR_MISS: "near miss", CONTACT: "contact"}
+KINDS = {
+    COURSE: "collision course",
+    NEAR_MISS: "near miss",
+    CONTACT: "contact",
+    VIOLATION: "violation",
+}
 """Labels of `Conflicts.kind`."""
+
+
+def with_whom(conflict: str, partner: str) -> str:
+    """Return a conflict and its partner in words; a departure has none."""
+    return f"{conflict} with {partner}" if partner else conflict
 
 
 @dataclass(frozen=True)
@@ -22,11 +32,11 @@ class Findings:
     """The decisive conflict of each of N rows; empty texts where there is none.
 
     Attributes:
-        conflict: ``(N,)`` of "contact", "near miss", "collision course".
+        conflict: ``(N,)`` of "contact", "near miss", "violation", "collision course".
         conflict_type: ``(N,)`` of `ConflictType`'s labels.
         responsible: ``(N,)`` of `Responsible`'s labels.
         rule: ``(N,)`` of `Rule`'s labels.
-        partner: ``(N,)`` name of the other participant.
+        partner: ``(N,)`` name of the other participant; "" of a departure.
         implausible: ``(N,)`` why the row's traffic could not happen.
         happened: ``(N,)`` of the texts of `bridgegen.conflict.happening.happened`; empty ones where
             it was not recorded.
@@ -78,7 +88,7 @@ class Findings:
         serious = conflicts.kind[rows, other] >= NEAR_MISS
         names = np.array(["", *conflicts.names[1:]], dtype=object)
         return cls(
-            words(conflicts.kind, [KINDS.get(kind, "") for kind in range(CONTACT + 1)]),
+            words(conflicts.kind, [KINDS.get(kind, "") for kind in range(VIOLATION + 1)]),
             words(conflicts.type, [one.label for one in ConflictType]),
             np.where(serious, words(conflicts.responsible, [one.label for one in Responsible]), ""),
             words(conflicts.rule, [one.label for one in Rule]),

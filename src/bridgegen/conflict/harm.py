@@ -5,7 +5,8 @@
                                           could not have prevented
 0 to ``COURSE`` (0.1)                     no collision course: how near they come
 ``COURSE`` to ``NEAR_MISS`` (0.3)         a collision course that leaves time to act
-``NEAR_MISS`` to 1                        a collision or a near miss of the ego's, by severity
+``NEAR_MISS`` to 1                        a collision, a near miss or a violation of the ego's, by
+                                          severity
 ========================================  ==================================================
 
 The harm of a collision course grows as its time to collision falls and as the deceleration that it
@@ -40,6 +41,11 @@ NEARLY = 0.01
 was. Ours: a pedestrian that is nearly hit at 13 m/s ranks with two cars that collide at 7 m/s."""
 
 
+VIOLATES = 0.02
+"""Severity of a violation, as a share [1] of what it may lead to: above near misses of the same
+speed, below the collision. Ours."""
+
+
 def urgency(conflicts: Conflicts) -> Float:
     """Return how urgent each collision course is, ``(N, E)`` in [0, 1]; 0 without one."""
     ttc = np.minimum(conflicts.ttc, HORIZON)
@@ -48,11 +54,18 @@ def urgency(conflicts: Conflicts) -> Float:
 
 
 def harm_of_pairs(conflicts: Conflicts, count: Count = "ego") -> Float:
-    """Return the harm of each pair, ``(N, E)`` in [0, 1]; 0 in the ego's own column."""
-    share = np.where(conflicts.kind == analysis.CONTACT, 1.0, NEARLY * urgency(conflicts))
+    """Return the harm of each pair, ``(N, E)`` in [0, 1]; column 0: of its departures."""
+    violates = conflicts.kind == analysis.VIOLATION
+    share = np.select(
+        [conflicts.kind == analysis.CONTACT, violates], [1.0, VIOLATES],
+        NEARLY * urgency(conflicts),
+    )  # fmt: skip
     severe = np.log1p(share * conflicts.potential / LIGHT) / np.log1p(1.0 / LIGHT)
     worth = NEAR_MISS + (1.0 - NEAR_MISS) * severe
-    return _of_kinds(conflicts, count, contact=worth, near=worth)
+    value = _of_kinds(conflicts, count, contact=worth, near=worth)
+    noted = COURSE + (NEAR_MISS - COURSE) * conflicts.breach
+    of_violations = np.where(conflicts.breach < 1.0, noted, worth)
+    return np.where(violates, np.maximum(value, of_violations), value)
 
 
 def closeness_of_pairs(conflicts: Conflicts, count: Count) -> Float:
@@ -72,7 +85,7 @@ def _of_kinds(conflicts: Conflicts, count: Count, contact: Float, near: Float) -
     """Return values by the kind of each pair, ``(N, E)``; 0 where a conflict does not count."""
     touches, nearly = (conflicts.kind == one for one in (analysis.CONTACT, analysis.NEAR_MISS))
     value = np.select(
-        [touches, nearly, conflicts.kind == analysis.COURSE],
+        [touches, nearly, (conflicts.kind != analysis.NO_CONFLICT) & np.isfinite(conflicts.ttc)],
         [contact, near, COURSE + (NEAR_MISS - COURSE) * urgency(conflicts)],
         COURSE * conflicts.nearness,
     )
@@ -88,13 +101,13 @@ def decisive(conflicts: Conflicts, count: Count = "ego") -> tuple[Int, Float]:
 
     A collision that counts is decisive; else the conflict of the largest harm; if all are below
     that of a collision course, a contact takes precedence, then a near miss. The participant is 0
-    if there is no other. The harm is the row's: the largest of all pairs, even where a near miss
-    before a light collision outranks it.
+    if the ego left its lane or the road, or there is no other. The harm is the row's: the largest
+    of all pairs, even where a near miss before a light collision outranks it.
     """
     harm = harm_of_pairs(conflicts, count)
     happened = harm >= COURSE
     order = harm + np.where(happened, 4.0, conflicts.kind.astype(np.float64))
     order += happened & (conflicts.kind == analysis.CONTACT)
-    order[:, 0] = -1.0
+    order[conflicts.kind[:, 0] != analysis.VIOLATION, 0] = -1.0
     other = np.argmax(order, axis=1)
     return other.astype(np.int64), harm.max(axis=1)

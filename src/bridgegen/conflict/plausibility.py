@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from bridgegen.arrays import Float, Int
-from bridgegen.conflict.analysis import COURSE, NEAR_MISS, analyse
+from bridgegen.conflict.analysis import COURSE, NEAR_MISS, encounters
 from bridgegen.ego.kinds import OTHER
 from bridgegen.metrics.metric import distance, recorded, steps
 from bridgegen.participants import OBJECT_CLASSES
@@ -167,7 +167,7 @@ class Plausibility:
 
 def _last_conflict(rollout: Rollout) -> Int:
     """Return the instant up to which each row's motion belongs to its conflicts, ``(N,)``."""
-    found = analyse(rollout)
+    found = encounters(rollout)
     worst = np.where(found.kind >= NEAR_MISS, NEAR_MISS, found.kind)
     counts = (worst == worst.max(axis=1, keepdims=True)) & (worst >= COURSE)
     after = round(AFTER / rollout.time_step)

@@ -97,7 +97,7 @@ def _measured(rollout: Rollout) -> dict[str, Float]:
     rows = np.arange(rollout.shape[0])
     other, harm = decisive(conflicts)
     _, harm_any = decisive(conflicts, "any")
-    on_course = conflicts.kind[rows, other] >= COURSE
+    on_course = (conflicts.kind[rows, other] >= COURSE) & np.isfinite(conflicts.ttc[rows, other])
     found = {
         HARM: harm,
         HARM_ANY: harm_any,

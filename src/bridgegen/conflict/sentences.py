@@ -4,7 +4,14 @@ The sentence depends on the numbers of `Conflicts` alone.
 """
 
 from bridgegen.conflict._limits import HORIZON
-from bridgegen.conflict.analysis import CONTACT, COURSE, NEAR_MISS, NO_CONFLICT, Conflicts
+from bridgegen.conflict.analysis import (
+    CONTACT,
+    COURSE,
+    NEAR_MISS,
+    NO_CONFLICT,
+    VIOLATION,
+    Conflicts,
+)
 from bridgegen.conflict.types import RULES, ConflictType, Responsible, Rule, Zone
 from bridgegen.physics import CAREFUL_BRAKING_G, CAREFUL_REACTION
 
@@ -41,15 +48,15 @@ def sentence(conflicts: Conflicts, row: int, other: int) -> str:
     Args:
         conflicts: of N scenarios and E participants.
         row: of the scenario.
-        other: the other participant, 1 to E − 1.
+        other: the other participant, 1 to E − 1; 0 for a departure of the ego's.
 
     Raises:
         IndexError: there is no such row or participant.
     """
     n, e = conflicts.kind.shape
-    if not 0 <= row < n or not 1 <= other < e:
+    if not 0 <= row < n or not 0 <= other < e:
         raise IndexError(
-            f"row must be 0 to {n - 1} and other 1 to {e - 1}, got row={row}, other={other}"
+            f"row must be 0 to {n - 1} and other 0 to {e - 1}, got row={row}, other={other}"
         )
     name = f"'{conflicts.names[other]}'"
     kind = conflicts.kind[row, other]
@@ -62,13 +69,14 @@ def sentence(conflicts: Conflicts, row: int, other: int) -> str:
             f"{conflicts.needed[row, other]:.1f} m/s² of braking."
         )
     parts = [_event(conflicts, row, other, name), _responsibility(conflicts, row, other, name)]
-    parts.append(_time_left(conflicts, row, other))
+    if kind != VIOLATION:
+        parts.append(_time_left(conflicts, row, other))
     return "; ".join(part for part in parts if part) + "."
 
 
 def avoidance(conflicts: Conflicts, row: int, other: int) -> str:
     """Return the end of `sentence` that says whether braking would have helped; "" without one."""
-    if conflicts.kind[row, other] < NEAR_MISS:
+    if conflicts.kind[row, other] not in (NEAR_MISS, CONTACT):
         return ""
     _, _, said = _time_left(conflicts, row, other).partition(", and ")
     return f", and {said}" if said else ""
@@ -83,6 +91,13 @@ def _event(conflicts: Conflicts, row: int, other: int, name: str) -> str:
         mine, whole = f"{own} of the ego's trailer", "the ego's trailer"
     its = Zone(int(conflicts.zone_other[row, other])).label
     kind = ConflictType(int(conflicts.type[row, other]))
+    if conflicts.kind[row, other] == VIOLATION:
+        aside, v = conflicts.aside[row, other], conflicts.v_ego[row, other]
+        if kind == ConflictType.CLOSE_PASS:
+            return f"The ego passed {name} at {v:.1f} m/s, {aside:.2f} m beside it"
+        left = "road" if kind == ConflictType.ROAD_DEPARTURE else "lane"
+        side = "left" if aside > 0.0 else "right"
+        return f"The ego left its {left} by {abs(aside):.1f} m to the {side} at {v:.1f} m/s"
     if conflicts.kind[row, other] == NEAR_MISS:
         return (
             f"The {mine} came within {conflicts.ttc[row, other]:.1f} s of the {its} of {name} "

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from math import isfinite
 from typing import Any, Self
 
-from bridgegen.conflict.analysis import CONTACT, COURSE, NEAR_MISS, Conflicts
+from bridgegen.conflict.analysis import COURSE, NEAR_MISS, Conflicts
 from bridgegen.conflict.findings import KINDS
 from bridgegen.conflict.harm import Count, decisive, harm_of_pairs
 from bridgegen.conflict.sentences import avoidance, sentence
@@ -19,21 +19,21 @@ UNITS: Mapping[str, str] = {
     "time": "s", "decided": "s", "ttc": "s", "needed_deceleration": "m/s²", "left": "s",
     "closing_normal": "m/s", "closing_tangential": "m/s", "v_ego": "m/s", "v_other": "m/s",
     "stood_ego": "s", "stood_other": "s", "overlap": "1", "delta_v_ego": "m/s",
-    "delta_v_other": "m/s", "severity": "1", "harm": "1",
+    "delta_v_other": "m/s", "severity": "1", "harm": "1", "aside": "m",
 }  # fmt: skip
 """The unit of each number of a summary."""
 
 
 @dataclass(frozen=True)
 class ConflictSummary:
-    """A conflict of the ego with one other participant.
+    """A conflict of the ego with one other participant, or a departure of its own.
 
     A collision course has no type, zones, responsibility or rule: nothing happened.
 
     Attributes:
-        conflict: "contact", "near miss" or "collision course".
+        conflict: "contact", "near miss", "violation" or "collision course".
         sentence: the event, in one sentence.
-        partner: name of the other participant.
+        partner: name of the other participant; "" of a departure.
         type: label of its `ConflictType`; empty of a collision course, as are all texts below.
         type_source: the typology's name for the type.
         responsible: label of `Responsible`.
@@ -59,6 +59,7 @@ class ConflictSummary:
         delta_v_other: change of the other's velocity [m/s].
         severity: probability of a MAIS3+ injury.
         harm: in [0, 1], as the row's, but of this conflict alone.
+        aside: of a violation, see `Conflicts.aside` [m]; else 0.
         avoidance: the end of ``sentence`` that says whether braking would have avoided it.
     """
 
@@ -90,6 +91,7 @@ class ConflictSummary:
     delta_v_other: float
     severity: float
     harm: float
+    aside: float = 0.0
     avoidance: str = ""
 
     @property
@@ -109,8 +111,8 @@ class ConflictSummary:
 
     @property
     def happened(self) -> bool:
-        """Whether it is a contact or a near miss, not only a collision course."""
-        return self.conflict in (KINDS[NEAR_MISS], KINDS[CONTACT])
+        """Whether it is a contact, a near miss or a violation, not only a collision course."""
+        return self.conflict not in ("", KINDS[COURSE])
 
     def to_dict(self) -> dict[str, Any]:
         """Return everything as JSON's types: texts, None where there is none; numbers with units.
@@ -152,7 +154,7 @@ def of_pair(conflicts: Conflicts, row: int, other: int, count: Count = "ego") ->
     Args:
         conflicts: of N scenarios.
         row: which of them.
-        other: number of the other participant.
+        other: number of the other participant; 0 for a departure of the ego's.
         count: whose conflicts count as harm.
     """
     kind = int(conflicts.kind[row, other])
@@ -168,13 +170,14 @@ def of_pair(conflicts: Conflicts, row: int, other: int, count: Count = "ego") ->
         for name in (
             "left", "ttc", "closing_normal", "closing_tangential", "v_ego", "v_other",
             "stood_ego", "stood_other", "overlap", "delta_v_ego", "delta_v_other", "severity",
+            "aside",
         )
     }  # fmt: skip
     return ConflictSummary(
         conflict=KINDS[kind],
         sentence=sentence(conflicts, row, other),
         avoidance=avoidance(conflicts, row, other),
-        partner=conflicts.names[other],
+        partner=conflicts.names[other] if other else "",
         type=sort.label,
         type_source=sort.source,
         responsible=Responsible(conflicts.responsible[row, other]).label if happened else "",

@@ -25,6 +25,9 @@ class ConflictType(IntEnum):
     VRU_BY_FRONT = _codes.VRU_BY_FRONT
     VRU_INTO_SIDE = _codes.VRU_INTO_SIDE
     OBJECT = _codes.OBJECT
+    LANE_DEPARTURE = _codes.LANE_DEPARTURE
+    ROAD_DEPARTURE = _codes.ROAD_DEPARTURE
+    CLOSE_PASS = _codes.CLOSE_PASS
 
     @property
     def label(self) -> str:
@@ -49,6 +52,9 @@ _TYPE_LABELS = {
     ConflictType.VRU_BY_FRONT: "vulnerable road user, front",
     ConflictType.VRU_INTO_SIDE: "vulnerable road user, side",
     ConflictType.OBJECT: "object",
+    ConflictType.LANE_DEPARTURE: "lane departure",
+    ConflictType.ROAD_DEPARTURE: "road departure",
+    ConflictType.CLOSE_PASS: "close pass",
 }
 
 _TYPE_SOURCES = {
@@ -63,6 +69,9 @@ _TYPE_SOURCES = {
     ConflictType.VRU_BY_FRONT: "NHTSA: pedestrian, pedalcyclist; GIDAS 4",
     ConflictType.VRU_INTO_SIDE: "NHTSA: pedestrian, pedalcyclist; GIDAS 4",
     ConflictType.OBJECT: "NHTSA: object contacted, parked vehicle; GIDAS 5, 7",
+    ConflictType.LANE_DEPARTURE: "NHTSA: drifting, opposite direction; GIDAS 1, 6",
+    ConflictType.ROAD_DEPARTURE: "NHTSA: road edge departure, control loss; GIDAS 1",
+    ConflictType.CLOSE_PASS: "NHTSA: pedalcyclist, pedestrian; GIDAS 6",
 }
 
 
@@ -132,6 +141,8 @@ class Rule(IntEnum):
     FROM_OFF_ROAD = _codes.FROM_OFF_ROAD
     WRONG_SIDE = _codes.WRONG_SIDE
     PASSED_TOO_CLOSE = _codes.PASSED_TOO_CLOSE
+    DID_NOT_KEEP_LANE = _codes.DID_NOT_KEEP_LANE
+    LEFT_THE_ROAD = _codes.LEFT_THE_ROAD
 
     @property
     def label(self) -> str:
@@ -233,6 +244,11 @@ RULES = {
         "drove on the wrong side of the road, towards the other",
         "Vienna Convention, Art. 10; StVO § 2 (1), (2)",
     ),
+    Rule.DID_NOT_KEEP_LANE: (
+        "did not keep to its lane",
+        "StVO § 2 (2), § 7; UN R79 and UN R130, departure from the lane",
+    ),
+    Rule.LEFT_THE_ROAD: ("left the road", "StVO § 2 (1), § 3 (1); UN R79, departure from the lane"),
     Rule.PASSED_TOO_CLOSE: (
         "overtook a cyclist without enough room to the side",
         "StVO § 5 (4): 1.5 m at least in towns, 2 m outside them",

@@ -202,11 +202,15 @@ def critical_in_words(
         which = "criterion" if len(criteria) == 1 else "one of the criteria"
         return f"a violation of {which} {names}"
     if rule == "harm" and count == "any":
-        return f"a collision or a near miss, whoever is responsible, harm_any ≥ {NEAR_MISS:g}"
+        return (
+            "a collision or a near miss, whoever is responsible, or a violation of the ego's, "
+            f"harm_any ≥ {NEAR_MISS:g}"
+        )
     if rule == "harm":
         return (
             "a collision that the ego is responsible for or could have prevented, or a near miss "
-            f"that it is responsible for, harm ≥ {NEAR_MISS:g}"
+            "that it is responsible for, or its leaving the lane or the road, or passing a cyclist "
+            f"or pedestrian too closely, harm ≥ {NEAR_MISS:g}"
         )
     many = limits.n_collision_above
     contact = "a collision" if many == 0 else f"more than {many:g} collisions"

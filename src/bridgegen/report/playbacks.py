@@ -271,7 +271,7 @@ def _conflict(conflicts: Conflicts, row: int, count: Count) -> Conflict | None:
     summary = summarise(conflicts, row, count)
     if summary is None:
         return None
-    other = conflicts.names.index(summary.partner)
+    other = conflicts.names.index(summary.partner or conflicts.names[0])
     instant = int(conflicts.instant[row, other])
     return Conflict(
         summary=summary,

@@ -4,8 +4,11 @@ import math
 
 import numpy as np
 
+from bridgegen.arrays import Bool
 from bridgegen.cause import CAUSES, Cause
 from bridgegen.confirmation.verdict import sentences as verdicts
+from bridgegen.conflict.analysis import VIOLATION
+from bridgegen.conflict.findings import KINDS, Findings
 from bridgegen.criteria import headline
 from bridgegen.regions.evidence import wilson
 from bridgegen.report.data import ReportData, RunSummary
@@ -110,6 +113,7 @@ def _of_harm(data: ReportData) -> list[tuple[str, str]]:
     rows = [
         ("Critical: collisions", f"{np.count_nonzero(contact):,}"),
         ("Critical: near misses", f"{np.count_nonzero(near):,}"),
+        ("Critical: violations", f"{np.count_nonzero(critical & _violates(e.findings)):,}"),
     ]
     for column in e.metrics:
         if column.name == "severity":
@@ -221,8 +225,11 @@ def _worst_harm(data: ReportData) -> str:
     contact = critical & (e.findings.conflict == "contact")
     n_contact = int(np.count_nonzero(contact))
     n_near = int(np.count_nonzero(critical & (e.findings.conflict == "near miss")))
-    if not n_contact and n_near < np.count_nonzero(critical):  # other criteria than harm
-        return f"{_count(n_near, 'near miss')} among them; no collision."
+    others = _count(n_near, "near miss")
+    if n_violations := int(np.count_nonzero(critical & _violates(e.findings))):
+        others += f", {_count(n_violations, 'violation')}"
+    if not n_contact and n_near < np.count_nonzero(critical):  # violations, or other criteria
+        return f"{others} among them; no collision."
     if not n_contact:
         return f"{'It is a near miss' if n_near == 1 else 'All are near misses'}; no collision."
     text = f"{_count(n_contact, 'collision')}"
@@ -230,7 +237,12 @@ def _worst_harm(data: ReportData) -> str:
     if severity is not None:
         worst = float(severity[contact].max())
         text += f", the most severe with a probability of {share(worst)} of a MAIS3+ injury"
-    return f"{text}; {_count(n_near, 'near miss')}."
+    return f"{text}; {others}."
+
+
+def _violates(findings: Findings) -> Bool:
+    """Return ``(N,)``: where the decisive conflict is a violation."""
+    return np.array(findings.conflict == KINDS[VIOLATION], dtype=np.bool_)
 
 
 def _worst(data: ReportData) -> str:

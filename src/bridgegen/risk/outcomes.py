@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from bridgegen.arrays import Float
-from bridgegen.conflict.analysis import analyse
+from bridgegen.conflict.analysis import encounters
 from bridgegen.conflict.findings import Findings
 from bridgegen.conflict.harm import NEAR_MISS, Count, closeness_of_pairs, decisive
 from bridgegen.conflict.plausibility import Implausible, plausibility
@@ -90,7 +90,7 @@ def outcomes(pipeline: Pipeline, X: Float, count: Count) -> Outcomes:
 
 def _outcomes(pipeline: Pipeline, X: Float, count: Count) -> tuple[Float, npt.NDArray[np.object_]]:
     rollout = pipeline.rollout(X)
-    conflicts = analyse(rollout)
+    conflicts = encounters(rollout)
     gate = plausibility(rollout)
     other, _ = decisive(conflicts, count)
     score, own, near = (

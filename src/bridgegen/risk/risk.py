@@ -14,7 +14,7 @@ from bridgegen import ego as egos
 from bridgegen.arrays import Float
 from bridgegen.campaign.run import Run
 from bridgegen.campaign.scenarios import driven_by, is_file, load
-from bridgegen.conflict.analysis import CONTACT
+from bridgegen.conflict.analysis import CONTACT, VIOLATION
 from bridgegen.conflict.findings import KINDS
 from bridgegen.conflict.harm import NEAR_MISS, Count
 from bridgegen.errors import InputError, Interrupted, UnknownNameError
@@ -304,6 +304,7 @@ def _points_of(run: Path, exposure: Exposure, event: str) -> Float:
     happens = rows.metrics[:, found.metrics.index("harm")] >= NEAR_MISS
     if event == "collision":
         happens &= rows.findings.conflict == KINDS[CONTACT]
+    happens &= rows.findings.conflict != KINDS[VIOLATION]
     good = happens & exposure.feasible(rows.X)
     X = rows.X[good]
     X = X[np.isfinite(exposure.log_density(X))] if len(X) else X

@@ -78,7 +78,8 @@ def _failure(facts: Facts) -> str:
     cause = facts.run.settings.cause
     only = f" Only failures with the root cause {cause} count." if cause else ""
     return (
-        f"A failure of {facts.ego}: a collision or a near miss of the ego, {whose}, in "
+        f"A failure of {facts.ego}: a collision or a near miss of the ego, {whose}, or "
+        f"that it leaves its lane or the road, or passes a cyclist or pedestrian too closely, in "
         f"plausible traffic: harm of {NEAR_MISS:g} or more.{only}"
     )
 

@@ -71,17 +71,24 @@ def _print_conflict(conflicts: "Conflicts", assumptions: Iterable[str] = ()) -> 
         return
     print(f"conflict: {one.sentence}")
     lines: list[tuple[str, str]] = []
+    violates = one.conflict == "violation"
     if one.happened:
         prevents = "would" if one.preventable else "would not"
         lines += [
             ("type", f"{one.conflict}, {one.type} ({one.type_source})"),
-            ("zones", f"ego {one.zone_ego}, {one.partner} {one.zone_other}"),
             ("responsible", one.responsible),
             ("rule", f"{one.rule}: {one.rule_says} ({one.rule_source})"),
+        ]
+    if violates:
+        lines += [("began", f"at {one.decided:.2f} s, worst at {one.time:.2f} s"),
+                  ("by", f"{abs(one.aside):.2f} m at {one.v_ego:.1f} m/s")]  # fmt: skip
+    elif one.happened:
+        lines += [
+            ("zones", f"ego {one.zone_ego}, {one.partner} {one.zone_other}"),
             ("decided", f"at {one.decided:.2f} s, {one.left:.2f} s before contact"),
             ("preventable", f"{CAREFUL_DRIVER} {prevents} have avoided it"),
         ]
-    lines += [
+    lines += [] if violates else [
         ("closing speed", f"{one.closing_normal:.1f} m/s across the surfaces that meet, "
                           f"{one.closing_tangential:.1f} m/s along them"),
     ]  # fmt: skip
@@ -91,7 +98,7 @@ def _print_conflict(conflicts: "Conflicts", assumptions: Iterable[str] = ()) -> 
                         f"{one.partner} {one.delta_v_other:.1f} m/s"),
             ("severity", f"{one.severity:.3g} (probability of a MAIS3+ injury)"),
         ]  # fmt: skip
-    else:
+    elif not violates:
         lines += [
             ("least TTC", f"{one.ttc:.2f} s at {one.time:.2f} s"),
             ("deceleration", f"{one.needed_deceleration:.1f} m/s² needed then"),

@@ -83,9 +83,11 @@ def print_replayed(made: "Replayed", page: Path, *, as_json: bool = False) -> No
         shown = "" if unit in ("1", "count", "?") else f" {unit}"
         print(f"  {name:<28}{value}{shown}")
     if row.conflict:
+        from bridgegen.conflict.findings import with_whom
+
         responsible = f", {row.responsible} responsible" if row.responsible else ""
         kind = f" ({row.conflict_type}{responsible})" if row.conflict_type else ""
-        print(f"  {row.conflict} with {row.partner}{kind}, MAIS3+ {row.severity:.2%}")
+        print(f"  {with_whom(row.conflict, row.partner)}{kind}, MAIS3+ {row.severity:.2%}")
     if row.problem or row.implausible:
         print(f"  {row.problem or f'implausible: {row.implausible}'}")
     for criterion, margin in zip(one.criteria, row.margins, strict=False):

@@ -208,7 +208,7 @@ def _mode_lines(found: "Triage") -> list[str]:
     for one in modes:
         bar = "█" * max(round(BAR * one.count / most), 1)
         what, _, _ = one.title.partition(" (")
-        worst = percent(one.severity) if one.conflict == "contact" else "near miss"
+        worst = percent(one.severity) if one.conflict == "contact" else one.conflict
         about = " · ".join(filter(None, [one.rule, worst, one.cause]))
         head = f"{one.number:>2} {bar:<{BAR}} {one.count:>5,}  "
         room = max(WIDTH - len(head) - len(about) - 3, 12)

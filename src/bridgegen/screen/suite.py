@@ -257,11 +257,14 @@ def _counted(one: "EntryResult") -> str:
 
 def _worst(some: Sequence["EntryResult"]) -> str:
     """Return the worst thing that happens in an entry."""
+    from bridgegen.conflict.findings import with_whom
+
     for one in some:
         if one.worst is not None:
             row = one.rows[one.worst]
             violated = ", ".join(str(one.criteria[i]["id"]) for i in row.violated)
-            texts = [f"{row.conflict} with {row.partner}"] if row.critical and row.conflict else []
+            happened = row.critical and row.conflict
+            texts = [with_whom(row.conflict, row.partner)] if happened else []
             texts += [f"impact at {row.impact_speed:.1f} m/s"] if row.impact_speed else []
             texts += [f"MAIS3+ {row.severity:.2%}"] if row.severity else []
             texts += [f"violates {violated}"] if violated else []

@@ -110,6 +110,10 @@ class Rollout:
             are no trailers. Coupled entities do not collide.
         progress: ``(N, 2)`` float64 [m], how far the ego's driver drove, and how far it then was
             from the end of its route; ``(0, 2)`` where unknown.
+        corridors: ``(P, L, 8)`` float64, the room beside the ego's route on each road network, at
+            every sample of it, see `bridgegen.ego.lane_tables.corridor_along`; +inf beyond its end.
+        corridor_of: ``(N,)`` int64, the one of each row; -1 where it is unknown, and where the ego
+            has stayed so near to its route that it does not matter. Empty where all are unknown.
         messages: details of failures, by row.
         incidents: by row, those that the simulator itself reported.
         derived: intermediate results that several metrics share; see `metrics.metric.shared`.
@@ -142,6 +146,8 @@ class Rollout:
     friction: Float = field(default_factory=lambda: np.zeros(0))
     towed_by: Int = field(default_factory=lambda: np.zeros(0, np.int64))
     progress: Float = field(default_factory=lambda: np.zeros((0, 2)))
+    corridors: Float = field(default_factory=lambda: np.zeros((0, 0, 8)))
+    corridor_of: Int = field(default_factory=lambda: np.zeros(0, np.int64))
     messages: Mapping[int, str] = field(default_factory=dict)
     incidents: Mapping[int, tuple[Incident, ...]] = field(default_factory=dict)
     derived: dict[Any, Any] = field(default_factory=dict, init=False, repr=False, compare=False)
@@ -216,6 +222,7 @@ class Rollout:
 _BY_ROW = (
     "x", "y", "h", "v", "a", "offset", "n_steps", "status", "lights", "began", "detections",
     "stop_lines", "present", "lamps", "claims", "crosswalks", "friction", "progress",
+    "corridor_of",
 )  # fmt: skip
 
 _BY_INSTANT = ("x", "y", "h", "v", "a", "offset", "lights", "present", "lamps", "detections")
@@ -239,7 +246,7 @@ def joined(parts: Sequence[tuple[Int, Rollout]]) -> Rollout:
     parts = [(each, _lengthened(one, most)) for each, one in parts]
     rows = np.concatenate([each for each, _ in parts])
     order = np.argsort(rows)
-    whole: dict[str, Any] = {}
+    parts, whole = _with_corridors(parts)
     for name in _BY_ROW:
         arrays = [getattr(one, name) for _, one in parts]
         if name == "present" and any(len(array) for array in arrays):
@@ -252,6 +259,22 @@ def joined(parts: Sequence[tuple[Int, Rollout]]) -> Rollout:
     messages = {int(each[row]): text for each, one in parts for row, text in one.messages.items()}
     incidents = {int(each[row]): what for each, one in parts for row, what in one.incidents.items()}
     return replace(parts[0][1], **whole, messages=messages, incidents=incidents)
+
+
+def _with_corridors(
+    parts: Sequence[tuple[Int, Rollout]],
+) -> tuple[list[tuple[Int, Rollout]], dict[str, Any]]:
+    """Return parts whose ``corridor_of`` counts through the corridors of all, and these."""
+    shape = np.max([one.corridors.shape for _, one in parts], axis=0)
+    found, tables = list[tuple[Int, Rollout]](), list[Float]()
+    for each, one in parts:
+        of = one.corridor_of if len(one.corridor_of) else np.full(one.shape[0], -1)
+        first = sum(map(len, tables))
+        found.append((each, replace(one, corridor_of=np.where(of < 0, -1, of + first))))
+        table = np.full((len(one.corridors), *shape[1:]), np.inf)
+        table[:, : one.corridors.shape[1]] = one.corridors
+        tables.append(table)
+    return found, {"corridors": np.concatenate(tables)}
 
 
 def _lengthened(rollout: Rollout, most: int) -> Rollout:

@@ -48,7 +48,7 @@ _LETTER: dict[Verdict, str] = {"passed": "p", "failed": "f", "not run": "n"}
 _OUTCOME: dict[Outcome | None, str] = {
     "avoided": "a", "mitigated": "m", "not avoided": "n", None: "-",
 }  # fmt: skip
-_HAPPENED = ("contact", "near miss")
+_HAPPENED = ("contact", "near miss", "violation")
 _SEVERITIES = ("critical", "major", "minor")
 
 

@@ -1,9 +1,9 @@
 """Failure modes: harmful rows that fail in the same way, by interpretable keys, then by distance.
 
-Rows of one mode agree in conflict (contact or near miss), conflict type, responsibility, cause, the
-other participant's kind, and place on the route. The rule that decides on the responsibility may
-differ: it names a breach, and does not change what happens. Such a group is divided further only
-where its rows form clusters in the space of parameters that are clearly apart.
+Rows of one mode agree in conflict (contact, near miss or violation), conflict type, responsibility,
+cause, the other participant's kind, and place on the route. The rule that decides on the
+responsibility may differ: it names a breach, and does not change what happens. Such a group is
+divided further only where its rows form clusters in the space of parameters that are clearly apart.
 """
 
 from collections import Counter
@@ -34,7 +34,7 @@ class Key(NamedTuple):
     """What the rows of a mode have in common; all are labels.
 
     Attributes:
-        conflict: "contact" or "near miss".
+        conflict: "contact", "near miss" or "violation".
         conflict_type: see `ConflictType`.
         responsible: see `Responsible`.
         partner: kind of the other participant.
@@ -180,6 +180,9 @@ _TITLES: Mapping[ConflictType, tuple[str, str]] = {
     ConflictType.VRU_BY_FRONT: ("hits {} with its front", "nearly hits {} with its front"),
     ConflictType.VRU_INTO_SIDE: ("is hit at its side by {}", "is nearly hit at its side by {}"),
     ConflictType.OBJECT: ("hits an obstacle ({})", "nearly hits an obstacle ({})"),
+    ConflictType.LANE_DEPARTURE: ("", "leaves its lane"),
+    ConflictType.ROAD_DEPARTURE: ("", "leaves the road"),
+    ConflictType.CLOSE_PASS: ("", "passes {} too closely"),
 }  # fmt: skip
 _ARTICLES = {"": "another participant", "other": "an object", "animal": "an animal"}
 _RESPONSIBLE = {

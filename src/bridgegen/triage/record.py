@@ -258,7 +258,7 @@ class Mode(_Model):
     Attributes:
         number: 1, 2, … in the order of the record: robust ones first, then by worst harm.
         title: in words.
-        conflict: "contact" or "near miss".
+        conflict: "contact", "near miss" or "violation".
         conflict_type: label of `ConflictType`.
         responsible: label of `Responsible`.
         rule: label of the `Rule` that decides on it most often.

@@ -228,7 +228,7 @@ def _scenario(run: Run, path: Path, name: str, group: str, broken: Sequence[Outc
     failed = [one.test for one in broken if _contributes(facts, one.figures)]
     values = {key: _text_of(one) for key, one in facts.metrics.items()}
     cause = f", cause: {facts.cause}" if facts.cause else ""
-    what = "collision" if facts.metrics["n_collision"].value else "near miss"
+    what = "collision" if facts.metrics["n_collision"].value else "failure without a collision"
     message = f"{what}: d_min {values['d_min']} at v_d {values['v_d']}{cause}"
     files = sorted(path.parent.glob(f"{path.stem}.*"))
     text = "\n".join(

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 
+from bridgegen.conflict.findings import with_whom
 from bridgegen.odd.clauses import read_clause
 from bridgegen.odd.criteria import read_criterion
 from bridgegen.suite.clauses import clause_results
@@ -216,7 +217,7 @@ def row_in_words(one: EntryResult, i: int, row: RowResult) -> str:
         for name, value, unit in values
     )
     happened = row.problem or (
-        f"{row.conflict} with {row.partner} ({row.conflict_type}), severity {row.severity:.2g}"
+        f"{with_whom(row.conflict, row.partner)} ({row.conflict_type}), severity {row.severity:.2g}"
         if row.conflict
         else "no conflict"
     )

@@ -14,13 +14,14 @@ const ZONES = {
 };
 
 const ZONE_SHOWN = 1; // s, before and after the instant
-const INSTANTS = { contact: "collision", "near miss": "least time to collision", "collision course": "least time to collision" };
+const INSTANTS = { contact: "collision", "near miss": "least time to collision", "collision course": "least time to collision", violation: "worst" };
+const WITH_DECISION = ["contact", "near miss", "violation"];
 export const ZONED = ["contact", "near miss"];
 
 export function fillConflict(kept) {
   const found = kept.conflict, words = $("conflict");
   words.hidden = !found;
-  $("to-decided").hidden = !found || !ZONED.includes(found.conflict);
+  $("to-decided").hidden = !found || !WITH_DECISION.includes(found.conflict);
   $("ticks").replaceChildren();
   if (!found) return;
   const judged = data.triage?.judged?.[kept.evaluation]; // by its neighbours: in place of the end on braking
@@ -31,7 +32,7 @@ export function fillConflict(kept) {
     mark.style.left = `${(100 * k) / last}%`;
     $("ticks").append(mark);
   };
-  if (ZONED.includes(found.conflict)) tick(found.decided, "decided", "decided");
+  if (WITH_DECISION.includes(found.conflict)) tick(found.decided, "decided", "decided");
   tick(found.instant, INSTANTS[found.conflict], "instant");
 }
 
@@ -41,10 +42,17 @@ export function conflictLines(found) {
   const line = (name, value, title = "") => element("div", { title }, element("span", { class: "name" }, name), element("b", {}, value));
   const figure = (name) => quantity(...found.numbers[name], 3);
   const lines = [element("h3", {}, "Its conflict"), line("conflict", conflictWord(found.conflict))];
+  if (WITH_DECISION.includes(found.conflict)) {
+    lines.push(line("type", found.type, found.type_source));
+    if (found.partner) lines.push(line("partner", found.partner));
+    lines.push(
+      line("responsible", found.responsible, found.rule_says ?? ""),
+      line("rule", found.rule ?? "–", `${found.rule_says ?? ""} (${found.rule_source ?? ""})`), line("decided at", figure("decided")),
+    );
+  }
+  if (found.conflict === "violation") return [...lines, line("by", figure("aside"), "beyond the border of its lanes or the edge of the road; of a pass the clearance"), line("speed of the ego", figure("v_ego")), line("harm", figure("harm"))];
   if (ZONED.includes(found.conflict)) {
     lines.push(
-      line("type", found.type, found.type_source), line("partner", found.partner), line("responsible", found.responsible, found.rule_says ?? ""),
-      line("rule", found.rule ?? "–", `${found.rule_says ?? ""} (${found.rule_source ?? ""})`), line("decided at", figure("decided")),
       line("avoidable by braking (UN R157)", found.preventable ? "yes" : "no", "whether the careful driver of UN R157, who brakes after the risk arose, would have avoided it"),
       line("where the ego is met", found.zone_ego), line(`where ${found.partner} is met`, found.zone_other),
     );
@@ -85,8 +93,8 @@ export function drawZones(c, kept, state, scale) {
 // A ring on both ways where they were at the instant that decided.
 export function drawDecided(c, kept, centres, scale) {
   const found = kept.conflict;
-  if (!found || !ZONED.includes(found.conflict)) return;
-  for (const e of [0, found.partner_number]) {
+  if (!found || !WITH_DECISION.includes(found.conflict)) return;
+  for (const e of new Set([0, found.partner_number])) {
     const at = centres[e]?.[found.decided];
     if (!at) continue;
     for (const [colour, width] of [[palette.card, 5], [palette.ink, 2.5]]) {

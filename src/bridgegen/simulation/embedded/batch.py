@@ -10,6 +10,7 @@ from bridgegen.arrays import Bool, Float, Int
 from bridgegen.compiled import compile_for_kernels, row_type
 from bridgegen.ego._attentive_kernels import MIND as HEED
 from bridgegen.ego._attentive_kernels import SEEN
+from bridgegen.ego._kind_tables import NEEDS_ROOM
 from bridgegen.ego._perception_kernels import MEMORY
 from bridgegen.ego._prediction_kernels import LOST, PASSAGE
 from bridgegen.ego._reference_kernels import MIND
@@ -283,6 +284,7 @@ class Batch:
     def rollout(self) -> Rollout:
         """Return what is recorded; all rows must have ended."""
         program, roads, record = self._program, self._roads, self.record
+        corridors, corridor_of = self._corridors()
         return Rollout(
             time_step=program.time_step,
             names=program.names,
@@ -304,10 +306,22 @@ class Batch:
             crosswalks=roads.crosswalks[self._rows],
             friction=self.state.weather[:, FRICTION].copy(),
             progress=self._progress(),
+            corridors=corridors,
+            corridor_of=corridor_of,
             n_steps=self.state.ending[:, memory.N_STEPS].copy(),
             status=self.state.ending[:, memory.STATUS].astype(np.int8),
             messages=self._messages,
         )  # fmt: skip
+
+    def _corridors(self) -> tuple[Float, Int]:
+        """Return `Rollout.corridors` and `Rollout.corridor_of`."""
+        matters = np.abs(self.record.offset[:, 0]).max(axis=1) > STRAYS
+        matters |= bool(np.array(NEEDS_ROOM)[self._program.kinds].any())
+        matters &= self.state.on[:, 0] == 0  # else it has left that path for another
+        networks, of = np.unique(self._rows[matters], return_inverse=True)
+        corridor_of = np.full(len(self._rows), -1)
+        corridor_of[matters] = of
+        return self._roads.corridors(networks.tolist()), corridor_of
 
     def _progress(self) -> Float:
         """Return `Rollout.progress`; no rows where the storyboard moves the ego."""
@@ -321,6 +335,9 @@ class Batch:
 FAR_APART = 1000.0  # [m]
 
 ALIGNED = 64  # bytes, a line of the processor's cache
+
+STRAYS = 0.2
+"""[m] beside its route, beyond which an ego may have left its lane: the narrowest have so much."""
 
 NO_DETECTIONS = np.zeros((0, 0, 0, DETECTION))
 

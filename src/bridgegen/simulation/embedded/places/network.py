@@ -8,7 +8,7 @@ import numpy as np
 
 from bridgegen.arrays import Float, Int
 from bridgegen.ego.interface import RoadMap
-from bridgegen.ego.lane_tables import LANE, lanes_along
+from bridgegen.ego.lane_tables import CORRIDOR, LANE, corridor_along, lanes_along
 from bridgegen.ego.map_grid import grid_of, no_grid
 from bridgegen.ego.road_map import road_map
 from bridgegen.ego.scene import Scene, beside, stacked, stop_lines, survey
@@ -60,6 +60,7 @@ class Network:
             for model, course in zip(models, given, strict=True)
         ]
         self._lock = Lock()
+        self._corridors: dict[int, Float] = {}
         self._points = np.zeros((len(models), len(program.points), 2))
         for p, model in enumerate(models):
             for i, point in enumerate(program.points):
@@ -140,6 +141,29 @@ class Network:
                     found.append([at, end])
             at = end
         return np.array(found, dtype=np.float64).reshape(len(found), 2)
+
+    def corridors(self, networks: Iterable[int]) -> Float:
+        """Return the room beside the ego's first path on some road networks, ``(P, L, 8)``.
+
+        See `Rollout.corridors`; it has no samples off the lanes.
+        """
+        from bridgegen.ego._speed_kernels import FAST_ROAD  # numba is slow to import
+
+        found: list[Float] = []
+        for p in networks:
+            ways = self._ways[p]
+            route, path = ways.routes[0], ways.paths[0]
+            if p not in self._corridors:
+                self._corridors[p] = (
+                    np.empty((0, CORRIDOR))
+                    if route is None
+                    else corridor_along(self._models[p], route, path.table, path.step, FAST_ROAD)
+                )
+            found.append(self._corridors[p])
+        whole = np.full((len(found), max(map(len, found), default=0), CORRIDOR), np.inf)
+        for table, one in zip(whole, found, strict=True):
+            table[: len(one)] = one
+        return whole
 
     def amend(self, name: str, first: int, part: Float) -> None:
         """Change a stretch of an entity's timed trajectory on each road network.
