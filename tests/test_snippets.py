@@ -10,8 +10,8 @@ Searches are shortened (``shortened``), but not those of the pages ``AS_PRINTED`
 a block says what else is to be known:
 ``<!-- not run: WHY -->`` and ``<!-- tested by: FILE -->`` (what takes too long here; the commands
 of both must still parse), ``<!-- file: NAME -->`` (what the reader saves as that file),
-``<!-- exit: 3 -->``, ``<!-- ci -->`` (another program's YAML), ``<!-- excerpt -->`` (text that is no
-output).
+``<!-- exit: 3 -->``, ``<!-- ci -->`` (the YAML of another program), ``<!-- excerpt -->`` (no
+output, but a part of a file).
 """
 
 import json
