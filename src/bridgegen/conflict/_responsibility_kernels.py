@@ -432,14 +432,14 @@ def of_crossing(scene, e, k, own, risk, avoidable, whole):
     it_could = braked(scene, e, 0, since, since, COMFORT) != COLLIDES
     ego_could = braked(scene, 0, e, risk, risk, COMFORT) != COLLIDES
     claim = scene.claims[e]
-    if it_could and not ego_could and not (claim < 0 and avoidable):
+    front = own in (FRONT, FRONT_LEFT, FRONT_RIGHT)
+    if it_could and not ego_could and not (claim < 0 and avoidable and front):
         whole[DECIDED] = since
         return OTHER, JUNCTION_OCCUPIED
     if ego_could and not it_could:
         return EGO, JUNCTION_OCCUPIED
     if claim == -SIREN:
         return of_siren(scene, e, k, whole)
-    front = own in (FRONT, FRONT_LEFT, FRONT_RIGHT)
     if claim < 0 and not avoidable and not front and has_set_off(scene, e, k):
         return NEITHER, REVEALED_LATE  # struck as it had all but passed, by one that had waited
     if claim != 0:
