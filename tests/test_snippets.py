@@ -10,7 +10,8 @@ Searches are shortened (``shortened``), but not those of the pages ``AS_PRINTED`
 a block says what else is to be known:
 ``<!-- not run: WHY -->`` and ``<!-- tested by: FILE -->`` (what takes too long here; the commands
 of both must still parse), ``<!-- file: NAME -->`` (what the reader saves as that file),
-``<!-- exit: 3 -->``, ``<!-- ci -->`` (another program's YAML).
+``<!-- exit: 3 -->``, ``<!-- ci -->`` (the YAML of another program), ``<!-- excerpt -->`` (no
+output, but a part of a file).
 """
 
 import json
@@ -228,7 +229,7 @@ class Page:
         tomllib.loads(block.text)
 
     def text(self, block: Block) -> None:
-        if self.as_printed and self.ran:
+        if self.as_printed and self.ran and not block.mark:
             assert missing_lines(block.text, self.output) == [], "\n".join(self.output)
 
 
@@ -293,5 +294,5 @@ def test_few_snippets_cannot_be_run():
 
 def test_marks_are_those_that_are_known():
     for block in (block for name in PAGES for block in blocks(name)):
-        assert block.mark in ("", *ELSEWHERE, "file", "exit", "ci"), block.mark
+        assert block.mark in ("", *ELSEWHERE, "file", "exit", "ci", "excerpt"), block.mark
         assert block.mark != "tested by" or (ROOT / block.value).is_file(), block.value

@@ -409,7 +409,8 @@ def crossing(track, meeting, claim, other_from=-1.0):
 def test_the_claims_of_the_map_decide(track, meeting, claim, rule):
     assert verdict(crossing(track, meeting, -claim)) == (EGO, rule)
     assert verdict(crossing(track, meeting, claim)) == (BV, rule)
-    assert not at_fault(crossing(track, meeting, claim))
+    # 2 s before they meet it is no longer to be expected that the other stops: 10 m/s can brake
+    assert at_fault(crossing(track, meeting, claim))
 
 
 def test_without_priorities_who_comes_from_the_right_goes_first(track, meeting):
@@ -636,6 +637,9 @@ def test_a_cyclist_with_priority_counts_as_a_vehicle(track, meeting):
     rollout = meeting(ego, cyclist, kinds=[CAR, BICYCLE], boxes=boxes, claims=[-BY_SIGNS])
     assert verdict(rollout) == (EGO, Rule.SIGNS)
     rollout = meeting(ego, cyclist, kinds=[CAR, BICYCLE], boxes=boxes, claims=[BY_SIGNS])
+    assert verdict(rollout) == (EGO, Rule.COULD_HAVE_STOPPED)  # 2 s before, at 10 m/s
+    ego = track(x=-90.0, v=30.0)
+    rollout = meeting(ego, cyclist, kinds=[CAR, BICYCLE], boxes=boxes, claims=[BY_SIGNS])
     assert verdict(rollout) == (BV, Rule.SIGNS)
 
 
@@ -665,14 +669,18 @@ def test_offsets_of_another_road_are_no_lane_change(track, meeting, course):
 
 
 def test_one_that_must_give_way_is_a_danger_once_it_cannot_stop_in_comfort(track, meeting):
-    """At 10 m/s, 3 m/s² stop within 16.7 m; its front is in the ego's way after 26.5 m.
+    """Or 2 s before they meet; here after 2.75 s, so that it is a danger from 0.75 s on.
 
-    So it is a danger from 9.8 m on, 1 s after the start. One to which the ego must give way is a
-    danger as soon as both are on a collision course, 4 s at most before they meet.
+    At 20 m/s, 3 m/s² stop within 66.7 m: that one is a danger from the start, 58 m before. One to
+    which the ego must give way is a danger as soon as both are on a collision course, 4 s at most
+    before they meet.
     """
     trusted = analyse(crossing(track, meeting, BY_SIGNS))
-    assert trusted.decided[0, 1] * DT == pytest.approx(1.0, abs=0.15)
-    assert not trusted.preventable[0, 1]
+    assert trusted.decided[0, 1] * DT == pytest.approx(0.75, abs=0.15)
+    assert trusted.preventable[0, 1]
+    fast = track(y=-60.0, h=RIGHT_ANGLE, v=20.0)
+    fast = analyse(meeting(track(x=-30.0, v=10.0), fast, claims=[BY_SIGNS]))
+    assert fast.decided[0, 1] * DT == pytest.approx(0.0, abs=0.15)
     feared = analyse(crossing(track, meeting, -BY_SIGNS))
     assert feared.decided[0, 1] == pytest.approx(0, abs=1)
     assert feared.preventable[0, 1]

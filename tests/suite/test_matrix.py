@@ -71,8 +71,8 @@ def test_junit_and_the_page_tell_outcomes(turn, tmp_path):
     assert "not avoided, impact at 19.4 m/s" in text
     found = payload(turn, {}, {})["suite"]
     assert found["outcomes"][0] == [
-        "Collisions: 0 avoided (0.0%), 0 mitigated (0.0%), 2 not avoided (100.0%); "
-        "fastest impact 19.4 m/s"
+        "Collisions: 2 of 2 (100.0%), 0 of them after slowing down; impact 16.7 m/s on average, "
+        "19.4 m/s at most"
     ]
     assert found["entries"][0]["results"][0]["hits"] == [0, 2]
     details = unpacked(found["details"][0])["results"][0]
@@ -158,8 +158,8 @@ def test_a_suite_without_collisions_tells_none():
     assert outcomes([result(RowResult(), RowResult())]) == ""
     some = outcomes([result(RowResult(), hit(36, 18), RowResult(problem="lost"))])
     assert some == (
-        "Collisions: 1 avoided (50.0%), 1 mitigated (50.0%), 0 not avoided (0.0%); "
-        "fastest impact 5.0 m/s"
+        "Collisions: 1 of 2 (50.0%), 1 of them after slowing down; impact 5.0 m/s on average, "
+        "5.0 m/s at most"
     )
 
 

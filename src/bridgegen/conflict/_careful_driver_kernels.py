@@ -57,13 +57,13 @@ def bend_at(scene, a, i):
 
 
 @kernel
-def careful_speed(scene, a, i, speed):
-    """Return the speed of a careful driver at instant i of body a's track, ``speed`` at most [m/s].
+def careful_speed(scene, i, speed):
+    """Return a careful driver's speed at instant i of the ego's track, ``speed`` at most [m/s].
 
-    It drives no faster than body a did there (which had slowed down before the bend, or given way),
-    and takes a bend with `BEND_SHARE` of the grip.
+    It drives no faster than the ego did there (which had slowed down before the bend, or given
+    way), and takes a bend with `BEND_SHARE` of the grip.
     """
-    recorded, bend = scene.v[a, i], abs(bend_at(scene, a, i))
+    recorded, bend = scene.v[0, i], abs(bend_at(scene, 0, i))
     if MOVES < recorded < speed:
         speed = recorded
     if bend > 0.0 and speed * speed * bend > BEND_SHARE * scene.friction:
@@ -97,8 +97,8 @@ def follows(gap, speed, its):
 def braked(scene, a, b, k, start, braking):
     """Return the outcome for body a on its own track if it brakes from instant ``start`` on.
 
-    From instant k to ``start`` it increases its gap to b as drivers do, see `follows`. It is never
-    faster than `careful_speed`.
+    From instant k to ``start`` it increases its gap to b as drivers do, see `follows`. The ego is
+    never faster than `careful_speed`.
 
     It keeps its motion for ``REACTION``; then its deceleration rises by ``JERK`` up to ``braking``
     [m/s²], or as far as the tyres allow. b moves as recorded up to ``scene.until``, then keeps its
@@ -128,7 +128,8 @@ def braked(scene, a, b, k, start, braking):
             at += 0.5 * (speed + after) * dt
             speed = after
         i, xa, ya = pose_on(x[a], y[a], c[a], s[a], gone[a], n, i, at)
-        speed = careful_speed(scene, a, i, speed)
+        if a == 0:  # another's speed may be its answer to the ego already
+            speed = careful_speed(scene, i, speed)
         way = gone[b, m] if m <= until else gone[b, until] + v[b, until] * (m - until) * dt
         j, xb, yb = pose_on(x[b], y[b], c[b], s[b], gone[b], n, j, way)
         if m <= until:  # a body that moves without a path: sideways, or on the spot

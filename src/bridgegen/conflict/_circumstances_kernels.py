@@ -13,6 +13,7 @@ from bridgegen.conflict._limits import (
     ALIKE,
     ASIDE,
     CROSSWALK_MARGIN,
+    HORIZON,
     JUNCTION,
     JUST_NOW,
     KERB,
@@ -136,6 +137,15 @@ def still_since(v, first, k):
     while k >= first and v[k] <= STANDS:
         k -= 1
     return k + 1
+
+
+@kernel
+def has_set_off(scene, e, k):
+    """Return whether body e, which moves at instant k, stood within `HORIZON` before."""
+    for i in range(max(k - int(HORIZON / scene.dt), scene.first), k + 1):
+        if scene.v[e, i] <= STANDS:
+            return True
+    return False
 
 
 @kernel

@@ -35,9 +35,9 @@ NEITHER, EGO, OTHER, SHARED = range(4)
 from off the road."""
 
 (
-    KIND, TYPE, RESPONSIBLE, RULE, INSTANT, DECIDED, ZONE_EGO, ZONE_OTHER, PREVENTABLE,
-) = range(9)  # fmt: skip
-INTEGERS = 9
+    KIND, TYPE, RESPONSIBLE, RULE, INSTANT, DECIDED, ZONE_EGO, ZONE_OTHER, PREVENTABLE, LEADS_EGO,
+) = range(10)  # fmt: skip
+INTEGERS = 10
 """Columns of a pair's row of whole numbers, and their number."""
 
 (

@@ -17,8 +17,12 @@ from bridgegen.conflict._codes import (
     ALONG,
     CONTACT,
     COURSE,
+    FRONT,
+    FRONT_LEFT,
+    FRONT_RIGHT,
     INSTANT,
     KIND,
+    LEADS_EGO,
     NEAR_MISS,
     NEARNESS,
     NEEDED,
@@ -39,6 +43,7 @@ from bridgegen.conflict._geometry_kernels import (
     displaced,
     lengths,
     meeting,
+    meets_at,
     normal_of,
     overlap,
     presence,
@@ -50,6 +55,7 @@ from bridgegen.conflict._geometry_kernels import (
 from bridgegen.conflict._limits import (
     COMFORT,
     CREEPS,
+    FRONT_PART,
     GUIDANCE,
     GUIDANCE_STEP,
     HORIZON,
@@ -187,7 +193,7 @@ def is_serious(time, needed, v, k, dt):
 @kernel
 def analyse_pair(
     e, n, dt, end, half, kinds, x, y, c, s, v, a, offset, distance, gone, claims, crosswalks,
-    friction, stop_entities, stop_lights, stop_lines, lights, routed, whole, real,
+    friction, stop_entities, stop_lights, stop_lines, lights, lamps, routed, whole, real,
 ):  # fmt: skip
     """Fill the rows of the ego and body e."""
     contact = end < n and distance[e, end] == 0.0
@@ -225,6 +231,10 @@ def analyse_pair(
     near = not contact and is_serious(time, needed, v[0], k, dt)
     whole[KIND] = CONTACT if contact else NEAR_MISS if near else COURSE
     whole[INSTANT], whole[ZONE_EGO], whole[ZONE_OTHER] = at, own, its
+    leads = (1.0 - 2.0 * FRONT_PART) * la
+    whole[LEADS_EGO] = own in (FRONT, FRONT_LEFT, FRONT_RIGHT) or (
+        meets_at(nx, ny, dx, dy, ca, sa, cb, sb, la, lb, wb) >= leads
+    )
     real[TTC], real[NEEDED] = time, needed
     real[ACROSS], real[ALONG] = max(-(wx * nx + wy * ny), 0.0), abs(wx * ny - wy * nx)
     real[V_EGO], real[V_OTHER] = v[0, k], v[e, k]
@@ -236,7 +246,7 @@ def analyse_pair(
     kind = type_of(e, first, until, k, dt, kinds, c, s, own, its, own_part, stood)
     scene = Scene(
         half, kinds, x, y, c, s, v, a, offset, distance, gone, claims, crosswalks, friction,
-        stop_entities, stop_lights, stop_lines, lights, routed, first, until, dt,
+        stop_entities, stop_lights, stop_lines, lights, lamps, routed, first, until, dt,
         until - 1 if contact else at, at, near,
     )  # fmt: skip
     crosses = near and kind != REAR_END_STRIKING and kind != REAR_END_STRUCK
@@ -252,7 +262,7 @@ def analyse_pair(
 @kernel
 def analyse_rows(
     half, kinds, x, y, c, s, v, a, offset, distance, n_steps, dt, claims, crosswalks, friction,
-    stop_entities, stop_lights, stop_lines, lights, routed, gone, whole, real,
+    stop_entities, stop_lights, stop_lines, lights, lamps, routed, gone, whole, real,
 ):  # fmt: skip
     """Fill ``whole`` ``(N, E, INTEGERS)`` and ``real`` ``(N, E, FLOATS)`` of N rows.
 
@@ -272,5 +282,5 @@ def analyse_rows(
             analyse_pair(
                 e, n, dt, end, half, kinds, x[i], y[i], c[i], s[i], v[i], a[i], offset[i],
                 distance[i], gone, claims[i, 0], crosswalks[i], friction[i], stop_entities,
-                stop_lights, stop_lines[i], lights[i], routed, whole[i, e], real[i, e],
+                stop_lights, stop_lines[i], lights[i], lamps[i], routed, whole[i, e], real[i, e],
             )  # fmt: skip

@@ -43,6 +43,7 @@ class Scene(NamedTuple):
         stop_lights: ``(L,)``.
         stop_lines: ``(L, 3)``.
         lights: ``(S, T)``.
+        lamps: ``(E, T)``, or ``(0, 0)`` where no scenario switches any.
         routed: whether offsets are known.
         first: the instant since which the other is present.
         n: the instant until which it is.
@@ -71,6 +72,7 @@ class Scene(NamedTuple):
     stop_lights: Int
     stop_lines: Float
     lights: Int
+    lamps: Int
     routed: bool
     first: int
     n: int
@@ -166,6 +168,23 @@ def zones(axis, nx, ny, ca, sa, cb, sb):
     if axis < 2:
         return edge_towards(nx, ny, ca, sa), corner_towards(-nx, -ny, cb, sb)
     return corner_towards(nx, ny, ca, sa), edge_towards(-nx, -ny, cb, sb)
+
+
+@kernel
+def meets_at(nx, ny, dx, dy, ca, sa, cb, sb, la, lb, wb):
+    """Return where along A, from its centre, B meets it: B's corner, or the middle of its edge."""
+    towards, aside = nx * cb + ny * sb, ny * cb - nx * sb
+    along, across = ca * cb + sa * sb, sa * cb - ca * sb
+    middle, spread = dx * ca + dy * sa, 0.0
+    if abs(towards) <= FLUSH:
+        spread = lb * abs(along)
+    else:
+        middle -= math.copysign(lb, towards) * along
+    if abs(aside) <= FLUSH:
+        spread = wb * abs(across)
+    else:
+        middle -= math.copysign(wb, aside) * across
+    return 0.5 * (max(middle - spread, -la) + min(middle + spread, la))
 
 
 @kernel

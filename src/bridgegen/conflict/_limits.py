@@ -61,6 +61,9 @@ TURN_BEGINS = math.radians(3.0)
 half of ``TURN_TIME``, turns, too. Ours."""
 TURN_TIME = 4.0
 """[s] A quarter turn of 8 m radius takes 4 s at 3 m/s. Ours."""
+FRONT_PART = 0.15
+"""[1] Share of a body's length, from its leading end: one that is met there at its side is met with
+its front. Ours: about the overhang of a car."""
 PUSHES = 0.3
 """[m/s] A body that moves into another more slowly does not strike it. Ours."""
 
@@ -93,6 +96,11 @@ EVIDENT_EVERY = 0.1
 UNSURE = 0.5
 """[s] For so long a collision course that grazes may seem none. Ours: a corner that would touch for
 less than a step of the prediction, or a body that speeds up.
+"""
+DOUBTS = 2.0
+"""[s] A careful driver does not trust that another stops if the two would meet within this
+time. Source: the careful
+driver of UN R157, Annex 3, who reacts to a time to collision below 2 s.
 """
 AHEAD_BY = 0.01
 """[m] A body that brakes and is farther ahead than without braking, by more, has not avoided the

@@ -16,6 +16,7 @@ from bridgegen.conflict._circumstances_kernels import (
     ego_came_over,
     ego_moved,
     has_reason,
+    has_set_off,
     on_crosswalk_since,
     ran_red,
     same_road,
@@ -82,6 +83,7 @@ from bridgegen.conflict._limits import (
     ASIDE,
     BRAKING,
     COMFORT,
+    DOUBTS,
     EVIDENT_EVERY,
     HARD,
     HORIZON,
@@ -99,6 +101,8 @@ from bridgegen.conflict._limits import (
 from bridgegen.conflict._type_kernels import strikes_with_front, turns
 from bridgegen.ego._claims import SIREN
 from bridgegen.ego._kind_tables import IS_ANIMAL, IS_CYCLE, IS_PEDESTRIAN, IS_VULNERABLE
+from bridgegen.ego.kinds import BUS
+from bridgegen.ego.lamps import HAZARD, LEFT, RIGHT
 
 
 @kernel
@@ -115,9 +119,14 @@ def judge(scene, e, k, at, kind, own, own_part, appears, whole, real):
     if stands > risk + 1:  # a moving body is a risk only once the two are near in time, or it stops
         since = max(risk, min(stands, k - int(HORIZON / scene.dt)))
     seen = since
-    if kind in (CROSSING, TURNING) or IS_CYCLE[scene.kinds[e]]:
-        early = evident_since(scene, e, k, entry)
+    signal = 0
+    if kind in (SIDE_SWIPE, REAR_END_STRIKING) and scene.kinds[e] == BUS and side != 0:
+        signal = RIGHT if side > 0 else LEFT  # it leaves its stop
+    if kind in (CROSSING, TURNING) or IS_CYCLE[scene.kinds[e]] or signal > 0:
+        early = evident_since(scene, e, k, entry, signal)
         seen = min(since, early) if early < entry else since
+        if signal > 0:
+            since = seen
     level = braked(scene, 0, e, seen, seen, BRAKING)
     avoidable = real[STOOD_EGO] <= 0.0 and level == CLEAR and not appears
     if kind == HEAD_ON and not scene.near and avoidable:  # standing does not avoid oncoming traffic
@@ -146,17 +155,18 @@ def judge(scene, e, k, at, kind, own, own_part, appears, whole, real):
 
 
 @kernel
-def evident_since(scene, e, k, entry):
+def evident_since(scene, e, k, entry, signal):
     """Return the instant since which body e, in sight, is on a collision course along the routes.
 
     Both drive on at their speeds, each on its own track, and touch within `HORIZON`; without a
     break of more than `UNSURE` up to ``entry``, when e comes into the ego's way (``entry`` if they
-    do not before). From
-    one that must give way, or that runs a red light, the ego may expect that it stops, before the
-    ego's way or at its line: it is a danger once that would take more than `COMFORT`.
+    do not before). A bus that leaves its stop must show a ``signal``, see `bridgegen.ego.lamps`;
+    0: none is asked for. From one that must give way, or that runs a red light, the ego may expect
+    that it stops, before the ego's way or at its line: it is a danger once that would take more
+    than `COMFORT`, or if they would touch within `DOUBTS`.
 
     Source: of the trust in others: StVO § 1 and the case law on it (Vertrauensgrundsatz); IEEE
-    2846-2022, reasonably foreseeable behaviour.
+    2846-2022, reasonably foreseeable behaviour. Of buses: StVO § 20 (5).
     """
     line = ran_red(scene, e, k, k)
     expected = scene.claims[e] > 0 or line >= 0
@@ -167,18 +177,28 @@ def evident_since(scene, e, k, entry):
     while i >= begin:
         v = scene.v[e, i]
         left = stops_at - scene.gone[e, i]
-        if (expected and v * v <= 2.0 * COMFORT * left) or hidden(scene, e, i):
+        if hidden(scene, e, i) or (signal > 0 and not shows(scene, e, i, signal)):
             break
         time = time_along_paths(
             scene.half, scene.x, scene.y, scene.c, scene.s, scene.v, scene.gone, e, i, scene.n,
             scene.n, HORIZON,
         )  # fmt: skip
+        if expected and time > DOUBTS and v * v <= 2.0 * COMFORT * left:
+            break
         if time < math.inf:
             since = i
         elif (since - i) * scene.dt > UNSURE:
             break
         i -= every
     return since
+
+
+@kernel
+def shows(scene, e, k, signal):
+    """Return whether body e, which moves, indicates to that side alone at instant k."""
+    if not len(scene.lamps) or scene.v[e, k] <= STANDS:
+        return False
+    return scene.lamps[e, k] & HAZARD == signal
 
 
 @kernel
@@ -341,6 +361,8 @@ def of_striking(scene, e, k, risk, since, side, late, stands, avoidable, whole):
     if side != 0 and not moved and not mine:
         begins, _ = entered(scene, 0, e, k, 0.0)  # UN R157: the bodies overlap across the way
         begins = visible_from(scene, e, begins, k)
+        if scene.kinds[e] == BUS:  # it is to be let go, see `evident_since`
+            begins = min(begins, since)
         could = braked(scene, 0, e, begins, begins, BRAKING) == CLEAR
         whole[DECIDED], whole[PREVENTABLE] = begins, could
         if could:
@@ -409,16 +431,17 @@ def of_crossing(scene, e, k, own, risk, avoidable, whole):
     since, _ = entered(scene, e, 0, k, 0.0)
     it_could = braked(scene, e, 0, since, since, COMFORT) != COLLIDES
     ego_could = braked(scene, 0, e, risk, risk, COMFORT) != COLLIDES
-    if it_could and not ego_could:
+    claim = scene.claims[e]
+    front = own in (FRONT, FRONT_LEFT, FRONT_RIGHT)
+    if it_could and not ego_could and not (claim < 0 and avoidable and front):
         whole[DECIDED] = since
         return OTHER, JUNCTION_OCCUPIED
     if ego_could and not it_could:
         return EGO, JUNCTION_OCCUPIED
-    claim = scene.claims[e]
     if claim == -SIREN:
         return of_siren(scene, e, k, whole)
-    if claim < 0 and not avoidable and own not in (FRONT, FRONT_LEFT, FRONT_RIGHT):
-        return NEITHER, REVEALED_LATE  # struck as it had all but passed, by one that sped up
+    if claim < 0 and not avoidable and not front and has_set_off(scene, e, k):
+        return NEITHER, REVEALED_LATE  # struck as it had all but passed, by one that had waited
     if claim != 0:
         return (OTHER if claim > 0 else EGO), rule_of(claim)
     mine, its = turns(scene.c, scene.s, e, scene.first, scene.n, k, scene.dt)

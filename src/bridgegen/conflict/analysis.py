@@ -24,7 +24,6 @@ _DIRECTION = np.array(
 """The direction of the force by `Zone`; a corner counts as its end."""
 
 
-_FRONT = (Zone.FRONT, Zone.FRONT_LEFT, Zone.FRONT_RIGHT)
 _BY_OTHERS = (
     ConflictType.REAR_END_STRUCK,
     ConflictType.SIDE_SWIPE,
@@ -59,7 +58,8 @@ class Conflicts:
         decided: ``(N, E)`` instant at which the risk arose that decides on responsibility.
         zone_ego: ``(N, E)`` of `Zone`, on the ego.
         zone_other: ``(N, E)`` of `Zone`, on the other.
-        leads_ego: ``(N, E)`` bool: the ego's zone is at the end that is ahead as it drives.
+        leads_ego: ``(N, E)`` bool: they meet at the end of the ego that is ahead as it drives, or
+            at its side within 15 % of its length from there.
         preventable: ``(N, E)`` bool: the careful driver of UN R157, Annex 3 (0.75 s, 0.774 g, or
             what the tyres give on this road), braking on the ego's path since the other was
             visibly in its way (or since the vehicle ahead braked), would have avoided the contact,
@@ -205,6 +205,7 @@ def _of_one_body(rollout: Rollout) -> Conflicts:
     friction = rollout.friction if rollout.friction.size else np.full(n, np.inf)
     lines = rollout.stop_lines if rollout.stop_entities.size else np.zeros((n, 0, 3))
     lights = rollout.lights if len(rollout.lights) else np.zeros((n, 0, 0), np.int8)
+    lamps = rollout.lamps if len(rollout.lamps) else np.zeros((n, 0, 0), np.int8)
     kinds = rollout.kinds if rollout.kinds.size else np.zeros(e, np.int64)
     kernels.analyse_rows(
         moving.half, np.ascontiguousarray(kinds, dtype=np.int64), moving.x, moving.y,
@@ -214,10 +215,10 @@ def _of_one_body(rollout: Rollout) -> Conflicts:
         np.ascontiguousarray(friction),
         np.ascontiguousarray(rollout.stop_entities, dtype=np.int64),
         np.ascontiguousarray(rollout.stop_lights, dtype=np.int64), np.ascontiguousarray(lines),
-        np.ascontiguousarray(lights, dtype=np.int8), _is_routed(rollout), np.empty((e, t)), whole,
+        np.ascontiguousarray(lights, dtype=np.int8), np.ascontiguousarray(lamps, dtype=np.int8),
+        _is_routed(rollout), np.empty((e, t)), whole,
         real,
     )  # fmt: skip
-    leads_ego = whole[:, :, codes.ZONE_EGO].copy()
     if moving.reverses is not None:
         _turn_round(whole, moving.reverses)
     ok = np.asarray(rollout.status) == 0
@@ -256,7 +257,7 @@ def _of_one_body(rollout: Rollout) -> Conflicts:
     found |= {name: real[:, :, column] for name, column in numbers.items()}
     return Conflicts(
         names=rollout.names, time_step=rollout.time_step, **found,
-        leads_ego=np.isin(leads_ego, _FRONT),
+        leads_ego=whole[:, :, codes.LEADS_EGO] > 0,
         preventable=whole[:, :, codes.PREVENTABLE] > 0,
         severity=np.where(touched, potential, 0.0), potential=potential,
         delta_v_ego=np.where(touched, dv_ego, 0.0), delta_v_other=np.where(touched, dv_other, 0.0),

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from bridgegen.arrays import Int
+from bridgegen.arrays import Bool, Int
 from bridgegen.conflict import severity as injury
 from bridgegen.conflict._limits import (
     CLEAR_ZONE,
@@ -54,7 +54,7 @@ def with_violations(rollout: Rollout, found: Conflicts) -> Conflicts:
     leavings, begins = np.full((n, kernels.LEAVINGS), -1), np.zeros(n, dtype=np.int64)
     passings = np.full((n, e, kernels.PASSINGS), -1)
     over, beside = np.zeros((n, 1)), np.zeros((n, e, 2))
-    others = ((found.kind >= NEAR_MISS) & ~found.at_fault).any(axis=1)
+    others: Bool = np.any((found.kind >= NEAR_MISS) & ~found.at_fault, axis=1)
     while rows.size:
         kernels.find_rows(
             rows, rollout.corridors, rollout.corridor_of, moving.half, kinds, rollout.x, rollout.y,

@@ -250,8 +250,9 @@ def _counted(one: "EntryResult") -> str:
     if not failed and not lost:
         return "pass" if n == 1 else f"pass ({n})"
     parts = ([f"{failed} of {n} fail"] if failed else []) + ([f"{lost} not run"] if lost else [])
-    mitigated = one.outcomes()["mitigated"]
-    parts += [f"{mitigated} mitigated"] if mitigated else []
+    _, slowed, unslowed = one.outcomes().values()
+    if slowed + unslowed:
+        parts.append(f"{slowed + unslowed} collide, {slowed} after slowing down")
     return ", ".join(parts)
 
 

@@ -59,9 +59,12 @@ def outcomes(results: Sequence[EntryResult]) -> str:
     if number["avoided"] == n:
         return ""
     hit = [one for each in results for one in each.rows if one.outcome in OUTCOMES[1:]]
-    worst = max(one.impact_speed for one in hit)
-    shares = ", ".join(f"{number[one]:,} {one} ({number[one] / n:.1%})" for one in OUTCOMES)
-    return f"Collisions: {shares}; fastest impact {worst:.1f} m/s"
+    speeds = [one.impact_speed for one in hit]
+    mean, slowed = sum(speeds) / len(speeds), number["mitigated"]
+    return (
+        f"Collisions: {len(hit):,} of {n:,} ({len(hit) / n:.1%}), {slowed:,} of them after slowing "
+        f"down; impact {mean:.1f} m/s on average, {max(speeds):.1f} m/s at most"
+    )
 
 
 def points(results: Sequence[EntryResult]) -> str:

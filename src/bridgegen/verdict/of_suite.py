@@ -101,7 +101,9 @@ def figures_of(suite: SuiteRun) -> dict[str, float]:
 def _all_pass(suite: SuiteRun, ego: str) -> Outcome:
     results = suite.of_ego(ego)
     number = counts(results)
-    details = ", ".join(f"{count} {name}" for name, count in number.items())
+    total = sum(number.values())
+    details = f"{number['failed']} of {total} fail, {number['passed']} pass"
+    details += f", {number['not run']} not run" if number["not run"] else ""
     standing = suite.known_failures.counts(results)
     known = sum(standing[one] for one in EXCUSED)
     if known:
@@ -114,7 +116,7 @@ def _all_pass(suite: SuiteRun, ego: str) -> Outcome:
         verdict = "failed"
     elif number["not run"] or not number["passed"] + known:
         verdict = "unknown"
-    test = "all variations pass" + (" but known failures" if suite.known_failures.failures else "")
+    test = "variations" + (" but known failures" if suite.known_failures.failures else "")
     return Outcome(test + (f" with {ego}" if ego else ""), verdict, details)
 
 

@@ -55,7 +55,7 @@ function resultCell(result) {
   if (!result) return ["–"];
   const words = element("span", { class: result.excused ? "excused" : { f: "failed", n: "lost", p: "passed" }[result.v] }, verdictWords(result));
   const more = result.blameless ? element("small", { title: "others are responsible, or their motion is implausible" }, `${counted(result.blameless)} blameless collision${result.blameless > 1 ? "s" : ""}`) : "";
-  const hits = result.hits ? element("small", {}, `${counted(result.hits[0])} mitigated, ${counted(result.hits[1])} not avoided`) : "";
+  const hits = result.hits ? element("small", {}, `${counted(result.hits[0] + result.hits[1])} collide, ${counted(result.hits[0])} of them after slowing down`) : "";
   const standing = result.standing ? element("small", { class: result.excused ? "" : "failed", title: result.comment }, result.standing) : "";
   return [words, bar(result.n), standing, hits, more];
 }
