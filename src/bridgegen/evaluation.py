@@ -8,7 +8,7 @@ import numpy.typing as npt
 
 from bridgegen.arrays import Bool, Float, Int
 from bridgegen.conflict import quantities
-from bridgegen.conflict.analysis import NO_CONFLICT, Conflicts, analyse
+from bridgegen.conflict.analysis import NO_CONFLICT, VIOLATION, Conflicts, analyse
 from bridgegen.conflict.findings import KINDS, Findings
 from bridgegen.conflict.harm import NEAR_MISS, Count, decisive
 from bridgegen.conflict.place import place_on_route
@@ -119,9 +119,15 @@ class Trials:
 
     @property
     def harmful(self) -> Bool:
-        """``(N,)`` bool: a collision or near miss of the ego's."""
+        """``(N,)`` bool: a collision, near miss or violation of the ego's."""
         harmful: Bool = self.ok & (self.harm >= NEAR_MISS)
         return harmful
+
+    @property
+    def avoidable(self) -> list[bool | None]:
+        """``preventable`` of N rows; None of a violation, of which it is not asked."""
+        pairs = zip(self.preventable.tolist(), self.findings.conflict, strict=True)
+        return [None if conflict == KINDS[VIOLATION] else one for one, conflict in pairs]
 
     @classmethod
     def of(cls, rollout: Rollout, roads: Network, which: Int, harm: str, count: Count) -> "Trials":

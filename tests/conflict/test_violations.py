@@ -25,6 +25,9 @@ from bridgegen.conflict.sentences import sentence
 from bridgegen.conflict.severity import FRONT, severity
 from bridgegen.conflict.summary import summarise
 from bridgegen.ego.kinds import BICYCLE, CAR, OTHER, PEDESTRIAN
+from bridgegen.odd.reader import load
+from bridgegen.options import PipelineOptions
+from bridgegen.pipeline import Pipeline
 
 HALF, FAR = 1.75, 5.25  # m, from the route to the border of the ego's lane; to the left edge
 
@@ -41,7 +44,12 @@ def corridor(edges=(FAR, HALF), lanes=(HALF, HALF), town=1.0):
 def aside(track, course, metres, v=10.0, **more):
     """An ego that moves to its left by so much from 2 s to 3 s, and stays there."""
     ego = track(v=v, **more)
-    ego["y"] = ego["y"] + course((0.0, 0.0), (2.0, 0.0), (3.0, metres), (6.0, metres))
+    return led(ego, course((0.0, 0.0), (2.0, 0.0), (3.0, metres), (6.0, metres)))
+
+
+def led(ego, y):
+    """An ego at y of the route, which its offset says."""
+    ego["y"] = ego["offset"] = y
     return ego
 
 
@@ -57,7 +65,7 @@ def turned(rollout, angle, mirrored=False):
     y = side * rollout.y
     return replace(
         rollout, x=c * rollout.x - s * y, y=s * rollout.x + c * y, h=side * rollout.h + angle,
-        corridors=table,
+        offset=side * rollout.offset, corridors=table,
     )  # fmt: skip
 
 
@@ -146,17 +154,15 @@ def test_lanes_of_one_way_and_the_room_of_a_junction(track, meeting, course):
 )
 def test_passing_what_is_in_the_lane_is_no_departure(track, meeting, course, x, y, v, excused):
     ego = track(v=10.0)
-    ego["y"] = course((0.0, 0.0), (2.0, 0.0), (3.0, 2.5), (6.0, 2.5))
+    led(ego, course((0.0, 0.0), (2.0, 0.0), (3.0, 2.5), (6.0, 2.5)))
     found = analyse(meeting(ego, track(x=x, y=y, v=v), **corridor()))
     assert (found.kind[0, 0] == 0) == excused
 
 
 def test_after_an_excused_departure_the_next_one_counts(track, meeting, course):
     ego = track(v=10.0, t=9.0)
-    ego["y"] = course(
-        (0.0, 0.0), (1.0, 0.0), (2.0, 2.5), (4.0, 2.5), (5.0, 0.0), (7.0, 0.0), (8.0, 2.5),
-        (9.0, 2.5),
-    )  # fmt: skip
+    led(ego, course((0.0, 0.0), (1.0, 0.0), (2.0, 2.5), (4.0, 2.5), (5.0, 0.0), (7.0, 0.0),
+                    (8.0, 2.5), (9.0, 2.5)))  # fmt: skip
     found = analyse(meeting(ego, track(x=30.0, y=-1.0, t=9.0), **corridor()))
     assert found.type[0, 0] == ConflictType.LANE_DEPARTURE
     assert found.decided[0, 0] * found.time_step > 7.0
@@ -302,3 +308,43 @@ def test_parts_of_a_batch_keep_their_own_corridors(track, meeting, course):
 def test_an_obstacle_is_no_party(track, meeting):
     rollout = meeting(track(v=8.0), track(x=25.0, y=-1.7), kinds=[CAR, OTHER], **corridor())
     assert (analyse(rollout).kind != VIOLATION).all()
+
+
+# Widths of lanes and shoulders are those of the scenarios' files; right-hand traffic.
+@pytest.mark.parametrize(
+    ("name", "expected"),
+    [
+        # two lanes of 3.75 m between shoulders of 2.5 m; the ego is on the right lane; 130 km/h
+        ("cut-in", {(5.625, 1.875, 8.125, 4.375, 0.0)}),
+        # one lane of 3.5 m each way, shoulders of 2.3 m; 50 km/h
+        ("cyclist-swings-out", {(1.75, 1.75, 7.55, 4.05, 1.0)}),
+        # the inner of two lanes of 3.5 m on each leg, and one through the junction
+        ("left-across-path", {(1.75, 5.25, 8.75, 5.25, 1.0), (1.75, 1.75, np.inf, np.inf, 1.0)}),
+    ],
+)
+def test_the_room_beside_routes_of_the_catalogue(name, expected):
+    scenario = load(name)
+    pipeline = Pipeline(scenario, scenario.space(), PipelineOptions(ego="route-follower"))
+    fixed = {"lane_width": 3.75 if name == "cut-in" else 3.5}
+    middle = pipeline.space.decode(np.full((1, pipeline.space.n_var), 0.5))[0]
+    x = [fixed.get(one, value) for one, value in zip(pipeline.space.names, middle, strict=True)]
+    roads, _ = pipeline._roads_of(np.array([x]))
+    table = roads.corridors([0])[0]
+    assert {tuple(row) for row in table[:, 3:].round(6).tolist()} == expected
+
+
+def test_slides_are_found_and_lane_changes_are_none():
+    """Where the bend behind the junction is slid through, harm is 0.3 or more in each row."""
+    rng = np.random.default_rng(5)
+    for name, ego in (("pedestrian-at-night", "route-follower"), ("cut-out", "reference")):
+        scenario = load(name)
+        pipeline = Pipeline(scenario, scenario.space(), PipelineOptions(ego=ego))
+        rollout = pipeline.rollout(pipeline.space.decode(rng.random((60, pipeline.space.n_var))))
+        there = np.arange(rollout.shape[2]) < rollout.n_steps[:, np.newaxis]
+        off = np.abs(np.where(there, rollout.offset[:, 0], 0.0)).max(axis=1) > 1.75
+        found = analyse(rollout)
+        assert off.sum() > 10
+        if ego == "reference":
+            assert (found.kind[:, 0] == 0).all()
+        else:
+            assert (decisive(found)[1][off] >= NEAR_MISS).all()

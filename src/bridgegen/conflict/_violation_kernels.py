@@ -17,7 +17,7 @@ from bridgegen.conflict._limits import (
     WALKING_PACE,
 )
 from bridgegen.ego._kind_tables import IS_PEDESTRIAN, NEEDS_ROOM
-from bridgegen.ego.lane_tables import EDGES, HEADING, LANES, TOWN
+from bridgegen.ego.lane_tables import EDGES, HEADING, LANES, STRAYS, TOWN
 
 AT, WORST, ROAD, SIDE, SAMPLE, END = range(6)
 LEAVINGS = 6
@@ -77,7 +77,7 @@ def beside(corridor, i, x, y):
 
 
 @kernel
-def leaving(corridor, x, y, c, s, v, half_width, begin, until, whole, real):
+def leaving(corridor, x, y, c, s, v, offset, half_width, begin, until, whole, real):
     """Find the ego's first departure from an instant on; ``whole`` keeps -1 if there is none.
 
     Its rear axle counts, with both wheels: what the body sweeps beside it in a turn is no fault.
@@ -86,6 +86,11 @@ def leaving(corridor, x, y, c, s, v, half_width, begin, until, whole, real):
     """
     n, i, worst = samples(corridor), -1, -math.inf
     for k in range(begin, until if n else 0):
+        if abs(offset[k]) <= STRAYS:
+            if whole[AT] >= 0:
+                return
+            i = -1
+            continue
         i = nearest(corridor, n, x[k], y[k], i)
         if i == 0 or i == n - 1:  # before or behind the route
             continue
@@ -124,15 +129,15 @@ def passing(corridor, half, kinds, e, x, y, c, s, v, distance, dt, until, whole,
     or that with which it drew level where the other moved over then; and the speed by which the ego
     was faster [m/s]. ``x``, ``y`` are centres.
     """
-    n, level, entry, own, early = samples(corridor), -1, 0.0, 0.0, False
+    n, level, entry, own, early, i = samples(corridor), -1, 0.0, 0.0, False, -1
     reach = half[0, 0] + half[e, 0]
     for k in range(until if n else 0):
         dx, dy = x[e, k] - x[0, k], y[e, k] - y[0, k]
         ahead = dx * c[0, k] + dy * s[0, k]
         if abs(ahead) > reach or not distance[k] < math.inf:
-            level = -1
+            level, i = -1, -1
             continue
-        i = nearest(corridor, n, x[e, k], y[e, k], -1)
+        i = nearest(corridor, n, x[e, k], y[e, k], i)
         its = beside(corridor, i, x[e, k], y[e, k])
         cosine = c[0, k] * c[e, k] + s[0, k] * s[e, k]
         faster = v[0, k] - v[e, k] * cosine
@@ -157,8 +162,8 @@ def passing(corridor, half, kinds, e, x, y, c, s, v, distance, dt, until, whole,
 
 @kernel
 def find_rows(
-    rows, corridors, corridor_of, half, kinds, rear_x, rear_y, x, y, c, s, v, distance, dt,
-    begins, until, leavings, over, passings, clearances,
+    rows, corridors, corridor_of, half, kinds, rear_x, rear_y, x, y, c, s, v, offset,
+    distance, dt, begins, until, leavings, over, passings, clearances,
 ):  # fmt: skip
     """Fill the departures ``(N, LEAVINGS)`` and passes ``(N, E, PASSINGS)`` of some rows.
 
@@ -167,7 +172,8 @@ def find_rows(
     for i in rows:
         corridor = corridors[corridor_of[i]]
         leaving(
-            corridor, rear_x[i, 0], rear_y[i, 0], c[i, 0], s[i, 0], v[i, 0], half[0, 1], begins[i],
+            corridor, rear_x[i, 0], rear_y[i, 0], c[i, 0], s[i, 0], v[i, 0],
+            offset[i, 0], half[0, 1], begins[i],
             until[i], leavings[i], over[i],
         )  # fmt: skip
         for e in range(1, x.shape[1]):

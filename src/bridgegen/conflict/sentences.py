@@ -95,9 +95,9 @@ def _event(conflicts: Conflicts, row: int, other: int, name: str) -> str:
         aside, v = conflicts.aside[row, other], conflicts.v_ego[row, other]
         if kind == ConflictType.CLOSE_PASS:
             return f"The ego passed {name} at {v:.1f} m/s, {aside:.2f} m beside it"
-        left = "road" if kind == ConflictType.ROAD_DEPARTURE else "lane"
+        left = "the road" if kind == ConflictType.ROAD_DEPARTURE else "its lane"
         side = "left" if aside > 0.0 else "right"
-        return f"The ego left its {left} by {abs(aside):.1f} m to the {side} at {v:.1f} m/s"
+        return f"The ego left {left} by {abs(aside):.1f} m to the {side} at {v:.1f} m/s"
     if conflicts.kind[row, other] == NEAR_MISS:
         return (
             f"The {mine} came within {conflicts.ttc[row, other]:.1f} s of the {its} of {name} "

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from math import isfinite
 from typing import Any, Self
 
-from bridgegen.conflict.analysis import COURSE, NEAR_MISS, Conflicts
+from bridgegen.conflict.analysis import COURSE, NEAR_MISS, VIOLATION, Conflicts
 from bridgegen.conflict.findings import KINDS
 from bridgegen.conflict.harm import Count, decisive, harm_of_pairs
 from bridgegen.conflict.sentences import avoidance, sentence
@@ -42,7 +42,8 @@ class ConflictSummary:
         rule_source: source of the rule.
         zone_ego: edge or corner of the ego that meets the other.
         zone_other: of the other.
-        preventable: whether the careful driver of UN R157 would have avoided it.
+        preventable: whether the careful driver of UN R157 would have avoided it; None of a
+            violation.
         time: of contact, or of the least time to collision [s].
         decided: when the risk arose that decides on responsibility [s].
         left: from then to the contact, or the predicted one [s].
@@ -74,7 +75,7 @@ class ConflictSummary:
     rule_source: str
     zone_ego: str
     zone_other: str
-    preventable: bool
+    preventable: bool | None
     time: float
     decided: float
     left: float
@@ -186,7 +187,7 @@ def of_pair(conflicts: Conflicts, row: int, other: int, count: Count = "ego") ->
         rule_source=RULES[rule][1],
         zone_ego=Zone(conflicts.zone_ego[row, other]).label if happened else "",
         zone_other=Zone(conflicts.zone_other[row, other]).label if happened else "",
-        preventable=bool(conflicts.preventable[row, other]),
+        preventable=None if kind == VIOLATION else bool(conflicts.preventable[row, other]),
         time=round(number("instant") * conflicts.time_step, 9),
         decided=round(number("decided" if happened else "instant") * conflicts.time_step, 9),
         needed_deceleration=number("needed"),

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from bridgegen.arrays import Int
+from bridgegen.arrays import Bool, Int
 from bridgegen.conflict import severity as injury
 from bridgegen.conflict._limits import (
     CLEAR_ZONE,
@@ -25,11 +25,12 @@ from bridgegen.conflict.analysis import CONTACT, COURSE, NEAR_MISS, VIOLATION, C
 from bridgegen.conflict.types import ConflictType, Responsible, Rule
 from bridgegen.ego.kinds import CAR, OTHER
 from bridgegen.ego.lane_tables import EDGES, HEADING, LANES
+from bridgegen.metrics.metric import recorded
 from bridgegen.metrics.motion import Motion, motion
 from bridgegen.simulation.rollout import Rollout
 
 _CHANGED = (
-    "kind", "type", "responsible", "rule", "instant", "decided", "preventable", "v_ego", "v_other",
+    "kind", "type", "responsible", "rule", "instant", "decided", "v_ego", "v_other",
     "aside", "breach", "potential",
 )  # fmt: skip
 
@@ -53,15 +54,21 @@ def with_violations(rollout: Rollout, found: Conflicts) -> Conflicts:
     leavings, begins = np.full((n, kernels.LEAVINGS), -1), np.zeros(n, dtype=np.int64)
     passings = np.full((n, e, kernels.PASSINGS), -1)
     over, beside = np.zeros((n, 1)), np.zeros((n, e, 2))
+    others: Bool = np.any((found.kind >= NEAR_MISS) & ~found.at_fault, axis=1)
     while rows.size:
         kernels.find_rows(
             rows, rollout.corridors, rollout.corridor_of, moving.half, kinds, rollout.x, rollout.y,
-            moving.x, moving.y, moving.cosine, moving.sine, moving.v, moving.distance,
+            moving.x, moving.y, moving.cosine, moving.sine, moving.v,
+            recorded(rollout, "offset"), moving.distance,
             rollout.time_step, begins, np.minimum(touch, moving.n_steps), leavings, over, passings,
             beside,
         )  # fmt: skip
         # What comes after a departure that is excused is looked at, too.
-        left = rows[(leavings[rows, kernels.AT] >= 0) & found.ok[rows]].tolist()
+        out = leavings[rows]
+        place = rollout.corridors[rollout.corridor_of[rows], out[:, kernels.SAMPLE]]
+        passes = (out[:, kernels.ROAD] == 0) & np.isfinite(place[:, EDGES]).all(axis=1)
+        may = (out[:, kernels.AT] >= 0) & found.ok[rows] & (passes | others[rows])
+        left = rows[may].tolist()
         excused = [_is_excused(rollout, found, moving, row, leavings[row]) for row in left]
         rows = np.array(left, dtype=np.int64)[np.array(excused, dtype=np.bool_)]
         begins[rows] = leavings[rows, kernels.END]
@@ -105,7 +112,7 @@ def with_violations(rollout: Rollout, found: Conflicts) -> Conflicts:
 
 def _put(arrays: dict[str, Any], at: tuple[Int, Int], **values: Any) -> None:
     """Set the ego's violations at some rows and columns."""
-    values |= {"kind": VIOLATION, "responsible": Responsible.EGO, "preventable": True}
+    values |= {"kind": VIOLATION, "responsible": Responsible.EGO}
     for name, value in values.items():
         arrays[name][at] = value
 
@@ -117,7 +124,7 @@ def _is_excused(rollout: Rollout, found: Conflicts, moving: Motion, row: int, le
     c, s = moving.cosine[row, :, at], moving.sine[row, :, at]
     left = (dy * c[0] - dx * s[0]) * side  # how far towards where the ego leaves
     recent = (at - found.instant[row]) * found.time_step
-    evaded = np.isin(found.kind[row], (NEAR_MISS, CONTACT)) & ~found.at_fault[row]
+    evaded = (found.kind[row] >= NEAR_MISS) & ~found.at_fault[row]
     evaded &= (np.abs(recent) <= HORIZON) & (left < 0.0)
     if evaded.any():
         return True

@@ -8,7 +8,7 @@ import numpy as np
 
 from bridgegen.arrays import Bool, Float
 from bridgegen.campaign.scenario_files import write_scenario
-from bridgegen.conflict.analysis import analyse
+from bridgegen.conflict.analysis import encounters
 from bridgegen.conflict.harm import Count, decisive
 from bridgegen.conflict.summary import summarise
 from bridgegen.errors import StorageError
@@ -84,7 +84,7 @@ def write_most_likely(
     for number, (mode, x) in enumerate(rows.items(), 1):
         name = f"{MOST_LIKELY}{number}"
         rollout = pipeline.rollout(x[np.newaxis])
-        conflicts = analyse(rollout)
+        conflicts = encounters(rollout)
         conflict = summarise(conflicts, count=count)
         try:
             write_scenario(pipeline, x, folder, name, rollout=rollout, conflict=conflict)

@@ -144,7 +144,7 @@ class _Triage:
         self._found: dict[int, Neighbourhood] = {}
         self._as_is: AsIs = {}
         self._unrecorded = 0
-        self._preventable: dict[int, bool] = {}
+        self._preventable: dict[int, bool | None] = {}
         self._event: Float = np.zeros((0, len(EVENT)))
 
     def run(self) -> Triaged:
@@ -183,7 +183,7 @@ class _Triage:
         place = np.full(len(order), "", dtype=object)
         trials = self._pipeline.try_all(self._rows.X[self._at[first]])
         place[first] = trials.place
-        self._preventable = dict(zip(first.tolist(), trials.preventable.tolist(), strict=True))
+        self._preventable = dict(zip(first.tolist(), trials.avoidable, strict=True))
         if not len(rest):
             self._event = trials.event[np.argsort(first)]
         else:
@@ -403,7 +403,7 @@ class _Triage:
         rest = [i for i in dict.fromkeys(at) if i not in self._preventable] if self._tests else []
         if rest:
             trials = self._pipeline.try_all(self._rows.X[self._at[rest]])
-            self._preventable |= dict(zip(rest, trials.preventable.tolist(), strict=True))
+            self._preventable |= dict(zip(rest, trials.avoidable, strict=True))
         for i, near in self._found.items():
             if near.cause:
                 text = self._judgement(i, near.cause)

@@ -21,6 +21,7 @@ from bridgegen.ego.compiled import CONFLICT
 from bridgegen.ego.detections import DETECTION
 from bridgegen.ego.drivers import STAGES, STORYBOARD
 from bridgegen.ego.interface import CONFLICT_WAYS, HISTORY, NEAR_PIECES, ROUTE_POINTS, RoadMap
+from bridgegen.ego.lane_tables import STRAYS
 from bridgegen.ego.noise import noise_key
 from bridgegen.ego.traits import Traits
 from bridgegen.ego.views import frames
@@ -335,9 +336,6 @@ class Batch:
 FAR_APART = 1000.0  # [m]
 
 ALIGNED = 64  # bytes, a line of the processor's cache
-
-STRAYS = 0.2
-"""[m] beside its route, beyond which an ego may have left its lane: the narrowest have so much."""
 
 NO_DETECTIONS = np.zeros((0, 0, 0, DETECTION))
 
