@@ -192,7 +192,9 @@ def test_a_driver_without_failures_leaves_an_empty_export_and_a_bound(tmp_path, 
     assert run.triage.bound.space.high == pytest.approx(1.0 - 0.025 ** (1 / 60))
     print_summary(run, 1.0)
     out = capsys.readouterr().out
-    assert out.startswith("NO FAILURE FOUND  reference in crossroads-s1: closest: harm ")
+    assert out.startswith(
+        "NO FAILURE FOUND  reference in crossroads-s1: in 60 evaluations; closest: harm "
+    )
     assert run.verdict == "no failure found"
     assert str(run.report) in out
     assert figures_of(run)["modes"] == 0
