@@ -7,6 +7,7 @@ from rich.console import Console
 from rich.table import Table
 
 from bridgegen.screen.comparison import RunsScreen
+from bridgegen.screen.tables import WHOLE
 
 if TYPE_CHECKING:
     from bridgegen.benchmark import Benchmark, BenchmarkCallbacks
@@ -57,7 +58,7 @@ def print_benchmark(result: "Benchmark", seconds: float) -> None:
 
     console = Console(markup=False, emoji=False, highlight=False)
     if not sys.stdout.isatty():
-        console.width = 140
+        console.width = WHOLE
     table = Table(box=None, pad_edge=False, header_style="bold")
     heads = (
         "driver", "perception", "modes", "robust", "first", "severity",

@@ -8,6 +8,7 @@ from rich.console import Console
 from rich.table import Table
 
 from bridgegen.screen.live import Live
+from bridgegen.screen.tables import WHOLE
 
 if TYPE_CHECKING:
     from bridgegen.comparison import Comparison, ComparisonCallbacks
@@ -78,7 +79,7 @@ def print_comparison(comparison: "Comparison", seconds: float) -> None:
     plan = comparison.plan
     console = Console(markup=False, emoji=False, highlight=False)
     if not sys.stdout.isatty():
-        console.width = 120
+        console.width = WHOLE
     for scenario in plan.scenarios:
         console.print(f"\n{scenario}, {plan.budget} evaluations a run, medians over the runs")
         if scenario in comparison.measured:

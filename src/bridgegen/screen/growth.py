@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING
 from rich.console import Console
 from rich.table import Table
 
+from bridgegen.screen.tables import WHOLE
+
 if TYPE_CHECKING:
     from bridgegen.suite.growth import Addition
     from bridgegen.suite.replay import Replayed
@@ -41,7 +43,7 @@ def print_additions(made: "Sequence[Addition]", to: Path, *, as_json: bool = Fal
         table.add_row(one.source, outcome, "\n".join(filter(None, (failure, one.reason))))
     console = Console(markup=False, emoji=False, highlight=False)
     if not sys.stdout.isatty():
-        console.width = 160
+        console.width = WHOLE
     if made:
         console.print(table)
         print()

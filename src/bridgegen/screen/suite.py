@@ -11,6 +11,7 @@ from rich.console import Console
 from rich.table import Table
 
 from bridgegen.screen.live import Live
+from bridgegen.screen.tables import WHOLE
 
 if TYPE_CHECKING:
     from bridgegen.preventability import PreventabilityMap
@@ -110,7 +111,7 @@ def print_suite(
             table.add_row(name, *(_verdict(suite, one) for one in some), _worst(some))
     console = Console(markup=False, emoji=False, highlight=False)
     if not sys.stdout.isatty():
-        console.width = 160
+        console.width = WHOLE
     console.print(table)
     if len(by_entry) > len(listed):
         print(f"and {len(by_entry) - len(listed)} more")
@@ -193,7 +194,7 @@ def print_difference(
         table.add_row(name, *(str(count) for count in of_it.values()))
     console = Console(markup=False, emoji=False, highlight=False)
     if not sys.stdout.isatty():
-        console.width = 160
+        console.width = WHOLE
     if changed:
         console.print(table)
         print()

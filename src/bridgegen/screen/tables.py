@@ -13,6 +13,9 @@ from rich.table import Table
 if TYPE_CHECKING:
     from bridgegen.odd.scenario import ParameterLine
 
+WHOLE = 10_000
+"""Width of a console that writes to a file or a pipe: nothing is wrapped there."""
+
 LEAST = 24
 """The fewest characters that a line of a wrapped column holds."""
 
