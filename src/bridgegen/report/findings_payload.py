@@ -86,6 +86,7 @@ def triage_payload(found: Triage) -> dict[str, Any]:
         "judged": {one.evaluation: one.judgement for one in found.neighbourhoods if one.judgement},
         "bound": {
             "sentence": found.bound.in_full,
+            "judged": found.bound.judged,
             "evaluations": found.bound.evaluations,
             "failed": found.bound.failed,
             "implausible": found.bound.implausible,

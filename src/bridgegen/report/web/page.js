@@ -31,7 +31,7 @@ function playNearest() {
   const nearest = nearestToHarm();
   hideScenario(nearest === null);
   $("no-scenarios").hidden = nearest !== null; // the verdict says it
-  $("no-scenarios").textContent = `Nothing critical was found${data.summary.finished ? "" : " yet"}.`;
+  $("no-scenarios").textContent = `No scenario is critical${data.summary.finished ? "" : " yet"}.`;
   $("kept").classList.add("alone");
   $("list").hidden = true;
   if (nearest !== null) return void begin(new Opener(hook));
