@@ -17,6 +17,7 @@ from bridgegen.risk.experiment import Experiment
 from bridgegen.risk.ledger import BATCHES
 from bridgegen.risk.outcomes import Column, outcomes
 from bridgegen.risk.risk import RiskCallbacks, estimate_risk
+from bridgegen.risk.text import number
 
 SCENARIO, DRIVER = "crossroads-s1", "route-follower"
 GIVEN = {"ego": DRIVER, "exposure": "uniform", "method": "mc", "precision": 0.0, "budget": 1200}
@@ -330,3 +331,8 @@ def test_the_check_counts_other_rows(tmp_path):
     same = np.isin(found.check.Z[:, 0], found.weighted.Z[:, 0])
     assert len(same)
     assert not same.any()
+
+
+def test_numbers_in_words_also_beyond_all_numbers():
+    assert [number(one) for one in (0.0, 0.25, 1.5e-7, 2e5)] == ["0", "0.25", "1.50e-7", "2.00e5"]
+    assert number(1e308 * 10.0) == "beyond 1e308"

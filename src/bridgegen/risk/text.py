@@ -1,5 +1,7 @@
 """A risk in words."""
 
+from math import isfinite
+
 from bridgegen.exposure.rates import Rate
 from bridgegen.risk.data import DataBand
 from bridgegen.risk.elsewhere import Elsewhere, Ratio
@@ -9,9 +11,14 @@ from bridgegen.risk.result import Risk
 
 
 def number(value: float) -> str:
-    """Return a number with three digits; small ones with a power of ten."""
+    """Return a number with three digits; small ones with a power of ten.
+
+    A rate per unit so short that it exceeds all numbers is "beyond 1e308".
+    """
     if value == 0.0:
         return "0"
+    if not isfinite(value):
+        return "beyond 1e308"
     if 1e-3 <= value < 1e4:
         return f"{value:.3g}"
     digits, power = f"{value:.2e}".split("e")
