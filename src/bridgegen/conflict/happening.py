@@ -263,7 +263,7 @@ class Happening:
         near: the participants: where the ego came near each.
         end: where the ego reached the end of its route; None where this is unknown.
         stuck: how many egos are stuck; None where this is unknown.
-        behind: whom most of these stand behind; "" if nobody.
+        behind: the participant that most of these stand behind; "" if there is none.
         driven: [m] that they drove, the median; NaN without any.
         left: [m] that was left of their routes.
         domain: a sentence if the ego's driver says that it is not made for this scenario, else "".
@@ -324,7 +324,9 @@ class Happening:
         ]
         if self.near and all(one.value < SELDOM for one in self.near):
             most = max(self.near, key=lambda one: one.rows)
-            found.append(f"nobody came near the ego but in {most.rows} of {most.of} evaluations")
+            found.append(
+                f"no participant came near the ego in more than {most.rows} of {most.of} evaluations"
+            )
         if self.stuck is not None and self.stuck > MOSTLY * self.rows:
             found.append(self.stuck_in_words)
         return tuple(found)
