@@ -324,9 +324,8 @@ class Happening:
         ]
         if self.near and all(one.value < SELDOM for one in self.near):
             most = max(self.near, key=lambda one: one.rows)
-            found.append(
-                f"no participant came near the ego in more than {most.rows} of {most.of} evaluations"
-            )
+            rows = f"{most.rows} of {most.of} evaluations"
+            found.append(f"no participant came near the ego in more than {rows}")
         if self.stuck is not None and self.stuck > MOSTLY * self.rows:
             found.append(self.stuck_in_words)
         return tuple(found)
