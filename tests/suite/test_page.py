@@ -106,7 +106,7 @@ def test_the_failed_variations_are_first_and_keep_their_numbers():
     one = result("a", rows=rows, parameters=["speed"], units=["m/s"])
     found = payload(suite_of(one), {}, {})["suite"]
     assert found["entries"][0]["results"] == [
-        {"v": "f", "n": [1, 2, 1], "problem": "it diverges", "severity": 0.1,
+        {"v": "f", "n": [1, 2, 1, 0], "problem": "it diverges", "severity": 0.1,
          "conflict": ["", "", ""]}
     ]  # fmt: skip
     details = unpacked(found["details"][0])["results"][0]
