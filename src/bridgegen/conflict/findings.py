@@ -33,7 +33,7 @@ def why_unjudged(implausible: str, unsafe_start: bool) -> str:
         implausible: why its traffic could not happen, or "".
         unsafe_start: see `is_unsafe_start`.
     """
-    return f"implausible traffic: {implausible}" if implausible else UNSAFE if unsafe_start else ""
+    return f"implausible traffic ({implausible})" if implausible else UNSAFE if unsafe_start else ""
 
 
 def with_whom(conflict: str, partner: str) -> str:

@@ -23,10 +23,12 @@ class Exported:
         case: its content.
         folder: that holds its files.
         page: of it.
+        unjudged: the folders of the runs that support nothing, as they could not be judged.
     """
 
     case: SafetyCase
     folder: Path
+    unjudged: tuple[Path, ...] = ()
 
     @property
     def page(self) -> Path:
@@ -79,4 +81,5 @@ def export_safety_case(runs: Sequence[Path | str], out: Path | None = None) -> E
     write_whole(folder / FILE, [data])
     write_whole(folder / PAGE, page(case, data))
     write_whole(folder / SCRIPT, [files("bridgegen.safety_case").joinpath(SCRIPT).read_bytes()])
-    return Exported(case, folder)
+    unjudged = [one.run.folder for one in found if not one.triage.bound.judged]
+    return Exported(case, folder, tuple(unjudged))

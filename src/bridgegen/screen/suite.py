@@ -231,7 +231,7 @@ def _print_searches(searches: Sequence["WorseThan"], found: "Difference") -> Non
     print(f"\nsearches for scenarios that {found.second} fails and {found.first} passes")
     for one in searches:
         if one.problem:
-            print(f"  {one.entry}: not searched: {one.problem}")
+            print(f"  {one.entry}: no result: {one.problem}")
         elif one.worse:
             print(f"  {one.entry}: {one.sentence}")
             for title in one.modes[:MOST_MODES]:
@@ -285,7 +285,7 @@ def _worst(some: Sequence["EntryResult"]) -> str:
             texts += [f"violates {violated}"] if violated else []
             return "; ".join(texts)
     lost = [one.problem or next((r.problem for r in one.rows if r.problem), "") for one in some]
-    return next(filter(None, [*lost, *(one.unjudged for one in some)]), "")
+    return next(filter(None, [*lost, *(o.unjudged for o in some if o.verdict == "not judged")]), "")
 
 
 def _facts(suite: "SuiteRun") -> dict[str, Any]:

@@ -198,10 +198,13 @@ class EntryResult(Strict):
     @property
     def unjudged(self) -> str:
         """Why rows without a failure say nothing of the ego, as those of a run; "" if they do."""
+        if not self.rows:
+            return ""
         reasons = Counter(one.unjudged for one in self.rows if one.verdict == "not judged")
         judged, n = len(self.rows) - reasons.total(), len(self.rows)
         if few := too_few(judged, n, "variations could be judged"):
-            return f"{few}: " + ", ".join(f"{why} {n}" for why, n in reasons.most_common())
+            why = ", ".join(f"{rows} × {why}" for why, rows in reasons.most_common())
+            return f"{few}: {why}" if n > 1 else next(iter(reasons))
         happened = "; ".join(self.not_happened)
         return f"the scenario did not happen: {happened}" if happened else ""
 

@@ -25,7 +25,7 @@ FIGURES = {
     "worse": "evaluations of the searches that the second ego fails and the first passes",
     "worse_modes": "failure modes that they make up",
     "worse_scenarios": "scenarios in which a search finds any",
-    "not_searched": "scenarios whose search failed",
+    "not_searched": "scenarios whose search failed, or could not be judged",
 }
 """The figures of a difference that ``--fail-if`` accepts."""
 
