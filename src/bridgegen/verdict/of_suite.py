@@ -64,8 +64,7 @@ class SuiteCriteria(Conditions):
         figures = figures_of(suite)
         outcomes = tuple(one.judge(figures) for one in self.conditions)
         if not {"not_judged", "not_judged_entries"} & {f for one in outcomes for f in one.figures}:
-            why = unjudged_entries(suite.results)
-            outcomes = unless_judged(outcomes, why, ("entries", "variations", "not_run"))
+            outcomes = unless_judged(outcomes, unjudged_entries(suite.results))
         if not outcomes:
             outcomes = tuple(_all_pass(suite, ego) for ego in suite.egos)
         if self.junit is not None:
