@@ -6,11 +6,14 @@ from xml.etree import ElementTree
 
 import pytest
 from tests.campaign.braking import deterministic, scenario_text, write_pair
+from tests.suite.test_index import failure
 
 import bridgegen as bg
 from bridgegen.conflict.happening import Happening, Share
 from bridgegen.suite.difference import difference
+from bridgegen.suite.index import Index, write_index
 from bridgegen.suite.known_failures import KnownFailures
+from bridgegen.suite.replay import replay
 from bridgegen.suite.results import EntryResult, RowResult
 from bridgegen.suite.suite import SuiteRun, run_suite
 from bridgegen.verdict.of_difference import DifferenceCriteria
@@ -165,6 +168,20 @@ def test_an_ego_that_stands_behind_a_van_is_not_judged(cli, tmp_path):
     assert "both pass       0" in out
     assert "not comparable  9" in out
     assert "NOT JUDGED: the drivers can be compared (double-parked: none of 9 variations" in err
+
+
+def test_a_kept_failure_passes_where_the_ego_stops_for_what_it_hit(tmp_path):
+    """A file of a collision with what stands: stopping behind it is what the fix is for."""
+    out = tmp_path / "out"
+    run_suite(DOUBLE_PARKED, samples=0, out=out, workers=1)
+    (file,) = [one for one in replay(out, "double-parked", 1).files if one.suffix == ".xosc"]
+    alone = run_suite(file, out=tmp_path / "alone", workers=1)
+    assert [one.unjudged[:48] for one in alone.results] == [
+        "the scenario did not happen: stuck in 1 of 1: st"
+    ]
+    write_index(file.parent, Index({}), {"b": failure("b", files=[file.name], status="fixed")})
+    kept = run_suite(file, out=tmp_path / "kept", workers=1)
+    assert [one.verdict for one in kept.results] == ["passed"]
 
 
 # ---- differences ----
