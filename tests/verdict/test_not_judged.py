@@ -258,8 +258,10 @@ def test_a_run_that_is_not_judged_passes_no_condition(stuck_run, tmp_path):
 def test_a_safety_case_of_a_run_that_is_not_judged_ends_with_3(cli, stuck_run, tmp_path):
     code, out, err = cli("safety-case", stuck_run.folder, "--out", tmp_path / "case")
     assert code == 3
-    assert "undeveloped" in out
-    assert f"NOT JUDGED: {stuck_run.folder} supports nothing" in err
+    status = {line.split()[0]: line.split()[1] for line in out.splitlines() if line[:1] == "G"}
+    assert (status["G1.3"], status["G1.4"]) == ("undeveloped", "undeveloped")
+    assert status["G1.5"] == "incomplete"  # although the criterion is met in each evaluation
+    assert f"NOT JUDGED: {stuck_run.folder} supports no claim on its driver: the scenario" in err
 
 
 def test_a_list_of_runs_does_not_say_that_it_has_no_failures(stuck_run):

@@ -13,8 +13,10 @@ def print_safety_case(exported: "Exported", *, as_json: bool) -> None:
     """Print the status of the goals of each run, then the files."""
     goals = [(one.id, one.status, one.statement.text) for one in exported.case.main_goals()]
     print_table(("goal", "status", "claim"), goals, as_json=as_json)
-    for run in exported.unjudged:
-        print(f"bridgegen: NOT JUDGED: {run} supports nothing", file=sys.stderr)
+    for run, why in exported.unjudged.items():
+        said = why.removeprefix("Not judged: ")
+        print(f"bridgegen: NOT JUDGED: {run} supports no claim on its driver: {said}",
+              file=sys.stderr)  # fmt: skip
     if as_json:
         return
     print(f"\n{'page':<12}{exported.page}")
