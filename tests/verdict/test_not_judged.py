@@ -11,11 +11,12 @@ from tests.suite.test_index import failure
 import bridgegen as bg
 from bridgegen.conflict.happening import Happening, Share
 from bridgegen.suite.difference import difference
+from bridgegen.suite.entries import RESULTS
 from bridgegen.suite.index import Index, write_index
 from bridgegen.suite.known_failures import KnownFailures
 from bridgegen.suite.replay import replay
 from bridgegen.suite.results import EntryResult, RowResult
-from bridgegen.suite.suite import SuiteRun, run_suite
+from bridgegen.suite.suite import SuiteRun, read_suite, run_suite
 from bridgegen.verdict.of_difference import DifferenceCriteria
 from bridgegen.verdict.of_run import PassFailCriteria
 from bridgegen.verdict.of_suite import SuiteCriteria, figures_of
@@ -99,6 +100,18 @@ def test_results_of_earlier_versions_can_be_read():
         {"entry": "a", "ego": "", "digest": "", "scenario": "a.xosc", "rows": [{"d_min": 2.0}]}
     )
     assert (one.verdict, one.not_happened, one.rows[0].unsafe_start) == ("passed", [], False)
+
+
+def test_results_of_earlier_versions_are_not_taken_for_passes(tmp_path):
+    out = tmp_path / "out"
+    run_suite(DOUBLE_PARKED, samples=3, out=out, workers=1)
+    file = out / RESULTS
+    header, line = file.read_text().splitlines()
+    before = json.loads(line)
+    del before["not_happened"]
+    file.write_text(f"{header}\n{json.dumps(before)}\n")
+    assert read_suite(out).results[0].verdict == "passed"  # it is read as it was
+    assert run_suite(DOUBLE_PARKED, samples=3, out=out, workers=1).results[0].unjudged
 
 
 # ---- suites ----
