@@ -228,7 +228,7 @@ def test_the_junit_of_a_difference_calls_an_error_what_could_not_be_compared(tmp
     assert [one.verdict for one in outcomes] == ["unknown", "passed"]
     errors = ElementTree.parse(tmp_path / "j.xml").getroot().findall(".//error")
     assert [one.get("message") for one in errors] == [
-        "none of 1 variations could be compared (implausible traffic (jump))"
+        "it could not be compared; one: implausible traffic (jump); two: implausible traffic (jump)"
     ]
 
 

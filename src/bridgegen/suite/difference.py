@@ -65,6 +65,8 @@ class Difference:
             of.setdefault(one.entry, []).append(one.change != "not comparable")
         whys = {
             entry: too_few(sum(known), len(known), "variations could be compared")
+            if len(known) > 1 or known[0]
+            else "it could not be compared"
             for entry, known in of.items()
         }
         return {entry: why for entry, why in whys.items() if why}

@@ -52,17 +52,11 @@ class DifferenceCriteria(Conditions):
         if self.junit is not None:
             conditions = outcomes
             if not outcomes:
+                breaks = _none(f"{found.second} breaks nothing", figures, "broken", "not_run")
+                worse = f"no search finds {found.second} worse"
                 outcomes = (
-                    _none(
-                        f"{found.second} breaks nothing",
-                        figures,
-                        "broken",
-                        "not_run",
-                        "not_judged_entries",
-                    ),
-                    _none(
-                        f"no search finds {found.second} worse", figures, "worse", "not_searched"
-                    ),
+                    *unless_judged([breaks], why),
+                    _none(worse, figures, "worse", "not_searched"),
                 )
             write_junit(self.junit, _suites(suite, found, searches, conditions))
         if not outcomes and why:
@@ -87,18 +81,20 @@ def figures_of(found: Difference, searches: Sequence[WorseThan]) -> dict[str, fl
     }
 
 
-def _none(test: str, figures: dict[str, float], wrong: str, *unknown: str) -> Outcome:
-    """Return the outcome of a test that passes if these figures are 0."""
-    lost = any(figures[name] for name in unknown)
-    verdict: Verdict = "failed" if figures[wrong] else "unknown" if lost else "passed"
-    details = ", ".join(f"{name} {figures[name]:g}" for name in (wrong, *unknown))
-    return Outcome(test, verdict, details, (wrong, *unknown))
+def _none(test: str, figures: dict[str, float], wrong: str, unknown: str) -> Outcome:
+    """Return the outcome of a test that passes if two figures are 0."""
+    verdict: Verdict = "failed" if figures[wrong] else "unknown" if figures[unknown] else "passed"
+    details = ", ".join(f"{name} {figures[name]:g}" for name in (wrong, unknown))
+    return Outcome(test, verdict, details, (wrong, unknown))
 
 
 def _unjudged(suite: SuiteRun, found: Difference) -> dict[str, str]:
     """Return by entry why it cannot be compared, of those of which too few variations can be."""
-    whys = {o.entry: f" ({o.unjudged})" for o in suite.results if o.verdict == "not judged"}
-    return {entry: f"{why}{whys.get(entry, '')}" for entry, why in found.unjudged.items()}
+    whys: dict[str, list[str]] = {}
+    for one in suite.results:
+        if one.verdict == "not judged":
+            whys.setdefault(one.entry, []).append(f"{one.ego}: {one.unjudged}")
+    return {entry: "; ".join([why, *whys.get(entry, [])]) for entry, why in found.unjudged.items()}
 
 
 def _suites(
