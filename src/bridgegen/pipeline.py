@@ -459,7 +459,8 @@ class Pipeline:
         rollout = self._run(roads, rows, X)
         metrics = self.measure(rollout)
         gate = plausibility(rollout)
-        findings = Findings.of(analyse(rollout), gate.labels, objective.count, happened(rollout))
+        texts = happened(rollout, may_stop=self._is_protocol)
+        findings = Findings.of(analyse(rollout), gate.labels, objective.count, texts)
         fit = gate.code == Implausible.NONE if objective.gated else True
         F, ok = objective.F(metrics, self.metrics, fit)
         critical = objective.critical(metrics, self.metrics) & ok
@@ -478,6 +479,15 @@ class Pipeline:
         cause = causes(self.fixes, found.critical, harmless)
         counts = found.critical if self.cause is None else cause == self.cause
         return replace(found, critical=counts, cause=cause)
+
+    @property
+    def _is_protocol(self) -> bool:
+        """Whether the scenario's own clauses or criteria decide what its ego fails.
+
+        Not where criteria stand beside harm: they need not ask for what the scenario is about.
+        """
+        own = self.scenario
+        return bool(own.clauses) or (bool(own.criteria) and own.objective.rule == "criteria")
 
     def _harmless(self, rollout: Rollout, objective: Objective) -> Bool:
         """Return which rows succeed and are not critical."""

@@ -13,6 +13,9 @@ from bridgegen import ego as egos
 from bridgegen import metrics as measures
 from bridgegen.conflict import quantities
 from bridgegen.conflict.analysis import Conflicts, analyse
+from bridgegen.conflict.findings import Findings, is_unsafe_start, why_unjudged
+from bridgegen.conflict.harm import decisive
+from bridgegen.conflict.plausibility import plausibility
 from bridgegen.criteria import CriterionResult, Monitor
 from bridgegen.errors import FileFormatError, UnknownNameError
 from bridgegen.odd.criteria import Criterion, joined
@@ -47,6 +50,8 @@ class FileResult:
         cause: of its harm, by the search that exported the file, as its header states; None where
             it states none, or another driver than the file's drives.
         notes: what runs otherwise than a reader of the file may expect, a sentence each.
+        unjudged: why the scenario says nothing of the ego: its traffic could not happen, or left no
+            time to act from the start on; "" if it does.
     """
 
     driver: str
@@ -59,6 +64,7 @@ class FileResult:
     criteria: tuple[CriterionResult, ...] = ()
     cause: str | None = None
     notes: tuple[str, ...] = ()
+    unjudged: str = ""
 
     @property
     def incidents(self) -> tuple[Incident, ...]:
@@ -151,6 +157,7 @@ def simulate_file(
     )  # fmt: skip
     rollout = runs.run(runs.roads([roads]), np.zeros(1, dtype=np.int64), {})
     values = quantities.evaluate(rollout, names)[0]
+    conflicts = analyse(rollout)
     return FileResult(
         driver=embedded.driver,
         status=": ".join([STATUS_MESSAGES[int(rollout.status[0])], *rollout.messages.values()]),
@@ -158,11 +165,19 @@ def simulate_file(
         parameters=embedded.parameters,
         metrics=dict(zip(names, values.tolist(), strict=True)),
         rollout=rollout,
-        conflicts=analyse(rollout),
+        conflicts=conflicts,
         criteria=monitor.results(rollout, 0),
         cause=None if changes else _stated_cause(scenario),
         notes=(*warnings, *(f"{path}: {one}" for one in unknown), *embedded.program.notes),
+        unjudged=_unjudged(rollout, conflicts),
     )
+
+
+def _unjudged(rollout: Rollout, conflicts: Conflicts) -> str:
+    findings = Findings.of(conflicts, plausibility(rollout).labels)
+    _, harm = decisive(conflicts)
+    unsafe = bool(is_unsafe_start(findings, harm)[0])
+    return why_unjudged(str(findings.implausible[0]), unsafe)
 
 
 def _stated_cause(scenario: OpenScenario) -> str | None:

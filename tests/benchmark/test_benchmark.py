@@ -195,3 +195,14 @@ def test_the_command_prints_the_table(package, cli, tmp_path):
     assert re.search(r"un-r157 +perfect +0 +0 +never", out)
     assert "1 runs of 3 evaluations: about" in err
     assert json.loads((tmp_path / "out" / "benchmark.json").read_text())["budget"] == 3
+
+
+def test_a_scenario_that_did_not_happen_is_not_without_failures(tmp_path):
+    van = Path(__file__).parents[1] / "campaign" / "double-parked.yaml"
+    made = benchmark_planners(
+        ["reference"], scenarios=[van], budget=6, seeds=1, triage="none", workers=1,
+        out=tmp_path / "out",
+    )  # fmt: skip
+    why = "Not judged: the scenario did not happen: stuck in 5 of 6"
+    assert why in made.page.read_text("utf-8")
+    assert table(made.plan.out / TABLES[1])[0]["why"].startswith(why)

@@ -89,7 +89,8 @@ def entry(*letters: str, problem: str = "") -> EntryResult:
         (("pp", "up", "xp"), "passed", "pass (2), 1 collision not preventable, 1 not applicable"),
         (("pp", "fp", ""), "failed", "1 of 2 fail, 1 not run"),
         (("pp", ""), "not run", "pass (1), 1 not run"),
-        (("xp", "xp"), "not run", "2 not applicable"),
+        (("xp", "xp"), "not judged", "2 not applicable"),
+        (("xp", "xp", "pp"), "not judged", "pass (1), 2 not applicable"),
         ((), "not run", "1 not run"),
     ],
 )

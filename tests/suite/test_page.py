@@ -27,6 +27,7 @@ CRITERIA = CommonOptions(criteria=["C-1: always(ego.v < 12 m/s)"])
 HIT = RowResult(critical=True, harm=0.5, severity=0.1, collisions=1.0, d_min=0.0)
 KEPT = RowResult(d_min=3.0)
 LOST = RowResult(problem="it diverges")
+JUMP = RowResult(collisions=1.0, d_min=0.0, implausible="jump", margins=[1.0])
 
 
 def result(entry: str, ego: str = "", rows: tuple[RowResult, ...] = (), **more: Any) -> EntryResult:
@@ -61,6 +62,8 @@ def data_of(text: str) -> dict[str, Any]:
         ([(KEPT, KEPT), (KEPT,)], "ref passes all 2 scenarios (3 variations)"),
         ([(KEPT, HIT), (KEPT,)], "ref passes 1 of 2 scenarios (2 of 3 variations) and fails 1"),
         ([(KEPT,), ()], "ref passes 1 of 2 scenarios; 1 did not run"),
+        ([(KEPT, JUMP), (JUMP,)], "ref passes 1 of 2 scenarios (1 of 3 variations); 1 is not "
+                                  "judged"),
         ([(KEPT, LOST)], "ref passes 0 of 1 scenario (1 of 2 variations); 1 ran only in part"),
         ([(LOST, HIT), (LOST,)], "ref passes 0 of 2 scenarios (0 of 3 variations) and fails 1; "
                                  "1 did not run"),
@@ -84,6 +87,8 @@ def test_own_drivers_are_many():
         (("failed", "passed"), "only A fails"),
         (("not run", "failed"), "B fails; A did not run"),
         (("passed", "failed", "failed"), "only A passes"),
+        (("not judged", "passed", "not judged"), "B passes; A, C are not judged"),
+        (("failed", "not judged"), "A fails; B is not judged"),
         (("passed", "failed", "passed"), "only B fails"),
         (("passed", "failed", "failed", "passed"), "B, C fail; A, D pass"),
     ],
@@ -106,13 +111,30 @@ def test_the_failed_variations_are_first_and_keep_their_numbers():
     one = result("a", rows=rows, parameters=["speed"], units=["m/s"])
     found = payload(suite_of(one), {}, {})["suite"]
     assert found["entries"][0]["results"] == [
-        {"v": "f", "n": [1, 2, 1], "problem": "it diverges", "severity": 0.1,
+        {"v": "f", "n": [1, 2, 1, 0], "problem": "it diverges", "severity": 0.1,
          "conflict": ["", "", ""]}
     ]  # fmt: skip
     details = unpacked(found["details"][0])["results"][0]
     assert (details["at"], details["verdict"], details["worst"]) == ([3, 2, 1, 0], "ffnp", 3)
     assert details["x"] == [[7.12346, None, None, None]]
     assert details["d_min"] == [0.0, 0.0, None, 3.0]
+
+
+def test_what_is_not_judged_has_its_reason_and_meets_no_criterion():
+    criterion = {"id": "R-1", "formula": "ttc >= 1.5 s"}
+    one = result("a", rows=(JUMP, JUMP, KEPT), criteria=[criterion])
+    two = result("b", rows=(KEPT,), not_happened=["stuck in 1 of 1"])
+    found = payload(suite_of(one, two), {}, {})["suite"]
+    assert [each["results"][0] for each in found["entries"]] == [
+        {"v": "u", "n": [1, 0, 0, 2],
+         "unjudged": "only 1 of 3 variations could be judged: 2 × implausible traffic (jump)"},
+        {"v": "u", "n": [0, 0, 0, 1],
+         "unjudged": "the scenario did not happen: stuck in 1 of 1"},
+    ]  # fmt: skip
+    details = unpacked(found["details"][0])
+    assert details["results"][0]["verdict"] == "uup"
+    assert [details["words"][k] for k in details["results"][0]["note"]] == ["jump", "jump", ""]
+    assert found["criteria"][0]["of"] == [{"entries": [0, 0, 1], "rows": [0, 0, 3]}]
 
 
 def test_criteria_are_counted_by_ego():

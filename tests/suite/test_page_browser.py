@@ -175,3 +175,34 @@ def test_sorting_puts_where_egos_differ_first(show, tmp_path):
     assert page.evaluate("bridgegen.shown()") == ["a", "b", "c", "d"]
     page.locator("#table thead button", has_text="scenario").click()
     assert page.evaluate("bridgegen.shown()") == ["d", "c", "b", "a"]
+
+
+@pytest.mark.parametrize("width", WIDTHS)
+def test_what_is_not_judged_is_neither_passed_nor_failed(show, tmp_path, width):
+    (tmp_path / "odd").mkdir()
+    rows = {
+        "kept": [RowResult()],
+        "odd": [RowResult(implausible="jump")] * 2,
+        "some": [RowResult()] * 2 + [RowResult(unsafe_start=True)],
+        "hit": [RowResult(critical=True)],
+    }
+    results = tuple(
+        EntryResult(entry=name, ego="", digest="", scenario="s.xosc", driver="d", rows=some)
+        for name, some in rows.items()
+    )
+    page = show(write_suite_page(SuiteRun(tmp_path / "odd", ("",), results, {}), ()), width=width)
+    assert page.evaluate("bridgegen.shown()") == ["hit", "odd", "kept", "some"]
+    assert page.inner_text(".headline").endswith("and fails 1; 1 is not judged.")
+    cells = page.locator("#table > tbody > tr > td.verdict > span:first-child")
+    assert [one.strip() for one in cells.all_inner_texts()] == [
+        "fails", "not judged (2)", "passes", "passes 2, 1 of 3 not judged",
+    ]  # fmt: skip
+    assert page.locator(".result .share i.unjudged").count() == 1
+    page.select_option("#verdict", "u0")
+    assert page.evaluate("bridgegen.shown()") == ["odd"]
+    page.locator("#table .open").click()
+    page.wait_for_selector(".variations")
+    assert "Not judged: none of 2 variations could be judged" in page.inner_text(".told")
+    first = page.locator(".variations tbody tr").first
+    assert "not judged" in first.inner_text()
+    assert "jump" in first.inner_text()

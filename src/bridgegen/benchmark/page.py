@@ -198,6 +198,8 @@ def _outcome(one: Outcome) -> str:
 
 
 def _without_modes(one: Outcome) -> str:
+    if one.unjudged:
+        return one.unjudged
     text = f"no failure in {_many(one.evaluations, 'evaluation')}"
     if one.preventable:
         text += f"; {one.preventable:,} that it could have prevented, others responsible"

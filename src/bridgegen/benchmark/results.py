@@ -73,6 +73,7 @@ class Outcome:
         avoided: by careful driver, in how many of its failures that one does not fail.
         judged: number of its failures that they have driven again.
         ways: in which it fails, robust ones first, then by harm.
+        unjudged: why none of its triaged runs says anything of it, a sentence; "" if one does.
     """
 
     driver: str
@@ -91,6 +92,7 @@ class Outcome:
     avoided: Mapping[str, int] | None = None
     judged: int = 0
     ways: tuple[Way, ...] = ()
+    unjudged: str = ""
 
     @property
     def robust(self) -> int:
@@ -177,7 +179,7 @@ def _outcome(
     messages: Counter[str] = Counter()
     avoided: Counter[str] = Counter()
     evaluations = failed_rows = failures = preventable = judged = 0
-    first, severity, modes = [], 0.0, []
+    first, severity, modes, bounds = [], 0.0, [], []
     for cell in good:
         run = Run(plan.folder(cell))
         rows = run.rows()
@@ -194,11 +196,13 @@ def _outcome(
         if judgement is not None:
             judged += judgement.failures
             avoided += Counter(judgement.avoided)
+        bounds += [run.triage.bound] if run.triage is not None else []
         modes += [(cell, run, one) for one in run.modes if one.responsible in RESPONSIBLE]
     return Outcome(
         name, scenario, column, "driven", why, len(good), evaluations, failed_rows,
         tuple(messages.most_common()), failures, preventable, tuple(first), severity,
         dict(avoided), judged, _ways(modes),
+        "" if any(one.judged for one in bounds) or not bounds else bounds[0].sentence,
     )  # fmt: skip
 
 

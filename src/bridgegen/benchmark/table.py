@@ -56,7 +56,7 @@ def _of_standing(one: Standing) -> Sequence[object]:
 
 
 def _of_outcome(one: Outcome) -> Sequence[object]:
-    head = (one.driver, one.scenario, one.column, one.state, one.why)
+    head = (one.driver, one.scenario, one.column, one.state, one.why or one.unjudged)
     if one.state != "driven":
         return (*head, *[""] * (len(OUTCOMES_HEAD) - len(head)))
     shares = [

@@ -315,7 +315,7 @@ def simulate(
         values = {k: v if abs(v) < float("inf") else None for k, v in result.metrics.items()}
         facts |= {"criteria": criteria_facts(result.criteria)}
         facts |= {"cause": result.cause, "parameters": result.parameters, "metrics": values}
-        facts |= conflict_facts(result.conflicts)
+        facts |= conflict_facts(result.conflicts) | {"unjudged": result.unjudged}
         if result.incidents:
             step = result.rollout.time_step
             facts["incidents"] = [

@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from bridgegen.cli import options as common
-from bridgegen.cli.app import app
+from bridgegen.cli.app import FAILED, app
 from bridgegen.cli.groups import RESULTS
 from bridgegen.cli.map_folder import with_map_folder
 
@@ -26,9 +26,13 @@ def safety_case(
 ) -> None:
     """Export what runs support: claims with evidence.
 
-    As Goal Structuring Notation, JSON and a page, with a script that recomputes every number.
+    As Goal Structuring Notation, JSON and a page, with a script that recomputes every number. Ends
+    with exit status 3 if a run could not be judged: it supports nothing.
     """
     from bridgegen.safety_case import export_safety_case
     from bridgegen.screen.safety_case import print_safety_case
 
-    print_safety_case(export_safety_case(runs, out), as_json=as_json)
+    exported = export_safety_case(runs, out)
+    print_safety_case(exported, as_json=as_json)
+    if exported.unjudged:
+        raise typer.Exit(FAILED)

@@ -95,7 +95,7 @@ def suite(
         list[str] | None,
         typer.Option(
             help="End with exit status 3 if this holds, e.g. 'failed > 2'; may be repeated.",
-            show_default="a variation fails or did not run",
+            show_default="a variation fails or did not run, or a scenario is not judged",
             rich_help_panel=OUTPUT,
         ),
     ] = None,
@@ -180,7 +180,8 @@ def diff(
         list[str] | None,
         typer.Option(
             help="End with exit status 3 if this holds, e.g. 'broken > 0'; may be repeated.",
-            show_default="none; with --junit, that one is broken or a search finds where",
+            show_default="too few can be compared; with --junit, that one is broken or a search "
+            "finds where",
             rich_help_panel=OUTPUT,
         ),
     ] = None,

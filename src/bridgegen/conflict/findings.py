@@ -8,8 +8,9 @@ from typing import Any, Self
 import numpy as np
 import numpy.typing as npt
 
-from bridgegen.arrays import Bool, Int
+from bridgegen.arrays import Bool, Float, Int
 from bridgegen.conflict.analysis import CONTACT, COURSE, NEAR_MISS, VIOLATION, Conflicts
+from bridgegen.conflict.harm import NEAR_MISS as SERIOUS
 from bridgegen.conflict.harm import Count, decisive
 from bridgegen.conflict.types import ConflictType, Responsible, Rule
 
@@ -20,6 +21,19 @@ KINDS = {
     VIOLATION: "violation",
 }
 """Labels of `Conflicts.kind`."""
+
+
+UNSAFE = "no time to act from the start on"
+
+
+def why_unjudged(implausible: str, unsafe_start: bool) -> str:
+    """Return why a scenario without a failure says nothing of its ego; "" if it does.
+
+    Args:
+        implausible: why its traffic could not happen, or "".
+        unsafe_start: see `is_unsafe_start`.
+    """
+    return f"implausible traffic ({implausible})" if implausible else UNSAFE if unsafe_start else ""
 
 
 def with_whom(conflict: str, partner: str) -> str:
@@ -113,6 +127,24 @@ class Findings:
     def row(self, i: int) -> dict[str, str | None]:
         """Return one row's texts by name; None instead of empty ones."""
         return {name: texts[i] or None for name, texts in self.columns().items()}
+
+
+def is_excused(findings: Findings, harm: Float) -> Bool:
+    """Return ``(N,)``: rows of plausible traffic whose contact or near miss is no failure.
+
+    Args:
+        findings: of N rows.
+        harm: ``(N,)``.
+    """
+    happened = np.isin(findings.conflict, [KINDS[CONTACT], KINDS[NEAR_MISS]])
+    found: Bool = happened & np.equal(findings.implausible, "").astype(np.bool_) & (harm < SERIOUS)
+    return found
+
+
+def is_unsafe_start(findings: Findings, harm: Float) -> Bool:
+    """Return ``(N,)``: such rows that left the ego no time to act from the start on."""
+    by_rule: Bool = np.equal(findings.rule, Rule.UNSAFE_START.label).astype(np.bool_)
+    return is_excused(findings, harm) & by_rule
 
 
 COLUMNS = tuple(one.name for one in fields(Findings))

@@ -61,13 +61,19 @@ MOSTLY = 0.5
 """Share of stuck evaluations above which the scenario did not happen: the ego did not get there."""
 
 
-def happened(rollout: Rollout) -> npt.NDArray[np.object_]:
+def happened(rollout: Rollout, *, may_stop: bool = False) -> npt.NDArray[np.object_]:
     """Return what happened in each of N scenarios, as a JSON text; "" of a failed one.
 
     Keys: ``began``, by event whether it began; ``near``, by participant whether the ego came near
     it; ``end``, whether the ego is at the end of its route; ``stuck``, see `stuck`: false, or an
     object with ``behind`` (a participant, or null), and ``driven`` and ``left`` [m], rounded. What
     a simulator does not know is absent.
+
+    Args:
+        rollout: of N scenarios.
+        may_stop: whether the scenario is a test of a protocol, which states what its ego has to do.
+            It asks to stop for its target, which stands as a parked vehicle does: an ego that ends
+            there has done what the test is about. Recorded in the object of ``stuck``.
     """
     n = rollout.shape[0]
     others = [e for e in range(1, rollout.shape[1]) if not rollout.is_ego_s(e)]
@@ -101,6 +107,7 @@ def happened(rollout: Rollout) -> npt.NDArray[np.object_]:
         if known:
             who = rollout.names[behind] if behind > 0 else None
             where = {"behind": who, "driven": driven, "left": left}
+            where |= {"may_stop": True} if may_stop else {}
             found |= {"end": bool(end), "stuck": where if behind >= 0 else False}
         return json.dumps(found, ensure_ascii=False, separators=(",", ":"))
 
@@ -222,6 +229,7 @@ class _Stuck(BaseModel, extra="forbid", strict=True):
     behind: str | None
     driven: int
     left: int
+    may_stop: bool = False
 
 
 class _Text(BaseModel, extra="forbid", strict=True):
@@ -263,6 +271,7 @@ class Happening:
         near: the participants: where the ego came near each.
         end: where the ego reached the end of its route; None where this is unknown.
         stuck: how many egos are stuck; None where this is unknown.
+        may_stop: of these, how many are in a test of a protocol, see `happened`.
         behind: the participant that most of these stand behind; "" if there is none.
         driven: [m] that they drove, the median; NaN without any.
         left: [m] that was left of their routes.
@@ -274,6 +283,7 @@ class Happening:
     near: tuple[Share, ...] = ()
     end: Share | None = None
     stuck: int | None = None
+    may_stop: int = 0
     behind: str = ""
     driven: float = float("nan")
     left: float = float("nan")
@@ -303,6 +313,7 @@ class Happening:
             near=_shares([(one.near, rows) for one, rows in found]),
             end=_share("end", ends) if ends else None,
             stuck=len(driven) if ends else None,
+            may_stop=sum(rows for one, rows in stuck if one.may_stop),
             behind=who if 2 * most > len(driven) else "",
             driven=median(driven) if stuck else float("nan"),
             left=median(left) if stuck else float("nan"),
@@ -317,16 +328,17 @@ class Happening:
     @cached_property
     def reasons(self) -> tuple[str, ...]:
         """Why it did not happen, a clause each."""
+        seldom = [one for one in self.events if one.value < SELDOM]
+        if self.rows * SELDOM < 1.0 and len(seldom) < len(self.events):
+            seldom = []  # too few to call one event of several seldom
         found = [
-            f"the event {one.name} began in {one.rows} of {one.of} evaluations"
-            for one in self.events
-            if one.value < SELDOM
+            f"the event {one.name} began in {one.rows} of {one.of} evaluations" for one in seldom
         ]
         if self.near and all(one.value < SELDOM for one in self.near):
             most = max(self.near, key=lambda one: one.rows)
             rows = f"{most.rows} of {most.of} evaluations"
             found.append(f"no participant came near the ego in more than {rows}")
-        if self.stuck is not None and self.stuck > MOSTLY * self.rows:
+        if self.stuck is not None and self.stuck - self.may_stop > MOSTLY * self.rows:
             found.append(self.stuck_in_words)
         return tuple(found)
 

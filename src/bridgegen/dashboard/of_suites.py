@@ -114,6 +114,7 @@ def _result(
             *violations(judged, scenario, driver.name),
         ),
         judged=judged,
+        unjudged=one.verdict == "not judged",
         seen=_seen(one, _scenery(project, one, sceneries)),
         entry=one.entry,
     )
@@ -122,7 +123,11 @@ def _result(
 def _judged(one: EntryResult) -> Iterator[Judged]:
     for i, given in enumerate(one.criteria):
         criterion = read_criterion(given)
-        margins = [row.margins[i] for row in one.rows if i < len(row.margins)]
+        margins = [
+            row.margins[i]
+            for row, verdict in zip(one.rows, one.verdicts, strict=True)
+            if i < len(row.margins) and verdict != "not judged"
+        ]
         violated = sum(margin < 0.0 for margin in margins)
         yield Judged(
             criterion,

@@ -37,8 +37,8 @@ def results_part(found: Dashboard, base: str) -> str:
             [_run(one, base) for one in runs],
         ),
         _folded(
-            "suite", ("suite", "drivers", "scenarios", "variations", "fail", "not run",
-                      "changed (UTC)"),
+            "suite", ("suite", "drivers", "scenarios", "not judged", "variations", "fail",
+                      "not run", "changed (UTC)"),
             [_suite(one, base) for one in suites],
         ),
         _folded(
@@ -118,6 +118,7 @@ def _suite(one: SuiteLine, base: str) -> list[str]:
         link(base, one.page, one.source),
         text(joined(one.egos)),
         f"{len(entries):,}",
+        f"{len({each.entry for each in one.results if each.unjudged}):,}",
         *(f"{number:,}" for number in sums),
         when(one.time),
     ]

@@ -5,6 +5,7 @@ from bridgegen.safety_case.builder import Draft
 from bridgegen.safety_case.facts import BINS
 from bridgegen.safety_case.failures import Failures, Part
 from bridgegen.safety_case.model import Condition
+from bridgegen.triage.record import NOT_JUDGED
 
 
 class RunArgument(Part):
@@ -159,14 +160,16 @@ class RunArgument(Part):
     def _requirement(self, above: Draft, at: str, one: CriterionSummary) -> None:
         name = one.criterion.id
         words = f" ({one.criterion.text.rstrip('.')})" if one.criterion.text else ""
+        known = bool(one.met + one.violated) and self._facts.run.verdict != NOT_JUDGED
         goal = above.add(
             "Goal", at,
-            f"{name}{words} is met in every evaluation with a result: {one.criterion.states}",
+            f"{name}{words} is met in every evaluation with a result: {one.criterion.states}"
+            + ("" if known else ". The run was not judged, so its evaluations do not support it."),
             holds=Condition(number=self._numbers.id(f"violated:{name}"), equals=0),
             details=[f"severity of a violation: {one.criterion.severity}"],
-            undeveloped=not one.met + one.violated,
+            undeveloped=not known,
         )  # fmt: skip
-        if not one.met + one.violated:
+        if not known:
             return
         least = ""
         if f"worst:{name}" in self._numbers:

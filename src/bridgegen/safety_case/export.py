@@ -1,7 +1,7 @@
 """``bridgegen safety-case``: writes the case, its page, and the script that recomputes it."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from importlib.resources import files
 from pathlib import Path
 
@@ -11,6 +11,7 @@ from bridgegen.safety_case.case import build
 from bridgegen.safety_case.facts import read_facts
 from bridgegen.safety_case.model import FILE, SafetyCase
 from bridgegen.safety_case.page import PAGE, page
+from bridgegen.triage.record import NOT_JUDGED
 
 FOLDER, SCRIPT = "safety-case", "recompute.py"
 
@@ -23,10 +24,13 @@ class Exported:
         case: its content.
         folder: that holds its files.
         page: of it.
+        unjudged: by folder of a run that could not be judged, why: no claim on its ego is
+            supported.
     """
 
     case: SafetyCase
     folder: Path
+    unjudged: Mapping[Path, str] = field(default_factory=dict)
 
     @property
     def page(self) -> Path:
@@ -79,4 +83,7 @@ def export_safety_case(runs: Sequence[Path | str], out: Path | None = None) -> E
     write_whole(folder / FILE, [data])
     write_whole(folder / PAGE, page(case, data))
     write_whole(folder / SCRIPT, [files("bridgegen.safety_case").joinpath(SCRIPT).read_bytes()])
-    return Exported(case, folder)
+    unjudged = {
+        one.run.folder: one.triage.bound.sentence for one in found if one.run.verdict == NOT_JUDGED
+    }
+    return Exported(case, folder, unjudged)

@@ -27,6 +27,8 @@ def print_file_result(file: Path, result: "FileResult") -> None:
     for one in result.incidents:
         print(f"at {one.step * result.rollout.time_step:.2f} s: {one.kind}: {one.what}")
     _print_conflict(result.conflicts)
+    if result.unjudged:
+        print(f"not judged: {result.unjudged}")
     for each in result.criteria:
         text = each.criterion.text or each.criterion.states
         verdict = f"{each.verdict} (margin {margin_in_words(each.margin, each.unit)})"

@@ -267,7 +267,7 @@ def _print_modes(found: "Triage") -> None:
 def _exported(run: "Run") -> str:
     n, minimal = len(run.scenarios), len(run.minimal_scenarios)
     if not (n or minimal or run.not_exported) and run.settings.keep:
-        return "none exported: no failure found"
+        return f"none exported: {run.verdict}" if run.verdict != "fails" else "none exported"
     return f"{n} in {run.folder / 'critical'}" + (f", and {minimal} minimal" if minimal else "")
 
 

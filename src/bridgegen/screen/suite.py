@@ -32,7 +32,7 @@ class SuiteScreen(Live):
 
     def __init__(self) -> None:
         super().__init__()
-        self._entries = self._done = self._failed = self._lost = 0
+        self._entries = self._done = self._failed = self._unjudged = self._lost = 0
 
     @property
     def callbacks(self) -> "SuiteCallbacks":
@@ -63,6 +63,7 @@ class SuiteScreen(Live):
     def _end(self, result: "EntryResult") -> None:
         self._done += 1
         self._failed += result.verdict == "failed"
+        self._unjudged += result.verdict == "not judged"
         self._lost += result.verdict == "not run"
         self._show()
 
@@ -71,7 +72,9 @@ class SuiteScreen(Live):
         self.show(what="cells of a map", done=done, total=total, facts="")
 
     def _show(self) -> None:
-        facts = f"{self._failed} failed" + (f", {self._lost} not run" if self._lost else "")
+        facts = f"{self._failed} failed"
+        facts += f", {self._unjudged} not judged" if self._unjudged else ""
+        facts += f", {self._lost} not run" if self._lost else ""
         self.show(what="scenarios", done=self._done, total=self._entries, facts=facts)
 
 
@@ -83,7 +86,7 @@ def print_suite(
     *,
     as_json: bool = False,
 ) -> None:
-    """Print the entries that fail or did not run, others if there is room; then the totals."""
+    """Print the entries that do not pass, others if there is room; then the totals."""
     from bridgegen.suite.results import counts
     from bridgegen.suite.sentences import outcomes, points
 
@@ -121,10 +124,13 @@ def print_suite(
         results = suite.of_ego(ego)
         number = counts(results)
         entries = sum(one.verdict == "passed" for one in results)
+        unjudged = sum(one.verdict == "not judged" for one in results)
         print(
-            f"{ego or 'the own drivers'}: {entries} of {len(results)} scenarios pass; of their "
-            f"variations {number['passed']} pass, {number['failed']} fail, "
-            f"{number['not run']} did not run"
+            f"{ego or 'the own drivers'}: {entries} of {len(results)} scenarios pass"
+            + (f", {unjudged} {'is' if unjudged == 1 else 'are'} not judged" if unjudged else "")
+            + f"; of their variations {number['passed']} pass, {number['failed']} fail, "
+            + (f"{number['not judged']} not judged, " if number["not judged"] else "")
+            + f"{number['not run']} did not run"
         )
         for text in filter(None, (outcomes(results), points(results))):
             print(f"  {text}")
@@ -173,6 +179,7 @@ def print_difference(
             "second": found.second,
             "counts": counts,
             "p_value": found.p_value,
+            "unjudged": found.unjudged,
             "rows": [vars(one) for one in found.rows if one.change in ("broken", "fixed")],
             "searches": [{**vars(one), "folder": str(one.folder)} for one in searches],
         }
@@ -224,7 +231,7 @@ def _print_searches(searches: Sequence["WorseThan"], found: "Difference") -> Non
     print(f"\nsearches for scenarios that {found.second} fails and {found.first} passes")
     for one in searches:
         if one.problem:
-            print(f"  {one.entry}: not searched: {one.problem}")
+            print(f"  {one.entry}: no result: {one.problem}")
         elif one.worse:
             print(f"  {one.entry}: {one.sentence}")
             for title in one.modes[:MOST_MODES]:
@@ -247,10 +254,16 @@ def _counted(one: "EntryResult") -> str:
     if one.problem:
         return "not run"
     n = len(one.rows)
-    failed, lost = one.count("failed"), one.count("not run")
-    if not failed and not lost:
+    failed, unjudged, lost = (one.count(v) for v in ("failed", "not judged", "not run"))
+    if not failed and not unjudged and not lost:
         return "pass" if n == 1 else f"pass ({n})"
-    parts = ([f"{failed} of {n} fail"] if failed else []) + ([f"{lost} not run"] if lost else [])
+    parts = [f"{failed} of {n} fail"] if failed else []
+    if one.verdict == "not judged":
+        parts.append("NOT JUDGED")
+    elif unjudged:
+        parts += [] if failed or lost else [f"pass ({n - unjudged})"]
+        parts.append(f"{unjudged} not judged")
+    parts += [f"{lost} not run"] if lost else []
     _, slowed, unslowed = one.outcomes().values()
     if slowed + unslowed:
         parts.append(f"{slowed + unslowed} collide, {slowed} after slowing down")
@@ -272,7 +285,7 @@ def _worst(some: Sequence["EntryResult"]) -> str:
             texts += [f"violates {violated}"] if violated else []
             return "; ".join(texts)
     lost = [one.problem or next((r.problem for r in one.rows if r.problem), "") for one in some]
-    return next(filter(None, lost), "")
+    return next(filter(None, [*lost, *(o.unjudged for o in some if o.verdict == "not judged")]), "")
 
 
 def _facts(suite: "SuiteRun") -> dict[str, Any]:
@@ -300,7 +313,9 @@ def _facts(suite: "SuiteRun") -> dict[str, Any]:
                 "verdict": one.verdict,
                 "variations": len(one.rows),
                 "failed": one.count("failed"),
+                "not_judged": one.count("not judged"),
                 "not_run": one.count("not run"),
+                "unjudged": one.unjudged if one.verdict == "not judged" else None,
                 "outcomes": one.outcomes(),
                 "problem": one.problem or None,
                 "status": suite.known_failures.status_of(one.entry),

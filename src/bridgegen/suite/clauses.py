@@ -23,6 +23,7 @@ from bridgegen.suite.results import (
     RowResult,
     Verdict,
 )
+from bridgegen.triage.bound import too_few
 from bridgegen.workers import Threads
 
 
@@ -38,7 +39,8 @@ class ClauseResult:
         passed: variations that pass, those with an unpreventable collision among them.
         failed: variations that fail.
         not_run: variations without a result, of the ego or of a model that decides.
-        not_applicable: variations whose traffic could not happen.
+        not_applicable: variations whose traffic could not happen, or in which what their scenario
+            is about did not happen.
         unpreventable: variations that pass although the ego collides, since the models do, too.
     """
 
@@ -54,10 +56,13 @@ class ClauseResult:
 
     @property
     def verdict(self) -> Verdict:
-        """Failed if a variation fails; not run if one did not run, or none was judged."""
+        """Failed if a variation fails; else not run if one did not; else whether it is judged."""
         if self.failed:
             return "failed"
-        return "not run" if self.not_run or not self.passed else "passed"
+        if self.not_run or not self.passed + self.not_applicable:
+            return "not run"
+        few = too_few(self.passed, self.passed + self.not_applicable, "variations could be judged")
+        return "not judged" if few else "passed"
 
 
 def clause_results(results: Sequence[EntryResult], ego: str) -> tuple[ClauseResult, ...]:

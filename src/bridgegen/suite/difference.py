@@ -3,9 +3,11 @@
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Literal
 
-from bridgegen.suite.results import EntryResult, RowResult
+from bridgegen.suite.results import EntryResult, RowResult, Verdict
+from bridgegen.triage.bound import too_few
 
 Change = Literal["fixed", "broken", "both fail", "both pass", "not comparable"]
 
@@ -22,6 +24,7 @@ class RowChange:
         change: the second passes what the first fails ("fixed"), the reverse ("broken"), …
         severity: second less first, of the probability of MAIS3+.
         harm: second less first.
+        run: whether both have a result.
     """
 
     entry: str
@@ -29,6 +32,7 @@ class RowChange:
     change: Change
     severity: float
     harm: float
+    run: bool = True
 
 
 @dataclass(frozen=True)
@@ -52,6 +56,20 @@ class Difference:
         """The number of variations of each change."""
         found = Counter(one.change for one in self.rows)
         return {change: found[change] for change in CHANGES}
+
+    @cached_property
+    def unjudged(self) -> dict[str, str]:
+        """By entry why it says nothing, of those of which too few variations can be compared."""
+        of: dict[str, list[bool]] = {}
+        for one in self.rows:
+            of.setdefault(one.entry, []).append(one.change != "not comparable")
+        whys = {
+            entry: too_few(sum(known), len(known), "variations could be compared")
+            if len(known) > 1 or known[0]
+            else "it could not be compared"
+            for entry, known in of.items()
+        }
+        return {entry: why for entry, why in whys.items() if why}
 
     def interval(self, change: Change) -> tuple[float, float]:
         """Return the 95 % interval of the share of a change among comparable variations.
@@ -94,24 +112,25 @@ def difference(
     rows, sampled = list[RowChange](), True
     for a, b in zip(first, second, strict=True):
         if a.problem or b.problem or len(a.rows) != len(b.rows):
-            rows.append(RowChange(a.entry, 0, "not comparable", 0.0, 0.0))
+            rows.append(RowChange(a.entry, 0, "not comparable", 0.0, 0.0, run=False))
             continue
         sampled = sampled and a.sampled
-        rows += [
-            _change(a.entry, i, *both) for i, both in enumerate(zip(a.rows, b.rows, strict=True))
-        ]
+        verdicts = zip(a.verdicts, b.verdicts, strict=True)
+        rows += [_change(a.entry, i, a.rows[i], b.rows[i], both) for i, both in enumerate(verdicts)]
     return Difference(*egos, tuple(rows), sampled)
 
 
-def _change(entry: str, row: int, a: RowResult, b: RowResult) -> RowChange:
-    verdicts = (a.verdict, b.verdict)
+def _change(
+    entry: str, row: int, a: RowResult, b: RowResult, verdicts: tuple[Verdict, Verdict]
+) -> RowChange:
     change: Change = "not comparable"
-    if "not run" not in verdicts:
+    if not {"not run", "not judged"} & {*verdicts}:
         named: dict[tuple[bool, bool], Change] = {
             (True, True): "both fail",
             (True, False): "fixed",
             (False, True): "broken",
             (False, False): "both pass",
         }
-        change = named[a.verdict == "failed", b.verdict == "failed"]
-    return RowChange(entry, row, change, b.severity - a.severity, b.harm - a.harm)
+        change = named[verdicts[0] == "failed", verdicts[1] == "failed"]
+    run = "not run" not in verdicts
+    return RowChange(entry, row, change, b.severity - a.severity, b.harm - a.harm, run)

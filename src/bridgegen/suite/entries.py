@@ -40,6 +40,7 @@ class Entry:
         criteria: pass criteria that the index of its folder states for it, besides its own; see
             `bridgegen.suite.index`.
         count: whose conflicts count as harm by that index; None leaves it to the scenario.
+        is_failure: whether that index keeps it as a failure.
     """
 
     name: str
@@ -48,6 +49,7 @@ class Entry:
     problem: str = ""
     criteria: tuple[Mapping[str, Any], ...] = ()
     count: Literal["any"] | None = None
+    is_failure: bool = False
 
     @property
     def digest(self) -> str:
@@ -131,7 +133,7 @@ def indexed(one: Entry, indexes: Indexes | None = None) -> Entry:
         return one
     _, failure = found
     count: Literal["any"] | None = "any" if failure.count == "any" else None
-    return replace(one, criteria=tuple(failure.criteria), count=count)
+    return replace(one, criteria=tuple(failure.criteria), count=count, is_failure=True)
 
 
 def of_edition(entries: Sequence[Entry], edition: str | None) -> tuple[Entry, ...]:

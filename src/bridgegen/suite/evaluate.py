@@ -8,6 +8,8 @@ import numpy as np
 
 from bridgegen.campaign.chosen import as_judged, chosen_objective
 from bridgegen.campaign.scenarios import driven_by, load
+from bridgegen.conflict.findings import is_unsafe_start
+from bridgegen.conflict.happening import Happening
 from bridgegen.errors import BridgeGenError, InputError
 from bridgegen.evaluation import Evaluation
 from bridgegen.odd.parameters import Parameter
@@ -165,12 +167,16 @@ def _evaluated(job: Job, found: EntryResult) -> EntryResult:
         notes.append(
             f"{given.excluded} combinations are excluded by the scenario's own constraints"
         )
-    rows: list[RowResult] = []
+    rows, texts = list[RowResult](), list[str]()
     for start in range(0, len(X), AT_ONCE):
         some = X[start : start + AT_ONCE]
         evaluation = pipeline.evaluate(some)
+        texts += evaluation.findings.happened.tolist()
         found_here = _rows(pipeline, some, evaluation, names)
         rows += judged(pipeline, job.simulator, some, found_here)
+    happening = Happening.of(texts)
+    if job.entry.is_failure:  # it is about that conflict: one that stops for it has met it
+        happening = replace(happening, stuck=0)
     units = dict(zip(space.names, space.units, strict=True))
     labels = [one.label for one in given.grids]
     if labels:
@@ -199,6 +205,7 @@ def _evaluated(job: Job, found: EntryResult) -> EntryResult:
             "clauses": [one.to_dict() for one in pipeline.scenario.clauses],
             "rows": rows,
             "notes": notes,
+            "not_happened": list(happening.reasons),
         }
     )
 
@@ -226,6 +233,7 @@ def _rows(
     of_file = scenario.texts if isinstance(scenario, FileScenario) else {}
     metrics = {name: evaluation.metrics[:, pipeline.metrics.index(name)] for name in QUANTITIES}
     margins = [evaluation.metrics[:, pipeline.metrics.index(one)] for one in pipeline.monitor.names]
+    unsafe = is_unsafe_start(evaluation.findings, metrics["harm"])
     rows = []
     for i in range(len(X)):
         x: list[float | str] = []
@@ -261,6 +269,7 @@ def _rows(
                 responsible=texts["responsible"],
                 partner=texts["partner"],
                 implausible=texts["implausible"],
+                unsafe_start=bool(unsafe[i]),
                 margins=[float(one[i]) for one in margins],
             )
         )

@@ -8,7 +8,7 @@ from typing import Literal, Self
 from bridgegen.suite.index import Failure, Indexes, Status
 from bridgegen.suite.results import EntryResult, RowResult
 
-Standing = Literal["passed", "not run", "new", "known", "accepted", "regression"]
+Standing = Literal["passed", "not run", "not judged", "new", "known", "accepted", "regression"]
 """Of a variation: known and accepted failures do not fail a suite; new ones do, and regressions:
 failures that were fixed, and are there again."""
 
@@ -61,10 +61,9 @@ class KnownFailures:
 
     def standing(self, one: EntryResult, row: RowResult) -> Standing:
         """Return how a variation of an entry stands."""
-        if row.verdict == "passed":
-            return "passed"
-        if row.verdict == "not run":
-            return "not run"
+        verdict = row.verdict
+        if verdict != "failed":
+            return verdict
         found = self.failures.get(one.entry)
         if found is None:
             return "new"
@@ -83,6 +82,8 @@ class KnownFailures:
         )  # fmt: skip
         if one.problem or not one.rows:
             return "not run"
+        if one.verdict == "not judged":
+            return "not judged"
         return next(each for each in order if each in found)
 
     def counts(self, results: Sequence[EntryResult]) -> Counter[Standing]:
@@ -133,7 +134,7 @@ class KnownFailures:
 
 def words(standing: Standing, failure: tuple[str, Failure] | None) -> str:
     """Return how a failing entry stands, where an index names it."""
-    if failure is None or standing in ("passed", "not run"):
+    if failure is None or standing in ("passed", "not run", "not judged"):
         return ""
     if standing == "regression":
         return "regression: it was fixed"

@@ -14,7 +14,7 @@ from bridgegen.suite.clauses import clause_results
 from bridgegen.suite.difference import difference as variations_compared
 from bridgegen.suite.known_failures import EXCUSED, words
 from bridgegen.suite.rating import colours_of
-from bridgegen.suite.results import EntryResult, Outcome, RowResult, Verdict, rank
+from bridgegen.suite.results import EntryResult, Outcome, Verdict, rank
 from bridgegen.suite.sentences import (
     changes,
     clause_in_words,
@@ -44,7 +44,7 @@ MOST_ROWS = 1000
 Key = tuple[str, str]
 """Name of an entry, and the ego as the user names it."""
 
-_LETTER: dict[Verdict, str] = {"passed": "p", "failed": "f", "not run": "n"}
+_LETTER: dict[Verdict, str] = {"passed": "p", "failed": "f", "not run": "n", "not judged": "u"}
 _OUTCOME: dict[Outcome | None, str] = {
     "avoided": "a", "mitigated": "m", "not avoided": "n", None: "-",
 }  # fmt: skip
@@ -69,7 +69,7 @@ def payload(
     """Return the page's data as plain dicts, lists, numbers and strings.
 
     Variations take what the rest leaves: of each entry the failed ones first, then those that did
-    not run, then those that pass.
+    not run, then those that are not judged, then those that pass.
 
     Args:
         suite: the results.
@@ -173,6 +173,8 @@ def _result(
     lost = one.problem or next((row.problem for row in one.rows if row.problem), "")
     if lost or not one.rows:
         found["problem"] = lost or "it has no variations"
+    if one.verdict == "not judged":
+        found["unjudged"] = one.unjudged
     blameless = sum(row.verdict == "passed" and row.collisions > 0 for row in one.rows)
     if blameless:
         found["blameless"] = blameless
@@ -243,7 +245,11 @@ def _matrix(suite: SuiteRun, criteria: Mapping[str, int]) -> list[dict[str, Any]
         of = [{"entries": [0, 0, 0], "rows": [0, 0, 0]} for _ in criteria]
         for one in suite.of_ego(ego):
             for i, criterion in enumerate(one.criteria):
-                known = [row.margins[i] for row in one.rows if i < len(row.margins)]
+                known = [
+                    row.margins[i]
+                    for row, verdict in zip(one.rows, one.verdicts, strict=True)
+                    if i < len(row.margins) and verdict != "not judged"
+                ]
                 violated = sum(margin < 0.0 for margin in known)
                 table = of[criteria[_text(criterion)]]
                 which = 0 if violated else 1 if known else 2
@@ -267,7 +273,7 @@ def _clauses(suite: SuiteRun) -> list[dict[str, Any]]:
             found.setdefault(one.id, shown)["of"][str(e)] = {
                 "v": _LETTER[one.verdict],
                 "words": clause_in_words(one),
-                "rows": [one.passed, one.failed, one.not_run],
+                "rows": [one.passed, one.failed, one.not_run, one.not_applicable],
             }
     return list(found.values())
 
@@ -337,8 +343,9 @@ def _of_entry(
         if one is None:
             found["results"].append(None)
             continue
-        order = sorted(range(len(one.rows)), key=lambda i: (*_order(one.rows[i]), i))
-        kept = order[:most]
+        verdicts = [_LETTER[verdict] for verdict in one.verdicts]
+        ranks = [("fnup".index(v), *rank(row)) for v, row in zip(verdicts, one.rows, strict=True)]
+        kept = sorted(range(len(one.rows)), key=lambda i: (*ranks[i], i))[:most]
         rows = [one.rows[i] for i in kept]
         colours = colours_of(one)
         found["results"].append(
@@ -352,7 +359,7 @@ def _of_entry(
                 "criteria": [criteria[_text(criterion)] for criterion in one.criteria],
                 "total": len(one.rows),
                 "at": kept,
-                "verdict": "".join(_LETTER[row.verdict] for row in rows),
+                "verdict": "".join(verdicts[i] for i in kept),
                 "critical": "".join("01"[row.critical] for row in rows),
                 "x": _columns([row.x for row in rows], len(one.parameters)),
                 "margins": _columns([row.margins for row in rows], len(one.criteria)),
@@ -366,17 +373,12 @@ def _of_entry(
                 "type": words.at(row.conflict_type for row in rows),
                 "partner": words.at(row.partner for row in rows),
                 "responsible": words.at(row.responsible for row in rows),
-                "note": words.at(row.problem or row.implausible for row in rows),
+                "note": words.at(row.problem or row.implausible or row.unjudged for row in rows),
                 "beside": _beside(results, one, kept) if same else [],
             }
         )
     found["words"] = list(words.number)
     return found
-
-
-def _order(row: RowResult) -> tuple[int, float, float, float]:
-    """Return a key by which failed rows are first, the worst ahead, then those that did not run."""
-    return "fnp".index(_LETTER[row.verdict]), *rank(row)
 
 
 def _columns(rows: Sequence[Sequence[float | str]], width: int) -> list[list[float | str | None]]:
@@ -388,12 +390,13 @@ def _beside(
     results: Sequence[EntryResult | None], one: EntryResult, kept: Sequence[int]
 ) -> list[str]:
     """Return the verdicts of all egos on the same variations, a letter each."""
+    verdicts = [[] if other is None else other.verdicts for other in results]
     return [
         "".join(
-            _LETTER[other.rows[i].verdict]
+            _LETTER[theirs[i]]
             if other is not None and i < len(other.rows) and other.rows[i].x == one.rows[i].x
             else "-"
-            for other in results
+            for other, theirs in zip(results, verdicts, strict=True)
         )
         for i in kept
     ] if len(results) > 1 else []  # fmt: skip

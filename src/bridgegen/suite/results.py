@@ -1,12 +1,17 @@
 """The results of a suite: of each entry and ego a line of JSON, of each row what happened."""
 
+from collections import Counter
 from collections.abc import Sequence
 from math import isfinite
 from typing import Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
-Verdict = Literal["passed", "failed", "not run"]
+from bridgegen.conflict.findings import why_unjudged
+from bridgegen.triage.bound import too_few
+
+Verdict = Literal["passed", "failed", "not judged", "not run"]
+VERDICTS: tuple[Verdict, ...] = ("passed", "failed", "not judged", "not run")
 
 Outcome = Literal["avoided", "mitigated", "not avoided"]
 OUTCOMES: tuple[Outcome, ...] = ("avoided", "mitigated", "not avoided")
@@ -21,7 +26,7 @@ of the test speed in that protocol (section 4.3.2)."""
 
 PASSED, FAILED, EXCUSED, NOT_RUN, NOT_APPLICABLE = "pfunx"
 """What a variation means for a clause: it passes, or fails; passes although the ego collides, for
-the models do, too; has no result; or has traffic that could not happen."""
+the models do, too; has no result; or says nothing, as its traffic could not happen, say."""
 
 
 class Strict(BaseModel):
@@ -50,6 +55,8 @@ class RowResult(Strict):
         responsible: who is, for a contact or near miss.
         partner: the other participant.
         implausible: why its traffic could not happen, or "".
+        unsafe_start: whether the ego's contact or near miss does not count because it had no time
+            to act from the start on.
         margins: of the entry's criteria; None: without a result.
         clauses: what it means for each of the entry's clauses, a letter each; empty without a
             result.
@@ -70,6 +77,7 @@ class RowResult(Strict):
     responsible: str = ""
     partner: str = ""
     implausible: str = ""
+    unsafe_start: bool = False
     margins: list[float] = []
     clauses: str = Field(default="", pattern="^[pfunx]{0,1000}$")
 
@@ -78,8 +86,18 @@ class RowResult(Strict):
         """Whether the ego passes: it neither is critical nor violates a criterion or a clause."""
         if self.problem:
             return "not run"
-        failed = self.critical or self.violated or FAILED in self.clauses
-        return "failed" if failed else "passed"
+        if self.critical or self.violated or FAILED in self.clauses:
+            return "failed"
+        return "not judged" if self.unjudged else "passed"
+
+    @property
+    def unjudged(self) -> str:
+        """Why a variation that does not fail says nothing of the ego; "" if it does.
+
+        A clause judges where there is no time to act, too: by whether the models collide.
+        """
+        by_clause = PASSED in self.clauses or EXCUSED in self.clauses
+        return why_unjudged(self.implausible, self.unsafe_start and not by_clause)
 
     @property
     def outcome(self) -> Outcome | None:
@@ -138,6 +156,8 @@ class EntryResult(Strict):
         rows: of each variation; empty if the entry cannot run.
         problem: why it cannot; empty if it can.
         notes: what runs otherwise than one may expect.
+        not_happened: why what the scenario is about does not happen in its rows, a clause each; see
+            `bridgegen.conflict.happening.Happening.reasons`. Empty if it does.
     """
 
     entry: str
@@ -157,20 +177,42 @@ class EntryResult(Strict):
     rows: list[RowResult] = []
     problem: str = ""
     notes: list[str] = []
+    not_happened: list[str] = []
 
     @property
     def verdict(self) -> Verdict:
-        """The worst of its rows: failed, else not run, else passed."""
+        """The worst of its rows: failed, else not run; else whether it is judged."""
         verdicts = {one.verdict for one in self.rows}
         if "failed" in verdicts:
             return "failed"
-        return "not run" if self.problem or not self.rows or "not run" in verdicts else "passed"
+        if self.problem or not self.rows or "not run" in verdicts:
+            return "not run"
+        return "not judged" if self.unjudged else "passed"
+
+    @property
+    def verdicts(self) -> list[Verdict]:
+        """The verdict of each row; none passes where what the scenario is about did not happen."""
+        found = [one.verdict for one in self.rows]
+        return ["not judged" if one == "passed" and self.not_happened else one for one in found]
+
+    @property
+    def unjudged(self) -> str:
+        """Why rows without a failure say nothing of the ego, as those of a run; "" if they do."""
+        if not self.rows:
+            return ""
+        reasons = Counter(one.unjudged for one in self.rows if one.verdict == "not judged")
+        judged, n = len(self.rows) - reasons.total(), len(self.rows)
+        if few := too_few(judged, n, "variations could be judged"):
+            why = ", ".join(f"{rows} × {why}" for why, rows in reasons.most_common())
+            return f"{few}: {why}" if n > 1 else next(iter(reasons))
+        happened = "; ".join(self.not_happened)
+        return f"the scenario did not happen: {happened}" if happened else ""
 
     def count(self, verdict: Verdict) -> int:
         """Return the number of rows with a verdict; an entry that cannot run counts as one."""
         if self.problem:
             return int(verdict == "not run")
-        return sum(one.verdict == verdict for one in self.rows)
+        return self.verdicts.count(verdict)
 
     def outcomes(self) -> dict[Outcome, int]:
         """Return the numbers of rows by outcome."""
@@ -186,11 +228,15 @@ class EntryResult(Strict):
     def letters(self, clause: int) -> str:
         """Return what each variation means for a clause, by its number.
 
-        An entry that cannot run counts as one.
+        An entry that cannot run counts as one. None passes where what the scenario is about did not
+        happen.
         """
         if not self.rows:
             return NOT_RUN
-        return "".join(row.clauses[clause : clause + 1] or NOT_RUN for row in self.rows)
+        found = "".join(row.clauses[clause : clause + 1] or NOT_RUN for row in self.rows)
+        if not self.not_happened:
+            return found
+        return found.replace(PASSED, NOT_APPLICABLE).replace(EXCUSED, NOT_APPLICABLE)
 
     def worst_of(self, criterion: int) -> int | None:
         """Return the number of the row that violates a criterion the most, or None."""
@@ -226,5 +272,4 @@ def finite(value: float) -> float | None:
 
 def counts(results: Sequence[EntryResult]) -> dict[Verdict, int]:
     """Return the numbers of rows by verdict."""
-    verdicts: tuple[Verdict, ...] = ("passed", "failed", "not run")
-    return {one: sum(each.count(one) for each in results) for one in verdicts}
+    return {one: sum(each.count(one) for each in results) for one in VERDICTS}

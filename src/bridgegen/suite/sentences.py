@@ -12,7 +12,9 @@ from bridgegen.suite.suite import SuiteRun
 MOST_DIFFERENCES = 4
 """Kinds of differences that a sentence names."""
 
-_WORD: dict[Verdict, str] = {"failed": "fails", "passed": "passes", "not run": "did not run"}
+_WORD: dict[Verdict, str] = {
+    "failed": "fails", "passed": "passes", "not judged": "is not judged", "not run": "did not run",
+}  # fmt: skip
 
 
 def label_of(suite: SuiteRun, ego: str) -> str:
@@ -44,9 +46,11 @@ def headline(results: Sequence[EntryResult], label: str) -> str:
     if number["failed"]:
         words += f" and fail{'' if some else 's'} {number['failed']:,}"
     partly = sum(one.verdict == "not run" and one.count("passed") > 0 for one in results)
+    unjudged = number["not judged"]
+    said = [f"{unjudged:,} {'is' if unjudged == 1 else 'are'} not judged"] if unjudged else []
     lost = [f"{number['not run'] - partly:,} did not run"] if number["not run"] > partly else []
     lost += [f"{partly:,} ran only in part"] if partly else []
-    return "; ".join([words, *lost])
+    return "; ".join([words, *said, *lost])
 
 
 def outcomes(results: Sequence[EntryResult]) -> str:
@@ -95,11 +99,11 @@ def difference(verdicts: Sequence[Verdict], labels: Sequence[str]) -> str:
         who.setdefault(verdict, []).append(label)
     for verdict in ("failed", "passed"):
         alone = who.get(verdict, [])
-        if len(who) == 2 and "not run" not in who and len(alone) == 1:
+        if len(who) == 2 and "failed" in who and "passed" in who and len(alone) == 1:
             return f"only {alone[0]} {_WORD[verdict]}"
     parts = [
         f"{', '.join(who[verdict])} {_of_many(_WORD[verdict], len(who[verdict]))}"
-        for verdict in ("failed", "passed", "not run")
+        for verdict in ("failed", "passed", "not judged", "not run")
         if verdict in who
     ]
     return "; ".join(parts)
@@ -120,6 +124,8 @@ def differences(of_entries: Sequence[Sequence[Verdict]], labels: Sequence[str]) 
         parts.append(f"{'both' if two else 'all'} fail {same['failed']:,}")
     if same["passed"]:
         parts.append(f"{'both' if two else 'all'} pass {same['passed']:,}")
+    if same["not judged"]:
+        parts.append(f"{'neither' if two else 'none'} is judged in {same['not judged']:,}")
     if same["not run"]:
         parts.append(f"{'neither' if two else 'none'} ran in {same['not run']:,}")
     text = "; ".join(parts)
@@ -127,7 +133,8 @@ def differences(of_entries: Sequence[Sequence[Verdict]], labels: Sequence[str]) 
 
 
 def _of_many(word: str, number: int) -> str:
-    return {"fails": "fail", "passes": "pass"}.get(word, word) if number > 1 else word
+    many = {"fails": "fail", "passes": "pass", "is not judged": "are not judged"}
+    return many.get(word, word) if number > 1 else word
 
 
 def changes(found: Difference) -> str:

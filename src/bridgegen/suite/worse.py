@@ -15,6 +15,7 @@ from bridgegen.store.run_file import FILE
 from bridgegen.suite.evaluate import Job, pipeline_of
 from bridgegen.suite.rows import is_sample
 from bridgegen.suite.suite import SuiteRun
+from bridgegen.triage.record import NOT_JUDGED
 
 FOLDER = "worse"
 """In a suite's folder, that of the searches, a run each."""
@@ -137,6 +138,8 @@ def _searched(
     except BridgeGenError as error:
         return WorseThan(name, folder, problem=str(error))
     triage, summary = run.triage, run.summary
+    if run.verdict == NOT_JUDGED and triage is not None and not summary.critical:
+        return WorseThan(name, folder, summary.evaluations, problem=triage.bound.sentence)
     sentence = triage.bound.sentence if triage else ""
     if triage is None or triage.bound.harmful != summary.critical:  # critical by another rule
         words = f"{summary.critical} of {summary.evaluations} evaluations are critical"

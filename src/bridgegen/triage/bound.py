@@ -10,7 +10,7 @@ import numpy as np
 
 from bridgegen.arrays import Bool, Float, Int, Numbers
 from bridgegen.conflict import analysis
-from bridgegen.conflict.findings import KINDS, Findings
+from bridgegen.conflict.findings import KINDS, Findings, is_excused
 from bridgegen.conflict.happening import Happening
 from bridgegen.conflict.harm import COURSE, NEAR_MISS
 from bridgegen.conflict.quantities import QUANTITIES
@@ -108,11 +108,8 @@ class NotCounted:
     @classmethod
     def of(cls, findings: Findings, harm: Float, ok: Bool) -> Self:
         """Return what N rows hold, by their findings, harm and whether they have a result."""
-        plausible = np.array(findings.implausible == "", dtype=np.bool_).reshape(len(ok))
-        contact = np.array(findings.conflict == CONTACT, dtype=np.bool_).reshape(len(ok))
-        near = np.array(findings.conflict == NEAR, dtype=np.bool_).reshape(len(ok))
-        excused = ok & plausible & (contact | near) & (harm < NEAR_MISS)
-        odd = ok & ~plausible
+        contact, odd = findings.conflict == CONTACT, ok & (findings.implausible != "")
+        excused = ok & is_excused(findings, harm)
         pairs = zip(findings.conflict[excused], findings.rule[excused], strict=True)
         return cls(
             Counter(pairs), Counter(findings.implausible[odd].tolist()),
@@ -156,13 +153,24 @@ def _listed(counts: Mapping[str, int]) -> str:
     return ", ".join(f"{name or 'no rule'} {n}" for name, n in ordered)
 
 
+def too_few(judged: int, n: int, what: str) -> str:
+    """Return that too few of N could be judged for a verdict, in words; "" if enough could.
+
+    Args:
+        judged: how many could.
+        n: all of them.
+        what: they are, in the plural, and what could be done with them.
+    """
+    if judged and judged >= JUDGED * n:
+        return ""
+    return f"{f'only {judged}' if judged else 'none'} of {n} {what}"
+
+
 def _unjudged(evaluations: int, besides: NotCounted, happening: Happening) -> str:
     """Return why a run without failures says nothing of its driver; "" if it does."""
     left_out = besides.failed + sum(besides.implausible.values()) + besides.unsafe
-    judged = evaluations - left_out
-    if judged < JUDGED * evaluations or not judged:
-        some = f"only {judged}" if judged else "none"
-        return f"{some} of {evaluations} evaluations could be judged"
+    if few := too_few(evaluations - left_out, evaluations, "evaluations could be judged"):
+        return few
     if not happening.happened:
         return "the scenario did not happen: " + "; ".join(happening.reasons)
     return ""

@@ -9,7 +9,7 @@ A figure that is NaN cannot be judged, and that is not a pass.
 import operator
 import re
 from collections.abc import Callable, Collection, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import isfinite, isnan
 from typing import TYPE_CHECKING, Literal
 
@@ -98,6 +98,28 @@ class FailCondition:
             verdict = "passed"
         details = ", ".join(f"{name} {_value_text(values[name])}" for name in self.figures)
         return Outcome(f"not {self.text}", verdict, details, self.figures)
+
+
+def unless_judged(
+    outcomes: Iterable[Outcome], why: str, known: Collection[str] = ()
+) -> tuple[Outcome, ...]:
+    """Return the outcomes of a result; where it is not judged, none on the ego passes.
+
+    Args:
+        outcomes: of its conditions and criteria.
+        why: it is not judged; "" if it is.
+        known: figures that are known all the same, as they are not of the ego.
+    """
+
+    def passes(one: Outcome) -> bool:
+        return bool(one.figures) and {*one.figures} <= {*known}
+
+    return tuple(
+        replace(one, verdict="unknown", details=f"{one.details}; not judged: {why}")
+        if why and one.verdict == "passed" and not passes(one)
+        else one
+        for one in outcomes
+    )
 
 
 def outcome_of(one: CriterionResult) -> Outcome:

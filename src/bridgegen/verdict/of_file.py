@@ -8,7 +8,13 @@ from typing import Self
 from bridgegen.conflict.quantities import QUANTITIES
 from bridgegen.odd.criteria import Criterion, read_criteria
 from bridgegen.simulate import FileResult
-from bridgegen.verdict.fail_if import FailCondition, Outcome, outcome_of, read_conditions
+from bridgegen.verdict.fail_if import (
+    FailCondition,
+    Outcome,
+    outcome_of,
+    read_conditions,
+    unless_judged,
+)
 from bridgegen.verdict.junit import Suite, case_of, refuse_junit, write_junit
 
 
@@ -53,7 +59,8 @@ class FileCriteria:
         """Apply the criteria to a result, and write the JUnit XML if requested.
 
         Without conditions, criteria and JUnit XML there are no outcomes. Otherwise the first is
-        whether the simulation succeeded; the file's own criteria are among the others.
+        whether the simulation succeeded; the file's own criteria are among the others. Of these
+        none passes where the scenario is not judged.
         """
         if not self.conditions and not self.criteria and self.junit is None:
             return ()
@@ -62,11 +69,11 @@ class FileCriteria:
             "passed" if result.status == "ok" else "unknown",
             f"{result.status}, {result.seconds:g} s simulated",
         )
-        outcomes = (
-            ran,
+        stated = (
             *(one.judge(result.metrics) for one in self.conditions),
             *(outcome_of(one) for one in result.criteria),
         )
+        outcomes = (ran, *unless_judged(stated, result.unjudged))
         if self.junit is not None:
             units = {name: QUANTITIES[name].unit for name in result.metrics}
             metrics = {

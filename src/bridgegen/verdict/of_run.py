@@ -22,6 +22,7 @@ from bridgegen.verdict.fail_if import (
     Outcome,
     Verdict,
     read_conditions,
+    unless_judged,
     words_of,
 )
 from bridgegen.verdict.junit import Case, Suite, case_of, refuse_junit, write_junit
@@ -56,6 +57,9 @@ FIGURES = {
 
 _OF_THE_RUN = ("evaluations", "failed", "stuck", "seconds", "harmful.upper")
 """Figures to which no single critical scenario contributes."""
+
+
+_NOT_OF_THE_EGO = ("evaluations", "failed", "seconds")
 
 
 @dataclass(frozen=True)
@@ -125,11 +129,11 @@ class PassFailCriteria:
         if not self.conditions and self.junit is None:
             return () if run.verdict != NOT_JUDGED else (_searched(run),)
         figures = figures_of(run)
-        outcomes = (
-            _searched(run),
+        stated = (
             *(one.judge(figures) for one in self.conditions),
             *(_outcome_of(one) for one in run.criteria),
         )
+        outcomes = (_searched(run), *unless_judged(stated, _why_not(run), _NOT_OF_THE_EGO))
         if self.junit is not None:
             write_junit(self.junit, _suites(run, outcomes))
         return outcomes
@@ -188,10 +192,18 @@ def _searched(run: Run) -> Outcome:
     found = run.triage
     if found is not None and found.bound.not_counted:
         details += f"; {found.bound.not_counted}"
+    if why := _why_not(run):
+        return Outcome("the search has results", "unknown", f"{why}; {details}")
+    return Outcome("the search has results", "passed", details)
+
+
+def _why_not(run: Run) -> str:
+    """Return why a run is not judged; "" if it is."""
     if run.verdict != NOT_JUDGED:
-        return Outcome("the search has results", "passed", details)
-    why = found.bound.sentence.rstrip(".") if found is not None else "the run has not ended"
-    return Outcome("the search has results", "unknown", f"{why}; {details}")
+        return ""
+    if run.triage is None:
+        return "the run has not ended"
+    return run.triage.bound.sentence.removeprefix("Not judged: ").rstrip(".")
 
 
 def _suites(run: Run, outcomes: Sequence[Outcome]) -> list[Suite]:

@@ -1,6 +1,7 @@
 """Pass/fail criteria for a suite."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 from bridgegen.conflict.findings import with_whom
 from bridgegen.odd.clauses import read_clause
@@ -15,6 +16,7 @@ from bridgegen.verdict.conditions import Conditions
 from bridgegen.verdict.fail_if import (
     Outcome,
     Verdict,
+    unless_judged,
     words_of,
 )
 from bridgegen.verdict.junit import Case, Problem, Suite, case_of, write_junit
@@ -27,6 +29,8 @@ FIGURES = {
     "known": "failed ones that the suite's index calls known or accepted",
     "regressions": "failed ones that the suite's index calls fixed",
     "new_failures": "the other failed ones",
+    "not_judged": "variations that could not be judged: they say nothing of the ego",
+    "not_judged_entries": "entries that could not be judged",
     "not_run": "variations that did not run; an entry that cannot run is one",
     "failed_entries": "entries in which a variation fails",
     "failed_clauses": "clauses of a regulation that an ego fails",
@@ -42,11 +46,15 @@ FIGURES = {
 MOST_NAMED = 20
 """Variations that a test's text names."""
 
+MOST_ENTRIES = 3
+"""Entries that an outcome names."""
+
 
 class SuiteCriteria(Conditions):
     """The criteria for a suite.
 
-    Without conditions, a variation that fails or did not run fails it.
+    Without conditions, a variation that fails or did not run fails it. An entry that could not be
+    judged leaves no condition passed, unless one of them states how many may be so.
     """
 
     known = FIGURES
@@ -54,12 +62,14 @@ class SuiteCriteria(Conditions):
     def judge(self, suite: SuiteRun) -> tuple[Outcome, ...]:
         """Apply the criteria to a suite, and write the JUnit XML if requested."""
         figures = figures_of(suite)
-        outcomes = [one.judge(figures) for one in self.conditions]
+        outcomes = tuple(one.judge(figures) for one in self.conditions)
+        if not {"not_judged", "not_judged_entries"} & {f for one in outcomes for f in one.figures}:
+            outcomes = unless_judged(outcomes, unjudged_entries(suite.results))
         if not outcomes:
-            outcomes = [_all_pass(suite, ego) for ego in suite.egos]
+            outcomes = tuple(_all_pass(suite, ego) for ego in suite.egos)
         if self.junit is not None:
             write_junit(self.junit, _suites(suite, outcomes if self.conditions else ()))
-        return tuple(outcomes)
+        return outcomes
 
 
 def figures_of(suite: SuiteRun) -> dict[str, float]:
@@ -76,6 +86,8 @@ def figures_of(suite: SuiteRun) -> dict[str, float]:
         "known": sum(standing[one] for one in EXCUSED),
         "regressions": standing["regression"],
         "new_failures": standing["new"],
+        "not_judged": number["not judged"],
+        "not_judged_entries": sum(one.verdict == "not judged" for one in results),
         "not_run": number["not run"],
         "failed_entries": sum(one.verdict == "failed" for one in results),
         "failed_clauses": sum(
@@ -98,11 +110,24 @@ def figures_of(suite: SuiteRun) -> dict[str, float]:
     return figures
 
 
+def unjudged_entries(results: Sequence[EntryResult]) -> str:
+    """Return which entries could not be judged, and why, in words; "" without any."""
+    return named([f"{o.entry}: {o.unjudged}" for o in results if o.verdict == "not judged"])
+
+
+def named(entries: Sequence[str]) -> str:
+    """Return texts on entries as one, of at most `MOST_ENTRIES` of them."""
+    more = len(entries) - MOST_ENTRIES
+    some = [*entries[:MOST_ENTRIES], *([f"and {more} more entries"] if more > 0 else [])]
+    return "; ".join(some)
+
+
 def _all_pass(suite: SuiteRun, ego: str) -> Outcome:
     results = suite.of_ego(ego)
     number = counts(results)
     total = sum(number.values())
     details = f"{number['failed']} of {total} fail, {number['passed']} pass"
+    details += f", {number['not judged']} not judged" if number["not judged"] else ""
     details += f", {number['not run']} not run" if number["not run"] else ""
     standing = suite.known_failures.counts(results)
     known = sum(standing[one] for one in EXCUSED)
@@ -114,8 +139,9 @@ def _all_pass(suite: SuiteRun, ego: str) -> Outcome:
     verdict: Verdict = "passed"
     if number["failed"] > known:
         verdict = "failed"
-    elif number["not run"] or not number["passed"] + known:
+    elif (why := unjudged_entries(results)) or number["not run"] or not number["passed"] + known:
         verdict = "unknown"
+        details += f"; {why}" if why else ""
     test = "variations" + (" but known failures" if suite.known_failures.failures else "")
     return Outcome(test + (f" with {ego}" if ego else ""), verdict, details)
 
@@ -148,7 +174,7 @@ def _suites(suite: SuiteRun, outcomes: Sequence[Outcome]) -> list[Suite]:
 def _cases(suite: SuiteRun, one: EntryResult, group: str) -> list[Case]:
     """Return the tests of an entry: that it runs, that no variation is critical, its criteria.
 
-    What fails as it is known to is skipped.
+    What fails as it is known to is skipped. Where the entry is not judged, none passes.
     """
     if one.problem:
         return [Case(group, "runs", "error", one.problem)]
@@ -166,6 +192,7 @@ def _cases(suite: SuiteRun, one: EntryResult, group: str) -> list[Case]:
 
     lost = [i for i, row in enumerate(one.rows) if row.problem]
     cases = [case_of_rows(group, "runs", one, lost, "did not run", "error")]
+    odd = [i for i, verdict in enumerate(one.verdicts) if verdict == "not judged"]
     critical = [i for i, row in enumerate(one.rows) if row.critical]
     excused = all(stated.is_excused(one, one.rows[i]) for i in critical)
     cases.append(case("no critical scenario", critical, "critical", excused))
@@ -178,7 +205,14 @@ def _cases(suite: SuiteRun, one: EntryResult, group: str) -> list[Case]:
         failing = [i for i, letter in enumerate(one.letters(number)) if letter == FAILED]
         name = f"clause {clause.id}: {clause.text}"
         cases.append(case(name, failing, "fail it", known=False))
-    return cases
+    if one.verdict != "not judged":
+        return cases
+    why = case_of_rows(group, "", one, odd, f"not judged: {one.unjudged}", "error")
+    return [
+        each if each.problem or each.name == "runs"
+        else replace(why, name=each.name, message=f"not judged: {one.unjudged}")
+        for each in cases
+    ]  # fmt: skip
 
 
 def case_of_rows(

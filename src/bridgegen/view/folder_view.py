@@ -83,7 +83,7 @@ def _facts(number: int, line: RunLine) -> Mapping[str, Any]:
         "judged": headline(line.ego, line.criteria),
         "violated": any(one.violated for one in line.criteria),
         "failures": bound.harmful if bound else None,
-        "unjudged": bound is not None and not bound.judged,
+        "unjudged": bound is None or not bound.judged,
         "share": bound.space.share if bound else None,
         "low": bound.space.low if bound else None,
         "high": bound.space.high if bound else None,
@@ -122,9 +122,13 @@ def _failures(line: RunLine) -> str:
     return f"{line.triage.bound.harmful:,}" if line.triage.bound.judged else "not judged"
 
 
+def _is_judged(line: RunLine) -> bool:
+    return line.triage is not None and line.triage.bound.judged
+
+
 def _share(line: RunLine) -> str:
     space = line.triage.bound.space if line.triage else None
-    if line.triage is None or space is None or space.share is None or not line.triage.bound.judged:
+    if space is None or space.share is None or not _is_judged(line):
         return "–"
     return f"{share(space.share)} (95{NARROW}%: {share(space.low)} to {share(space.high)})"
 
@@ -136,10 +140,10 @@ _FIGURES: dict[str, Callable[[RunLine], str]] = {
     "evaluations": lambda one: f"{one.evaluations:,}" + ("" if one.finished else ", not finished"),
     "pass criteria": lambda one: headline(one.ego, one.criteria) or "–",
     "failures": lambda one: _failures(one),
-    "failure modes": lambda one: f"{len(one.modes):,}" if one.triage else "–",
+    "failure modes": lambda one: f"{len(one.modes):,}" if _is_judged(one) else "–",
     "harmful share of the space": _share,
     "worst severity (MAIS3+)": lambda one: (
-        share(max((mode.severity for mode in one.modes), default=0.0)) if one.triage else "–"
+        share(max((mode.severity for mode in one.modes), default=0.0)) if _is_judged(one) else "–"
     ),
 }
 

@@ -20,9 +20,9 @@ function nameCell(run) {
   return [run.problem ? run.path : element("a", { href: `run/${run.number}/` }, run.path), small];
 }
 
-const shareCell = ({ share, low, high }) => (share === null ? ["–"] : [perCent(share), element("small", {}, `${perCent(low)} to ${perCent(high)}`)]);
-const noneFound = ({ finished, problem, judged, unjudged }) => {
-  if (!finished || problem) return "";
+const shareCell = ({ share, low, high, unjudged }) => (share === null || unjudged ? ["–"] : [perCent(share), element("small", {}, `${perCent(low)} to ${perCent(high)}`)]);
+const noneFound = ({ finished, problem, judged, unjudged, violated }) => {
+  if (!finished || problem || (unjudged && violated)) return ""; // a violation is a verdict
   return unjudged ? "not judged" : judged ? "no harm found" : "no failure found";
 };
 const judgedCell = ({ judged, violated }) => (judged ? [element("small", { class: violated ? "problem" : "" }, judged)] : []);
@@ -35,7 +35,7 @@ const COLUMNS = [
   ["driver", ({ ego }) => ego, ({ ego }) => [ego], ""],
   ["algorithm", ({ algorithm }) => algorithm, ({ algorithm, seed, problem }) => [algorithm, problem ? "" : element("small", {}, `seed ${seed}`)], ""],
   ["evaluations", ({ evaluations }) => evaluations, ({ evaluations, problem }) => [problem ? "" : plain(evaluations)], "number"],
-  ["failures", ({ failures }) => failures ?? -1, ({ failures, problem }) => [problem ? "" : plain(failures)], "number"],
+  ["failures", ({ failures }) => failures ?? -1, ({ failures, unjudged, problem }) => [problem ? "" : plain(unjudged ? null : failures)], "number"],
   ["of the space", ({ share }) => share ?? -1, shareCell, "number"],
   ["worst failure", ({ modes, violated }) => modes + Number(violated), modesCell, "words"],
   ["changed", ({ changed }) => changed, ({ changed }) => [new Date(1000 * changed).toLocaleString("sv-SE").slice(0, 16)], "number"],

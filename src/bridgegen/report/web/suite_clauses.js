@@ -2,7 +2,7 @@
 
 import { $, element } from "./common.js";
 import { table } from "./suite_table.js";
-import { bar, button, suite } from "./suite_words.js";
+import { CLASSES, PASSES, bar, button, suite } from "./suite_words.js";
 
 export function showClauses() {
   const { clauses, egos } = suite;
@@ -17,7 +17,7 @@ export function showClauses() {
 
 function cell(of) {
   if (!of) return ["–"];
-  return [element("span", { class: of.v === "f" ? "failed" : "" }, of.words), bar(of.rows)];
+  return [element("span", { class: of.v === "p" ? "" : CLASSES[of.v] }, of.v === "u" ? `${PASSES.u}: ${of.words}` : of.words), bar(of.rows)];
 }
 
 function scenario(name) {

@@ -19,7 +19,7 @@ export function showCriteria() {
 function countCell({ entries: [violating, met, none], rows: [violated, kept, lost] }) {
   const all = violating + met, rows = violated + kept;
   const words = violating ? `${counted(violating)} of ${counted(all)} scenario${all === 1 ? " violates" : "s violate"} it` : all ? `met in ${all === 1 ? "the only scenario" : `all ${counted(all)}`}` : "not evaluated";
-  const more = [rows > all ? `${violated ? `${counted(violated)} of ` : ""}${counted(rows)} variations` : "", none ? `${counted(none)} without a result` : ""].filter(Boolean).join("; ");
+  const more = [rows > all ? `${violated ? `${counted(violated)} of ` : ""}${counted(rows)} variations` : "", none ? `${counted(none)} not judged` : ""].filter(Boolean).join("; ");
   return [element("span", { class: violating ? "failed" : "" }, words), bar([kept, violated, lost]), more ? element("small", {}, more) : ""];
 }
 

@@ -58,9 +58,9 @@ export class Details {
     return element("div", { class: "replay" }, element("p", { class: "muted" }, "To run it again, in the folder in which the suite was run:"), element("div", { class: "command" }, code, copying));
   }
 
-  facts({ driver, files, notes }, { problem, blameless, standing, comment }) {
-    const lines = [standing ? element("p", {}, `${standing[0].toUpperCase()}${standing.slice(1)}${comment ? `: ${comment}` : ""}.`) : "", problem ? element("p", { class: "lost" }, `Did not run: ${problem}`) : "", element("p", { class: "muted files" }, [...files, driver ? `driver ${driver}` : ""].filter(Boolean).join("  ·  "))];
-    if (blameless) lines.push(element("p", {}, `${blameless} of the variations that pass ${blameless === 1 ? "has a collision that is" : "have collisions that are"} no failure of the ego: others are responsible, or their motion is implausible.`));
+  facts({ driver, files, notes }, { problem, unjudged, blameless, standing, comment }) {
+    const lines = [standing ? element("p", {}, `${standing[0].toUpperCase()}${standing.slice(1)}${comment ? `: ${comment}` : ""}.`) : "", problem ? element("p", { class: "lost" }, `Did not run: ${problem}`) : "", unjudged ? element("p", { class: "lost" }, `Not judged: ${unjudged}.`) : "", element("p", { class: "muted files" }, [...files, driver ? `driver ${driver}` : ""].filter(Boolean).join("  ·  "))];
+    if (blameless) lines.push(element("p", {}, `${blameless} of the variations that pass ${blameless === 1 ? "has a collision that is" : "have collisions that are"} no failure of the ego: others are responsible.`));
     if (notes.length) lines.push(element("details", {}, element("summary", {}, notes.length === 1 ? "1 note" : `${notes.length} notes`), element("ul", {}, ...notes.map((note) => element("li", {}, note)))));
     return element("div", { class: "told" }, ...lines);
   }

@@ -5,7 +5,7 @@ import { $, element } from "./common.js";
 import { shareText } from "./numbers.js";
 import { Details } from "./suite_details.js";
 import { motions } from "./suite_motions.js";
-import { WORSE, bar, button, counted, happens, suite, verdictWords } from "./suite_words.js";
+import { CLASSES, PASSES, WORSE, bar, button, counted, happens, suite, verdictWords } from "./suite_words.js";
 
 const entries = suite.entries;
 const egos = suite.egos;
@@ -18,8 +18,9 @@ const told = entries.map(({ results }) => {
   const worst = failed.reduce((a, b) => ((b.severity ?? 0) > (a.severity ?? 0) ? b : a), failed[0]);
   const violated = [...new Set(known.flatMap((one) => one.violated ?? []))].sort((a, b) => a - b);
   return {
-    worst, who: worst ? egos[results.indexOf(worst)] : "", violated, verdict: known.length ? Math.min(...known.map(({ v }) => WORSE[v])) : 3,
-    problem: known.find(({ problem }) => problem)?.problem ?? "", share: failed.reduce((sum, { n }) => sum + n[1] / (n[0] + n[1] + n[2]), 0),
+    worst, who: worst ? egos[results.indexOf(worst)] : "", violated, verdict: known.length ? Math.min(...known.map(({ v }) => WORSE[v])) : 4,
+    problem: known.find(({ problem }) => problem)?.problem ?? known.find(({ unjudged }) => unjudged)?.unjudged ?? "",
+    share: failed.reduce((sum, { n }) => sum + n[1] / n.reduce((a, b) => a + b), 0),
   };
 });
 const texts = entries.map((entry, k) => {
@@ -40,9 +41,8 @@ const FIRST = several ? "where egos differ, then failures" : "failures";
 const firstKey = (k) => [several && entries[k].differ ? 0 : 1, told[k].verdict, -(told[k].worst?.severity ?? 0), -told[k].share];
 
 function verdictKey(result) {
-  if (!result) return [3, 0];
-  const [passed, failed, lost] = result.n;
-  return [WORSE[result.v], -failed / Math.max(1, passed + failed + lost)];
+  if (!result) return [4, 0];
+  return [WORSE[result.v], -result.n[1] / Math.max(1, result.n.reduce((a, b) => a + b))];
 }
 
 function scenarioCell(k) {
@@ -53,8 +53,8 @@ function scenarioCell(k) {
 
 function resultCell(result) {
   if (!result) return ["–"];
-  const words = element("span", { class: result.excused ? "excused" : { f: "failed", n: "lost", p: "passed" }[result.v] }, verdictWords(result));
-  const more = result.blameless ? element("small", { title: "others are responsible, or their motion is implausible" }, `${counted(result.blameless)} blameless collision${result.blameless > 1 ? "s" : ""}`) : "";
+  const words = element("span", { class: result.excused ? "excused" : CLASSES[result.v] }, verdictWords(result));
+  const more = result.blameless ? element("small", { title: "others are responsible" }, `${counted(result.blameless)} blameless collision${result.blameless > 1 ? "s" : ""}`) : "";
   const hits = result.hits ? element("small", {}, `${counted(result.hits[0] + result.hits[1])} collide, ${counted(result.hits[0])} of them after slowing down`) : "";
   const standing = result.standing ? element("small", { class: result.excused ? "" : "failed", title: result.comment }, result.standing) : "";
   return [words, bar(result.n), standing, hits, more];
@@ -94,7 +94,7 @@ class Entries {
       const kept = options.filter(([, , n]) => n);
       if (kept.length) $("verdict").append(element("optgroup", { label }, ...kept.map(([value, words, n]) => element("option", { value }, `${words} (${counted(n)})`))));
     };
-    const words = { f: "fails", n: "did not run, or not all", p: "passes" };
+    const words = { ...PASSES, n: "did not run, or not all" };
     egos.forEach((label, e) => group(label, Object.keys(words).map((v) => [`${v}${e}`, words[v], entries.filter(({ results }) => results[e]?.v === v).length])));
     const differ = [...new Set(entries.map((one) => one.differ).filter(Boolean))].sort();
     group("Egos differ", [["differ", "in any way", entries.filter((one) => one.differ).length], ...differ.map((text) => [`=${text}`, text, entries.filter((one) => one.differ === text).length])]);

@@ -3,7 +3,7 @@
 import { element } from "./common.js";
 import { conflictWord } from "./findings.js";
 import { number, quantity, shareText, unitText } from "./numbers.js";
-import { MARKS, PASSES, WORSE, button, counted, suite } from "./suite_words.js";
+import { CLASSES, MARKS, PASSES, WORSE, button, counted, suite } from "./suite_words.js";
 
 const ROWS_AT_ONCE = 100;
 const FEW_PARAMETERS = 6; // parameters that stand before the results
@@ -22,7 +22,7 @@ function columnsOf(found, words, ego) {
   ];
   if (found.beside.length) {
     suite.egos.forEach((label, k) => {
-      if (k !== ego) columns.push([label, found.beside.map((letters) => WORSE[letters[k]] ?? 3), (_, i) => markCell(found.beside[i][k]), "", `the same variation with ${label}`]);
+      if (k !== ego) columns.push([label, found.beside.map((letters) => WORSE[letters[k]] ?? 4), (_, i) => markCell(found.beside[i][k]), "", `the same variation with ${label}`]);
     });
   }
   const parameters = parametersOf(found), few = parameters.length <= FEW_PARAMETERS;
@@ -49,7 +49,7 @@ function columnsOf(found, words, ego) {
     ["responsible", word("responsible"), (value) => value, "", ""],
   );
   const notes = word("note");
-  if (notes.some(Boolean)) columns.push(["note", notes, (value) => value, "words", "why it did not run; or why its traffic is implausible, so that harm does not count"]);
+  if (notes.some(Boolean)) columns.push(["note", notes, (value) => value, "words", "why it did not run, or is not judged"]);
   if (!few) columns.push(...parameters);
   return columns.filter(([title, values]) => !["conflict", "type", "partner", "responsible"].includes(title) || values.some(Boolean));
 }
@@ -62,7 +62,7 @@ function parametersOf({ parameters, x }) {
 }
 
 function rowVerdict({ verdict, critical }, i) {
-  return element("span", { class: { f: "failed", n: "lost", p: "" }[verdict[i]] }, `${PASSES[verdict[i]]}${critical[i] === "1" ? ": critical" : ""}`);
+  return element("span", { class: verdict[i] === "p" ? "" : CLASSES[verdict[i]] }, `${PASSES[verdict[i]]}${critical[i] === "1" ? ": critical" : ""}`);
 }
 
 function markCell(letter) {

@@ -5,23 +5,24 @@ import { data } from "./data.js";
 import { conflictWord } from "./findings.js";
 
 export const suite = data.suite;
-export const WORSE = { f: 0, n: 1, p: 2 };
-export const PASSES = { f: "fails", n: "did not run", p: "passes" };
-export const MARKS = { f: "✗", n: "?", p: "✓" };
+export const WORSE = { f: 0, n: 1, u: 2, p: 3 };
+export const PASSES = { f: "fails", n: "did not run", u: "not judged", p: "passes" };
+export const MARKS = { f: "✗", n: "?", u: "○", p: "✓" };
+export const CLASSES = { f: "failed", n: "lost", u: "unjudged", p: "passed" };
 export const counted = (n) => n.toLocaleString("en-GB");
 
 // The verdict of a scenario with an ego, in words.
-export function verdictWords({ v, n: [passed, failed, lost] }) {
-  const n = passed + failed + lost;
+export function verdictWords({ v, n: [passed, failed, lost, unjudged] }) {
+  const n = passed + failed + lost + unjudged, some = (count, words) => (count ? `${counted(count)} of ${counted(n)} ${words}` : "");
   if (n <= 1 || lost === n) return PASSES[v];
-  if (passed === n) return `passes (${counted(n)})`;
-  return [failed ? `fails ${counted(failed)} of ${counted(n)}` : "", lost ? `${counted(lost)} of ${counted(n)} did not run` : ""].filter(Boolean).join(", ");
+  if (passed === n || unjudged === n) return `${PASSES[v]} (${counted(n)})`;
+  return [v === "p" ? `passes ${counted(passed)}` : "", v === "u" ? PASSES.u : "", failed ? `fails ${counted(failed)} of ${counted(n)}` : "", some(lost, PASSES.n), some(unjudged, PASSES.u)].filter(Boolean).join(", ");
 }
 
-// A bar of numbers that pass, fail and did not run.
+// A bar of numbers that pass, fail, did not run and are not judged.
 export function bar(numbers) {
   const total = numbers.reduce((sum, n) => sum + n, 0);
-  const parts = ["passed", "failed", "lost"].map((kind, k) => {
+  const parts = ["passed", "failed", "lost", "unjudged"].map((kind, k) => {
     const part = element("i", { class: kind });
     part.style.flexGrow = `${numbers[k] / Math.max(1, total)}`;
     return part;
