@@ -165,7 +165,7 @@ def _unjudged(evaluations: int, besides: NotCounted, happening: Happening) -> st
         return f"{some} of {evaluations} evaluations could be judged"
     if not happening.happened:
         return "the scenario did not happen: " + "; ".join(happening.reasons)
-    return ""
+    return happening.domain
 
 
 def bound(
