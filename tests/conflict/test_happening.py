@@ -143,6 +143,51 @@ def test_everything_is_recorded_and_a_failed_scenario_has_nothing():
     assert json.loads(third)["stuck"] is False
 
 
+def test_an_ego_that_never_moves_is_stuck_whatever_the_reason():
+    """It stands at a red light from the start on, or is struck where it stands."""
+    still = {"v": np.zeros(round(SECONDS / DT) + 1)}
+    jam = parked(6.0), parked(12.0)
+    assert stuck(scene(*jam, **still))[0].size
+    struck = scene(drive(x=-20.0, v=10.0, t=SECONDS), **still)
+    assert struck.distance.min() == 0.0
+    assert stuck(struck)[0].size
+    assert not stuck(scene(*jam, left=0.0, **still))[0].size
+
+
+def test_only_what_happens_up_to_the_first_contact_counts():
+    """The ego is struck after 1.6 s; a car ahead brakes, and another comes, after that."""
+    ego = drive(v=10.0, t=6.0)
+    rear, ahead = drive(x=-20.0, v=20.0, t=6.0), drive(x=45.0, v=5.0, t=6.0)
+    one = meet(ego, rear, ahead)
+    contact = int(np.argmax((one.distance <= 0.0).any(axis=1)))
+    names = ("before", "at_it", "after")
+    began = np.array([[contact - 1, contact + 1, contact + 2]])
+    found = json.loads(happened(replace(one, event_names=names, began=began))[0])
+    assert found["began"] == {"before": True, "at_it": True, "after": False}
+    assert found["near"] == {"bv": True, "bv2": False}
+
+
+@pytest.mark.parametrize(("instant", "met"), [(0, True), (20, True), (60, False), (-1, False)])
+def test_whoever_acts_is_to_be_met_when_it_does(instant, met):
+    """An oncoming car at 10 m/s is near until it is 25 m behind, after 2.9 s."""
+    ego, other = drive(v=10.0, t=6.0), drive(x=20.0, y=3.5, h=np.pi, v=10.0, t=6.0)
+    one = replace(
+        meet(ego, other), event_names=("swerves", "lights"), began=np.array([[instant, 0]]),
+        event_actors=(frozenset({1}), frozenset()),
+    )  # fmt: skip
+    assert json.loads(happened(one)[0])["met"] == {"swerves": met}
+    assert "met" not in json.loads(happened(replace(one, event_actors=()))[0])
+
+
+def test_a_run_in_which_nobody_who_acts_is_met_did_not_happen():
+    def texts(first, second):
+        return json.dumps({"began": {}, "near": {"bv": True}, "met": {"a": first, "b": second}})
+
+    (reason,) = Happening.of([texts(False, False)] * 99 + [texts(True, False)]).reasons
+    assert reason == "the ego was near whoever acts, when it did, in 1 of 100 evaluations at most"
+    assert Happening.of([texts(True, False)] * 2 + [texts(False, False)] * 98).happened
+
+
 def text_of(began=True, near=True, behind=None, is_stuck=False):
     where = {"behind": behind, "driven": 80, "left": 120}
     return json.dumps(

@@ -191,6 +191,34 @@ def test_one_that_still_comes_against_the_traffic_drives_on_the_wrong_side(track
     assert verdict(without_map) == (NEITHER, Rule.LEFT_ITS_LANE)  # which side is whose?
 
 
+@pytest.mark.parametrize("v", [12.0, 20.0, 30.0])
+def test_an_oncoming_car_that_is_about_to_stop_would_not_have_run_into_who_stops(track, meeting, v):
+    """It still does 2 m/s when they meet, and stands 0.4 s later; 4 s before, there was room."""
+    rollout = wrong_way(track, meeting, v, -0.4)
+    assert verdict(rollout) == (BV, Rule.WRONG_SIDE)
+    assert analyse(rollout).v_other[0, 1] > 1.0
+    assert at_fault(rollout)
+
+
+def test_four_seconds_are_counted_by_the_speeds_of_each_instant(track, meeting):
+    """The ego brakes by 3 m/s² from 2.5 s before they meet, so it was 4 s away earlier.
+
+    It would have stopped from then on, but not from 4 s before the contact on.
+    """
+    t = DT * np.arange(301)
+    ego = np.interp(t, [0.0, 6.0, 15.0], [30.0, 30.0, 3.0])
+    ghost = np.interp(t, [0.0, 4.0, 8.0], [16.0, 16.0, 0.0])
+    meets = 8.5
+    way = 30.0 * 6.0 + 30.0 * (meets - 6.0) - 0.5 * 3.0 * (meets - 6.0) ** 2
+    rollout = meeting(
+        track(v=ego, t=15.0), track(x=4.0 + way + 96.0, h=np.pi, v=ghost, t=15.0), claims=[0],
+        friction=np.array([4.7]),
+    )  # fmt: skip
+    assert verdict(rollout) == (BV, Rule.WRONG_SIDE)
+    assert analyse(rollout).left[0, 1] > 4.3
+    assert at_fault(rollout)
+
+
 def test_one_that_crosses_and_stops_stands_ahead_only_since_it_stands(track, meeting, course):
     """It has priority by the signs, so the ego gives way; or none, then it stopped too late."""
     # at 2 m/s across from 20 m to the right of the ego's lane; it stops in it at 10 s

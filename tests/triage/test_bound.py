@@ -51,6 +51,13 @@ def test_a_scenario_that_did_not_happen_is_not_judged():
     assert bounded(happening=never, harmful=1, modes=1).verdict == "fails"
 
 
+def test_a_driver_outside_its_domain_is_not_judged_unless_it_fails():
+    outside = Happening(1000, domain="outside the domain of un-r157 (motorway): x has a junction")
+    assert bounded(happening=outside).verdict == "not judged"
+    assert text(happening=outside) == f"Not judged: {outside.domain}."
+    assert bounded(happening=outside, harmful=1, modes=1).verdict == "fails"
+
+
 def test_what_does_not_count_is_named_with_its_reasons():
     """A failure, two excused contacts, a near miss, two implausible rows, one without a result."""
     rows = [

@@ -32,8 +32,8 @@ def by(fix):
          "scenarios"),
         (0, False, f"root cause perception: {BRAKING} would not have avoided it; ideal perception "
          "does, in 32 of 32 nearby scenarios"),
-        (9, False, "unavoidable: the ego is responsible, but no fix prevents it in nearby "
-         f"scenarios, nor would {BRAKING}"),
+        (9, False, "root cause not found: the ego is responsible, but no fix prevents it in "
+         f"nearby scenarios, nor would {BRAKING}"),
         (9, True, f"root cause not found: {BRAKING} would have avoided it, but no fix does in "
          "nearby scenarios"),
     ],
@@ -43,6 +43,17 @@ def test_where_judges_differ_the_sentence_says_which_says_what(
 ):
     tested = near(space, world, fixed, by(fix))
     assert judgement(tested.cause, tested, preventable=preventable, responsible="ego") == said
+
+
+def test_only_what_the_ego_is_not_responsible_for_is_called_unavoidable(space, world, fixed):
+    """Who must give way, or keep its distance, could have; that no fix does is another matter."""
+    tested = near(space, world, fixed, by(9))
+    text = judgement(tested.cause, tested, preventable=False, responsible="other")
+    assert text == f"unavoidable: no fix prevents it in nearby scenarios, nor would {BRAKING}"
+    passed = judgement(tested.cause, tested, preventable=None, responsible="ego")
+    assert passed == (
+        "root cause not found: the ego is responsible, but no fix prevents it in nearby scenarios"
+    )
 
 
 def test_what_one_replay_says_is_no_more(space):

@@ -326,6 +326,7 @@ def _finish(
         triaged = triage(
             pipeline, rows, algorithm=settings.algorithm, seed=settings.seed, keep=settings.keep,
             chosen=best.tolist() if rule == "criteria" else None, effort=effort(settings.triage),
+            domain=store.domain,
         )  # fmt: skip
         record = triaged.record
         if rule != "criteria":

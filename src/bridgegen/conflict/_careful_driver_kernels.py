@@ -95,6 +95,12 @@ def follows(gap, speed, its):
 
 @kernel
 def braked(scene, a, b, k, start, braking):
+    """Return the outcome for body a if it brakes: of `braked_and_stood`, up to where it stands."""
+    return braked_and_stood(scene, a, b, k, start, braking, False)
+
+
+@kernel
+def braked_and_stood(scene, a, b, k, start, braking, stands):
     """Return the outcome for body a on its own track if it brakes from instant ``start`` on.
 
     From instant k to ``start`` it increases its gap to b as drivers do, see `follows`. The ego is
@@ -103,8 +109,9 @@ def braked(scene, a, b, k, start, braking):
     It keeps its motion for ``REACTION``; then its deceleration rises by ``JERK`` up to ``braking``
     [m/s²], or as far as the tyres allow. b moves as recorded up to ``scene.until``, then keeps its
     speed on its track. A body that stands when b runs into it counts as clear: braking cannot do
-    more. One that crosses b's way and is ahead of its recorded place when they meet does not: it
-    has escaped by not braking.
+    more; unless it ``stands`` in the way of b, which must have stopped before it then. One that
+    crosses b's way and is ahead of its recorded place when they meet is not clear: it has escaped
+    by not braking.
     """
     half, x, y, c, s, v, gone = (
         scene.half, scene.x, scene.y, scene.c, scene.s, scene.v, scene.gone
@@ -138,11 +145,13 @@ def braked(scene, a, b, k, start, braking):
         apart = separation(dx, dy, c[a, i], s[a, i], c[b, j], s[b, j], la, wa, lb, wb)
         its = v[b, min(m, until)]
         if apart <= 0.0:
-            return worst if speed <= 0.0 and its > 0.0 else COLLIDES
+            return worst if speed <= 0.0 and its > 0.0 and not stands else COLLIDES
         meets = crosses and (speed <= 0.0 or m == k_meet)
         if meets and at > gone[a, k_meet] + AHEAD_BY:
             return COLLIDES
         if speed <= 0.0:
+            if stands and its > 0.0:
+                continue
             return worst
         if scene.near and worst == CLEAR and speed >= MOVES:
             wx, wy = its * c[b, j] - speed * c[a, i], its * s[b, j] - speed * s[a, i]

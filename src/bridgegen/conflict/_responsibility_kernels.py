@@ -10,7 +10,13 @@ on its own path? See ``_careful_driver_kernels``.
 import math
 
 from bridgegen.compiled import kernel
-from bridgegen.conflict._careful_driver_kernels import CLEAR, COLLIDES, COMES_NEAR, braked
+from bridgegen.conflict._careful_driver_kernels import (
+    CLEAR,
+    COLLIDES,
+    COMES_NEAR,
+    braked,
+    braked_and_stood,
+)
 from bridgegen.conflict._circumstances_kernels import (
     ahead_until,
     ego_came_over,
@@ -127,10 +133,12 @@ def judge(scene, e, k, at, kind, own, own_part, appears, whole, real):
         seen = min(since, early) if early < entry else since
         if signal > 0:
             since = seen
-    level = braked(scene, 0, e, seen, seen, BRAKING)
+    comes = kind == HEAD_ON and not scene.near  # standing does not avoid it unless it stops, too
+    level = braked_and_stood(scene, 0, e, seen, seen, BRAKING, comes)
+    if comes and level != CLEAR and risk < seen < stands:
+        seen = foreseen_since(scene, e, risk, seen)
+        level = braked_and_stood(scene, 0, e, seen, seen, BRAKING, comes)
     avoidable = real[STOOD_EGO] <= 0.0 and level == CLEAR and not appears
-    if kind == HEAD_ON and not scene.near and avoidable:  # standing does not avoid oncoming traffic
-        avoidable = abs(scene.v[e, k]) <= STANDS
     whole[DECIDED], whole[PREVENTABLE] = seen, avoidable
     if appears:
         whole[RESPONSIBLE], whole[RULE] = NEITHER, UNSAFE_START
@@ -152,6 +160,24 @@ def judge(scene, e, k, at, kind, own, own_part, appears, whole, real):
             real,
         )
     real[LEFT_TO_ACT] = max(at - whole[DECIDED], 0) * scene.dt + real[TTC]
+
+
+@kernel
+def foreseen_since(scene, e, risk, since):
+    """Return the instant, not before ``risk``, since which the two are to touch within `HORIZON`.
+
+    By the speeds of each instant: an ego that brakes, or another that does, meets it later.
+    """
+    every = max(int(EVIDENT_EVERY / scene.dt + 0.5), 1)
+    while since - every >= risk:
+        time = time_along_paths(
+            scene.half, scene.x, scene.y, scene.c, scene.s, scene.v, scene.gone, e, since - every,
+            scene.n, scene.n, HORIZON,
+        )  # fmt: skip
+        if time == math.inf:
+            break
+        since -= every
+    return since
 
 
 @kernel

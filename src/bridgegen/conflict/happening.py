@@ -65,9 +65,10 @@ def happened(rollout: Rollout, *, may_stop: bool = False) -> npt.NDArray[np.obje
     """Return what happened in each of N scenarios, as a JSON text; "" of a failed one.
 
     Keys: ``began``, by event whether it began; ``near``, by participant whether the ego came near
-    it; ``end``, whether the ego is at the end of its route; ``stuck``, see `stuck`: false, or an
-    object with ``behind`` (a participant, or null), and ``driven`` and ``left`` [m], rounded. What
-    a simulator does not know is absent.
+    it; ``met``, by event that moves others whether the ego was near one of them since; ``end``,
+    whether the ego is at the end of its route; ``stuck``, see `stuck`: false, or an object with
+    ``behind`` (a participant, or null), and ``driven`` and ``left`` [m], rounded. What a simulator
+    does not know is absent. All but the last two hold up to the ego's first contact.
 
     Args:
         rollout: of N scenarios.
@@ -79,11 +80,24 @@ def happened(rollout: Rollout, *, may_stop: bool = False) -> npt.NDArray[np.obje
     others = [e for e in range(1, rollout.shape[1]) if not rollout.is_ego_s(e)]
     if rollout.kinds.size:  # cones and barriers take no part
         others = [e for e in others if not IS_OBSTACLE[rollout.kinds[e]]]
-    began = rollout.began >= 0 if len(rollout.began) else np.zeros((n, 0), np.bool_)
-    near = np.zeros((n, len(others)), np.bool_)
+    last = _last_judged(rollout)
+    at = np.where(rollout.began <= last[:, np.newaxis] + 1, rollout.began, -1)
+    began = at >= 0 if len(rollout.began) else np.zeros((n, 0), np.bool_)
     reach = NEAR + NEAR_TIME * np.abs(rollout.v[:, 0])
-    for k, e in enumerate(others):
-        near[:, k] = (rollout.distance[:, e] <= reach).any(axis=1)
+    reach[np.arange(rollout.shape[2]) > last[:, np.newaxis]] = -1.0
+    last_near = np.full((n, rollout.shape[1]), -1)  # the last instant at which each is near
+    for e in others:
+        is_near = rollout.distance[:, e] <= reach
+        last_near[:, e] = np.where(is_near, np.arange(is_near.shape[1]), -1).max(axis=1)
+    near = last_near[:, others] >= 0
+    acting = [
+        (i, sorted(actors & {*others}))
+        for i, actors in enumerate(rollout.event_actors)
+        if actors & {*others}
+    ]
+    met = np.zeros((n, len(acting)), np.bool_)
+    for k, (i, actors) in enumerate(acting):
+        met[:, k] = began[:, i] & (last_near[:, actors].max(axis=1) >= at[:, i])
     code = np.full((n, 4), -1, np.int64)  # at its end; behind whom, metres driven and left
     if known := bool(len(rollout.progress)):
         # A storyboard may end where the ego arrives, before the end of the lane there.
@@ -92,18 +106,20 @@ def happened(rollout: Rollout, *, may_stop: bool = False) -> npt.NDArray[np.obje
         rows, behind = stuck(rollout)
         code[rows, 1] = behind
         code[rows, 2:] = np.rint(rollout.progress[rows])
-    keys, which = np.unique(np.hstack([began, near, code]), axis=0, return_inverse=True)
+    keys, which = np.unique(np.hstack([began, near, met, code]), axis=0, return_inverse=True)
     names, v = [rollout.names[e] for e in others], began.shape[1]
-    events: dict[str, list[int]] = {}  # several may have one name
-    for i, name in enumerate(rollout.event_names[:v]):
-        events.setdefault(name, []).append(i)
+    w = v + len(names)
+    events = _by_name(enumerate(rollout.event_names[:v]))
+    moving = _by_name((w + k, rollout.event_names[i]) for k, (i, _) in enumerate(acting))
 
     def text(key: Sequence[int]) -> str:
         end, behind, driven, left = key[-4:]
         found: dict[str, Any] = {
             "began": {name: any(key[i] for i in at) for name, at in events.items()},
-            "near": dict(zip(names, map(bool, key[v:-4]), strict=True)),
+            "near": dict(zip(names, map(bool, key[v:w]), strict=True)),
         }
+        if moving:
+            found["met"] = {name: any(key[i] for i in at) for name, at in moving.items()}
         if known:
             who = rollout.names[behind] if behind > 0 else None
             where = {"behind": who, "driven": driven, "left": left}
@@ -117,6 +133,22 @@ def happened(rollout: Rollout, *, may_stop: bool = False) -> npt.NDArray[np.obje
     return texts
 
 
+def _by_name(numbered: Iterable[tuple[int, str]]) -> dict[str, list[int]]:
+    """Return the numbers of each name; several events may have one."""
+    found: dict[str, list[int]] = {}
+    for i, name in numbered:
+        found.setdefault(name, []).append(i)
+    return found
+
+
+def _last_judged(rollout: Rollout) -> Int:
+    """Return the last instant that counts, ``(N,)``: of the ego's first contact, or of all."""
+    touches: Bool = np.any(rollout.distance <= 0.0, axis=1)
+    first = np.where(touches.any(axis=1), touches.argmax(axis=1), rollout.shape[2])
+    found: Int = np.minimum(first, rollout.n_steps - 1)
+    return found
+
+
 def stuck(rollout: Rollout) -> tuple[Int, Int]:
     """Return which egos stand at the end of their scenarios, for no reason, before their routes'.
 
@@ -125,7 +157,8 @@ def stuck(rollout: Rollout) -> tuple[Int, Int]:
     light is not green; someone on foot on a crosswalk just ahead; any participant that comes
     nearer and could be at the ego within `GAP_TIME`; and what stands in the way just ahead, unless
     it is a vehicle or an object that never moves and has no other standing just ahead of it, as in
-    a jam: that one is parked, and is to be passed.
+    a jam: that one is parked, and is to be passed. An ego that does not move at all, until its
+    first contact or the end, is stuck whatever the reason.
 
     Args:
         rollout: of N scenarios, with ``progress``.
@@ -141,7 +174,10 @@ def stuck(rollout: Rollout) -> tuple[Int, Int]:
     there = at <= last[:, np.newaxis]
     idle = there & (at > np.where(there & (np.abs(v) >= STANDS), at, -1).max(axis=1, keepdims=True))
     waits = (rollout.status == 0) & (rollout.progress[:, 1] > 0.0) & (idle.sum(axis=1) > least)
-    rows = np.flatnonzero(waits)
+    counts = np.arange(rollout.shape[2]) <= _last_judged(rollout)[:, np.newaxis]
+    never_moves = ~(counts & (np.abs(rollout.v[:, 0]) >= STANDS)).any(axis=1)
+    never_moves &= (rollout.status == 0) & (rollout.progress[:, 1] > 0.0)
+    rows = np.flatnonzero(waits | never_moves)
     if not rows.size:
         return rows, rows
     some, idle, there, last = _sampled(rollout, rows, every), idle[rows], there[rows], last[rows]
@@ -161,7 +197,7 @@ def stuck(rollout: Rollout) -> tuple[Int, Int]:
         parked &= ~np.array(IS_ON_FOOT)[some.kinds]
     reason = (comes | (blocks & ~parked[:, :, np.newaxis])).any(axis=1)
     idle &= ~(reason | _red(some) | _crossed(some, distance))
-    found = idle.sum(axis=1) > least
+    found = (idle.sum(axis=1) > least) | never_moves[rows]
     gap = np.where(blocks, distance, np.inf)[np.arange(len(rows)), :, last]
     behind = np.where(np.isfinite(gap).any(axis=1), gap.argmin(axis=1), 0)
     return rows[found], behind[found]
@@ -237,6 +273,7 @@ class _Text(BaseModel, extra="forbid", strict=True):
 
     began: dict[str, bool]
     near: dict[str, bool]
+    met: dict[str, bool] = {}
     end: bool | None = None
     stuck: _Stuck | Literal[False] | None = None
 
@@ -269,6 +306,7 @@ class Happening:
         rows: how many these are; 0 of a run that recorded nothing of it.
         events: of the storyboard: where each began.
         near: the participants: where the ego came near each.
+        met: the events that move others: where the ego was near one of these since it began.
         end: where the ego reached the end of its route; None where this is unknown.
         stuck: how many egos are stuck; None where this is unknown.
         may_stop: of these, how many are in a test of a protocol, see `happened`.
@@ -281,6 +319,7 @@ class Happening:
     rows: int
     events: tuple[Share, ...] = ()
     near: tuple[Share, ...] = ()
+    met: tuple[Share, ...] = ()
     end: Share | None = None
     stuck: int | None = None
     may_stop: int = 0
@@ -311,6 +350,7 @@ class Happening:
             rows=sum(counts.values()),
             events=_shares([(one.began, rows) for one, rows in found]),
             near=_shares([(one.near, rows) for one, rows in found]),
+            met=_shares([(one.met, rows) for one, rows in found]),
             end=_share("end", ends) if ends else None,
             stuck=len(driven) if ends else None,
             may_stop=sum(rows for one, rows in stuck if one.may_stop),
@@ -338,6 +378,10 @@ class Happening:
             most = max(self.near, key=lambda one: one.rows)
             rows = f"{most.rows} of {most.of} evaluations"
             found.append(f"no participant came near the ego in more than {rows}")
+        elif self.met and all(one.value < SELDOM for one in self.met) and not found:
+            most = max(self.met, key=lambda one: one.rows)
+            rows = f"{most.rows} of {most.of} evaluations"
+            found.append(f"the ego was near whoever acts, when it did, in {rows} at most")
         if self.stuck is not None and self.stuck - self.may_stop > MOSTLY * self.rows:
             found.append(self.stuck_in_words)
         return tuple(found)

@@ -158,7 +158,7 @@ def verdict_lines(run: "Run", seconds: float) -> list[str]:
         lines += ["", *_found_lines(found)]
     if not run.happening.happened or run.happening.stuck:
         lines.append(f"What happened: {run.happening.sentence}")
-    elif run.happening.domain:
+    elif run.happening.domain and run.verdict != "not judged":
         lines.append(f"Domain: {run.happening.domain}")
     if s.failed:
         reasons = ", ".join(f"{n} × {why}" for why, n in run.failures.most_common(MOST_REASONS))

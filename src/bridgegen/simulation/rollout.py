@@ -86,6 +86,7 @@ class Rollout:
         lights: ``(N, S, T)`` int8, their states: 0 off, 1 red, 2 red and yellow, 3 yellow, 4 green.
         event_names: of the V events of the storyboard, in the order of the file.
         began: ``(N, V)`` int64, the instant at which each began; -1 if it never did.
+        event_actors: the entities that each of the V events moves; empty where unknown.
         present: ``(N, E, T)`` bool, which entity is present at which instant; where one is
             absent, its states are finite but meaningless. ``(0, 0, 0)`` where all always are.
         lamps: ``(N, E, T)`` int8, indicators and brake lights that show, see `bridgegen.ego.lamps`;
@@ -134,6 +135,7 @@ class Rollout:
     lights: npt.NDArray[np.int8] = field(default_factory=lambda: np.zeros((0, 0, 0), np.int8))
     event_names: tuple[str, ...] = ()
     began: Int = field(default_factory=lambda: np.zeros((0, 0), np.int64))
+    event_actors: tuple[frozenset[int], ...] = ()
     present: Bool = field(default_factory=lambda: np.zeros((0, 0, 0), np.bool_))
     lamps: npt.NDArray[np.int8] = field(default_factory=lambda: np.zeros((0, 0, 0), np.int8))
     kinds: Int = field(default_factory=lambda: np.zeros(0, np.int64))

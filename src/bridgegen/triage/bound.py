@@ -173,7 +173,7 @@ def _unjudged(evaluations: int, besides: NotCounted, happening: Happening) -> st
         return few
     if not happening.happened:
         return "the scenario did not happen: " + "; ".join(happening.reasons)
-    return ""
+    return happening.domain
 
 
 def bound(

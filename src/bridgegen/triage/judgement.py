@@ -63,9 +63,11 @@ def _unavoidable(tested: bool, preventable: bool | None, responsible: str) -> st
     where = "in nearby scenarios" if tested else _IN_ONE_REPLAY
     if preventable:
         return f"root cause not found: {BRAKING} would have avoided it, but no fix does {where}"
-    blamed = "the ego is responsible, but " if responsible in ("ego", "shared") else ""
+    said = "unavoidable:"
+    if responsible in ("ego", "shared"):  # it could have kept its duty
+        said = "root cause not found: the ego is responsible, but"
     braking = f", nor would {BRAKING}" if preventable is False else ""
-    return f"unavoidable: {blamed}no fix prevents it {where}{braking}"
+    return f"{said} no fix prevents it {where}{braking}"
 
 
 def _harmful(near: Neighbourhood, fix: Treatment) -> int:

@@ -74,6 +74,7 @@ def triage(
     keep: int,
     chosen: Sequence[int] | None = None,
     effort: Effort = FULL,
+    domain: str = "",
 ) -> Triaged:
     """Group a run's harmful rows into failure modes, and test the robustness of each finding.
 
@@ -88,8 +89,9 @@ def triage(
         chosen: positions of the rows to export, best first, where something else than harm chooses
             them; the harmful ones among them are tested.
         effort: how much is tested.
+        domain: a sentence if the driver is not made for the scenario.
     """
-    return _Triage(pipeline, rows, algorithm, seed, keep, chosen, effort).run()
+    return _Triage(pipeline, rows, algorithm, seed, keep, chosen, effort, domain).run()
 
 
 def harmful_rows(
@@ -126,11 +128,12 @@ class _Triage:
         keep: int,
         chosen: Sequence[int] | None,
         effort: Effort,
+        domain: str,
     ) -> None:
         self._effort, self._tests = effort, pipeline.tries and effort.tests
         self._pipeline, self._rows, self._space = pipeline, rows, pipeline.space
         self._algorithm, self._seed, self._keep = algorithm, seed, keep
-        self._chosen = chosen
+        self._chosen, self._domain = chosen, domain
         name = pipeline.objective.harm
         harmful, self._harm = harmful_rows(
             rows.metrics, pipeline.metrics, name, rows.status, rows.findings
@@ -383,7 +386,7 @@ class _Triage:
             bound=bound(
                 evaluations=len(ok),
                 besides=NotCounted.of(rows.findings.take(slice(None)), self._harm, ok),
-                happening=Happening.of(rows.findings.happened),
+                happening=Happening.of(rows.findings.happened, self._domain),
                 harmful=len(self._at), space=space,
                 least=least_margins(
                     rows.metrics, pipeline.metrics, self._harm, rows.id, ok & ~implausible,

@@ -296,6 +296,7 @@ class Batch:
             lights=record.lights,
             event_names=program.event_names,
             began=record.began,
+            event_actors=tuple(program.actors),
             present=NO_PRESENCE if record.present.all() else record.present,
             lamps=record.lamps if record.lamps.size else NO_LAMPS,
             detections=record.detections if record.detections.size else NO_DETECTIONS,
