@@ -11,13 +11,13 @@ import numpy as np
 import pytest
 
 import bridgegen as bg
-from bridgegen.campaign import SearchCallbacks
-from bridgegen.errors import UnknownNameError
-from bridgegen.odd.reader import load
-from bridgegen.options import PipelineOptions
+from bridgegen.base.errors import UnknownNameError
+from bridgegen.engine.options import PipelineOptions
+from bridgegen.engine.workers.processes import Processes
+from bridgegen.jobs.search import SearchCallbacks
+from bridgegen.results.store import Store
+from bridgegen.scenario.language.reader import load
 from bridgegen.simulation.rollout import WORKER_ENDED
-from bridgegen.store import Store
-from bridgegen.workers.processes import Processes
 
 DRIVERS = Path(__file__).parents[1] / "ego" / "drivers.py"
 DOUBLES = Path(__file__).parents[1] / "workers" / "doubles"

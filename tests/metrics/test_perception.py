@@ -10,13 +10,13 @@ import shapely
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bridgegen.ego import kinds
-from bridgegen.ego.detections import BOTH, MISSED, NO_FRAME
-from bridgegen.metrics import perceived
-from bridgegen.metrics.e_position import e_position
-from bridgegen.metrics.iou import iou
-from bridgegen.metrics.mean_average_precision import mean_average_precision
-from bridgegen.metrics.r_red import r_red
+from bridgegen.assess.metrics import perceived
+from bridgegen.assess.metrics.e_position import e_position
+from bridgegen.assess.metrics.iou import iou
+from bridgegen.assess.metrics.mean_average_precision import mean_average_precision
+from bridgegen.assess.metrics.r_red import r_red
+from bridgegen.drivers import kinds
+from bridgegen.drivers.detections import BOTH, MISSED, NO_FRAME
 
 # r_red. The ego drives along +x; its front bumper is 2 m ahead of its reference point.
 

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from bridgegen.regions.evidence import Evidence, clopper_pearson, wilson
+from bridgegen.search.regions.evidence import Evidence, clopper_pearson, wilson
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 import typer
 
 from bridgegen.cli.expansion import expand
-from bridgegen.options.option import SIMULATOR
+from bridgegen.engine.options.option import SIMULATOR
 from bridgegen.simulation.choice import SIMULATORS, SimulatorChoice, Value
 
 Connection = Mapping[str, Value]

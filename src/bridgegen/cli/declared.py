@@ -1,4 +1,4 @@
-"""Options of the command line from the declarations in `bridgegen.options`."""
+"""Options of the command line from the declarations in `bridgegen.engine.options`."""
 
 from collections.abc import Callable, Collection
 from dataclasses import replace
@@ -9,7 +9,7 @@ import typer
 
 from bridgegen.cli.completion import completing
 from bridgegen.cli.expansion import expand
-from bridgegen.options import Option, PipelineOptions, SearchOptions, options_of
+from bridgegen.engine.options import Option, PipelineOptions, SearchOptions, options_of
 
 
 def with_declared_options(command: Callable[..., None]) -> Callable[..., None]:

@@ -10,7 +10,7 @@ from typing import Annotated, Any
 
 import typer
 
-from bridgegen.errors import InputError
+from bridgegen.base.errors import InputError
 
 
 def with_map_folder(

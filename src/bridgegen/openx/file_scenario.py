@@ -12,15 +12,8 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
-from bridgegen.arrays import Float
-from bridgegen.errors import FileFormatError, InputError, ScenarioError
-from bridgegen.odd.constraints import Constraints
-from bridgegen.odd.objectives import HARM
-from bridgegen.odd.parameters import Axis, Bound
-from bridgegen.odd.scenario import SearchedScenario, content_of
-from bridgegen.odd.space import SearchSpace
-from bridgegen.ontology.graph import Individuals
-from bridgegen.ontology.site import Site
+from bridgegen.base.arrays import Float
+from bridgegen.base.errors import FileFormatError, InputError, ScenarioError
 from bridgegen.openx.logic_file import logic_path
 from bridgegen.openx.opendrive.model import OpenDrive
 from bridgegen.openx.opendrive.read import read as read_roads
@@ -40,6 +33,13 @@ from bridgegen.openx.openscenario.to_owl import individuals_from_openscenario
 from bridgegen.openx.openscenario.values import Kind, format_double
 from bridgegen.openx.prepared import prepared
 from bridgegen.openx.xml import read_bytes
+from bridgegen.scenario.language.constraints import Constraints
+from bridgegen.scenario.language.objectives import HARM
+from bridgegen.scenario.language.parameters import Axis, Bound
+from bridgegen.scenario.language.scenario import SearchedScenario, content_of
+from bridgegen.scenario.language.space import SearchSpace
+from bridgegen.scenario.ontology.graph import Individuals
+from bridgegen.scenario.ontology.site import Site
 
 MAX_SEED = 2**32 - 1
 

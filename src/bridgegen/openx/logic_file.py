@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from bridgegen.errors import FileFormatError
+from bridgegen.base.errors import FileFormatError
 from bridgegen.openx.opendrive import read as opendrive_read
 from bridgegen.openx.opendrive.carla_maps import map_path
 from bridgegen.openx.opendrive.model import Header, OpenDrive

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from bridgegen.errors import FileFormatError, InputError
+from bridgegen.base.errors import FileFormatError, InputError
 from bridgegen.openx.opendrive.lanes import section_end, section_index
 from bridgegen.openx.opendrive.model import OpenDrive
 from bridgegen.openx.opendrive.routes import Stretch, next_stretches

@@ -1,1 +1,1 @@
-"""Recorded traffic: files of many formats become one table of trajectories, cleaned."""
+"""What is made of recorded traffic: what was recorded, and where on lanes it was."""

@@ -4,16 +4,16 @@ from collections.abc import Callable, Mapping, MutableMapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from bridgegen.errors import InputError, UnknownNameError
-from bridgegen.plugins import PlugIns, Registry
-from bridgegen.simulation.carla.settings import MEANINGS as CARLA_SETTINGS
-from bridgegen.simulation.carla.settings import OPTIONS as CARLA_OPTIONS
-from bridgegen.simulation.carla.settings import Access as CarlaAccess
-from bridgegen.simulation.carla.settings import CarlaSettings
+from bridgegen.adapters.carla.settings import MEANINGS as CARLA_SETTINGS
+from bridgegen.adapters.carla.settings import OPTIONS as CARLA_OPTIONS
+from bridgegen.adapters.carla.settings import Access as CarlaAccess
+from bridgegen.adapters.carla.settings import CarlaSettings
+from bridgegen.base.errors import InputError, UnknownNameError
+from bridgegen.base.plugins import PlugIns, Registry
 from bridgegen.simulation.vehicles import KINEMATIC
 
 if TYPE_CHECKING:  # it is part of the command line, which starts fast
-    from bridgegen.ego import Driver
+    from bridgegen.drivers import Driver
     from bridgegen.openx.openscenario.model import OpenScenario
     from bridgegen.simulation.embedded.simulator import EmbeddedSimulator
     from bridgegen.simulation.simulator import Simulator
@@ -76,7 +76,7 @@ def _carla(
     settings: Mapping[str, Value],
     access: Mapping[str, Value],
 ) -> "Simulator[Any]":
-    from bridgegen.simulation.carla.simulator import CarlaSimulator
+    from bridgegen.adapters.carla.simulator import CarlaSimulator
 
     chosen, where = CarlaSettings.of(settings), CarlaAccess.of(access)
     return CarlaSimulator(embedded, storyboard, settings=chosen, access=where)

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
-from bridgegen.arrays import Float
-from bridgegen.errors import FileFormatError, InputError, UnknownNameError
+from bridgegen.base.arrays import Float
+from bridgegen.base.errors import FileFormatError, InputError, UnknownNameError
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.read import read as read_scenario
 from bridgegen.openx.openscenario.resolve import resolved
@@ -55,7 +55,7 @@ def boxes_of(path: Path) -> dict[str, tuple[float, float, float]]:
 
 
 def kinds_of(path: Path) -> dict[str, int]:
-    """Return what a scenario file's entities are, as `bridgegen.ego.kinds` numbers it.
+    """Return what a scenario file's entities are, as `bridgegen.drivers.kinds` numbers it.
 
     Raises:
         FileFormatError: not a valid OpenSCENARIO file.

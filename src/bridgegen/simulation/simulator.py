@@ -5,8 +5,8 @@ from typing import TYPE_CHECKING, Protocol, TypeVar
 
 import numpy.typing as npt
 
-from bridgegen.arrays import Float, Int
-from bridgegen.ego import Driver
+from bridgegen.base.arrays import Float, Int
+from bridgegen.drivers import Driver
 from bridgegen.openx.opendrive.model import OpenDrive
 from bridgegen.simulation.rollout import Rollout
 

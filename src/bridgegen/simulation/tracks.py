@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from math import isfinite
 from pathlib import Path
 
-from bridgegen.errors import FileFormatError
+from bridgegen.base.errors import FileFormatError
 from bridgegen.openx.xml import read_bytes
 from bridgegen.simulation.trace import COLUMNS, MORE
 

@@ -11,13 +11,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bridgegen.ontology.individuals import build_static
 from bridgegen.openx.opendrive.from_owl import opendrive_from_owl
 from bridgegen.openx.opendrive.lanes import lane_pose, section_end
 from bridgegen.openx.opendrive.model import Header, Lane, LaneSection, OpenDrive, Road, Width
 from bridgegen.openx.opendrive.plan_view import Arc, Cubic, Geometry, Line, Spiral
 from bridgegen.openx.opendrive.site import find_site
 from bridgegen.openx.opendrive.write import to_xml
+from bridgegen.scenario.ontology.individuals import build_static
 
 from .kinds import FURNISHED, KINDS
 from .kinds import model as kind

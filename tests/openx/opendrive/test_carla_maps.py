@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from bridgegen.errors import FileFormatError
+from bridgegen.base.errors import FileFormatError
 from bridgegen.openx.convert import import_file
 from bridgegen.openx.opendrive.carla_maps import map_path
 from bridgegen.openx.opendrive.road_map import map_of

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import HealthCheck, assume, given, settings
 from lxml import etree
 
-from bridgegen.errors import UnsupportedError
+from bridgegen.base.errors import UnsupportedError
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario import versions
 from bridgegen.openx.openscenario.element import references, rewritten, walk

@@ -11,8 +11,8 @@ from pathlib import Path
 import numpy as np
 from lxml import etree
 
-from bridgegen.ego import DRIVERS
-from bridgegen.errors import InputError
+from bridgegen.base.errors import InputError
+from bridgegen.drivers import DRIVERS
 from bridgegen.openx.logic_file import roads_of
 from bridgegen.openx.openscenario import parameters
 from bridgegen.openx.openscenario.read import read

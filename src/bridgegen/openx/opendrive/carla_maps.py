@@ -3,7 +3,7 @@
 import os
 from pathlib import Path
 
-from bridgegen.errors import FileFormatError
+from bridgegen.base.errors import FileFormatError
 
 ROOT = "CARLA_ROOT"
 """The environment variable that says where CARLA is installed, or a folder with its maps."""

@@ -6,7 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from bridgegen.arrays import Float
+from bridgegen.base.arrays import Float
 from bridgegen.openx.opendrive.geometry import reference_pose
 from bridgegen.openx.opendrive.lanes import borders, breaks, points, section_end
 from bridgegen.openx.opendrive.model import Junction, LaneSection, OpenDrive, Road

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bridgegen.arrays import Float
+from bridgegen.base.arrays import Float
 from bridgegen.openx.opendrive.furniture import Object, Signal
 from bridgegen.openx.opendrive.geometry import reference_pose
 from bridgegen.openx.opendrive.lanes import points

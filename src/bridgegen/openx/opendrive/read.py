@@ -12,7 +12,7 @@ from typing import Any
 
 from lxml import etree
 
-from bridgegen.errors import FileFormatError, UnsupportedError
+from bridgegen.base.errors import FileFormatError, UnsupportedError
 from bridgegen.openx.opendrive.declaration import DECORATION, ID, Field, plan
 from bridgegen.openx.opendrive.geometry import impossible_shape
 from bridgegen.openx.opendrive.model import (

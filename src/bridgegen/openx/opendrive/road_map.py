@@ -4,16 +4,16 @@ import hashlib
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from bridgegen.errors import FileFormatError
-from bridgegen.odd.scenario import LogicalScenario
-from bridgegen.ontology.files import load
-from bridgegen.ontology.site import Site
+from bridgegen.base.errors import FileFormatError
 from bridgegen.openx.opendrive.carla_maps import map_path
 from bridgegen.openx.opendrive.model import OpenDrive
 from bridgegen.openx.opendrive.read import read
 from bridgegen.openx.opendrive.site import find_site
 from bridgegen.openx.opendrive.site_fit import ALL, BEST, alike, fitting_sites, site_for
 from bridgegen.openx.xml import read_bytes
+from bridgegen.scenario.language.scenario import LogicalScenario
+from bridgegen.scenario.ontology.files import load
+from bridgegen.scenario.ontology.site import Site
 
 
 @dataclass(frozen=True)

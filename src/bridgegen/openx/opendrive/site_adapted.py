@@ -4,13 +4,21 @@ from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 
-from bridgegen.errors import InputError
-from bridgegen.odd.scenario import LogicalScenario
-from bridgegen.odd.story import Action, Arrival, LaneChange, Participant, Story, Way, Waypoint
-from bridgegen.ontology.site import Leg, Site
+from bridgegen.base.errors import InputError
 from bridgegen.openx.opendrive.merges import AFTER, MAIN
 from bridgegen.openx.opendrive.model import OpenDrive
 from bridgegen.openx.opendrive.routes import plan_route
+from bridgegen.scenario.language.scenario import LogicalScenario
+from bridgegen.scenario.language.story import (
+    Action,
+    Arrival,
+    LaneChange,
+    Participant,
+    Story,
+    Way,
+    Waypoint,
+)
+from bridgegen.scenario.ontology.site import Leg, Site
 
 END_MARGIN = 1.0
 """How far before the end of its leg a shortened route ends [m]."""

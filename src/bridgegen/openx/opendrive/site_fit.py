@@ -3,9 +3,7 @@
 import math
 from collections.abc import Iterator
 
-from bridgegen.errors import InputError, UnsupportedError
-from bridgegen.odd.scenario import LogicalScenario
-from bridgegen.ontology.site import Site
+from bridgegen.base.errors import InputError, UnsupportedError
 from bridgegen.openx.opendrive.merges import merges
 from bridgegen.openx.opendrive.model import OpenDrive
 from bridgegen.openx.opendrive.rings import rings
@@ -13,6 +11,8 @@ from bridgegen.openx.opendrive.site import ring_sites, turned_sites, unlikeness
 from bridgegen.openx.opendrive.site_furniture import furnished
 from bridgegen.openx.opendrive.site_lacks import all_places, missing, reach, turning, value
 from bridgegen.openx.opendrive.stretches import stretches
+from bridgegen.scenario.language.scenario import LogicalScenario
+from bridgegen.scenario.ontology.site import Site
 
 INTERSECTIONS = ("crossroads", "t-junction")
 """Templates whose scenarios take place at a junction of a map."""

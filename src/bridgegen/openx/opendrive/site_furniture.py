@@ -8,13 +8,13 @@ lights, those of the map are off.
 from collections.abc import Iterator
 from dataclasses import replace
 
-from bridgegen.odd.roads import RoadsSpec
-from bridgegen.ontology.site import Facility, Leg, Site
-from bridgegen.ontology.templates import phases_of
 from bridgegen.openx.opendrive.furniture import Signal, SignalReference
 from bridgegen.openx.opendrive.legs import governs, leads_to, signals_on
 from bridgegen.openx.opendrive.model import OpenDrive, Road
 from bridgegen.openx.opendrive.to_owl.furniture import box_of, class_of, sign_of
+from bridgegen.scenario.language.roads import RoadsSpec
+from bridgegen.scenario.ontology.site import Facility, Leg, Site
+from bridgegen.scenario.ontology.templates import phases_of
 
 NEAR = 40.0
 """A light or a sign within this distance before a junction [m] is for that junction."""

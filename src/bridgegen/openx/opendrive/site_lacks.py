@@ -3,11 +3,11 @@
 import math
 from collections.abc import Iterator
 
-from bridgegen.odd.scenario import LogicalScenario
-from bridgegen.odd.story import Arrival, Waypoint
-from bridgegen.ontology.site import Site
 from bridgegen.openx.opendrive.model import OpenDrive
 from bridgegen.openx.opendrive.site_adapted import adapted, has_way
+from bridgegen.scenario.language.scenario import LogicalScenario
+from bridgegen.scenario.language.story import Arrival, Waypoint
+from bridgegen.scenario.ontology.site import Site
 
 TURN_TOLERANCE = 60.0
 """How far a turn may differ from the scenario's [deg]: half a T-junction's, and more."""

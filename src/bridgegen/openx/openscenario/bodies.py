@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping, Sequence
 
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.declarations import KIND
-from bridgegen.participants import Body, ParticipantKind
+from bridgegen.scenario.participants import Body, ParticipantKind
 
 EntityBody = osc.Vehicle | osc.Pedestrian | osc.MiscObject
 

@@ -15,7 +15,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
-from bridgegen.errors import FileFormatError, UnsupportedError
+from bridgegen.base.errors import FileFormatError, UnsupportedError
 from bridgegen.openx.openscenario.catalog_files import CatalogLocations, CatalogReference
 from bridgegen.openx.openscenario.catalogs import Catalogs, NoEntryError
 from bridgegen.openx.openscenario.declarations import ParameterDeclaration, ParameterDeclarations

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 
 from lxml import etree
 
-from bridgegen.errors import FileFormatError
+from bridgegen.base.errors import FileFormatError
 from bridgegen.openx.openscenario.element import Element
 from bridgegen.openx.openscenario.reader import element_of
 from bridgegen.openx.openscenario.write import fill

@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterator
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.declarations import KIND
 from bridgegen.openx.openscenario.element import Element
-from bridgegen.participants import PARTICIPANTS, ObjectClass, ParticipantKind
+from bridgegen.scenario.participants import PARTICIPANTS, ObjectClass, ParticipantKind
 
 Resolve = Callable[[str | osc.ParameterRef], str | None]
 """Returns the text of an attribute, at its parameter's value; None where that is unknown."""

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from lxml import etree
 
-from bridgegen.errors import FileFormatError, UnsupportedError
+from bridgegen.base.errors import FileFormatError, UnsupportedError
 from bridgegen.openx.openscenario import parameters
 from bridgegen.openx.openscenario.expand import expanded
 from bridgegen.openx.openscenario.pruning import strays, without

@@ -17,16 +17,19 @@ from enum import Enum
 from functools import lru_cache
 from typing import Annotated, TypeVar
 
-from bridgegen.arrays import Float
-from bridgegen.errors import FileFormatError, InputError
-from bridgegen.odd.expression import RESERVED, Expression, parse
+from bridgegen.base.arrays import Float
+from bridgegen.base.errors import FileFormatError, InputError
+from bridgegen.scenario.language.expression import RESERVED, Expression, parse
 
 V = TypeVar("V")
 
 _REFERENCE = re.compile(r"\$[A-Za-z_][A-Za-z0-9_]*")
 _EXPRESSION = re.compile(r"\$\{[ A-Za-z0-9_+\-*/%$().,]*\}")
 _WORD = re.compile(r"\$?[A-Za-z_][A-Za-z0-9_]*|(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?")
-_TRUTHS = {"true": "(0<1)", "false": "(1<0)"}  # as `bridgegen.odd.expression` has no such words
+_TRUTHS = {
+    "true": "(0<1)",
+    "false": "(1<0)",
+}  # as `bridgegen.scenario.language.expression` has no such words
 _TRUTH = re.compile(r"(?<![$A-Za-z0-9_])(true|false)(?![A-Za-z0-9_])")
 _WORDS = RESERVED | {"not", "and", "or", *_TRUTHS}  # of an expression besides parameters
 

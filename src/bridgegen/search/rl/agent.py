@@ -7,12 +7,12 @@ from typing import Any, ClassVar, Protocol
 import numpy as np
 import numpy.typing as npt
 
-from bridgegen.arrays import Float
-from bridgegen.search.algorithm import Arity, Problem, Results, Setting, Value, resolve
-from bridgegen.search.observation import ENCODINGS, Observation
+from bridgegen.base.arrays import Float
+from bridgegen.search.algorithms.algorithm import Arity, Problem, Results, Setting, Value, resolve
+from bridgegen.search.algorithms.observation import ENCODINGS, Observation
+from bridgegen.search.algorithms.space_filling import latin_hypercube
 from bridgegen.search.rl.saved import Saved
 from bridgegen.search.rl.walkers import Walkers
-from bridgegen.search.space_filling import latin_hypercube
 
 COMMON = {
     "population": Setting(40, "environments side by side, and rows per batch", 2, 10_000),

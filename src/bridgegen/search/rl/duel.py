@@ -7,8 +7,8 @@ import numpy as np
 import numpy.typing as npt
 import torch
 
-from bridgegen.arrays import Bool, Float
-from bridgegen.search.algorithm import Arena
+from bridgegen.base.arrays import Bool, Float
+from bridgegen.search.algorithms.algorithm import Arena
 from bridgegen.search.rl.models import Arrays, arrays_of
 from bridgegen.search.rl.on_policy import model_of
 

@@ -10,8 +10,8 @@ from gymnasium import spaces
 from stable_baselines3 import DDPG, DQN
 from stable_baselines3.common.off_policy_algorithm import OffPolicyAlgorithm
 
-from bridgegen.arrays import Float
-from bridgegen.search.observation import Observation, step_from
+from bridgegen.base.arrays import Float
+from bridgegen.search.algorithms.observation import Observation, step_from
 from bridgegen.search.rl.models import Arrays, Spaces, arrays_of, silent
 
 

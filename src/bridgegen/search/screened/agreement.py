@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from pydantic import FiniteFloat, NonNegativeInt, TypeAdapter, ValidationError
 
-from bridgegen.arrays import Bool, Float
+from bridgegen.base.arrays import Bool, Float
 
 NOTE = "agreement with the screen"
 """The title of an agreement among a run's notes."""

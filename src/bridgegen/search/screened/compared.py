@@ -5,8 +5,8 @@ from typing import Self
 
 import numpy as np
 
-from bridgegen.arrays import Bool, Float, Int
-from bridgegen.search.algorithm import Results
+from bridgegen.base.arrays import Bool, Float, Int
+from bridgegen.search.algorithms.algorithm import Results
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from bridgegen.arrays import Bool, Float
+from bridgegen.base.arrays import Bool, Float
 from bridgegen.search.screened.compared import Compared
 from bridgegen.search.screened.correction import Correction
 

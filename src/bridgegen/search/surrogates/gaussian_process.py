@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from bridgegen.arrays import Float
+from bridgegen.base.arrays import Float
 from bridgegen.search.surrogates import _gaussian_process_kernels as kernels
 from bridgegen.search.surrogates.parameters import HIGH, LOW, Parameters, prior
 from bridgegen.search.surrogates.subset import telling

@@ -5,7 +5,7 @@ from typing import Self
 
 import numpy as np
 
-from bridgegen.arrays import Float
+from bridgegen.base.arrays import Float
 
 LOW, HIGH = np.log([0.02, 0.05, 1e-4]), np.log([50.0, 20.0, 0.5])
 """Least and greatest length, variance and noise."""

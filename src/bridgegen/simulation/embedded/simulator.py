@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from bridgegen.arrays import Float, Int
-from bridgegen.ego import Driver
-from bridgegen.ego.traits import Traits
-from bridgegen.errors import InputError
+from bridgegen.base.arrays import Float, Int
+from bridgegen.base.errors import InputError
+from bridgegen.drivers import Driver
+from bridgegen.drivers.traits import Traits
 from bridgegen.openx.opendrive.model import OpenDrive
 from bridgegen.openx.openscenario.model import OpenScenario
 from bridgegen.simulation.embedded.compiler import compile_storyboard

@@ -5,8 +5,8 @@ from collections.abc import Mapping
 import numpy as np
 import numpy.typing as npt
 
-from bridgegen.arrays import Float
-from bridgegen.ego._weather_columns import WEATHER
+from bridgegen.base.arrays import Float
+from bridgegen.drivers._weather_columns import WEATHER
 from bridgegen.simulation.embedded._codes import (
     DOES,
     EVENT,
@@ -35,7 +35,7 @@ def weathers(
         rollout: of these N rows.
         row: which of them.
     """
-    from bridgegen.ego._weather_kernels import change, set_clear  # numba is slow to import
+    from bridgegen.drivers._weather_kernels import change, set_clear  # numba is slow to import
 
     slots = program.fill(values, rollout.shape[0])[row]
     changes = [(0, 0)]

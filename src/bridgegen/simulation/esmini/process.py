@@ -10,13 +10,13 @@ from pathlib import Path
 from shutil import rmtree
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from bridgegen.errors import BridgeGenError, InputError, StorageError
-from bridgegen.isolated import Answer, CallError, IsolatedProcess, serve
+from bridgegen.base.errors import BridgeGenError, InputError, StorageError
+from bridgegen.base.processes.isolated import Answer, CallError, IsolatedProcess, serve
 from bridgegen.simulation.esmini.library import Library
 from bridgegen.simulation.esmini.log import error_in
 
 if TYPE_CHECKING:  # the process answers as soon as it has loaded the library
-    from bridgegen.ego import Driver
+    from bridgegen.drivers import Driver
     from bridgegen.simulation.embedded.own_drivers import Layout
     from bridgegen.simulation.embedded.places.network import Network
     from bridgegen.simulation.embedded.simulator import EmbeddedSimulator
@@ -205,7 +205,7 @@ class Answers:
 
     def _warm(self, roads: "tuple[Network, RoadFiles] | None", network: int) -> None:
         """Compile or load the kernels that a row needs; esmini's time limit excludes it."""
-        from bridgegen.ego import DRIVERS
+        from bridgegen.drivers import DRIVERS
 
         self._hold(roads)
         embedded = self._job.embedded
@@ -219,7 +219,7 @@ class Answers:
             joint.move(k, *joint.demand(k))
 
     def _run(self, roads: "tuple[Network, RoadFiles] | None", row: EsminiRow) -> "Rollout":
-        from bridgegen.ego.driver_process import DriverError
+        from bridgegen.drivers.driver_process import DriverError
         from bridgegen.simulation.esmini.together import EsminiError, run_together
         from bridgegen.simulation.rollout import FAILURES, SIMULATOR_FAILURES
 

@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from bridgegen.arrays import Float, Int
-from bridgegen.ego import STORYBOARD, Driver
-from bridgegen.errors import InputError
-from bridgegen.isolated import CallError
+from bridgegen.base.arrays import Float, Int
+from bridgegen.base.errors import InputError
+from bridgegen.base.processes.isolated import CallError
+from bridgegen.drivers import STORYBOARD, Driver
 from bridgegen.openx.opendrive.model import OpenDrive
 from bridgegen.openx.openscenario.model import OpenScenario
 from bridgegen.simulation.around import AroundEmbedded

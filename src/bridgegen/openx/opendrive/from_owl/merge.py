@@ -7,7 +7,7 @@ at a shallow angle and becomes the acceleration lane in one bend.
 import math
 from dataclasses import replace
 
-from bridgegen.errors import OntologyError
+from bridgegen.base.errors import OntologyError
 from bridgegen.openx.opendrive.from_owl.arms import (
     EDGE,
     LEVEL,

@@ -7,7 +7,7 @@ equal tangent lengths at both ends.
 import math
 from typing import NamedTuple
 
-from bridgegen.errors import OntologyError
+from bridgegen.base.errors import OntologyError
 from bridgegen.openx.opendrive.geometry import along_arc
 from bridgegen.openx.opendrive.plan_view import Arc, Geometry, Line
 

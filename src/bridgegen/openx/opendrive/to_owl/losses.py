@@ -3,10 +3,10 @@
 from collections import Counter
 from collections.abc import Iterator
 
-from bridgegen.ontology.vocabulary import tbox
 from bridgegen.openx.opendrive.model import OpenDrive
 from bridgegen.openx.opendrive.plan_view import ParamPoly3, Poly3
 from bridgegen.openx.opendrive.to_owl.furniture import class_of
+from bridgegen.scenario.ontology.vocabulary import tbox
 
 
 def losses(model: OpenDrive) -> Iterator[str]:

@@ -10,9 +10,6 @@ from pathlib import PurePath
 
 import pyoxigraph as ox
 
-from bridgegen.ontology.builder import Builder
-from bridgegen.ontology.graph import Individuals
-from bridgegen.ontology.vocabulary import tbox
 from bridgegen.openx.opendrive.geometry import pose
 from bridgegen.openx.opendrive.lanes import section_end, width_of
 from bridgegen.openx.opendrive.legs import heading, junction_end
@@ -22,6 +19,9 @@ from bridgegen.openx.opendrive.plan_view import Arc, Line, Spiral
 from bridgegen.openx.opendrive.to_owl.furniture import Furniture
 from bridgegen.openx.opendrive.to_owl.junctions import Junctions
 from bridgegen.openx.opendrive.user_data import number, values_of
+from bridgegen.scenario.ontology.builder import Builder
+from bridgegen.scenario.ontology.graph import Individuals
+from bridgegen.scenario.ontology.vocabulary import tbox
 
 STRIPS = {"shoulder": "Shoulder", "sidewalk": "Sidewalk", "walking": "Sidewalk"}
 """The class of a lane that cars do not travel on, by its type; of all others, ``RoadStrip``."""

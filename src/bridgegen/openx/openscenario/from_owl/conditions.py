@@ -1,14 +1,14 @@
 """OWL2OpenSCENARIO, its conditions: when an event happens."""
 
-from bridgegen.errors import OntologyError, UnsupportedError
-from bridgegen.ontology.graph import Individuals
-from bridgegen.ontology.vocabulary import Subject
+from bridgegen.base.errors import OntologyError, UnsupportedError
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.from_owl.entities import Cast, plain_text
 from bridgegen.openx.openscenario.from_owl.places import Places
 from bridgegen.openx.openscenario.from_owl.quantities import Quantities
 from bridgegen.openx.openscenario.from_owl.quoted import quoted_element
 from bridgegen.openx.openscenario.from_owl.signals import lamp_states
+from bridgegen.scenario.ontology.graph import Individuals
+from bridgegen.scenario.ontology.vocabulary import Subject
 
 AnyCondition = osc.ByEntityCondition | osc.ByValueCondition
 _EUCLIDIAN = osc.RelativeDistanceType.EUCLIDIAN_DISTANCE

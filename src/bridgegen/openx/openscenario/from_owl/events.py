@@ -4,13 +4,13 @@ Every action and condition class of the ontology that a scenario's individuals m
 here, or refused by name.
 """
 
-from bridgegen.errors import OntologyError
-from bridgegen.ontology.graph import Individuals
-from bridgegen.ontology.vocabulary import Subject
+from bridgegen.base.errors import OntologyError
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.from_owl.actions import Actions
 from bridgegen.openx.openscenario.from_owl.conditions import Conditions
 from bridgegen.openx.openscenario.from_owl.entities import Cast, plain_text
+from bridgegen.scenario.ontology.graph import Individuals
+from bridgegen.scenario.ontology.vocabulary import Subject
 
 _PRIORITIES = (osc.Priority.OVERRIDE, osc.Priority.PARALLEL, osc.Priority.SKIP)
 

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from bridgegen.errors import UnsupportedError
+from bridgegen.base.errors import UnsupportedError
 from bridgegen.openx.opendrive.lanes import lane_pose, values
 from bridgegen.openx.opendrive.model import OpenDrive
 from bridgegen.openx.openscenario import model as osc

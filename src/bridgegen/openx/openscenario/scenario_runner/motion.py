@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from bridgegen.arrays import Float
+from bridgegen.base.arrays import Float
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.recorded import Recording
 

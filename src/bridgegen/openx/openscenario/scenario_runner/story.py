@@ -11,7 +11,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from bridgegen.errors import UnsupportedError
+from bridgegen.base.errors import UnsupportedError
 from bridgegen.openx.opendrive.model import OpenDrive
 from bridgegen.openx.opendrive.outline_furniture import Light, lights
 from bridgegen.openx.openscenario import model as osc

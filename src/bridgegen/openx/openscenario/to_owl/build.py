@@ -10,14 +10,14 @@ from urllib.parse import quote
 
 import pyoxigraph as ox
 
-from bridgegen.ontology.builder import Builder
-from bridgegen.ontology.vocabulary import NAMED_INDIVIDUAL, TYPE, bg, tbox
 from bridgegen.openx.opendrive.map_names import part_name
 from bridgegen.openx.opendrive.model import OpenDrive
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario import parameters
 from bridgegen.openx.openscenario.element import Element, walk
 from bridgegen.openx.openscenario.to_owl.legs import Stretch
+from bridgegen.scenario.ontology.builder import Builder
+from bridgegen.scenario.ontology.vocabulary import NAMED_INDIVIDUAL, TYPE, bg, tbox
 
 E = TypeVar("E", bound=StrEnum)
 

@@ -11,7 +11,7 @@ from typing import Any
 
 import pyoxigraph as ox
 
-from bridgegen.errors import InputError
+from bridgegen.base.errors import InputError
 from bridgegen.openx.opendrive.lanes import lane_at, section_index
 from bridgegen.openx.opendrive.legs import junction_end
 from bridgegen.openx.opendrive.map_names import lane_name

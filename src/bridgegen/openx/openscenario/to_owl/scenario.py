@@ -22,9 +22,7 @@ from pathlib import PurePath
 
 import pyoxigraph as ox
 
-from bridgegen.errors import InputError, UnsupportedError
-from bridgegen.ontology.graph import Individuals
-from bridgegen.ontology.vocabulary import bg
+from bridgegen.base.errors import InputError, UnsupportedError
 from bridgegen.openx.opendrive.map_names import road_name
 from bridgegen.openx.opendrive.model import OpenDrive
 from bridgegen.openx.opendrive.to_owl import individuals_from_opendrive
@@ -59,6 +57,8 @@ from bridgegen.openx.openscenario.to_owl.quoted import ACTION, quoted
 from bridgegen.openx.openscenario.to_owl.signals import add_controllers
 from bridgegen.openx.openscenario.to_owl.simplified import simplified
 from bridgegen.openx.openscenario.to_owl.weather import add_weather
+from bridgegen.scenario.ontology.graph import Individuals
+from bridgegen.scenario.ontology.vocabulary import bg
 
 DURATION = 60.0
 """The duration [s] of a file whose stop trigger names no time, if that is put up with."""

@@ -2,7 +2,7 @@
 
 import math
 
-from bridgegen.ego.kinds import NAMES
+from bridgegen.drivers.kinds import NAMES
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.declarations import SIREN
 from bridgegen.openx.openscenario.participant_kinds import object_class_of
@@ -14,7 +14,7 @@ _STEEPEST = 1.5  # rad, a steering angle that is as good as a right angle
 
 
 def kind(body: Body) -> int:
-    """Return what an entity is, see `bridgegen.ego.kinds`."""
+    """Return what an entity is, see `bridgegen.drivers.kinds`."""
     return NAMES.index(object_class_of(body).name)
 
 

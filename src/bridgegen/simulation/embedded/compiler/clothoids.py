@@ -8,8 +8,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from bridgegen.arrays import Float
-from bridgegen.errors import InputError
+from bridgegen.base.arrays import Float
+from bridgegen.base.errors import InputError
 from bridgegen.openx.opendrive.geometry import TURN_LIMIT, evaluate
 from bridgegen.openx.opendrive.plan_view import Arc, Geometry, Line, Spiral
 from bridgegen.openx.openscenario import model as osc

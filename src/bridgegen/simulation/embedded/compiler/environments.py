@@ -1,14 +1,14 @@
 """The weathers of a storyboard, at the start and in events, as rows of slots.
 
-What they do to sensors and tyres: ``bridgegen.ego._weather_kernels``.
+What they do to sensors and tyres: ``bridgegen.drivers._weather_kernels``.
 """
 
 import math
 import re
 from typing import Any
 
-from bridgegen.arrays import Int
-from bridgegen.ego._weather_columns import (
+from bridgegen.base.arrays import Int
+from bridgegen.drivers._weather_columns import (
     CLOUD,
     ILLUMINANCE,
     RAIN,
@@ -17,13 +17,13 @@ from bridgegen.ego._weather_columns import (
     SUN_AZIMUTH,
     SUN_ELEVATION,
 )
-from bridgegen.odd.expression import parse
 from bridgegen.openx.openscenario import cloudiness
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.values import Expr, Value
+from bridgegen.scenario.language.expression import parse
+from bridgegen.scenario.weather import COLUMNS, STATED_BY, Parameter, Physical, rain_formula
 from bridgegen.simulation.embedded.compiler.tables import Tables, table
 from bridgegen.simulation.embedded.program import UNSAID
-from bridgegen.weather import COLUMNS, STATED_BY, Parameter, Physical, rain_formula
 
 _TIME = re.compile(r"T(\d\d):(\d\d):(\d\d)")
 
@@ -41,7 +41,7 @@ class Environments:
 
     @property
     def rows(self) -> Int:
-        """``(V, STATED)``, see ``bridgegen.ego._weather_columns``."""
+        """``(V, STATED)``, see ``bridgegen.drivers._weather_columns``."""
         return table([tuple(row) for row in self._rows], STATED)
 
     def begin_with(self, environment: osc.Environment) -> None:

@@ -10,8 +10,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from bridgegen.arrays import Float, Int
-from bridgegen.errors import InputError
+from bridgegen.base.arrays import Float, Int
+from bridgegen.base.errors import InputError
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.values import Value
 from bridgegen.simulation.embedded._codes import LAYOUT_WIDTH, RIGID, THROUGH, WEIGHTED

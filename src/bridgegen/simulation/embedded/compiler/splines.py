@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from bridgegen.arrays import Float
+from bridgegen.base.arrays import Float
 
 
 def basis(order: int, knots: Sequence[float], weights: Sequence[float], count: int) -> Float:

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable, Iterator
 
-from bridgegen.errors import InputError
+from bridgegen.base.errors import InputError
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.element import Element, walk
 from bridgegen.simulation.embedded._codes import WHOSE

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from bridgegen.arrays import Float, Int
+from bridgegen.base.arrays import Float, Int
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.element import Element
 from bridgegen.simulation.embedded.compiler.tables import Tables, table

@@ -1,0 +1,33 @@
+"""Systems under test: the drivers that an ego can have, by name."""
+
+from bridgegen.drivers.address import is_remote
+from bridgegen.drivers.drivers import (
+    DRIVERS,
+    GUESTS,
+    OTHERS,
+    STAGES,
+    STORYBOARD,
+    Driver,
+    file_of,
+    is_planner,
+    is_spec,
+    join,
+    split,
+)
+from bridgegen.drivers.own_file import get
+
+__all__ = [
+    "DRIVERS",
+    "GUESTS",
+    "OTHERS",
+    "STAGES",
+    "STORYBOARD",
+    "Driver",
+    "file_of",
+    "get",
+    "is_planner",
+    "is_remote",
+    "is_spec",
+    "join",
+    "split",
+]

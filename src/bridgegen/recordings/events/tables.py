@@ -1,0 +1,123 @@
+"""Events as tables: all with all quantities, and per scenario a row of parameters per event."""
+
+import csv
+import io
+import math
+from collections import Counter
+from collections.abc import Iterable, Iterator, Sequence
+from pathlib import Path
+
+from bridgegen.base.disk import write_whole
+from bridgegen.base.errors import StorageError
+from bridgegen.recordings.cells import cell
+from bridgegen.recordings.events.event import ABSENT
+from bridgegen.recordings.events.find import FoundEvents, named
+from bridgegen.recordings.events.of_scenarios import Broken, ScenarioEvents, encounters_of
+from bridgegen.scenario.exposure.rates import Encounters
+from bridgegen.scenario.language.event_kinds import EVENT_KINDS
+
+TABLE, FOLDER = "events.csv", "events"
+NAMES_SHOWN = 3
+"""Of events that break a constraint."""
+QUANTITIES = tuple(dict.fromkeys(name for one in EVENT_KINDS.values() for name in one.quantities))
+ROLES = tuple(dict.fromkeys(role for one in EVENT_KINDS.values() for role in one.roles))
+HEAD = ("name", "recording", "file", "event", "ego", *ROLES, "begin", "end", *QUANTITIES)
+
+
+def write_events(
+    out: Path, found: Sequence[FoundEvents], scenarios: Sequence[ScenarioEvents]
+) -> None:
+    """Write the table of all events, and that of each scenario in a folder beside it.
+
+    Raises:
+        StorageError: they cannot be written.
+    """
+    write_whole(out / TABLE, _csv(HEAD, _rows(found)))
+    try:
+        (out / FOLDER).mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise StorageError(f"{out / FOLDER}: cannot be made: {error.strerror}") from None
+    for one in scenarios:
+        rows = zip(*(values.tolist() for values in one.rows.values()), strict=True)
+        path = out / FOLDER / f"{one.scenario}.csv"
+        write_whole(path, _csv(one.rows, ([f"{v:.7g}" for v in row] for row in rows)))
+
+
+def _rows(found: Sequence[FoundEvents]) -> Iterator[list[object]]:
+    for one, events, names in named(found):
+        for i, (name, ego) in enumerate(zip(names, events.ego.tolist(), strict=True)):
+            others = {role: int(who[i]) for role, who in events.others.items()}
+            yield [
+                name, one.recording, one.source, events.kind.name, one.names[ego],
+                *(_name(one.names, others.get(role, ABSENT)) for role in ROLES),
+                f"{events.begin[i]:.10g}", f"{events.end[i]:.10g}",
+                *(_number(events.quantities[name][i]) if name in events.quantities else ""
+                  for name in QUANTITIES),
+            ]  # fmt: skip
+
+
+def _name(names: Sequence[str], who: int) -> str:
+    return names[who] if who != ABSENT else ""
+
+
+def _number(value: float) -> str:
+    return "" if math.isnan(value) else f"{value:.7g}"
+
+
+def _csv(head: Iterable[str], rows: Iterable[Iterable[object]]) -> Iterator[bytes]:
+    text = io.StringIO()
+    writer = csv.writer(text)
+    writer.writerow(head)
+    writer.writerows([cell(value) for value in row] for row in rows)
+    yield text.getvalue().encode("utf-8", "replace")
+
+
+def kind_rows(found: Sequence[FoundEvents]) -> Iterator[tuple[str, int, str, str, str]]:
+    """Yield per kind: its name, how many, rates per hour and per 1000 km, what was refused."""
+    for kind in EVENT_KINDS:
+        same = [one for each in found for one in each.kinds if one.kind.name == kind]
+        count = sum(len(one) for one in same)
+        refused: Counter[str] = Counter()
+        for one in same:
+            refused.update(one.refused)
+        yield (
+            kind, count, *rates_in_words(encounters_of(count, found, kind)),
+            "; ".join(f"{number:,} {reason}" for reason, number in refused.items()),
+        )  # fmt: skip
+
+
+def rates_in_words(met: Encounters | None) -> tuple[str, str]:
+    """Return how often something was met, per hour and per 1000 km, with the 95 % interval."""
+    if met is None:
+        return "–", "–"
+    texts = []
+    for rate, scale in ((met.per_hour, 1.0), (met.per_km, 1000.0)):
+        if rate is None:
+            texts.append("–")
+        else:
+            estimate, low, high = (
+                _three_digits(scale * value) for value in (rate.estimate, rate.low, rate.high)
+            )
+            texts.append(f"{estimate} ({low} to {high})")
+    return texts[0], texts[1]
+
+
+def _three_digits(value: float) -> str:
+    return f"{value:,.0f}" if value >= 999.5 else f"{value:.3g}"
+
+
+def against_in_words(one: ScenarioEvents) -> tuple[str, ...]:
+    """Return what events say against the ranges and constraints of a scenario, a text each."""
+    texts = [
+        f"{each.parameter} [{each.unit}]: {each.below:,} below {each.low:g}, {each.above:,} above "
+        f"{each.high:g}; seen {each.least:.4g} to {each.most:.4g}"
+        for each in one.outside
+    ]
+    return (*texts, *(broken_in_words(each) for each in one.broken))
+
+
+def broken_in_words(one: Broken) -> str:
+    """Return how many events break a constraint, and the first of them."""
+    more = ", …" if len(one.events) > NAMES_SHOWN else ""
+    first = ", ".join(one.events[:NAMES_SHOWN])
+    return f"{len(one.events):,} break {one.rule} ({first}{more})"

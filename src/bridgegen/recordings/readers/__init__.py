@@ -1,0 +1,1 @@
+"""Recorded traffic: files of many formats become one table of trajectories, cleaned."""
