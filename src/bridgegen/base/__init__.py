@@ -1,1 +1,4 @@
-"""base"""
+"""What every room builds on: errors, arrays, statistics, files, records, processes, compiled kernels.
+
+It knows nothing of driving. Imports no other room.
+"""

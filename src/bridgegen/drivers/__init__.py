@@ -1,4 +1,8 @@
-"""Systems under test: the drivers that an ego can have, by name."""
+"""The system under test: drivers that an ego can have, those that ship and those of users.
+
+Those that ship are compiled; users' run in processes of their own (`remote` is the protocol to
+other languages). Imports `openx` and below.
+"""
 
 from bridgegen.drivers.address import is_remote
 from bridgegen.drivers.drivers import (

@@ -1,1 +1,4 @@
-"""What is made of recorded traffic: what was recorded, and where on lanes it was."""
+"""Recorded traffic: readers, cleaning, lanes, events, conflicts, and scenarios made of them.
+
+A format is one file of `readers`. Imports `search` and below.
+"""
