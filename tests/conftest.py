@@ -170,7 +170,7 @@ def add_planners(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
 
     They are those of ``ego/planner_packages.py``: the name of each, and that of its constant.
     """
-    from bridgegen.drivers.planners import registry
+    from bridgegen.drivers import planners as registry
 
     site, code = tmp_path_factory.mktemp("site"), Path(__file__).with_name("ego")
     info = site / "planner_packages-1.0.dist-info"

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from bridgegen.drivers.planners.planner import DOMAINS
+from bridgegen.drivers.planners import DOMAINS
 from bridgegen.engine.options import PipelineOptions
 from bridgegen.engine.pipeline import Pipeline
 from bridgegen.engine.workers import Threads

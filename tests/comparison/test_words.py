@@ -13,7 +13,7 @@ MEASURES = {one.name: one for one in measures(1000)}
 
 
 def line(p: float, a12: float, values=(1.0, 2.0, 3.0)) -> Line:
-    from bridgegen.jobs.compare.statistics import quartiles
+    from bridgegen.base.statistics import quartiles
 
     return Line("s", "pso", "to_50", 3, 0, quartiles(np.array(values)), p, p, a12)
 

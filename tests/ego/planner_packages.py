@@ -3,7 +3,7 @@
 import numpy as np
 
 from bridgegen.drivers.interface import Control
-from bridgegen.drivers.planners.planner import Planner
+from bridgegen.drivers.planners import Planner
 
 
 def made(name: str, driver: str, **changes: object) -> Planner:

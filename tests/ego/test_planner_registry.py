@@ -11,8 +11,8 @@ import pytest
 
 from bridgegen import drivers as ego
 from bridgegen.base.errors import InputError, UnknownNameError
-from bridgegen.drivers.planners import registry
-from bridgegen.drivers.planners.planner import DOMAINS, Planner
+from bridgegen.drivers import planners as registry
+from bridgegen.drivers.planners import DOMAINS, Planner
 from bridgegen.engine.options import PipelineOptions
 from bridgegen.engine.pipeline import Pipeline
 from bridgegen.engine.simulate import simulate_file
@@ -42,7 +42,7 @@ def test_what_is_declared_here_is_complete():
 def test_reading_the_declarations_imports_no_planner():
     """Nor does the command line read them before it must."""
     code = (
-        "import sys; from bridgegen.drivers.planners.registry import planners, missing\n"
+        "import sys; from bridgegen.drivers.planners import planners, missing\n"
         "found = [missing(one) for one in planners().values()]\n"
         "print(*sys.modules)"
     )
@@ -61,7 +61,7 @@ def test_reading_the_declarations_imports_no_planner():
     code = "import sys, bridgegen.cli; print(*sys.modules)"
     names = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     ours = {one for one in names.stdout.split() if one.startswith("bridgegen.adapters.planners.")}
-    assert ours <= {"bridgegen.drivers.planners.planner", "bridgegen.drivers.planners.registry"}
+    assert ours <= {"bridgegen.drivers.planners"}
     assert "packaging.requirements" not in names.stdout.split()
 
 

@@ -11,13 +11,13 @@ from hypothesis import strategies as st
 from tests.campaign.biased import biased_kind, not_finite
 
 from bridgegen.base.errors import InputError, Interrupted
+from bridgegen.base.statistics import clopper_pearson
 from bridgegen.jobs.risk import elsewhere
 from bridgegen.jobs.risk.elsewhere import Group, compare, look_elsewhere, share_of
 from bridgegen.jobs.risk.estimators import subset
 from bridgegen.jobs.risk.estimators.problem import Aim
 from bridgegen.jobs.risk.outcomes import Column
 from bridgegen.jobs.risk.risk import RiskCallbacks, estimate_risk
-from bridgegen.search.regions.evidence import clopper_pearson
 from bridgegen.simulation import choice
 
 SCENARIO, DRIVER = "paper/crossroads-s1", "route-follower"

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from bridgegen.base.arrays import Float
+from bridgegen.base.statistics import a12, holm, mann_whitney, quartiles
 from bridgegen.jobs.compare.measures import Measured
-from bridgegen.jobs.compare.statistics import a12, holm, mann_whitney, quartiles
 from bridgegen.jobs.compare.words import SURE, p_value
 from bridgegen_reproduction import paper
 from bridgegen_reproduction.numbers import number

@@ -11,7 +11,7 @@ import numpy as np
 
 from bridgegen.assess import cause
 from bridgegen.assess.cause import Cause
-from bridgegen.jobs.compare.statistics import quartiles
+from bridgegen.base.statistics import quartiles
 from bridgegen_reproduction.numbers import number, share, spread
 from bridgegen_reproduction.paper import METHODS, RS, TITLES
 from bridgegen_reproduction.protocol import IDEAL, PERCEIVING, Protocol

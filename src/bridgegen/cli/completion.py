@@ -62,7 +62,7 @@ def _settings(ctx: typer.Context) -> Iterable[str]:
 
 def _drivers(_: typer.Context) -> Iterable[str]:
     from bridgegen.drivers import DRIVERS
-    from bridgegen.drivers.planners.registry import planners
+    from bridgegen.drivers.planners import planners
 
     return (*DRIVERS, *planners())
 

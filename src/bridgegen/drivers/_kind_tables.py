@@ -1,4 +1,4 @@
-"""Properties of each kind for compiled code, by the code that `bridgegen.drivers.kinds` gives it."""
+"""Properties of each kind for compiled code, by its code in `bridgegen.drivers.kinds`."""
 
 from bridgegen.drivers.kinds import NAMES
 from bridgegen.scenario.participants import OBJECT_CLASSES

@@ -11,7 +11,7 @@ from bridgegen.base import user_code as own_code
 from bridgegen.base.errors import InputError, UnknownNameError
 from bridgegen.base.physics import CAREFUL_BRAKING_G, CAREFUL_REACTION
 from bridgegen.drivers.address import address_of, is_remote
-from bridgegen.drivers.planners.registry import planners, require
+from bridgegen.drivers.planners import planners, require
 
 STAGES = ("perception", "prediction", "control")
 """The stages of a driver that can be idealised, in order of execution; planning is the rest."""
@@ -65,7 +65,7 @@ class Driver:
         origin: where its code comes from.
         spec: of a user's own driver and of a planner, what its process makes: ``module:Class``,
             ``file.py:Class``, ``file.fmu``.
-        domain: where it means to drive: words of `bridgegen.drivers.planners.planner.DOMAINS`;
+        domain: where it means to drive: words of `bridgegen.drivers.planners.DOMAINS`;
             empty: it does not say.
     """
 

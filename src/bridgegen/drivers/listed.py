@@ -3,8 +3,7 @@
 from collections.abc import Iterator
 
 from bridgegen.drivers.drivers import DRIVERS, GUESTS, OTHERS, join
-from bridgegen.drivers.planners.planner import DOMAINS, Planner
-from bridgegen.drivers.planners.registry import how_to_get, installed, missing, planners
+from bridgegen.drivers.planners import DOMAINS, Planner, how_to_get, installed, missing, planners
 
 HEAD = ("driver", "description", "can be ideal", "available", "licence", "domain", "source")
 

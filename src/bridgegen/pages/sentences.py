@@ -9,9 +9,9 @@ from bridgegen.assess.conflict.analysis import VIOLATION
 from bridgegen.assess.conflict.findings import KINDS, Findings
 from bridgegen.assess.criteria import headline
 from bridgegen.base.arrays import Bool
+from bridgegen.base.statistics import wilson
 from bridgegen.pages.data import ReportData, RunSummary
 from bridgegen.results.confirmation.verdict import sentences as verdicts
-from bridgegen.search.regions.evidence import wilson
 
 NARROW = "\N{NARROW NO-BREAK SPACE}"
 

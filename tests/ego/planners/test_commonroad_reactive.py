@@ -91,7 +91,7 @@ def test_a_package_that_lacks_is_one_sentence(monkeypatch):
     def none(name):
         raise metadata.PackageNotFoundError(name)
 
-    monkeypatch.setattr("bridgegen.drivers.planners.registry.version", none)
+    monkeypatch.setattr("bridgegen.drivers.planners.version", none)
     with pytest.raises(InputError, match=r"commonroad-reactive-planner==2025\.1.*pip") as error:
         CommonroadReactive()
     assert "\n" not in str(error.value)

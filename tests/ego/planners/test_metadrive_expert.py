@@ -42,11 +42,11 @@ def test_a_package_that_lacks_is_one_sentence(monkeypatch):
     def none(name):
         raise metadata.PackageNotFoundError(name)
 
-    monkeypatch.setattr("bridgegen.drivers.planners.registry.version", none)
+    monkeypatch.setattr("bridgegen.drivers.planners.version", none)
     with pytest.raises(InputError, match=r"metadrive-simulator==0\.4\.3.*pip install") as error:
         MetadriveExpert()
     assert "\n" not in str(error.value)
-    monkeypatch.setattr("bridgegen.drivers.planners.registry.version", lambda name: "0.3.0")
+    monkeypatch.setattr("bridgegen.drivers.planners.version", lambda name: "0.3.0")
     with pytest.raises(InputError, match=r"is 0\.3\.0"):
         MetadriveExpert()
 

@@ -6,12 +6,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bridgegen.base.arrays import Float
+from bridgegen.base.statistics import quartiles
 from bridgegen.jobs.compare.drawing import Theme
 from bridgegen.jobs.compare.fronts import spread
 from bridgegen.jobs.compare.measures import Measured
 from bridgegen.jobs.compare.plan import Cell
 from bridgegen.jobs.compare.record import Record
-from bridgegen.jobs.compare.statistics import quartiles
 from bridgegen_reproduction.figures.look import legend, looks, panels, title_of
 
 if TYPE_CHECKING:

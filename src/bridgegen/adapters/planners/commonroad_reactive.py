@@ -33,8 +33,7 @@ from bridgegen.adapters.planners._along_lanes import AlongLanes
 from bridgegen.adapters.planners._commonroad_alone import N_STEPS, STEP, Arrays, Reactive
 from bridgegen.base.arrays import Float
 from bridgegen.drivers.interface import ROUTE_STEP, Lane, Observation, RoadMap, Scene, Trajectory
-from bridgegen.drivers.planners.planner import Planner
-from bridgegen.drivers.planners.registry import require
+from bridgegen.drivers.planners import Planner, require
 
 PLANNER = Planner(
     name="commonroad-reactive",

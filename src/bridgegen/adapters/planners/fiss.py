@@ -42,7 +42,7 @@ from bridgegen.base.arrays import Float
 from bridgegen.base.errors import InputError
 from bridgegen.drivers import kinds
 from bridgegen.drivers.interface import Control, Lane, Observation, RoadMap, Scene
-from bridgegen.drivers.planners.planner import Planner
+from bridgegen.drivers.planners import Planner
 
 PLANNER = Planner(
     name="fiss",

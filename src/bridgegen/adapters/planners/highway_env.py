@@ -39,8 +39,7 @@ from bridgegen.adapters.planners._corridor import Corridor, CorridorLane
 from bridgegen.adapters.planners._highway_env_script import SCRIPT
 from bridgegen.base.arrays import Bool, Float
 from bridgegen.drivers.interface import Control, Observation, Scene
-from bridgegen.drivers.planners.planner import Planner
-from bridgegen.drivers.planners.registry import require
+from bridgegen.drivers.planners import Planner, require
 
 PLANNER = Planner(
     name="highway-env-idm-mobil",

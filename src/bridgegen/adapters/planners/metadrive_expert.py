@@ -38,8 +38,7 @@ from bridgegen.base.arrays import Float
 from bridgegen.base.errors import InputError
 from bridgegen.drivers.batches import FixedBatch
 from bridgegen.drivers.interface import Control, Observation, Scene
-from bridgegen.drivers.planners.planner import Planner
-from bridgegen.drivers.planners.registry import require
+from bridgegen.drivers.planners import Planner, require
 
 PACKAGE, VERSION = "metadrive-simulator", "0.4.3"
 

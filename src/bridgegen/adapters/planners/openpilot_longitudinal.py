@@ -45,7 +45,7 @@ from bridgegen.adapters.planners._openpilot_checkout import (
 from bridgegen.base.arrays import Float
 from bridgegen.base.errors import InputError
 from bridgegen.drivers.interface import ROUTE_POINTS, ROUTE_STEP, Control, Observation, Scene
-from bridgegen.drivers.planners.planner import Planner
+from bridgegen.drivers.planners import Planner
 
 PLANNER = Planner(
     name="openpilot-longitudinal",

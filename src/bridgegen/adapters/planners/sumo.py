@@ -44,8 +44,7 @@ from bridgegen.base.physics import GRAVITY
 from bridgegen.drivers._route_follower_kernels import preview
 from bridgegen.drivers._shift_kernels import aside_at, shift_length
 from bridgegen.drivers.interface import Control, Observation, Scene
-from bridgegen.drivers.planners.planner import Planner
-from bridgegen.drivers.planners.registry import require
+from bridgegen.drivers.planners import Planner, require
 
 PLANNERS = tuple(
     Planner(
@@ -59,6 +58,7 @@ PLANNERS = tuple(
     )
     for model, what in MODELS.items()
 )
+KRAUSS, EIDM, ACC, CACC = PLANNERS  # as pyproject.toml's entry points name them
 
 
 class SumoDriver:

@@ -59,7 +59,8 @@ def _checked(found: object, name: str) -> Metric:
     """
     if not isinstance(found, Metric):
         raise InputError(
-            f"{ADDED.place(name)} must be a bridgegen.assess.metrics.Metric, got {type(found).__name__}"
+            f"{ADDED.place(name)} must be a bridgegen.assess.metrics.Metric, got "
+            f"{type(found).__name__}"
         )
     if found.name != name:
         raise InputError(

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 
-PACKAGE = Path(__file__).parents[1]
+PACKAGE = Path(__file__).parents[2]
 
 IMPORTED = re.compile(r"^ *from bridgegen\.([\w.]+) import (\([^)]*\)|[^\n]*)", re.MULTILINE)
 """A module of ours, and the names that another one imports from it."""

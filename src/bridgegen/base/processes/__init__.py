@@ -1,1 +1,1 @@
-"""Processes that BridgeGen starts: begun, supervised, called, and ended with all that they started."""
+"""Processes that BridgeGen starts: supervised, called, ended with all that they started."""

@@ -84,8 +84,7 @@ class RemoteDriver:
 
 
 class RemoteProcess:
-    """A driver in another process, like `bridgegen.base.processes.isolated.IsolatedProcess` one in
-    Python.
+    """A driver in another process and language; its like in Python is `isolated.IsolatedProcess`.
 
     Args:
         spec: ``connect:HOST:PORT``, ``unix:PATH`` or ``exec:COMMAND``.

@@ -1,4 +1,4 @@
-"""The program of a worker process (`bridgegen.engine.workers.process`): it calls functions on request."""
+"""The program of a worker process (see `process.py`): it calls functions on request."""
 
 import pickle
 import queue

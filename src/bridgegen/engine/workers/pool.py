@@ -150,7 +150,7 @@ class WorkerPool(ABC, Generic[WorkerHandle]):
 
     @abstractmethod
     def _receive(self) -> tuple[WorkerHandle | None, tuple[Any, ...]]:
-        """Wait for the next message of a worker, see `bridgegen.engine.workers.process`; or for `wake`."""
+        """Wait for the next message of a worker (see `process.py`), or for `wake`."""
 
     @abstractmethod
     def wake(self) -> None:

@@ -19,8 +19,7 @@ IDLE_SECONDS = 60.0
 
 
 class RayActor:
-    """The actor itself, without Ray; its methods return messages: see
-    `bridgegen.engine.workers.process`.
+    """The actor itself, without Ray; its methods return messages, see `process.py`.
 
     Args:
         leave: ends this actor for good; called when it has been idle for ``idle_seconds``.

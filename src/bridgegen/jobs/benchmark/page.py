@@ -9,7 +9,7 @@ from pathlib import Path
 
 from bridgegen.base.disk import write_whole
 from bridgegen.drivers.listed import available
-from bridgegen.drivers.planners.planner import DOMAINS
+from bridgegen.drivers.planners import DOMAINS
 from bridgegen.jobs.benchmark.failures import CAREFUL
 from bridgegen.jobs.benchmark.plan import COLUMNS, PERFECT, SENSED, Entrant, Plan
 from bridgegen.jobs.benchmark.results import Outcome, Standing, Way

@@ -11,8 +11,7 @@ from typing import Any
 from bridgegen import drivers as egos
 from bridgegen.base.errors import InputError
 from bridgegen.drivers.drivers import DRIVERS, Driver
-from bridgegen.drivers.planners.planner import DOMAINS, Planner
-from bridgegen.drivers.planners.registry import installed, missing, planners
+from bridgegen.drivers.planners import DOMAINS, Planner, installed, missing, planners
 from bridgegen.engine.options import SearchOptions
 from bridgegen.jobs.compare.plan import MAX_SEEDS, RUNS
 from bridgegen.jobs.search.domain import in_words

@@ -13,7 +13,7 @@ import numpy as np
 from bridgegen.base.disk import write_whole
 from bridgegen.drivers import is_planner
 from bridgegen.drivers.interface import Observation, Scene
-from bridgegen.drivers.planners.registry import planners
+from bridgegen.drivers.planners import planners
 from bridgegen.engine.options import PipelineOptions
 from bridgegen.engine.pipeline import Pipeline
 from bridgegen.engine.workers import Threads

@@ -10,11 +10,11 @@ from typing import Literal
 import numpy as np
 
 from bridgegen.base.errors import BridgeGenError
+from bridgegen.base.statistics import quartiles
 from bridgegen.jobs.benchmark.failures import RESPONSIBLE, failures_of, read_judgement
 from bridgegen.jobs.benchmark.plan import Cell, Entrant, Plan, why_not
 from bridgegen.jobs.benchmark.reproduction import SCRIPT
 from bridgegen.jobs.compare.plan import RUNS
-from bridgegen.jobs.compare.statistics import quartiles
 from bridgegen.jobs.search.exported import FOLDER
 from bridgegen.jobs.search.run import REPORT, Run
 from bridgegen.search.triage.record import Mode

@@ -4,10 +4,10 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
+from bridgegen.base.statistics import quartiles
 from bridgegen.jobs.benchmark.failures import CAREFUL
 from bridgegen.jobs.benchmark.plan import Plan
 from bridgegen.jobs.benchmark.results import Outcome, Standing
-from bridgegen.jobs.compare.statistics import quartiles
 from bridgegen.jobs.compare.table import write_csv
 
 DRIVERS_FILE, OUTCOMES_FILE, MODES_FILE = "drivers.csv", "outcomes.csv", "modes.csv"

@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 
 from bridgegen.base.arrays import Float
+from bridgegen.base.statistics import quartiles
 from bridgegen.jobs.compare.drawing import Theme, canvas, png
-from bridgegen.jobs.compare.statistics import quartiles
 
 STYLES: tuple[Any, ...] = ("-", (0, (5, 2)), (0, (1.5, 1.5)))
 """Line styles; each is used with all colours before the next."""

@@ -7,10 +7,10 @@ from math import ceil
 import numpy as np
 
 from bridgegen.base.arrays import Float
+from bridgegen.base.statistics import quartiles
 from bridgegen.jobs.compare.fronts import Scale, front, generational_distance, hypervolume, spread
 from bridgegen.jobs.compare.plan import Cell
 from bridgegen.jobs.compare.record import DISTINCT, MODES, Record
-from bridgegen.jobs.compare.statistics import quartiles
 
 SHARE = 0.05
 """T_critic counts evaluations until this share of the budget is critical: 50 of 1000."""

@@ -9,10 +9,10 @@ from pathlib import Path
 import numpy as np
 
 from bridgegen.base.disk import write_whole
+from bridgegen.base.statistics import Quartiles, a12, holm, mann_whitney, quartiles
 from bridgegen.jobs.compare.measures import Measure
 from bridgegen.jobs.compare.plan import RUNS, Cell, Plan
 from bridgegen.jobs.compare.record import Record
-from bridgegen.jobs.compare.statistics import Quartiles, a12, holm, mann_whitney, quartiles
 
 RUNS_FILE, SUMMARY_FILE, TIMES_FILE = "runs.csv", "summary.csv", "times.csv"
 

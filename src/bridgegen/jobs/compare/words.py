@@ -6,9 +6,9 @@ from math import isinf, isnan
 
 import numpy as np
 
+from bridgegen.base.statistics import effect, mann_whitney
 from bridgegen.jobs.compare.measures import Measure, others
 from bridgegen.jobs.compare.result import Comparison
-from bridgegen.jobs.compare.statistics import effect, mann_whitney
 from bridgegen.jobs.compare.table import Line
 
 SURE = 0.05

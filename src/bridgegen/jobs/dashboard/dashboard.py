@@ -108,7 +108,7 @@ class Dashboard:
 
     @cached_property
     def figures(self) -> dict[str, float]:
-        """The figures that ``--fail-if`` judges, see `bridgegen.cli.verdict.of_dashboard.FIGURES`."""
+        """The figures that ``--fail-if`` judges, see ``of_dashboard.FIGURES``."""
         failing = [one.status for one in self.failing]
         project = self.project
         return {

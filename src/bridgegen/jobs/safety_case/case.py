@@ -4,6 +4,7 @@ import os
 from collections.abc import Sequence
 from pathlib import Path
 
+from bridgegen.base.statistics import CONFIDENCE
 from bridgegen.jobs.safety_case.argument import RunArgument
 from bridgegen.jobs.safety_case.builder import Draft, finish
 from bridgegen.jobs.safety_case.context import (
@@ -17,7 +18,6 @@ from bridgegen.jobs.safety_case.facts import Facts
 from bridgegen.jobs.safety_case.measured import measure
 from bridgegen.jobs.safety_case.model import Number, RunFacts, SafetyCase
 from bridgegen.jobs.safety_case.numbers import Numbers
-from bridgegen.search.regions.evidence import CONFIDENCE
 
 
 def build(runs: Sequence[Facts], out: Path) -> SafetyCase:

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from bridgegen.base.arrays import Bool, Float
-from bridgegen.drivers.planners.planner import DOMAINS
+from bridgegen.drivers.planners import DOMAINS
 from bridgegen.engine.options import PipelineOptions
 from bridgegen.engine.pipeline import Pipeline
 from bridgegen.engine.workers import Threads

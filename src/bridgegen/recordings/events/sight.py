@@ -22,8 +22,7 @@ BESIDE = 10.0
 
 
 class Bodies(NamedTuple):
-    """What the kernel of lines of sight looks at; see
-    `bridgegen.assess.conflict._geometry_kernels.Scene`.
+    """What the kernel of lines of sight looks at; see ``Scene`` of the conflict analysis.
 
     Attributes:
         half: ``(E, 2)`` [m].

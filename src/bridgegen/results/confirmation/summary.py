@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from statistics import median
 from typing import Any
 
+from bridgegen.base.statistics import wilson
 from bridgegen.results.confirmation.schema import Scenario
-from bridgegen.search.regions.evidence import wilson
 
 
 @dataclass(frozen=True)

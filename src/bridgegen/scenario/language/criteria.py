@@ -228,8 +228,8 @@ def _of_package(name: str) -> tuple[Criterion, ...]:
     several = (found,) if isinstance(found, Criterion) else found
     if not isinstance(several, list | tuple) or not all(isinstance(c, Criterion) for c in several):
         raise InputError(
-            f"{ADDED.place(name)} must be a bridgegen.scenario.language.criteria.Criterion, or a list of them, "
-            f"got {type(found).__name__}"
+            f"{ADDED.place(name)} must be a bridgegen.scenario.language.criteria.Criterion, "
+            f"or a list of them, got {type(found).__name__}"
         )
     return tuple(several)
 

@@ -409,8 +409,7 @@ class Story:
 
 @dataclass(frozen=True)
 class Adversary:
-    """A participant that the search drives, and within what limits
-    (`bridgegen.scenario.language.adversary`).
+    """A participant that the search drives, and within what limits; see `adversary.py`.
 
     Attributes:
         participant: its name.

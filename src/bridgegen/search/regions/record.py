@@ -6,9 +6,10 @@ from typing import Any
 
 from bridgegen.base.errors import FileFormatError
 from bridgegen.base.records import parse_json, read_bytes
+from bridgegen.base.statistics import CONFIDENCE
 from bridgegen.scenario.language.space import SearchSpace
 from bridgegen.search.regions.box import Box, whole
-from bridgegen.search.regions.evidence import CONFIDENCE, Evidence
+from bridgegen.search.regions.evidence import Evidence
 from bridgegen.search.regions.find import Found, Region
 from bridgegen.search.regions.words import rule, sentence
 

@@ -15,7 +15,7 @@ from bridgegen.assess.conflict.harm import COURSE, NEAR_MISS
 from bridgegen.assess.conflict.quantities import QUANTITIES
 from bridgegen.assess.conflict.types import Rule
 from bridgegen.base.arrays import Bool, Float, Int, Numbers
-from bridgegen.search.regions.evidence import clopper_pearson
+from bridgegen.base.statistics import clopper_pearson
 from bridgegen.search.regions.words import percent
 from bridgegen.search.triage.record import NOT_JUDGED, Bound, Drawn, Estimate, Least, Verdict
 

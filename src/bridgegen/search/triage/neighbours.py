@@ -13,11 +13,10 @@ import numpy as np
 
 from bridgegen.assess.cause import Cause, Counterfactual
 from bridgegen.base.arrays import Bool, Float, Int
+from bridgegen.base.statistics import paired_drop, wilson
 from bridgegen.engine.pipeline import Pipeline
-from bridgegen.search.regions.evidence import wilson
 from bridgegen.search.triage.moves import around
 from bridgegen.search.triage.record import Neighbourhood, Treatment
-from bridgegen.search.triage.statistics import paired_drop
 
 NEIGHBOURS = 32
 RADIUS = 0.025

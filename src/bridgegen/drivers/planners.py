@@ -1,44 +1,67 @@
-"""The planners that have an adapter, by name: those of this folder, and of installed packages.
+"""Planners of others as drivers: what an adapter declares, and the table of all adapters.
 
-An adapter's file imports its planner only when it drives, so that reading what it says is cheap.
+Adapters are found by the entry points ``bridgegen.drivers``, ours (`adapters/planners`) like those
+of other packages. An adapter's file imports its planner only when it drives, so that reading what
+it declares is cheap.
 """
 
 import os
 import shlex
+from dataclasses import dataclass
 from functools import cache
-from importlib import import_module
 from importlib.metadata import PackageNotFoundError, version
-from pkgutil import iter_modules
-from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
-from bridgegen.adapters import planners as folder
 from bridgegen.base.errors import InputError
 from bridgegen.base.plugins import PlugIns, Registry
-from bridgegen.drivers.planners.planner import DOMAINS, Planner
 
 if TYPE_CHECKING:
     from packaging.requirements import Requirement
+
+
+@dataclass(frozen=True)
+class Planner:
+    """A planner that others wrote, and our adapter for it.
+
+    Attributes:
+        name: as given to ``--ego``.
+        description: one sentence: what it is, and what of the driving is its own.
+        spec: of the adapter, ``module:Class``, see `bridgegen.drivers.interface.BatchDriver`.
+        requires: requirements of pip, as ``fiss-planner>=1.0,<2``, that it needs to drive.
+        licence: of the planner.
+        source: its publication or page.
+        how_to_get: one sentence, where pip alone is not enough; else empty.
+        domain: where it means to drive: words of `DOMAINS`; elsewhere it is not judged.
+        variables: environment variables that must be set, to the folder of a checkout for example.
+    """
+
+    name: str
+    description: str
+    spec: str
+    requires: tuple[str, ...]
+    licence: str
+    source: str
+    how_to_get: str = ""
+    domain: frozenset[str] = frozenset()
+    variables: tuple[str, ...] = ()
+
+
+DOMAINS = {
+    "motorway": "carriageways of one direction, without crossing traffic",
+    "road": "roads with oncoming traffic, without junctions on the way",
+    "junction": "junctions, where others cross or turn",
+    "oncoming": "a vehicle that drives the wrong way towards the ego",
+    "vulnerable": "pedestrians and cyclists on the way or beside it",
+}
+"""Parts of an operational design domain, as planners state them."""
 
 PLUG_INS = PlugIns("planner", "bridgegen.drivers")
 
 
 @cache
 def planners() -> Registry[Planner]:
-    """Return the planners by name; those of installed packages are imported when asked for."""
-    ours: dict[str, Planner] = {}
-    for module in _modules():
-        for one in constants(module):
-            if one.name in ours:
-                raise InputError(f"planner '{one.name}' is declared twice, again in {module}")
-            ours[one.name] = one
-    return Registry(ours, PLUG_INS, _checked)
-
-
-def constants(module: ModuleType) -> tuple[Planner, ...]:
-    """Return the planners that a module declares, as ``PLANNER`` or ``PLANNERS``."""
-    one = getattr(module, "PLANNER", None)
-    return tuple(getattr(module, "PLANNERS", () if one is None else (one,)))
+    """Return the planners by name; each is imported when it is asked for."""
+    return Registry({}, PLUG_INS, _checked)
 
 
 def missing(planner: Planner) -> str:
@@ -84,16 +107,6 @@ def _requirements(planner: Planner) -> list["Requirement"]:
     from packaging.requirements import Requirement  # takes a while
 
     return [Requirement(text) for text in planner.requires]
-
-
-def _modules() -> list[ModuleType]:
-    names = sorted(one.name for one in iter_modules(folder.__path__))
-    ours = {"planner", __name__.rpartition(".")[2]}
-    return [
-        import_module(f"{folder.__name__}.{name}")
-        for name in names
-        if name not in ours and not name.startswith("_")
-    ]
 
 
 def _checked(found: Any, name: str) -> Planner:
