@@ -1,4 +1,5 @@
 """Recorded traffic: readers, cleaning, lanes, events, conflicts, and scenarios made of them.
 
-A format is one file of `readers`. Imports `search` and below.
+`excerpt.py` makes a rollout of recorded traffic, so that every analysis applies to it. Imports
+`search` and below.
 """

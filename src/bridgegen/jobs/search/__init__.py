@@ -1,4 +1,4 @@
-"""A campaign: search, export, report; from Python `run_search` and `resume` return a `Run`."""
+"""A search: ask → evaluate → tell → record, triage, export, report; and what is done with runs."""
 
 from typing import TYPE_CHECKING, Any
 

@@ -1,1 +1,1 @@
-"""Many scenario files, with all their variations, run and judged together."""
+"""Many scenario files with all their variations: found, run, judged, compared between drivers."""
