@@ -258,7 +258,7 @@ def test_pages_that_are_made_of_the_code_can_be_made(tmp_path):
 
 
 def test_the_sections_of_a_report_are_called_as_the_page_calls_them():
-    web = DOCS.parent / "src/bridgegen/report/web"
+    web = DOCS.parent / "src/bridgegen/pages/web"
     headings = re.findall(r"<h[23][^>]*>([^<]+)</h[23]>", (web / "page.html").read_text("utf-8"))
     for module in web.glob("*.js"):  # a section may make its own element
         headings += re.findall(r'addSection\(\{.*title: "([^"]+)"', module.read_text("utf-8"))

@@ -124,7 +124,7 @@ def test_a_wheel_carries_every_file_of_the_package():
     package = PROJECT.parent / "src" / "bridgegen"
     patterns = tomllib.loads(PROJECT.read_text("utf-8"))["tool"]["setuptools"]["package-data"]
     carried = {path for pattern in patterns["bridgegen"] for path in package.glob(pattern)}
-    development = {package / "report/web" / name for name in ("jsconfig.json", "page.d.ts")}
+    development = {package / "pages/web" / name for name in ("jsconfig.json", "page.d.ts")}
     found = {
         path
         for path in package.rglob("*")

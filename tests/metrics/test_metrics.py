@@ -466,7 +466,7 @@ def test_kernels_give_the_same_bits_without_compilation(driven):
     code = (
         f"import sys; sys.path.insert(0, {folder!r})\n"
         "import conftest, numba\n"
-        "from bridgegen import metrics\n"
+        "from bridgegen.assess import metrics\n"
         "assert numba.config.DISABLE_JIT\n"
         "values = metrics.evaluate(conftest.drive_around(8, 3, 21), list(metrics.METRICS))\n"
         "print(values.tobytes().hex())"

@@ -285,4 +285,4 @@ def _left_out(mined: Mined) -> str:
 
 
 def _own(name: str) -> str:
-    return files("bridgegen.recordings").joinpath(name).read_text("utf-8")
+    return files("bridgegen.jobs.mine").joinpath(name).read_text("utf-8")

@@ -22,7 +22,7 @@ PLACEHOLDERS = (
     "Where it comes from: a standard, an accident database, a drive.",
     "Why these limits?",
 )
-"""Texts of the template (odd/starter.yaml) that say nothing about a scenario."""
+"""Texts of the template (language/starter.yaml) that say nothing about a scenario."""
 
 
 def validate_file(
