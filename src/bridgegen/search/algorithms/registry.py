@@ -1,60 +1,69 @@
 """The algorithms by name: BridgeGen's own, those of installed packages, and of the user's files."""
 
+from collections.abc import Iterator, MutableMapping
+from importlib import import_module
 from typing import Any
 
 from bridgegen.base.errors import InputError
 from bridgegen.base.plugins import PlugIns
 from bridgegen.base.user_code import class_of, is_own
 from bridgegen.search.algorithms.algorithm import Algorithm
-from bridgegen.search.algorithms.cma_es import CMAES
-from bridgegen.search.algorithms.ddpg import DDPG
-from bridgegen.search.algorithms.dqn import DQN
-from bridgegen.search.algorithms.es import ES
-from bridgegen.search.algorithms.ga import GA
-from bridgegen.search.algorithms.grid import Grid
-from bridgegen.search.algorithms.map_elites import MAPElites
-from bridgegen.search.algorithms.mopso import MOPSO
-from bridgegen.search.algorithms.nsga2 import NSGA2
-from bridgegen.search.algorithms.nsga2_dt import NSGA2DT
-from bridgegen.search.algorithms.pairwise import Pairwise
-from bridgegen.search.algorithms.ppo import PPO
-from bridgegen.search.algorithms.ppo_adversary import PPOAdversary
-from bridgegen.search.algorithms.pso import PSO
-from bridgegen.search.algorithms.random import Random
-from bridgegen.search.algorithms.sobol import Sobol
-from bridgegen.search.algorithms.spea2 import SPEA2
-from bridgegen.search.algorithms.surrogate import Surrogate
-from bridgegen.search.algorithms.turbo import TuRBO
 
 PARTS = ("name", "description", "source", "settings", "objectives", "ask", "tell")
 """Of the protocol."""
 
 ADDED = PlugIns("algorithm", "bridgegen.algorithms")
 
-ALGORITHMS: dict[str, type[Algorithm]] = {
-    cls.name: cls
-    for cls in (
-        Random,
-        Sobol,
-        Grid,
-        Pairwise,
-        PSO,
-        GA,
-        ES,
-        CMAES,
-        NSGA2,
-        SPEA2,
-        MOPSO,
-        NSGA2DT,
-        MAPElites,
-        TuRBO,
-        Surrogate,
-        DQN,
-        DDPG,
-        PPO,
-        PPOAdversary,
-    )
+_PLACES = {
+    "random": "bridgegen.search.algorithms.random:Random",
+    "sobol": "bridgegen.search.algorithms.sobol:Sobol",
+    "grid": "bridgegen.search.algorithms.grid:Grid",
+    "pairwise": "bridgegen.search.algorithms.pairwise:Pairwise",
+    "pso": "bridgegen.search.algorithms.pso:PSO",
+    "ga": "bridgegen.search.algorithms.ga:GA",
+    "es": "bridgegen.search.algorithms.es:ES",
+    "cma-es": "bridgegen.search.algorithms.cma_es:CMAES",
+    "nsga2": "bridgegen.search.algorithms.nsga2:NSGA2",
+    "spea2": "bridgegen.search.algorithms.spea2:SPEA2",
+    "mopso": "bridgegen.search.algorithms.mopso:MOPSO",
+    "nsga2-dt": "bridgegen.search.algorithms.nsga2_dt:NSGA2DT",
+    "map-elites": "bridgegen.search.algorithms.map_elites:MAPElites",
+    "turbo": "bridgegen.search.algorithms.turbo:TuRBO",
+    "surrogate": "bridgegen.search.algorithms.surrogate:Surrogate",
+    "dqn": "bridgegen.search.algorithms.dqn:DQN",
+    "ddpg": "bridgegen.search.algorithms.ddpg:DDPG",
+    "ppo": "bridgegen.search.algorithms.ppo:PPO",
+    "ppo-adversary": "bridgegen.search.algorithms.ppo_adversary:PPOAdversary",
 }
+"""Where each of ours is."""
+
+
+class _Ours(MutableMapping[str, type[Algorithm]]):
+    """Ours by name, each imported when it is asked for: a search needs one of them."""
+
+    def __init__(self) -> None:
+        self._loaded: dict[str, type[Algorithm]] = {}
+
+    def __getitem__(self, name: str) -> type[Algorithm]:
+        if name not in self._loaded:
+            module, _, attribute = _PLACES[name].partition(":")
+            self._loaded[name] = getattr(import_module(module), attribute)
+        return self._loaded[name]
+
+    def __setitem__(self, name: str, algorithm: type[Algorithm]) -> None:
+        self._loaded[name] = algorithm
+
+    def __delitem__(self, name: str) -> None:
+        del self._loaded[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(dict.fromkeys([*_PLACES, *self._loaded]))
+
+    def __len__(self) -> int:
+        return len({*_PLACES, *self._loaded})
+
+
+ALGORITHMS: MutableMapping[str, type[Algorithm]] = _Ours()
 
 
 def names() -> list[str]:
