@@ -28,7 +28,7 @@ from tests.mining.events import test_round_trip as lane_events
 from tests.recordings import binary_writers, writers
 
 from bridgegen.recordings.readers.formats import read
-from bridgegen.scenario.exposure.rates import Encounters
+from bridgegen.scenario.exposure.exposure import Encounters
 
 ROWS = 400
 """Rows of a piece: what is simulated and written at once."""

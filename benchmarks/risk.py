@@ -25,11 +25,10 @@ from bridgegen.assess.conflict.harm import NEAR_MISS
 from bridgegen.jobs.risk import Risk, estimate_risk
 from bridgegen.jobs.risk.estimators.problem import Aim
 from bridgegen.jobs.risk.estimators.weighted import Probability, of_weights
-from bridgegen.jobs.risk.methods import estimate
+from bridgegen.jobs.risk.experiment import estimate
 from bridgegen.jobs.search.scenarios import load
 from bridgegen.scenario.exposure import Exposure
-from bridgegen.scenario.exposure.chosen import UNIFORM
-from bridgegen.scenario.exposure.reader import build_exposure
+from bridgegen.scenario.exposure.reader import UNIFORM, build_exposure
 from bridgegen.scenario.language.plain_yaml import read_plain_yaml
 from bridgegen.scenario.language.scenario import LogicalScenario
 

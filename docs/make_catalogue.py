@@ -6,7 +6,7 @@ Run it after a change to the catalogue: ``python docs/make_catalogue.py``.
 from pathlib import Path
 
 from bridgegen.engine.pipeline import Pipeline
-from bridgegen.pages.scenario_words import story_lines
+from bridgegen.pages.scenario_page import story_lines
 from bridgegen.pages.sketch import sketch
 from bridgegen.scenario.language.reader import load, names
 from bridgegen.scenario.language.roads import KNOBS

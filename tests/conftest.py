@@ -15,8 +15,7 @@ from typing import Any
 import pytest
 from hypothesis import settings
 
-from bridgegen.base.processes.child import ONE_THREAD
-from bridgegen.base.processes.garbage import collect_rarely
+from bridgegen.base.processes.child import ONE_THREAD, collect_rarely
 
 CHECKERS = "BRIDGEGEN_CHECKERS"
 

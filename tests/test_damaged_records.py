@@ -17,8 +17,8 @@ from bridgegen.base.errors import BridgeGenError
 from bridgegen.engine.options import CommonOptions
 from bridgegen.jobs.compare.plan import begin, make_plan
 from bridgegen.jobs.search.exported import exported_scenarios, not_exported, read_facts
+from bridgegen.results.confirmation.record import Outcome, Record, Scenario
 from bridgegen.results.confirmation.record import read_record as read_confirmation
-from bridgegen.results.confirmation.schema import Outcome, Record, Scenario
 from bridgegen.results.store import Store
 from bridgegen.scenario.language.thresholds import Thresholds
 from bridgegen.search.regions.record import read_record as read_regions

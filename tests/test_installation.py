@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from bridgegen.base.compilation import cache, folder
-from bridgegen.base.compilation.sources import digest
+from bridgegen.base.compilation.folder import digest
 from bridgegen.base.errors import InputError
 from bridgegen.base.extras import EXTRAS, Extra, is_installed, require
 from bridgegen.cli import installation

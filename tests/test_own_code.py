@@ -6,7 +6,7 @@ import sys
 import pytest
 
 from bridgegen.base.errors import InputError
-from bridgegen.base.user_code import class_of, file_of, is_own, label_of
+from bridgegen.base.plugins import class_of, file_of, is_own, label_of
 
 
 @pytest.mark.parametrize(

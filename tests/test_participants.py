@@ -15,13 +15,12 @@ from bridgegen.drivers.kinds import NAMES
 from bridgegen.engine.pipeline import Pipeline
 from bridgegen.openx.opendrive.from_owl import opendrive_from_owl
 from bridgegen.openx.openscenario import model as osc
+from bridgegen.openx.openscenario.bodies import kind_of
 from bridgegen.openx.openscenario.from_owl import openscenario_from_owl
-from bridgegen.openx.openscenario.participant_kinds import kind_of
 from bridgegen.openx.openscenario.read import read
 from bridgegen.openx.openscenario.scenario_runner.blueprints import SIZES
 from bridgegen.openx.openscenario.to_owl import individuals_from_openscenario
-from bridgegen.openx.openscenario.versions import VERSIONS, to_version
-from bridgegen.openx.openscenario.write import to_xml
+from bridgegen.openx.openscenario.write import VERSIONS, to_version, to_xml
 from bridgegen.pages.sketch import sketch
 from bridgegen.scenario.language.json_schema import schema
 from bridgegen.scenario.language.reader import load

@@ -5,7 +5,7 @@
 
 It builds the wheel as `pip wheel` does, compiles every kernel that the catalogue's scenarios
 and the shipped drivers need in a copy of it, adds that code, and packs it again under a tag of its
-platform. See ``bridgegen.base.compilation.shipped`` for when an installation uses it.
+platform. See ``bridgegen.base.compilation.folder`` for when an installation uses it.
 """
 
 import argparse
@@ -45,7 +45,7 @@ for file in sorted(files("bridgegen.scenario.catalogue").iterdir()):
 """
 DESCRIBE = """
 import json
-from bridgegen.base.compilation.shipped import BASELINE, described, features
+from bridgegen.base.compilation.folder import BASELINE, described, features
 print(json.dumps([described(), BASELINE, features()]))
 """
 

@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 from bridgegen.base.errors import InputError
 from bridgegen.cli import app
 from bridgegen.jobs import search as campaign
-from bridgegen.jobs.search.failing_driver import LEAST, FailingDriver
+from bridgegen.jobs.search.searcher import LEAST, FailingDriver
 from bridgegen.results.store import Store
 
 DRIVERS = Path(__file__).parents[1] / "ego" / "drivers.py"

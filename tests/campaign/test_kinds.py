@@ -13,7 +13,7 @@ from bridgegen.cli.verdict.of_run import PassFailCriteria
 from bridgegen.jobs.search.table import _columns, write_tables
 from bridgegen.jobs.search.validate import validate_file
 from bridgegen.openx.openscenario.read import read
-from bridgegen.pages.show import show_scenario
+from bridgegen.pages.scenario_page import show_scenario
 from bridgegen.results.store import Store
 
 EXAMPLE = Path(__file__).parents[2] / "docs/examples/braking-manner.yaml"

@@ -23,8 +23,8 @@ from bridgegen.jobs.compare.plan import Cell
 from bridgegen.jobs.compare.record import points
 from bridgegen.jobs.search.coverage import coverage_of
 from bridgegen.results.store import Store
-from bridgegen.search.algorithms.random import Random
 from bridgegen.search.algorithms.registry import ALGORITHMS
+from bridgegen.search.algorithms.sampling import Random
 
 GRID = {"algorithms": ["random", "pso"], "seeds": 2, "budget": 120, "baseline": "random",
         "objective": {"paper": None}}  # fmt: skip

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from bridgegen.jobs.compare import figures
-from bridgegen.jobs.compare.drawing import DARK, LIGHT
+from bridgegen.jobs.compare.figures import DARK, LIGHT
 
 PNG = b"\x89PNG\r\n\x1a\n"
 

@@ -4,8 +4,7 @@ import os
 from pathlib import Path
 
 from bridgegen.engine.options import SearchOptions
-from bridgegen.jobs.compare.runs import RunCallbacks, Task, evaluations_of
-from bridgegen.jobs.compare.workers import run_all
+from bridgegen.jobs.compare.runs import RunCallbacks, Task, evaluations_of, run_all
 
 
 class Bomb(str):

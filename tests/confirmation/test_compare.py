@@ -17,7 +17,7 @@ from bridgegen.results.confirmation.differences import (
     LightTimes,
     Offset,
 )
-from bridgegen.results.confirmation.schema import Differences, Outcome
+from bridgegen.results.confirmation.record import Differences, Outcome
 from bridgegen.results.confirmation.words import explanation
 from bridgegen.scenario.language.thresholds import Thresholds
 from bridgegen.simulation.rollout import Rollout

@@ -19,19 +19,17 @@ from bridgegen.results.confirmation.differences import (
     Parting,
 )
 from bridgegen.results.confirmation.record import (
-    digest_of,
-    file_name,
-    read_record,
-    read_records,
-    write_record,
-)
-from bridgegen.results.confirmation.schema import (
     Change,
     Course,
     Differences,
     Outcome,
     Record,
     Scenario,
+    digest_of,
+    file_name,
+    read_record,
+    read_records,
+    write_record,
 )
 from bridgegen.scenario.language.thresholds import Thresholds
 

@@ -13,7 +13,7 @@ from bridgegen.results.confirmation.differences import (
     Offset,
     Parting,
 )
-from bridgegen.results.confirmation.schema import Differences, Margin, Outcome
+from bridgegen.results.confirmation.record import Differences, Margin, Outcome
 from bridgegen.results.confirmation.words import explanation
 from bridgegen.scenario.language.thresholds import Thresholds
 from bridgegen.scenario.stl import TINY

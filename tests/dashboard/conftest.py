@@ -8,8 +8,7 @@ from typing import Any
 import pytest
 
 import bridgegen as bg
-from bridgegen.jobs.dashboard.names import Driver
-from bridgegen.jobs.dashboard.results import Failure, Judged, ModeKey, Result
+from bridgegen.jobs.dashboard.results import Driver, Failure, Judged, ModeKey, Result
 from bridgegen.jobs.suite.suite import run_suite
 from bridgegen.scenario.language.criteria import Criterion
 

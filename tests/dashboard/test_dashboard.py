@@ -18,8 +18,7 @@ from bridgegen.jobs.dashboard.dashboard import Dashboard
 from bridgegen.jobs.dashboard.markup import within
 from bridgegen.jobs.dashboard.modes import failure_modes
 from bridgegen.jobs.dashboard.odd import coverage
-from bridgegen.jobs.dashboard.page import write_page
-from bridgegen.jobs.dashboard.page_modes import MOST_MODES
+from bridgegen.jobs.dashboard.page import MOST_MODES, write_page
 from bridgegen.jobs.dashboard.project import Problem, Project
 from bridgegen.jobs.dashboard.requirements import matrices
 from bridgegen.jobs.dashboard.scenery import scenery_of

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bridgegen.jobs.dashboard.charts import chart, strip
-from bridgegen.jobs.dashboard.of_suites import SuiteLine
+from bridgegen.jobs.dashboard.results_of import SuiteLine
 from bridgegen.jobs.dashboard.trends import MOST_POINTS, Point, Series, trends
 from bridgegen.search.triage.record import Estimate
 

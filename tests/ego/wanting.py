@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from bridgegen.drivers.interface import Observation
-from bridgegen.drivers.traits import Traits
+from bridgegen.drivers.user_drivers import Traits
 from bridgegen.drivers.views import MapSender, Viewer
 from bridgegen.engine.options import PipelineOptions
 from bridgegen.engine.pipeline import Pipeline

@@ -13,7 +13,7 @@ from scipy import integrate, stats
 
 from bridgegen.base.errors import BridgeGenError, InputError, ScenarioError
 from bridgegen.scenario.exposure import Encounters, example_names, exposure_of, read_exposure
-from bridgegen.scenario.exposure.rates import poisson_interval
+from bridgegen.scenario.exposure.exposure import poisson_interval
 from bridgegen.scenario.language.json_schema import schema
 from bridgegen.scenario.language.reader import load
 

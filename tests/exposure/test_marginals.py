@@ -9,10 +9,9 @@ from hypothesis import strategies as st
 from scipy import integrate, special, stats
 
 from bridgegen.base.errors import InputError
-from bridgegen.scenario.exposure.candidates import Recipe, fit
+from bridgegen.scenario.exposure.candidates import Recipe, estimate, fit, usual_bandwidth
 from bridgegen.scenario.exposure.families import FAMILIES
 from bridgegen.scenario.exposure.forms import Naming, build_marginal
-from bridgegen.scenario.exposure.kernels import estimate, usual_bandwidth
 from bridgegen.scenario.exposure.marginals import Conditional, Spliced, Truncated
 from bridgegen.scenario.language.exposure_schema import MarginalSection
 from bridgegen.scenario.language.parameters import Axis, Parameter

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bridgegen.base.errors import InputError, ScenarioError
-from bridgegen.scenario.language.clauses import Clause, read_clause
+from bridgegen.scenario.language.protocols import Clause, read_clause
 from bridgegen.scenario.language.reader import load, pack_names
 
 R157 = [name for name in pack_names() if name.startswith("r157/")]

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bridgegen.base.errors import InputError
-from bridgegen.scenario.language import binned
+from bridgegen.scenario.language import coverage as binned
 from bridgegen.scenario.language import coverage as module
 from bridgegen.scenario.language.coverage import Ways, coverage, coverage_map
 from bridgegen.scenario.language.kinds import INTEGER

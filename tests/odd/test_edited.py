@@ -6,8 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bridgegen.base.errors import FileFormatError
-from bridgegen.scenario.language.edited import replaced, scalars
-from bridgegen.scenario.language.plain_yaml import read_plain_yaml
+from bridgegen.scenario.language.plain_yaml import read_plain_yaml, replaced, scalars
 
 NAMES = st.text("abc_", min_size=1, max_size=4)
 VALUES = st.one_of(

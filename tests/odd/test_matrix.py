@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 
 from bridgegen.base.errors import ScenarioError
 from bridgegen.jobs.suite.rows import rows_of
-from bridgegen.scenario.language import matrix as matrices
-from bridgegen.scenario.language.matrix import Grid
+from bridgegen.scenario.language import protocols as matrices
+from bridgegen.scenario.language.protocols import Grid
 from bridgegen.scenario.language.reader import load, shipped_text
 
 GRID = """

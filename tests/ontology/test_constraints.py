@@ -14,11 +14,10 @@ from bridgegen.scenario.language.parameters import Axis
 from bridgegen.scenario.language.reader import load, names
 from bridgegen.scenario.language.roads import LegSpec, usual
 from bridgegen.scenario.ontology.check import check, constraints_in_words
-from bridgegen.scenario.ontology.conduct import conduct_rules
+from bridgegen.scenario.ontology.conduct import conduct_rules, placement_rules
 from bridgegen.scenario.ontology.files import to_bytes
 from bridgegen.scenario.ontology.graph import Individuals
 from bridgegen.scenario.ontology.individuals import build, build_static
-from bridgegen.scenario.ontology.placement import placement_rules
 from bridgegen.scenario.ontology.rule import with_unit
 from bridgegen.scenario.ontology.shapes import turtle
 from bridgegen.scenario.ontology.vocabulary import SUBCLASS, TYPE, bg, local_name, tbox

@@ -4,7 +4,7 @@ import pyoxigraph as ox
 import pytest
 
 from bridgegen.scenario.ontology.graph import Individuals
-from bridgegen.scenario.ontology.layers import LAYERS, Members
+from bridgegen.scenario.ontology.structure import LAYERS, Members
 from bridgegen.scenario.ontology.vocabulary import BG, LABEL, SCENARIOS, SUBCLASS, TYPE, bg, tbox
 
 RDF_ABOUT = "{http://www.w3.org/1999/02/22-rdf-syntax-ns#}about"

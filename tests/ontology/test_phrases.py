@@ -2,8 +2,8 @@ import pyoxigraph as ox
 import pytest
 
 from bridgegen.scenario.ontology.graph import Individuals
-from bridgegen.scenario.ontology.layers import Members
 from bridgegen.scenario.ontology.phrases import Phrases, quantity
+from bridgegen.scenario.ontology.structure import Members
 from bridgegen.scenario.ontology.vocabulary import SCENARIOS, TYPE, bg, local_name, tbox
 
 NARROW = "\N{NARROW NO-BREAK SPACE}"

@@ -13,7 +13,7 @@ from bridgegen.openx.opendrive.write import to_xml
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.element import walk
 from bridgegen.openx.openscenario.read import read
-from bridgegen.openx.random_routes import LONGEST, with_random_routes
+from bridgegen.openx.prepared import LONGEST, with_random_routes
 from bridgegen.scenario.ontology.individuals import build_static
 
 STATIC = {"lane_width": 3.5, "lanes_per_direction": 1, "arm_length": 100.0,

@@ -9,8 +9,9 @@ import pytest
 from bridgegen.base.errors import InputError, Interrupted, StorageError, UnknownNameError
 from bridgegen.cli import main
 from bridgegen.drivers.preventable import avoids_cut_in
-from bridgegen.jobs.preventability import CellClass, GridAxis, chunks, map_preventability
+from bridgegen.jobs.preventability import CellClass, GridAxis, map_preventability
 from bridgegen.jobs.preventability import preventability as module
+from bridgegen.jobs.preventability import result as chunks
 from bridgegen.jobs.preventability.preventability import MapCallbacks
 
 GRID = ["gap=1:61:13", "relative_speed=10 km/h:50 km/h:5", "lateral_speed=0.6:1.8:3"]

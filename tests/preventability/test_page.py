@@ -8,7 +8,7 @@ import numpy as np
 from PIL import Image
 
 from bridgegen.jobs.preventability import CellClass, GridAxis, map_preventability
-from bridgegen.jobs.preventability.picture import COLOURS, png
+from bridgegen.jobs.preventability.page import COLOURS, png
 
 
 def test_a_pixel_has_the_colour_of_its_cell_s_class():

@@ -6,8 +6,8 @@ import pytest
 from bridgegen.base.errors import FileFormatError, InputError
 from bridgegen.drivers.kinds import BICYCLE, CAR, MOTORCYCLE, PEDESTRIAN, TRUCK
 from bridgegen.recordings.readers.clean import clean
-from bridgegen.recordings.readers.cuts import suspects
 from bridgegen.recordings.readers.quality import Rule
+from bridgegen.recordings.readers.smoothing import suspects
 from bridgegen.recordings.readers.table import Facts, build
 
 STEP = 0.1

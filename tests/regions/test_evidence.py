@@ -3,7 +3,7 @@ import pytest
 from scipy import stats
 
 from bridgegen.base.statistics import clopper_pearson, wilson
-from bridgegen.search.regions.evidence import Evidence
+from bridgegen.search.regions.box import Evidence
 
 
 @pytest.mark.parametrize(

@@ -3,9 +3,8 @@ import pytest
 
 from bridgegen.base.errors import InputError
 from bridgegen.scenario.language.within import in_box
-from bridgegen.search.regions.box import whole
+from bridgegen.search.regions.box import ANYWHERE, rule, whole
 from bridgegen.search.regions.find import MOST_CONDITIONS, find_regions
-from bridgegen.search.regions.words import ANYWHERE, rule
 
 
 def planted(v):

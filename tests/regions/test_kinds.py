@@ -9,12 +9,10 @@ import pytest
 from bridgegen.scenario.language.reader import load
 from bridgegen.scenario.ontology.individuals import build
 from bridgegen.scenario.ontology.vocabulary import OWL, RDF
-from bridgegen.search.regions.box import Box, whole
-from bridgegen.search.regions.evidence import Evidence
+from bridgegen.search.regions.box import Box, Evidence, conditions, whole
 from bridgegen.search.regions.find import Found, Region
 from bridgegen.search.regions.owl import carriers, classes, statable
 from bridgegen.search.regions.record import to_json
-from bridgegen.search.regions.words import conditions
 
 SCENARIO = load(Path(__file__).parents[2] / "docs/examples/braking-manner.yaml")
 SPACE = SCENARIO.space()

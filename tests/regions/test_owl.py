@@ -9,8 +9,7 @@ from bridgegen.scenario.ontology.files import from_bytes, load, save, to_bytes
 from bridgegen.scenario.ontology.graph import Individuals
 from bridgegen.scenario.ontology.individuals import build
 from bridgegen.scenario.ontology.vocabulary import LABEL, OWL, RDF, RDFS, XSD, local_name, tbox
-from bridgegen.search.regions.box import Box, whole
-from bridgegen.search.regions.evidence import Evidence
+from bridgegen.search.regions.box import Box, Evidence, whole
 from bridgegen.search.regions.find import Region
 from bridgegen.search.regions.owl import carriers, classes, statable
 

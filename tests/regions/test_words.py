@@ -7,9 +7,16 @@ from hypothesis import strategies as st
 
 from bridgegen.scenario.language.parameters import Axis
 from bridgegen.scenario.language.reader import load
-from bridgegen.search.regions.box import Box, whole
-from bridgegen.search.regions.evidence import Evidence
-from bridgegen.search.regions.words import ANYWHERE, number, percent, rule, sentence
+from bridgegen.search.regions.box import (
+    ANYWHERE,
+    Box,
+    Evidence,
+    number,
+    percent,
+    rule,
+    sentence,
+    whole,
+)
 
 EVERY = load("crossroads-s4").space(tuple(Axis))
 OUTER = whole(EVERY)

@@ -12,7 +12,7 @@ from bridgegen.pages.page import write_report
 from bridgegen.pages.payload import news, payload
 from bridgegen.pages.series import unpacked
 from bridgegen.results.confirmation.differences import Contact, Parting, Track
-from bridgegen.results.confirmation.schema import (
+from bridgegen.results.confirmation.record import (
     Change,
     Course,
     Differences,

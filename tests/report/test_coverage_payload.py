@@ -9,8 +9,8 @@ import pytest
 
 from bridgegen.base.errors import ScenarioError
 from bridgegen.pages import build as build_module
-from bridgegen.pages.coverage_payload import IMPOSSIBLE, coverage_payload
 from bridgegen.pages.payload import payload
+from bridgegen.pages.sections import IMPOSSIBLE, coverage_payload
 from bridgegen.scenario.language.coverage import CoverageMap, coverage_map
 from bridgegen.scenario.language.reader import load
 

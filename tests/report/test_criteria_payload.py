@@ -10,7 +10,7 @@ from tests.report.conftest import make_report
 
 from bridgegen.assess.criteria import headline, summarise_criteria
 from bridgegen.assess.criteria.monitor import LARGEST
-from bridgegen.pages.criteria_payload import criteria_payload, histogram, margins_shown
+from bridgegen.pages.confirmation_payload import criteria_payload, histogram, margins_shown
 from bridgegen.pages.data import Column, ReportData
 from bridgegen.pages.page import write_report
 from bridgegen.pages.payload import payload

@@ -10,7 +10,7 @@ from itertools import pairwise
 import pytest
 
 from bridgegen.pages import page
-from bridgegen.pages.modules import Module, ModuleError, bundle, in_order
+from bridgegen.pages.page import Module, ModuleError, bundle, in_order
 
 ENTRIES = (*page.SERVED, "show.js", "runs.js", "suite.js")
 OURS = {

@@ -11,8 +11,7 @@ from hypothesis.extra.numpy import arrays
 from bridgegen.pages.data import Column
 from bridgegen.pages.payload import payload, to_json
 from bridgegen.pages.playback_payload import SCALE
-from bridgegen.pages.rounding import decimals, significant
-from bridgegen.pages.series import unpacked
+from bridgegen.pages.series import decimals, significant, unpacked
 
 HOSTILE = [
     "</script><script>window.hacked = 1</script>", "<!-- <script>", "\"'`\\", "\u2028\u2029\x00",

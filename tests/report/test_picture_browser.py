@@ -8,7 +8,7 @@ import pytest
 
 from bridgegen.pages.page import write_report
 from bridgegen.pages.painter import paint
-from bridgegen.pages.show import show_file
+from bridgegen.pages.scenario_page import show_file
 from bridgegen.scenario.ontology.files import save
 
 pytestmark = pytest.mark.browser

@@ -16,7 +16,7 @@ from bridgegen.engine.pipeline import Pipeline
 from bridgegen.pages.page import write_report
 from bridgegen.pages.playbacks import playbacks
 from bridgegen.scenario.language.reader import load
-from bridgegen.simulation.embedded.weathers import weathers
+from bridgegen.simulation.embedded.simulator import weathers
 
 pytestmark = pytest.mark.browser
 

@@ -12,8 +12,7 @@ from bridgegen.base.errors import InputError, StorageError, UnknownNameError
 from bridgegen.engine.pipeline import Pipeline
 from bridgegen.pages import page
 from bridgegen.pages.playbacks import playbacks
-from bridgegen.pages.scenario_words import story_lines
-from bridgegen.pages.show import show_scenario
+from bridgegen.pages.scenario_page import show_scenario, story_lines
 from bridgegen.pages.sketch import HEIGHT, WIDTH, sketch
 from bridgegen.scenario.language.reader import load, names
 from bridgegen.scenario.language.starter import start_scenario

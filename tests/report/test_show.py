@@ -6,7 +6,7 @@ import sys
 import pytest
 
 from bridgegen.base.errors import FileFormatError, InputError, StorageError
-from bridgegen.pages.show import show_file
+from bridgegen.pages.scenario_page import show_file
 from bridgegen.scenario.ontology.files import save
 
 

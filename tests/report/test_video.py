@@ -11,7 +11,7 @@ from lxml import etree
 from PIL import Image, ImageColor
 
 from bridgegen.base.errors import InputError, StorageError
-from bridgegen.pages import ffmpeg
+from bridgegen.pages import video as ffmpeg
 from bridgegen.pages.frames import FINE, PLAYERS, Film, _overlap
 from bridgegen.pages.video import write_video
 

@@ -21,10 +21,10 @@ from shapely.geometry import Point, box
 import bridgegen as bg
 from bridgegen.base.errors import InputError, Interrupted, StorageError
 from bridgegen.cli import main
-from bridgegen.jobs.compare.drawing import DARK
+from bridgegen.jobs.compare.figures import DARK
 from bridgegen.jobs.search.restored import pipeline_of
 from bridgegen.results.store import Store
-from bridgegen.search.algorithms.pso import PSO
+from bridgegen.search.algorithms.evolved import PSO
 from bridgegen_reproduction import (
     ReproductionCallbacks,
     paper,

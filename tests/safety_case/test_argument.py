@@ -6,8 +6,15 @@ import sqlite3
 import pytest
 
 import bridgegen as bg
-from bridgegen.results.confirmation.record import digest_of, write_record
-from bridgegen.results.confirmation.schema import Change, Differences, Outcome, Record, Scenario
+from bridgegen.results.confirmation.record import (
+    Change,
+    Differences,
+    Outcome,
+    Record,
+    Scenario,
+    digest_of,
+    write_record,
+)
 from bridgegen.scenario.language.thresholds import Thresholds
 
 RUNS = ["fails", "unlucky", "clean", "judged", "all"]

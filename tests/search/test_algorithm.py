@@ -6,8 +6,7 @@ from hypothesis.extra import numpy as hnp
 
 from bridgegen.base.errors import InputError
 from bridgegen.search.algorithms import Problem, get
-from bridgegen.search.algorithms.algorithm import resolve
-from bridgegen.search.algorithms.penalty import Penalty
+from bridgegen.search.algorithms.algorithm import Penalty, resolve
 
 
 def test_penalty_by_hand():

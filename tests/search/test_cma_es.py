@@ -4,8 +4,7 @@ import pytest
 
 from bridgegen.base.arrays import Float
 from bridgegen.search.algorithms import Problem, Results
-from bridgegen.search.algorithms._cma import Distribution
-from bridgegen.search.algorithms.cma_es import CMAES, reflected
+from bridgegen.search.algorithms.cma_es import CMAES, Distribution, reflected
 
 TARGET = 1e-9
 

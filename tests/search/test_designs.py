@@ -10,10 +10,8 @@ from scipy.stats import qmc
 
 from bridgegen.base.arrays import Float
 from bridgegen.search.algorithms import Algorithm, Problem
-from bridgegen.search.algorithms.grid import Grid
 from bridgegen.search.algorithms.pairwise import Pairwise
-from bridgegen.search.algorithms.random import Random
-from bridgegen.search.algorithms.sobol import Sobol
+from bridgegen.search.algorithms.sampling import Grid, Random, Sobol
 
 
 def rows(search: Algorithm) -> Float:

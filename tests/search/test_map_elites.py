@@ -10,7 +10,7 @@ from bridgegen.base.arrays import Float
 from bridgegen.base.errors import InputError, UnknownNameError
 from bridgegen.search.algorithms import Problem, Results
 from bridgegen.search.algorithms.map_elites import MAPElites, _Archive
-from bridgegen.search.algorithms.random import Random
+from bridgegen.search.algorithms.sampling import Random
 
 PROBLEM = Problem(("speed", "gap", "fog"), ("d_min", "ttc"))
 

@@ -7,7 +7,7 @@ import pytest
 from bridgegen.base.arrays import Bool, Float
 from bridgegen.search.algorithms import Problem, Results
 from bridgegen.search.algorithms.nsga2_dt import NSGA2DT
-from bridgegen.search.algorithms.random import Random
+from bridgegen.search.algorithms.sampling import Random
 
 N_VAR = 3
 

@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 
 from bridgegen.search.algorithms import Problem, Results
-from bridgegen.search.algorithms.pso import PSO
-from bridgegen.search.algorithms.random import Random
+from bridgegen.search.algorithms.evolved import PSO
+from bridgegen.search.algorithms.sampling import Random
 
 
 def search(algorithm, function, n_batches=25, n_var=10):

@@ -6,7 +6,7 @@ import pytest
 
 from bridgegen.base.errors import InputError, UnknownNameError
 from bridgegen.search.algorithms import ALGORITHMS, Problem, get, names
-from bridgegen.search.algorithms.random import Random
+from bridgegen.search.algorithms.sampling import Random
 
 
 class Lazy(Random):

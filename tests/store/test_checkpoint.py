@@ -6,7 +6,7 @@ import pytest
 
 from bridgegen.base.errors import InputError
 from bridgegen.results.store import Checkpoint
-from bridgegen.results.store.checkpoint import read_checkpoint, write_checkpoint
+from bridgegen.results.store.sqlite import read_checkpoint, write_checkpoint
 
 ONE = Checkpoint(40, 3, b"state \0\xff")
 

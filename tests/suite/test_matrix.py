@@ -10,10 +10,9 @@ from bridgegen.cli.verdict.of_suite import SuiteCriteria, figures_of
 from bridgegen.jobs.suite.entries import find_entries, of_edition
 from bridgegen.jobs.suite.page import command_of
 from bridgegen.jobs.suite.page_payload import payload
-from bridgegen.jobs.suite.rating import colour_of, points_of
 from bridgegen.jobs.suite.replay import replay
 from bridgegen.jobs.suite.results import EntryResult, GridResult, RowResult
-from bridgegen.jobs.suite.sentences import outcomes, points
+from bridgegen.jobs.suite.sentences import colour_of, outcomes, points, points_of
 from bridgegen.jobs.suite.suite import run_suite
 from bridgegen.scenario.language.reader import pack_names
 

@@ -9,11 +9,10 @@ from bridgegen.base.errors import InputError
 from bridgegen.cli.verdict.of_difference import DifferenceCriteria
 from bridgegen.engine.options import CommonOptions
 from bridgegen.jobs.search import Run
-from bridgegen.jobs.suite.difference import difference
+from bridgegen.jobs.suite.difference import WorseCallbacks, WorseThan, difference, search_worse
 from bridgegen.jobs.suite.page import write_suite_page
 from bridgegen.jobs.suite.sentences import changes
 from bridgegen.jobs.suite.suite import SuiteCallbacks, run_suite
-from bridgegen.jobs.suite.worse import WorseCallbacks, WorseThan, search_worse
 
 EGOS = ("careful", "route-follower")
 HARM = CommonOptions(objective={"harm": None})

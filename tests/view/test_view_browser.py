@@ -6,8 +6,7 @@ import pytest
 from bridgegen.cli.terminal.view import _redirect
 from bridgegen.jobs.view.run_view import RunView
 from bridgegen.jobs.view.server import Server
-from bridgegen.results.confirmation.record import digest_of, write_record
-from bridgegen.results.confirmation.schema import Outcome, Record, Scenario
+from bridgegen.results.confirmation.record import Outcome, Record, Scenario, digest_of, write_record
 from bridgegen.scenario.language.thresholds import Thresholds
 
 pytestmark = pytest.mark.browser

@@ -9,7 +9,7 @@ from bridgegen.adapters.carla.settings import Access
 from bridgegen.base.errors import InputError
 from bridgegen.engine.pipeline import FAR_ROWS, Pipeline
 from bridgegen.engine.workers import Lost, Part
-from bridgegen.engine.workers.chunks import cut
+from bridgegen.engine.workers.workers import cut
 from bridgegen.scenario.language.reader import load
 from bridgegen.simulation import choice
 from bridgegen.simulation.choice import Kind, SimulatorChoice

@@ -10,7 +10,7 @@ from bridgegen.base import extras
 from bridgegen.base.errors import InputError
 from bridgegen.engine.workers import open_workers
 from bridgegen.engine.workers.pipeline_cache import CAPACITY, NotPrepared, PipelineCache
-from bridgegen.engine.workers.ray_actor import RayActor
+from bridgegen.engine.workers.ray_bridge import RayActor
 from bridgegen.engine.workers.recipe import Recipe
 
 

@@ -16,7 +16,7 @@ from numba.core.sigutils import normalize_signature
 from numba.core.typing.templates import AttributeTemplate, infer_getattr
 
 from bridgegen.base.compilation.cache import KernelCache
-from bridgegen.base.compilation.passes import KernelCompiler, for_kernel, is_for_kernel
+from bridgegen.base.compilation.library import KernelCompiler, for_kernel, is_for_kernel
 
 
 class _RelaxGarbageCollection(event.Listener):  # type: ignore[misc]

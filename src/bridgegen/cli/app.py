@@ -11,7 +11,7 @@ from typing import Annotated
 import typer
 
 from bridgegen.base.errors import BridgeGenError, Interrupted
-from bridgegen.base.processes.garbage import collect_rarely
+from bridgegen.base.processes.child import collect_rarely
 from bridgegen.cli.groups import ONTOLOGY, SEARCH, Application, PanelledGroup, WithDefault
 
 FAILED = 3

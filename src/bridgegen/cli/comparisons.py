@@ -8,9 +8,9 @@ import typer
 from bridgegen.cli import options as common
 from bridgegen.cli.app import app
 from bridgegen.cli.completion import completing
+from bridgegen.cli.connection import with_map_folder
 from bridgegen.cli.declared import with_declared_options
 from bridgegen.cli.groups import SEARCH
-from bridgegen.cli.map_folder import with_map_folder
 from bridgegen.engine.options import CommonOptions
 from bridgegen.engine.options.forms import read_names
 from bridgegen.engine.options.option import OUTPUT, WHAT

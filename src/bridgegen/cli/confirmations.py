@@ -8,9 +8,13 @@ import typer
 from bridgegen.cli import options
 from bridgegen.cli.app import FAILED, app
 from bridgegen.cli.completion import completing
-from bridgegen.cli.connection import NO_CONNECTION, Connection, with_connection_options
+from bridgegen.cli.connection import (
+    NO_CONNECTION,
+    Connection,
+    with_connection_options,
+    with_map_folder,
+)
 from bridgegen.cli.groups import RESULTS
-from bridgegen.cli.map_folder import with_map_folder
 from bridgegen.engine.options.option import SIMULATOR
 
 

@@ -10,8 +10,8 @@ from bridgegen.base.errors import InputError
 from bridgegen.cli import options
 from bridgegen.cli.app import app, ontology
 from bridgegen.cli.completion import completing
+from bridgegen.cli.connection import with_map_folder
 from bridgegen.cli.groups import FILES, ONTOLOGY, RESULTS
-from bridgegen.cli.map_folder import with_map_folder
 from bridgegen.engine.options.forms import read_names
 
 
@@ -222,7 +222,7 @@ def show(
 
     Violated constraints are red; a logical scenario is explained.
     """
-    from bridgegen.pages.show import show_file, show_scenario
+    from bridgegen.pages.scenario_page import show_file, show_scenario
 
     file = Path(what)
     if file.suffix.lower() != ".owl":

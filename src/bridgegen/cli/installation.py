@@ -12,8 +12,8 @@ from importlib.metadata import PackageNotFoundError, requires, version
 from pathlib import Path
 
 from bridgegen.base.extras import EXTRAS, is_installed
-from bridgegen.drivers.listed import planner_findings
-from bridgegen.engine.workers.process import cores
+from bridgegen.drivers.drivers import planner_findings
+from bridgegen.engine.workers.processes import cores
 
 LIBRARIES = ("numpy", "numba", "llvmlite", "pyoxigraph", "pyshacl")
 """Packages whose versions decide on results, or on compiled code."""

@@ -50,7 +50,7 @@ def list_drivers(as_json: options.Json = False) -> None:
     Of planners that others wrote: whether they are installed, or how to get them.
     """
     from bridgegen.cli.terminal.tables import print_entries
-    from bridgegen.drivers.listed import HEAD, listed
+    from bridgegen.drivers.drivers import HEAD, listed
 
     print_entries(HEAD, listed(), as_json=as_json)
 

@@ -9,8 +9,8 @@ import typer
 from bridgegen.cli import options
 from bridgegen.cli.app import app
 from bridgegen.cli.completion import completing
+from bridgegen.cli.connection import with_map_folder
 from bridgegen.cli.groups import FILES
-from bridgegen.cli.map_folder import with_map_folder
 
 if TYPE_CHECKING:
     from bridgegen.jobs.search.places import PlaceFit

@@ -8,8 +8,13 @@ import typer
 from bridgegen.cli import options as common
 from bridgegen.cli.app import FAILED, suites
 from bridgegen.cli.completion import completing
-from bridgegen.cli.connection import NO_CONNECTION, Connection, read_access, with_connection_options
-from bridgegen.cli.map_folder import with_map_folder
+from bridgegen.cli.connection import (
+    NO_CONNECTION,
+    Connection,
+    read_access,
+    with_connection_options,
+    with_map_folder,
+)
 from bridgegen.engine.options.option import DRIVER, OUTPUT, WHAT
 
 Results = Annotated[

@@ -17,10 +17,10 @@ from bridgegen.cli.connection import (
     Connection,
     read_access,
     with_connection_options,
+    with_map_folder,
 )
 from bridgegen.cli.declared import with_declared_options
 from bridgegen.cli.groups import FILES, RESULTS, SEARCH
-from bridgegen.cli.map_folder import with_map_folder
 from bridgegen.cli.run_files import keys_of, schema, with_run_files
 from bridgegen.cli.several_runs import search_all
 from bridgegen.drivers import split

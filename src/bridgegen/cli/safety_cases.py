@@ -7,8 +7,8 @@ import typer
 
 from bridgegen.cli import options as common
 from bridgegen.cli.app import FAILED, app
+from bridgegen.cli.connection import with_map_folder
 from bridgegen.cli.groups import RESULTS
-from bridgegen.cli.map_folder import with_map_folder
 
 
 @app.command("safety-case", rich_help_panel=RESULTS)

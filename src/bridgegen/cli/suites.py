@@ -9,10 +9,14 @@ from bridgegen.base.errors import InputError
 from bridgegen.cli import options as common
 from bridgegen.cli.app import FAILED, app, suites
 from bridgegen.cli.completion import completing
-from bridgegen.cli.connection import NO_CONNECTION, Connection, with_connection_options
+from bridgegen.cli.connection import (
+    NO_CONNECTION,
+    Connection,
+    with_connection_options,
+    with_map_folder,
+)
 from bridgegen.cli.declared import with_options
 from bridgegen.cli.groups import DEFAULT, SEARCH, DefaultCommand
-from bridgegen.cli.map_folder import with_map_folder
 from bridgegen.engine.options import CommonOptions
 from bridgegen.engine.options.option import DRIVER, OUTPUT, WHAT
 from bridgegen.engine.options.option import SEARCH as HOW
@@ -196,10 +200,9 @@ def diff(
     from bridgegen.cli.terminal.suite import SuiteScreen, print_difference
     from bridgegen.cli.terminal.verdict import print_outcomes
     from bridgegen.cli.verdict.of_difference import DifferenceCriteria
-    from bridgegen.jobs.suite.difference import difference
+    from bridgegen.jobs.suite.difference import difference, search_worse
     from bridgegen.jobs.suite.page import write_suite_page
     from bridgegen.jobs.suite.suite import run_suite
-    from bridgegen.jobs.suite.worse import search_worse
 
     if len(ego) != 2 or ego[0] == ego[1]:
         raise InputError(f"two different drivers are compared: --ego A --ego B, got {len(ego)}")

@@ -13,9 +13,9 @@ from bridgegen.cli.connection import (
     Connection,
     read_access,
     with_connection_options,
+    with_map_folder,
 )
 from bridgegen.cli.groups import RESULTS
-from bridgegen.cli.map_folder import with_map_folder
 
 
 @app.command(rich_help_panel=RESULTS)

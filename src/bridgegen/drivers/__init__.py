@@ -18,7 +18,7 @@ from bridgegen.drivers.drivers import (
     join,
     split,
 )
-from bridgegen.drivers.own_file import get
+from bridgegen.drivers.user_drivers import get
 
 __all__ = [
     "DRIVERS",

@@ -33,7 +33,7 @@ from bridgegen.drivers.interface import (
     PIECE_POINTS,
     ROUTE_POINTS,
 )
-from bridgegen.drivers.traits import checked_wants
+from bridgegen.drivers.user_drivers import checked_wants
 
 ANY = -1  # the size of an axis that depends on the scenario
 

@@ -22,7 +22,7 @@ import numpy.typing as npt
 
 from bridgegen.base.arrays import Float, Int
 from bridgegen.base.errors import InputError
-from bridgegen.base.user_code import class_of
+from bridgegen.base.plugins import class_of
 from bridgegen.drivers.kinds import NAMES
 
 

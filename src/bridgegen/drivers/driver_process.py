@@ -19,16 +19,16 @@ import numpy as np
 
 from bridgegen.base.arrays import Float
 from bridgegen.base.errors import InputError
+from bridgegen.base.plugins import module_of
 from bridgegen.base.processes.child import ONE_THREAD
 from bridgegen.base.processes.isolated import Answer, CallError, IsolatedProcess, serve
-from bridgegen.base.user_code import module_of
 from bridgegen.drivers.address import is_remote
 from bridgegen.drivers.compiled import CompiledDriver
 from bridgegen.drivers.drivers import TIME_LIMIT, is_spec
 from bridgegen.drivers.interface import BatchDriver, Control, Observation, Scene, Trajectory
 from bridgegen.drivers.remote.process import RemoteProcess
-from bridgegen.drivers.traits import NAMES, Traits, traits_of
 from bridgegen.drivers.trajectory import Plans, checked_plans
+from bridgegen.drivers.user_drivers import NAMES, Traits, traits_of
 from bridgegen.drivers.views import MapSender, Viewer, Views
 
 START_SECONDS = 120.0

@@ -8,14 +8,14 @@ from bridgegen.base.arrays import Float, Int
 from bridgegen.drivers.right_of_way import inner
 from bridgegen.drivers.scene import NARROW, lane_of, speed_limits
 from bridgegen.openx.opendrive.geometry import reference_line
-from bridgegen.openx.opendrive.lanes import borders, section_end, section_index
-from bridgegen.openx.opendrive.markings import (
+from bridgegen.openx.opendrive.lane_changes import (
     allows_change,
     between,
     marked_stretches,
     marking,
     neighbour,
 )
+from bridgegen.openx.opendrive.lanes import borders, section_end, section_index
 from bridgegen.openx.opendrive.model import OpenDrive, Road
 from bridgegen.openx.opendrive.routes import Route
 

@@ -24,9 +24,7 @@ from bridgegen.drivers.interface import (
 from bridgegen.drivers.right_of_way import inner
 from bridgegen.drivers.scene import line_of, speed_limits
 from bridgegen.openx.opendrive.geometry import Curve, reference_line
-from bridgegen.openx.opendrive.lanes import borders, section_end, section_index
-from bridgegen.openx.opendrive.legs import governs, signals_on
-from bridgegen.openx.opendrive.markings import (
+from bridgegen.openx.opendrive.lane_changes import (
     CROSSED,
     NONE,
     allows_change,
@@ -34,8 +32,10 @@ from bridgegen.openx.opendrive.markings import (
     marking,
     neighbour,
 )
+from bridgegen.openx.opendrive.lanes import borders, section_end, section_index
+from bridgegen.openx.opendrive.legs import governs, signals_on
 from bridgegen.openx.opendrive.model import OpenDrive, Road, RoadMark
-from bridgegen.openx.opendrive.outline_furniture import outline_of, stop_lines
+from bridgegen.openx.opendrive.outline import outline_of, stop_lines
 from bridgegen.openx.opendrive.routes import Route, Stretch, next_stretches
 
 SPACING = 2.0

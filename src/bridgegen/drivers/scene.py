@@ -24,7 +24,7 @@ from bridgegen.drivers.right_of_way import (
 from bridgegen.openx.opendrive.lanes import borders, section_end, section_index
 from bridgegen.openx.opendrive.legs import governs, signals_on
 from bridgegen.openx.opendrive.model import SPEED_UNITS, OpenDrive, Road
-from bridgegen.openx.opendrive.outline_furniture import outline_of
+from bridgegen.openx.opendrive.outline import outline_of
 from bridgegen.openx.opendrive.routes import Place, Route, Step, Stretch, next_stretches, plan_route
 
 Number = TypeVar("Number", bound=np.generic)

@@ -19,14 +19,13 @@ from bridgegen.assess.conflict.plausibility import plausibility
 from bridgegen.assess.criteria import CriterionResult, Monitor
 from bridgegen.base.errors import FileFormatError, UnknownNameError
 from bridgegen.engine.options import checked
-from bridgegen.openx.logic_file import roads_of
 from bridgegen.openx.openscenario import validate as openscenario_validate
 from bridgegen.openx.openscenario.declarations import CAUSE
 from bridgegen.openx.openscenario.empty_triggers import NEVER, read_empty_triggers
 from bridgegen.openx.openscenario.model import OpenScenario
 from bridgegen.openx.openscenario.read import read as read_scenario
 from bridgegen.openx.openscenario.stated_criteria import stated_criteria
-from bridgegen.openx.prepared import prepared
+from bridgegen.openx.prepared import prepared, roads_of
 from bridgegen.scenario.language.criteria import Criterion, joined
 from bridgegen.simulation.choice import EMBEDDED, SimulatorChoice
 from bridgegen.simulation.embedded.simulator import EmbeddedSimulator

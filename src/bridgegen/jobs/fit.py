@@ -10,7 +10,7 @@ from bridgegen.base.errors import InputError, StorageError
 from bridgegen.openx.openscenario.exposure import distribution_xml, left_out
 from bridgegen.scenario.exposure.fit import Fit, Progress, fit_exposure
 from bridgegen.scenario.exposure.page import refuse_other_page, write_page
-from bridgegen.scenario.exposure.text import refuse_other_file, write_exposure
+from bridgegen.scenario.exposure.reader import refuse_other_file, write_exposure
 from bridgegen.scenario.language.reader import load
 
 _OTHERS = ("uniform", "default")

@@ -31,7 +31,7 @@ from bridgegen.pages.notes import tables
 from bridgegen.pages.playback import Playback
 from bridgegen.pages.playbacks import minimal_playbacks, playbacks
 from bridgegen.pages.screened_payload import screened_payload
-from bridgegen.results.confirmation.schema import Record
+from bridgegen.results.confirmation.record import Record
 from bridgegen.results.store import Recorded, Rows
 from bridgegen.results.store.summary import Summary
 from bridgegen.scenario.language.coverage import CoverageMap, coverage_map

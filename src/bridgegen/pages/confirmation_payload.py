@@ -1,14 +1,22 @@
-"""Cross-simulator validation as the plain data that the page shows."""
+"""Pass criteria and cross-simulator validation as the plain data that the page shows."""
 
 from collections.abc import Mapping, Sequence
+from math import ceil, floor, log10
 from typing import Any
 
 import numpy as np
 
+from bridgegen.assess.criteria import CriterionSummary, headline
+from bridgegen.assess.criteria.monitor import LARGEST
 from bridgegen.base.arrays import Float
+from bridgegen.pages.data import ReportData
+from bridgegen.pages.playback_payload import number
 from bridgegen.pages.series import packed
-from bridgegen.results.confirmation.schema import Course, Outcome, Record, Scenario
-from bridgegen.results.confirmation.verdict import name_of, sentences
+from bridgegen.results.confirmation.record import Course, Outcome, Record, Scenario
+from bridgegen.results.confirmation.words import name_of, sentences
+
+# --- Cross-simulator validation as the plain data that the page shows ---
+
 
 MOST_NUMBERS = 150_000
 """Maximum count of numbers in all tracks together: well under a megabyte of the page."""
@@ -95,3 +103,92 @@ def _values(one: Course, name: str) -> Float:
 
 def _size(tracks: Sequence[Mapping[str, Any]]) -> int:
     return sum(len(run) for one in tracks for name in ("x", "y", "h") for run in one[name])
+
+
+# --- Pass criteria as the plain data that the page shows: verdicts, and the spread of margins ---
+
+
+BINS = 24
+"""Maximum number of a histogram's bins."""
+
+OUTER = 0.05
+"""Share of the margins at each end that a histogram's outermost bins take up."""
+
+DIGITS = 5
+LEAST = 1e-9
+"""Margins nearer to 0 are shown as this, so that their sign, which is the verdict, is kept."""
+
+
+def criteria_payload(data: ReportData) -> dict[str, Any] | None:
+    """Return the criteria of a run, in their order, and the result in a clause; None without any.
+
+    The evaluation with the least margin is counted from 0, as everywhere in the page's data.
+    """
+    if not data.criteria:
+        return None
+    columns = {one.name: one for one in data.evaluations.metrics}
+    return {
+        "headline": headline(data.summary.ego, data.criteria),
+        "violated": any(one.violated for one in data.criteria),
+        "critical": list(data.summary.criteria),
+        "list": [_criterion(one, columns[one.criterion.quantity].whole) for one in data.criteria],
+    }
+
+
+def _criterion(one: CriterionSummary, margins: Float) -> dict[str, Any]:
+    return {
+        "id": one.criterion.id,
+        "quantity": one.criterion.quantity,
+        "text": one.criterion.text,
+        "formula": one.criterion.states,
+        "severity": one.criterion.severity,
+        "tags": list(one.criterion.tags),
+        "met": one.met,
+        "violated": one.violated,
+        "failed": one.unknown,
+        "unit": one.unit,
+        "worst": number(one.worst),
+        "at": None if one.at is None else one.at - 1,
+        "histogram": histogram(margins),
+    }
+
+
+def histogram(margins: Float) -> dict[str, Any] | None:
+    """Return how many margins lie in bins of equal width, of which 0 is an edge.
+
+    Margins without a value, and those at the limit, which stand for infinity, have no part; None
+    where no other is left. The outermost bins also count what lies beyond them, on their side of 0.
+
+    Args:
+        margins: ``(N,)``, NaN where an evaluation failed.
+    """
+    values = margins[np.abs(margins) < LARGEST]
+    if not values.size:
+        return None
+    low, high = np.quantile(values, [OUTER, 1.0 - OUTER]).tolist()
+    low, high = min(low, 0.0), max(high, 0.0)
+    width = _step((high - low) / (BINS - 2)) if high - low > 2.0 * LEAST else 1.0
+    violated = values < 0.0
+    first = min(floor(low / width), -1 if violated.any() else 0)
+    last = max(ceil(high / width), 0 if violated.all() else 1)
+    bins = np.clip(np.floor(values / width), first, last - 1).astype(np.int64) - first
+    counts: list[int] = np.bincount(bins, minlength=last - first).tolist()
+    return {"first": first, "width": width, "counts": counts}
+
+
+def margins_shown(margins: Float) -> list[float | None]:
+    """Return margins rounded to what a page can show, none of them to 0; None for NaN."""
+    return [None if np.isnan(one) else _rounded(one) for one in margins.tolist()]
+
+
+def _rounded(margin: float) -> float:
+    if abs(margin) < LEAST:
+        return LEAST if margin > 0.0 else -LEAST
+    return float(f"{margin:.{DIGITS}g}")
+
+
+def _step(least: float) -> float:
+    """Return the least of 1, 2 and 5 times a power of ten that is not below a number > 0."""
+    power = 10.0 ** floor(log10(least))
+    steps: Sequence[float] = (1.0, 2.0, 5.0, 10.0)
+    return next(one * power for one in steps if one * power >= least * (1.0 - 1e-9))

@@ -17,7 +17,7 @@ from bridgegen.assess.criteria import CriterionSummary
 from bridgegen.base.arrays import Bool, Float, Int, Numbers, as_float
 from bridgegen.pages.notes import NoteTable
 from bridgegen.pages.playback import Playback
-from bridgegen.results.confirmation.schema import Record
+from bridgegen.results.confirmation.record import Record
 from bridgegen.scenario.language.coverage import CoverageMap
 from bridgegen.search.triage.record import Triage
 

@@ -2,15 +2,158 @@
 
 import html
 import re
-from functools import cache
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
+from functools import cache, cached_property
 from importlib.resources import files
 from pathlib import Path
 
 from bridgegen.base.disk import write_whole
 from bridgegen.pages.data import ReportData
-from bridgegen.pages.modules import bundle
 from bridgegen.pages.payload import to_json
 from bridgegen.pages.sections import SECTIONS
+
+# --- Joins the page's JavaScript modules, and the styles beside them, into one script and one style
+# A page is one file that is opened from disk, where a browser loads no module. So the modules are
+# joined here, each after those that it imports, into one scope: ``import`` statements and the word
+# ``export`` are removed, names keep their meaning. Two forms are supported, at the start of a line:
+# ``import { a, b } from "./x.js";`` (or ``import "./x.js";``), and ``export`` before a
+# ``function``, # ``class``, ``const`` or ``let`` that declares one name.
+
+
+IMPORT = re.compile(r'^import (?:\{([^{}]*)\} from )?"\./([\w.-]+\.js)";\n', re.MULTILINE)
+DECLARED = re.compile(
+    r"^(export )?(?:(?:async )?function\*?|class|const|let|var) ([\w$]+)", re.MULTILINE
+)
+STATEMENT = re.compile(r"^(?:import|export)\b.*", re.MULTILINE)
+NAME = re.compile(r"[\w$]+")
+
+
+class ModuleError(Exception):
+    """The modules cannot be joined; the message names the place."""
+
+
+@dataclass(frozen=True)
+class Module:
+    """One JavaScript module.
+
+    Attributes:
+        name: of its file ("table.js").
+        text: all of it.
+    """
+
+    name: str
+    text: str
+
+    @cached_property
+    def imports(self) -> dict[str, tuple[str, ...]]:
+        """The modules that it imports, in order, and which names of each.
+
+        Raises:
+            ModuleError: a name is imported under another name, or as a default.
+        """
+        found: dict[str, tuple[str, ...]] = {}
+        for names, module in IMPORT.findall(self.text):
+            listed = [one.strip() for one in names.split(",") if one.strip()]
+            for one in listed:
+                if not NAME.fullmatch(one):
+                    raise ModuleError(f"{self.name}: `{one}` is not a name that can be imported")
+            found[module] = (*found.get(module, ()), *listed)
+        return found
+
+    @cached_property
+    def declared(self) -> list[str]:
+        """All names that it declares."""
+        return [name for _, name in DECLARED.findall(self.text)]
+
+    @cached_property
+    def exported(self) -> list[str]:
+        """The names that other modules may import."""
+        return [name for export, name in DECLARED.findall(self.text) if export]
+
+    @cached_property
+    def body(self) -> str:
+        """The text without imports and exports.
+
+        Raises:
+            ModuleError: an import or export of another form, with its line.
+        """
+        text = DECLARED.sub(lambda m: m[0].removeprefix("export "), IMPORT.sub("", self.text))
+        if left := STATEMENT.search(text):
+            line = self.text[: self.text.index(left[0])].count("\n") + 1
+            raise ModuleError(f"{self.name}, line {line}: `{left[0]}` is not supported")
+        return text
+
+
+@dataclass
+class _Graph:
+    """The modules that were read, each after those that it imports."""
+
+    read: Callable[[str], str | None]
+    done: dict[str, Module] = field(default_factory=dict)
+    open: list[str] = field(default_factory=list)
+
+    def add(self, name: str, importer: str = "") -> Module:
+        if name in self.done:
+            return self.done[name]
+        if name in self.open:
+            circle = " → ".join([*self.open[self.open.index(name) :], name])
+            raise ModuleError(f"circular import: {circle}")
+        text = self.read(name)
+        if text is None:
+            raise ModuleError(f"{importer or 'the page'} imports {name}, which does not exist")
+        module = Module(name, text)
+        self.open.append(name)
+        for other, names in module.imports.items():
+            exported = self.add(other, name).exported
+            for one in names:
+                if one not in exported:
+                    raise ModuleError(f"{name} imports `{one}`, which {other} does not export")
+        self.open.pop()
+        self.done[name] = module
+        return module
+
+
+def in_order(entries: Iterable[str], read: Callable[[str], str | None]) -> list[Module]:
+    """Return modules and all that they import, each once and after those that it imports.
+
+    Args:
+        entries: names of modules, in the order in which they run.
+        read: returns the text of a file by its name; None where there is no such file.
+
+    Raises:
+        ModuleError: a module that does not exist, an import of what is not exported, a circular
+            import, or two modules that declare the same name.
+    """
+    graph = _Graph(read)
+    for name in entries:
+        graph.add(name)
+    owner: dict[str, str] = {}
+    for module in graph.done.values():
+        for name in module.declared:
+            if name in owner:
+                raise ModuleError(f"`{name}` is declared by {owner[name]} and by {module.name}")
+            owner[name] = module.name
+    return list(graph.done.values())
+
+
+def bundle(entries: Iterable[str], read: Callable[[str], str | None]) -> tuple[str, str]:
+    """Return the script and the style of a page.
+
+    The style is that of the ``x.css`` beside every ``x.js``, in the order of the modules.
+
+    Args:
+        entries: names of modules, in the order in which they run.
+        read: returns the text of a file by its name; None where there is no such file.
+
+    Raises:
+        ModuleError: as of `in_order`, or an import or export of an unknown form.
+    """
+    modules = in_order(entries, read)
+    styles = (read(module.name.removesuffix(".js") + ".css") for module in modules)
+    script = "\n".join(module.body for module in modules)
+    return script, "\n".join(style for style in styles if style is not None)
+
 
 WEB = files("bridgegen.pages").joinpath("web")
 

@@ -13,14 +13,14 @@ import numpy as np
 from bridgegen.base.arrays import Bool
 from bridgegen.base.physics import HARD_BRAKING
 from bridgegen.pages import convergence, sentences
-from bridgegen.pages.criteria_payload import margins_shown
+from bridgegen.pages.confirmation_payload import margins_shown
 from bridgegen.pages.data import WHOLE, Column, Evaluations, ReportData
 from bridgegen.pages.findings_payload import findings_payload, implausible_payload
 from bridgegen.pages.packed import packed_files, packed_motions, road_key
 from bridgegen.pages.picture_payload import pictures_payload
 from bridgegen.pages.playback_payload import ROAD_SCALE, SCALE, playback_payload, road_payload
-from bridgegen.pages.rounding import significant
 from bridgegen.pages.sections import sections_payload
+from bridgegen.pages.series import significant
 from bridgegen.scenario.language.criteria import PREFIX
 from bridgegen.search.algorithms.dominance import by_merit, non_dominated
 

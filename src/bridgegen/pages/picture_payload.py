@@ -10,8 +10,8 @@ from itertools import groupby
 from typing import Any
 
 from bridgegen.pages.picture import Box, Fact, Parameter, Picture
-from bridgegen.scenario.ontology.layers import LAYERS
 from bridgegen.scenario.ontology.phrases import quantity
+from bridgegen.scenario.ontology.structure import LAYERS
 
 FOLD = 3
 """Maximum number of boxes of a class before they fold into one."""

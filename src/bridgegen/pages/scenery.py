@@ -12,8 +12,7 @@ from bridgegen.drivers.lamps import BLUE, BRAKE, BRAKE_LIGHTS_FROM
 from bridgegen.engine.pipeline import Pipeline
 from bridgegen.openx.opendrive.lanes import points
 from bridgegen.openx.opendrive.model import OpenDrive
-from bridgegen.openx.opendrive.outline import Shape, outline
-from bridgegen.openx.opendrive.outline_furniture import Light, lights
+from bridgegen.openx.opendrive.outline import Light, Shape, lights, outline
 from bridgegen.openx.opendrive.to_owl.furniture import class_of
 from bridgegen.pages.playback import Entity, Lamp, Outline
 from bridgegen.scenario.ontology.site import Site

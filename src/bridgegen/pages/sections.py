@@ -4,21 +4,193 @@ A section is a module that registers itself (``addSection`` in ``web/sections.js
 beside it, a function here that returns its data, and its line in `SECTIONS`.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
+import numpy as np
+
+from bridgegen.assess.cause import Cause
 from bridgegen.assess.conflict.happening import Happening, Share
-from bridgegen.base.arrays import Bool
-from bridgegen.pages.batches_payload import TRENDS, TRENDS_OF_HARM, batches_payload
-from bridgegen.pages.causes_payload import causes_payload
-from bridgegen.pages.confirmation_payload import confirmations_payload
-from bridgegen.pages.coverage_payload import coverage_payload
-from bridgegen.pages.criteria_payload import criteria_payload
-from bridgegen.pages.data import ReportData
+from bridgegen.base.arrays import Bool, Int
+from bridgegen.pages import convergence
+from bridgegen.pages.confirmation_payload import confirmations_payload, criteria_payload
+from bridgegen.pages.data import Evaluations, ReportData
 from bridgegen.pages.findings_payload import triage_payload
 from bridgegen.pages.notes import notes_payload
-from bridgegen.pages.regions_payload import regions_payload
+from bridgegen.pages.series import significant
+from bridgegen.scenario.language.coverage import CoverageMap, PairBins, ParameterBins, Ways
+
+# --- Data of the charts over the iterations ---
+
+
+TRENDS = {"d_min": False, "v_d": True}
+"""The metrics shown over iterations, and whether a larger one is worse."""
+
+TRENDS_OF_HARM = {"harm": True, "d_min": False}
+"""Likewise, where harm makes a scenario critical."""
+
+
+def batches_payload(e: Evaluations, trends_of: Mapping[str, bool] = TRENDS) -> dict[str, Any]:
+    """Return shares and trends, batch by batch.
+
+    Args:
+        e: all evaluations.
+        trends_of: the metrics, and whether a larger one is worse.
+    """
+    found = convergence.batches(e)
+    n = found.first.size
+    trends = {}
+    for column in e.metrics:
+        if column.name in trends_of:
+            values = np.where(e.status == 0, column.whole, np.nan)
+            t = convergence.trend(values, found.group, n, larger_is_worse=trends_of[column.name])
+            trends[column.name] = {
+                "unit": column.unit,
+                "median": significant(t.median),
+                "lower": significant(t.lower),
+                "upper": significant(t.upper),
+                "best": significant(t.best),
+            }
+    return {
+        "first": found.first.tolist(),
+        "last": found.last.tolist(),
+        "evaluations": found.evaluations.tolist(),
+        "share": significant(found.share),
+        "cumulative": significant(found.cumulative),
+        "trends": trends,
+    }
+
+
+# --- Number of scenarios by cause, as data of the page ---
+
+
+def causes_payload(e: Evaluations) -> dict[str, Any] | None:
+    """Return the number of evaluations per cause; cause 0 is none.
+
+    The vehicle's dynamics, the last one, is left out where no scenario is put down to it.
+    """
+    if e.cause is None:
+        return None
+    counts = [int(np.count_nonzero(e.cause == one)) for one in Cause]
+    shown = len(counts) if counts[Cause.VEHICLE_DYNAMICS] else int(Cause.VEHICLE_DYNAMICS)
+    return {
+        "labels": ["none", *(one.label for one in Cause if one)][:shown],
+        "counts": counts[:shown],
+    }
+
+
+# --- Critical regions as the plain data that the page draws ---
+
+
+def regions_payload(
+    record: Mapping[str, Any], evaluations: Evaluations, shown: Bool
+) -> dict[str, Any]:
+    """Return the data to describe, draw and filter by regions.
+
+    Args:
+        record: in the form of `bridgegen.search.regions.record`.
+        evaluations: of the run.
+        shown: ``(N,)``, the rows that the page holds; a region names the rows in it by their
+            indices among these.
+    """
+    columns = {one.name: one.values for one in evaluations.parameters}
+    keys = ("evaluations", "critical", "critical_held", "space_share", "confidence", "at_least")
+    regions = []
+    for one in record["regions"]:
+        box = {name: one["box"][name] for name in one["named"]}
+        inside = np.ones(int(shown.sum()), np.bool_)
+        for name, ends in box.items():
+            x = columns[name][shown] if name in columns else np.full(inside.size, np.nan)
+            inside &= (ends["low"] <= x) & (x <= ends["high"])
+        regions.append(
+            {
+                **{key: one[key] for key in ("number", "confirmed", "rule", "sentence")},
+                "narrowed": bool(one.get("narrowed")),
+                "space_share": one["space_share"],
+                "box": {name: [ends["low"], ends["high"]] for name, ends in box.items()},
+                "fresh": _evidence(one["fresh"]),
+                "search": _evidence(one["search"]),
+                "exposure": one.get("exposure"),
+                "rows": np.flatnonzero(inside).tolist(),
+            }
+        )
+    return {
+        **{key: record[key] for key in keys},
+        "exposure": record.get("exposure_share"),
+        "exposure_source": record.get("exposure", ""),
+        "regions": regions,
+    }
+
+
+def _evidence(one: Mapping[str, Any]) -> dict[str, Any]:
+    return {"rows": one["rows"], "critical": one["critical"], "interval": one["interval"]}
+
+
+# --- Coverage as the plain data that the page draws ---
+
+
+IMPOSSIBLE = -1
+"""Replaces the number of rows in a bin that is not feasible."""
+
+
+def coverage_payload(found: CoverageMap) -> dict[str, Any]:
+    """Return what the page needs to draw strips, matrix and grids.
+
+    Parameters come axis by axis, in the order in which the axes first occur; a pair names them by
+    their numbers here, the earlier first. Its cells are a list of the rows per pair of bins, the
+    second parameter's bins running fastest, and one of the critical rows; None where there are
+    too many to be drawn.
+    """
+    axes = list(dict.fromkeys(one.axis for one in found.total.parameters))
+    parameters = sorted(found.total.parameters, key=lambda one: axes.index(one.axis))
+    number = {one.name: k for k, one in enumerate(parameters)}
+    return {
+        "evaluations": found.total.evaluations,
+        "critical": found.total.critical,
+        "sample": found.total.sample,
+        "ways": [{"strength": one.strength, **_ways(one)} for one in found.total.ways],
+        "parameters": [_parameter(one) for one in parameters],
+        "pairs": [_pair(one, number) for one in found.pairs],
+    }
+
+
+def _parameter(one: ParameterBins) -> dict[str, Any]:
+    return {
+        "name": one.name,
+        "unit": one.unit,
+        "axis": one.axis,
+        "integer": one.integer,
+        **one.labels,
+        "edges": [float(f"{edge:.6g}") for edge in one.edges.tolist()],
+        "evaluated": _counts(one.evaluated, one.feasible),
+        "critical": one.critical.tolist(),
+    }
+
+
+def _ways(ways: Ways) -> dict[str, int]:
+    return {
+        "total": ways.total,
+        "feasible": ways.feasible,
+        "evaluated": ways.evaluated,
+        "critical": ways.critical,
+    }
+
+
+def _pair(pair: PairBins, number: dict[str, int]) -> dict[str, Any]:
+    first, second = number[pair.first], number[pair.second]
+    turned = first > second
+    cells = None
+    if pair.evaluated is not None and pair.critical is not None and pair.feasible is not None:
+        grids = (_counts(pair.evaluated, pair.feasible), pair.critical.tolist())
+        evaluated, critical = (np.transpose(one) if turned else np.array(one) for one in grids)
+        cells = {"evaluated": evaluated.ravel().tolist(), "critical": critical.ravel().tolist()}
+    return {"of": sorted((first, second)), **_ways(pair.ways), "cells": cells}
+
+
+def _counts(evaluated: Int, feasible: Bool) -> list[Any]:
+    counts: list[Any] = np.where(feasible, evaluated, IMPOSSIBLE).tolist()
+    return counts
 
 
 @dataclass(frozen=True)

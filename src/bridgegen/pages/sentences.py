@@ -11,7 +11,7 @@ from bridgegen.assess.criteria import headline
 from bridgegen.base.arrays import Bool
 from bridgegen.base.statistics import wilson
 from bridgegen.pages.data import ReportData, RunSummary
-from bridgegen.results.confirmation.verdict import sentences as verdicts
+from bridgegen.results.confirmation.words import sentences as verdicts
 
 NARROW = "\N{NARROW NO-BREAK SPACE}"
 

@@ -6,8 +6,7 @@ from bridgegen.drivers.kinds import CAR
 from bridgegen.recordings.events.find import find_events
 from bridgegen.recordings.lanes.find import locate
 from bridgegen.recordings.readers.clean import clean
-from bridgegen.recordings.readers.lights import RecordedLight
-from bridgegen.recordings.readers.table import Facts, build
+from bridgegen.recordings.readers.table import Facts, RecordedLight, build
 
 T = np.arange(0.0, 14.0, 0.1)
 CAR_BOX, PERSON_BOX = (4.5, 1.8), (0.5, 0.5)

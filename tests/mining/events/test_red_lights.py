@@ -8,7 +8,7 @@ from bridgegen.drivers.kinds import BICYCLE
 from bridgegen.recordings.events.event import NOT_WHOLE
 from bridgegen.recordings.events.of_scenarios import encounters_of
 from bridgegen.recordings.events.red_light import RIGHT_ON_RED
-from bridgegen.recordings.readers.lights import RecordedLight
+from bridgegen.recordings.readers.table import RecordedLight
 from bridgegen.scenario.language.reader import load
 
 KIND = "red-light-violation"

@@ -13,7 +13,7 @@ from bridgegen.openx.opendrive.model import Offset
 from bridgegen.openx.opendrive.write import to_xml
 from bridgegen.recordings.lanes.find import locate, read_map
 from bridgegen.recordings.readers.clean import clean
-from bridgegen.recordings.readers.lanelets import Lanelet
+from bridgegen.recordings.readers.table import Lanelet
 
 
 @pytest.fixture(scope="module")

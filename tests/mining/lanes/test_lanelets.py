@@ -9,7 +9,7 @@ from bridgegen.recordings.lanes.find import locate
 from bridgegen.recordings.lanes.lanelets import lanes_of_lanelets
 from bridgegen.recordings.readers.clean import clean
 from bridgegen.recordings.readers.formats import read
-from bridgegen.recordings.readers.lanelets import Lanelet
+from bridgegen.recordings.readers.table import Lanelet
 
 UPPER, LOWER = "-12.0;-8.0;-4.0", "2.0;6.0;10.0;13.5"
 

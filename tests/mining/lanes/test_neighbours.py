@@ -7,7 +7,7 @@ from tests.mining.lanes.planted import BOX, recorded
 from bridgegen.recordings.lanes.lanelets import lanes_of_lanelets
 from bridgegen.recordings.lanes.neighbours import HORIZON, Neighbours
 from bridgegen.recordings.lanes.placing import place
-from bridgegen.recordings.readers.lanelets import Lanelet
+from bridgegen.recordings.readers.table import Lanelet
 
 PIECE, PIECES, LANES, WIDTH = 60.0, 5, 3, 3.5
 

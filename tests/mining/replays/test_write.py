@@ -14,9 +14,8 @@ from bridgegen.openx.opendrive.geometry import pose
 from bridgegen.recordings.conflicts.find import conflicts_of
 from bridgegen.recordings.excerpt import clock_of
 from bridgegen.recordings.readers.clean import clean
-from bridgegen.recordings.replays.picture import moving_picture
-from bridgegen.recordings.replays.road import BEFORE, along
-from bridgegen.recordings.replays.write import prepare, write
+from bridgegen.recordings.replays.scenario import BEFORE, along
+from bridgegen.recordings.replays.write import moving_picture, prepare, write
 
 
 def bend(n=80, v=8.0, radius=25.0, y=0.0):

@@ -7,8 +7,8 @@ from tests.mining.scenarios.planted import approaches, met, sought
 from tests.mining.scenarios.test_mined import SLOWER
 
 from bridgegen.recordings.scenarios import mined
+from bridgegen.recordings.scenarios.files import mined_individuals
 from bridgegen.recordings.scenarios.mined import mined_scenario
-from bridgegen.recordings.scenarios.ontology import mined_individuals
 from bridgegen.scenario.ontology.check import check
 from bridgegen.scenario.ontology.files import load, save
 from bridgegen.scenario.ontology.vocabulary import BG

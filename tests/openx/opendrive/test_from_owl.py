@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 from bridgegen.base.errors import BridgeGenError, InputError, OntologyError
 from bridgegen.openx.opendrive.from_owl import opendrive_from_owl
-from bridgegen.openx.opendrive.from_owl.turns import Ray, joining
+from bridgegen.openx.opendrive.from_owl.arms import Ray, joining
 from bridgegen.openx.opendrive.geometry import along_arc
 from bridgegen.openx.opendrive.lanes import lane_pose
 from bridgegen.openx.opendrive.model import OpenDrive

@@ -6,7 +6,7 @@ from bridgegen.openx.opendrive.from_owl.furniture import ranges
 from bridgegen.openx.opendrive.model import OpenDrive
 from bridgegen.openx.opendrive.read import read
 from bridgegen.openx.opendrive.to_owl import individuals_from_opendrive
-from bridgegen.openx.opendrive.to_owl.losses import losses
+from bridgegen.openx.opendrive.to_owl.network import losses
 from bridgegen.scenario.ontology.check import check
 from bridgegen.scenario.ontology.graph import Individuals
 

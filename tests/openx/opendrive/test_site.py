@@ -16,8 +16,7 @@ from bridgegen.openx.opendrive.lanes import lane_pose
 from bridgegen.openx.opendrive.model import Junction, LaneSection, OpenDrive, Road
 from bridgegen.openx.opendrive.site import find_site
 from bridgegen.openx.opendrive.site_adapted import adapted
-from bridgegen.openx.opendrive.site_fit import site_for
-from bridgegen.openx.opendrive.site_lacks import missing
+from bridgegen.openx.opendrive.site_fit import missing, site_for
 from bridgegen.scenario.language.reader import load
 from bridgegen.scenario.language.roads import LegSpec
 from bridgegen.scenario.language.scenario import LogicalScenario

@@ -13,8 +13,7 @@ from bridgegen.openx.opendrive.furniture import Signal, SignalReference
 from bridgegen.openx.opendrive.model import OpenDrive
 from bridgegen.openx.opendrive.road_map import load_map
 from bridgegen.openx.opendrive.site_adapted import adapted
-from bridgegen.openx.opendrive.site_fit import site_for
-from bridgegen.openx.opendrive.site_lacks import missing
+from bridgegen.openx.opendrive.site_fit import missing, site_for
 from bridgegen.openx.opendrive.write import to_xml
 from bridgegen.scenario.language.reader import load
 from bridgegen.scenario.language.scenario import LogicalScenario

@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from bridgegen.jobs.risk.estimators.problem import Aim
-from bridgegen.jobs.risk.methods import METHODS, estimate
+from bridgegen.jobs.risk.experiment import METHODS, estimate
 
 _spec = importlib.util.spec_from_file_location(
     "risk_problems", Path(__file__).with_name("problems.py")

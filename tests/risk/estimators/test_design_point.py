@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from bridgegen.jobs.risk.estimators import design_point
+from bridgegen.jobs.risk.estimators import exploration as design_point
 from bridgegen.jobs.risk.estimators.problem import SCORE, block_of
 
 from .problems import Analytic, bent, linear, product, two_sides

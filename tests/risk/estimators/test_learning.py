@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from bridgegen.jobs.risk.estimators.learning import learn
+from bridgegen.jobs.risk.estimators.importance import learn
 from bridgegen.jobs.risk.estimators.problem import SCORE, Aim, block_of
 from bridgegen.jobs.risk.estimators.proposals import Proposals
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from bridgegen.adapters.carla.blueprints import choose
+from bridgegen.adapters.carla.stage import choose
 from bridgegen.base.errors import InputError
 from bridgegen.drivers.kinds import ANIMAL, CAR, NAMES, TRUCK
 from bridgegen.engine.pipeline import Pipeline

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from bridgegen.adapters.carla import frame, server
-from bridgegen.adapters.carla.turn import turn_at
+from bridgegen.adapters.carla.server import turn_at
 from bridgegen.base.errors import InputError, UnknownNameError
 from bridgegen.drivers import get
 from bridgegen.engine.options import PipelineOptions
@@ -464,7 +464,7 @@ def test_another_time_step_is_refused(machine):
 def test_processes_take_turns_at_a_server(machine):
     """Another one waits for the row to end; in this one, turns nest."""
     code = (
-        "from bridgegen.adapters.carla.turn import turn_at\n"
+        "from bridgegen.adapters.carla.server import turn_at\n"
         "print('waits', flush=True)\n"
         f"with turn_at('localhost:{machine.port}'): print('has it', flush=True)"
     )

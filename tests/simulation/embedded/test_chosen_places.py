@@ -6,7 +6,7 @@ import pytest
 from bridgegen.base.errors import ScenarioError, UnsupportedError
 from bridgegen.engine.pipeline import Pipeline
 from bridgegen.openx.opendrive.site_fit import site_for
-from bridgegen.pages.scenario_words import story_lines
+from bridgegen.pages.scenario_page import story_lines
 from bridgegen.scenario.language.reader import load
 
 HEAD = """

@@ -10,7 +10,7 @@ from bridgegen.drivers import _weather_columns as column
 from bridgegen.engine.pipeline import Pipeline
 from bridgegen.openx.openscenario.from_owl.weather import time_of_day
 from bridgegen.scenario.language.reader import load
-from bridgegen.simulation.embedded.compiler.environments import sun_at
+from bridgegen.simulation.embedded.compiler.global_actions import sun_at
 
 from .storyboards import after, crossroads, lane, scenario, simulator, start
 

@@ -14,7 +14,7 @@ from bridgegen.engine.pipeline import Pipeline
 from bridgegen.openx.openscenario.from_owl import openscenario_from_owl
 from bridgegen.openx.openscenario.to_owl import individuals_from_openscenario
 from bridgegen.openx.openscenario.write import to_xml
-from bridgegen.pages.scenario_words import story_lines
+from bridgegen.pages.scenario_page import story_lines
 from bridgegen.scenario import participants as participant_types
 from bridgegen.scenario.language.reader import load
 from bridgegen.scenario.named_models import MODELS

@@ -13,9 +13,9 @@ from lxml import etree
 
 from bridgegen.base.errors import InputError
 from bridgegen.drivers import DRIVERS
-from bridgegen.openx.logic_file import roads_of
 from bridgegen.openx.openscenario import parameters
 from bridgegen.openx.openscenario.read import read
+from bridgegen.openx.prepared import roads_of
 from bridgegen.simulation.embedded.simulator import EmbeddedSimulator
 from bridgegen.simulation.esmini import process
 from bridgegen.simulation.esmini.files import ScenarioFile

@@ -11,7 +11,7 @@ from bridgegen.openx.openscenario.read import read
 from bridgegen.openx.source import source_of
 from bridgegen.scenario.language.reader import load
 from bridgegen.simulation.esmini.files import RoadFiles, ScenarioFile
-from bridgegen.simulation.esmini.log import error_in
+from bridgegen.simulation.esmini.process import error_in
 
 from ..embedded.storyboards import (
     after,

@@ -135,7 +135,7 @@ def test_whoever_is_killed_leaves_nothing_behind(library, tmp_path):
         "from pathlib import Path\n"
         "import numpy as np\n"
         "from bridgegen.drivers import DRIVERS\n"
-        "from bridgegen.openx.logic_file import roads_of\n"
+        "from bridgegen.openx.prepared import roads_of\n"
         "from bridgegen.openx.openscenario.read import read\n"
         "from bridgegen.simulation.embedded.simulator import EmbeddedSimulator\n"
         "from bridgegen.simulation.esmini import process\n"

@@ -9,7 +9,7 @@ import numpy as np
 
 from bridgegen.base.arrays import Float
 from bridgegen.jobs import search as campaign
-from bridgegen.jobs.compare.drawing import Theme, blank
+from bridgegen.jobs.compare.figures import Theme, blank
 from bridgegen.jobs.search.restored import pipeline_of
 from bridgegen.pages.playback import AREA_KINDS, Outline
 from bridgegen.pages.scenery import Scenery

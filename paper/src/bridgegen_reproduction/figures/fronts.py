@@ -7,7 +7,7 @@ import numpy as np
 
 from bridgegen.base.arrays import Float
 from bridgegen.base.statistics import quartiles
-from bridgegen.jobs.compare.drawing import Theme
+from bridgegen.jobs.compare.figures import Theme
 from bridgegen.jobs.compare.fronts import spread
 from bridgegen.jobs.compare.measures import Measured
 from bridgegen.jobs.compare.plan import Cell

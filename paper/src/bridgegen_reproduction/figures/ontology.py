@@ -5,7 +5,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from bridgegen.jobs.compare.drawing import Theme, blank
+from bridgegen.jobs.compare.figures import Theme, blank
 from bridgegen.openx.source import source_of
 from bridgegen.pages.painter import paint
 from bridgegen.pages.picture import Picture

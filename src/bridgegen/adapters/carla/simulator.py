@@ -4,7 +4,7 @@ import threading
 import weakref
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, cast
 
@@ -12,9 +12,8 @@ import numpy as np
 import numpy.typing as npt
 
 from bridgegen.adapters.carla.eyes import Eyes
-from bridgegen.adapters.carla.found import Found, refuse_used
 from bridgegen.adapters.carla.guests import CONTROLLERS
-from bridgegen.adapters.carla.incidents import Incidents
+from bridgegen.adapters.carla.incidents import Incidents, write_incidents
 from bridgegen.adapters.carla.lights import Lights
 from bridgegen.adapters.carla.pedals import Car
 from bridgegen.adapters.carla.row import BridgeGenDriver, CarlaRow, EgoController, Stopped
@@ -31,14 +30,58 @@ from bridgegen.drivers.driver_process import DriverError
 from bridgegen.drivers.drivers import ROUTE_FOLLOWER
 from bridgegen.openx.opendrive.model import OpenDrive
 from bridgegen.openx.openscenario.model import OpenScenario
-from bridgegen.simulation.around import AroundEmbedded
 from bridgegen.simulation.embedded.places.network import Network
 from bridgegen.simulation.embedded.program import Program
 from bridgegen.simulation.embedded.simulator import EmbeddedSimulator
 from bridgegen.simulation.rollout import FAILURES, Rollout, joined
+from bridgegen.simulation.simulator import AroundEmbedded
+from bridgegen.simulation.trace import write_trace
 
 if TYPE_CHECKING:
     from bridgegen.simulation.embedded.co_simulation import CoSimulation
+
+# --- What there is of a row beside its motion: incidents, detections, what was recorded ---
+
+
+@dataclass(frozen=True)
+class Found:
+    """What there is of a row beside its motion.
+
+    Attributes:
+        incidents: what CARLA noticed.
+        eyes: whose detections are the row's; None: the driver's sensors' are.
+        folder: where it is recorded; None: it is not.
+    """
+
+    incidents: Incidents
+    eyes: Eyes | None
+    folder: Path | None
+
+    def added(self, rollout: Rollout) -> Rollout:
+        """Return the row's rollout, N = 1, with it."""
+        incidents = self.incidents.all(rollout)
+        if incidents:
+            rollout = replace(rollout, incidents={0: incidents})
+        if self.folder is not None:
+            write_incidents(self.folder, incidents, rollout.time_step)
+            write_trace(self.folder / "trace.csv", rollout)
+        if self.eyes is not None:
+            detections = self.eyes.detections
+            n = int(rollout.n_steps[0])
+            detections[:, n:] = detections[:, n - 1 : n]
+            rollout = replace(rollout, detections=detections[np.newaxis])
+        return rollout
+
+
+def refuse_used(folder: Path) -> None:
+    """Refuse to record where something is.
+
+    Raises:
+        InputError: it is a file, or not empty.
+    """
+    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+        raise InputError(f"--record: {folder} must be a new folder, or an empty one")
+
 
 ROWS = 8
 """Rows between which the server is left stepping, and the measures of which come together."""

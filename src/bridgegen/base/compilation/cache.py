@@ -12,11 +12,8 @@ from typing import IO, Any
 from numba.core import caching
 from numba.core.compiler_lock import global_compiler_lock
 
-from bridgegen.base.compilation.folder import cache_folder
-from bridgegen.base.compilation.library import CodeStore, KernelLibrary
-from bridgegen.base.compilation.passes import is_for_kernel
-from bridgegen.base.compilation.shipped import shipped
-from bridgegen.base.compilation.sources import PACKAGE, digest
+from bridgegen.base.compilation.folder import PACKAGE, cache_folder, digest, shipped
+from bridgegen.base.compilation.library import CodeStore, KernelLibrary, is_for_kernel
 
 MAIN = PACKAGE / "simulation" / "embedded" / "_rollout_kernels.py"
 """What every search calls."""

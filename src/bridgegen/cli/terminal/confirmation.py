@@ -13,7 +13,7 @@ from bridgegen.cli.terminal.live import Live
 
 if TYPE_CHECKING:
     from bridgegen.jobs.search.confirm import RunConfirmation, Tally
-    from bridgegen.results.confirmation.schema import Outcome
+    from bridgegen.results.confirmation.record import Outcome
 
 MOST_MARGINS = 3
 """Maximum number of columns with margins of pass criteria."""
@@ -40,7 +40,7 @@ class ConfirmationScreen(Live):
 def print_confirmation(found: "RunConfirmation", *, as_json: bool) -> None:
     """Print each scenario's result, why some are not confirmed, and the totals."""
     from bridgegen.results.confirmation.summary import to_json
-    from bridgegen.results.confirmation.verdict import name_of, sentences
+    from bridgegen.results.confirmation.words import name_of, sentences
 
     record = found.record
     if as_json:

@@ -12,8 +12,8 @@ from bridgegen.cli.terminal.tables import print_table
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from bridgegen.scenario.exposure.exposure import Rate
     from bridgegen.scenario.exposure.fit import Fit
-    from bridgegen.scenario.exposure.rates import Rate
 
 
 class FitScreen(Live):

@@ -11,8 +11,8 @@ from bridgegen.cli.terminal.live import Live
 from bridgegen.cli.terminal.tables import print_table
 from bridgegen.jobs.mine.near_misses import conflicts_as_json, recordings_in_words, screen_rows
 from bridgegen.recordings.scenarios.files import FOLDER as SCENARIOS
+from bridgegen.recordings.scenarios.files import made_as_json, made_row
 from bridgegen.recordings.scenarios.mined import MinedScenario, Unmade
-from bridgegen.recordings.scenarios.page import made_as_json, made_row
 from bridgegen.recordings.scenarios.update import ENDING as DIFF
 from bridgegen.recordings.scenarios.update import in_words
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
     from bridgegen.jobs.mine.mine import Mined, Summary
     from bridgegen.recordings.scenarios.update import Update
-    from bridgegen.scenario.exposure.rates import Encounters
+    from bridgegen.scenario.exposure.exposure import Encounters
 
 CARRIAGEWAYS_SHOWN = 4
 

@@ -86,7 +86,7 @@ def print_regions(run: "RunRegions", *, as_json: bool) -> None:
 
 
 def _print_regions(run: "RunRegions", start: int, stop: int) -> None:
-    from bridgegen.search.regions.words import ANYWHERE, conditions
+    from bridgegen.search.regions.box import ANYWHERE, conditions
 
     failed = any(one.fresh.failed for one in run.found.regions[start:stop])
     table = Table(box=None, pad_edge=False, header_style="bold", padding=(0, 2, 1, 0))
@@ -118,6 +118,6 @@ def _shares(one: "Evidence") -> str:
 
 
 def _percent(share: float) -> str:
-    from bridgegen.search.regions.words import percent
+    from bridgegen.search.regions.box import percent
 
     return percent(share)

@@ -28,7 +28,7 @@ class RiskScreen(Live):
 
 def print_risk(result: "Risk", seconds: float, *, as_json: bool) -> None:
     """Print a risk's sentence, its probabilities and rates, then its files; or its record."""
-    from bridgegen.jobs.risk.events import EVENTS
+    from bridgegen.jobs.risk.outcomes import EVENTS
     from bridgegen.jobs.risk.result import PAGE
     from bridgegen.jobs.risk.text import (
         data_sentence,

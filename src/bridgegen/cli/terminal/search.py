@@ -4,7 +4,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from bridgegen.cli.terminal.live import Live
-from bridgegen.search.regions.words import percent
+from bridgegen.search.regions.box import percent
 
 if TYPE_CHECKING:
     from bridgegen.engine.workers import Workers

@@ -15,10 +15,9 @@ from bridgegen.cli.terminal.tables import WHOLE
 
 if TYPE_CHECKING:
     from bridgegen.jobs.preventability import PreventabilityMap
-    from bridgegen.jobs.suite.difference import Difference
+    from bridgegen.jobs.suite.difference import Difference, WorseCallbacks, WorseThan
     from bridgegen.jobs.suite.results import EntryResult
     from bridgegen.jobs.suite.suite import SuiteCallbacks, SuiteRun
-    from bridgegen.jobs.suite.worse import WorseCallbacks, WorseThan
 
 MOST_MODES = 3
 """Failure modes of a search that are named."""
@@ -47,7 +46,7 @@ class SuiteScreen(Live):
         Args:
             budget: evaluations of each search.
         """
-        from bridgegen.jobs.suite.worse import WorseCallbacks
+        from bridgegen.jobs.suite.difference import WorseCallbacks
 
         def begin(entry: str, number: int, count: int) -> None:
             facts = f"{number + 1} of {count}: {entry}"
@@ -290,8 +289,8 @@ def _worst(some: Sequence["EntryResult"]) -> str:
 
 def _facts(suite: "SuiteRun") -> dict[str, Any]:
     from bridgegen.jobs.suite.clauses import clause_results
-    from bridgegen.jobs.suite.rating import points_of
     from bridgegen.jobs.suite.results import counts
+    from bridgegen.jobs.suite.sentences import points_of
 
     return {
         "folder": str(suite.folder),

@@ -7,7 +7,7 @@ from bridgegen.cli.verdict.conditions import Conditions
 from bridgegen.cli.verdict.fail_if import Outcome
 from bridgegen.cli.verdict.junit import Case, Suite, case_of, write_junit
 from bridgegen.jobs.search.confirm import RunConfirmation
-from bridgegen.results.confirmation.schema import Scenario
+from bridgegen.results.confirmation.record import Scenario
 
 FIGURES = {
     "confirmed": "scenarios that are critical there, too / scenarios that ran there",

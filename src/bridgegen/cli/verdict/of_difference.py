@@ -6,10 +6,9 @@ from bridgegen.cli.verdict.conditions import Conditions
 from bridgegen.cli.verdict.fail_if import Outcome, Verdict, unless_judged
 from bridgegen.cli.verdict.junit import Case, Suite, case_of, write_junit
 from bridgegen.cli.verdict.of_suite import case_of_rows, named
-from bridgegen.jobs.suite.difference import Difference
+from bridgegen.jobs.suite.difference import Difference, WorseThan
 from bridgegen.jobs.suite.results import EntryResult
 from bridgegen.jobs.suite.suite import SuiteRun
-from bridgegen.jobs.suite.worse import WorseThan
 
 FIGURES = {
     "broken": "variations that the first ego passes and the second fails",

@@ -13,8 +13,8 @@ from bridgegen.jobs.suite.replay import replay_command
 from bridgegen.jobs.suite.results import FAILED, EntryResult, RowResult, counts
 from bridgegen.jobs.suite.sentences import clause_in_words
 from bridgegen.jobs.suite.suite import SuiteRun
-from bridgegen.scenario.language.clauses import read_clause
 from bridgegen.scenario.language.criteria import read_criterion
+from bridgegen.scenario.language.protocols import read_clause
 
 FIGURES = {
     "entries": "scenarios with their variations, of all egos",

@@ -21,7 +21,7 @@ from bridgegen.drivers.remote.messages import (
     unpack,
 )
 from bridgegen.drivers.remote.wire import ClosedError, Wire, connected
-from bridgegen.drivers.traits import NAMES, Traits
+from bridgegen.drivers.user_drivers import NAMES, Traits
 from bridgegen.drivers.views import MapSender
 
 AGAIN_SECONDS = 10.0

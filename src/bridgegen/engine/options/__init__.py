@@ -5,8 +5,7 @@ command that reproduces a run are all derived from these declarations. Imports n
 command line needs it to start.
 """
 
-from bridgegen.engine.options.keywords import called_with, checked
-from bridgegen.engine.options.option import Option, options_of, range_problems
+from bridgegen.engine.options.option import Option, called_with, checked, options_of, range_problems
 from bridgegen.engine.options.search import CommonOptions, PipelineOptions, SearchOptions
 
 __all__ = [

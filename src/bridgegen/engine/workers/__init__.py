@@ -6,9 +6,8 @@ plan, or its connection to a simulator), and rows. The result of a row depends o
 no result depends on the kind of workers, on their number or on which of them crashed.
 """
 
-from bridgegen.engine.workers.carried import CarriedDriver
 from bridgegen.engine.workers.choice import Choice, open_workers, read_choice
-from bridgegen.engine.workers.recipe import Recipe
+from bridgegen.engine.workers.recipe import CarriedDriver, Recipe
 from bridgegen.engine.workers.threads import Threads
 from bridgegen.engine.workers.workers import Lost, Part, Stream, Workers
 

@@ -3,8 +3,7 @@
 import pickle
 import queue
 
-from bridgegen.base.processes.child import Say, connect, leave
-from bridgegen.base.processes.garbage import collect_rarely
+from bridgegen.base.processes.child import Say, collect_rarely, connect, leave
 from bridgegen.engine.workers.pipeline_cache import picklable
 
 

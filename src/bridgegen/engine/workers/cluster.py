@@ -12,7 +12,7 @@ from bridgegen.base.arrays import Float
 from bridgegen.base.errors import InputError, WorkersError
 from bridgegen.base.extras import require
 from bridgegen.engine.workers.pool import PoolStream, WorkerPool
-from bridgegen.engine.workers.process import Process, Said
+from bridgegen.engine.workers.processes import Process, Said
 from bridgegen.engine.workers.ray_bridge import RayBridge
 from bridgegen.engine.workers.recipe import Recipe
 from bridgegen.engine.workers.workers import Args, Evaluator, Part, Result, Work

@@ -18,10 +18,9 @@ import numpy as np
 
 from bridgegen.base.arrays import Float
 from bridgegen.base.errors import WorkersError
-from bridgegen.engine.workers.chunks import cut
 from bridgegen.engine.workers.pipeline_cache import NotPrepared
 from bridgegen.engine.workers.recipe import Recipe
-from bridgegen.engine.workers.workers import Args, Evaluator, Lost, Part, Result, Work
+from bridgegen.engine.workers.workers import Args, Evaluator, Lost, Part, Result, Work, cut
 
 MAX_START_FAILURES = 3
 """`WorkersError` is raised after so many workers in a row, or as many as the pool has if that is

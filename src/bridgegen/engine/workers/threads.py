@@ -8,8 +8,7 @@ from functools import partial
 from typing import Generic
 
 from bridgegen.base.arrays import Float
-from bridgegen.engine.workers.chunks import cut
-from bridgegen.engine.workers.workers import Args, Evaluator, Part, Result
+from bridgegen.engine.workers.workers import Args, Evaluator, Part, Result, cut
 
 
 class Threads:

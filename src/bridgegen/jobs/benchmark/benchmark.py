@@ -5,8 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from bridgegen.base.errors import InputError, Interrupted
-from bridgegen.engine.workers.process import cores
-from bridgegen.jobs.benchmark.estimate import measured, seconds_of
+from bridgegen.engine.workers.processes import cores
 from bridgegen.jobs.benchmark.page import write_page
 from bridgegen.jobs.benchmark.plan import (
     FILE,
@@ -23,11 +22,19 @@ from bridgegen.jobs.benchmark.plan import (
     catalogue,
     entrants,
     make_plan,
+    measured,
     number_problems,
     ours,
+    seconds_of,
 )
-from bridgegen.jobs.benchmark.results import Outcome, Standing, outcomes, read_gaps, standings
-from bridgegen.jobs.benchmark.table import write_tables
+from bridgegen.jobs.benchmark.results import (
+    Outcome,
+    Standing,
+    outcomes,
+    read_gaps,
+    standings,
+    write_tables,
+)
 from bridgegen.jobs.benchmark.work import (
     Finish,
     chosen,
@@ -38,8 +45,7 @@ from bridgegen.jobs.benchmark.work import (
     task_of,
 )
 from bridgegen.jobs.compare.plan import claim
-from bridgegen.jobs.compare.runs import RunCallbacks
-from bridgegen.jobs.compare.workers import run_all
+from bridgegen.jobs.compare.runs import RunCallbacks, run_all
 from bridgegen.jobs.search.domain import domain_of
 from bridgegen.results.store.sqlite import Lock
 from bridgegen.search import algorithms as toolkit

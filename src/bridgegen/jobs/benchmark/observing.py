@@ -12,7 +12,7 @@ from typing import IO, Any
 from bridgegen.base.errors import InputError
 from bridgegen.drivers.driver_process import make
 from bridgegen.drivers.interface import BatchDriver, Observation, Scene
-from bridgegen.drivers.traits import NAMES
+from bridgegen.drivers.user_drivers import NAMES
 
 _FILE = "observer.py"
 _SEEN = "seen.bin"

@@ -8,7 +8,7 @@ from importlib.resources import files
 from pathlib import Path
 
 from bridgegen.base.disk import write_whole
-from bridgegen.drivers.listed import available
+from bridgegen.drivers.drivers import available
 from bridgegen.drivers.planners import DOMAINS
 from bridgegen.jobs.benchmark.failures import CAREFUL
 from bridgegen.jobs.benchmark.plan import COLUMNS, PERFECT, SENSED, Entrant, Plan

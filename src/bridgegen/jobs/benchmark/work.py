@@ -7,9 +7,14 @@ from typing import Any
 
 from bridgegen.base.errors import BridgeGenError, FileFormatError, StorageError
 from bridgegen.engine.workers.tasks import READY, TaskPool
-from bridgegen.jobs.benchmark.failures import failures_of, judge, read_judgement, write_judgement
+from bridgegen.jobs.benchmark.failures import (
+    failures_of,
+    judge,
+    read_judgement,
+    write_judgement,
+    write_reproductions,
+)
 from bridgegen.jobs.benchmark.plan import Cell, Plan
-from bridgegen.jobs.benchmark.reproduction import write_reproductions
 from bridgegen.jobs.compare.runs import RunCallbacks, Task, evaluations_of
 from bridgegen.jobs.search.run import REPORT, Run
 from bridgegen.search.triage.record import JSON_FILE

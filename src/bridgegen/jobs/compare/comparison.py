@@ -7,16 +7,15 @@ from pathlib import Path
 from bridgegen.base.errors import Interrupted, StorageError
 from bridgegen.engine.options import CommonOptions, called_with
 from bridgegen.engine.workers import read_choice
-from bridgegen.engine.workers.process import cores
+from bridgegen.engine.workers.processes import cores
 from bridgegen.jobs.compare.distinct import APART
 from bridgegen.jobs.compare.measures import counts, measure, measures
 from bridgegen.jobs.compare.page import write_page
 from bridgegen.jobs.compare.plan import Cell, Plan, begin, make_plan
 from bridgegen.jobs.compare.record import read, space_of, terms_of
 from bridgegen.jobs.compare.result import Comparison
-from bridgegen.jobs.compare.runs import RunCallbacks, Task, evaluations_of
+from bridgegen.jobs.compare.runs import RunCallbacks, Task, evaluations_of, run_all
 from bridgegen.jobs.compare.table import summarise, write_tables
-from bridgegen.jobs.compare.workers import run_all
 from bridgegen.results.store.sqlite import Lock
 from bridgegen.scenario.language.space import SearchSpace
 from bridgegen.search.algorithms.algorithm import Value

@@ -15,7 +15,7 @@ from bridgegen.assess.metrics import Quantity
 from bridgegen.base.disk import write_whole
 from bridgegen.base.errors import StorageError
 from bridgegen.jobs.compare import figures, words
-from bridgegen.jobs.compare.drawing import DARK, LIGHT
+from bridgegen.jobs.compare.figures import DARK, LIGHT
 from bridgegen.jobs.compare.measures import Measure, ordinal, waited_for
 from bridgegen.jobs.compare.plan import RUNS, Cell
 from bridgegen.jobs.compare.record import points

@@ -11,8 +11,8 @@ from typing import Any
 
 from bridgegen.base.disk import write_whole
 from bridgegen.base.errors import InputError, StorageError, UnknownNameError
+from bridgegen.base.plugins import file_of, label_of
 from bridgegen.base.records import parse_json, read_bytes
-from bridgegen.base.user_code import file_of, label_of
 from bridgegen.engine.options import CommonOptions, SearchOptions, options_of
 from bridgegen.jobs.compare.distinct import APART
 from bridgegen.jobs.search.scenarios import is_file, load

@@ -6,13 +6,18 @@ from pathlib import Path
 
 from bridgegen.base.errors import BridgeGenError, StorageError
 from bridgegen.jobs.compare.plan import FILE as COMPARISON_FILE
-from bridgegen.jobs.dashboard.of_others import ComparisonLine, MapLine, read_comparison, read_map
-from bridgegen.jobs.dashboard.of_runs import read_run
-from bridgegen.jobs.dashboard.of_suites import SuiteLine, read_suite_line
 from bridgegen.jobs.dashboard.results import Result
-from bridgegen.jobs.dashboard.sceneries import Sceneries
-from bridgegen.jobs.dashboard.scenery import Scenery
-from bridgegen.jobs.preventability.chunks import SETTINGS as MAP_FILE
+from bridgegen.jobs.dashboard.results_of import (
+    ComparisonLine,
+    MapLine,
+    SuiteLine,
+    read_comparison,
+    read_map,
+    read_run,
+    read_suite_line,
+)
+from bridgegen.jobs.dashboard.scenery import Sceneries, Scenery
+from bridgegen.jobs.preventability.result import SETTINGS as MAP_FILE
 from bridgegen.jobs.suite.entries import RESULTS as SUITE_FILE
 from bridgegen.jobs.view.overview import MOST_RUNS, find_folders
 from bridgegen.results.store.run_file import FILE as RUN_FILE

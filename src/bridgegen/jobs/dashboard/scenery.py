@@ -3,15 +3,18 @@
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property, reduce
+from pathlib import Path
 
 import numpy as np
 
 from bridgegen.base.arrays import Float
-from bridgegen.jobs.dashboard.results import Seen
+from bridgegen.base.errors import BridgeGenError
+from bridgegen.jobs.dashboard.results import Seen, scenario_name
 from bridgegen.jobs.dashboard.taxonomy import QUANTITIES
+from bridgegen.jobs.search.scenarios import load
 from bridgegen.openx.file_scenario import FileScenario
 from bridgegen.openx.opendrive.model import OpenDrive, Road
-from bridgegen.openx.openscenario.participant_kinds import kind_of
+from bridgegen.openx.openscenario.bodies import kind_of
 from bridgegen.scenario.language.parameters import Parameter
 from bridgegen.scenario.language.roads import Quantity, RoadsSpec
 from bridgegen.scenario.language.scenario import LogicalScenario, SearchedScenario
@@ -284,3 +287,47 @@ def _facts_of_lanes(road: Road) -> set[str]:
     if any(one.type == "crosswalk" for one in road.objects):
         facts.add("crosswalk")
     return facts
+
+
+# --- The sceneries of a project: each scenario is read once, whatever number of results it has ---
+
+
+Source = tuple[str, str, str, bool]
+"""Path or name, distribution, reading of empty triggers ("" for none), whether it is on a map."""
+
+
+class Sceneries:
+    """Reads scenarios, and remembers them."""
+
+    def __init__(self) -> None:
+        self._known: dict[Source, tuple[Scenery, str] | None] = {}
+
+    def of(self, source: Source, fingerprint: str = "") -> Scenery | None:
+        """Return the scenery of a scenario; None where it cannot be read, or has changed.
+
+        Args:
+            source: of the scenario.
+            fingerprint: of the scenario when its result was made; "" if that is not known.
+        """
+        if source not in self._known:
+            self._known[source] = self._read(source)
+        known = self._known[source]
+        if known is None or (fingerprint and known[1] != fingerprint):
+            return None
+        return known[0]
+
+    def by_name(self, project: Path) -> dict[str, Scenery]:
+        """Return all that were read, by the names that results have their scenarios under."""
+        return {
+            scenario_name(text, project, distribution): known[0]
+            for (text, distribution, _, _), known in self._known.items()
+            if known is not None
+        }
+
+    def _read(self, source: Source) -> tuple[Scenery, str] | None:
+        text, distribution, trigger, on_map = source
+        try:
+            scenario = load(text, distribution or None, trigger or None)
+            return scenery_of(scenario, on_map=on_map), scenario.fingerprint
+        except (BridgeGenError, OSError, ValueError):  # ValueError: NUL in a path
+            return None

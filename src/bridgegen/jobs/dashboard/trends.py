@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from typing import Literal
 
 from bridgegen.jobs.dashboard.markup import counted
-from bridgegen.jobs.dashboard.of_suites import SuiteLine
 from bridgegen.jobs.dashboard.results import Result, in_order
+from bridgegen.jobs.dashboard.results_of import SuiteLine
 
 Measure = Literal["harmful share", "failed variations"]
 

@@ -5,8 +5,7 @@ from html import escape
 
 from bridgegen.jobs.mine.mine import CRITICAL, Mined, Summary
 from bridgegen.recordings.conflicts.find import RecordedConflict
-from bridgegen.recordings.replays.picture import moving_picture
-from bridgegen.recordings.replays.write import Replay
+from bridgegen.recordings.replays.write import Replay, moving_picture
 
 HEAD = (
     "recording", "file", "ego", "other", "time_s", "conflict", "type", "responsible", "ttc_s",

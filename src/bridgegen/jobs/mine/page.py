@@ -18,14 +18,13 @@ from bridgegen.drivers.kinds import BICYCLE, MOTORCYCLE, NAMES, PEDESTRIAN
 from bridgegen.jobs.mine import near_misses as conflicts
 from bridgegen.jobs.mine.mine import CRITICAL, PATHS_SHOWN, Mined, Summary
 from bridgegen.recordings.cells import cell, html_table
-from bridgegen.recordings.events.page import events_section
 from bridgegen.recordings.events.playback import playback_section
-from bridgegen.recordings.events.tables import FOLDER
+from bridgegen.recordings.events.tables import FOLDER, events_section
 from bridgegen.recordings.events.tables import HEAD as EVENTS_HEAD
 from bridgegen.recordings.events.tables import TABLE as EVENTS
 from bridgegen.recordings.lanes.account import LanesFound
 from bridgegen.recordings.scenarios.files import FOLDER as SCENARIOS
-from bridgegen.recordings.scenarios.page import scenarios_section
+from bridgegen.recordings.scenarios.files import scenarios_section
 
 GENERATOR = "BridgeGen recordings"
 PAGE, TABLE, LANES, QUALITY = "recordings.html", "recordings.csv", "lanes.csv", "quality.csv"

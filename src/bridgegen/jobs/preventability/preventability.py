@@ -16,10 +16,9 @@ from bridgegen.engine.options import PipelineOptions, checked
 from bridgegen.engine.pipeline import Pipeline
 from bridgegen.engine.workers import CarriedDriver, Lost, Workers, open_workers
 from bridgegen.jobs.preventability import arithmetic
-from bridgegen.jobs.preventability.chunks import ChunkStore
 from bridgegen.jobs.preventability.classes import Codes, Outcome, outcomes
 from bridgegen.jobs.preventability.grid import Grid, GridAxis, grid_of
-from bridgegen.jobs.preventability.result import PreventabilityMap, simulated
+from bridgegen.jobs.preventability.result import ChunkStore, PreventabilityMap, simulated
 from bridgegen.jobs.search.scenarios import driven_by, is_file, load
 from bridgegen.scenario.language.scenario import SearchedScenario
 from bridgegen.simulation import vehicles

@@ -17,7 +17,7 @@ from bridgegen.base.arrays import Float
 from bridgegen.base.disk import write_whole
 from bridgegen.base.records import read_bytes
 from bridgegen.jobs.risk.outcomes import Column, Outcomes
-from bridgegen.results.store.claimed import claim
+from bridgegen.results.store.run_file import claim
 
 SETTINGS = "settings.json"
 BATCHES = "batches"

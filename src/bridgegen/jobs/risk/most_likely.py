@@ -12,7 +12,7 @@ from bridgegen.assess.conflict.summary import summarise
 from bridgegen.base.arrays import Bool, Float
 from bridgegen.base.errors import StorageError
 from bridgegen.engine.pipeline import Pipeline
-from bridgegen.jobs.risk.estimators import design_point
+from bridgegen.jobs.risk.estimators import exploration as design_point
 from bridgegen.jobs.risk.estimators.problem import block_of
 from bridgegen.jobs.risk.estimators.weighted import Weighted
 from bridgegen.jobs.risk.experiment import Experiment
@@ -20,7 +20,7 @@ from bridgegen.jobs.risk.ledger import MOST_LIKELY
 from bridgegen.jobs.risk.outcomes import Column
 from bridgegen.jobs.risk.result import Likely
 from bridgegen.jobs.search.scenario_files import write_scenario
-from bridgegen.recordings.replays.picture import moving_picture
+from bridgegen.recordings.replays.write import moving_picture
 from bridgegen.scenario.exposure import Exposure
 from bridgegen.simulation.rollout import Rollout
 

@@ -14,14 +14,12 @@ import numpy as np
 
 from bridgegen.base.arrays import Float
 from bridgegen.base.disk import write_whole
-from bridgegen.jobs.risk.data import DataBand
 from bridgegen.jobs.risk.elsewhere import Elsewhere
 from bridgegen.jobs.risk.estimators.weighted import FEWEST_HITS, Probability, Weighted
-from bridgegen.jobs.risk.events import EVENTS, INJURY, WORDS
-from bridgegen.jobs.risk.methods import Estimated
-from bridgegen.jobs.risk.outcomes import Column
+from bridgegen.jobs.risk.experiment import Estimated
+from bridgegen.jobs.risk.outcomes import EVENTS, INJURY, WORDS, Column, DataBand
 from bridgegen.scenario.exposure import Exposure
-from bridgegen.scenario.exposure.rates import Rate
+from bridgegen.scenario.exposure.exposure import Rate
 
 RECORD, PAGE, TABLE = "risk.json", "risk.html", "harmful.csv"
 MOST_ROWS = 100_000  # of the table

@@ -19,23 +19,22 @@ from bridgegen.base.errors import InputError, Interrupted, UnknownNameError
 from bridgegen.engine.options import PipelineOptions, checked
 from bridgegen.engine.pipeline import Pipeline
 from bridgegen.engine.workers import CarriedDriver, Choice, open_workers
-from bridgegen.jobs.risk import methods
-from bridgegen.jobs.risk.data import data_band
+from bridgegen.jobs.risk import experiment as methods
 from bridgegen.jobs.risk.elsewhere import HERE, kept_elsewhere, look_elsewhere
 from bridgegen.jobs.risk.estimators import monte_carlo
 from bridgegen.jobs.risk.estimators.problem import Aim
-from bridgegen.jobs.risk.events import LEAST
-from bridgegen.jobs.risk.events import require as require_event
 from bridgegen.jobs.risk.experiment import Experiment
 from bridgegen.jobs.risk.ledger import Ledger
 from bridgegen.jobs.risk.most_likely import find_most_likely, write_most_likely
+from bridgegen.jobs.risk.outcomes import LEAST, data_band
+from bridgegen.jobs.risk.outcomes import require as require_event
 from bridgegen.jobs.risk.result import Risk
 from bridgegen.jobs.search.run import Run
 from bridgegen.jobs.search.scenarios import driven_by, is_file, load
 from bridgegen.results.store import Store
 from bridgegen.scenario.exposure import Exposure
-from bridgegen.scenario.exposure.chosen import UNIFORM, chosen_exposure
 from bridgegen.scenario.exposure.fit import Fit, fit_exposure
+from bridgegen.scenario.exposure.reader import UNIFORM, chosen_exposure
 from bridgegen.scenario.exposure.tables import read_header
 from bridgegen.scenario.language.scenario import LogicalScenario
 from bridgegen.simulation.choice import EMBEDDED, SimulatorChoice

@@ -2,12 +2,11 @@
 
 from math import isfinite
 
-from bridgegen.jobs.risk.data import DataBand
 from bridgegen.jobs.risk.elsewhere import Elsewhere, Ratio
 from bridgegen.jobs.risk.estimators.weighted import Probability
-from bridgegen.jobs.risk.events import WORDS
+from bridgegen.jobs.risk.outcomes import WORDS, DataBand
 from bridgegen.jobs.risk.result import Risk
-from bridgegen.scenario.exposure.rates import Rate
+from bridgegen.scenario.exposure.exposure import Rate
 
 
 def number(value: float) -> str:

@@ -7,9 +7,8 @@ from bridgegen.assess.conflict.harm import NEAR_MISS
 from bridgegen.assess.conflict.summary import CAREFUL_DRIVER
 from bridgegen.drivers import STORYBOARD, is_spec
 from bridgegen.jobs.safety_case.builder import Draft
-from bridgegen.jobs.safety_case.evidence import Files
-from bridgegen.jobs.safety_case.facts import Facts
-from bridgegen.pages.scenario_words import story_lines
+from bridgegen.jobs.safety_case.facts import Facts, Files
+from bridgegen.pages.scenario_page import story_lines
 from bridgegen.scenario.language.parameters import Axis, Parameter
 from bridgegen.scenario.language.scenario import LogicalScenario
 from bridgegen.simulation.choice import EMBEDDED

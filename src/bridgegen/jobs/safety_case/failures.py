@@ -1,8 +1,7 @@
 """The failures of a run in its argument: none, or counter goals for each failure mode."""
 
 from bridgegen.jobs.safety_case.builder import Draft
-from bridgegen.jobs.safety_case.evidence import MOST_SHOWN, Files
-from bridgegen.jobs.safety_case.facts import Facts
+from bridgegen.jobs.safety_case.facts import MOST_SHOWN, Facts, Files
 from bridgegen.jobs.safety_case.measured import way_of, ways
 from bridgegen.jobs.safety_case.model import Condition
 from bridgegen.jobs.safety_case.numbers import Numbers

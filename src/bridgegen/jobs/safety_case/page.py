@@ -5,8 +5,7 @@ from collections.abc import Iterator
 from html import escape
 from urllib.parse import quote
 
-from bridgegen.jobs.safety_case.drawing import drawing
-from bridgegen.jobs.safety_case.layout import layout
+from bridgegen.jobs.safety_case.drawing import drawing, layout
 from bridgegen.jobs.safety_case.model import FILE, Element, Evidence, SafetyCase, Statement
 from bridgegen.pages.page import still_page
 

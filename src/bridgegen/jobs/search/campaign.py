@@ -17,18 +17,24 @@ from bridgegen.drivers import STORYBOARD
 from bridgegen.engine.options import SearchOptions, called_with, checked, range_problems
 from bridgegen.engine.pipeline import Pipeline
 from bridgegen.engine.workers import Choice, Workers, open_workers
-from bridgegen.jobs.search.chosen import as_judged, chosen_objective, columns_of
 from bridgegen.jobs.search.critical import export_critical, most_critical
 from bridgegen.jobs.search.domain import outside
 from bridgegen.jobs.search.exportable import require_exportable
-from bridgegen.jobs.search.failing_driver import FailingDriver
 from bridgegen.jobs.search.loop import Progress, Reason, run_loop
 from bridgegen.jobs.search.report import write_run_report
 from bridgegen.jobs.search.restored import check_named, pipeline_of, placed
 from bridgegen.jobs.search.run import Run
-from bridgegen.jobs.search.scenarios import driven_by, is_file, load, refuse_standstill
+from bridgegen.jobs.search.scenarios import (
+    as_judged,
+    chosen_objective,
+    columns_of,
+    driven_by,
+    is_file,
+    load,
+    refuse_standstill,
+)
 from bridgegen.jobs.search.screening import BATCH, require_screen, screen_budget
-from bridgegen.jobs.search.searcher import require_asynchronous, searcher_of
+from bridgegen.jobs.search.searcher import FailingDriver, require_asynchronous, searcher_of
 from bridgegen.jobs.search.settings import Settings
 from bridgegen.openx.opendrive.road_map import RoadMap
 from bridgegen.openx.opendrive.site_adapted import adapted

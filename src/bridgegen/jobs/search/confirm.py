@@ -16,8 +16,14 @@ from bridgegen.jobs.search.elsewhere import run_elsewhere
 from bridgegen.jobs.search.report import rewrite_report
 from bridgegen.jobs.search.restored import pipeline_of
 from bridgegen.jobs.search.run import Run
-from bridgegen.results.confirmation.record import check_rows, file_name, read_record, write_record
-from bridgegen.results.confirmation.schema import Record, Scenario
+from bridgegen.results.confirmation.record import (
+    Record,
+    Scenario,
+    check_rows,
+    file_name,
+    read_record,
+    write_record,
+)
 from bridgegen.results.confirmation.summary import ConfirmationSummary, summarise
 from bridgegen.results.store import Rows
 from bridgegen.search.algorithms.dominance import by_merit

@@ -6,7 +6,7 @@ from bridgegen.jobs.search.restored import searched
 from bridgegen.jobs.search.run import Run
 from bridgegen.jobs.search.settings import Settings
 from bridgegen.scenario.exposure import Exposure
-from bridgegen.scenario.exposure.chosen import chosen_exposure, rows_on_the_road
+from bridgegen.scenario.exposure.reader import chosen_exposure, rows_on_the_road
 from bridgegen.scenario.language.coverage import MAX_STRENGTH, Coverage, coverage
 
 

@@ -20,9 +20,9 @@ from bridgegen.jobs.search.exported import FOLDER, NOT_EXPORTED, Exported, Refus
 from bridgegen.jobs.search.scenario_files import write_scenario
 from bridgegen.results.store import Rows
 from bridgegen.search.algorithms.dominance import by_merit
-from bridgegen.search.triage.distinct import distinct
 from bridgegen.search.triage.judgement import judgement
 from bridgegen.search.triage.record import Minimal, Mode, Neighbourhood, Triage
+from bridgegen.search.triage.what_happened import distinct
 from bridgegen.simulation.rollout import Rollout
 
 

@@ -15,14 +15,14 @@ from bridgegen.base.errors import InputError
 from bridgegen.engine.pipeline import Pipeline
 from bridgegen.engine.workers import Lost
 from bridgegen.results.confirmation.compare import compare, first_contact, tracks
-from bridgegen.results.confirmation.record import digest_of
-from bridgegen.results.confirmation.schema import (
+from bridgegen.results.confirmation.record import (
     Change,
     Course,
     Differences,
     Margin,
     Outcome,
     Scenario,
+    digest_of,
     number,
 )
 from bridgegen.results.confirmation.words import explanation

@@ -23,7 +23,6 @@ from bridgegen.engine.simulate import simulate_file
 from bridgegen.jobs.search.exported import FOLDER, MINIMAL
 from bridgegen.jobs.search.run import Run
 from bridgegen.jobs.search.scenario_files import keyed
-from bridgegen.openx.logic_file import logic_path, roads_of
 from bridgegen.openx.opendrive.model import OpenDrive
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario import validate
@@ -32,9 +31,8 @@ from bridgegen.openx.openscenario.read import read
 from bridgegen.openx.openscenario.recorded import Recording, recorded
 from bridgegen.openx.openscenario.resolve import resolved
 from bridgegen.openx.openscenario.scenario_runner.convert import CONTROL, for_scenario_runner
-from bridgegen.openx.openscenario.versions import VERSIONS, least_version, to_version
-from bridgegen.openx.openscenario.write import to_xml
-from bridgegen.openx.prepared import prepared
+from bridgegen.openx.openscenario.write import VERSIONS, least_version, to_version, to_xml
+from bridgegen.openx.prepared import logic_path, prepared, roads_of
 from bridgegen.openx.xml import read_bytes
 from bridgegen.simulation.embedded.compiler import compile_storyboard
 

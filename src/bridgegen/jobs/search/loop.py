@@ -17,8 +17,7 @@ import numpy as np
 
 from bridgegen.base.arrays import Bool, Float, Int, as_float
 from bridgegen.base.errors import InputError, StorageError
-from bridgegen.jobs.search.known_rows import KnownRows
-from bridgegen.jobs.search.result_log import ResultLog
+from bridgegen.jobs.search.known_rows import KnownRows, ResultLog
 from bridgegen.results.store import Checkpoint, Evaluated, Rows, Store
 from bridgegen.search.algorithms import Algorithm, Restorable, TakesNotes
 

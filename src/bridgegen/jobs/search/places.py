@@ -6,15 +6,13 @@ from pathlib import Path
 from bridgegen.base.errors import BridgeGenError, UnsupportedError
 from bridgegen.engine.pipeline import Pipeline
 from bridgegen.openx.on_map import on_map, searchable
-from bridgegen.openx.opendrive.carla_maps import map_path
 from bridgegen.openx.opendrive.merges import merges
 from bridgegen.openx.opendrive.model import Junction, OpenDrive
 from bridgegen.openx.opendrive.read import read
 from bridgegen.openx.opendrive.rings import Ring, rings
-from bridgegen.openx.opendrive.road_map import RoadMap, map_of
+from bridgegen.openx.opendrive.road_map import RoadMap, map_of, map_path
 from bridgegen.openx.opendrive.site import road_ends
-from bridgegen.openx.opendrive.site_fit import candidates, kind_of_place, sites_at
-from bridgegen.openx.opendrive.site_lacks import missing
+from bridgegen.openx.opendrive.site_fit import candidates, kind_of_place, missing, sites_at
 from bridgegen.openx.opendrive.stretches import stretches
 from bridgegen.openx.xml import read_bytes
 from bridgegen.scenario.language.scenario import LogicalScenario

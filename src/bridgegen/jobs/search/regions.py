@@ -17,10 +17,10 @@ from bridgegen.jobs.search.report import rewrite_report
 from bridgegen.jobs.search.restored import pipeline_of, searched
 from bridgegen.jobs.search.run import Run
 from bridgegen.scenario.exposure import Exposure
-from bridgegen.scenario.exposure.chosen import chosen_exposure, rows_on_the_road
+from bridgegen.scenario.exposure.reader import chosen_exposure, rows_on_the_road
 from bridgegen.scenario.language.space import SearchSpace
 from bridgegen.scenario.ontology.files import save
-from bridgegen.search.regions.evidence import Evidence
+from bridgegen.search.regions.box import Evidence
 from bridgegen.search.regions.find import AT_LEAST, SAMPLES, Found, Region, check, find_regions
 from bridgegen.search.regions.owl import carriers, classes, statable
 from bridgegen.search.regions.record import JSON_FILE, to_json

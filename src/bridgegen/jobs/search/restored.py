@@ -7,14 +7,13 @@ from pathlib import Path
 
 from bridgegen.assess.objective import Objective
 from bridgegen.base.errors import InputError, StorageError
-from bridgegen.base.user_code import is_own
+from bridgegen.base.plugins import is_own
 from bridgegen.drivers import STORYBOARD, is_spec
 from bridgegen.engine.options import PipelineOptions
 from bridgegen.engine.pipeline import Pipeline
 from bridgegen.engine.workers import Workers
-from bridgegen.jobs.search.chosen import as_judged
 from bridgegen.jobs.search.run import Run
-from bridgegen.jobs.search.scenarios import driven_by, load
+from bridgegen.jobs.search.scenarios import as_judged, driven_by, load
 from bridgegen.jobs.search.settings import Settings
 from bridgegen.openx.on_map import on_map, searchable
 from bridgegen.openx.opendrive.road_map import RoadMap, load_map

@@ -189,7 +189,7 @@ class Run:
         The worst exported scenario is simulated again for its speed and distance, unless that
         would import a driver of your own, or needs another simulator.
         """
-        from bridgegen.jobs.search.drawing import draw
+        from bridgegen.jobs.search.notebook import draw
 
         return draw(self)
 

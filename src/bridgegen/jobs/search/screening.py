@@ -7,8 +7,7 @@ from bridgegen.base.errors import InputError
 from bridgegen.engine.options import SearchOptions
 from bridgegen.engine.options.search import MAX_BUDGET
 from bridgegen.engine.pipeline import Pipeline
-from bridgegen.jobs.search.known_rows import KnownRows
-from bridgegen.jobs.search.result_log import ResultLog
+from bridgegen.jobs.search.known_rows import KnownRows, ResultLog
 from bridgegen.search.algorithms import Results
 from bridgegen.simulation.choice import SimulatorChoice
 

@@ -12,8 +12,7 @@ from bridgegen.base.errors import InputError, StorageError
 from bridgegen.drivers import STORYBOARD
 from bridgegen.engine.options import SearchOptions, options_of, range_problems
 from bridgegen.engine.options.option import ALWAYS
-from bridgegen.jobs.search.chosen import PAPER
-from bridgegen.jobs.search.scenarios import is_file
+from bridgegen.jobs.search.scenarios import PAPER, is_file
 from bridgegen.scenario.language.objectives import PAPERS
 from bridgegen.simulation.choice import SimulatorChoice, Value
 

@@ -147,10 +147,10 @@ def _roads(path: Path, warnings: list[str] | None) -> list[str]:
 
 def _storyboard(path: Path, warnings: list[str] | None) -> list[str]:
     from bridgegen.openx.file_scenario import load_file_scenario
-    from bridgegen.openx.logic_file import roads_of
     from bridgegen.openx.openscenario import read as openscenario_read
     from bridgegen.openx.openscenario import validate as openscenario_validate
     from bridgegen.openx.openscenario.distributions import is_distribution, read_distribution
+    from bridgegen.openx.prepared import roads_of
 
     if is_distribution(path):
         named = read_distribution(path).scenario_file.filepath

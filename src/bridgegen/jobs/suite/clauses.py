@@ -22,7 +22,7 @@ from bridgegen.jobs.suite.results import (
     RowResult,
     Verdict,
 )
-from bridgegen.scenario.language.clauses import read_clause
+from bridgegen.scenario.language.protocols import read_clause
 from bridgegen.search.triage.bound import too_few
 from bridgegen.simulation.choice import SimulatorChoice
 

@@ -1,7 +1,10 @@
 """An entry of a suite → its pipeline → the results of its rows."""
 
+import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -9,14 +12,14 @@ import numpy as np
 from bridgegen.assess.conflict.findings import is_unsafe_start
 from bridgegen.assess.conflict.happening import Happening
 from bridgegen.base.errors import BridgeGenError, InputError
+from bridgegen.drivers import is_remote
+from bridgegen.drivers.address import Command, address_of
 from bridgegen.engine.evaluation import Evaluation
 from bridgegen.engine.options import CommonOptions
 from bridgegen.engine.pipeline import Pipeline
-from bridgegen.engine.workers import Threads
-from bridgegen.jobs.search.chosen import as_judged, chosen_objective
-from bridgegen.jobs.search.scenarios import driven_by, load
+from bridgegen.engine.workers import CarriedDriver, Threads
+from bridgegen.jobs.search.scenarios import as_judged, chosen_objective, driven_by, load
 from bridgegen.jobs.suite.clauses import judged
-from bridgegen.jobs.suite.driver_digest import driver_digest
 from bridgegen.jobs.suite.entries import Entry
 from bridgegen.jobs.suite.results import EntryResult, GridResult, RowResult, finite
 from bridgegen.jobs.suite.rows import Rows, is_sample, rows_of
@@ -27,6 +30,43 @@ from bridgegen.scenario.language.scenario import SearchedScenario
 from bridgegen.scenario.language.space import SearchSpace
 from bridgegen.simulation.choice import SimulatorChoice
 from bridgegen.simulation.rollout import STATUS_MESSAGES
+
+# --- A digest of a user's driver: whether results are those of the driver as it is now ---
+
+
+def driver_digest(name: str) -> str:
+    """Return a digest of the files that a driver's name holds, not of what they import.
+
+    Empty where it holds none: a driver that ships, in a package, or of a server.
+    """
+    try:
+        if is_remote(name):
+            return _digest_of_command(name)
+        data = CarriedDriver.of(name).data
+    except (InputError, OSError, ValueError):
+        return ""
+    return "" if data is None else hashlib.sha256(data).hexdigest()
+
+
+def _digest_of_command(name: str) -> str:
+    """Return a digest of a program and of the files among its arguments."""
+    command = address_of(name)
+    if not isinstance(command, Command):
+        return ""
+    digest = hashlib.sha256()
+    for path in (Path(word) for word in (command.program or "", *command.words[1:])):
+        if path.is_file():
+            stat = path.stat()
+            digest.update(_digest_of_file(path, stat.st_mtime_ns, stat.st_size))
+    return digest.hexdigest()
+
+
+@lru_cache(maxsize=64)
+def _digest_of_file(path: Path, modified: int, size: int) -> bytes:
+    """Return the digest of a file that was modified then."""
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").digest()
+
 
 AT_ONCE = 512
 """Rows that are evaluated together; no result depends on it."""

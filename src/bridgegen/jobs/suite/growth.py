@@ -18,10 +18,17 @@ from bridgegen.engine.options import CommonOptions
 from bridgegen.jobs.search.scenario_files import write_scenario
 from bridgegen.jobs.suite.entries import RESULTS, Entry
 from bridgegen.jobs.suite.evaluate import Job, pipeline_of, rows_of_job
-from bridgegen.jobs.suite.failing import Failing, NotFailing, failing_in
+from bridgegen.jobs.suite.failing import (
+    NO_KEY,
+    Failing,
+    NotFailing,
+    Way,
+    failing_in,
+    seeking_causes,
+    ways,
+)
 from bridgegen.jobs.suite.index import MOST_TEXT, Failure, Index, read_index, write_index
 from bridgegen.jobs.suite.replay import slug
-from bridgegen.jobs.suite.ways import NO_KEY, Way, seeking_causes, ways
 from bridgegen.results.store.run_file import FILE as RUN_FILE
 from bridgegen.scenario.language.criteria import CriterionSection
 from bridgegen.search.triage.modes import Key

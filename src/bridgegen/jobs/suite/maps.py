@@ -10,7 +10,7 @@ import numpy as np
 
 from bridgegen.jobs.preventability.classes import CellClass
 from bridgegen.jobs.preventability.grid import coarse_axes
-from bridgegen.jobs.preventability.picture import COLOURS, data_uri
+from bridgegen.jobs.preventability.page import COLOURS, data_uri
 from bridgegen.jobs.preventability.preventability import MapCallbacks, digest_of, map_preventability
 from bridgegen.jobs.preventability.result import PreventabilityMap
 from bridgegen.jobs.search.scenarios import driven_by, load

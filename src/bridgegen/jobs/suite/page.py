@@ -10,13 +10,13 @@ from bridgegen.base.errors import BridgeGenError
 from bridgegen.engine.options import CommonOptions
 from bridgegen.engine.options.option import options_of
 from bridgegen.jobs.preventability.result import PreventabilityMap
+from bridgegen.jobs.suite.difference import WorseThan
 from bridgegen.jobs.suite.evaluate import Job, pipeline_of, rows_of_job
 from bridgegen.jobs.suite.maps import picture_payload
 from bridgegen.jobs.suite.page_payload import Key, key_of, payload
 from bridgegen.jobs.suite.replay import Replayed, replay_command
 from bridgegen.jobs.suite.results import EntryResult, rank
 from bridgegen.jobs.suite.suite import SuiteRun
-from bridgegen.jobs.suite.worse import WorseThan
 from bridgegen.pages.page import code_of, page_of
 from bridgegen.pages.payload import script_json
 from bridgegen.pages.playback import Playback

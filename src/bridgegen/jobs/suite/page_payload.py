@@ -7,13 +7,14 @@ from typing import Any
 
 from bridgegen.base.physics import HARD_BRAKING
 from bridgegen.jobs.suite.clauses import clause_results
+from bridgegen.jobs.suite.difference import WorseThan
 from bridgegen.jobs.suite.difference import difference as variations_compared
 from bridgegen.jobs.suite.known_failures import EXCUSED, words
-from bridgegen.jobs.suite.rating import colours_of
 from bridgegen.jobs.suite.results import EntryResult, Outcome, Verdict, rank
 from bridgegen.jobs.suite.sentences import (
     changes,
     clause_in_words,
+    colours_of,
     difference,
     differences,
     headline,
@@ -22,7 +23,6 @@ from bridgegen.jobs.suite.sentences import (
     points,
 )
 from bridgegen.jobs.suite.suite import SuiteRun
-from bridgegen.jobs.suite.worse import WorseThan
 from bridgegen.pages.packed import OF_ROW, deflated, road_key
 from bridgegen.pages.payload import script_json
 from bridgegen.pages.playback import Playback

@@ -118,7 +118,7 @@ class RowResult(Strict):
 
 
 class GridResult(Strict):
-    """A grid of a matrix that an entry runs; see `bridgegen.scenario.language.matrix.Grid`.
+    """A grid of a matrix that an entry runs; see `bridgegen.scenario.language.protocols.Grid`.
 
     Attributes:
         label: the text of the column ``matrix`` in its rows.
@@ -152,7 +152,7 @@ class EntryResult(Strict):
         criteria: as `bridgegen.scenario.language.criteria.Criterion.to_dict` gives them.
         grids: of the matrix that it runs, if it has one.
         sampled: whether its rows are some of very many, drawn evenly or at random.
-        clauses: as `bridgegen.scenario.language.clauses.Clause.to_dict` gives them.
+        clauses: as `bridgegen.scenario.language.protocols.Clause.to_dict` gives them.
         rows: of each variation; empty if the entry cannot run.
         problem: why it cannot; empty if it can.
         notes: what runs otherwise than one may expect.

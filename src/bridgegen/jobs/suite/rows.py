@@ -14,8 +14,8 @@ from bridgegen.openx.openscenario import distributions as dst
 from bridgegen.openx.openscenario.ranges import FileParameter
 from bridgegen.scenario.language.distributions import Discrete
 from bridgegen.scenario.language.kinds import INTEGER
-from bridgegen.scenario.language.matrix import Grid
 from bridgegen.scenario.language.parameters import Parameter
+from bridgegen.scenario.language.protocols import Grid
 from bridgegen.scenario.language.scenario import LogicalScenario, SearchedScenario
 from bridgegen.scenario.language.space import SearchSpace
 

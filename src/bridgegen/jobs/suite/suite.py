@@ -16,17 +16,17 @@ from bridgegen.base.disk import write_whole
 from bridgegen.base.errors import InputError, Interrupted, StorageError
 from bridgegen.base.records import parse_json
 from bridgegen.engine.options import CommonOptions, called_with
-from bridgegen.engine.workers.process import cores
+from bridgegen.engine.workers.processes import cores
 from bridgegen.engine.workers.tasks import TaskPool
-from bridgegen.jobs.search.chosen import PAPER
+from bridgegen.jobs.search.scenarios import PAPER
 from bridgegen.jobs.suite.entries import RESULTS as FILE
 from bridgegen.jobs.suite.entries import find_entries, of_edition
 from bridgegen.jobs.suite.evaluate import Job, evaluate
 from bridgegen.jobs.suite.known_failures import KnownFailures
 from bridgegen.jobs.suite.results import EntryResult, Header
 from bridgegen.results.store.sqlite import Lock
-from bridgegen.scenario.language.clauses import read_clause
 from bridgegen.scenario.language.criteria import read_criterion
+from bridgegen.scenario.language.protocols import read_clause
 from bridgegen.simulation import vehicles
 from bridgegen.simulation.choice import EMBEDDED, SimulatorChoice
 

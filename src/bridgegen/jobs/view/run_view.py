@@ -12,11 +12,10 @@ from bridgegen.jobs.search.report import minimal_files, run_data
 from bridgegen.jobs.search.restored import pipeline_of
 from bridgegen.jobs.search.run import Run
 from bridgegen.pages.data import WHOLE
-from bridgegen.pages.motion import motion_payload
+from bridgegen.pages.further import motion_payload
 from bridgegen.pages.page import report_page
 from bridgegen.pages.payload import news
-from bridgegen.results.confirmation.record import file_name, read_records
-from bridgegen.results.confirmation.schema import Record
+from bridgegen.results.confirmation.record import Record, file_name, read_records
 from bridgegen.results.store import Recorded, Store
 from bridgegen.search.regions.record import JSON_FILE
 from bridgegen.search.triage.record import JSON_FILE as TRIAGE_FILE

@@ -9,8 +9,7 @@ from pathlib import Path
 from typing import Annotated
 
 from bridgegen.base.errors import FileFormatError, InputError, UnsupportedError
-from bridgegen.openx.openscenario.catalog_files import ParameterAssignment
-from bridgegen.openx.openscenario.declarations import File, FileHeader
+from bridgegen.openx.openscenario.declarations import File, FileHeader, ParameterAssignment
 from bridgegen.openx.openscenario.element import AtLeast, Element, Tag
 from bridgegen.openx.openscenario.read import DISTRIBUTION
 from bridgegen.openx.openscenario.reader import element_of

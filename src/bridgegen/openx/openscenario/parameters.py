@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from bridgegen.base.errors import FileFormatError
-from bridgegen.openx.openscenario import expression_types
+from bridgegen.openx.openscenario import values as expression_types
 from bridgegen.openx.openscenario.conditions import Condition
 from bridgegen.openx.openscenario.declarations import ParameterDeclaration, ValueConstraint
 from bridgegen.openx.openscenario.element import (

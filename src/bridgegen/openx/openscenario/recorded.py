@@ -16,7 +16,7 @@ import numpy.typing as npt
 from bridgegen.base.arrays import Bool, Float
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.element import walk
-from bridgegen.openx.openscenario.versions import at, at_once
+from bridgegen.openx.openscenario.write import at, at_once
 
 _TURNING = "plineInterpolation"
 

@@ -4,8 +4,8 @@ import numpy as np
 
 from bridgegen.recordings.events.changes import LaneChanges
 from bridgegen.recordings.events.event import OVERLAP, Events, events_of
-from bridgegen.recordings.events.runs import least_of, mean_of, runs_of
 from bridgegen.recordings.events.scene import Scene
+from bridgegen.recordings.events.steps import least_of, mean_of, runs_of
 
 LONGEST_HEADWAY = 4.0
 """[s]."""

@@ -9,9 +9,8 @@ import numpy as np
 from bridgegen.assess.metrics.pet import pet
 from bridgegen.base.arrays import Bool
 from bridgegen.recordings.events.event import NOT_WHOLE, Events, events_of
-from bridgegen.recordings.events.pace import pace_changes
+from bridgegen.recordings.events.pace import apart, pace_changes, set_off_instants
 from bridgegen.recordings.events.scene import Scene
-from bridgegen.recordings.events.setting_off import apart, set_off_instants
 from bridgegen.recordings.excerpt import excerpt
 from bridgegen.recordings.readers.table import wrap
 from bridgegen.scenario.language.event_kinds import EVENT_KINDS

@@ -7,8 +7,7 @@ import numpy as np
 
 from bridgegen.recordings.events.changes import LaneChanges
 from bridgegen.recordings.events.event import NO_CHANGE, Events
-from bridgegen.recordings.events.joins import Join, path_joins
-from bridgegen.recordings.events.lane_joins import lane_joins
+from bridgegen.recordings.events.joins import Join, lane_joins, path_joins
 from bridgegen.recordings.events.meetings import (
     Meeting,
     crossing_speed,

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from bridgegen.recordings.events.event import ABSENT
+from bridgegen.recordings.events.pace import STANDS_TIME, apart, stands
 from bridgegen.recordings.events.scene import Scene
-from bridgegen.recordings.events.setting_off import STANDS_TIME, apart, stands
 from bridgegen.recordings.lanes.placing import WALKS
 
 FARTHEST = 50.0

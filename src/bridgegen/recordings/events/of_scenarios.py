@@ -11,7 +11,7 @@ from bridgegen.base.arrays import Bool, Float
 from bridgegen.base.errors import InputError
 from bridgegen.recordings.events.event import NOT_WHOLE
 from bridgegen.recordings.events.find import FoundEvents, named
-from bridgegen.scenario.exposure.rates import Encounters
+from bridgegen.scenario.exposure.exposure import Encounters
 from bridgegen.scenario.language.kinds import slack
 from bridgegen.scenario.language.plain_yaml import Document
 from bridgegen.scenario.language.reader import build, document_of, names, pack_names, shipped_text

@@ -12,8 +12,8 @@ from bridgegen.recordings.events.event import ABSENT, Events
 from bridgegen.recordings.events.find import FoundEvents
 from bridgegen.recordings.excerpt import Clock, excerpt
 from bridgegen.recordings.readers.table import RecordedTraffic
-from bridgegen.recordings.replays.picture import moving_picture
 from bridgegen.recordings.replays.scenario import others_near
+from bridgegen.recordings.replays.write import moving_picture
 from bridgegen.scenario.language.event_kinds import EVENT_KINDS
 from bridgegen.simulation.rollout import Rollout
 

@@ -10,8 +10,8 @@ from bridgegen.assess.metrics.motion import motion
 from bridgegen.base.arrays import Float, Int
 from bridgegen.recordings.events.event import ABSENT
 from bridgegen.recordings.events.meetings import Meeting
+from bridgegen.recordings.events.pace import stands
 from bridgegen.recordings.events.scene import Scene
-from bridgegen.recordings.events.setting_off import stands
 from bridgegen.recordings.excerpt import excerpt
 from bridgegen.recordings.lanes.placing import WALKS
 

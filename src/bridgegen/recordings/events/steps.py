@@ -10,6 +10,7 @@ from typing import Literal
 import numpy as np
 
 from bridgegen.base.arrays import Bool, Float, Int
+from bridgegen.recordings.events.scene import Scene
 
 SPAN = 20.0
 """Longest window [s]."""
@@ -134,3 +135,34 @@ def _shape(t: Float, begin: Float, duration: Float, shape: Shape) -> tuple[Float
     if shape == "cosine":
         return phase, 0.5 * (1.0 - np.cos(np.pi * phase)), 0.5 * np.pi * np.sin(np.pi * phase)
     return phase, phase, ((raw > 0.0) & (raw < 1.0)).astype(np.float64)
+
+
+# --- Runs of states in which something holds, and the ego keeps its leader ---
+
+
+def runs_of(scene: Scene, holds: Bool, least: int) -> tuple[Int, Int]:
+    """Return the first and the last state of each run.
+
+    Args:
+        scene: the recording.
+        holds: ``(S,)``.
+        least: how many time steps a run must last.
+    """
+    edge = np.ones(len(holds) + 1, np.bool_)
+    edge[1:-1] = (holds[1:] != holds[:-1]) | (scene.led_since[1:] != scene.led_since[:-1])
+    bounds = np.flatnonzero(edge)
+    first, last = bounds[:-1], bounds[1:] - 1
+    kept = holds[first] & (last - first >= least)
+    return first[kept], last[kept]
+
+
+def least_of(values: Float, first: Int, last: Int) -> Float:
+    """Return the least value of each run, ``(N,)``."""
+    found = [values[a : b + 1].min() for a, b in zip(first.tolist(), last.tolist(), strict=True)]
+    return np.array(found, np.float64)
+
+
+def mean_of(values: Float, first: Int, last: Int) -> Float:
+    """Return the mean value of each run, ``(N,)``."""
+    found = [values[a : b + 1].mean() for a, b in zip(first.tolist(), last.tolist(), strict=True)]
+    return np.array(found, np.float64)

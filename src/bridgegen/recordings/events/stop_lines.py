@@ -8,7 +8,7 @@ from scipy.spatial import KDTree
 
 from bridgegen.base.arrays import Bool, Float
 from bridgegen.recordings.events.paths import Paths
-from bridgegen.recordings.readers.lights import RecordedLight
+from bridgegen.recordings.readers.table import RecordedLight
 
 BESIDE = 1.75
 """Of a lane's middle, within which a vehicle's front passes the stop line [m]."""

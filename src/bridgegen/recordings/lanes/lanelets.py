@@ -8,7 +8,7 @@ import numpy as np
 from bridgegen.base.arrays import Float
 from bridgegen.base.errors import FileFormatError
 from bridgegen.recordings.lanes.model import NONE, STEP, Kind, RecordedLanes, Strip, along, assemble
-from bridgegen.recordings.readers.lanelets import Lanelet
+from bridgegen.recordings.readers.table import Lanelet
 
 KINDS: dict[str, Kind] = {"bicycleLane": "bicycle", "sidewalk": "sidewalk"}
 PASSED_OVER = frozenset(("crosswalk", "border", "parking", "restricted", "shoulder"))

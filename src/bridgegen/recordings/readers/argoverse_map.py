@@ -12,8 +12,7 @@ import numpy as np
 from bridgegen.base.arrays import Float
 from bridgegen.base.errors import FileFormatError
 from bridgegen.openx.xml import read_bytes
-from bridgegen.recordings.readers.lanelets import Lanelet
-from bridgegen.recordings.readers.table import FARTHEST
+from bridgegen.recordings.readers.table import FARTHEST, Lanelet
 
 KINDS = {"BIKE": ("bicycleLane",)}
 MOST_BYTES = 256 * 2**20

@@ -14,7 +14,6 @@ from scipy.spatial import cKDTree
 
 from bridgegen.base.arrays import Float
 from bridgegen.base.errors import FileFormatError
-from bridgegen.recordings.readers.lanelets import Lanelet
 from bridgegen.recordings.readers.road_lines import (
     NEIGHBOURS,
     PARALLEL,
@@ -26,7 +25,7 @@ from bridgegen.recordings.readers.road_lines import (
     cuts_of,
     half_widths,
 )
-from bridgegen.recordings.readers.table import FARTHEST
+from bridgegen.recordings.readers.table import FARTHEST, Lanelet
 
 JOINED = 1.0
 """How far a centre line may begin from where another one ends, to follow it [m]."""

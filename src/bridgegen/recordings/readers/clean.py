@@ -10,9 +10,10 @@ import numpy.typing as npt
 from bridgegen.base.arrays import Bool, Float, Int
 from bridgegen.base.errors import FileFormatError, InputError
 from bridgegen.drivers.kinds import BICYCLE, CAR, MOTORCYCLE, PEDESTRIAN, TRUCK
-from bridgegen.recordings.readers import cuts, plausibility, smoothing
-from bridgegen.recordings.readers.bodies import usual_box
-from bridgegen.recordings.readers.motion import headings, velocities
+from bridgegen.recordings.readers import quality as plausibility
+from bridgegen.recordings.readers import smoothing
+from bridgegen.recordings.readers import smoothing as cuts
+from bridgegen.recordings.readers.motion import headings, usual_box, velocities
 from bridgegen.recordings.readers.quality import Quality, Rule
 from bridgegen.recordings.readers.table import UNKNOWN_KIND, RecordedTraffic, kind_in_words, wrap
 

@@ -17,8 +17,14 @@ from bridgegen.base.errors import FileFormatError
 from bridgegen.drivers.kinds import BICYCLE, BUS, CAR, MOTORCYCLE, OTHER, PEDESTRIAN, TRUCK
 from bridgegen.openx.xml import parse_xml
 from bridgegen.recordings.readers.format import Format, Head
-from bridgegen.recordings.readers.lanelets import Lanelet
-from bridgegen.recordings.readers.table import FARTHEST, UNKNOWN_KIND, Facts, RecordedTraffic, build
+from bridgegen.recordings.readers.table import (
+    FARTHEST,
+    UNKNOWN_KIND,
+    Facts,
+    Lanelet,
+    RecordedTraffic,
+    build,
+)
 
 KINDS = {
     "car": CAR, "taxi": CAR, "parkedVehicle": CAR, "priorityVehicle": CAR, "truck": TRUCK,

@@ -18,14 +18,18 @@ import numpy.typing as npt
 from bridgegen.base.arrays import Float, Int
 from bridgegen.base.errors import FileFormatError
 from bridgegen.drivers.kinds import BICYCLE, BUS, CAR, MOTORCYCLE, PEDESTRIAN, TRUCK
-from bridgegen.recordings.readers.bodies import centre_ahead
 from bridgegen.recordings.readers.columns import Columns, read_columns, whole_numbers
 from bridgegen.recordings.readers.format import Format, Head, read_head
-from bridgegen.recordings.readers.lanelets import Lanelet
-from bridgegen.recordings.readers.motion import SHORTEST_ARM, STANDING, headings_of_centres
+from bridgegen.recordings.readers.motion import (
+    SHORTEST_ARM,
+    STANDING,
+    centre_ahead,
+    headings_of_centres,
+)
 from bridgegen.recordings.readers.table import (
     UNKNOWN_KIND,
     Facts,
+    Lanelet,
     RecordedTraffic,
     build,
     line_of_table,

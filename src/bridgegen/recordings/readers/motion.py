@@ -6,8 +6,10 @@ from typing import Literal
 import numpy as np
 
 from bridgegen.base.arrays import Float, Int
+from bridgegen.drivers.kinds import NAMES
 from bridgegen.recordings.readers._motion_kernels import following_headings
 from bridgegen.recordings.readers.table import wrap
+from bridgegen.scenario.participants import PARTICIPANTS, ParticipantKind
 
 STANDING = 0.5
 """Speed [m/s] below which a body's motion says nothing of its heading."""
@@ -76,3 +78,32 @@ def headings_of_centres(
     way = np.hypot(mean_x, mean_y) * np.maximum(np.diff(time, prepend=time[0]), 0.0)
     found: Float = following_headings(np.arctan2(mean_y, mean_x), way, first, arm, begin)
     return wrap(found)
+
+
+# --- The usual body of each kind, for what recordings do not say ---
+
+
+_USUAL = {
+    name: next(one for one in PARTICIPANTS.values() if one.seen_as.name == name) for name in NAMES
+}
+"""The first participant of each class, which is the one that gave the class its name."""
+
+
+def usual(kind: int) -> ParticipantKind:
+    """Return the participant that a kind of `bridgegen.drivers.kinds` usually is."""
+    return _USUAL[NAMES[kind]]
+
+
+def usual_box(kind: int) -> tuple[float, float]:
+    """Return length and width [m] of a kind of `bridgegen.drivers.kinds`."""
+    body = usual(kind).body
+    return body.length, body.width
+
+
+def centre_ahead(kind: int, length: float) -> float:
+    """Return how far a body's centre is ahead of its rear axle [m]; 0 for what has no axles.
+
+    It is the same share of the length as of the usual body.
+    """
+    body = usual(kind).body
+    return body.center_ahead / body.length * length

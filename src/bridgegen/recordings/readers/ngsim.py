@@ -17,10 +17,9 @@ import numpy as np
 
 from bridgegen.base.arrays import Float, Int
 from bridgegen.drivers.kinds import CAR, MOTORCYCLE, TRUCK
-from bridgegen.recordings.readers.bodies import centre_ahead
 from bridgegen.recordings.readers.columns import read_columns, whole_numbers
 from bridgegen.recordings.readers.format import Format, Head
-from bridgegen.recordings.readers.motion import SHORTEST_ARM, headings_behind
+from bridgegen.recordings.readers.motion import SHORTEST_ARM, centre_ahead, headings_behind
 from bridgegen.recordings.readers.smoothing import NOISE, scatter, smooth
 from bridgegen.recordings.readers.table import (
     NO_LANE,

@@ -17,14 +17,15 @@ import numpy.typing as npt
 from bridgegen.base.errors import FileFormatError
 from bridgegen.drivers.kinds import BICYCLE, CAR, MOTORCYCLE, OTHER, PEDESTRIAN
 from bridgegen.recordings.readers.format import Format, Head
-from bridgegen.recordings.readers.lights import RecordedLight, changes_of
 from bridgegen.recordings.readers.pickles import PickledArray, read_pickle
 from bridgegen.recordings.readers.scenarionet_map import lanelets_of
 from bridgegen.recordings.readers.table import (
     UNKNOWN_KIND,
     Facts,
+    RecordedLight,
     RecordedTraffic,
     build,
+    changes_of,
     median_step,
 )
 

@@ -10,9 +10,9 @@ import numpy as np
 from bridgegen.base.arrays import Float
 from bridgegen.base.errors import FileFormatError
 from bridgegen.recordings.readers.centre_lines import lanelets_of_centre_lines
-from bridgegen.recordings.readers.lanelets import Lanelet
 from bridgegen.recordings.readers.pickles import PickledArray
 from bridgegen.recordings.readers.road_lines import CentreLine
+from bridgegen.recordings.readers.table import Lanelet
 
 KINDS = {"LANE_BIKE_LANE": ("bicycleLane",)}
 

@@ -8,8 +8,8 @@ import numpy as np
 
 from bridgegen.recordings.readers.format import Format, Head
 from bridgegen.recordings.readers.table import Facts, RecordedTraffic, build, median_step
+from bridgegen.simulation.recording import read_tracks
 from bridgegen.simulation.trace import COLUMNS
-from bridgegen.simulation.tracks import read_tracks
 
 
 def _recognises(head: Head) -> bool:

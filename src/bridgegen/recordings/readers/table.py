@@ -16,8 +16,84 @@ import numpy.typing as npt
 from bridgegen.base.arrays import Float, Int
 from bridgegen.base.errors import FileFormatError
 from bridgegen.drivers.kinds import NAMES
-from bridgegen.recordings.readers.lanelets import Lanelet
-from bridgegen.recordings.readers.lights import RecordedLight
+
+# --- Traffic lights that come with a recording, as it describes them ---
+
+
+RED = "red"
+
+
+@dataclass(frozen=True, eq=False)
+class RecordedLight:
+    """A traffic light of one lane.
+
+    Attributes:
+        changes: the instants [s] and from then on its state: "red", "yellow", "green", "red and
+            yellow", "flashing red", "flashing yellow", "off" or "unknown".
+        lane: name of the lane that it governs; "" if unknown.
+        path: ``(n, 2)`` of that lane's centre line from the stop line on, in the direction of
+            travel [m]: two points at least, the first of them on the stop line; ``(0, 2)`` if
+            unknown.
+    """
+
+    changes: tuple[tuple[float, str], ...]
+    lane: str = ""
+    path: Float = field(default_factory=lambda: np.zeros((0, 2)))
+
+    def red_since(self, time: float) -> float:
+        """Return since when it has been red at an instant [s]; NaN if it is not."""
+        since, is_red = np.nan, False
+        for at, state in self.changes:
+            if at > time:
+                break
+            if state == RED and not is_red:
+                since = at
+            is_red = state == RED
+        return since if is_red else np.nan
+
+    def is_seen_to_turn_red(self, since: float) -> bool:
+        """Return whether it had another state before an instant."""
+        return bool(self.changes and self.changes[0][0] < since)
+
+
+def changes_of(times: Sequence[float], states: Sequence[str]) -> tuple[tuple[float, str], ...]:
+    """Return the changes of a light whose state is known at some instants [s]."""
+    return tuple(
+        (float(time), state)
+        for k, (time, state) in enumerate(zip(times, states, strict=False))
+        if k == 0 or state != states[k - 1]
+    )
+
+
+# --- Lanes that come with a recording, as it describes them ---
+
+
+@dataclass(frozen=True, eq=False)
+class Lanelet:
+    """A piece of a lane between two bounds, which run in the direction of travel.
+
+    Attributes:
+        name: the recording's own.
+        left: ``(n, 2)`` of the left bound [m].
+        right: ``(m, 2)`` of the right bound [m].
+        left_same: name of the neighbour to the left in the same direction; "" for none.
+        right_same: to the right.
+        left_opposite: to the left in the other direction.
+        successors: names of those that it leads to.
+        kinds: what it is for, in the recording's words.
+        is_marked: it lies between painted markings that the recording gives, and has its name.
+    """
+
+    name: str
+    left: Float
+    right: Float
+    left_same: str = ""
+    right_same: str = ""
+    left_opposite: str = ""
+    successors: tuple[str, ...] = ()
+    kinds: tuple[str, ...] = ()
+    is_marked: bool = False
+
 
 MOST_STATES = 40_000_000
 MOST_PARTICIPANTS = 1_000_000

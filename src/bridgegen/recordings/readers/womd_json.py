@@ -20,9 +20,8 @@ from bridgegen.drivers.kinds import BICYCLE, CAR, PEDESTRIAN
 from bridgegen.openx.xml import read_bytes
 from bridgegen.recordings.readers.centre_lines import lanelets_of_centre_lines
 from bridgegen.recordings.readers.format import Format, Head
-from bridgegen.recordings.readers.lanelets import Lanelet
 from bridgegen.recordings.readers.road_lines import CentreLine
-from bridgegen.recordings.readers.table import UNKNOWN_KIND, Facts, RecordedTraffic, build
+from bridgegen.recordings.readers.table import UNKNOWN_KIND, Facts, Lanelet, RecordedTraffic, build
 
 TIME_STEP = 0.1
 """Of the Waymo Open Motion Dataset [s]; the file does not repeat it."""

@@ -20,9 +20,8 @@ from bridgegen.base.units import has_unit, in_unit
 from bridgegen.recordings.events.of_scenarios import ScenarioEvents, Sought, broken_by
 from bridgegen.recordings.events.tables import broken_in_words
 from bridgegen.recordings.scenarios.ranges import Range, around
-from bridgegen.scenario.language.edited import replaced, scalars
 from bridgegen.scenario.language.parameters import Parameter
-from bridgegen.scenario.language.plain_yaml import read_plain_yaml
+from bridgegen.scenario.language.plain_yaml import read_plain_yaml, replaced, scalars
 from bridgegen.scenario.language.reader import build
 
 ENDING = ".diff"

@@ -6,7 +6,7 @@ from statistics import median
 from typing import Any
 
 from bridgegen.base.statistics import wilson
-from bridgegen.results.confirmation.schema import Scenario
+from bridgegen.results.confirmation.record import Scenario
 
 
 @dataclass(frozen=True)

@@ -15,8 +15,7 @@ from bridgegen.assess.cause import Cause
 from bridgegen.base.arrays import Float, Int
 from bridgegen.base.errors import InputError, StorageError
 from bridgegen.base.extras import require
-from bridgegen.results.store.checkpoint import Checkpoint, read_checkpoint, write_checkpoint
-from bridgegen.results.store.rows import Evaluated, Rows, quoted
+from bridgegen.results.store.rows import FAILURES, Evaluated, Rows, quoted
 from bridgegen.results.store.run_file import (
     FILE,
     LOCK,
@@ -28,8 +27,15 @@ from bridgegen.results.store.run_file import (
     require_there,
     write_run,
 )
-from bridgegen.results.store.schema import FAILURES
-from bridgegen.results.store.sqlite import Lock, connect, storage_errors, transaction
+from bridgegen.results.store.sqlite import (
+    Checkpoint,
+    Lock,
+    connect,
+    read_checkpoint,
+    storage_errors,
+    transaction,
+    write_checkpoint,
+)
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -4,8 +4,7 @@
 estimators of risk sample: rows, their density, and the transform to standard normal space.
 """
 
-from bridgegen.scenario.exposure.exposure import Exposure, FeasibleShare, Sample
-from bridgegen.scenario.exposure.rates import Encounters, Rate
+from bridgegen.scenario.exposure.exposure import Encounters, Exposure, FeasibleShare, Rate, Sample
 from bridgegen.scenario.exposure.reader import example_names, exposure_of, read_exposure
 
 __all__ = [

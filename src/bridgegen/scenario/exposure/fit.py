@@ -26,9 +26,8 @@ from bridgegen.scenario.exposure.dependence import GaussianCopula
 from bridgegen.scenario.exposure.exposure import Exposure
 from bridgegen.scenario.exposure.forms import Naming, build_marginal
 from bridgegen.scenario.exposure.marginals import Conditional, Form, Marginal
-from bridgegen.scenario.exposure.reader import build_exposure
+from bridgegen.scenario.exposure.reader import build_exposure, exposure_text
 from bridgegen.scenario.exposure.tables import cell_reader, read_header, read_table
-from bridgegen.scenario.exposure.text import exposure_text
 from bridgegen.scenario.language.exposure_schema import MarginalSection
 from bridgegen.scenario.language.parameters import Parameter, nearest
 from bridgegen.scenario.language.plain_yaml import read_plain_yaml

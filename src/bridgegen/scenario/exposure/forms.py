@@ -9,8 +9,8 @@ import numpy as np
 
 from bridgegen.base.errors import InputError
 from bridgegen.base.units import has_unit, in_unit
+from bridgegen.scenario.exposure.candidates import estimate
 from bridgegen.scenario.exposure.families import FAMILIES, Beta, Pareto
-from bridgegen.scenario.exposure.kernels import estimate
 from bridgegen.scenario.exposure.marginals import (
     Clipped,
     Conditional,

@@ -12,8 +12,8 @@ import numpy as np
 
 from bridgegen.base.arrays import Float
 from bridgegen.base.disk import refuse_other, write_whole
+from bridgegen.scenario.exposure.exposure import Rate
 from bridgegen.scenario.exposure.fit import Fit, ParameterFit
-from bridgegen.scenario.exposure.rates import Rate
 
 GENERATOR = "BridgeGen fit"
 _WIDTH, _HEIGHT, _LEFT, _BOTTOM, _TOP = 560, 373, 14, 40, 12

@@ -1,22 +1,29 @@
 """From an exposure's block, in a scenario file or a file of its own, to the exposure."""
 
+import json
+from collections.abc import Mapping
 from importlib import resources
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+import yaml
 
-from bridgegen.base.errors import InputError, ScenarioError, UnknownNameError
+from bridgegen.base.arrays import Float
+from bridgegen.base.disk import write_whole
+from bridgegen.base.errors import InputError, ScenarioError, StorageError, UnknownNameError
 from bridgegen.scenario.exposure.dependence import GaussianCopula
-from bridgegen.scenario.exposure.exposure import Exposure
+from bridgegen.scenario.exposure.exposure import Encounters, Exposure
 from bridgegen.scenario.exposure.forms import Naming, build_marginal
-from bridgegen.scenario.exposure.marginals import Conditional, Marginal
-from bridgegen.scenario.exposure.rates import Encounters
+from bridgegen.scenario.exposure.marginals import Conditional, Marginal, Shared
+from bridgegen.scenario.language.distributions import Discrete
 from bridgegen.scenario.language.exposure_schema import ExposureFile, ExposureSection, FormSection
 from bridgegen.scenario.language.parameters import nearest
 from bridgegen.scenario.language.plain_yaml import Document, read_plain_yaml
 from bridgegen.scenario.language.reader import load, names, pack_names, read_document
 from bridgegen.scenario.language.scenario import LogicalScenario, SearchedScenario
 from bridgegen.scenario.language.shape import section, shape_problems
+from bridgegen.scenario.language.space import SearchSpace
 
 _EXAMPLES = "bridgegen.scenario.exposure.examples"
 _EVENLY = FormSection(distribution="uniform")
@@ -214,3 +221,127 @@ def _copula(
             place = document.at(("dependence",))
             problems += [f"{text} ({place})" for text in error.problems]
     return GaussianCopula.independent(names_)
+
+
+# --- Which exposure a command takes: the one that is named, or the scenario's own ---
+
+
+UNIFORM = "uniform"
+"""Names the exposure in which each parameter is uniform over its range: no road is like that."""
+ROWS = 200_000
+"""Of an exposure, always the same ones, that show how likely parts of a search space are."""
+
+_EVENLY_CHOSEN = b"source: Uniform over the ranges, which no road is like.\nothers: uniform\n"
+
+
+def chosen_exposure(
+    scenario: SearchedScenario, given: str | Path | Exposure | None
+) -> Exposure | None:
+    """Return the exposure that was asked for; None where none was, and the scenario has none.
+
+    Args:
+        scenario: of which.
+        given: a file, the name of an example, `UNIFORM`, or the exposure itself; by default that of
+            the scenario's file.
+
+    Raises:
+        FileFormatError: a file cannot be read.
+        UnknownNameError: no such example.
+        ScenarioError: it breaks a rule.
+        InputError: it is that of another scenario, or contradicts the scenario's constraints.
+    """
+    if isinstance(given, Exposure):
+        if given.scenario.name != scenario.name:
+            raise InputError(
+                f"the exposure must be that of {scenario.name}, got one of {given.scenario.name}"
+            )
+        return given
+    if given == UNIFORM:
+        return build_exposure(read_plain_yaml(_EVENLY_CHOSEN, UNIFORM), scenario, None)
+    if given is not None:
+        return read_exposure(given, scenario)
+    return exposure_of(scenario) if isinstance(scenario, LogicalScenario) else None
+
+
+def evenly(exposure: Exposure) -> Exposure:
+    """Return the exposure that distributes the same parameters, each uniformly over its range.
+
+    One that takes single values of its range takes each of them equally often.
+    """
+    even = {name: _even(one) for name, one in exposure.marginals.items()}
+    node = {"source": "Uniform over the ranges.", "others": "default", "parameters": even}
+    text = json.dumps(node).encode()
+    return build_exposure(read_plain_yaml(text, UNIFORM), exposure.scenario, None)
+
+
+def _even(marginal: Marginal | Conditional) -> dict[str, object]:
+    if isinstance(marginal, Shared) and isinstance(marginal.distribution, Discrete):
+        return {"distribution": "discrete", "values": list(marginal.distribution.values)}
+    return {"distribution": "uniform"}
+
+
+def rows_on_the_road(exposure: Exposure, space: SearchSpace, n: int = ROWS) -> Float:
+    """Return rows of an exposure in the columns of a search space of its scenario.
+
+    A parameter that the exposure does not distribute stands at its default.
+
+    Args:
+        exposure: of the space's scenario.
+        space: it may search other parameters than the exposure distributes.
+        n: how many.
+
+    Returns:
+        ``(n, len(space.names))``, always the same rows.
+
+    Raises:
+        InputError: the exposure contradicts the constraints.
+    """
+    X = exposure.sample(n, 0).X
+    rows = np.empty((n, len(space.names)))
+    for column, name in enumerate(space.names):
+        if name in exposure.space.names:
+            rows[:, column] = X[:, exposure.space.index(name)]
+        else:
+            rows[:, column] = space.parameters[name].default
+    return rows
+
+
+# --- An exposure's file as text, and where one is written ---
+
+
+_HEAD = "# Fitted by 'bridgegen fit'. A later fit replaces this file."
+
+
+def exposure_text(data: Mapping[str, Any]) -> str:
+    """Return a file's data as YAML; numbers keep all their digits."""
+    body = yaml.safe_dump(
+        dict(data), sort_keys=False, allow_unicode=True, width=100, default_flow_style=None
+    )
+    return f"{_HEAD}\n{body}"
+
+
+def refuse_other_file(path: Path) -> None:
+    """Refuse a place where something else is than an earlier fit.
+
+    Raises:
+        StorageError: there is one, or it cannot be read.
+    """
+    try:
+        with path.open("rb") as file:
+            ours = file.read(len(_HEAD)) == _HEAD.encode()
+    except FileNotFoundError:
+        return
+    except OSError as error:
+        raise StorageError(f"{path}: cannot be written: {error.strerror}") from None
+    if not ours:
+        raise StorageError(f"{path}: exists already, is no fit of ours, and is not overwritten")
+
+
+def write_exposure(path: Path, text: str) -> None:
+    """Write the file of a fit; an earlier one is replaced.
+
+    Raises:
+        StorageError: something else is there, or it cannot be written.
+    """
+    refuse_other_file(path)
+    write_whole(path, [text.encode()])

@@ -8,9 +8,8 @@ from collections.abc import Iterator
 
 from bridgegen.scenario.language.expression import parse
 from bridgegen.scenario.language.parameters import Axis, Derived
-from bridgegen.scenario.language.places import Places
+from bridgegen.scenario.language.places import Places, Quantities
 from bridgegen.scenario.language.plain_yaml import Path, entries
-from bridgegen.scenario.language.quantities import Quantities
 from bridgegen.scenario.language.roads import Quantity, RoadsSpec
 from bridgegen.scenario.language.shape import section
 from bridgegen.scenario.language.story import Jam, Participant, RoadWorks, Waypoint

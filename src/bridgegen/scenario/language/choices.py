@@ -3,8 +3,8 @@
 from collections.abc import Sequence
 
 from bridgegen.scenario.language.parameters import Axis, Parameter, nearest
+from bridgegen.scenario.language.places import Quantities
 from bridgegen.scenario.language.plain_yaml import Path
-from bridgegen.scenario.language.quantities import Quantities
 from bridgegen.scenario.language.story_schema import ParticipantSection
 from bridgegen.scenario.named_models import MODELS, type_of
 from bridgegen.scenario.participants import PARTICIPANTS, TYPES

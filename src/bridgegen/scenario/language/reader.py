@@ -11,12 +11,10 @@ from typing import Any, TypeVar
 from bridgegen.base.errors import FileFormatError, InputError, ScenarioError, UnknownNameError
 from bridgegen.scenario.language.changes import TemporaryChanges, jam_members
 from bridgegen.scenario.language.checks import NEEDED, time_problems, try_out, use_problems
-from bridgegen.scenario.language.clauses import read_clauses_in
 from bridgegen.scenario.language.constraints import problems_of
 from bridgegen.scenario.language.criteria import read_criteria_in, unknown_entities
 from bridgegen.scenario.language.expression import Expression, parse
 from bridgegen.scenario.language.kinds import KEYS, KINDS
-from bridgegen.scenario.language.matrix import read_matrix
 from bridgegen.scenario.language.objectives import HARM, PAPERS, read_objective
 from bridgegen.scenario.language.others import DRIVERS, SCRIPTED, driven
 from bridgegen.scenario.language.parameters import (
@@ -28,12 +26,12 @@ from bridgegen.scenario.language.parameters import (
     nearest,
     read_axes,
 )
+from bridgegen.scenario.language.places import Quantities
 from bridgegen.scenario.language.plain_yaml import MAX_BYTES, Document, entries, read_plain_yaml
-from bridgegen.scenario.language.quantities import Quantities
+from bridgegen.scenario.language.protocols import read_clauses_in, read_matrix
 from bridgegen.scenario.language.recorded import read_recorded
 from bridgegen.scenario.language.roads import KNOBS, RoadsSpec
 from bridgegen.scenario.language.roads_reader import read_roads
-from bridgegen.scenario.language.roads_schema import RoadsSection
 from bridgegen.scenario.language.rules import bounds_between_layers
 from bridgegen.scenario.language.scenario import LogicalScenario, ObjectiveSpec
 from bridgegen.scenario.language.schema import (
@@ -42,6 +40,7 @@ from bridgegen.scenario.language.schema import (
     FragmentFile,
     ObjectiveSection,
     ParameterSection,
+    RoadsSection,
     ScenarioFile,
 )
 from bridgegen.scenario.language.shape import Section, section, shape_problems

@@ -18,7 +18,7 @@ from bridgegen.scenario.language.roads import (
     knob_problems,
     knobs_of,
 )
-from bridgegen.scenario.language.roads_schema import LegSection, RoadsSection
+from bridgegen.scenario.language.schema import LegSection, RoadsSection
 
 LEAST_ANGLE = 45.0
 """Between two legs of a junction [deg]."""

@@ -17,10 +17,9 @@ from bridgegen.scenario.language.story import Adversary, EventSpec, Participant,
 from bridgegen.scenario.language.thresholds import Thresholds
 
 if TYPE_CHECKING:  # the checks of individuals start without pydantic
-    from bridgegen.scenario.language.clauses import Clause
     from bridgegen.scenario.language.criteria import Criterion
-    from bridgegen.scenario.language.matrix import Grid
     from bridgegen.scenario.language.plain_yaml import Document
+    from bridgegen.scenario.language.protocols import Clause, Grid
     from bridgegen.scenario.language.recorded import RecordedSpec
 
 

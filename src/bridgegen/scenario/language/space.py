@@ -9,10 +9,15 @@ import numpy.typing as npt
 
 from bridgegen.base.arrays import Bool, Float, as_float
 from bridgegen.base.errors import ScenarioError, UnknownNameError
-from bridgegen.scenario.language.constraints import Constraints, order, problems_of
+from bridgegen.scenario.language.constraints import (
+    Constraints,
+    Violation,
+    order,
+    problems_of,
+    violations,
+)
 from bridgegen.scenario.language.kinds import slack
 from bridgegen.scenario.language.parameters import Bound, Derived, Parameter, at, nearest, read_axes
-from bridgegen.scenario.language.violations import Violation, violations
 
 # Points at which a new space is tried: all corners of the cube up to _CORNERS, and as many others.
 _CORNERS = 2048

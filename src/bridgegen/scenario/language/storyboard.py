@@ -6,9 +6,8 @@ from dataclasses import replace
 from bridgegen.scenario.language.choices import Choices
 from bridgegen.scenario.language.others import DRIVERS, LOOKING
 from bridgegen.scenario.language.parameters import nearest
-from bridgegen.scenario.language.places import Places
+from bridgegen.scenario.language.places import Places, Quantities
 from bridgegen.scenario.language.plain_yaml import Path, entries
-from bridgegen.scenario.language.quantities import Quantities
 from bridgegen.scenario.language.roads import LETTERS, Quantity, RoadsSpec
 from bridgegen.scenario.language.shape import section
 from bridgegen.scenario.language.story import (

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 import pyoxigraph as ox
 
 from bridgegen.scenario.ontology.graph import as_number
-from bridgegen.scenario.ontology.layers import Members
+from bridgegen.scenario.ontology.structure import Members
 from bridgegen.scenario.ontology.vocabulary import TYPE, Subject, bg, local_name, tbox
 
 NARROW = "\N{NARROW NO-BREAK SPACE}"

@@ -16,9 +16,8 @@ from typing import TYPE_CHECKING
 from bridgegen.scenario.language.expression import Expression
 from bridgegen.scenario.language.kinds import FLOAT, TOLERANCE
 from bridgegen.scenario.language.parameters import Axis, Parameter
-from bridgegen.scenario.ontology.conduct import conduct_rules
+from bridgegen.scenario.ontology.conduct import conduct_rules, placement_rules
 from bridgegen.scenario.ontology.individuals import reason
-from bridgegen.scenario.ontology.placement import placement_rules
 from bridgegen.scenario.ontology.rule import Rule, slack
 from bridgegen.scenario.ontology.sparql import binds, literal, variable
 from bridgegen.scenario.ontology.story import WEATHER

@@ -14,8 +14,7 @@ from pymoo.core.problem import Problem as PymooProblem
 from pymoo.core.termination import NoTermination
 
 from bridgegen.base.arrays import Float
-from bridgegen.search.algorithms.algorithm import Problem, Results
-from bridgegen.search.algorithms.penalty import Penalty
+from bridgegen.search.algorithms.algorithm import Penalty, Problem, Results
 
 Box = tuple[Float, Float]
 """The lowest and the highest value of each parameter."""

@@ -18,7 +18,7 @@ from bridgegen.search.algorithms.algorithm import (
     Value,
     resolve,
 )
-from bridgegen.search.algorithms.space_filling import latin_hypercube
+from bridgegen.search.algorithms.sampling import latin_hypercube
 
 CELLS_AT_MOST = 100_000
 ELITES_KEPT = 1000

@@ -9,6 +9,7 @@ from bridgegen.base.arrays import Bool, Float
 from bridgegen.search.algorithms.algorithm import (
     RESTART_WITHIN,
     Arity,
+    Penalty,
     Problem,
     Results,
     Setting,
@@ -16,8 +17,7 @@ from bridgegen.search.algorithms.algorithm import (
     resolve,
 )
 from bridgegen.search.algorithms.dominance import crowding, non_dominated, thin
-from bridgegen.search.algorithms.penalty import Penalty
-from bridgegen.search.algorithms.space_filling import latin_hypercube
+from bridgegen.search.algorithms.sampling import latin_hypercube
 
 TURNED = -0.001
 """Factor of a particle's velocity at a face of the cube."""

@@ -19,7 +19,7 @@ from bridgegen.search.algorithms.algorithm import (
     resolve,
 )
 from bridgegen.search.algorithms.dominance import non_dominated, thin
-from bridgegen.search.algorithms.space_filling import latin_hypercube
+from bridgegen.search.algorithms.sampling import latin_hypercube
 from bridgegen.search.algorithms.tree import Leaf, fit_leaves
 
 Rounds = Generator[Float, Results, None]

@@ -10,8 +10,8 @@ from bridgegen.base.arrays import Float
 from bridgegen.base.errors import InputError
 from bridgegen.search.algorithms.algorithm import Arity, Problem, Results, Setting, Value, resolve
 from bridgegen.search.algorithms.observation import Reward, step_from
-from bridgegen.search.algorithms.space_filling import latin_hypercube
-from bridgegen.search.rl.saved import Saved
+from bridgegen.search.algorithms.sampling import latin_hypercube
+from bridgegen.search.rl.agent import Saved
 
 
 class PPOAdversary(Saved):

@@ -5,8 +5,7 @@ from importlib import import_module
 from typing import Any
 
 from bridgegen.base.errors import InputError
-from bridgegen.base.plugins import PlugIns
-from bridgegen.base.user_code import class_of, is_own
+from bridgegen.base.plugins import PlugIns, class_of, is_own
 from bridgegen.search.algorithms.algorithm import Algorithm
 
 PARTS = ("name", "description", "source", "settings", "objectives", "ask", "tell")
@@ -15,24 +14,24 @@ PARTS = ("name", "description", "source", "settings", "objectives", "ask", "tell
 ADDED = PlugIns("algorithm", "bridgegen.algorithms")
 
 _PLACES = {
-    "random": "bridgegen.search.algorithms.random:Random",
-    "sobol": "bridgegen.search.algorithms.sobol:Sobol",
-    "grid": "bridgegen.search.algorithms.grid:Grid",
+    "random": "bridgegen.search.algorithms.sampling:Random",
+    "sobol": "bridgegen.search.algorithms.sampling:Sobol",
+    "grid": "bridgegen.search.algorithms.sampling:Grid",
     "pairwise": "bridgegen.search.algorithms.pairwise:Pairwise",
-    "pso": "bridgegen.search.algorithms.pso:PSO",
-    "ga": "bridgegen.search.algorithms.ga:GA",
-    "es": "bridgegen.search.algorithms.es:ES",
+    "pso": "bridgegen.search.algorithms.evolved:PSO",
+    "ga": "bridgegen.search.algorithms.evolved:GA",
+    "es": "bridgegen.search.algorithms.evolved:ES",
     "cma-es": "bridgegen.search.algorithms.cma_es:CMAES",
-    "nsga2": "bridgegen.search.algorithms.nsga2:NSGA2",
-    "spea2": "bridgegen.search.algorithms.spea2:SPEA2",
+    "nsga2": "bridgegen.search.algorithms.evolved:NSGA2",
+    "spea2": "bridgegen.search.algorithms.evolved:SPEA2",
     "mopso": "bridgegen.search.algorithms.mopso:MOPSO",
     "nsga2-dt": "bridgegen.search.algorithms.nsga2_dt:NSGA2DT",
     "map-elites": "bridgegen.search.algorithms.map_elites:MAPElites",
     "turbo": "bridgegen.search.algorithms.turbo:TuRBO",
     "surrogate": "bridgegen.search.algorithms.surrogate:Surrogate",
-    "dqn": "bridgegen.search.algorithms.dqn:DQN",
-    "ddpg": "bridgegen.search.algorithms.ddpg:DDPG",
-    "ppo": "bridgegen.search.algorithms.ppo:PPO",
+    "dqn": "bridgegen.search.algorithms.reinforcement:DQN",
+    "ddpg": "bridgegen.search.algorithms.reinforcement:DDPG",
+    "ppo": "bridgegen.search.algorithms.reinforcement:PPO",
     "ppo-adversary": "bridgegen.search.algorithms.ppo_adversary:PPOAdversary",
 }
 """Where each of ours is."""

@@ -7,9 +7,9 @@ import numpy as np
 
 from bridgegen.base.arrays import Float
 from bridgegen.search.algorithms.algorithm import Arity, Problem, Results, Setting, Value, resolve
-from bridgegen.search.algorithms.space_filling import latin_hypercube, sobol_rows
+from bridgegen.search.algorithms.sampling import latin_hypercube, sobol_rows
+from bridgegen.search.surrogates.gaussian_process import Parameters
 from bridgegen.search.surrogates.known import Known, distances
-from bridgegen.search.surrogates.parameters import Parameters
 from bridgegen.search.surrogates.saved import Saved, packed, unpacked
 from bridgegen.search.surrogates.subset import telling
 

@@ -18,8 +18,7 @@ from bridgegen.base.errors import InputError
 from bridgegen.scenario.language.space import SearchSpace
 from bridgegen.scenario.language.within import draw_within
 from bridgegen.search.algorithms.tree import Leaf, fit_leaves
-from bridgegen.search.regions.box import Box, joined, readable, whole
-from bridgegen.search.regions.evidence import Evidence
+from bridgegen.search.regions.box import Box, Evidence, joined, readable, whole
 
 SAMPLES, MAX_SAMPLES = 300, 100_000
 AT_LEAST = 0.5

@@ -41,10 +41,8 @@ from bridgegen.scenario.ontology.vocabulary import (
     local_name,
     tbox,
 )
-from bridgegen.search.regions.box import Box, whole
-from bridgegen.search.regions.evidence import Evidence
+from bridgegen.search.regions.box import Box, Evidence, sentence, whole
 from bridgegen.search.regions.find import Region
-from bridgegen.search.regions.words import sentence
 
 REGIONS = ONTOLOGY + "/regions"
 

@@ -8,10 +8,8 @@ from bridgegen.base.errors import FileFormatError
 from bridgegen.base.records import parse_json, read_bytes
 from bridgegen.base.statistics import CONFIDENCE
 from bridgegen.scenario.language.space import SearchSpace
-from bridgegen.search.regions.box import Box, whole
-from bridgegen.search.regions.evidence import Evidence
+from bridgegen.search.regions.box import Box, Evidence, rule, sentence, whole
 from bridgegen.search.regions.find import Found, Region
-from bridgegen.search.regions.words import rule, sentence
 
 JSON_FILE = "regions.json"
 """The file name in a run's folder."""

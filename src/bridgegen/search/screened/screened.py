@@ -15,10 +15,16 @@ from bridgegen.search.algorithms.algorithm import (
     Setting,
     TakesNotes,
 )
-from bridgegen.search.screened.agreement import NOTE, Agreement, counts, place_of, rank_correlation
-from bridgegen.search.screened.compared import Compared
+from bridgegen.search.screened.agreement import (
+    NOTE,
+    Agreement,
+    Compared,
+    Pool,
+    counts,
+    place_of,
+    rank_correlation,
+)
 from bridgegen.search.screened.correction import Correction
-from bridgegen.search.screened.pool import Pool
 
 LEAD = 0.25
 """Share of the screen's budget that is spent before the first row is asked for."""

@@ -18,7 +18,6 @@ from bridgegen.engine.evaluation import EVENT
 from bridgegen.engine.pipeline import Pipeline
 from bridgegen.results.store import Recorded, Rows
 from bridgegen.search.triage.bound import UNBIASED, NotCounted, bound, estimate, least_margins
-from bridgegen.search.triage.distinct import COPY, apart, distinct
 from bridgegen.search.triage.effort import FULL, Effort
 from bridgegen.search.triage.influence import influences
 from bridgegen.search.triage.judgement import judgement
@@ -34,8 +33,7 @@ from bridgegen.search.triage.modes import (
     title,
     where,
 )
-from bridgegen.search.triage.moves import searched
-from bridgegen.search.triage.neighbours import NEIGHBOURS, RADIUS, AsIs, neighbourhoods
+from bridgegen.search.triage.neighbours import NEIGHBOURS, RADIUS, AsIs, neighbourhoods, searched
 from bridgegen.search.triage.record import (
     MOST_EXAMPLES,
     MOST_MODES,
@@ -47,7 +45,7 @@ from bridgegen.search.triage.record import (
     Neighbourhood,
     Triage,
 )
-from bridgegen.search.triage.what_happened import of_events, of_results
+from bridgegen.search.triage.what_happened import COPY, apart, distinct, of_events, of_results
 
 _SAMPLE, _FRESH = 18, 19  # streams of random numbers, apart from others of the same seed
 

@@ -8,9 +8,8 @@ import numpy as np
 from bridgegen.base.arrays import Bool, Float, Int
 from bridgegen.base.errors import InputError
 from bridgegen.scenario.language.space import SearchSpace
-from bridgegen.scenario.ontology.courses import rounded
-from bridgegen.simulation.adversary.course import Course
-from bridgegen.simulation.adversary.source import AdversarySource
+from bridgegen.scenario.ontology.builder import rounded
+from bridgegen.simulation.adversary.source import AdversarySource, Course
 from bridgegen.simulation.embedded.places.network import Network
 from bridgegen.simulation.embedded.simulator import EmbeddedSimulator
 

@@ -24,7 +24,7 @@ from bridgegen.drivers.drivers import STAGES, STORYBOARD
 from bridgegen.drivers.interface import CONFLICT_WAYS, HISTORY, NEAR_PIECES, ROUTE_POINTS, RoadMap
 from bridgegen.drivers.lane_tables import STRAYS
 from bridgegen.drivers.noise import noise_key
-from bridgegen.drivers.traits import Traits
+from bridgegen.drivers.user_drivers import Traits
 from bridgegen.drivers.views import frames
 from bridgegen.simulation.embedded import _memory_kernels as memory
 from bridgegen.simulation.embedded import _rollout_kernels as kernels

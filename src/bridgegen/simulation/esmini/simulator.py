@@ -16,12 +16,12 @@ from bridgegen.base.processes.isolated import CallError
 from bridgegen.drivers import STORYBOARD, Driver
 from bridgegen.openx.opendrive.model import OpenDrive
 from bridgegen.openx.openscenario.model import OpenScenario
-from bridgegen.simulation.around import AroundEmbedded
 from bridgegen.simulation.embedded.places.network import Network
 from bridgegen.simulation.embedded.simulator import EmbeddedSimulator
 from bridgegen.simulation.esmini.files import RoadFiles, ScenarioFile
 from bridgegen.simulation.esmini.process import EsminiProcess, EsminiRow, Job
 from bridgegen.simulation.rollout import SIMULATOR_FAILURES, Rollout, joined
+from bridgegen.simulation.simulator import AroundEmbedded
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

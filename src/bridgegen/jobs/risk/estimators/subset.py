@@ -15,9 +15,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bridgegen.base.arrays import Bool, Float, Int
+from bridgegen.jobs.risk.estimators.exploration import SinglePoints, most_evaluations
 from bridgegen.jobs.risk.estimators.problem import SCORE, Aim, Problem, block_of
 from bridgegen.jobs.risk.estimators.proposals import OF_CHAIN, Proposals
-from bridgegen.jobs.risk.estimators.single_points import SinglePoints, most_evaluations
 from bridgegen.jobs.risk.estimators.weighted import Weighted
 
 PASSING = 0.1

@@ -12,13 +12,15 @@ from bridgegen.openx.opendrive.from_owl.arms import (
     EDGE,
     LEVEL,
     Arm,
+    Ray,
+    along,
     centre,
+    joining,
     lanes_of,
     road_of,
     types_of,
 )
 from bridgegen.openx.opendrive.from_owl.intersection import connecting_sections
-from bridgegen.openx.opendrive.from_owl.turns import Ray, along, joining
 from bridgegen.openx.opendrive.model import (
     Connection,
     Header,

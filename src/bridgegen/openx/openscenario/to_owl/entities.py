@@ -5,9 +5,9 @@ from functools import partial
 import pyoxigraph as ox
 
 from bridgegen.openx.openscenario import model as osc
+from bridgegen.openx.openscenario.bodies import kind_of
 from bridgegen.openx.openscenario.declarations import DRIVER, IDEAL
 from bridgegen.openx.openscenario.from_owl.entities import LIFTED, MAX_SPEED
-from bridgegen.openx.openscenario.participant_kinds import kind_of
 from bridgegen.openx.openscenario.to_owl.actions import (
     add_action,
     add_route,
@@ -15,15 +15,16 @@ from bridgegen.openx.openscenario.to_owl.actions import (
     put_speed,
 )
 from bridgegen.openx.openscenario.to_owl.build import (
+    ACTION,
     Lost,
     StoryBuilder,
     UnsayableError,
     numbered,
+    said_or_quoted,
 )
 from bridgegen.openx.openscenario.to_owl.differences import is_detail
 from bridgegen.openx.openscenario.to_owl.lights import known_light
 from bridgegen.openx.openscenario.to_owl.places import add_position
-from bridgegen.openx.openscenario.to_owl.quoted import ACTION, said_or_quoted
 from bridgegen.scenario.named_models import MODELS
 from bridgegen.scenario.participants import PARTICIPANTS
 

@@ -19,13 +19,14 @@ from bridgegen.openx.opendrive.model import Road
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.from_owl.places import RADIANS
 from bridgegen.openx.openscenario.to_owl.build import (
+    POSITION,
     StoryBuilder,
     UnsayableError,
+    node_of,
     shortest,
     simplest,
 )
 from bridgegen.openx.openscenario.to_owl.legs import Stretch
-from bridgegen.openx.openscenario.to_owl.quoted import POSITION, node_of
 
 _LENGTH_SLACK = 1e-6  # [m]
 _NAME = r"\(?\s*\$(?P<name>[A-Za-z_][A-Za-z0-9_]*)\s*\)?"

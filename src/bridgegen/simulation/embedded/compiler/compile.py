@@ -27,6 +27,7 @@ from bridgegen.simulation.embedded.compiler import declared
 from bridgegen.simulation.embedded.compiler.actions import Actions
 from bridgegen.simulation.embedded.compiler.bodies import (
     Body,
+    Towing,
     has_siren,
     kind,
     measures,
@@ -39,7 +40,6 @@ from bridgegen.simulation.embedded.compiler.positions import Positions
 from bridgegen.simulation.embedded.compiler.start import Start
 from bridgegen.simulation.embedded.compiler.storyboard import elements
 from bridgegen.simulation.embedded.compiler.tables import Tables, table
-from bridgegen.simulation.embedded.compiler.towing import Towing
 from bridgegen.simulation.embedded.compiler.triggers import MAX_STEPS, Triggers
 from bridgegen.simulation.embedded.program import (
     AlongLanes,

@@ -13,7 +13,7 @@ from bridgegen.base.arrays import Float
 from bridgegen.base.errors import InputError
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.element import Element
-from bridgegen.simulation.embedded.compiler.clothoids import bends
+from bridgegen.simulation.embedded.compiler.curves import bends
 from bridgegen.simulation.embedded.compiler.tables import Tables
 from bridgegen.simulation.embedded.program import AlongTrajectory, Bend, LanePoint, Point
 

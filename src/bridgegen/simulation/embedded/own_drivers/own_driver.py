@@ -18,8 +18,8 @@ from bridgegen.base.arrays import Bool, Float, Int
 from bridgegen.base.compiled import call_from_python
 from bridgegen.drivers import Driver
 from bridgegen.drivers.driver_process import START_SECONDS, DriverError, DriverProcess
-from bridgegen.drivers.traits import Traits
 from bridgegen.drivers.trajectory import Plans
+from bridgegen.drivers.user_drivers import Traits
 from bridgegen.simulation.embedded._memory_kernels import (
     N_STEPS,
     NO_CONTROL,

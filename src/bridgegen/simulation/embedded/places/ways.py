@@ -21,7 +21,7 @@ from bridgegen.openx.opendrive.routes import (
     plan_route,
 )
 from bridgegen.openx.openscenario.values import Expr, ParameterRef, Value
-from bridgegen.simulation.embedded.compiler import clothoids
+from bridgegen.simulation.embedded.compiler import curves as clothoids
 from bridgegen.simulation.embedded.compiler.trajectories import Corner, polyline, timetable
 from bridgegen.simulation.embedded.places.lanes import Lanes, Path, sampled
 from bridgegen.simulation.embedded.places.slopes import slopes
