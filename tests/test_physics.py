@@ -64,4 +64,4 @@ def test_no_other_module_states_them(number):
         for node in ast.walk(ast.parse(text))
         if isinstance(node, ast.Constant) and node.value == float(number)
     }
-    assert stating == {"physics.py"}
+    assert stating == {"base/physics.py"}

@@ -8,6 +8,7 @@ run.frame().query("critical").sort_values("d_min").head()
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from bridgegen.base import errors
     from bridgegen.engine.simulate import simulate_file
     from bridgegen.jobs.compare import Comparison, compare
     from bridgegen.jobs.dashboard import Dashboard, build_dashboard
@@ -34,6 +35,7 @@ __all__ = [
     "build_dashboard",
     "compare",
     "confirm",
+    "errors",
     "estimate_risk",
     "export_safety_case",
     "exposure_of",
@@ -52,6 +54,7 @@ _HOMES = {
     "Dashboard": "bridgegen.jobs.dashboard",
     "build_dashboard": "bridgegen.jobs.dashboard",
     "confirm": "bridgegen.jobs.search.confirm",
+    "errors": "bridgegen.base.errors",
     "Run": "bridgegen.jobs.search",
     "Exposure": "bridgegen.scenario.exposure",
     "Fit": "bridgegen.scenario.exposure.fit",
@@ -78,7 +81,8 @@ def __getattr__(name: str) -> Any:
         raise AttributeError(f"module 'bridgegen' has no attribute '{name}'")
     from importlib import import_module
 
-    return getattr(import_module(_HOMES[name]), name)
+    home = import_module(_HOMES[name])
+    return home if name == "errors" else getattr(home, name)
 
 
 def __dir__() -> list[str]:

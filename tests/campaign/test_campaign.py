@@ -362,7 +362,7 @@ def test_a_run_is_never_overwritten(tmp_path):
 
 def test_a_changed_scenario_is_not_gone_on_with(tmp_path):
     text = "\n".join(
-        (Path(bg.__file__).parent / "catalogue" / "crossroads-s4.yaml")
+        (Path(bg.__file__).parent / "scenario" / "catalogue" / "crossroads-s4.yaml")
         .read_text("utf-8")
         .split("\n")
     ).replace("scenario: crossroads-s4", "scenario: mine")

@@ -210,7 +210,7 @@ def test_every_figure_is_there_and_explained(found):
 
 
 def test_a_changed_scenario_is_named_and_not_counted(copy, tmp_path):
-    text = (Path(bg.__file__).parent / "catalogue" / "cut-in.yaml").read_text("utf-8")
+    text = (Path(bg.__file__).parent / "scenario" / "catalogue" / "cut-in.yaml").read_text("utf-8")
     file = tmp_path / "mine.yaml"
     file.write_text(text, "utf-8")
     bg.run_search(

@@ -203,7 +203,7 @@ def test_the_best_of_two_detections_takes_the_box(rollout_of):
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"kinds": np.array([0])}, r"kinds must be 2 of bridgegen\.ego\.kinds, got \[0\]"),
+        ({"kinds": np.array([0])}, r"kinds must be 2 of bridgegen\.drivers\.kinds, got \[0\]"),
         ({"kinds": np.array([0, len(kinds.NAMES)])}, "kinds must be 2 of"),
         ({"detections": np.zeros((1, 1, 1, 8))}, r"detections must have shape \(1, 2, 1, 8\)"),
         (

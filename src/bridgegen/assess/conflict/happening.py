@@ -82,7 +82,7 @@ def happened(rollout: Rollout, *, may_stop: bool = False) -> npt.NDArray[np.obje
         others = [e for e in others if not IS_OBSTACLE[rollout.kinds[e]]]
     last = _last_judged(rollout)
     at = np.where(rollout.began <= last[:, np.newaxis] + 1, rollout.began, -1)
-    began = at >= 0 if len(rollout.began) else np.zeros((n, 0), np.bool_)
+    began = at >= 0 if len(at) == n else np.zeros((n, 0), np.bool_)
     reach = NEAR + NEAR_TIME * np.abs(rollout.v[:, 0])
     reach[np.arange(rollout.shape[2]) > last[:, np.newaxis]] = -1.0
     last_near = np.full((n, rollout.shape[1]), -1)  # the last instant at which each is near

@@ -10,9 +10,6 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from typing import Any, Generic, TypeVar
 
-import numba
-
-from bridgegen.base.compilation.cache import is_compiled
 from bridgegen.engine.workers.processes import Process, Said, ending
 from bridgegen.engine.workers.recipe import Recipe
 
@@ -114,6 +111,10 @@ def compiled_ahead(recipe: Recipe) -> Iterator[bool]:
     Yields:
         whether another process does; this one then had better begin with the rest.
     """
+    import numba  # late, as pages, which need no compiler, import this file
+
+    from bridgegen.base.compilation.cache import is_compiled
+
     if is_compiled() or numba.config.DISABLE_JIT or (os.cpu_count() or 1) == 1:
         yield False
         return
