@@ -51,6 +51,8 @@ class TaskPool(Generic[Task]):
         Raises:
             Exception: what a task raises; all processes have ended.
         """
+        from bridgegen.base.compilation.cache import is_compiled  # late, see `compiled_ahead`
+
         try:
             # Compiles once, not in every process.
             self._begin(at_once if is_compiled() else 1)
