@@ -2,9 +2,9 @@
 
 import pytest
 
-from bridgegen.engine.workers import tasks as compile_ahead
+from bridgegen.engine.workers import compile_ahead
+from bridgegen.engine.workers.compile_ahead import compiled_ahead
 from bridgegen.engine.workers.recipe import Recipe
-from bridgegen.engine.workers.tasks import compiled_ahead
 
 
 def touch(path: str) -> None:

@@ -32,7 +32,7 @@ from bridgegen.engine.evaluation import Evaluation, Replay, Replays, Trials
 from bridgegen.engine.options import PipelineOptions
 from bridgegen.engine.variants import Variants, nominal_of
 from bridgegen.engine.workers import CarriedDriver, Lost, Part, Recipe, Stream, Threads, Workers
-from bridgegen.engine.workers.tasks import compiled_ahead
+from bridgegen.engine.workers.compile_ahead import compiled_ahead
 from bridgegen.openx.opendrive.road_map import RoadMap
 from bridgegen.openx.source import ConcreteScenario, OntologySource, Source, source_of
 from bridgegen.scenario.language.criteria import PREFIX, joined, read_criterion

@@ -3,15 +3,13 @@
 A process that crashes (out of memory, or by its driver) costs the task that it was doing.
 """
 
-import os
 import queue
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Iterable
 from typing import Any, Generic, TypeVar
 
+from bridgegen.base.compilation.cache import is_compiled
 from bridgegen.engine.workers.processes import Process, Said, ending
-from bridgegen.engine.workers.recipe import Recipe
 
 Task = TypeVar("Task")
 
@@ -51,8 +49,6 @@ class TaskPool(Generic[Task]):
         Raises:
             Exception: what a task raises; all processes have ended.
         """
-        from bridgegen.base.compilation.cache import is_compiled  # late, see `compiled_ahead`
-
         try:
             # Compiles once, not in every process.
             self._begin(at_once if is_compiled() else 1)
@@ -96,41 +92,3 @@ class TaskPool(Generic[Task]):
     def _leave(self, process: Process) -> int:
         del self._doing[process]
         return process.end()
-
-
-# --- A process that compiles kernels while this one compiles others ---
-
-
-@contextmanager
-def compiled_ahead(recipe: Recipe) -> Iterator[bool]:
-    """Have another process follow a recipe meanwhile, if nothing is compiled and a core is free.
-
-    Both put what they compile into the cache, and neither compiles what the other one does.
-
-    Args:
-        recipe: of a call that compiles what this process will need later.
-
-    Yields:
-        whether another process does; this one then had better begin with the rest.
-    """
-    import numba  # late, as pages, which need no compiler, import this file
-
-    from bridgegen.base.compilation.cache import is_compiled
-
-    if is_compiled() or numba.config.DISABLE_JIT or (os.cpu_count() or 1) == 1:
-        yield False
-        return
-    said: Said = queue.SimpleQueue()
-    helper = None
-    with suppress(OSError), open(os.devnull, "wb") as nowhere:  # no process more: alone, then
-        helper = Process(said, errors=nowhere)
-        helper.call(_follow, recipe)
-    try:
-        yield helper is not None
-    finally:
-        if helper is not None:
-            helper.end()
-
-
-def _follow(recipe: Recipe) -> None:
-    recipe.make()
