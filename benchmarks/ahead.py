@@ -18,7 +18,7 @@ import numpy as np
 from searches import Found, found
 
 import bridgegen as bg
-from bridgegen.comparison.record import space_of
+from bridgegen.jobs.compare.record import space_of
 
 PAIRS = ("crossroads-s4/route-follower", "bus-pulls-out/careful")
 

@@ -18,13 +18,13 @@ from pathlib import Path
 
 import numpy as np
 
-from bridgegen.arrays import Float
-from bridgegen.campaign.campaign import SearchCallbacks, resume, run_search
-from bridgegen.errors import Interrupted
-from bridgegen.evaluation import Evaluation
-from bridgegen.odd.reader import load
-from bridgegen.pipeline import Pipeline
-from bridgegen.view.run_view import RunView
+from bridgegen.base.arrays import Float
+from bridgegen.base.errors import Interrupted
+from bridgegen.engine.evaluation import Evaluation
+from bridgegen.engine.pipeline import Pipeline
+from bridgegen.jobs.search.campaign import SearchCallbacks, resume, run_search
+from bridgegen.jobs.view.run_view import RunView
+from bridgegen.scenario.language.reader import load
 
 SCENARIO = "crossroads-s4"
 SIZES = (10_000, 100_000, 1_000_000)

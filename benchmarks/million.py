@@ -15,10 +15,10 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from bridgegen.arrays import Float
-from bridgegen.campaign.loop import run_loop
-from bridgegen.search import Problem, get
-from bridgegen.store import Store
+from bridgegen.base.arrays import Float
+from bridgegen.jobs.search.loop import run_loop
+from bridgegen.results.store import Store
+from bridgegen.search.algorithms import Problem, get
 
 PARAMETERS = tuple(f"p{i}" for i in range(10))
 METRICS = tuple(f"m{i}" for i in range(11))

@@ -10,12 +10,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from bridgegen.compiled import bundled, kernel
-from bridgegen.ego._perception_kernels import MEMORY, perceive
-from bridgegen.ego._tracking_kernels import TRACK
-from bridgegen.ego.detections import DETECTION
-from bridgegen.ego.kinds import CAR
-from bridgegen.ego.sight import Sky
+from bridgegen.base.compiled import bundled, kernel
+from bridgegen.drivers._perception_kernels import MEMORY, perceive
+from bridgegen.drivers._tracking_kernels import TRACK
+from bridgegen.drivers.detections import DETECTION
+from bridgegen.drivers.kinds import CAR
+from bridgegen.drivers.sight import Sky
 
 STEPS, DT = 401, 0.05
 CARS = (4.5, 1.8, 1.4, 50.0, 3.0, 9.0, 0.2, 1.5)

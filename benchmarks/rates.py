@@ -4,8 +4,8 @@ import os
 import time
 from dataclasses import dataclass
 
-from bridgegen.arrays import Float
-from bridgegen.pipeline import Pipeline
+from bridgegen.base.arrays import Float
+from bridgegen.engine.pipeline import Pipeline
 
 
 @dataclass(frozen=True)

@@ -27,8 +27,8 @@ from tests.mining.events import test_crossing_round_trip as meetings
 from tests.mining.events import test_round_trip as lane_events
 from tests.recordings import binary_writers, writers
 
-from bridgegen.exposure.rates import Encounters
-from bridgegen.recordings.formats import read
+from bridgegen.recordings.readers.formats import read
+from bridgegen.scenario.exposure.exposure import Encounters
 
 ROWS = 400
 """Rows of a piece: what is simulated and written at once."""

@@ -21,17 +21,16 @@ from types import ModuleType
 
 import numpy as np
 
-from bridgegen.campaign.scenarios import load
-from bridgegen.conflict.harm import NEAR_MISS
-from bridgegen.exposure import Exposure
-from bridgegen.exposure.chosen import UNIFORM
-from bridgegen.exposure.reader import build_exposure
-from bridgegen.odd.plain_yaml import read_plain_yaml
-from bridgegen.odd.scenario import LogicalScenario
-from bridgegen.risk import Risk, estimate_risk
-from bridgegen.risk.estimators.problem import Aim
-from bridgegen.risk.estimators.weighted import Probability, of_weights
-from bridgegen.risk.methods import estimate
+from bridgegen.assess.conflict.harm import NEAR_MISS
+from bridgegen.jobs.risk import Risk, estimate_risk
+from bridgegen.jobs.risk.estimators.problem import Aim
+from bridgegen.jobs.risk.estimators.weighted import Probability, of_weights
+from bridgegen.jobs.risk.experiment import estimate
+from bridgegen.jobs.search.scenarios import load
+from bridgegen.scenario.exposure import Exposure
+from bridgegen.scenario.exposure.reader import UNIFORM, build_exposure
+from bridgegen.scenario.language.plain_yaml import read_plain_yaml
+from bridgegen.scenario.language.scenario import LogicalScenario
 
 TESTS = Path(__file__).parents[1] / "tests/risk/estimators/problems.py"
 

@@ -23,22 +23,22 @@ from perception import perception
 from rates import Rate, processor_time, rate_of
 from traffic import ALL, traffic_rate
 
-from bridgegen.campaign.scenario_files import write_scenario
-from bridgegen.extras import is_installed
-from bridgegen.odd.reader import load
-from bridgegen.odd.scenario import LogicalScenario
-from bridgegen.ontology.check import check
-from bridgegen.ontology.files import save
-from bridgegen.ontology.individuals import build
+from bridgegen.base.extras import is_installed
+from bridgegen.engine.options import PipelineOptions
+from bridgegen.engine.pipeline import Pipeline
+from bridgegen.jobs.search.scenario_files import write_scenario
 from bridgegen.openx.convert import import_file
 from bridgegen.openx.on_map import on_map
 from bridgegen.openx.opendrive.read import read as read_map
 from bridgegen.openx.opendrive.road_map import load_map
-from bridgegen.options import PipelineOptions
-from bridgegen.pipeline import Pipeline
-from bridgegen.search import Problem, Results, get, names
-from bridgegen.store import Rows
-from bridgegen.triage.triage import triage as triage_of
+from bridgegen.results.store import Rows
+from bridgegen.scenario.language.reader import load
+from bridgegen.scenario.language.scenario import LogicalScenario
+from bridgegen.scenario.ontology.check import check
+from bridgegen.scenario.ontology.files import save
+from bridgegen.scenario.ontology.individuals import build
+from bridgegen.search.algorithms import Problem, Results, get, names
+from bridgegen.search.triage.triage import triage as triage_of
 from workers import workers
 
 SCENARIO = "crossroads-s4"

@@ -14,11 +14,11 @@ from pathlib import Path
 import numpy as np
 from rates import rate_of
 
-from bridgegen.campaign.campaign import MAX_BUDGET
-from bridgegen.odd.reader import load
-from bridgegen.options import PipelineOptions
-from bridgegen.pipeline import Pipeline
-from bridgegen.workers import Threads
+from bridgegen.engine.options import PipelineOptions
+from bridgegen.engine.pipeline import Pipeline
+from bridgegen.engine.workers import Threads
+from bridgegen.jobs.search.campaign import MAX_BUDGET
+from bridgegen.scenario.language.reader import load
 
 SCENARIO = "crossroads-s4"
 SIZES = (10_000, 100_000, 1_000_000)

@@ -21,13 +21,13 @@ import numpy as np
 from run import seconds_a_row
 
 import bridgegen as bg
-from bridgegen.comparison import Comparison
-from bridgegen.comparison.distinct import distinct, normalised
-from bridgegen.comparison.record import modes_of, space_of
-from bridgegen.errors import BridgeGenError
-from bridgegen.odd.space import SearchSpace
-from bridgegen.own_code import label_of
-from bridgegen.store import Store
+from bridgegen.base.errors import BridgeGenError
+from bridgegen.base.plugins import label_of
+from bridgegen.jobs.compare import Comparison
+from bridgegen.jobs.compare.distinct import distinct, normalised
+from bridgegen.jobs.compare.record import modes_of, space_of
+from bridgegen.results.store import Store
+from bridgegen.scenario.language.space import SearchSpace
 
 PAIRS = {
     "stopped-after-curve/reference": 0.0007,

@@ -13,12 +13,12 @@ from pathlib import Path
 import numpy as np
 from rates import Rate, rate_of
 
-from bridgegen import metrics
-from bridgegen.odd.others import with_others
-from bridgegen.odd.reader import load
-from bridgegen.odd.scenario import LogicalScenario
-from bridgegen.options import PipelineOptions
-from bridgegen.pipeline import Pipeline
+from bridgegen.assess import metrics
+from bridgegen.engine.options import PipelineOptions
+from bridgegen.engine.pipeline import Pipeline
+from bridgegen.scenario.language.others import with_others
+from bridgegen.scenario.language.reader import load
+from bridgegen.scenario.language.scenario import LogicalScenario
 
 ALL = tuple(metrics.METRICS)
 

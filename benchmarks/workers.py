@@ -18,12 +18,12 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from bridgegen.arrays import Float
-from bridgegen.campaign.loop import run_loop
-from bridgegen.search import Problem, get
-from bridgegen.store import Store
-from bridgegen.workers import Recipe, Stream, Workers, open_workers
-from bridgegen.workers.processes import Processes
+from bridgegen.base.arrays import Float
+from bridgegen.engine.workers import Recipe, Stream, Workers, open_workers
+from bridgegen.engine.workers.processes import Processes
+from bridgegen.jobs.search.loop import run_loop
+from bridgegen.results.store import Store
+from bridgegen.search.algorithms import Problem, get
 
 ROWS = 40
 """A batch of the paper's PSO."""
@@ -46,7 +46,7 @@ class Burner:
 
     Args:
         seconds: so much [s].
-        rows_at_once: see `bridgegen.workers.workers.Portable`.
+        rows_at_once: see `bridgegen.engine.workers.workers.Portable`.
     """
 
     runs_at_once = 1
@@ -57,7 +57,7 @@ class Burner:
 
     @property
     def recipe(self) -> Recipe:
-        """See `bridgegen.workers.workers.Portable`."""
+        """See `bridgegen.engine.workers.workers.Portable`."""
         return Recipe.of(Burner, self.seconds, self.rows_at_once)
 
     def burn(self, X: Float) -> Float:
@@ -141,7 +141,7 @@ class Uneven(Burner):
 
     @property
     def recipe(self) -> Recipe:
-        """See `bridgegen.workers.workers.Portable`."""
+        """See `bridgegen.engine.workers.workers.Portable`."""
         return Recipe.of(Uneven, 0.0, 1)
 
     def wait(self, X: Float) -> tuple[float, float, float]:
@@ -163,7 +163,7 @@ class Timed:
         self.submit = rows.submit
 
     def take(self, n: int) -> SimpleNamespace:
-        """See `bridgegen.campaign.loop.Stream`."""
+        """See `bridgegen.jobs.search.loop.Stream`."""
         results = [one.result for one in self._rows.take(n)]
         self.times += [(begun, ended) for _, begun, ended in results]
         F = np.array([[value] for value, _, _ in results])

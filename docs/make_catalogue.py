@@ -5,11 +5,11 @@ Run it after a change to the catalogue: ``python docs/make_catalogue.py``.
 
 from pathlib import Path
 
-from bridgegen.odd.reader import load, names
-from bridgegen.odd.roads import KNOBS
-from bridgegen.pipeline import Pipeline
-from bridgegen.report.scenario_words import story_lines
-from bridgegen.report.sketch import sketch
+from bridgegen.engine.pipeline import Pipeline
+from bridgegen.pages.scenario_page import story_lines
+from bridgegen.pages.sketch import sketch
+from bridgegen.scenario.language.reader import load, names
+from bridgegen.scenario.language.roads import KNOBS
 
 HERE = Path(__file__).parent
 PICTURES = HERE / "catalogue"

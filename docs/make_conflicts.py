@@ -7,7 +7,7 @@ from math import cos, pi, sin
 from pathlib import Path
 from typing import NamedTuple
 
-from bridgegen.conflict.types import ConflictType
+from bridgegen.assess.conflict.types import ConflictType
 
 WIDTH, HEIGHT, COLUMNS = 210, 132, 5
 EGO, OTHER, INK = "#1f6fb2", "#c45a2b", "#333333"

@@ -14,9 +14,9 @@ from typing import Any
 
 import numpy as np
 
-from bridgegen.ego import interface
-from bridgegen.ego.interface import WANTS, Observation, Scene
-from bridgegen.ego.remote import messages
+from bridgegen.drivers import interface
+from bridgegen.drivers.interface import WANTS, Observation, Scene
+from bridgegen.drivers.remote import messages
 
 FILE = Path(messages.__file__).with_name("protocol.json")
 

@@ -12,9 +12,9 @@ from typer.main import get_command
 
 from bridgegen.cli import app
 from bridgegen.cli.groups import DEFAULT
-from bridgegen.odd.json_schema import schema, schema_text
-from bridgegen.odd.parameters import Axis
-from bridgegen.odd.reader import load
+from bridgegen.scenario.language.json_schema import schema, schema_text
+from bridgegen.scenario.language.parameters import Axis
+from bridgegen.scenario.language.reader import load
 
 HERE = Path(__file__).parent
 

@@ -15,8 +15,7 @@ from typing import Any
 import pytest
 from hypothesis import settings
 
-from bridgegen.child import ONE_THREAD
-from bridgegen.garbage import collect_rarely
+from bridgegen.base.processes.child import ONE_THREAD, collect_rarely
 
 CHECKERS = "BRIDGEGEN_CHECKERS"
 
@@ -69,7 +68,7 @@ def sort_by_file(items: list[Any]) -> None:
 @pytest.fixture(scope="session")
 def same_rows() -> Any:
     """Say whether two runs, by their folders, have recorded the same, to the bit."""
-    from bridgegen.store import Store
+    from bridgegen.results.store import Store
 
     names = ("id", "U", "X", "metrics", "F", "status", "critical", "cause")
 
@@ -170,7 +169,7 @@ def add_planners(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
 
     They are those of ``ego/planner_packages.py``: the name of each, and that of its constant.
     """
-    from bridgegen.ego.planners import registry
+    from bridgegen.drivers import planners as registry
 
     site, code = tmp_path_factory.mktemp("site"), Path(__file__).with_name("ego")
     info = site / "planner_packages-1.0.dist-info"

@@ -153,15 +153,15 @@ def _roads(seed: Seed, folder: Path) -> None:
 
 
 def _individuals(seed: Seed, folder: Path) -> None:
-    from bridgegen.ontology.check import check
-    from bridgegen.ontology.files import from_bytes
+    from bridgegen.scenario.ontology.check import check
+    from bridgegen.scenario.ontology.files import from_bytes
 
     check(from_bytes(seed.data, "mutated.owl"))
 
 
 def _logical(seed: Seed, folder: Path) -> None:
-    from bridgegen.odd.reader import load
-    from bridgegen.pipeline import Pipeline
+    from bridgegen.engine.pipeline import Pipeline
+    from bridgegen.scenario.language.reader import load
 
     path = folder / "mutated.yaml"
     path.write_bytes(seed.data)
@@ -170,7 +170,7 @@ def _logical(seed: Seed, folder: Path) -> None:
 
 
 def _recording(seed: Seed, folder: Path) -> None:
-    from bridgegen.conflict.recorded import measure_recording
+    from bridgegen.assess.conflict.recorded import measure_recording
 
     path = folder / "mutated.csv"
     path.write_bytes(seed.data)
@@ -193,11 +193,11 @@ def write_ours(folder: Path) -> None:
     """Write the catalogue's scenarios at their defaults into a folder, in all formats."""
     from importlib import resources
 
-    from bridgegen.odd.reader import load, names
-    from bridgegen.ontology.files import save
+    from bridgegen.engine.pipeline import Pipeline
     from bridgegen.openx.opendrive.write import to_xml as road_xml
     from bridgegen.openx.openscenario.write import to_xml as scenario_xml
-    from bridgegen.pipeline import Pipeline
+    from bridgegen.scenario.language.reader import load, names
+    from bridgegen.scenario.ontology.files import save
     from bridgegen.simulation.trace import write_trace
 
     for name in names():
@@ -209,7 +209,7 @@ def write_ours(folder: Path) -> None:
         save(concrete.individuals, folder / f"{name}.owl")
         (folder / f"{name}.xodr").write_bytes(road_xml(concrete.roads))
         (folder / f"{name}.xosc").write_bytes(scenario_xml(concrete.storyboard))
-        text = resources.files("bridgegen.catalogue").joinpath(f"{name}.yaml").read_bytes()
+        text = resources.files("bridgegen.scenario.catalogue").joinpath(f"{name}.yaml").read_bytes()
         (folder / f"{name}.yaml").write_bytes(text)
         write_trace(folder / f"{name}.csv", pipeline.rollout(space.row({})[None]))
     log = Path(__file__).parent / "simulation" / "data" / "esmini_log.csv"
@@ -234,7 +234,7 @@ def read_seeds(folders: list[Path], kinds: set[str]) -> list[Seed]:
 
 def try_one(seed: Seed) -> str:
     """Return "read", "refused", or what was found: the last line of a traceback and its place."""
-    from bridgegen.errors import BridgeGenError
+    from bridgegen.base.errors import BridgeGenError
 
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)

@@ -7,8 +7,8 @@ import sys
 import pytest
 
 import bridgegen as bg
-from bridgegen.campaign.exported import exported_scenarios, read_facts
-from bridgegen.errors import StorageError
+from bridgegen.base.errors import StorageError
+from bridgegen.jobs.search.exported import exported_scenarios, read_facts
 
 
 def test_tab_completes_all_names_before_first_use():

@@ -5,7 +5,7 @@ import pytest
 
 @pytest.mark.parametrize("values", [[[1.0, float("nan")]], [[1.0, float("inf")]]])
 def test_arrays_refuse_what_is_not_finite(values):
-    from bridgegen.arrays import as_float
+    from bridgegen.base.arrays import as_float
 
     with pytest.raises(
         ValueError, match=r"speed \[m/s\] must be finite, got (nan|inf) at \[0, 1\]"
@@ -15,7 +15,7 @@ def test_arrays_refuse_what_is_not_finite(values):
 
 
 def test_arrays_refuse_another_shape():
-    from bridgegen.arrays import as_float
+    from bridgegen.base.arrays import as_float
 
     with pytest.raises(ValueError, match=r"x must have shape \(·, 3\), got \(2, 2\)"):
         as_float("x", [[1, 2], [3, 4]], (None, 3))

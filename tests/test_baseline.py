@@ -7,17 +7,17 @@ import numpy as np
 import pytest
 
 import bridgegen as bg
-from bridgegen.baseline import RECORDED
-from bridgegen.campaign.regions import regions_of
-from bridgegen.conflict.harm import NEAR_MISS
-from bridgegen.dashboard.project import read_project
-from bridgegen.errors import InputError, UnknownNameError
-from bridgegen.odd.reader import load
-from bridgegen.options import PipelineOptions
-from bridgegen.pipeline import Pipeline
-from bridgegen.report.playbacks import beside_others, measured_playbacks, others_of
-from bridgegen.simulate import simulate_file
-from bridgegen.workers import Threads
+from bridgegen.assess.conflict.harm import NEAR_MISS
+from bridgegen.base.errors import InputError, UnknownNameError
+from bridgegen.engine.baseline import RECORDED
+from bridgegen.engine.options import PipelineOptions
+from bridgegen.engine.pipeline import Pipeline
+from bridgegen.engine.simulate import simulate_file
+from bridgegen.engine.workers import Threads
+from bridgegen.jobs.dashboard.project import read_project
+from bridgegen.jobs.search.regions import regions_of
+from bridgegen.pages.playbacks import beside_others, measured_playbacks, others_of
+from bridgegen.scenario.language.reader import load
 
 DRIVERS = Path(__file__).parent / "ego" / "drivers.py"
 NAME = "crossroads-s3"

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from bridgegen.extras import EXTRAS, Extra
+from bridgegen.base.extras import EXTRAS, Extra
 
 RUN = Path(__file__).parents[1] / "benchmarks" / "run.py"
 

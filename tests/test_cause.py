@@ -8,16 +8,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bridgegen.cause import CAUSES, Cause, causes, counterfactuals, require
-from bridgegen.ego import DRIVERS, STORYBOARD
-from bridgegen.errors import InputError, UnknownNameError
-from bridgegen.objective import Objective
-from bridgegen.odd.objectives import PAPERS
-from bridgegen.odd.others import with_others
-from bridgegen.odd.reader import load
-from bridgegen.odd.thresholds import Thresholds
-from bridgegen.options import PipelineOptions
-from bridgegen.pipeline import Pipeline
+from bridgegen.assess.cause import CAUSES, Cause, causes, counterfactuals, require
+from bridgegen.assess.objective import Objective
+from bridgegen.base.errors import InputError, UnknownNameError
+from bridgegen.drivers import DRIVERS, STORYBOARD
+from bridgegen.engine.options import PipelineOptions
+from bridgegen.engine.pipeline import Pipeline
+from bridgegen.scenario.language.objectives import PAPERS
+from bridgegen.scenario.language.others import with_others
+from bridgegen.scenario.language.reader import load
+from bridgegen.scenario.language.thresholds import Thresholds
 from bridgegen.simulation.embedded import simulator
 
 WHOLE = replace(DRIVERS["reference"], stages=frozenset({"perception", "prediction", "control"}))

@@ -23,7 +23,7 @@ def finished(tmp_path_factory) -> "bg.Run":
 @pytest.fixture
 def s4_file(tmp_path) -> Path:
     """A scenario file of the user's own."""
-    import bridgegen.catalogue as catalogue
+    import bridgegen.scenario.catalogue as catalogue
 
     folder = Path(catalogue.__file__).parent
     for path in folder.glob("*.yaml"):
@@ -187,7 +187,7 @@ def test_ask_prints_brackets_as_they_are(cli, finished, tmp_path):
 
 
 def test_validate_with_the_reasoner(cli, finished, monkeypatch):
-    from bridgegen.ontology import reasoner
+    from bridgegen.scenario.ontology import reasoner
 
     owl = finished.scenarios[0].with_suffix(".owl")
     monkeypatch.setattr(reasoner, "find_spec", lambda name: None)

@@ -4,6 +4,7 @@ import inspect
 
 import pytest
 
+from bridgegen.base.errors import InputError
 from bridgegen.cli import runs
 from bridgegen.cli.confirmations import confirm
 from bridgegen.cli.connection import (
@@ -14,7 +15,6 @@ from bridgegen.cli.connection import (
     with_connection_options,
 )
 from bridgegen.cli.options import read_simulators
-from bridgegen.errors import InputError
 from bridgegen.simulation.choice import SIMULATORS
 
 

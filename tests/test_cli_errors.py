@@ -66,7 +66,7 @@ def test_a_population_beyond_the_budget_is_a_warning(cli, tmp_path):
 
 
 def test_validate_notes_a_name_that_is_not_the_file_s(cli, tmp_path):
-    from bridgegen.odd.starter import start_scenario
+    from bridgegen.scenario.language.starter import start_scenario
 
     path = start_scenario("mine", like="crossroads-s4", folder=tmp_path)
     code, out, err = cli("validate", path)
@@ -78,7 +78,7 @@ def test_validate_notes_a_name_that_is_not_the_file_s(cli, tmp_path):
 
 
 def test_validate_notes_texts_of_the_template_and_indicators_that_mislead(cli, tmp_path):
-    from bridgegen.odd.starter import start_scenario
+    from bridgegen.scenario.language.starter import start_scenario
 
     path = start_scenario("mine", folder=tmp_path)
     _, _, err = cli("validate", path)

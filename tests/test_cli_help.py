@@ -9,7 +9,7 @@ from typer.main import get_command
 
 from bridgegen.cli import app
 from bridgegen.cli.groups import PANELS
-from bridgegen.options.option import GROUPS
+from bridgegen.engine.options.option import GROUPS
 
 ROOT = get_command(app)
 SEARCH_GROUPS = (

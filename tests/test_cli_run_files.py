@@ -12,9 +12,9 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 import bridgegen as bg
+from bridgegen.base.errors import InputError
 from bridgegen.cli import main
-from bridgegen.errors import InputError
-from bridgegen.options import SearchOptions, options_of
+from bridgegen.engine.options import SearchOptions, options_of
 from bridgegen.simulation.choice import SimulatorChoice
 
 NAMES = st.text("abcdefgh_", min_size=1, max_size=8)
@@ -78,7 +78,7 @@ def searched(monkeypatch):
         found.update(given, scenario=scenario, out=out, workers=workers)
         raise InputError("not today")
 
-    monkeypatch.setattr("bridgegen.campaign.run_search", keep)
+    monkeypatch.setattr("bridgegen.jobs.search.run_search", keep)
 
     def run(*words):
         found.clear()

@@ -12,17 +12,17 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 import bridgegen as bg
-from bridgegen.campaign.exported import exported_scenarios, not_exported, read_facts
-from bridgegen.comparison.plan import begin, make_plan
-from bridgegen.confirmation.record import read_record as read_confirmation
-from bridgegen.confirmation.schema import Outcome, Record, Scenario
-from bridgegen.errors import BridgeGenError
-from bridgegen.objective import Objective
-from bridgegen.odd.thresholds import Thresholds
-from bridgegen.options import CommonOptions
-from bridgegen.regions.record import read_record as read_regions
-from bridgegen.store import Store
-from bridgegen.triage.record import read_record as read_triage
+from bridgegen.assess.objective import Objective
+from bridgegen.base.errors import BridgeGenError
+from bridgegen.engine.options import CommonOptions
+from bridgegen.jobs.compare.plan import begin, make_plan
+from bridgegen.jobs.search.exported import exported_scenarios, not_exported, read_facts
+from bridgegen.results.confirmation.record import Outcome, Record, Scenario
+from bridgegen.results.confirmation.record import read_record as read_confirmation
+from bridgegen.results.store import Store
+from bridgegen.scenario.language.thresholds import Thresholds
+from bridgegen.search.regions.record import read_record as read_regions
+from bridgegen.search.triage.record import read_record as read_triage
 
 MARK = "the value that is damaged"
 

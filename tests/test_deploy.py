@@ -10,7 +10,7 @@ import yaml
 from typer.main import get_command
 
 from bridgegen.cli import app
-from bridgegen.workers import read_choice
+from bridgegen.engine.workers import read_choice
 
 ROOT = Path(__file__).parents[1]
 DEPLOY = ROOT / "deploy"

@@ -8,13 +8,13 @@ from pathlib import Path
 
 import pytest
 
-from bridgegen.disk import write_whole
-from bridgegen.errors import StorageError
+from bridgegen.base.disk import write_whole
+from bridgegen.base.errors import StorageError
 
 KILLED = """
 import os, signal, sys
 from pathlib import Path
-from bridgegen.disk import write_whole
+from bridgegen.base.disk import write_whole
 
 def chunks():
     yield b"half"

@@ -1,6 +1,6 @@
 import gc
 
-from bridgegen.garbage import RARELY
+from bridgegen.base.processes.child import RARELY
 
 
 def test_a_command_looks_for_garbage_rarely(cli):

@@ -10,12 +10,12 @@ from pathlib import Path
 
 import pytest
 
-from bridgegen import installation
-from bridgegen.compilation import cache, folder
-from bridgegen.compilation.sources import digest
-from bridgegen.errors import InputError
-from bridgegen.extras import EXTRAS, Extra, is_installed, require
-from bridgegen.installation import Finding, examine
+from bridgegen.base.compilation import cache, folder
+from bridgegen.base.compilation.folder import digest
+from bridgegen.base.errors import InputError
+from bridgegen.base.extras import EXTRAS, Extra, is_installed, require
+from bridgegen.cli import installation
+from bridgegen.cli.installation import Finding, examine
 
 PROJECT = Path(__file__).parents[1] / "pyproject.toml"
 
@@ -71,7 +71,7 @@ def test_only_data_frames_need_pandas(tmp_path):
 import sys
 sys.modules["pandas"] = None
 import bridgegen as bg
-from bridgegen.errors import InputError
+from bridgegen.base.errors import InputError
 run = bg.run_search(
     "crossroads-s4", algorithm="random", budget=20, triage="none", out={str(tmp_path / "run")!r}
 )
@@ -124,7 +124,7 @@ def test_a_wheel_carries_every_file_of_the_package():
     package = PROJECT.parent / "src" / "bridgegen"
     patterns = tomllib.loads(PROJECT.read_text("utf-8"))["tool"]["setuptools"]["package-data"]
     carried = {path for pattern in patterns["bridgegen"] for path in package.glob(pattern)}
-    development = {package / "report/web" / name for name in ("jsconfig.json", "page.d.ts")}
+    development = {package / "pages/web" / name for name in ("jsconfig.json", "page.d.ts")}
     found = {
         path
         for path in package.rglob("*")

@@ -8,11 +8,11 @@ from pathlib import Path
 
 import pytest
 
-from bridgegen.isolated import CallError, IsolatedProcess
+from bridgegen.base.processes.isolated import CallError, IsolatedProcess
 
 WORKER = """
 import os, sys, time
-from bridgegen.isolated import CallError, serve
+from bridgegen.base.processes.isolated import CallError, serve
 
 def answer(what, *rest):
     print("a word on the standard output, which carries the answers")
@@ -93,7 +93,7 @@ def test_it_ends_with_whoever_asks_even_while_it_hangs(process, tmp_path):
     script = tmp_path / "asker.py"
     script.write_text(
         "import os, signal, sys, threading\n"
-        "from bridgegen.isolated import IsolatedProcess\n"
+        "from bridgegen.base.processes.isolated import IsolatedProcess\n"
         "one = IsolatedProcess('isolated_worker', ['you'])\n"
         "one.start(30.0)\n"
         "print(one._child.pid, flush=True)\n"

@@ -8,15 +8,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from bridgegen import metrics
-from bridgegen.errors import InputError, UnknownNameError
-from bridgegen.objective import (
+from bridgegen.assess import metrics
+from bridgegen.assess.objective import (
     Objective,
     Thresholds,
     entropy_weights,
     needs_sample,
     positivised,
 )
+from bridgegen.base.errors import InputError, UnknownNameError
 
 PAPER = (("d_min", 0.8297), ("v_d", 0.1703))
 UNWEIGHTED = (("d_min", None), ("v_d", None))

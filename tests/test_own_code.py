@@ -5,8 +5,8 @@ import sys
 
 import pytest
 
-from bridgegen.errors import InputError
-from bridgegen.own_code import class_of, file_of, is_own, label_of
+from bridgegen.base.errors import InputError
+from bridgegen.base.plugins import class_of, file_of, is_own, label_of
 
 
 @pytest.mark.parametrize(

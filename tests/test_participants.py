@@ -6,28 +6,29 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bridgegen.conflict.analysis import analyse
-from bridgegen.conflict.plausibility import plausibility
-from bridgegen.ego.detections import MISSED, SEEN_BY
-from bridgegen.ego.kinds import NAMES
-from bridgegen.errors import ScenarioError
-from bridgegen.metrics.perceived import CLASSES
-from bridgegen.odd.json_schema import schema
-from bridgegen.odd.reader import load
-from bridgegen.ontology.check import check
-from bridgegen.ontology.files import from_bytes, to_bytes
-from bridgegen.ontology.individuals import build
-from bridgegen.ontology.vocabulary import tbox
+from bridgegen.assess.conflict.analysis import analyse
+from bridgegen.assess.conflict.plausibility import plausibility
+from bridgegen.assess.metrics.perceived import CLASSES
+from bridgegen.base.errors import ScenarioError
+from bridgegen.drivers.detections import MISSED, SEEN_BY
+from bridgegen.drivers.kinds import NAMES
+from bridgegen.engine.pipeline import Pipeline
 from bridgegen.openx.opendrive.from_owl import opendrive_from_owl
 from bridgegen.openx.openscenario import model as osc
+from bridgegen.openx.openscenario.bodies import kind_of
 from bridgegen.openx.openscenario.from_owl import openscenario_from_owl
-from bridgegen.openx.openscenario.participant_kinds import kind_of
 from bridgegen.openx.openscenario.read import read
 from bridgegen.openx.openscenario.scenario_runner.blueprints import SIZES
 from bridgegen.openx.openscenario.to_owl import individuals_from_openscenario
-from bridgegen.openx.openscenario.versions import VERSIONS, to_version
-from bridgegen.openx.openscenario.write import to_xml
-from bridgegen.participants import (
+from bridgegen.openx.openscenario.write import VERSIONS, to_version, to_xml
+from bridgegen.pages.sketch import sketch
+from bridgegen.scenario.language.json_schema import schema
+from bridgegen.scenario.language.reader import load
+from bridgegen.scenario.ontology.check import check
+from bridgegen.scenario.ontology.files import from_bytes, to_bytes
+from bridgegen.scenario.ontology.individuals import build
+from bridgegen.scenario.ontology.vocabulary import tbox
+from bridgegen.scenario.participants import (
     OBJECT_CLASSES,
     PARTICIPANTS,
     QUEUES,
@@ -35,8 +36,6 @@ from bridgegen.participants import (
     TYPES,
     canonical,
 )
-from bridgegen.pipeline import Pipeline
-from bridgegen.report.sketch import sketch
 
 ALL = list(PARTICIPANTS.values())
 FILE = """

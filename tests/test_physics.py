@@ -6,18 +6,18 @@ from pathlib import Path
 import pytest
 
 import bridgegen
-from bridgegen import physics
-from bridgegen.conflict import _limits
-from bridgegen.conflict.plausibility import LIMITS
-from bridgegen.conflict.summary import CAREFUL_DRIVER
-from bridgegen.conflict.types import RULES, Rule
-from bridgegen.ego.drivers import CAREFUL, OTHERS, UN_R157
-from bridgegen.ego.kinds import CAR
-from bridgegen.metrics import METRICS
-from bridgegen.odd.expression import parse
-from bridgegen.odd.rules import GRIP_FORMULA
-from bridgegen.ontology.conduct import conduct_rules
-from bridgegen.ontology.sparql import literal
+from bridgegen.assess.conflict import _limits
+from bridgegen.assess.conflict.plausibility import LIMITS
+from bridgegen.assess.conflict.summary import CAREFUL_DRIVER
+from bridgegen.assess.conflict.types import RULES, Rule
+from bridgegen.assess.metrics import METRICS
+from bridgegen.base import physics
+from bridgegen.drivers.drivers import CAREFUL, OTHERS, UN_R157
+from bridgegen.drivers.kinds import CAR
+from bridgegen.scenario.language.expression import parse
+from bridgegen.scenario.language.rules import GRIP_FORMULA
+from bridgegen.scenario.ontology.conduct import conduct_rules
+from bridgegen.scenario.ontology.sparql import literal
 
 SOURCES = Path(bridgegen.__file__).parent
 
@@ -64,4 +64,4 @@ def test_no_other_module_states_them(number):
         for node in ast.walk(ast.parse(text))
         if isinstance(node, ast.Constant) and node.value == float(number)
     }
-    assert stating == {"physics.py"}
+    assert stating == {"base/physics.py"}

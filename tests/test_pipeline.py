@@ -3,13 +3,13 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 
-from bridgegen import metrics
-from bridgegen.conflict.quantities import MEASURED
-from bridgegen.errors import InputError, UnknownNameError
-from bridgegen.odd.reader import load
-from bridgegen.odd.scenario import Term
-from bridgegen.options import PipelineOptions
-from bridgegen.pipeline import Pipeline
+from bridgegen.assess import metrics
+from bridgegen.assess.conflict.quantities import MEASURED
+from bridgegen.base.errors import InputError, UnknownNameError
+from bridgegen.engine.options import PipelineOptions
+from bridgegen.engine.pipeline import Pipeline
+from bridgegen.scenario.language.reader import load
+from bridgegen.scenario.language.scenario import Term
 from bridgegen.simulation.embedded import simulator
 
 ALL_AXES = ("static", "participants", "weather")

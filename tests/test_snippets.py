@@ -31,20 +31,20 @@ import pytest
 import yaml
 from tests.command_lines import missing_lines, must_parse
 
-from bridgegen.campaign import driver_contract
-from bridgegen.campaign.exported import NOT_EXPORTED
 from bridgegen.cli import main
 from bridgegen.cli.run_files import keys_of, read_runs
 from bridgegen.cli.runs import search
-from bridgegen.exposure import read_exposure
-from bridgegen.odd.json_schema import schema
-from bridgegen.odd.plain_yaml import read_plain_yaml
-from bridgegen.odd.reader import load
-from bridgegen.odd.starter import start_scenario
-from bridgegen.ontology.check import check
-from bridgegen.ontology.files import load as load_owl
+from bridgegen.jobs.preventability.grid import DEFAULT_GRIDS
+from bridgegen.jobs.search import driver_contract
+from bridgegen.jobs.search.exported import NOT_EXPORTED
 from bridgegen.openx.openscenario.read import read
-from bridgegen.preventability.grid import DEFAULT_GRIDS
+from bridgegen.scenario.exposure import read_exposure
+from bridgegen.scenario.language.json_schema import schema
+from bridgegen.scenario.language.plain_yaml import read_plain_yaml
+from bridgegen.scenario.language.reader import load
+from bridgegen.scenario.language.starter import start_scenario
+from bridgegen.scenario.ontology.check import check
+from bridgegen.scenario.ontology.files import load as load_owl
 
 ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"

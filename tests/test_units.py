@@ -10,11 +10,11 @@ import yaml
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bridgegen.errors import ScenarioError
-from bridgegen.odd.json_schema import schema
-from bridgegen.odd.parameters import UNITS
-from bridgegen.odd.reader import load
-from bridgegen.units import WRITTEN, has_unit, in_unit
+from bridgegen.base.errors import ScenarioError
+from bridgegen.base.units import WRITTEN, has_unit, in_unit
+from bridgegen.scenario.language.json_schema import schema
+from bridgegen.scenario.language.parameters import UNITS
+from bridgegen.scenario.language.reader import load
 
 
 @pytest.mark.parametrize(
@@ -75,7 +75,7 @@ def test_refusals(text, unit, message):
 @pytest.fixture
 def cut_in(tmp_path):
     """Write the scenario cut-in with some texts replaced; return the file."""
-    folder = resources.files("bridgegen.catalogue")
+    folder = resources.files("bridgegen.scenario.catalogue")
     for one in folder.iterdir():
         if one.name.endswith(".yaml"):
             (tmp_path / one.name).write_bytes(one.read_bytes())

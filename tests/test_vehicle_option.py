@@ -7,12 +7,12 @@ import pytest
 from tests.campaign.braking import scenario_text, write_pair
 
 import bridgegen as bg
-from bridgegen.campaign.scenario_files import write_scenario
-from bridgegen.odd.reader import load
-from bridgegen.options import PipelineOptions
-from bridgegen.pipeline import Pipeline
-from bridgegen.preventability import CellClass, map_preventability
-from bridgegen.suite.suite import FILE, read_suite
+from bridgegen.engine.options import PipelineOptions
+from bridgegen.engine.pipeline import Pipeline
+from bridgegen.jobs.preventability import CellClass, map_preventability
+from bridgegen.jobs.search.scenario_files import write_scenario
+from bridgegen.jobs.suite.suite import FILE, read_suite
+from bridgegen.scenario.language.reader import load
 
 UNKNOWN = "unknown vehicle 'tank'; known: kinematic, multi-body, single-track"
 ELSEWHERE = "the vehicle 'single-track' is of the embedded simulator; esmini moves the ego in its"

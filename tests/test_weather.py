@@ -10,20 +10,20 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bridgegen.ego import _weather_columns as column
-from bridgegen.odd.checks import NEEDED
-from bridgegen.odd.expression import parse
-from bridgegen.odd.reader import load
-from bridgegen.ontology.individuals import build
-from bridgegen.ontology.questions import ask, questions
-from bridgegen.ontology.shapes import WEATHER_PATHS
-from bridgegen.ontology.vocabulary import XSD, bg, tbox
+from bridgegen.drivers import _weather_columns as column
 from bridgegen.openx.opendrive.from_owl import opendrive_from_owl
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.element import rewritten
 from bridgegen.openx.openscenario.from_owl import openscenario_from_owl
 from bridgegen.openx.openscenario.to_owl import individuals_from_openscenario
-from bridgegen.weather import (
+from bridgegen.scenario.language.checks import NEEDED
+from bridgegen.scenario.language.expression import parse
+from bridgegen.scenario.language.reader import load
+from bridgegen.scenario.ontology.individuals import build
+from bridgegen.scenario.ontology.questions import ask, questions
+from bridgegen.scenario.ontology.shapes import WEATHER_PATHS
+from bridgegen.scenario.ontology.vocabulary import XSD, bg, tbox
+from bridgegen.scenario.weather import (
     CARLA_FIELDS,
     CARLA_NAMES,
     COLUMNS,
@@ -68,7 +68,7 @@ def test_what_the_percentages_stand_for():
     assert RAIN.inverse(0.0) == 0.0
     assert VISIBILITY.inverse(1e4 / math.sqrt(200.0)) == pytest.approx(50.0)
     assert WIND.inverse(5.0) == pytest.approx(25.0)
-    text = (files("bridgegen.catalogue") / "weather.yaml").read_text("utf-8")
+    text = (files("bridgegen.scenario.catalogue") / "weather.yaml").read_text("utf-8")
     for said in ("0.1·500^(p/100) mm/h", "10000·200^(-f/100) m", "0.2 m/s of wind"):
         assert said in text
 
@@ -251,7 +251,7 @@ def test_every_phrase_is_of_a_column():
 
 
 def test_the_page_draws_what_it_is_sent_and_has_no_words_of_its_own():
-    web = files("bridgegen.report").joinpath("web")
+    web = files("bridgegen.pages").joinpath("web")
     drawing = (web / "atmosphere.js").read_text("utf-8")
     used = set(re.findall(r"\bweather\.(\w+)", drawing))
     sent = CLEAR.keys() | {"sight", "background"}

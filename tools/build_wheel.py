@@ -5,7 +5,7 @@
 
 It builds the wheel as `pip wheel` does, compiles every kernel that the catalogue's scenarios
 and the shipped drivers need in a copy of it, adds that code, and packs it again under a tag of its
-platform. See ``bridgegen.compilation.shipped`` for when an installation uses it.
+platform. See ``bridgegen.base.compilation.folder`` for when an installation uses it.
 """
 
 import argparse
@@ -24,13 +24,13 @@ PLATFORM = "manylinux_2_28_x86_64"
 COMPILE = """
 import numpy as np
 from importlib.resources import files
-from bridgegen.ego.drivers import DRIVERS
-from bridgegen.errors import BridgeGenError
-from bridgegen.odd.reader import load
-from bridgegen.options import PipelineOptions
-from bridgegen.pipeline import Pipeline
+from bridgegen.drivers.drivers import DRIVERS
+from bridgegen.base.errors import BridgeGenError
+from bridgegen.scenario.language.reader import load
+from bridgegen.engine.options import PipelineOptions
+from bridgegen.engine.pipeline import Pipeline
 
-for file in sorted(files("bridgegen.catalogue").iterdir()):
+for file in sorted(files("bridgegen.scenario.catalogue").iterdir()):
     if not file.name.endswith(".yaml"):
         continue
     for driver in (None, *DRIVERS):
@@ -45,7 +45,7 @@ for file in sorted(files("bridgegen.catalogue").iterdir()):
 """
 DESCRIBE = """
 import json
-from bridgegen.compilation.shipped import BASELINE, described, features
+from bridgegen.base.compilation.folder import BASELINE, described, features
 print(json.dumps([described(), BASELINE, features()]))
 """
 

@@ -37,7 +37,7 @@ CONFIRM = """
 import sys
 from dataclasses import replace
 from pathlib import Path
-from bridgegen.campaign.confirm import confirm
+from bridgegen.jobs.search.confirm import confirm
 from bridgegen.simulation import choice
 
 class Shifted:

@@ -10,7 +10,7 @@ import sys
 
 import numpy as np
 
-from bridgegen.search.environment import ScenarioVectorEnv
+from bridgegen.search.algorithms.environment import ScenarioVectorEnv
 
 
 def cross_entropy(environment: ScenarioVectorEnv, batches: int, seed: int = 0) -> list[float]:

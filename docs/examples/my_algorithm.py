@@ -8,8 +8,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from bridgegen.search import Problem, Results, Setting
-from bridgegen.search.algorithm import resolve
+from bridgegen.search.algorithms import Problem, Results, Setting
+from bridgegen.search.algorithms.algorithm import resolve
 
 
 class Neighbours:

@@ -6,7 +6,7 @@ bridgegen search cut-in --ego docs/examples/my_compiled_driver.py:drive
 
 import math
 
-from bridgegen.ego.compiled import compiled_driver
+from bridgegen.drivers.compiled import compiled_driver
 
 
 @compiled_driver()

@@ -6,7 +6,7 @@ bridgegen search cut-in --ego docs/examples/my_driver.py:MyDriver
 
 import numpy as np
 
-from bridgegen.ego.interface import Control, Observation, Scene
+from bridgegen.drivers.interface import Control, Observation, Scene
 
 
 class MyDriver:

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from bridgegen.ego.batches import FixedBatch
-from bridgegen.ego.policy import SIZE, control, vectors
+from bridgegen.drivers.batches import FixedBatch
+from bridgegen.drivers.policy import SIZE, control, vectors
 
 
 class MyNetwork:

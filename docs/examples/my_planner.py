@@ -6,7 +6,7 @@ bridgegen search cut-in --ego docs/examples/my_planner.py:MyPlanner
 
 import numpy as np
 
-from bridgegen.ego.interface import ROUTE_STEP, Observation, Scene, Trajectory
+from bridgegen.drivers.interface import ROUTE_STEP, Observation, Scene, Trajectory
 
 TIME = np.linspace(0.0, 3.0, 31)  # s from now
 GAP, HEADWAY = 3.0, 1.5  # m at standstill, s

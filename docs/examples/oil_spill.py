@@ -5,7 +5,7 @@ def spill(builder, values):
     """Add an event that changes the road's friction; the parameters give its numbers.
 
     Args:
-        builder: a ``bridgegen.ontology.builder.Builder`` that holds the scenario so far.
+        builder: a ``bridgegen.scenario.ontology.builder.Builder`` that holds the scenario so far.
         values: of every parameter, by name; not needed here, as the individuals are bound to them.
     """
     put, quantity = builder.put, builder.quantity

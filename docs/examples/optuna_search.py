@@ -11,8 +11,8 @@ from typing import ClassVar
 import numpy as np
 import optuna
 
-from bridgegen.search import Problem, Results, Setting
-from bridgegen.search.algorithm import resolve
+from bridgegen.search.algorithms import Problem, Results, Setting
+from bridgegen.search.algorithms.algorithm import resolve
 
 optuna.logging.set_verbosity(optuna.logging.WARNING)
 

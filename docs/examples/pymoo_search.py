@@ -13,8 +13,8 @@ from pymoo.core.problem import Problem as Space
 from pymoo.core.termination import NoTermination
 from pymoo.problems.static import StaticProblem
 
-from bridgegen.search import Problem, Results, Setting
-from bridgegen.search.algorithm import resolve
+from bridgegen.search.algorithms import Problem, Results, Setting
+from bridgegen.search.algorithms.algorithm import resolve
 
 
 class DE:

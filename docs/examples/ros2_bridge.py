@@ -3,7 +3,7 @@
 source /opt/ros/jazzy/setup.bash    # and start your stack with use_sim_time:=true
 bridgegen search cut-in --ego "exec:python3 server.py ros2_bridge.py:Ros2Driver"
 
-Here, python3 is ROS's; server.py and messages.py are src/bridgegen/ego/remote's, copied beside this
+Here, python3 is ROS's; server.py and messages.py are drivers/remote's, copied beside this
 file where BridgeGen is not installed for it. Published at each instant, in this order:
 
     /bridgegen/reset          std_msgs/Empty       only when a scenario begins: forget the last one

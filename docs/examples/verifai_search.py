@@ -13,8 +13,8 @@ import numpy as np
 from verifai.features import Box, Feature, FeatureSpace
 from verifai.samplers import FeatureSampler
 
-from bridgegen.search import Problem, Results, Setting
-from bridgegen.search.algorithm import resolve
+from bridgegen.search.algorithms import Problem, Results, Setting
+from bridgegen.search.algorithms.algorithm import resolve
 
 
 class Sampled(ABC):

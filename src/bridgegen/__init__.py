@@ -8,17 +8,18 @@ run.frame().query("critical").sort_values("d_min").head()
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from bridgegen.campaign import Run, resume, run_search
-    from bridgegen.campaign.confirm import confirm
-    from bridgegen.comparison import Comparison, compare
-    from bridgegen.dashboard import Dashboard, build_dashboard
-    from bridgegen.exposure import Exposure, exposure_of, read_exposure
-    from bridgegen.exposure.fit import Fit, fit_exposure
-    from bridgegen.odd.reader import load
-    from bridgegen.preventability import PreventabilityMap, map_preventability
-    from bridgegen.risk import Risk, estimate_risk
-    from bridgegen.safety_case import SafetyCase, export_safety_case
-    from bridgegen.simulate import simulate_file
+    from bridgegen.base import errors
+    from bridgegen.engine.simulate import simulate_file
+    from bridgegen.jobs.compare import Comparison, compare
+    from bridgegen.jobs.dashboard import Dashboard, build_dashboard
+    from bridgegen.jobs.preventability import PreventabilityMap, map_preventability
+    from bridgegen.jobs.risk import Risk, estimate_risk
+    from bridgegen.jobs.safety_case import SafetyCase, export_safety_case
+    from bridgegen.jobs.search import Run, resume, run_search
+    from bridgegen.jobs.search.confirm import confirm
+    from bridgegen.scenario.exposure import Exposure, exposure_of, read_exposure
+    from bridgegen.scenario.exposure.fit import Fit, fit_exposure
+    from bridgegen.scenario.language.reader import load
     from bridgegen.simulation.choice import SimulatorChoice
 
 __all__ = [
@@ -34,6 +35,7 @@ __all__ = [
     "build_dashboard",
     "compare",
     "confirm",
+    "errors",
     "estimate_risk",
     "export_safety_case",
     "exposure_of",
@@ -47,27 +49,28 @@ __all__ = [
 ]
 
 _HOMES = {
-    "Comparison": "bridgegen.comparison",
-    "compare": "bridgegen.comparison",
-    "Dashboard": "bridgegen.dashboard",
-    "build_dashboard": "bridgegen.dashboard",
-    "confirm": "bridgegen.campaign.confirm",
-    "Run": "bridgegen.campaign",
-    "Exposure": "bridgegen.exposure",
-    "Fit": "bridgegen.exposure.fit",
-    "exposure_of": "bridgegen.exposure",
-    "fit_exposure": "bridgegen.exposure.fit",
-    "read_exposure": "bridgegen.exposure",
-    "load": "bridgegen.odd.reader",
-    "map_preventability": "bridgegen.preventability",
-    "PreventabilityMap": "bridgegen.preventability",
-    "Risk": "bridgegen.risk",
-    "estimate_risk": "bridgegen.risk",
-    "resume": "bridgegen.campaign",
-    "run_search": "bridgegen.campaign",
-    "export_safety_case": "bridgegen.safety_case",
-    "SafetyCase": "bridgegen.safety_case",
-    "simulate_file": "bridgegen.simulate",
+    "Comparison": "bridgegen.jobs.compare",
+    "compare": "bridgegen.jobs.compare",
+    "Dashboard": "bridgegen.jobs.dashboard",
+    "build_dashboard": "bridgegen.jobs.dashboard",
+    "confirm": "bridgegen.jobs.search.confirm",
+    "errors": "bridgegen.base.errors",
+    "Run": "bridgegen.jobs.search",
+    "Exposure": "bridgegen.scenario.exposure",
+    "Fit": "bridgegen.scenario.exposure.fit",
+    "exposure_of": "bridgegen.scenario.exposure",
+    "fit_exposure": "bridgegen.scenario.exposure.fit",
+    "read_exposure": "bridgegen.scenario.exposure",
+    "load": "bridgegen.scenario.language.reader",
+    "map_preventability": "bridgegen.jobs.preventability",
+    "PreventabilityMap": "bridgegen.jobs.preventability",
+    "Risk": "bridgegen.jobs.risk",
+    "estimate_risk": "bridgegen.jobs.risk",
+    "resume": "bridgegen.jobs.search",
+    "run_search": "bridgegen.jobs.search",
+    "export_safety_case": "bridgegen.jobs.safety_case",
+    "SafetyCase": "bridgegen.jobs.safety_case",
+    "simulate_file": "bridgegen.engine.simulate",
     "SimulatorChoice": "bridgegen.simulation.choice",
 }
 
@@ -78,7 +81,8 @@ def __getattr__(name: str) -> Any:
         raise AttributeError(f"module 'bridgegen' has no attribute '{name}'")
     from importlib import import_module
 
-    return getattr(import_module(_HOMES[name]), name)
+    home = import_module(_HOMES[name])
+    return home if name == "errors" else getattr(home, name)
 
 
 def __dir__() -> list[str]:

@@ -7,15 +7,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import bridgegen as bg
-from bridgegen.adversary import OBSERVED
-from bridgegen.campaign.coverage import coverage_of
-from bridgegen.campaign.scenario_files import write_scenario
-from bridgegen.errors import InputError
-from bridgegen.odd.adversary import MARGIN, adversarial
-from bridgegen.odd.reader import load
-from bridgegen.options import PipelineOptions
-from bridgegen.pipeline import Pipeline
-from bridgegen.simulate import simulate_file
+from bridgegen.base.errors import InputError
+from bridgegen.engine.options import PipelineOptions
+from bridgegen.engine.pipeline import Pipeline
+from bridgegen.engine.simulate import simulate_file
+from bridgegen.jobs.search.coverage import coverage_of
+from bridgegen.jobs.search.scenario_files import write_scenario
+from bridgegen.scenario.language.adversary import MARGIN, adversarial
+from bridgegen.scenario.language.reader import load
+from bridgegen.simulation.adversary import OBSERVED
 from bridgegen.simulation.embedded.motion._steering_kernels import steer
 
 DT = 0.05

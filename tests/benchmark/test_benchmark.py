@@ -10,12 +10,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bridgegen.benchmark import BenchmarkCallbacks, benchmark_planners
-from bridgegen.benchmark.failures import failures_of
-from bridgegen.benchmark.plan import Cell
-from bridgegen.campaign.run import Run
-from bridgegen.errors import InputError, Interrupted, StorageError, UnknownNameError
-from bridgegen.participants import PARTICIPANTS
+from bridgegen.base.errors import InputError, Interrupted, StorageError, UnknownNameError
+from bridgegen.jobs.benchmark import BenchmarkCallbacks, benchmark_planners
+from bridgegen.jobs.benchmark.failures import failures_of
+from bridgegen.jobs.benchmark.plan import Cell
+from bridgegen.jobs.search.run import Run
+from bridgegen.scenario.participants import PARTICIPANTS
 
 GRID = {
     "scenarios": ["cut-in", "left-across-path"], "budget": 6, "seeds": 1, "keep": 1, "workers": 1,
@@ -180,7 +180,7 @@ def test_bad_arguments_are_one_error(package, tmp_path, changes, error, message)
 
 
 def test_without_planners_ours_take_part(monkeypatch, tmp_path):
-    from bridgegen.benchmark.plan import entrants, ours
+    from bridgegen.jobs.benchmark.plan import entrants, ours
 
     found = [one.name for one in entrants(None, ours())]
     assert found[-len(ours()) :] == list(ours())

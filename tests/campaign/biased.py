@@ -1,6 +1,6 @@
 """Other simulators than the embedded one: biased copies of it."""
 
-from bridgegen.errors import InputError
+from bridgegen.base.errors import InputError
 from bridgegen.simulation.choice import Kind
 
 

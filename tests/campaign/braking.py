@@ -2,10 +2,10 @@
 
 from pathlib import Path
 
-from bridgegen.odd.roads import usual
-from bridgegen.ontology.individuals import build_static
 from bridgegen.openx.opendrive.from_owl import opendrive_from_owl
 from bridgegen.openx.opendrive.write import to_xml as road_xml
+from bridgegen.scenario.language.roads import usual
+from bridgegen.scenario.ontology.individuals import build_static
 
 _VEHICLE = """<ScenarioObject name="{name}"><Vehicle name="car" vehicleCategory="car">
 <BoundingBox><Center x="1.4" y="0" z="0.75"/>

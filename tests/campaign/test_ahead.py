@@ -15,16 +15,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import bridgegen as bg
-from bridgegen.arrays import Float
-from bridgegen.campaign import SearchCallbacks
-from bridgegen.campaign.loop import LoopResult, Reason, run_loop
-from bridgegen.errors import InputError, Interrupted
-from bridgegen.search import ALGORITHMS, Problem, get
-from bridgegen.search.algorithm import asynchronous
-from bridgegen.store import Store
-from bridgegen.workers import Lost, Recipe
-from bridgegen.workers.pool import PoolStream, WorkerPool
-from bridgegen.workers.processes import Processes
+from bridgegen.base.arrays import Float
+from bridgegen.base.errors import InputError, Interrupted
+from bridgegen.engine.workers import Lost, Recipe
+from bridgegen.engine.workers.pool import PoolStream, WorkerPool
+from bridgegen.engine.workers.processes import Processes
+from bridgegen.jobs.search import SearchCallbacks
+from bridgegen.jobs.search.loop import LoopResult, Reason, run_loop
+from bridgegen.results.store import Store
+from bridgegen.search.algorithms import ALGORITHMS, Problem, get
+from bridgegen.search.algorithms.algorithm import asynchronous
 
 RESULT = ("id", "batch", "U", "X", "metrics", "F", "status", "critical")
 

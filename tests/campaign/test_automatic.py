@@ -3,9 +3,9 @@
 import pytest
 
 import bridgegen as bg
-from bridgegen.errors import InputError
-from bridgegen.search import names
-from bridgegen.search.automatic import AUTO, MOST_MODELLED, MOST_PARAMETERS, automatic
+from bridgegen.base.errors import InputError
+from bridgegen.search.algorithms import names
+from bridgegen.search.algorithms.automatic import AUTO, MOST_MODELLED, MOST_PARAMETERS, automatic
 
 QUIET = {"keep": 0, "causes": False, "deliver": False}
 

@@ -13,15 +13,15 @@ import numpy as np
 import pytest
 
 import bridgegen as bg
-from bridgegen.campaign import SearchCallbacks
-from bridgegen.campaign.critical import most_critical
+from bridgegen.assess.conflict.findings import COLUMNS
+from bridgegen.assess.metrics import METRICS
+from bridgegen.base.errors import InputError, StorageError, UnknownNameError
 from bridgegen.cli import main
-from bridgegen.conflict.findings import COLUMNS
-from bridgegen.errors import InputError, StorageError, UnknownNameError
-from bridgegen.metrics import METRICS
-from bridgegen.odd.reader import load
+from bridgegen.jobs.search import SearchCallbacks
+from bridgegen.jobs.search.critical import most_critical
 from bridgegen.openx.convert import import_file
-from bridgegen.store import Store
+from bridgegen.results.store import Store
+from bridgegen.scenario.language.reader import load
 
 TOWN05 = Path(__file__).parents[3] / "shared" / "data" / "Town05.xodr"
 
@@ -83,8 +83,8 @@ FIRST_SEVEN = ("n_collision", "ttc", "d_min", "v_d", "l_offset", "a_change", "n_
 def test_a_run_of_the_first_version_opens_resumes_and_is_reported(tmp_path, monkeypatch):
     """It holds seven metrics, in another order, and says nothing of more."""
     with monkeypatch.context() as patch:
-        patch.setattr("bridgegen.pipeline.metrics_of", lambda *_, **__: FIRST_SEVEN)
-        patch.setattr("bridgegen.campaign.campaign._finish", lambda *_: None)
+        patch.setattr("bridgegen.engine.pipeline.metrics_of", lambda *_, **__: FIRST_SEVEN)
+        patch.setattr("bridgegen.jobs.search.campaign._finish", lambda *_: None)
         bg.run_search("paper/crossroads-s4", algorithm="pso", budget=80, out=tmp_path / "run")
     first = load("paper/crossroads-s4")
     with sqlite3.connect(tmp_path / "run" / "run.sqlite") as connection:
@@ -362,7 +362,7 @@ def test_a_run_is_never_overwritten(tmp_path):
 
 def test_a_changed_scenario_is_not_gone_on_with(tmp_path):
     text = "\n".join(
-        (Path(bg.__file__).parent / "catalogue" / "crossroads-s4.yaml")
+        (Path(bg.__file__).parent / "scenario" / "catalogue" / "crossroads-s4.yaml")
         .read_text("utf-8")
         .split("\n")
     ).replace("scenario: crossroads-s4", "scenario: mine")

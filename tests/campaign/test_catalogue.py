@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 
 import bridgegen as bg
-from bridgegen.campaign.scenario_files import write_scenario
-from bridgegen.campaign.validate import validate_file
-from bridgegen.odd.reader import load, names
-from bridgegen.options import PipelineOptions
-from bridgegen.pipeline import Pipeline
-from bridgegen.simulate import simulate_file
-from bridgegen.store import Store
+from bridgegen.engine.options import PipelineOptions
+from bridgegen.engine.pipeline import Pipeline
+from bridgegen.engine.simulate import simulate_file
+from bridgegen.jobs.search.scenario_files import write_scenario
+from bridgegen.jobs.search.validate import validate_file
+from bridgegen.results.store import Store
+from bridgegen.scenario.language.reader import load, names
 
 
 @pytest.mark.parametrize("name", names())

@@ -11,10 +11,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from bridgegen.campaign.loop import Reason, run_loop
-from bridgegen.errors import StorageError
-from bridgegen.search import Restorable
-from bridgegen.store import Checkpoint, Store
+from bridgegen.base.errors import StorageError
+from bridgegen.jobs.search.loop import Reason, run_loop
+from bridgegen.results.store import Checkpoint, Store
+from bridgegen.search.algorithms import Restorable
 
 BUDGET = 60
 RESULT = ("id", "batch", "U", "X", "metrics", "F", "status", "critical")

@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 
 import bridgegen as bg
-from bridgegen.campaign.confirm import confirm
-from bridgegen.campaign.settings import Settings
-from bridgegen.errors import FileFormatError, InputError, Interrupted
+from bridgegen.base.errors import FileFormatError, InputError, Interrupted
+from bridgegen.jobs.search.confirm import confirm
+from bridgegen.jobs.search.settings import Settings
+from bridgegen.results.store import Store
 from bridgegen.simulation import choice
 from bridgegen.simulation.choice import SimulatorChoice
-from bridgegen.store import Store
 
 
 class Double:
@@ -219,7 +219,7 @@ def test_ctrl_c_keeps_what_is_done_and_the_rest_follows(folder, double):
 
 def test_what_is_killed_keeps_what_it_had_written(folder, double, monkeypatch):
     """A process that ends without a word: nothing after the last whole file is there."""
-    monkeypatch.setattr("bridgegen.campaign.confirm.SECONDS", 0.0)
+    monkeypatch.setattr("bridgegen.jobs.search.confirm.SECONDS", 0.0)
     written = threading.Event()
 
     def disturb(rollout):

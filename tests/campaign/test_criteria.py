@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from bridgegen import resume, run_search
-from bridgegen.errors import InputError
-from bridgegen.simulate import simulate_file
-from bridgegen.store import Store
-from bridgegen.verdict.of_run import PassFailCriteria
+from bridgegen.base.errors import InputError
+from bridgegen.cli.verdict.of_run import PassFailCriteria
+from bridgegen.engine.simulate import simulate_file
+from bridgegen.results.store import Store
 
 GAP = "R-12: always(gap to bv > 2 m)"
 BRAKE = "R-13: always(ego.a > -12 m/s²)"
@@ -95,7 +95,9 @@ def test_junit_has_a_test_for_each_and_fails_with_the_exit_status(tmp_path):
 def test_a_scenario_file_states_criteria(tmp_path):
     from importlib import resources
 
-    text = resources.files("bridgegen.catalogue").joinpath("cut-in.yaml").read_text("utf-8")
+    text = (
+        resources.files("bridgegen.scenario.catalogue").joinpath("cut-in.yaml").read_text("utf-8")
+    )
     text = text.replace(
         "objective: harm\n",
         "criteria:\n  - {id: R-12, formula: always(gap to bv > 2 m), severity: critical}\n"

@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
-from bridgegen.campaign.domain import domain_of, in_words, needed, outside
-from bridgegen.ego.planners.planner import DOMAINS
-from bridgegen.odd.reader import load
+from bridgegen.drivers.planners import DOMAINS
+from bridgegen.engine.options import PipelineOptions
+from bridgegen.engine.pipeline import Pipeline
+from bridgegen.engine.workers import Threads
+from bridgegen.jobs.search.domain import domain_of, in_words, needed, outside
 from bridgegen.openx.opendrive.from_owl.network import opendrive_from_owl
 from bridgegen.openx.source import build_static
-from bridgegen.options import PipelineOptions
-from bridgegen.pipeline import Pipeline
-from bridgegen.workers import Threads
+from bridgegen.scenario.language.reader import load
 
 
 @pytest.mark.parametrize(

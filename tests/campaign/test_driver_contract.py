@@ -5,9 +5,9 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from bridgegen.campaign import driver_contract
-from bridgegen.campaign.driver_contract import check_driver
 from bridgegen.cli import app
+from bridgegen.jobs.search import driver_contract
+from bridgegen.jobs.search.driver_contract import check_driver
 
 DRIVERS = Path(__file__).parents[1] / "ego" / "drivers.py"
 NETWORKS = DRIVERS.with_name("network_drivers.py")
@@ -22,7 +22,7 @@ def short_scenarios(tmp_path_factory):
     """The folder of two scenarios that end after 8 s."""
     folder = tmp_path_factory.mktemp("scenarios")
     for name in (CROSSROADS, CUT_IN):
-        text = resources.files("bridgegen.catalogue").joinpath(name).read_text("utf-8")
+        text = resources.files("bridgegen.scenario.catalogue").joinpath(name).read_text("utf-8")
         short, n = re.subn(r"^duration: [\d.]+", "duration: 8.0", text, flags=re.M)
         assert n == 1
         (folder / name).write_text(short, "utf-8")
@@ -115,7 +115,7 @@ def test_a_driver_that_is_another_one_in_another_process_is_found_out():
 def test_a_driver_that_rounds_by_the_batch_is_told_what_to_do():
     found = broken("RoundsByBatch")
     problem = found["a row alone moves as it does among others"]
-    assert "bridgegen.ego.batches.FixedBatch" in problem
+    assert "bridgegen.drivers.batches.FixedBatch" in problem
     before, after = (
         words.split()[0].rstrip(";") for words in problem.split(" = ")[1].split("then ")
     )

@@ -5,8 +5,8 @@ import re
 import pytest
 
 import bridgegen as bg
-from bridgegen.campaign import SearchCallbacks
-from bridgegen.errors import InputError, UnknownNameError
+from bridgegen.base.errors import InputError, UnknownNameError
+from bridgegen.jobs.search import SearchCallbacks
 
 from .braking import USUAL, scenario_text, write_pair
 

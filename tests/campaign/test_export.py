@@ -10,16 +10,16 @@ import pytest
 from lxml import etree
 
 import bridgegen as bg
-from bridgegen.campaign.export import FLAVOURS, export
-from bridgegen.campaign.scenario_files import write_scenario
-from bridgegen.campaign.validate import validate_file
-from bridgegen.errors import FileFormatError, InputError, StorageError, UnsupportedError
-from bridgegen.odd.reader import load, names
+from bridgegen.base.errors import FileFormatError, InputError, StorageError, UnsupportedError
+from bridgegen.engine.pipeline import Pipeline
+from bridgegen.engine.simulate import FileResult
+from bridgegen.jobs.search.export import FLAVOURS, export
+from bridgegen.jobs.search.scenario_files import write_scenario
+from bridgegen.jobs.search.validate import validate_file
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.element import references, walk
 from bridgegen.openx.openscenario.read import read
-from bridgegen.pipeline import Pipeline
-from bridgegen.simulate import FileResult
+from bridgegen.scenario.language.reader import load, names
 
 SCHEMAS = {
     "1.2": "1.2.0",

@@ -8,15 +8,15 @@ import pytest
 from lxml import etree
 
 import bridgegen as bg
-from bridgegen.campaign.export import export
-from bridgegen.campaign.scenario_files import write_scenario
-from bridgegen.errors import InputError, UnsupportedError
-from bridgegen.odd.reader import load, names
+from bridgegen.base.errors import InputError, UnsupportedError
+from bridgegen.engine.pipeline import Pipeline
+from bridgegen.jobs.search.export import export
+from bridgegen.jobs.search.scenario_files import write_scenario
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.element import walk
 from bridgegen.openx.openscenario.read import read
 from bridgegen.openx.openscenario.write import to_xml
-from bridgegen.pipeline import Pipeline
+from bridgegen.scenario.language.reader import load, names
 
 MM = 1e-3
 

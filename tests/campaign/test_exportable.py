@@ -7,16 +7,16 @@ import numpy as np
 import pytest
 
 import bridgegen as bg
-from bridgegen.campaign import critical
-from bridgegen.campaign.exportable import corners
-from bridgegen.campaign.exported import NOT_EXPORTED, Refused, not_exported
-from bridgegen.campaign.scenario_files import write_scenario
-from bridgegen.campaign.validate import validate_file
-from bridgegen.errors import OntologyError, StorageError
-from bridgegen.odd.reader import load
-from bridgegen.odd.starter import start_scenario
-from bridgegen.pipeline import Pipeline
-from bridgegen.screen.search import print_summary
+from bridgegen.base.errors import OntologyError, StorageError
+from bridgegen.cli.terminal.search import print_summary
+from bridgegen.engine.pipeline import Pipeline
+from bridgegen.jobs.search import critical
+from bridgegen.jobs.search.exportable import corners
+from bridgegen.jobs.search.exported import NOT_EXPORTED, Refused, not_exported
+from bridgegen.jobs.search.scenario_files import write_scenario
+from bridgegen.jobs.search.validate import validate_file
+from bridgegen.scenario.language.reader import load
+from bridgegen.scenario.language.starter import start_scenario
 
 
 @pytest.fixture

@@ -3,9 +3,9 @@
 from collections import Counter
 
 import bridgegen as bg
-from bridgegen.campaign import SearchCallbacks
-from bridgegen.pipeline import Pipeline
-from bridgegen.store import Store
+from bridgegen.engine.pipeline import Pipeline
+from bridgegen.jobs.search import SearchCallbacks
+from bridgegen.results.store import Store
 
 
 def test_an_exported_scenario_is_simulated_once(tmp_path, monkeypatch):

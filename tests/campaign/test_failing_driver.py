@@ -9,11 +9,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from typer.testing import CliRunner
 
-from bridgegen import campaign
-from bridgegen.campaign.failing_driver import LEAST, FailingDriver
+from bridgegen.base.errors import InputError
 from bridgegen.cli import app
-from bridgegen.errors import InputError
-from bridgegen.store import Store
+from bridgegen.jobs import search as campaign
+from bridgegen.jobs.search.searcher import LEAST, FailingDriver
+from bridgegen.results.store import Store
 
 DRIVERS = Path(__file__).parents[1] / "ego" / "drivers.py"
 COMPILED = DRIVERS.with_name("compiled_drivers.py")

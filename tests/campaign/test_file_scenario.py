@@ -9,11 +9,11 @@ import pytest
 from scipy import stats
 
 import bridgegen as bg
-from bridgegen.campaign import SearchCallbacks
-from bridgegen.campaign.validate import validate_file
+from bridgegen.base.errors import BridgeGenError, InputError, Interrupted, StorageError
 from bridgegen.cli import main
-from bridgegen.errors import BridgeGenError, InputError, Interrupted, StorageError
-from bridgegen.store import Store
+from bridgegen.jobs.search import SearchCallbacks
+from bridgegen.jobs.search.validate import validate_file
+from bridgegen.results.store import Store
 
 from .braking import (
     deterministic,

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from bridgegen.campaign import Run, SearchCallbacks, run_search
-from bridgegen.errors import StorageError
-from bridgegen.verdict.of_run import PassFailCriteria, figures_of
+from bridgegen.base.errors import StorageError
+from bridgegen.cli.verdict.of_run import PassFailCriteria, figures_of
+from bridgegen.jobs.search import Run, SearchCallbacks, run_search
 
 DOUBLE_PARKED = Path(__file__).parent / "double-parked.yaml"
 

@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 
 import bridgegen as bg
-from bridgegen.campaign import SearchCallbacks
-from bridgegen.errors import InputError, Interrupted, UnknownNameError
-from bridgegen.odd.criteria import read_criteria
-from bridgegen.verdict.of_run import PassFailCriteria
-from bridgegen.workers.processes import Processes
+from bridgegen.base.errors import InputError, Interrupted, UnknownNameError
+from bridgegen.cli.verdict.of_run import PassFailCriteria
+from bridgegen.engine.workers.processes import Processes
+from bridgegen.jobs.search import SearchCallbacks
+from bridgegen.scenario.language.criteria import read_criteria
 
 GAP, TTC, CRASH = "R-12: always(gap to bv > 2 m)", "R-13: ttc >= 1.5 s", "R-14: n_collision == 0"
 BUDGET = 240
@@ -209,7 +209,7 @@ def test_a_run_from_before_criteria_opens_and_resumes(tmp_path):
 
 def test_margins_are_columns_of_parquet_files(falsified, tmp_path):
     parquet = pytest.importorskip("pyarrow.parquet")
-    from bridgegen.campaign.table import write_tables
+    from bridgegen.jobs.search.table import write_tables
 
     (path,) = write_tables([falsified.folder], tmp_path)
     table = parquet.read_table(path).to_pydict()

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 import bridgegen as bg
-from bridgegen.campaign.table import _columns, write_tables
-from bridgegen.campaign.validate import validate_file
+from bridgegen.cli.verdict.of_run import PassFailCriteria
+from bridgegen.jobs.search.table import _columns, write_tables
+from bridgegen.jobs.search.validate import validate_file
 from bridgegen.openx.openscenario.read import read
-from bridgegen.report.show import show_scenario
-from bridgegen.store import Store
-from bridgegen.verdict.of_run import PassFailCriteria
+from bridgegen.pages.scenario_page import show_scenario
+from bridgegen.results.store import Store
 
 EXAMPLE = Path(__file__).parents[2] / "docs/examples/braking-manner.yaml"
 NAMES = ("gentle", "firm", "emergency")

@@ -2,8 +2,8 @@ import tracemalloc
 
 import numpy as np
 
-from bridgegen.campaign import known_rows
-from bridgegen.campaign.known_rows import KnownRows
+from bridgegen.jobs.search import known_rows
+from bridgegen.jobs.search.known_rows import KnownRows
 
 
 def test_ids_are_those_of_a_dict(monkeypatch):

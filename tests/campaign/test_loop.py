@@ -9,10 +9,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from bridgegen.campaign.loop import Progress, Reason, run_loop
-from bridgegen.errors import InputError, StorageError
-from bridgegen.search import Problem, Results, get
-from bridgegen.store import Store
+from bridgegen.base.errors import InputError, StorageError
+from bridgegen.jobs.search.loop import Progress, Reason, run_loop
+from bridgegen.results.store import Store
+from bridgegen.search.algorithms import Problem, Results, get
 
 RESULT = ("id", "batch", "U", "X", "metrics", "F", "status", "critical")
 
@@ -342,9 +342,9 @@ KILLED = """
 import os, sys, time
 from types import SimpleNamespace
 import numpy as np
-from bridgegen.campaign.loop import run_loop
-from bridgegen.search import Problem, get
-from bridgegen.store import Store
+from bridgegen.jobs.search.loop import run_loop
+from bridgegen.search.algorithms import Problem, get
+from bridgegen.results.store import Store
 
 folder, log, name = sys.argv[1:]
 log = os.open(log, os.O_WRONLY | os.O_APPEND | os.O_CREAT)

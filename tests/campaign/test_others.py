@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 import bridgegen as bg
-from bridgegen.campaign.export import export
-from bridgegen.campaign.settings import Settings
-from bridgegen.errors import UnknownNameError, UnsupportedError
+from bridgegen.base.errors import UnknownNameError, UnsupportedError
+from bridgegen.jobs.search.export import export
+from bridgegen.jobs.search.settings import Settings
 from bridgegen.openx.convert import import_file
-from bridgegen.store import Store
+from bridgegen.results.store import Store
 
 
 def settings_of(folder):

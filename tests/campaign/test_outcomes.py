@@ -7,24 +7,14 @@ import pyoxigraph as ox
 import pytest
 
 import bridgegen as bg
-from bridgegen.campaign.scenario_files import write_scenario
-from bridgegen.cause import CAUSES
-from bridgegen.conflict.analysis import CONTACT, NEAR_MISS, analyse
-from bridgegen.conflict.outcomes import with_outcomes
-from bridgegen.conflict.summary import summarise
-from bridgegen.conflict.types import ConflictType, Responsible
-from bridgegen.errors import InputError
-from bridgegen.odd.reader import load
-from bridgegen.odd.roads import usual
-from bridgegen.ontology.check import check
-from bridgegen.ontology.files import from_bytes, to_bytes
-from bridgegen.ontology.files import load as load_owl
-from bridgegen.ontology.graph import Individuals
-from bridgegen.ontology.individuals import build_static
-from bridgegen.ontology.questions import ask
-from bridgegen.ontology.reasoner import reason, require
-from bridgegen.ontology.vocabulary import bg as tbox_property
-from bridgegen.ontology.vocabulary import local_name, tbox
+from bridgegen.assess.cause import CAUSES
+from bridgegen.assess.conflict.analysis import CONTACT, NEAR_MISS, analyse
+from bridgegen.assess.conflict.outcomes import with_outcomes
+from bridgegen.assess.conflict.summary import summarise
+from bridgegen.assess.conflict.types import ConflictType, Responsible
+from bridgegen.base.errors import InputError
+from bridgegen.engine.pipeline import Pipeline
+from bridgegen.jobs.search.scenario_files import write_scenario
 from bridgegen.openx.convert import convert_file, import_file
 from bridgegen.openx.file_scenario import load_file_scenario
 from bridgegen.openx.on_map import on_map
@@ -35,7 +25,17 @@ from bridgegen.openx.openscenario.from_owl import openscenario_from_owl
 from bridgegen.openx.openscenario.from_owl.notes import FINDINGS
 from bridgegen.openx.openscenario.read import read
 from bridgegen.openx.openscenario.write import to_xml
-from bridgegen.pipeline import Pipeline
+from bridgegen.scenario.language.reader import load
+from bridgegen.scenario.language.roads import usual
+from bridgegen.scenario.ontology.check import check
+from bridgegen.scenario.ontology.files import from_bytes, to_bytes
+from bridgegen.scenario.ontology.files import load as load_owl
+from bridgegen.scenario.ontology.graph import Individuals
+from bridgegen.scenario.ontology.individuals import build_static
+from bridgegen.scenario.ontology.questions import ask
+from bridgegen.scenario.ontology.reasoner import reason, require
+from bridgegen.scenario.ontology.vocabulary import bg as tbox_property
+from bridgegen.scenario.ontology.vocabulary import local_name, tbox
 
 
 def records(individuals):

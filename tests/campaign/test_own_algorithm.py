@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 import bridgegen as bg
-from bridgegen.campaign import SearchCallbacks
-from bridgegen.errors import InputError, Interrupted, StorageError
-from bridgegen.search import Problem, Results, get
-from bridgegen.store import Store
+from bridgegen.base.errors import InputError, Interrupted, StorageError
+from bridgegen.jobs.search import SearchCallbacks
+from bridgegen.results.store import Store
+from bridgegen.search.algorithms import Problem, Results, get
 
 EXAMPLES = Path(__file__).parents[2] / "docs" / "examples"
 OWN = f"{EXAMPLES}/my_algorithm.py:Neighbours"

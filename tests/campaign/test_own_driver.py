@@ -4,10 +4,10 @@ from pathlib import Path
 
 import pytest
 
-from bridgegen import campaign
-from bridgegen.errors import InputError, UnsupportedError
-from bridgegen.simulate import simulate_file
-from bridgegen.store import Store
+from bridgegen.base.errors import InputError, UnsupportedError
+from bridgegen.engine.simulate import simulate_file
+from bridgegen.jobs import search as campaign
+from bridgegen.results.store import Store
 
 DRIVERS = Path(__file__).parents[1] / "ego" / "drivers.py"
 COMPILED = DRIVERS.with_name("compiled_drivers.py")

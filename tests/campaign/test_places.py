@@ -11,22 +11,22 @@ import numpy as np
 import pytest
 
 import bridgegen as bg
-from bridgegen.campaign import Run
-from bridgegen.campaign.places import PlaceFit, places_of
-from bridgegen.campaign.restored import searched
-from bridgegen.campaign.validate import validate_file
-from bridgegen.errors import BridgeGenError, InputError, StorageError, UnsupportedError
-from bridgegen.odd.parameters import Axis
-from bridgegen.odd.reader import load
-from bridgegen.ontology.individuals import build_static
+from bridgegen.base.errors import BridgeGenError, InputError, StorageError, UnsupportedError
+from bridgegen.engine.pipeline import Pipeline
+from bridgegen.jobs.search import Run
+from bridgegen.jobs.search.places import PlaceFit, places_of
+from bridgegen.jobs.search.restored import searched
+from bridgegen.jobs.search.validate import validate_file
 from bridgegen.openx.on_map import on_map, searchable
 from bridgegen.openx.opendrive.from_owl import opendrive_from_owl
 from bridgegen.openx.opendrive.model import OpenDrive
 from bridgegen.openx.opendrive.rings import rings
 from bridgegen.openx.opendrive.road_map import load_map
 from bridgegen.openx.opendrive.write import to_xml
-from bridgegen.pipeline import Pipeline
-from bridgegen.report.map_picture import write_map_picture
+from bridgegen.pages.map_picture import write_map_picture
+from bridgegen.scenario.language.parameters import Axis
+from bridgegen.scenario.language.reader import load
+from bridgegen.scenario.ontology.individuals import build_static
 
 TOWN05 = Path(__file__).parents[3] / "shared" / "data" / "Town05.xodr"
 

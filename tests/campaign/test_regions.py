@@ -5,13 +5,13 @@ import numpy as np
 import pytest
 
 import bridgegen as bg
-from bridgegen.campaign.coverage import coverage_of
-from bridgegen.campaign.regions import regions_of
-from bridgegen.errors import InputError, ScenarioError, StorageError
-from bridgegen.odd.within import in_box
-from bridgegen.ontology.files import load
-from bridgegen.ontology.vocabulary import LABEL
-from bridgegen.store import Store
+from bridgegen.base.errors import InputError, ScenarioError, StorageError
+from bridgegen.jobs.search.coverage import coverage_of
+from bridgegen.jobs.search.regions import regions_of
+from bridgegen.results.store import Store
+from bridgegen.scenario.language.within import in_box
+from bridgegen.scenario.ontology.files import load
+from bridgegen.scenario.ontology.vocabulary import LABEL
 
 from .braking import limits, stochastic, write_pair
 
@@ -51,7 +51,7 @@ def copied(folder, place, **changes):
 
 def test_regions_hold_for_scenarios_found_by_trying(folder, found):
     """Independent rows of the whole space, those outside a region thrown away."""
-    from bridgegen.campaign.restored import pipeline_of
+    from bridgegen.jobs.search.restored import pipeline_of
 
     assert len(found.found.confirmed) >= 2
     pipeline = pipeline_of(bg.Run(folder), "regions")

@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 import bridgegen as bg
-from bridgegen.campaign import SearchCallbacks
-from bridgegen.campaign.restored import pipeline_of
+from bridgegen.base.errors import InputError, Interrupted
 from bridgegen.cli import main
-from bridgegen.errors import InputError, Interrupted
+from bridgegen.jobs.search import SearchCallbacks
+from bridgegen.jobs.search.restored import pipeline_of
+from bridgegen.results.store import Store
 from bridgegen.simulation import choice
 from bridgegen.simulation.choice import EMBEDDED, SimulatorChoice
-from bridgegen.store import Store
 
 from .biased import biased_kind, not_finite, slower
 from .braking import write_pair
@@ -84,7 +84,7 @@ def test_the_results_are_those_of_the_run_s_simulator(tmp_path):
 
 def test_workers_do_not_matter(tmp_path, monkeypatch):
     """Processes know no simulator of a test's: the embedded one screens for itself here."""
-    monkeypatch.setattr("bridgegen.campaign.campaign.require_screen", lambda given, budget: None)
+    monkeypatch.setattr("bridgegen.jobs.search.campaign.require_screen", lambda given, budget: None)
     given = {"simulator": EMBEDDED, "budget": 16}
     one, other = (search(tmp_path / str(n), workers=n, **given) for n in (None, 2))
     assert rows(one.folder) == rows(other.folder)
@@ -142,7 +142,7 @@ def test_the_same_simulator_with_other_settings_is_a_screen(tmp_path):
 
 
 def test_a_screen_that_fails_everywhere_is_said_in_a_line(tmp_path, monkeypatch):
-    from bridgegen.pipeline import Pipeline
+    from bridgegen.engine.pipeline import Pipeline
 
     evaluate = Pipeline.evaluate
 

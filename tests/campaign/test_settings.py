@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from bridgegen.campaign.settings import DEFAULTS_BEFORE_FIELD, RECORDED_AS, Settings
-from bridgegen.errors import StorageError
-from bridgegen.options import SearchOptions, options_of
+from bridgegen.base.errors import StorageError
+from bridgegen.engine.options import SearchOptions, options_of
+from bridgegen.jobs.search.settings import DEFAULTS_BEFORE_FIELD, RECORDED_AS, Settings
 from bridgegen.simulation.choice import EMBEDDED
 
 PLACE = Path("runs/s3")

@@ -6,10 +6,10 @@ import json
 import numpy as np
 import pytest
 
-from bridgegen.campaign import run_search
-from bridgegen.campaign.table import CHUNK, RUN, WEIGHT, write_tables
-from bridgegen.errors import InputError, StorageError
-from bridgegen.store import Store
+from bridgegen.base.errors import InputError, StorageError
+from bridgegen.jobs.search import run_search
+from bridgegen.jobs.search.table import CHUNK, RUN, WEIGHT, write_tables
+from bridgegen.results.store import Store
 
 missing = importlib.util.find_spec("pyarrow") is None
 pytestmark = [
@@ -88,7 +88,7 @@ def test_a_sample_keeps_what_is_critical_and_stands_for_the_rest(runs, tmp_path)
 def test_rows_are_written_a_part_at_a_time(runs, tmp_path, monkeypatch):
     assert CHUNK > 400
     (path,) = write_tables(runs[:1], tmp_path / "a")
-    monkeypatch.setattr("bridgegen.campaign.table.CHUNK", 37)
+    monkeypatch.setattr("bridgegen.jobs.search.table.CHUNK", 37)
     (parts,) = write_tables(runs[:1], tmp_path / "b")
     assert read(parts).combine_chunks().equals(read(path).combine_chunks())
 

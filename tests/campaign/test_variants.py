@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 import bridgegen as bg
-from bridgegen.campaign import SearchCallbacks
-from bridgegen.errors import FileFormatError
+from bridgegen.base.errors import FileFormatError
+from bridgegen.engine.options import PipelineOptions
+from bridgegen.engine.pipeline import Pipeline
+from bridgegen.jobs.search import SearchCallbacks
 from bridgegen.openx.file_scenario import load_file_scenario
-from bridgegen.options import PipelineOptions
-from bridgegen.pipeline import Pipeline
-from bridgegen.report.playbacks import nominal_playback
-from bridgegen.store import Store
+from bridgegen.pages.playbacks import nominal_playback
+from bridgegen.results.store import Store
 
 from .braking import deterministic, limits, scenario_text, stochastic, value_sets, write_pair
 

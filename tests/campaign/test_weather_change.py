@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
-from bridgegen.campaign.scenario_files import write_scenario
-from bridgegen.campaign.validate import validate_file
-from bridgegen.odd.reader import load
-from bridgegen.odd.starter import start_scenario
-from bridgegen.ontology.files import load as load_owl
-from bridgegen.ontology.questions import ask
-from bridgegen.pipeline import Pipeline
-from bridgegen.simulate import simulate_file
+from bridgegen.engine.pipeline import Pipeline
+from bridgegen.engine.simulate import simulate_file
+from bridgegen.jobs.search.scenario_files import write_scenario
+from bridgegen.jobs.search.validate import validate_file
+from bridgegen.scenario.language.reader import load
+from bridgegen.scenario.language.starter import start_scenario
+from bridgegen.scenario.ontology.files import load as load_owl
+from bridgegen.scenario.ontology.questions import ask
 
 
 @pytest.fixture

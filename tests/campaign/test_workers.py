@@ -11,13 +11,14 @@ import numpy as np
 import pytest
 
 import bridgegen as bg
-from bridgegen.campaign import SearchCallbacks
-from bridgegen.errors import UnknownNameError
-from bridgegen.odd.reader import load
-from bridgegen.options import PipelineOptions
+from bridgegen.base.errors import UnknownNameError
+from bridgegen.engine.options import PipelineOptions
+from bridgegen.engine.pipeline import Pipeline
+from bridgegen.engine.workers.processes import Processes
+from bridgegen.jobs.search import SearchCallbacks
+from bridgegen.results.store import Store
+from bridgegen.scenario.language.reader import load
 from bridgegen.simulation.rollout import WORKER_ENDED
-from bridgegen.store import Store
-from bridgegen.workers.processes import Processes
 
 DRIVERS = Path(__file__).parents[1] / "ego" / "drivers.py"
 DOUBLES = Path(__file__).parents[1] / "workers" / "doubles"
@@ -80,7 +81,7 @@ def test_a_row_that_takes_its_process_with_it_fails_alone(monkeypatch):
     assert np.isnan(found.metrics[3]).all()
     assert not found.critical[3]
     others = np.arange(3)
-    calm = bg.pipeline.Pipeline(scenario, space, PipelineOptions(causes=True))
+    calm = Pipeline(scenario, space, PipelineOptions(causes=True))
     calm.choose_objective()
     expected = calm.evaluate(X[others])
     for name in ("metrics", "F", "critical", "cause"):

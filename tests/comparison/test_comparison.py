@@ -15,16 +15,16 @@ import numpy as np
 import pytest
 
 import bridgegen as bg
-from bridgegen.campaign.coverage import coverage_of
+from bridgegen.base.errors import InputError, Interrupted, StorageError, UnknownNameError
 from bridgegen.cli import main
-from bridgegen.comparison import ComparisonCallbacks
-from bridgegen.comparison.page import FIGURE_NAMES
-from bridgegen.comparison.plan import Cell
-from bridgegen.comparison.record import points
-from bridgegen.errors import InputError, Interrupted, StorageError, UnknownNameError
-from bridgegen.search.random import Random
-from bridgegen.search.registry import ALGORITHMS
-from bridgegen.store import Store
+from bridgegen.jobs.compare import ComparisonCallbacks
+from bridgegen.jobs.compare.page import FIGURE_NAMES
+from bridgegen.jobs.compare.plan import Cell
+from bridgegen.jobs.compare.record import points
+from bridgegen.jobs.search.coverage import coverage_of
+from bridgegen.results.store import Store
+from bridgegen.search.algorithms.registry import ALGORITHMS
+from bridgegen.search.algorithms.sampling import Random
 
 GRID = {"algorithms": ["random", "pso"], "seeds": 2, "budget": 120, "baseline": "random",
         "objective": {"paper": None}}  # fmt: skip

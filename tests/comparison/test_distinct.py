@@ -4,8 +4,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from bridgegen.comparison.distinct import distinct, normalised
-from bridgegen.odd.reader import load
+from bridgegen.jobs.compare.distinct import distinct, normalised
+from bridgegen.scenario.language.reader import load
 
 clouds = st.tuples(st.integers(0, 40), st.integers(1, 4)).flatmap(
     lambda shape: arrays(np.float64, shape, elements=st.integers(0, 16).map(lambda k: k / 16))

@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
-from bridgegen.comparison import figures
-from bridgegen.comparison.drawing import DARK, LIGHT
+from bridgegen.jobs.compare import figures
+from bridgegen.jobs.compare.figures import DARK, LIGHT
 
 PNG = b"\x89PNG\r\n\x1a\n"
 

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from bridgegen.comparison.fronts import Scale, front, generational_distance, hypervolume, spread
+from bridgegen.jobs.compare.fronts import Scale, front, generational_distance, hypervolume, spread
 
 grids = st.tuples(st.integers(1, 30), st.integers(1, 3)).flatmap(
     lambda shape: arrays(np.float64, shape, elements=st.integers(0, 8).map(lambda k: k / 8))

@@ -5,10 +5,10 @@ import math
 import numpy as np
 import pytest
 
-from bridgegen.comparison.measures import counts, measure, measures, ordinal, others, waited_for
-from bridgegen.comparison.plan import Cell
-from bridgegen.comparison.record import Record, modes_of
-from bridgegen.conflict.findings import Findings
+from bridgegen.assess.conflict.findings import Findings
+from bridgegen.jobs.compare.measures import counts, measure, measures, ordinal, others, waited_for
+from bridgegen.jobs.compare.plan import Cell
+from bridgegen.jobs.compare.record import Record, modes_of
 
 INF = math.inf
 

@@ -7,10 +7,10 @@ import sys
 import pytest
 
 import bridgegen as bg
+from bridgegen.base.errors import InputError, StorageError
 from bridgegen.cli import main
-from bridgegen.comparison.plan import Cell, begin, make_plan
-from bridgegen.errors import InputError, StorageError
-from bridgegen.options import CommonOptions
+from bridgegen.engine.options import CommonOptions
+from bridgegen.jobs.compare.plan import Cell, begin, make_plan
 
 
 @pytest.fixture
@@ -22,7 +22,7 @@ def plans(monkeypatch):
         found.append(plan)
         raise InputError("not today")
 
-    monkeypatch.setattr("bridgegen.comparison.comparison.begin", keep)
+    monkeypatch.setattr("bridgegen.jobs.compare.comparison.begin", keep)
     return found
 
 

@@ -7,10 +7,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bridgegen.comparison.fronts import front
-from bridgegen.comparison.record import _Reader, points
-from bridgegen.conflict.findings import Findings
-from bridgegen.store.rows import Rows
+from bridgegen.assess.conflict.findings import Findings
+from bridgegen.jobs.compare.fronts import front
+from bridgegen.jobs.compare.record import _Reader, points
+from bridgegen.results.store.rows import Rows
 
 
 def rows_of(n: int, seed: int) -> Rows:

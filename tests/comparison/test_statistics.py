@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.stats import mannwhitneyu
 
-from bridgegen.comparison.statistics import a12, effect, holm, mann_whitney, quartiles
+from bridgegen.base.statistics import a12, effect, holm, mann_whitney, quartiles
 
 INF, NAN = math.inf, math.nan
 values = st.lists(st.integers(-5, 5).map(float) | st.just(INF), min_size=1, max_size=9)

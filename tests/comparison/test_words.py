@@ -4,16 +4,16 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from bridgegen.comparison import words
-from bridgegen.comparison.measures import measures
-from bridgegen.comparison.plan import Cell
-from bridgegen.comparison.table import Line, summarise
+from bridgegen.jobs.compare import words
+from bridgegen.jobs.compare.measures import measures
+from bridgegen.jobs.compare.plan import Cell
+from bridgegen.jobs.compare.table import Line, summarise
 
 MEASURES = {one.name: one for one in measures(1000)}
 
 
 def line(p: float, a12: float, values=(1.0, 2.0, 3.0)) -> Line:
-    from bridgegen.comparison.statistics import quartiles
+    from bridgegen.base.statistics import quartiles
 
     return Line("s", "pso", "to_50", 3, 0, quartiles(np.array(values)), p, p, a12)
 

@@ -3,9 +3,8 @@
 import os
 from pathlib import Path
 
-from bridgegen.comparison.runs import RunCallbacks, Task, evaluations_of
-from bridgegen.comparison.workers import run_all
-from bridgegen.options import SearchOptions
+from bridgegen.engine.options import SearchOptions
+from bridgegen.jobs.compare.runs import RunCallbacks, Task, evaluations_of, run_all
 
 
 class Bomb(str):

@@ -15,7 +15,7 @@ LOW = """
 import math
 
 from bridgegen._constants import FACTOR
-from bridgegen.compiled import kernel
+from bridgegen.base.compiled import kernel
 
 
 @kernel
@@ -24,7 +24,7 @@ def low(x):
 """
 HIGH = """
 from bridgegen._low_kernels import low
-from bridgegen.compiled import kernel
+from bridgegen.base.compiled import kernel
 
 
 @kernel
@@ -32,7 +32,7 @@ def high(x):
     return low(x) + low(x + 1.0)
 """
 OTHER = """
-from bridgegen.compiled import kernel
+from bridgegen.base.compiled import kernel
 
 
 @kernel
@@ -41,7 +41,7 @@ def other(x):
 """
 COUNTED = """
 from numba.core import event
-from bridgegen.compilation import library
+from bridgegen.base.compilation import library
 library.LARGE = 0  # so that every kernel is called, none linked
 with event.install_recorder("numba:compile") as recorder:
     {}

@@ -11,10 +11,10 @@ from pathlib import Path
 import pytest
 
 import bridgegen
-from bridgegen.compilation.folder import cache_folder
+from bridgegen.base.compilation.folder import cache_folder
 
 FOLDER = """
-from bridgegen.compilation import folder
+from bridgegen.base.compilation import folder
 print(folder.cache_folder())
 """
 COMPILES = """
@@ -27,7 +27,7 @@ with event.install_recorder("numba:compile") as recorder:
 print(sum(one.is_start for _, one in recorder.buffer))
 """
 MINE = """
-from bridgegen.compiled import kernel
+from bridgegen.base.compiled import kernel
 
 @kernel
 def doubled(x):
@@ -191,7 +191,7 @@ def test_of_four_first_runs_at_once_one_compiles(mine):
 def test_the_place_of_the_package_does_not_matter(tmp_path):
     """A new virtual environment finds what an earlier one has compiled."""
     code = (
-        "from bridgegen.metrics import _kernels as k\n"
+        "from bridgegen.assess.metrics import _kernels as k\n"
         "one = next(v for v in vars(k).values() if hasattr(v, '_cache'))\n"
         "print(one._cache.cache_path, one._cache._impl.locator.get_source_stamp())"
     )

@@ -7,7 +7,7 @@ import pytest
 HIGH = "from bridgegen._high_kernels import high\n    "
 LOW = "from bridgegen._low_kernels import low\n    "
 CHECK = "import math; assert high(0.5) == 2.0 * math.sin(0.5) + 2.0 * math.sin(1.5)"
-FOR_KERNELS = "from bridgegen.compiled import compile_for_kernels; import numba\n    "
+FOR_KERNELS = "from bridgegen.base.compiled import compile_for_kernels; import numba\n    "
 
 
 @pytest.fixture

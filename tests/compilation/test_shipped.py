@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 import yaml
 
-from bridgegen.compilation import shipped as shipped_module
-from bridgegen.compilation.shipped import BASELINE, described, features, shipped
+from bridgegen.base.compilation import folder as shipped_module
+from bridgegen.base.compilation.folder import BASELINE, described, features, shipped
 
 ROOT = Path(__file__).parents[2]
 CODE = (

@@ -1,6 +1,6 @@
 """What a change of a source file has compiled again: what depends on it, and nothing else."""
 
-from bridgegen.compilation.sources import PACKAGE, digest
+from bridgegen.base.compilation.folder import PACKAGE, digest
 
 ALL = """from bridgegen._high_kernels import high
     from bridgegen._other_kernels import other
@@ -32,7 +32,7 @@ def test_what_was_compiled_for_an_earlier_source_serves_again(package, compiled_
 def test_names_of_a_package_may_be_modules():
     """`from package import module` counts that module."""
     rollout = PACKAGE / "simulation" / "embedded" / "batch.py"
-    from bridgegen.compilation.sources import _imported
+    from bridgegen.base.compilation.folder import _imported
 
     assert PACKAGE / "simulation" / "embedded" / "_memory_kernels.py" in _imported(rollout)
     assert digest(rollout) == digest(rollout)

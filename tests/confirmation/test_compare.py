@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bridgegen.confirmation.compare import compare, tracks
-from bridgegen.confirmation.differences import (
+from bridgegen.results.confirmation.compare import compare, tracks
+from bridgegen.results.confirmation.differences import (
     PARTED,
     TRACE,
     Approach,
@@ -17,9 +17,9 @@ from bridgegen.confirmation.differences import (
     LightTimes,
     Offset,
 )
-from bridgegen.confirmation.schema import Differences, Outcome
-from bridgegen.confirmation.words import explanation
-from bridgegen.odd.thresholds import Thresholds
+from bridgegen.results.confirmation.record import Differences, Outcome
+from bridgegen.results.confirmation.words import explanation
+from bridgegen.scenario.language.thresholds import Thresholds
 from bridgegen.simulation.rollout import Rollout
 
 STEP = 0.1

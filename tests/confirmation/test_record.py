@@ -10,17 +10,28 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bridgegen.confirmation.differences import BoxSizes, Contact, EventTimes, LightTimes, Parting
-from bridgegen.confirmation.record import (
+from bridgegen.base.errors import FileFormatError, StorageError
+from bridgegen.results.confirmation.differences import (
+    BoxSizes,
+    Contact,
+    EventTimes,
+    LightTimes,
+    Parting,
+)
+from bridgegen.results.confirmation.record import (
+    Change,
+    Course,
+    Differences,
+    Outcome,
+    Record,
+    Scenario,
     digest_of,
     file_name,
     read_record,
     read_records,
     write_record,
 )
-from bridgegen.confirmation.schema import Change, Course, Differences, Outcome, Record, Scenario
-from bridgegen.errors import FileFormatError, StorageError
-from bridgegen.odd.thresholds import Thresholds
+from bridgegen.scenario.language.thresholds import Thresholds
 
 X, METRICS = np.arange(8.0).reshape(4, 2), np.array([[1.0, np.nan]] * 4)
 

@@ -2,11 +2,11 @@
 
 import pytest
 
-from bridgegen.confirmation.differences import Contact, Parting
-from bridgegen.confirmation.schema import Change, Differences, Outcome, Scenario
-from bridgegen.confirmation.summary import summarise, to_json
-from bridgegen.confirmation.verdict import sentences
-from bridgegen.regions.evidence import wilson
+from bridgegen.base.statistics import wilson
+from bridgegen.results.confirmation.differences import Contact, Parting
+from bridgegen.results.confirmation.record import Change, Differences, Outcome, Scenario
+from bridgegen.results.confirmation.summary import summarise, to_json
+from bridgegen.results.confirmation.words import sentences
 
 
 def outcome(critical=True, d_min=1.0, v_d=5.0, touch=None):

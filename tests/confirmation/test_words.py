@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from bridgegen.confirmation.differences import (
+from bridgegen.results.confirmation.differences import (
     Approach,
     BoxSizes,
     Contact,
@@ -13,10 +13,10 @@ from bridgegen.confirmation.differences import (
     Offset,
     Parting,
 )
-from bridgegen.confirmation.schema import Differences, Margin, Outcome
-from bridgegen.confirmation.words import explanation
-from bridgegen.odd.thresholds import Thresholds
-from bridgegen.stl import TINY
+from bridgegen.results.confirmation.record import Differences, Margin, Outcome
+from bridgegen.results.confirmation.words import explanation
+from bridgegen.scenario.language.thresholds import Thresholds
+from bridgegen.scenario.stl import TINY
 
 LIMITS = Thresholds()
 

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from bridgegen.ego.kinds import CAR
+from bridgegen.drivers.kinds import CAR
 from bridgegen.simulation.rollout import Rollout
 
 DT = 0.05

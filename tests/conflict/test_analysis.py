@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bridgegen.conflict.analysis import (
+from bridgegen.assess.conflict.analysis import (
     CONTACT,
     COURSE,
     NEAR_MISS,
@@ -16,8 +16,8 @@ from bridgegen.conflict.analysis import (
     Zone,
     analyse,
 )
-from bridgegen.conflict.harm import harm_of_pairs
-from bridgegen.ego.kinds import ANIMAL, BICYCLE, CAR, OTHER, PEDESTRIAN
+from bridgegen.assess.conflict.harm import harm_of_pairs
+from bridgegen.drivers.kinds import ANIMAL, BICYCLE, CAR, OTHER, PEDESTRIAN
 
 RIGHT_ANGLE = np.pi / 2
 
@@ -363,7 +363,7 @@ def test_a_simulator_s_lights_of_another_integer_type_do_not_compile_the_analysi
     track, meeting
 ):
     """It takes half a minute."""
-    from bridgegen.conflict._conflict_kernels import analyse_rows
+    from bridgegen.assess.conflict._conflict_kernels import analyse_rows
 
     rollout = meeting(track(v=20.0), track(x=60.0))
     lights = np.ones((1, 1, rollout.shape[2]), np.int64)

@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from bridgegen.conflict import _limits as limits
-from bridgegen.conflict.types import ConflictType, Rule
+from bridgegen.assess.conflict import _limits as limits
+from bridgegen.assess.conflict.types import ConflictType, Rule
 
 DOCS = Path(__file__).parents[2] / "docs"
 PAGE = (DOCS / "conflicts.md").read_text(encoding="utf-8")

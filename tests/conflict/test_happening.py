@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from tests.conflict.conftest import DT, drive, meet
 
-from bridgegen.conflict.happening import Happening, happened, stuck
-from bridgegen.ego.kinds import CAR, OTHER, PEDESTRIAN
+from bridgegen.assess.conflict.happening import Happening, happened, stuck
+from bridgegen.drivers.kinds import CAR, OTHER, PEDESTRIAN
 from bridgegen.simulation.rollout import joined
 
 SECONDS = 14.0

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bridgegen.conflict.analysis import (
+from bridgegen.assess.conflict.analysis import (
     CONTACT,
     COURSE,
     NEAR_MISS,
@@ -16,7 +16,7 @@ from bridgegen.conflict.analysis import (
     Zone,
     analyse,
 )
-from bridgegen.conflict.harm import closeness_of_pairs, decisive, harm_of_pairs
+from bridgegen.assess.conflict.harm import closeness_of_pairs, decisive, harm_of_pairs
 
 
 @pytest.fixture(scope="module")

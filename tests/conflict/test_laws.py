@@ -7,16 +7,16 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from bridgegen.conflict import quantities
-from bridgegen.conflict import severity as injury
-from bridgegen.conflict._codes import CONTACT, COURSE, NEAR_MISS, NO_CONFLICT
-from bridgegen.conflict._conflict_kernels import urgency
-from bridgegen.conflict._limits import HORIZON
-from bridgegen.conflict.analysis import Conflicts, Responsible, Zone, analyse
-from bridgegen.conflict.harm import NEAR_MISS as CRITICAL
-from bridgegen.conflict.harm import closeness_of_pairs, decisive, harm_of_pairs
-from bridgegen.conflict.plausibility import plausibility
-from bridgegen.ego.kinds import CAR, PEDESTRIAN
+from bridgegen.assess.conflict import quantities
+from bridgegen.assess.conflict import severity as injury
+from bridgegen.assess.conflict._codes import CONTACT, COURSE, NEAR_MISS, NO_CONFLICT
+from bridgegen.assess.conflict._conflict_kernels import urgency
+from bridgegen.assess.conflict._limits import HORIZON
+from bridgegen.assess.conflict.analysis import Conflicts, Responsible, Zone, analyse
+from bridgegen.assess.conflict.harm import NEAR_MISS as CRITICAL
+from bridgegen.assess.conflict.harm import closeness_of_pairs, decisive, harm_of_pairs
+from bridgegen.assess.conflict.plausibility import plausibility
+from bridgegen.drivers.kinds import CAR, PEDESTRIAN
 from bridgegen.simulation.rollout import Rollout
 
 DT = 0.05

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from bridgegen.conflict.place import place_on_route
+from bridgegen.assess.conflict.place import place_on_route
 
 STEP = 0.5
 WAY = np.column_stack([np.arange(0.0, 100.0 + STEP, STEP), np.zeros(201)])

@@ -6,17 +6,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bridgegen.conflict.plausibility import LIMITS, SLIP, Implausible, plausibility
-from bridgegen.ego.kinds import (
-    ANIMAL,
-    BICYCLE,
-    BUS,
-    CAR,
-    MOTORCYCLE,
-    OTHER,
-    PEDESTRIAN,
-    TRUCK,
-)
+from bridgegen.assess.conflict.plausibility import LIMITS, SLIP, Implausible, plausibility
+from bridgegen.drivers.kinds import ANIMAL, BICYCLE, BUS, CAR, MOTORCYCLE, OTHER, PEDESTRIAN, TRUCK
 from bridgegen.simulation.rollout import Rollout
 
 DT = 0.05

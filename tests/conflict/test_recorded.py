@@ -5,9 +5,9 @@ import json
 import numpy as np
 import pytest
 
-from bridgegen.conflict.recorded import NO_KINDS, NO_MAP, NO_OFFSET, measure_recording
-from bridgegen.conflict.summary import UNITS, summarise
-from bridgegen.simulate import simulate_file
+from bridgegen.assess.conflict.recorded import NO_KINDS, NO_MAP, NO_OFFSET, measure_recording
+from bridgegen.assess.conflict.summary import UNITS, summarise
+from bridgegen.engine.simulate import simulate_file
 from bridgegen.simulation.trace import write_trace
 
 HEADER = "time,entity,x,y,h,speed,length,width"

@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bridgegen.conflict.analysis import CONTACT, COURSE, NEAR_MISS, ConflictType, analyse
-from bridgegen.conflict.harm import decisive
-from bridgegen.conflict.types import RULES, Responsible, Rule
-from bridgegen.ego._claims import BY_MAP, BY_SIGNS, FROM_THE_RIGHT, ONCOMING, SIREN
-from bridgegen.ego.kinds import BICYCLE, CAR, OTHER, PEDESTRIAN
-from bridgegen.ego.preventable import avoids_cut_in
+from bridgegen.assess.conflict.analysis import CONTACT, COURSE, NEAR_MISS, ConflictType, analyse
+from bridgegen.assess.conflict.harm import decisive
+from bridgegen.assess.conflict.types import RULES, Responsible, Rule
+from bridgegen.drivers._claims import BY_MAP, BY_SIGNS, FROM_THE_RIGHT, ONCOMING, SIREN
+from bridgegen.drivers.kinds import BICYCLE, CAR, OTHER, PEDESTRIAN
+from bridgegen.drivers.preventable import avoids_cut_in
 
 DT = 0.05
 RIGHT_ANGLE = np.pi / 2

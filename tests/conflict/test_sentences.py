@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from bridgegen.conflict.analysis import analyse
-from bridgegen.conflict.sentences import sentence
-from bridgegen.ego._claims import BY_SIGNS
-from bridgegen.ego.kinds import CAR, PEDESTRIAN
+from bridgegen.assess.conflict.analysis import analyse
+from bridgegen.assess.conflict.sentences import sentence
+from bridgegen.drivers._claims import BY_SIGNS
+from bridgegen.drivers.kinds import CAR, PEDESTRIAN
 
 RIGHT_ANGLE = np.pi / 2
 

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bridgegen.conflict.severity import (
+from bridgegen.assess.conflict.severity import (
     DIRECTIONS,
     FRONT,
     MASS,
@@ -19,7 +19,7 @@ from bridgegen.conflict.severity import (
     p_mais3,
     severity,
 )
-from bridgegen.ego.kinds import (
+from bridgegen.drivers.kinds import (
     ANIMAL,
     BICYCLE,
     BUS,
@@ -30,7 +30,7 @@ from bridgegen.ego.kinds import (
     PEDESTRIAN,
     TRUCK,
 )
-from bridgegen.participants import PARTICIPANTS
+from bridgegen.scenario.participants import PARTICIPANTS
 
 KMH, MPH = 1 / 3.6, 0.44704  # m/s
 

@@ -10,8 +10,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bridgegen.conflict import quantities
-from bridgegen.conflict.analysis import (
+from bridgegen.assess.conflict import quantities
+from bridgegen.assess.conflict.analysis import (
     VIOLATION,
     ConflictType,
     Responsible,
@@ -19,15 +19,15 @@ from bridgegen.conflict.analysis import (
     analyse,
     encounters,
 )
-from bridgegen.conflict.findings import Findings
-from bridgegen.conflict.harm import NEAR_MISS, closeness_of_pairs, decisive, harm_of_pairs
-from bridgegen.conflict.sentences import sentence
-from bridgegen.conflict.severity import FRONT, severity
-from bridgegen.conflict.summary import summarise
-from bridgegen.ego.kinds import BICYCLE, CAR, OTHER, PEDESTRIAN
-from bridgegen.odd.reader import load
-from bridgegen.options import PipelineOptions
-from bridgegen.pipeline import Pipeline
+from bridgegen.assess.conflict.findings import Findings
+from bridgegen.assess.conflict.harm import NEAR_MISS, closeness_of_pairs, decisive, harm_of_pairs
+from bridgegen.assess.conflict.sentences import sentence
+from bridgegen.assess.conflict.severity import FRONT, severity
+from bridgegen.assess.conflict.summary import summarise
+from bridgegen.drivers.kinds import BICYCLE, CAR, OTHER, PEDESTRIAN
+from bridgegen.engine.options import PipelineOptions
+from bridgegen.engine.pipeline import Pipeline
+from bridgegen.scenario.language.reader import load
 
 HALF, FAR = 1.75, 5.25  # m, from the route to the border of the ego's lane; to the left edge
 

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from tests.metrics.conftest import drive_around, make_rollout, take_rows
 
-from bridgegen.criteria import Monitor, evaluate, quantity
-from bridgegen.criteria.monitor import LARGEST
-from bridgegen.errors import InputError
-from bridgegen.odd.criteria import (
+from bridgegen.assess.criteria import Monitor, evaluate, quantity
+from bridgegen.assess.criteria.monitor import LARGEST
+from bridgegen.base.errors import InputError
+from bridgegen.scenario.language.criteria import (
     Criterion,
     in_words,
     joined,

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from tests.metrics.conftest import drive_around, make_rollout, take_rows
 
-from bridgegen.criteria.signals import SIGNALS, read
+from bridgegen.assess.criteria.signals import SIGNALS, read
 
 
 def test_states_by_hand():
@@ -32,7 +32,7 @@ def test_relations_by_hand():
 
 
 def test_the_least_over_time_and_others_is_the_metric():
-    from bridgegen import metrics
+    from bridgegen.assess import metrics
 
     rollout = drive_around()
     expected = metrics.evaluate(rollout, ["d_min", "ttc", "thw"])

@@ -8,10 +8,9 @@ from typing import Any
 import pytest
 
 import bridgegen as bg
-from bridgegen.dashboard.names import Driver
-from bridgegen.dashboard.results import Failure, Judged, ModeKey, Result
-from bridgegen.odd.criteria import Criterion
-from bridgegen.suite.suite import run_suite
+from bridgegen.jobs.dashboard.results import Driver, Failure, Judged, ModeKey, Result
+from bridgegen.jobs.suite.suite import run_suite
+from bridgegen.scenario.language.criteria import Criterion
 
 R_12 = "R-12: always(gap to bv > 2 m)"
 

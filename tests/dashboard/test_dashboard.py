@@ -12,23 +12,22 @@ import pytest
 from tests.dashboard.conftest import R_12
 
 import bridgegen as bg
-from bridgegen.dashboard.dashboard import Dashboard
-from bridgegen.dashboard.markup import within
-from bridgegen.dashboard.modes import failure_modes
-from bridgegen.dashboard.odd import coverage
-from bridgegen.dashboard.page import write_page
-from bridgegen.dashboard.page_modes import MOST_MODES
-from bridgegen.dashboard.project import Problem, Project
-from bridgegen.dashboard.requirements import matrices
-from bridgegen.dashboard.scenery import scenery_of
-from bridgegen.dashboard.sentences import failing_sentence, requirements_sentence
-from bridgegen.dashboard.status_file import FILE, StatusFile, read_status_file
-from bridgegen.dashboard.trends import trends
-from bridgegen.errors import FileFormatError, StorageError
-from bridgegen.odd.reader import load
-from bridgegen.suite.suite import read_suite
-from bridgegen.triage.record import Estimate, read_record
-from bridgegen.verdict.of_dashboard import FIGURES
+from bridgegen.base.errors import FileFormatError, StorageError
+from bridgegen.cli.verdict.of_dashboard import FIGURES
+from bridgegen.jobs.dashboard.dashboard import Dashboard
+from bridgegen.jobs.dashboard.markup import within
+from bridgegen.jobs.dashboard.modes import failure_modes
+from bridgegen.jobs.dashboard.odd import coverage
+from bridgegen.jobs.dashboard.page import MOST_MODES, write_page
+from bridgegen.jobs.dashboard.project import Problem, Project
+from bridgegen.jobs.dashboard.requirements import matrices
+from bridgegen.jobs.dashboard.scenery import scenery_of
+from bridgegen.jobs.dashboard.sentences import failing_sentence, requirements_sentence
+from bridgegen.jobs.dashboard.status_file import FILE, StatusFile, read_status_file
+from bridgegen.jobs.dashboard.trends import trends
+from bridgegen.jobs.suite.suite import read_suite
+from bridgegen.scenario.language.reader import load
+from bridgegen.search.triage.record import Estimate, read_record
 
 
 class Tags(HTMLParser):
@@ -211,7 +210,7 @@ def test_every_figure_is_there_and_explained(found):
 
 
 def test_a_changed_scenario_is_named_and_not_counted(copy, tmp_path):
-    text = (Path(bg.__file__).parent / "catalogue" / "cut-in.yaml").read_text("utf-8")
+    text = (Path(bg.__file__).parent / "scenario" / "catalogue" / "cut-in.yaml").read_text("utf-8")
     file = tmp_path / "mine.yaml"
     file.write_text(text, "utf-8")
     bg.run_search(

@@ -1,8 +1,8 @@
 """Failure modes over all results, with the status that a person sets."""
 
-from bridgegen.dashboard.modes import decisions_of, failure_modes, unseen
-from bridgegen.dashboard.results import ModeKey
-from bridgegen.dashboard.status_file import Decision, StatusFile
+from bridgegen.jobs.dashboard.modes import decisions_of, failure_modes, unseen
+from bridgegen.jobs.dashboard.results import ModeKey
+from bridgegen.jobs.dashboard.status_file import Decision, StatusFile
 
 
 def file_of(**statuses):

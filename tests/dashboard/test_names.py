@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from bridgegen.dashboard.names import driver_of, place_of, scenario_name
+from bridgegen.jobs.dashboard.results import driver_of, place_of, scenario_name
 
 PROJECT = Path("/srv/project")
 

@@ -1,7 +1,7 @@
 """Requirements by scenario and driver."""
 
-from bridgegen.dashboard.requirements import matrices, statements
-from bridgegen.odd.criteria import Criterion
+from bridgegen.jobs.dashboard.requirements import matrices, statements
+from bridgegen.scenario.language.criteria import Criterion
 
 DECLARED = Criterion("R-99", "min(ego.v) > 0", severity="critical")
 

@@ -2,7 +2,7 @@
 
 from itertools import permutations
 
-from bridgegen.dashboard.results import ModeKey, Seen, current, versions
+from bridgegen.jobs.dashboard.results import ModeKey, Seen, current, versions
 
 
 def test_the_version_that_was_tested_last_counts_with_all_its_results(result):

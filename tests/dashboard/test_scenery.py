@@ -7,12 +7,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bridgegen.campaign.scenarios import load
-from bridgegen.dashboard.odd import coverage
-from bridgegen.dashboard.scenery import scenery_of
-from bridgegen.dashboard.taxonomy import QUANTITIES, TAXONOMY
-from bridgegen.odd.reader import names
-from bridgegen.weather import PARAMETERS
+from bridgegen.jobs.dashboard.odd import coverage
+from bridgegen.jobs.dashboard.scenery import scenery_of
+from bridgegen.jobs.dashboard.taxonomy import QUANTITIES, TAXONOMY
+from bridgegen.jobs.search.scenarios import load
+from bridgegen.scenario.language.reader import names
+from bridgegen.scenario.weather import PARAMETERS
 
 CUT_IN = scenery_of(load("cut-in"))
 

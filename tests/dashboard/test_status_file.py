@@ -7,13 +7,13 @@ import yaml
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bridgegen.dashboard.status_file import (
+from bridgegen.base.errors import FileFormatError
+from bridgegen.jobs.dashboard.status_file import (
     MOST_TEXT,
     Decision,
     add_decisions,
     read_status_file,
 )
-from bridgegen.errors import FileFormatError
 
 TEXT = """\
 # Our modes; ask Ada.

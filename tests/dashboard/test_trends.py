@@ -6,10 +6,10 @@ from xml.etree import ElementTree
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bridgegen.dashboard.charts import chart, strip
-from bridgegen.dashboard.of_suites import SuiteLine
-from bridgegen.dashboard.trends import MOST_POINTS, Point, Series, trends
-from bridgegen.triage.record import Estimate
+from bridgegen.jobs.dashboard.charts import chart, strip
+from bridgegen.jobs.dashboard.results_of import SuiteLine
+from bridgegen.jobs.dashboard.trends import MOST_POINTS, Point, Series, trends
+from bridgegen.search.triage.record import Estimate
 
 
 def estimate(harmful: int, rows: int) -> Estimate:

@@ -2,7 +2,7 @@
 
 import math
 
-from bridgegen.ego.compiled import compiled_driver
+from bridgegen.drivers.compiled import compiled_driver
 
 LIMIT = 7.5
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from bridgegen.ego.interface import Control, Trajectory
+from bridgegen.drivers.interface import Control, Trajectory
 
 
 class Cruises:

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from bridgegen.ego.interface import Control
+from bridgegen.drivers.interface import Control
 
 FOLDER = "FORKING_DRIVERS"
 SLEEP = ["sleep", "300"]

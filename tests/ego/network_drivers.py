@@ -3,7 +3,7 @@
 import torch
 from stable_baselines3.common.policies import ActorCriticPolicy
 
-from bridgegen.ego.policy import PolicyDriver
+from bridgegen.drivers.policy import PolicyDriver
 
 
 class Policy(PolicyDriver):

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from bridgegen.ego.interface import Control
-from bridgegen.ego.planners.planner import Planner
+from bridgegen.drivers.interface import Control
+from bridgegen.drivers.planners import Planner
 
 
 def made(name: str, driver: str, **changes: object) -> Planner:

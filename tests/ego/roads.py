@@ -6,11 +6,11 @@ from functools import cache
 
 import numpy as np
 
-from bridgegen.odd.reader import load
+from bridgegen.engine.options import PipelineOptions
+from bridgegen.engine.pipeline import Pipeline
 from bridgegen.openx.opendrive.model import OpenDrive
 from bridgegen.openx.opendrive.routes import Route
-from bridgegen.options import PipelineOptions
-from bridgegen.pipeline import Pipeline
+from bridgegen.scenario.language.reader import load
 
 
 @cache

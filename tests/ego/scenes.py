@@ -4,12 +4,12 @@ import math
 
 import numpy as np
 
-from bridgegen.ego import _weather_columns as column
-from bridgegen.ego import _weather_kernels
-from bridgegen.ego._perception_kernels import MEMORY, perceive
-from bridgegen.ego._tracking_kernels import TRACK
-from bridgegen.ego.detections import DETECTION
-from bridgegen.ego.kinds import CAR, PEDESTRIAN
+from bridgegen.drivers import _weather_columns as column
+from bridgegen.drivers import _weather_kernels
+from bridgegen.drivers._perception_kernels import MEMORY, perceive
+from bridgegen.drivers._tracking_kernels import TRACK
+from bridgegen.drivers.detections import DETECTION
+from bridgegen.drivers.kinds import CAR, PEDESTRIAN
 
 BOX = {
     CAR: (4.5, 1.8, 1.4, 50.0, 3.0, 9.0, 0.2, 1.5),

@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from bridgegen.ego import kinds
+from bridgegen.drivers import kinds
 
 DT = 0.05
 CAR = np.array([4.6, 1.9, 1.4])

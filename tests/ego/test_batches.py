@@ -7,8 +7,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from bridgegen.ego.batches import FixedBatch, blocks
-from bridgegen.errors import InputError
+from bridgegen.base.errors import InputError
+from bridgegen.drivers.batches import FixedBatch, blocks
 
 N = 150  # two blocks and a part of a third
 
@@ -39,7 +39,7 @@ def test_a_rows_bits_depend_on_that_row_alone(dtype, width):
 
 TORCH = """
 import numpy as np, torch
-from bridgegen.ego.batches import FixedBatch
+from bridgegen.drivers.batches import FixedBatch
 torch.set_num_threads(1)
 for dtype in (torch.float32, torch.float64):
     for width in (8, 17, 64, 256):

@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bridgegen.ego import kinds
-from bridgegen.ego._careful_kernels import drive_careful
+from bridgegen.drivers import kinds
+from bridgegen.drivers._careful_kernels import drive_careful
 
 from .straight import DT, WALKER, Road, ahead, path
 

@@ -5,9 +5,9 @@ import ctypes
 import numpy as np
 import pytest
 
-from bridgegen.compiled import call_at, kernel
-from bridgegen.ego.compiled import EGO, ROUTE, SCENE, TRACK, CompiledDriver, compiled_driver
-from bridgegen.errors import InputError
+from bridgegen.base.compiled import call_at, kernel
+from bridgegen.base.errors import InputError
+from bridgegen.drivers.compiled import EGO, ROUTE, SCENE, TRACK, CompiledDriver, compiled_driver
 
 
 def helper(x):

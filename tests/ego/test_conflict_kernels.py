@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from shapely import affinity
 from shapely.geometry import box
 
-from bridgegen.ego._conflict_kernels import (
+from bridgegen.drivers._conflict_kernels import (
     CROSSING,
     END_MARGIN,
     LEADER,

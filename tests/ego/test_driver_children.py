@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bridgegen.ego.driver_process import DriverError, DriverProcess
-from bridgegen.ego.interface import ROUTE_POINTS, Observation, Scene
+from bridgegen.drivers.driver_process import DriverError, DriverProcess
+from bridgegen.drivers.interface import ROUTE_POINTS, Observation, Scene
 
 pytestmark = pytest.mark.skipif(
     sys.platform != "linux", reason="only Linux tells which processes descend from one that ended"
@@ -24,7 +24,7 @@ ASK = """
 import sys
 sys.path.insert(0, sys.argv[1])
 from test_driver_children import DRIVERS, SECONDS, observation, scene
-from bridgegen.ego.driver_process import DriverProcess
+from bridgegen.drivers.driver_process import DriverProcess
 driver = DriverProcess(f"{DRIVERS}:{sys.argv[2]}", time_limit=10 * SECONDS)
 try:
     driver.reset(1, scene())

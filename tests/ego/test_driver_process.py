@@ -3,10 +3,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bridgegen.ego.driver_process import DriverError, DriverProcess
-from bridgegen.ego.drivers import is_spec
-from bridgegen.ego.interface import ROUTE_POINTS, Observation, Scene
-from bridgegen.errors import InputError
+from bridgegen.base.errors import InputError
+from bridgegen.drivers.driver_process import DriverError, DriverProcess
+from bridgegen.drivers.drivers import is_spec
+from bridgegen.drivers.interface import ROUTE_POINTS, Observation, Scene
 
 DRIVERS = Path(__file__).with_name("drivers.py")
 N = 3

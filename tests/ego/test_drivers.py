@@ -4,19 +4,19 @@ from pathlib import Path
 
 import pytest
 
-from bridgegen import ego
-from bridgegen.campaign import run_search
-from bridgegen.campaign.scenario_files import write_scenario
-from bridgegen.campaign.settings import Settings
-from bridgegen.errors import InputError, UnknownNameError
-from bridgegen.odd.reader import load
+from bridgegen import drivers as ego
+from bridgegen.base.errors import InputError, UnknownNameError
+from bridgegen.engine.options import PipelineOptions
+from bridgegen.engine.pipeline import Pipeline
+from bridgegen.engine.simulate import simulate_file
+from bridgegen.jobs.search import run_search
+from bridgegen.jobs.search.scenario_files import write_scenario
+from bridgegen.jobs.search.settings import Settings
 from bridgegen.openx.convert import roads_of
 from bridgegen.openx.openscenario.from_owl import openscenario_from_owl
 from bridgegen.openx.openscenario.read import read
 from bridgegen.openx.openscenario.to_owl.scenario import individuals_from_openscenario
-from bridgegen.options import PipelineOptions
-from bridgegen.pipeline import Pipeline
-from bridgegen.simulate import simulate_file
+from bridgegen.scenario.language.reader import load
 
 
 def test_stages_are_told_in_the_order_of_the_work() -> None:

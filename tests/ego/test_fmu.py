@@ -7,8 +7,8 @@ import sys
 import numpy as np
 import pytest
 
-from bridgegen.ego.interface import ROUTE_POINTS, Observation, Scene
-from bridgegen.errors import FileFormatError, InputError
+from bridgegen.base.errors import FileFormatError, InputError
+from bridgegen.drivers.interface import ROUTE_POINTS, Observation, Scene
 
 missing = importlib.util.find_spec("fmpy") is None
 pytestmark = [pytest.mark.fmi, pytest.mark.skipif(missing, reason="the extra 'fmi' is missing")]
@@ -62,7 +62,7 @@ def unit(tmp_path_factory):
 
 
 def driven(path, m=1):
-    from bridgegen.ego.fmu import FmuDriver
+    from bridgegen.drivers.fmu import FmuDriver
 
     one = np.arange(3.0)
     observation = Observation(
@@ -103,7 +103,7 @@ def test_an_unknown_input_or_output_is_refused(unit):
 
 
 def test_what_is_no_unit_is_refused(tmp_path):
-    from bridgegen.ego.fmu import FmuDriver
+    from bridgegen.drivers.fmu import FmuDriver
 
     path = tmp_path / "unit.fmu"
     for content in (None, b"", b"PK\x03\x04 nonsense"):

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bridgegen.ego._fsm_kernels import braking, critical, drive_fsm, proactive
+from bridgegen.drivers._fsm_kernels import braking, critical, drive_fsm, proactive
 
 from .straight import DT, Road, ahead, path
 

@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bridgegen.odd.reader import load
-from bridgegen.pipeline import Pipeline
+from bridgegen.engine.pipeline import Pipeline
+from bridgegen.scenario.language.reader import load
 from bridgegen.simulation.rollout import Rollout
 
 SCENARIO = """

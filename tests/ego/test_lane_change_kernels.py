@@ -4,13 +4,13 @@ import math
 
 import numpy as np
 
-from bridgegen.arrays import Float
-from bridgegen.ego import _lane_change_kernels as change
-from bridgegen.ego import _tracking_kernels as track
-from bridgegen.ego import kinds
-from bridgegen.ego._prediction_kernels import PASSAGE
-from bridgegen.ego._reference_kernels import MIND
-from bridgegen.ego._surroundings_kernels import AROUND, surround
+from bridgegen.base.arrays import Float
+from bridgegen.drivers import _lane_change_kernels as change
+from bridgegen.drivers import _tracking_kernels as track
+from bridgegen.drivers import kinds
+from bridgegen.drivers._prediction_kernels import PASSAGE
+from bridgegen.drivers._reference_kernels import MIND
+from bridgegen.drivers._surroundings_kernels import AROUND, surround
 
 DS, LENGTH, LANE = 0.5, 600.0, 3.5
 GRIP = 0.85 * 9.81

@@ -7,10 +7,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bridgegen.ego import _camera_kernels as camera
-from bridgegen.ego import _lidar_kernels as lidar
-from bridgegen.ego import _weather_columns as column
-from bridgegen.ego.detections import (
+from bridgegen.drivers import _camera_kernels as camera
+from bridgegen.drivers import _lidar_kernels as lidar
+from bridgegen.drivers import _weather_columns as column
+from bridgegen.drivers.detections import (
     BOTH,
     CAMERA,
     HEADING,
@@ -22,7 +22,7 @@ from bridgegen.ego.detections import (
     X,
     Y,
 )
-from bridgegen.ego.kinds import CAR, PEDESTRIAN
+from bridgegen.drivers.kinds import CAR, PEDESTRIAN
 
 from .scenes import Scene, ahead, weather
 

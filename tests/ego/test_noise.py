@@ -4,7 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
 
-from bridgegen.ego.noise import noise_key
+from bridgegen.drivers.noise import noise_key
 
 NUMBERS = st.floats(allow_nan=False, allow_infinity=False)
 ROWS = st.dictionaries(st.text(max_size=5), NUMBERS, min_size=1, max_size=5)

@@ -5,19 +5,13 @@ import math
 import numpy as np
 import pytest
 
-from bridgegen.ego import _camera_kernels as camera
-from bridgegen.ego import _lidar_kernels as lidar
-from bridgegen.ego import _weather_columns as column
-from bridgegen.ego._kind_tables import LAMPS, REFLECTANCE
-from bridgegen.ego._physics_kernels import (
-    DROPOUT_TIME,
-    ERROR_TIME,
-    HEADING_ERROR,
-    MOUNT,
-    veil,
-)
-from bridgegen.ego.detections import BOTH, CAMERA, HEADING, KIND, LENGTH, LIDAR, SEEN_BY, X, Y
-from bridgegen.ego.kinds import CAR, PEDESTRIAN
+from bridgegen.drivers import _camera_kernels as camera
+from bridgegen.drivers import _lidar_kernels as lidar
+from bridgegen.drivers import _weather_columns as column
+from bridgegen.drivers._kind_tables import LAMPS, REFLECTANCE
+from bridgegen.drivers._physics_kernels import DROPOUT_TIME, ERROR_TIME, HEADING_ERROR, MOUNT, veil
+from bridgegen.drivers.detections import BOTH, CAMERA, HEADING, KIND, LENGTH, LIDAR, SEEN_BY, X, Y
+from bridgegen.drivers.kinds import CAR, PEDESTRIAN
 
 from .scenes import BOX, Scene, weather
 

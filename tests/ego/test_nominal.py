@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from bridgegen import metrics as measures
-from bridgegen.odd.reader import load, names
-from bridgegen.options import PipelineOptions
-from bridgegen.pipeline import Pipeline
+from bridgegen.assess import metrics as measures
+from bridgegen.engine.options import PipelineOptions
+from bridgegen.engine.pipeline import Pipeline
+from bridgegen.scenario.language.reader import load, names
 
 IDEAL = {"perceiving": (), "all ideal": ("perception", "prediction", "control")}
 

@@ -8,8 +8,8 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from shapely import LineString, Polygon, affinity, box
 
-from bridgegen.ego._occlusion_kernels import LAST, RAYS, visible_share
-from bridgegen.ego._perception_kernels import MEMORY, place
+from bridgegen.drivers._occlusion_kernels import LAST, RAYS, visible_share
+from bridgegen.drivers._perception_kernels import MEMORY, place
 
 EYE = 1.425  # 0.95 of the ego's 1.5 m
 

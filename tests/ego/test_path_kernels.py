@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bridgegen.ego._path_kernels import pose, project, pursue
+from bridgegen.drivers._path_kernels import pose, project, pursue
 
 
 def circle(radius: float, turn: float, ds: float = 0.2) -> tuple[np.ndarray, int, float]:

@@ -3,9 +3,9 @@ import math
 import numpy as np
 import pytest
 
-from bridgegen.ego import _tracking_kernels as track
-from bridgegen.ego.detections import BOTH, HEADING, NO_FRAME, SEEN_BY, X, Y
-from bridgegen.ego.kinds import CAR, PEDESTRIAN
+from bridgegen.drivers import _tracking_kernels as track
+from bridgegen.drivers.detections import BOTH, HEADING, NO_FRAME, SEEN_BY, X, Y
+from bridgegen.drivers.kinds import CAR, PEDESTRIAN
 
 from .scenes import Scene, ahead, weather
 

@@ -6,9 +6,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bridgegen.ego import _weather_columns as column
-from bridgegen.ego._physics_kernels import recognised, snr, transmission, veil
-from bridgegen.ego._weather_kernels import skylight, sunbeam
+from bridgegen.drivers import _weather_columns as column
+from bridgegen.drivers._physics_kernels import recognised, snr, transmission, veil
+from bridgegen.drivers._weather_kernels import skylight, sunbeam
 
 from .scenes import NIGHT, weather
 

@@ -9,15 +9,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bridgegen import ego
-from bridgegen.campaign import Run, resume, run_search
-from bridgegen.ego.planners import registry
-from bridgegen.ego.planners.planner import DOMAINS, Planner
-from bridgegen.errors import InputError, UnknownNameError
-from bridgegen.odd.reader import load
-from bridgegen.options import PipelineOptions
-from bridgegen.pipeline import Pipeline
-from bridgegen.simulate import simulate_file
+from bridgegen import drivers as ego
+from bridgegen.base.errors import InputError, UnknownNameError
+from bridgegen.drivers import planners as registry
+from bridgegen.drivers.planners import DOMAINS, Planner
+from bridgegen.engine.options import PipelineOptions
+from bridgegen.engine.pipeline import Pipeline
+from bridgegen.engine.simulate import simulate_file
+from bridgegen.jobs.search import Run, resume, run_search
+from bridgegen.scenario.language.reader import load
 
 ROOT = Path(__file__).parents[2]
 
@@ -42,7 +42,7 @@ def test_what_is_declared_here_is_complete():
 def test_reading_the_declarations_imports_no_planner():
     """Nor does the command line read them before it must."""
     code = (
-        "import sys; from bridgegen.ego.planners.registry import planners, missing\n"
+        "import sys; from bridgegen.drivers.planners import planners, missing\n"
         "found = [missing(one) for one in planners().values()]\n"
         "print(*sys.modules)"
     )
@@ -60,8 +60,8 @@ def test_reading_the_declarations_imports_no_planner():
     assert not {one for one in names.stdout.split() if one.startswith("commonroad")}
     code = "import sys, bridgegen.cli; print(*sys.modules)"
     names = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    ours = {one for one in names.stdout.split() if one.startswith("bridgegen.ego.planners.")}
-    assert ours <= {"bridgegen.ego.planners.planner", "bridgegen.ego.planners.registry"}
+    ours = {one for one in names.stdout.split() if one.startswith("bridgegen.adapters.planners.")}
+    assert ours <= {"bridgegen.drivers.planners"}
     assert "packaging.requirements" not in names.stdout.split()
 
 

@@ -7,25 +7,25 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bridgegen.arrays import Float
-from bridgegen.ego import _tracking_kernels as track
-from bridgegen.ego import kinds
-from bridgegen.ego._caution_kernels import careful_speed, safe_speed
-from bridgegen.ego._control_kernels import EMERGENCY_JERK, JERK, SIZE, actuate
-from bridgegen.ego._emergency_kernels import boxes_meet, must_brake
-from bridgegen.ego._following_kernels import (
+from bridgegen.base.arrays import Float
+from bridgegen.drivers import _tracking_kernels as track
+from bridgegen.drivers import kinds
+from bridgegen.drivers._caution_kernels import careful_speed, safe_speed
+from bridgegen.drivers._control_kernels import EMERGENCY_JERK, JERK, SIZE, actuate
+from bridgegen.drivers._emergency_kernels import boxes_meet, must_brake
+from bridgegen.drivers._following_kernels import (
     COMFORT_DECELERATION,
     follow,
     idm,
     keep_distance,
     stop_for,
 )
-from bridgegen.ego._lights_kernels import stop_at_lights, stop_at_signs
-from bridgegen.ego._prediction_kernels import LOST, PASSAGE, add_straight, predict
-from bridgegen.ego._shift_kernels import UNSHIFTED as STAYS
-from bridgegen.ego._speed_kernels import bend_speed, limit_speed, scan_length, sight_speed
-from bridgegen.ego._surroundings_kernels import AROUND, surround
-from bridgegen.ego._yielding_kernels import (
+from bridgegen.drivers._lights_kernels import stop_at_lights, stop_at_signs
+from bridgegen.drivers._prediction_kernels import LOST, PASSAGE, add_straight, predict
+from bridgegen.drivers._shift_kernels import UNSHIFTED as STAYS
+from bridgegen.drivers._speed_kernels import bend_speed, limit_speed, scan_length, sight_speed
+from bridgegen.drivers._surroundings_kernels import AROUND, surround
+from bridgegen.drivers._yielding_kernels import (
     EDGE,
     PART,
     SPEED,

@@ -6,9 +6,9 @@ from gymnasium.spaces import Box
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bridgegen.ego.interface import ROUTE_POINTS, Observation, Scene
-from bridgegen.ego.policy import NEAREST, SIZE, PolicyDriver, control, vectors
-from bridgegen.errors import InputError
+from bridgegen.base.errors import InputError
+from bridgegen.drivers.interface import ROUTE_POINTS, Observation, Scene
+from bridgegen.drivers.policy import NEAREST, SIZE, PolicyDriver, control, vectors
 
 ANGLE = st.floats(-np.pi, np.pi)
 PLACE = st.floats(-1000.0, 1000.0)

@@ -11,17 +11,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bridgegen.ego.preventable import (
-    MODELS,
-    avoids_cut_in,
-    avoids_cut_out,
-    avoids_deceleration,
-)
-from bridgegen.errors import InputError, UnknownNameError
-from bridgegen.metrics import evaluate
-from bridgegen.odd.reader import load, shipped_text
-from bridgegen.options import PipelineOptions
-from bridgegen.pipeline import Pipeline
+from bridgegen.assess.metrics import evaluate
+from bridgegen.base.errors import InputError, UnknownNameError
+from bridgegen.drivers.preventable import MODELS, avoids_cut_in, avoids_cut_out, avoids_deceleration
+from bridgegen.engine.options import PipelineOptions
+from bridgegen.engine.pipeline import Pipeline
+from bridgegen.scenario.language.reader import load, shipped_text
 
 BRAKING, JERK = 0.774 * 9.81, 12.65
 

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from bridgegen.ego._random_kernels import block, normal, philox, uniform
+from bridgegen.drivers._random_kernels import block, normal, philox, uniform
 
 KEY = np.uint64(0x1234_5678_9ABC_DEF0)
 

@@ -6,16 +6,20 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bridgegen import metrics as measures
-from bridgegen.odd.reader import load
-from bridgegen.options import PipelineOptions
-from bridgegen.pipeline import Pipeline
+from bridgegen.assess import metrics as measures
+from bridgegen.engine.options import PipelineOptions
+from bridgegen.engine.pipeline import Pipeline
+from bridgegen.scenario.language.reader import load
 
 
 @pytest.fixture(scope="module")
 def red(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The red-light runner's crossroads, but the ego comes at red."""
-    text = resources.files("bridgegen.catalogue").joinpath("red-light-runner.yaml").read_text()
+    text = (
+        resources.files("bridgegen.scenario.catalogue")
+        .joinpath("red-light-runner.yaml")
+        .read_text()
+    )
     assert "green_time: 30.0, signal_offset: 5.0" in text
     path: Path = tmp_path_factory.mktemp("red") / "red.yaml"
     path.write_text(

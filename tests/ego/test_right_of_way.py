@@ -6,20 +6,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bridgegen.ego._claims import BY_MAP, BY_SIGNS, FROM_THE_RIGHT, OFF_ROAD, ONCOMING, SIREN
-from bridgegen.ego.right_of_way import (
-    NO_RULE,
-    THEY_WAIT,
-    WE_WAIT,
-    claim,
-    claims,
-    right_of_way,
-)
-from bridgegen.ego.scene import stop_signs
-from bridgegen.odd.reader import load
+from bridgegen.drivers._claims import BY_MAP, BY_SIGNS, FROM_THE_RIGHT, OFF_ROAD, ONCOMING, SIREN
+from bridgegen.drivers.right_of_way import NO_RULE, THEY_WAIT, WE_WAIT, claim, claims, right_of_way
+from bridgegen.drivers.scene import stop_signs
+from bridgegen.engine.pipeline import Pipeline
 from bridgegen.openx.opendrive.model import OpenDrive, Priority
 from bridgegen.openx.opendrive.routes import Route
-from bridgegen.pipeline import Pipeline
+from bridgegen.scenario.language.reader import load
 from bridgegen.simulation.embedded.places.ways import Ways
 
 CROSSING = """

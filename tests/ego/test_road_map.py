@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bridgegen.ego import interface
-from bridgegen.ego.road_map import road_map
+from bridgegen.drivers import interface
+from bridgegen.drivers.road_map import road_map
 from bridgegen.openx.opendrive.lanes import lane_pose
 
 from .roads import moved, network_of

@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bridgegen.ego._path_kernels import pursue
-from bridgegen.ego._shift_kernels import (
+from bridgegen.drivers._path_kernels import pursue
+from bridgegen.drivers._shift_kernels import (
     LATERAL_COMFORT,
     UNSHIFTED,
     aside_at,

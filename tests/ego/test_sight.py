@@ -4,9 +4,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bridgegen.ego.kinds import CAR, PEDESTRIAN
-from bridgegen.ego.sight import HEAD, Sky, detection_range, table
-from bridgegen.errors import InputError
+from bridgegen.base.errors import InputError
+from bridgegen.drivers.kinds import CAR, PEDESTRIAN
+from bridgegen.drivers.sight import HEAD, Sky, detection_range, table
 
 
 @given(st.sampled_from([CAR, PEDESTRIAN]), st.floats(20.0, 10_000.0), st.floats(0.0, 50.0))

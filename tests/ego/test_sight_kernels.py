@@ -4,12 +4,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bridgegen.ego import _camera_kernels as camera
-from bridgegen.ego import _lidar_kernels as lidar
-from bridgegen.ego import _weather_columns as column
-from bridgegen.ego._physics_kernels import BEST, CULL, IDENTIFY, veil
-from bridgegen.ego._sight_kernels import LIGHT, REAR, WALKER, camera_sight, lidar_sight, sight
-from bridgegen.ego._weather_kernels import derive
+from bridgegen.drivers import _camera_kernels as camera
+from bridgegen.drivers import _lidar_kernels as lidar
+from bridgegen.drivers import _weather_columns as column
+from bridgegen.drivers._physics_kernels import BEST, CULL, IDENTIFY, veil
+from bridgegen.drivers._sight_kernels import LIGHT, REAR, WALKER, camera_sight, lidar_sight, sight
+from bridgegen.drivers._weather_kernels import derive
 
 from .scenes import NIGHT, weather
 

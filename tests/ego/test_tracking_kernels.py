@@ -3,8 +3,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bridgegen.ego import _tracking_kernels as track
-from bridgegen.ego.kinds import CAR, TRUCK
+from bridgegen.drivers import _tracking_kernels as track
+from bridgegen.drivers.kinds import CAR, TRUCK
 
 DT = 0.1
 

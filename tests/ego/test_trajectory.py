@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bridgegen.ego.interface import ROUTE_POINTS, Observation, Trajectory
-from bridgegen.ego.traits import Traits, traits_of
-from bridgegen.ego.trajectory import checked_plans
-from bridgegen.errors import InputError
+from bridgegen.base.errors import InputError
+from bridgegen.drivers.interface import ROUTE_POINTS, Observation, Trajectory
+from bridgegen.drivers.trajectory import checked_plans
+from bridgegen.drivers.user_drivers import Traits, traits_of
 
 N, PERIOD = 3, 0.2
 TIME = np.linspace(0.0, 1.0, 11)

@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bridgegen.ego._trajectory_kernels import follow, lay, pose, schedule
-from bridgegen.ego.trajectory import Follower, Plans
+from bridgegen.drivers._trajectory_kernels import follow, lay, pose, schedule
+from bridgegen.drivers.trajectory import Follower, Plans
 from bridgegen.simulation.embedded._motion_kernels import bicycle
 
 STEP = 0.05

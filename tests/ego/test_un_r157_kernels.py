@@ -10,8 +10,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bridgegen.ego import kinds
-from bridgegen.ego._un_r157_kernels import drive_un_r157
+from bridgegen.drivers import kinds
+from bridgegen.drivers._un_r157_kernels import drive_un_r157
 
 from .straight import DT, WALKER, Road, ahead, path
 

@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bridgegen.ego import interface
-from bridgegen.ego.polylines import ATTRIBUTES, gather
-from bridgegen.ego.road_map import road_map
-from bridgegen.ego.views import History, MapSender
+from bridgegen.drivers import interface
+from bridgegen.drivers.polylines import ATTRIBUTES, gather
+from bridgegen.drivers.road_map import road_map
+from bridgegen.drivers.views import History, MapSender
 
 from .roads import network_of
 from .wanting import watched

@@ -6,12 +6,12 @@ from pathlib import Path
 
 import numpy as np
 
-from bridgegen.ego.interface import Observation
-from bridgegen.ego.traits import Traits
-from bridgegen.ego.views import MapSender, Viewer
-from bridgegen.odd.reader import load
-from bridgegen.options import PipelineOptions
-from bridgegen.pipeline import Pipeline
+from bridgegen.drivers.interface import Observation
+from bridgegen.drivers.user_drivers import Traits
+from bridgegen.drivers.views import MapSender, Viewer
+from bridgegen.engine.options import PipelineOptions
+from bridgegen.engine.pipeline import Pipeline
+from bridgegen.scenario.language.reader import load
 from bridgegen.simulation.embedded.own_drivers.lock_step import drive_in_lock_step
 
 DRIVERS = Path(__file__).with_name("drivers.py")

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from bridgegen.ego.compiled import compiled_driver
+from bridgegen.drivers.compiled import compiled_driver
 
 
 def pursued(o):

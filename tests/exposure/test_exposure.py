@@ -11,11 +11,11 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from scipy import integrate, stats
 
-from bridgegen.errors import BridgeGenError, InputError, ScenarioError
-from bridgegen.exposure import Encounters, example_names, exposure_of, read_exposure
-from bridgegen.exposure.rates import poisson_interval
-from bridgegen.odd.json_schema import schema
-from bridgegen.odd.reader import load
+from bridgegen.base.errors import BridgeGenError, InputError, ScenarioError
+from bridgegen.scenario.exposure import Encounters, example_names, exposure_of, read_exposure
+from bridgegen.scenario.exposure.exposure import poisson_interval
+from bridgegen.scenario.language.json_schema import schema
+from bridgegen.scenario.language.reader import load
 
 # Two parameters of a triangle: the constraint keeps half of a square.
 SCENARIO = """\

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from bridgegen.base.errors import BridgeGenError, InputError
 from bridgegen.cli import main
-from bridgegen.errors import BridgeGenError, InputError
-from bridgegen.exposure import read_exposure
-from bridgegen.exposure.candidates import candidates
-from bridgegen.exposure.fit import LEAST_ROWS, fit_exposure
-from bridgegen.odd.reader import load
 from bridgegen.openx.openscenario.distributions import distribution_of, read_distribution
+from bridgegen.scenario.exposure import read_exposure
+from bridgegen.scenario.exposure.candidates import candidates
+from bridgegen.scenario.exposure.fit import LEAST_ROWS, fit_exposure
+from bridgegen.scenario.language.reader import load
 
 PLANTED = """\
 exposure_of: cut-in

@@ -8,14 +8,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import integrate, special, stats
 
-from bridgegen.errors import InputError
-from bridgegen.exposure.candidates import Recipe, fit
-from bridgegen.exposure.families import FAMILIES
-from bridgegen.exposure.forms import Naming, build_marginal
-from bridgegen.exposure.kernels import estimate, usual_bandwidth
-from bridgegen.exposure.marginals import Conditional, Spliced, Truncated
-from bridgegen.odd.exposure_schema import MarginalSection
-from bridgegen.odd.parameters import Axis, Parameter
+from bridgegen.base.errors import InputError
+from bridgegen.scenario.exposure.candidates import Recipe, estimate, fit, usual_bandwidth
+from bridgegen.scenario.exposure.families import FAMILIES
+from bridgegen.scenario.exposure.forms import Naming, build_marginal
+from bridgegen.scenario.exposure.marginals import Conditional, Spliced, Truncated
+from bridgegen.scenario.language.exposure_schema import MarginalSection
+from bridgegen.scenario.language.parameters import Axis, Parameter
 
 GAP = Parameter("gap", Axis.PARTICIPANTS, "m", 5.0, 80.0, 30.0)
 NAMING = Naming(frozenset({"gap", "ego_speed"}), {}, None)

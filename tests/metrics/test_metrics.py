@@ -11,15 +11,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bridgegen import metrics
-from bridgegen.errors import InputError, UnknownNameError
-from bridgegen.metrics.a_change import a_change
-from bridgegen.metrics.d_min import d_min
-from bridgegen.metrics.l_offset import l_offset
-from bridgegen.metrics.metric import Metric, in_steps
-from bridgegen.metrics.n_brake import n_brake
-from bridgegen.metrics.n_collision import n_collision
-from bridgegen.metrics.v_d import v_d
+from bridgegen.assess import metrics
+from bridgegen.assess.metrics.a_change import a_change
+from bridgegen.assess.metrics.d_min import d_min
+from bridgegen.assess.metrics.l_offset import l_offset
+from bridgegen.assess.metrics.metric import Metric, in_steps
+from bridgegen.assess.metrics.n_brake import n_brake
+from bridgegen.assess.metrics.n_collision import n_collision
+from bridgegen.assess.metrics.v_d import v_d
+from bridgegen.base.errors import InputError, UnknownNameError
 
 ALL = list(metrics.METRICS)
 
@@ -456,7 +456,7 @@ def run_python(code: str, **environment: str) -> str:
 
 def test_importing_metrics_does_not_import_the_compiler():
     run_python(
-        "import sys, bridgegen.metrics, bridgegen.objective\n"
+        "import sys, bridgegen.assess.metrics, bridgegen.assess.objective\n"
         "assert not {'numba', 'pandas', 'scipy'} & set(sys.modules)"
     )
 
@@ -466,7 +466,7 @@ def test_kernels_give_the_same_bits_without_compilation(driven):
     code = (
         f"import sys; sys.path.insert(0, {folder!r})\n"
         "import conftest, numba\n"
-        "from bridgegen import metrics\n"
+        "from bridgegen.assess import metrics\n"
         "assert numba.config.DISABLE_JIT\n"
         "values = metrics.evaluate(conftest.drive_around(8, 3, 21), list(metrics.METRICS))\n"
         "print(values.tobytes().hex())"

@@ -10,13 +10,13 @@ import shapely
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bridgegen.ego import kinds
-from bridgegen.ego.detections import BOTH, MISSED, NO_FRAME
-from bridgegen.metrics import perceived
-from bridgegen.metrics.e_position import e_position
-from bridgegen.metrics.iou import iou
-from bridgegen.metrics.mean_average_precision import mean_average_precision
-from bridgegen.metrics.r_red import r_red
+from bridgegen.assess.metrics import perceived
+from bridgegen.assess.metrics.e_position import e_position
+from bridgegen.assess.metrics.iou import iou
+from bridgegen.assess.metrics.mean_average_precision import mean_average_precision
+from bridgegen.assess.metrics.r_red import r_red
+from bridgegen.drivers import kinds
+from bridgegen.drivers.detections import BOTH, MISSED, NO_FRAME
 
 # r_red. The ego drives along +x; its front bumper is 2 m ahead of its reference point.
 
@@ -203,7 +203,7 @@ def test_the_best_of_two_detections_takes_the_box(rollout_of):
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"kinds": np.array([0])}, r"kinds must be 2 of bridgegen\.ego\.kinds, got \[0\]"),
+        ({"kinds": np.array([0])}, r"kinds must be 2 of bridgegen\.drivers\.kinds, got \[0\]"),
         ({"kinds": np.array([0, len(kinds.NAMES)])}, "kinds must be 2 of"),
         ({"detections": np.zeros((1, 1, 1, 8))}, r"detections must have shape \(1, 2, 1, 8\)"),
         (

@@ -6,10 +6,10 @@ from functools import partial
 import numpy as np
 import pytest
 
-from bridgegen import metrics
-from bridgegen.conflict import quantities
-from bridgegen.errors import InputError, UnknownNameError
-from bridgegen.metrics import Metric
+from bridgegen.assess import metrics
+from bridgegen.assess.conflict import quantities
+from bridgegen.assess.metrics import Metric
+from bridgegen.base.errors import InputError, UnknownNameError
 from bridgegen.simulation.rollout import Rollout
 
 
@@ -49,7 +49,7 @@ def test_a_package_adds_its_own(installed, driven):
     ("name", "value", "message"),
     [
         ("gone", "Nothing", "cannot be loaded: AttributeError"),
-        ("not_one", "top_speed", "must be a bridgegen.metrics.Metric, got function"),
+        ("not_one", "top_speed", "must be a bridgegen.assess.metrics.Metric, got function"),
         ("other", "TOP", "has the name 'top_speed'"),
         ("fails", "FAILS", "fails: ZeroDivisionError"),
         ("wrong_shape", "WRONG_SHAPE", r"must return \d+ numbers.*\(2, 2\)"),

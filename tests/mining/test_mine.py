@@ -9,10 +9,10 @@ from tests.mining.lanes.test_lanelets import with_lanelets as write_two_lanes
 from tests.openx.opendrive.kinds import model
 from tests.recordings import writers as w
 
-from bridgegen.errors import FileFormatError, InputError, StorageError
-from bridgegen.mining.mine import mine
+from bridgegen.base.errors import FileFormatError, InputError, StorageError
+from bridgegen.jobs.mine.mine import mine
 from bridgegen.openx.opendrive.write import to_xml
-from bridgegen.recordings.quality import Rule
+from bridgegen.recordings.readers.quality import Rule
 
 
 def rows(path):

@@ -3,12 +3,12 @@ from pathlib import Path
 
 import pytest
 
-from bridgegen.odd.expression import parse
-from bridgegen.odd.parameters import Axis, Bound, Derived, Parameter
-from bridgegen.odd.reader import load
-from bridgegen.odd.roads import usual
-from bridgegen.odd.scenario import LogicalScenario, ObjectiveSpec, Term
-from bridgegen.odd.story import Participant, Story, Waypoint
+from bridgegen.scenario.language.expression import parse
+from bridgegen.scenario.language.parameters import Axis, Bound, Derived, Parameter
+from bridgegen.scenario.language.reader import load
+from bridgegen.scenario.language.roads import usual
+from bridgegen.scenario.language.scenario import LogicalScenario, ObjectiveSpec, Term
+from bridgegen.scenario.language.story import Participant, Story, Waypoint
 
 BuildScenario = Callable[..., LogicalScenario]
 
@@ -77,7 +77,7 @@ def s4() -> LogicalScenario:
 
 @pytest.fixture(scope="session")
 def s4_text() -> str:
-    import bridgegen.catalogue as catalogue
+    import bridgegen.scenario.catalogue as catalogue
 
     return (Path(catalogue.__file__).parent / "crossroads-s4.yaml").read_text("utf-8")
 

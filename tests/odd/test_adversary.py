@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
-from bridgegen.errors import InputError, UnknownNameError
-from bridgegen.odd.adversary import (
+from bridgegen.base.errors import InputError, UnknownNameError
+from bridgegen.scenario.language.adversary import (
     PERIOD,
     adversarial,
     first_speed,
@@ -10,8 +10,8 @@ from bridgegen.odd.adversary import (
     room,
     top_speed,
 )
-from bridgegen.odd.parameters import Axis
-from bridgegen.odd.reader import load
+from bridgegen.scenario.language.parameters import Axis
+from bridgegen.scenario.language.reader import load
 
 
 def test_its_decisions_take_the_place_of_the_events():

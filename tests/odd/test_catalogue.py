@@ -5,16 +5,22 @@ import math
 import numpy as np
 import pytest
 
-from bridgegen.conflict.plausibility import plausibility
-from bridgegen.ego.kinds import ANIMAL, OTHER, PEDESTRIAN
-from bridgegen.errors import UnknownNameError
-from bridgegen.odd import objectives
-from bridgegen.odd.parameters import Axis
-from bridgegen.odd.reader import load, names
-from bridgegen.odd.scenario import ObjectiveSpec, SearchedScenario, Term
-from bridgegen.odd.story import Change, ConditionSpec, EventSpec, SpeedChange, Waypoint
-from bridgegen.options import PipelineOptions
-from bridgegen.pipeline import Pipeline
+from bridgegen.assess.conflict.plausibility import plausibility
+from bridgegen.base.errors import UnknownNameError
+from bridgegen.drivers.kinds import ANIMAL, OTHER, PEDESTRIAN
+from bridgegen.engine.options import PipelineOptions
+from bridgegen.engine.pipeline import Pipeline
+from bridgegen.scenario.language import objectives
+from bridgegen.scenario.language.parameters import Axis
+from bridgegen.scenario.language.reader import load, names
+from bridgegen.scenario.language.scenario import ObjectiveSpec, SearchedScenario, Term
+from bridgegen.scenario.language.story import (
+    Change,
+    ConditionSpec,
+    EventSpec,
+    SpeedChange,
+    Waypoint,
+)
 
 PAPERS = ("crossroads-s1", "crossroads-s2", "crossroads-s3", "crossroads-s4")
 

@@ -6,12 +6,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bridgegen.errors import InputError, ScenarioError
-from bridgegen.odd.clauses import Clause, read_clause
-from bridgegen.odd.reader import load, pack_names
+from bridgegen.base.errors import InputError, ScenarioError
+from bridgegen.scenario.language.protocols import Clause, read_clause
+from bridgegen.scenario.language.reader import load, pack_names
 
 R157 = [name for name in pack_names() if name.startswith("r157/")]
-FOLLOWING = (resources.files("bridgegen.packs.r157") / "following.yaml").read_text("utf-8")
+FOLLOWING = (resources.files("bridgegen.scenario.packs.r157") / "following.yaml").read_text("utf-8")
 
 
 def edited(folder, old: str, new: str):

@@ -4,8 +4,8 @@ from importlib.resources import files
 
 import pytest
 
-from bridgegen.errors import ScenarioError
-from bridgegen.odd.reader import load
+from bridgegen.base.errors import ScenarioError
+from bridgegen.scenario.language.reader import load
 
 LONG = """
 parameters:
@@ -39,7 +39,9 @@ SECOND = """events:
 
 
 def problems(tmp_path, *changes):
-    text = files("bridgegen.catalogue").joinpath("red-light-runner.yaml").read_text("utf-8")
+    text = (
+        files("bridgegen.scenario.catalogue").joinpath("red-light-runner.yaml").read_text("utf-8")
+    )
     for old, new in changes:
         assert text.count(old) == 1
         text = text.replace(old, new)

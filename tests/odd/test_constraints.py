@@ -2,8 +2,8 @@ from itertools import pairwise
 
 import pytest
 
-from bridgegen.errors import ScenarioError
-from bridgegen.odd.constraints import order, problems_of
+from bridgegen.base.errors import ScenarioError
+from bridgegen.scenario.language.constraints import order, problems_of
 
 
 def rules(build, make_parameter, names="abcd", bounds=(), derived=()):

@@ -8,13 +8,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bridgegen.errors import InputError
-from bridgegen.odd import binned
-from bridgegen.odd import coverage as module
-from bridgegen.odd.coverage import Ways, coverage, coverage_map
-from bridgegen.odd.kinds import INTEGER
-from bridgegen.search import Problem
-from bridgegen.search.pairwise import Pairwise
+from bridgegen.base.errors import InputError
+from bridgegen.scenario.language import coverage as binned
+from bridgegen.scenario.language import coverage as module
+from bridgegen.scenario.language.coverage import Ways, coverage, coverage_map
+from bridgegen.scenario.language.kinds import INTEGER
+from bridgegen.search.algorithms import Problem
+from bridgegen.search.algorithms.pairwise import Pairwise
 
 
 def none(X):

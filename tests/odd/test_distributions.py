@@ -6,8 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
 
-from bridgegen.errors import InputError
-from bridgegen.odd.distributions import (
+from bridgegen.base.errors import InputError
+from bridgegen.scenario.language.distributions import (
     TAIL,
     Discrete,
     Histogram,

@@ -5,9 +5,8 @@ import yaml
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bridgegen.errors import FileFormatError
-from bridgegen.odd.edited import replaced, scalars
-from bridgegen.odd.plain_yaml import read_plain_yaml
+from bridgegen.base.errors import FileFormatError
+from bridgegen.scenario.language.plain_yaml import read_plain_yaml, replaced, scalars
 
 NAMES = st.text("abc_", min_size=1, max_size=4)
 VALUES = st.one_of(

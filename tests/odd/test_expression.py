@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bridgegen.errors import InputError
-from bridgegen.odd.expression import MAX_LENGTH, lookup, parse
+from bridgegen.base.errors import InputError
+from bridgegen.scenario.language.expression import MAX_LENGTH, lookup, parse
 
 # Each formula beside its value at a = 2.5, b = -4, worked by hand.
 WORKED = {

@@ -10,12 +10,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bridgegen.errors import InputError, StorageError
-from bridgegen.odd.json_schema import schema, schema_text, write_schema
-from bridgegen.odd.plain_yaml import Document, read_plain_yaml
-from bridgegen.odd.reader import _Declarations, build, names
-from bridgegen.odd.schema import FragmentFile, ScenarioFile
-from bridgegen.odd.shape import shape_problems
+from bridgegen.base.errors import InputError, StorageError
+from bridgegen.scenario.language.json_schema import schema, schema_text, write_schema
+from bridgegen.scenario.language.plain_yaml import Document, read_plain_yaml
+from bridgegen.scenario.language.reader import _Declarations, build, names
+from bridgegen.scenario.language.schema import FragmentFile, ScenarioFile
+from bridgegen.scenario.language.shape import shape_problems
 
 ROOT = Path(__file__).parents[2]
 OTHERS = [
@@ -24,12 +24,12 @@ OTHERS = [
     ROOT / "tests/ontology/everything.yaml",
     ROOT / "docs/examples/braking-manner.yaml",
     ROOT / "docs/examples/oil-spill.yaml",
-    ROOT / "src/bridgegen/odd/starter.yaml",
+    ROOT / "src/bridgegen/scenario/language/starter.yaml",
 ]
 
 
 def catalogue(name: str) -> object:
-    data = resources.files("bridgegen.catalogue").joinpath(f"{name}.yaml").read_bytes()
+    data = resources.files("bridgegen.scenario.catalogue").joinpath(f"{name}.yaml").read_bytes()
     return read_plain_yaml(data, name).data
 
 

@@ -9,15 +9,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bridgegen.comparison.distinct import normalised
-from bridgegen.errors import InputError, ScenarioError
-from bridgegen.odd.coverage import coverage
-from bridgegen.odd.expression import parse
-from bridgegen.odd.kinds import FLOAT, INTEGER, KINDS, Angle, Category
-from bridgegen.odd.parameters import Axis, Parameter
-from bridgegen.odd.reader import load
-from bridgegen.triage.minimal import Ladder
-from bridgegen.triage.moves import around, nearest
+from bridgegen.base.errors import InputError, ScenarioError
+from bridgegen.jobs.compare.distinct import normalised
+from bridgegen.scenario.language.coverage import coverage
+from bridgegen.scenario.language.expression import parse
+from bridgegen.scenario.language.kinds import FLOAT, INTEGER, KINDS, Angle, Category
+from bridgegen.scenario.language.parameters import Axis, Parameter
+from bridgegen.scenario.language.reader import load
+from bridgegen.search.triage.minimal import Ladder
+from bridgegen.search.triage.moves import around, nearest
 
 EXAMPLE = Path(__file__).parents[2] / "docs/examples/braking-manner.yaml"
 MANNER = """    kind: category
@@ -122,8 +122,8 @@ def test_an_included_category_takes_another_default_by_name(tmp_path):
 
 
 def test_every_kind_is_in_the_language_and_in_its_schema():
-    from bridgegen.odd.json_schema import schema
-    from bridgegen.odd.schema import ParameterSection
+    from bridgegen.scenario.language.json_schema import schema
+    from bridgegen.scenario.language.schema import ParameterSection
 
     known = schema()["definitions"]["ParameterSection"]
     assert known["properties"]["kind"]["enum"] == list(KINDS)

@@ -9,11 +9,11 @@ import yaml
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from bridgegen.campaign.validate import validate_file
-from bridgegen.errors import InputError, ScenarioError
-from bridgegen.odd.reader import load, names
-from bridgegen.odd.starter import start_scenario
-from bridgegen.participants import PARTICIPANTS
+from bridgegen.base.errors import InputError, ScenarioError
+from bridgegen.jobs.search.validate import validate_file
+from bridgegen.scenario.language.reader import load, names
+from bridgegen.scenario.language.starter import start_scenario
+from bridgegen.scenario.participants import PARTICIPANTS
 
 
 @pytest.fixture
@@ -163,7 +163,9 @@ JUNK = st.sampled_from(
 @settings(max_examples=150, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(name=st.sampled_from(names()), data=st.data())
 def test_nonsense_anywhere_is_refused_or_taken_never_a_traceback(tmp_path, name, data):
-    text = resources.files("bridgegen.catalogue").joinpath(f"{name}.yaml").read_text("utf-8")
+    text = (
+        resources.files("bridgegen.scenario.catalogue").joinpath(f"{name}.yaml").read_text("utf-8")
+    )
     scenario = yaml.safe_load(text)
     for _ in range(data.draw(st.integers(1, 2))):
         path = data.draw(st.sampled_from(sorted(places_in(scenario), key=str)))

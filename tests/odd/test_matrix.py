@@ -7,11 +7,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bridgegen.errors import ScenarioError
-from bridgegen.odd import matrix as matrices
-from bridgegen.odd.matrix import Grid
-from bridgegen.odd.reader import load, shipped_text
-from bridgegen.suite.rows import rows_of
+from bridgegen.base.errors import ScenarioError
+from bridgegen.jobs.suite.rows import rows_of
+from bridgegen.scenario.language import protocols as matrices
+from bridgegen.scenario.language.protocols import Grid
+from bridgegen.scenario.language.reader import load, shipped_text
 
 GRID = """
   - edition: "2030"

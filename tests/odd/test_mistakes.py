@@ -6,9 +6,9 @@ line that it names (``None``: the file is named, no line).
 
 import pytest
 
-from bridgegen.errors import InputError, ScenarioError
-from bridgegen.odd.criteria import read_criterion
-from bridgegen.odd.reader import load
+from bridgegen.base.errors import InputError, ScenarioError
+from bridgegen.scenario.language.criteria import read_criterion
+from bridgegen.scenario.language.reader import load
 
 MISTAKES = [
     (

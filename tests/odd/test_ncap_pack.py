@@ -6,11 +6,11 @@ from functools import lru_cache
 import numpy as np
 import pytest
 
-from bridgegen.metrics.impact import first_contact
-from bridgegen.odd.reader import load, pack_names
-from bridgegen.options import PipelineOptions
-from bridgegen.pipeline import Pipeline
-from bridgegen.suite.rows import rows_of
+from bridgegen.assess.metrics.impact import first_contact
+from bridgegen.engine.options import PipelineOptions
+from bridgegen.engine.pipeline import Pipeline
+from bridgegen.jobs.suite.rows import rows_of
+from bridgegen.scenario.language.reader import load, pack_names
 
 read = lru_cache(load)
 NAMES = [name for name in pack_names() if name.startswith("ncap-aeb/")]

@@ -4,9 +4,9 @@ from importlib.resources import files
 
 import pytest
 
-from bridgegen.errors import ScenarioError
-from bridgegen.odd.others import with_others
-from bridgegen.odd.reader import load, names
+from bridgegen.base.errors import ScenarioError
+from bridgegen.scenario.language.others import with_others
+from bridgegen.scenario.language.reader import load, names
 
 PAPERS = ("crossroads-s1", "crossroads-s2", "crossroads-s3", "crossroads-s4")
 
@@ -47,7 +47,7 @@ def test_vehicles_look_ahead_but_for_those_of_the_paper():
 
 
 def text_of(tmp_path, *changes):
-    text = files("bridgegen.catalogue").joinpath("cut-in.yaml").read_text(encoding="utf-8")
+    text = files("bridgegen.scenario.catalogue").joinpath("cut-in.yaml").read_text(encoding="utf-8")
     for old, new in changes:
         assert old in text
         text = text.replace(old, new, 1)

@@ -5,13 +5,13 @@ import re
 import numpy as np
 import pytest
 
-from bridgegen.conflict.plausibility import plausibility
-from bridgegen.errors import FileFormatError, UnknownNameError
-from bridgegen.odd.reader import load, names, pack_names
-from bridgegen.odd.starter import start_scenario
+from bridgegen.assess.conflict.plausibility import plausibility
+from bridgegen.base.errors import FileFormatError, UnknownNameError
+from bridgegen.engine.options import PipelineOptions
+from bridgegen.engine.pipeline import Pipeline
 from bridgegen.openx.convert import scenario_of
-from bridgegen.options import PipelineOptions
-from bridgegen.pipeline import Pipeline
+from bridgegen.scenario.language.reader import load, names, pack_names
+from bridgegen.scenario.language.starter import start_scenario
 
 R157 = [name for name in pack_names() if name.startswith("r157/")]
 

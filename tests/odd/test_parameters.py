@@ -3,10 +3,10 @@ import math
 import numpy as np
 import pytest
 
-from bridgegen.errors import ScenarioError, UnknownNameError
-from bridgegen.odd.expression import parse
-from bridgegen.odd.kinds import INTEGER, TOLERANCE, slack
-from bridgegen.odd.parameters import UNITS, Axis, Bound, Derived, Parameter, read_axes
+from bridgegen.base.errors import ScenarioError, UnknownNameError
+from bridgegen.scenario.language.expression import parse
+from bridgegen.scenario.language.kinds import INTEGER, TOLERANCE, slack
+from bridgegen.scenario.language.parameters import UNITS, Axis, Bound, Derived, Parameter, read_axes
 
 GOOD = {
     "name": "speed",

@@ -6,9 +6,9 @@ import yaml
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bridgegen.errors import FileFormatError
-from bridgegen.odd import plain_yaml
-from bridgegen.odd.plain_yaml import MAX_BYTES, MAX_DEPTH, read_plain_yaml
+from bridgegen.base.errors import FileFormatError
+from bridgegen.scenario.language import plain_yaml
+from bridgegen.scenario.language.plain_yaml import MAX_BYTES, MAX_DEPTH, read_plain_yaml
 
 SCALARS = {
     "text": "text", "'3'": "3", '"true"': "true", "3": 3, "-3": -3, "+3": 3, "007": 7,

@@ -8,12 +8,12 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from bridgegen.errors import FileFormatError, InputError, ScenarioError, UnknownNameError
-from bridgegen.odd.objectives import PAPERS
-from bridgegen.odd.parameters import Axis
-from bridgegen.odd.reader import load
-from bridgegen.odd.story import Change, SpeedChange
-from bridgegen.odd.thresholds import Thresholds
+from bridgegen.base.errors import FileFormatError, InputError, ScenarioError, UnknownNameError
+from bridgegen.scenario.language.objectives import PAPERS
+from bridgegen.scenario.language.parameters import Axis
+from bridgegen.scenario.language.reader import load
+from bridgegen.scenario.language.story import Change, SpeedChange
+from bridgegen.scenario.language.thresholds import Thresholds
 
 
 @pytest.fixture
@@ -162,7 +162,7 @@ def test_a_rate_must_stay_above_zero(refuse, write, s4_text):
 
 
 def test_what_road_and_weather_need_has_its_axis_unit_and_kind(write, refuse, s4_text):
-    import bridgegen.catalogue as catalogue
+    import bridgegen.scenario.catalogue as catalogue
 
     folder = Path(catalogue.__file__).parent
     own = (folder / "crossroads.yaml").read_text("utf-8")

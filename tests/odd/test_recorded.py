@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from bridgegen.errors import ScenarioError
-from bridgegen.odd.reader import load, shipped_text
-from bridgegen.odd.recorded import unmapped
+from bridgegen.base.errors import ScenarioError
+from bridgegen.scenario.language.reader import load, shipped_text
+from bridgegen.scenario.language.recorded import unmapped
 
 
 @pytest.fixture

@@ -5,11 +5,17 @@ from dataclasses import replace
 
 import pytest
 
-from bridgegen.odd.expression import parse
-from bridgegen.odd.parameters import Axis, Parameter
-from bridgegen.odd.roads import LegSpec, RoadsSpec, Segment, usual
-from bridgegen.odd.rules import bend, bounds_between_layers, cap, speed_bounds, speeds_of
-from bridgegen.odd.story import (
+from bridgegen.scenario.language.expression import parse
+from bridgegen.scenario.language.parameters import Axis, Parameter
+from bridgegen.scenario.language.roads import LegSpec, RoadsSpec, Segment, usual
+from bridgegen.scenario.language.rules import (
+    bend,
+    bounds_between_layers,
+    cap,
+    speed_bounds,
+    speeds_of,
+)
+from bridgegen.scenario.language.story import (
     Change,
     EventSpec,
     LaneChange,

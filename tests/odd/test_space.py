@@ -6,11 +6,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
-from bridgegen.errors import ScenarioError, UnknownNameError
-from bridgegen.odd.kinds import FLOAT, INTEGER, TOLERANCE
-from bridgegen.odd.parameters import Axis
-from bridgegen.odd.reader import load
-from bridgegen.odd.space import probes
+from bridgegen.base.errors import ScenarioError, UnknownNameError
+from bridgegen.scenario.language.kinds import FLOAT, INTEGER, TOLERANCE
+from bridgegen.scenario.language.parameters import Axis
+from bridgegen.scenario.language.reader import load
+from bridgegen.scenario.language.space import probes
 
 EVERY = tuple(Axis)
 _unit = st.one_of(st.sampled_from([0.0, 1.0, 0.5]), st.floats(0.0, 1.0))

@@ -4,10 +4,10 @@ import json
 
 import pytest
 
-from bridgegen.errors import InputError, StorageError, UnknownNameError
-from bridgegen.odd.json_schema import schema
-from bridgegen.odd.reader import load, names
-from bridgegen.odd.starter import start_scenario
+from bridgegen.base.errors import InputError, StorageError, UnknownNameError
+from bridgegen.scenario.language.json_schema import schema
+from bridgegen.scenario.language.reader import load, names
+from bridgegen.scenario.language.starter import start_scenario
 
 
 def test_it_is_valid_and_says_what_each_section_is(tmp_path):

@@ -2,12 +2,12 @@ from pathlib import Path
 
 import pytest
 
-from bridgegen.odd.parameters import Axis
-from bridgegen.odd.reader import load
-from bridgegen.odd.scenario import LogicalScenario
-from bridgegen.odd.space import SearchSpace
-from bridgegen.ontology.graph import Individuals
-from bridgegen.ontology.individuals import build
+from bridgegen.scenario.language.parameters import Axis
+from bridgegen.scenario.language.reader import load
+from bridgegen.scenario.language.scenario import LogicalScenario
+from bridgegen.scenario.language.space import SearchSpace
+from bridgegen.scenario.ontology.graph import Individuals
+from bridgegen.scenario.ontology.individuals import build
 
 
 @pytest.fixture(scope="session")

@@ -9,17 +9,17 @@ import pyoxigraph as ox
 import pytest
 import rdflib
 
-from bridgegen.odd.expression import parse
-from bridgegen.odd.kinds import FLOAT, TOLERANCE, slack
-from bridgegen.odd.parameters import Axis, Bound, Derived, Parameter
-from bridgegen.odd.reader import load, names
-from bridgegen.ontology.check import check
-from bridgegen.ontology.files import from_bytes, to_bytes
-from bridgegen.ontology.graph import Individuals
-from bridgegen.ontology.individuals import build
-from bridgegen.ontology.shapes import rules, turtle
-from bridgegen.ontology.site import ArmRoad, Leg, Site, SiteLane
-from bridgegen.ontology.vocabulary import RDFS, SCENARIOS, TYPE, bg
+from bridgegen.scenario.language.expression import parse
+from bridgegen.scenario.language.kinds import FLOAT, TOLERANCE, slack
+from bridgegen.scenario.language.parameters import Axis, Bound, Derived, Parameter
+from bridgegen.scenario.language.reader import load, names
+from bridgegen.scenario.ontology.check import check
+from bridgegen.scenario.ontology.files import from_bytes, to_bytes
+from bridgegen.scenario.ontology.graph import Individuals
+from bridgegen.scenario.ontology.individuals import build
+from bridgegen.scenario.ontology.shapes import rules, turtle
+from bridgegen.scenario.ontology.site import ArmRoad, Leg, Site, SiteLane
+from bridgegen.scenario.ontology.vocabulary import RDFS, SCENARIOS, TYPE, bg
 
 
 def at_fault(scenario, values):
@@ -403,7 +403,7 @@ def test_another_shacl_processor_agrees(scenario, values):
 
 def test_pyshacl_is_imported_when_it_is_used():
     code = (
-        "import sys, bridgegen.ontology.check, bridgegen.ontology.individuals\n"
+        "import sys, bridgegen.scenario.ontology.check, bridgegen.scenario.ontology.individuals\n"
         "print(sorted({'pyshacl', 'rdflib', 'pandas', 'numba', 'pydantic'} & set(sys.modules)))"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

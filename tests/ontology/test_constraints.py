@@ -10,18 +10,17 @@ import pyshacl
 import pytest
 import rdflib
 
-from bridgegen.odd.parameters import Axis
-from bridgegen.odd.reader import load, names
-from bridgegen.odd.roads import LegSpec, usual
-from bridgegen.ontology.check import check, constraints_in_words
-from bridgegen.ontology.conduct import conduct_rules
-from bridgegen.ontology.files import to_bytes
-from bridgegen.ontology.graph import Individuals
-from bridgegen.ontology.individuals import build, build_static
-from bridgegen.ontology.placement import placement_rules
-from bridgegen.ontology.rule import with_unit
-from bridgegen.ontology.shapes import turtle
-from bridgegen.ontology.vocabulary import SUBCLASS, TYPE, bg, local_name, tbox
+from bridgegen.scenario.language.parameters import Axis
+from bridgegen.scenario.language.reader import load, names
+from bridgegen.scenario.language.roads import LegSpec, usual
+from bridgegen.scenario.ontology.check import check, constraints_in_words
+from bridgegen.scenario.ontology.conduct import conduct_rules, placement_rules
+from bridgegen.scenario.ontology.files import to_bytes
+from bridgegen.scenario.ontology.graph import Individuals
+from bridgegen.scenario.ontology.individuals import build, build_static
+from bridgegen.scenario.ontology.rule import with_unit
+from bridgegen.scenario.ontology.shapes import turtle
+from bridgegen.scenario.ontology.vocabulary import SUBCLASS, TYPE, bg, local_name, tbox
 
 from ..openx.opendrive.kinds import KINDS
 
@@ -420,7 +419,7 @@ LATER = """
 @pytest.fixture(scope="module")
 def changing(tmp_path_factory):
     """Thin fog at first, any fog later."""
-    text = files("bridgegen.catalogue").joinpath("lead-brakes.yaml").read_text("utf-8")
+    text = files("bridgegen.scenario.catalogue").joinpath("lead-brakes.yaml").read_text("utf-8")
     text = text.replace("include: [", "include: [weather as later_, ")
     text = text.replace("\nevents:\n", f"\nevents:{LATER}")
     bound = "\n  - {target: fog_density, hi: 20, why: It is clear at first., source: ours.}\n"

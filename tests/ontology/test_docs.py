@@ -10,9 +10,9 @@ from html.parser import HTMLParser
 import pytest
 import rdflib
 
-from bridgegen.errors import InputError, StorageError
-from bridgegen.ontology.docs import to_html, write_docs
-from bridgegen.ontology.vocabulary import BG, OWL, RDF, RDFS, VOCABULARIES, tbox
+from bridgegen.base.errors import InputError, StorageError
+from bridgegen.scenario.ontology.docs import to_html, write_docs
+from bridgegen.scenario.ontology.vocabulary import BG, OWL, RDF, RDFS, VOCABULARIES, tbox
 
 VOID = {"meta", "link", "br", "wbr"}
 BLOCKS = {"h3", "p", "dt", "dd", "th", "td", "summary", "span"}
@@ -76,7 +76,7 @@ def graph():
     """The ontology as another parser reads it."""
     from importlib.resources import files
 
-    data = files("bridgegen.ontology").joinpath("bridgegen.owl").read_bytes()
+    data = files("bridgegen.scenario.ontology").joinpath("bridgegen.owl").read_bytes()
     return rdflib.Graph().parse(data=data, format="xml")
 
 

@@ -2,12 +2,12 @@
 
 import pytest
 
-from bridgegen.odd.others import with_others
-from bridgegen.odd.reader import load
-from bridgegen.ontology.check import check
-from bridgegen.ontology.individuals import build
 from bridgegen.openx.openscenario.declarations import DRIVER
 from bridgegen.openx.openscenario.from_owl import openscenario_from_owl
+from bridgegen.scenario.language.others import with_others
+from bridgegen.scenario.language.reader import load
+from bridgegen.scenario.ontology.check import check
+from bridgegen.scenario.ontology.individuals import build
 
 
 def concrete(name, others):

@@ -4,10 +4,10 @@ from pathlib import Path
 
 import pytest
 
-from bridgegen.errors import InputError
-from bridgegen.odd.reader import load
-from bridgegen.odd.starter import start_scenario
-from bridgegen.ontology.individuals import build
+from bridgegen.base.errors import InputError
+from bridgegen.scenario.language.reader import load
+from bridgegen.scenario.language.starter import start_scenario
+from bridgegen.scenario.ontology.individuals import build
 
 GOOD = """
 def apply(builder, values):

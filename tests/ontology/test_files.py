@@ -11,12 +11,12 @@ import rdflib
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bridgegen.errors import FileFormatError, StorageError
-from bridgegen.ontology import files
-from bridgegen.ontology.files import from_bytes, load, save, to_bytes
-from bridgegen.ontology.graph import Individuals
-from bridgegen.ontology.individuals import build_static
-from bridgegen.ontology.vocabulary import BG, OWL, RDFS, SCENARIOS, TYPE, XSD, bg, tbox
+from bridgegen.base.errors import FileFormatError, StorageError
+from bridgegen.scenario.ontology import files
+from bridgegen.scenario.ontology.files import from_bytes, load, save, to_bytes
+from bridgegen.scenario.ontology.graph import Individuals
+from bridgegen.scenario.ontology.individuals import build_static
+from bridgegen.scenario.ontology.vocabulary import BG, OWL, RDFS, SCENARIOS, TYPE, XSD, bg, tbox
 
 HEAD = (
     '<rdf:RDF xmlns:rdf="http://www.w3.org/1999/02/22-rdf-syntax-ns#" '
@@ -37,7 +37,7 @@ def test_saving_again_changes_nothing(individuals, tmp_path):
 
 SAVES = """
 import sys
-from bridgegen.ontology.files import from_bytes, to_bytes
+from bridgegen.scenario.ontology.files import from_bytes, to_bytes
 sys.stdout.buffer.write(to_bytes(from_bytes(sys.stdin.buffer.read())))
 """
 
@@ -226,7 +226,7 @@ def test_disjointness_of_the_users_own_is_not_taken_for_ours(individuals):
 
 def test_the_ontology_itself_opened_and_filled_in_protege():
     """Its header then is the ontology's own."""
-    source = resources.files("bridgegen.ontology").joinpath("bridgegen.owl")
+    source = resources.files("bridgegen.scenario.ontology").joinpath("bridgegen.owl")
     text = source.read_text(encoding="utf-8")
     road = '<bg:Road rdf:about="urn:r"/>'
     individuals = from_bytes(text.replace("</rdf:RDF>", road + "</rdf:RDF>").encode())

@@ -6,9 +6,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bridgegen.errors import OntologyError
-from bridgegen.ontology.graph import Individuals
-from bridgegen.ontology.vocabulary import BG, OWL, RDFS, SCENARIOS, TYPE, XSD, bg
+from bridgegen.base.errors import OntologyError
+from bridgegen.scenario.ontology.graph import Individuals
+from bridgegen.scenario.ontology.vocabulary import BG, OWL, RDFS, SCENARIOS, TYPE, XSD, bg
 
 HOME = SCENARIOS + "test#"
 

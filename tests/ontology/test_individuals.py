@@ -6,15 +6,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bridgegen.errors import OntologyError
-from bridgegen.odd.expression import parse
-from bridgegen.odd.parameters import Axis, Derived, Parameter
-from bridgegen.odd.reader import load as load_scenario
-from bridgegen.odd.reader import names
-from bridgegen.odd.story import Waypoint
-from bridgegen.ontology.individuals import build, build_static
-from bridgegen.ontology.site import ArmRoad, Leg, Site, SiteLane
-from bridgegen.ontology.vocabulary import BG
+from bridgegen.base.errors import OntologyError
+from bridgegen.scenario.language.expression import parse
+from bridgegen.scenario.language.parameters import Axis, Derived, Parameter
+from bridgegen.scenario.language.reader import load as load_scenario
+from bridgegen.scenario.language.reader import names
+from bridgegen.scenario.language.story import Waypoint
+from bridgegen.scenario.ontology.individuals import build, build_static
+from bridgegen.scenario.ontology.site import ArmRoad, Leg, Site, SiteLane
+from bridgegen.scenario.ontology.vocabulary import BG
 
 STATIC = {
     "lane_width": 3.25,

@@ -3,9 +3,9 @@ from xml.etree import ElementTree
 import pyoxigraph as ox
 import pytest
 
-from bridgegen.ontology.graph import Individuals
-from bridgegen.ontology.layers import LAYERS, Members
-from bridgegen.ontology.vocabulary import BG, LABEL, SCENARIOS, SUBCLASS, TYPE, bg, tbox
+from bridgegen.scenario.ontology.graph import Individuals
+from bridgegen.scenario.ontology.structure import LAYERS, Members
+from bridgegen.scenario.ontology.vocabulary import BG, LABEL, SCENARIOS, SUBCLASS, TYPE, bg, tbox
 
 RDF_ABOUT = "{http://www.w3.org/1999/02/22-rdf-syntax-ns#}about"
 NODE = ox.NamedNode(SCENARIOS + "x#one")
@@ -21,7 +21,7 @@ def annotated() -> dict[str, int]:
     from importlib.resources import files
 
     root = ElementTree.fromstring(
-        files("bridgegen.ontology").joinpath("bridgegen.owl").read_bytes()
+        files("bridgegen.scenario.ontology").joinpath("bridgegen.owl").read_bytes()
     )
     return {
         cls.attrib[RDF_ABOUT].lstrip("#"): int(layer.text)

@@ -1,10 +1,10 @@
 import pyoxigraph as ox
 import pytest
 
-from bridgegen.ontology.graph import Individuals
-from bridgegen.ontology.layers import Members
-from bridgegen.ontology.phrases import Phrases, quantity
-from bridgegen.ontology.vocabulary import SCENARIOS, TYPE, bg, local_name, tbox
+from bridgegen.scenario.ontology.graph import Individuals
+from bridgegen.scenario.ontology.phrases import Phrases, quantity
+from bridgegen.scenario.ontology.structure import Members
+from bridgegen.scenario.ontology.vocabulary import SCENARIOS, TYPE, bg, local_name, tbox
 
 NARROW = "\N{NARROW NO-BREAK SPACE}"
 

@@ -6,15 +6,15 @@ from dataclasses import replace
 import pyoxigraph as ox
 import pytest
 
-from bridgegen.errors import FileFormatError, InputError, UnknownNameError
-from bridgegen.odd.reader import load
-from bridgegen.odd.story import Waypoint
-from bridgegen.ontology import questions as module
-from bridgegen.ontology.files import from_bytes, save, to_bytes
-from bridgegen.ontology.graph import Individuals
-from bridgegen.ontology.individuals import build, build_static
-from bridgegen.ontology.questions import ask, ask_file, ask_sparql, questions
-from bridgegen.ontology.vocabulary import SCENARIOS, TYPE, bg
+from bridgegen.base.errors import FileFormatError, InputError, UnknownNameError
+from bridgegen.scenario.language.reader import load
+from bridgegen.scenario.language.story import Waypoint
+from bridgegen.scenario.ontology import questions as module
+from bridgegen.scenario.ontology.files import from_bytes, save, to_bytes
+from bridgegen.scenario.ontology.graph import Individuals
+from bridgegen.scenario.ontology.individuals import build, build_static
+from bridgegen.scenario.ontology.questions import ask, ask_file, ask_sparql, questions
+from bridgegen.scenario.ontology.vocabulary import SCENARIOS, TYPE, bg
 
 # The scenarios' descriptions: from leg, to leg, turn; legs A south, B west, C north, D east.
 ROUTES = {

@@ -3,15 +3,15 @@
 import pyoxigraph as ox
 import pytest
 
-from bridgegen.errors import InputError, OntologyError
-from bridgegen.odd.reader import load, names
-from bridgegen.ontology import reasoner as module
-from bridgegen.ontology.check import check
-from bridgegen.ontology.files import save
-from bridgegen.ontology.graph import Individuals
-from bridgegen.ontology.individuals import build
-from bridgegen.ontology.reasoner import reason, require, smallest
-from bridgegen.ontology.vocabulary import OWL, SCENARIOS, SUBCLASS, TYPE, XSD, bg, tbox
+from bridgegen.base.errors import InputError, OntologyError
+from bridgegen.scenario.language.reader import load, names
+from bridgegen.scenario.ontology import reasoner as module
+from bridgegen.scenario.ontology.check import check
+from bridgegen.scenario.ontology.files import save
+from bridgegen.scenario.ontology.graph import Individuals
+from bridgegen.scenario.ontology.individuals import build
+from bridgegen.scenario.ontology.reasoner import reason, require, smallest
+from bridgegen.scenario.ontology.vocabulary import OWL, SCENARIOS, SUBCLASS, TYPE, XSD, bg, tbox
 
 
 def installed() -> bool:

@@ -6,9 +6,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bridgegen.odd.expression import parse
-from bridgegen.odd.kinds import TOLERANCE
-from bridgegen.ontology.sparql import binds, literal, variable
+from bridgegen.scenario.language.expression import parse
+from bridgegen.scenario.language.kinds import TOLERANCE
+from bridgegen.scenario.ontology.sparql import binds, literal, variable
 
 XSD_DOUBLE = "http://www.w3.org/2001/XMLSchema#double"
 

@@ -7,13 +7,13 @@ import numpy as np
 import pyoxigraph as ox
 import pytest
 
-from bridgegen.odd.reader import load, names
-from bridgegen.ontology import check as checks
-from bridgegen.ontology.check import check
-from bridgegen.ontology.graph import Individuals
-from bridgegen.ontology.individuals import build
-from bridgegen.ontology.structure import Structure, property_shapes, requirements
-from bridgegen.ontology.vocabulary import RDFS, SCENARIOS, TYPE, XSD, bg, tbox
+from bridgegen.scenario.language.reader import load, names
+from bridgegen.scenario.ontology import check as checks
+from bridgegen.scenario.ontology.check import check
+from bridgegen.scenario.ontology.graph import Individuals
+from bridgegen.scenario.ontology.individuals import build
+from bridgegen.scenario.ontology.structure import Structure, property_shapes, requirements
+from bridgegen.scenario.ontology.vocabulary import RDFS, SCENARIOS, TYPE, XSD, bg, tbox
 
 SCENARIO = "crossroads-s4"
 

@@ -7,10 +7,10 @@ import pyoxigraph as ox
 import pytest
 import rdflib
 
-from bridgegen.odd.reader import names
-from bridgegen.ontology.individuals import build
-from bridgegen.ontology.site import ArmRoad, Leg, Site, SiteLane
-from bridgegen.ontology.vocabulary import (
+from bridgegen.scenario.language.reader import names
+from bridgegen.scenario.ontology.individuals import build
+from bridgegen.scenario.ontology.site import ArmRoad, Leg, Site, SiteLane
+from bridgegen.scenario.ontology.vocabulary import (
     BG,
     DCTERMS,
     ONTOLOGY,
@@ -23,7 +23,7 @@ from bridgegen.ontology.vocabulary import (
     tbox,
 )
 
-PATH = files("bridgegen.ontology").joinpath("bridgegen.owl")
+PATH = files("bridgegen.scenario.ontology").joinpath("bridgegen.owl")
 PAPER_CLASSES = {
     *("AreaEntities", "PointEntities", "ConstructionCard", "RoadCone", "TrafficLight", "Signage"),
     *("Event", "TrafficAccident", "TrafficJam", "Condition", "Trigger"),

@@ -8,11 +8,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bridgegen.errors import FileFormatError, InputError
+from bridgegen.base.errors import FileFormatError, InputError
+from bridgegen.engine.simulate import simulate_file
 from bridgegen.openx.geo import on_plane, projection
 from bridgegen.openx.opendrive.model import Header, Offset, OpenDrive
 from bridgegen.openx.openscenario.read import read
-from bridgegen.simulate import simulate_file
 
 pyproj = pytest.importorskip("pyproj")
 
@@ -127,7 +127,7 @@ def test_an_orientation_without_a_type_is_relative_from_1_3_on(tmp_path):
 
 
 def test_without_the_extra_one_is_told_its_name(tmp_path, monkeypatch):
-    monkeypatch.setattr("bridgegen.extras.is_installed", lambda extra: extra != "geo")
+    monkeypatch.setattr("bridgegen.base.extras.is_installed", lambda extra: extra != "geo")
     with pytest.raises(InputError, match=r"a GeoPosition needs the extra 'geo'"):
         simulate_file(files(tmp_path))
 

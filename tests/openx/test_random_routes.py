@@ -6,15 +6,15 @@ from pathlib import Path
 
 import pytest
 
-from bridgegen.errors import FileFormatError
-from bridgegen.ontology.individuals import build_static
+from bridgegen.base.errors import FileFormatError
+from bridgegen.engine.simulate import simulate_file
 from bridgegen.openx.opendrive.from_owl import opendrive_from_owl
 from bridgegen.openx.opendrive.write import to_xml
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.element import walk
 from bridgegen.openx.openscenario.read import read
-from bridgegen.openx.random_routes import LONGEST, with_random_routes
-from bridgegen.simulate import simulate_file
+from bridgegen.openx.prepared import LONGEST, with_random_routes
+from bridgegen.scenario.ontology.individuals import build_static
 
 STATIC = {"lane_width": 3.5, "lanes_per_direction": 1, "arm_length": 100.0,
           "intersection_size": 26.0}  # fmt: skip

@@ -7,15 +7,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bridgegen.campaign.export import export
-from bridgegen.errors import FileFormatError
-from bridgegen.ontology.individuals import build_static
+from bridgegen.base.errors import FileFormatError
+from bridgegen.engine.simulate import simulate_file
+from bridgegen.jobs.search.export import export
 from bridgegen.openx.opendrive.from_owl import opendrive_from_owl
 from bridgegen.openx.opendrive.write import to_xml
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.read import read
 from bridgegen.openx.traffic import APART, MOST, populated
-from bridgegen.simulate import simulate_file
+from bridgegen.scenario.ontology.individuals import build_static
 
 from .opendrive.kinds import usual
 

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bridgegen.errors import FileFormatError
+from bridgegen.base.errors import FileFormatError
 from bridgegen.openx import xml
 from bridgegen.openx.xml import parse_xml, read_bytes
 

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 import bridgegen as bg
+from bridgegen.base.errors import InputError
 from bridgegen.cli import comparisons, main, runs
-from bridgegen.errors import InputError
-from bridgegen.options import CommonOptions, PipelineOptions, SearchOptions, options_of
-from bridgegen.options.forms import read_names, read_numbers, read_settings, read_terms
+from bridgegen.engine.options import CommonOptions, PipelineOptions, SearchOptions, options_of
+from bridgegen.engine.options.forms import read_names, read_numbers, read_settings, read_terms
+from bridgegen.jobs.suite.suite import run_suite
 from bridgegen.simulation.choice import SimulatorChoice
-from bridgegen.suite.suite import run_suite
 
 DECLARED = {one.name: one for one in options_of(SearchOptions)}
 
@@ -156,7 +156,7 @@ def test_options_are_what_their_command_line_says(options, monkeypatch):
         found.update(given)
         raise InputError("not today")
 
-    monkeypatch.setattr("bridgegen.campaign.run_search", keep)
+    monkeypatch.setattr("bridgegen.jobs.search.run_search", keep)
     words = shlex.split(shlex.join(["bridgegen", "search", "crossroads-s4", *line(options)]))
     monkeypatch.setattr(sys, "argv", words)
     with pytest.raises(SystemExit):

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from bridgegen.ego.preventable import avoids_cut_in, avoids_deceleration
-from bridgegen.errors import InputError
-from bridgegen.preventability import CellClass, map_preventability
-from bridgegen.preventability.arithmetic import NAMES
+from bridgegen.base.errors import InputError
+from bridgegen.drivers.preventable import avoids_cut_in, avoids_deceleration
+from bridgegen.jobs.preventability import CellClass, map_preventability
+from bridgegen.jobs.preventability.arithmetic import NAMES
 
 
 def test_a_computed_cut_in_is_the_regulation_s(tmp_path):

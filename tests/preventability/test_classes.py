@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bridgegen.odd.reader import load
-from bridgegen.options import PipelineOptions
-from bridgegen.pipeline import Pipeline
-from bridgegen.preventability.classes import CellClass, Outcome, classes, collides
+from bridgegen.engine.options import PipelineOptions
+from bridgegen.engine.pipeline import Pipeline
+from bridgegen.jobs.preventability.classes import CellClass, Outcome, classes, collides
+from bridgegen.scenario.language.reader import load
 from bridgegen.simulation.rollout import Rollout
 
 A, C, F, N, X = (

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from bridgegen.errors import InputError
-from bridgegen.odd.reader import load
-from bridgegen.preventability.grid import DEFAULT_GRIDS, Grid, GridAxis, grid_of, read_axis
+from bridgegen.base.errors import InputError
+from bridgegen.jobs.preventability.grid import DEFAULT_GRIDS, Grid, GridAxis, grid_of, read_axis
+from bridgegen.scenario.language.reader import load
 
 CUT_IN = load("r157/cut-in").space()
 

@@ -6,17 +6,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from bridgegen.base.errors import InputError, Interrupted, StorageError, UnknownNameError
 from bridgegen.cli import main
-from bridgegen.ego.preventable import avoids_cut_in
-from bridgegen.errors import InputError, Interrupted, StorageError, UnknownNameError
-from bridgegen.preventability import CellClass, GridAxis, chunks, map_preventability
-from bridgegen.preventability import preventability as module
-from bridgegen.preventability.preventability import MapCallbacks
+from bridgegen.drivers.preventable import avoids_cut_in
+from bridgegen.jobs.preventability import CellClass, GridAxis, map_preventability
+from bridgegen.jobs.preventability import preventability as module
+from bridgegen.jobs.preventability import result as chunks
+from bridgegen.jobs.preventability.preventability import MapCallbacks
 
 GRID = ["gap=1:61:13", "relative_speed=10 km/h:50 km/h:5", "lateral_speed=0.6:1.8:3"]
 HALT = """
 import numpy as np
-from bridgegen.ego.interface import Control
+from bridgegen.drivers.interface import Control
 
 class Halts:
     def reset(self, n, scene):

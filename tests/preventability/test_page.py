@@ -7,8 +7,8 @@ import re
 import numpy as np
 from PIL import Image
 
-from bridgegen.preventability import CellClass, GridAxis, map_preventability
-from bridgegen.preventability.picture import COLOURS, png
+from bridgegen.jobs.preventability import CellClass, GridAxis, map_preventability
+from bridgegen.jobs.preventability.page import COLOURS, png
 
 
 def test_a_pixel_has_the_colour_of_its_cell_s_class():
@@ -59,7 +59,7 @@ def test_text_of_a_user_is_escaped(tmp_path):
     folder.mkdir()
     (folder / "mine.py").write_text(
         "import numpy as np\n"
-        "from bridgegen.ego.interface import Control\n"
+        "from bridgegen.drivers.interface import Control\n"
         "class D:\n"
         "    def reset(self, n, scene): pass\n"
         "    def act(self, o): return Control(np.full(len(o.v), -8.0), np.zeros(len(o.v)))\n"

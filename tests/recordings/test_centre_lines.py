@@ -6,12 +6,12 @@ import pickle
 import numpy as np
 import pytest
 
-from bridgegen.errors import FileFormatError
-from bridgegen.mining.lanes.find import locate
-from bridgegen.recordings.centre_lines import lanelets_of_centre_lines
-from bridgegen.recordings.clean import clean
-from bridgegen.recordings.formats import read
-from bridgegen.recordings.road_lines import CentreLine
+from bridgegen.base.errors import FileFormatError
+from bridgegen.recordings.lanes.find import locate
+from bridgegen.recordings.readers.centre_lines import lanelets_of_centre_lines
+from bridgegen.recordings.readers.clean import clean
+from bridgegen.recordings.readers.formats import read
+from bridgegen.recordings.readers.road_lines import CentreLine
 
 from . import writers as w
 

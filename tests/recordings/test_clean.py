@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from bridgegen.ego.kinds import BICYCLE, CAR, MOTORCYCLE, PEDESTRIAN, TRUCK
-from bridgegen.errors import FileFormatError, InputError
-from bridgegen.recordings.clean import clean
-from bridgegen.recordings.cuts import suspects
-from bridgegen.recordings.quality import Rule
-from bridgegen.recordings.table import Facts, build
+from bridgegen.base.errors import FileFormatError, InputError
+from bridgegen.drivers.kinds import BICYCLE, CAR, MOTORCYCLE, PEDESTRIAN, TRUCK
+from bridgegen.recordings.readers.clean import clean
+from bridgegen.recordings.readers.quality import Rule
+from bridgegen.recordings.readers.smoothing import suspects
+from bridgegen.recordings.readers.table import Facts, build
 
 STEP = 0.1
 

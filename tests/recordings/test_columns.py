@@ -9,9 +9,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bridgegen.errors import FileFormatError
-from bridgegen.recordings import columns
-from bridgegen.recordings.columns import read_columns
+from bridgegen.base.errors import FileFormatError
+from bridgegen.recordings.readers import columns
+from bridgegen.recordings.readers.columns import read_columns
 
 
 @pytest.fixture(scope="module")

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from bridgegen.errors import FileFormatError
-from bridgegen.recordings.formats import read
+from bridgegen.base.errors import FileFormatError
+from bridgegen.recordings.readers.formats import read
 
 from . import binary_writers as b
 

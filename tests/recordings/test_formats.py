@@ -7,10 +7,10 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from bridgegen.ego.kinds import CAR, TRUCK
-from bridgegen.errors import FileFormatError
-from bridgegen.recordings.format import read_head
-from bridgegen.recordings.formats import FORMATS, files_of, read, recognise
+from bridgegen.base.errors import FileFormatError
+from bridgegen.drivers.kinds import CAR, TRUCK
+from bridgegen.recordings.readers.format import read_head
+from bridgegen.recordings.readers.formats import FORMATS, files_of, read, recognise
 
 from . import binary_writers as b
 from . import writers as w

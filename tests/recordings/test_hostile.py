@@ -10,10 +10,10 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from bridgegen.errors import FileFormatError
-from bridgegen.recordings.clean import clean
-from bridgegen.recordings.formats import read
-from bridgegen.recordings.pickles import PickledArray, read_pickle
+from bridgegen.base.errors import FileFormatError
+from bridgegen.recordings.readers.clean import clean
+from bridgegen.recordings.readers.formats import read
+from bridgegen.recordings.readers.pickles import PickledArray, read_pickle
 
 from . import binary_writers as b
 from . import writers as w

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from bridgegen.recordings.bodies import centre_ahead
-from bridgegen.recordings.formats import read
+from bridgegen.recordings.readers.formats import read
+from bridgegen.recordings.readers.motion import centre_ahead
 
 from . import writers as w
 

@@ -8,10 +8,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bridgegen.errors import FileFormatError, InputError
-from bridgegen.recordings import mcap, osi
-from bridgegen.recordings.formats import read
-from bridgegen.recordings.wire import Message, Shape
+from bridgegen.base.errors import FileFormatError, InputError
+from bridgegen.recordings.readers import mcap, osi
+from bridgegen.recordings.readers.formats import read
+from bridgegen.recordings.readers.wire import Message, Shape
 
 from . import binary_writers as b
 from . import writers as w
@@ -199,7 +199,7 @@ def test_a_compressed_file_holds_what_an_uncompressed_one_does(tmp_path, method)
 
 
 def test_without_the_extra_a_compressed_file_names_it(tmp_path, monkeypatch):
-    monkeypatch.setattr("bridgegen.extras.is_installed", lambda extra: extra != "osi")
+    monkeypatch.setattr("bridgegen.base.extras.is_installed", lambda extra: extra != "osi")
     path = tmp_path / "one.mcap"
     path.write_bytes(b.mcap(b.records([_state()]), method=b"zstd"))
     with pytest.raises(InputError, match=r"pip install 'bridgegen\[osi\]'"):

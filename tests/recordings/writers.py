@@ -15,8 +15,8 @@ from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
-from bridgegen.ego.kinds import TRUCK
-from bridgegen.recordings.bodies import centre_ahead
+from bridgegen.drivers.kinds import TRUCK
+from bridgegen.recordings.readers.motion import centre_ahead
 
 STEP = 0.1
 N = 41

@@ -3,9 +3,9 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from bridgegen.odd.parameters import Axis
-from bridgegen.odd.reader import load
-from bridgegen.odd.space import SearchSpace
+from bridgegen.scenario.language.parameters import Axis
+from bridgegen.scenario.language.reader import load
+from bridgegen.scenario.language.space import SearchSpace
 
 
 @dataclass

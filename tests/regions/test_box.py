@@ -3,10 +3,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bridgegen.odd.parameters import Axis
-from bridgegen.odd.reader import load
-from bridgegen.regions.box import Box, joined, readable, whole
-from bridgegen.search.tree import Leaf, fit_leaves
+from bridgegen.scenario.language.parameters import Axis
+from bridgegen.scenario.language.reader import load
+from bridgegen.search.algorithms.tree import Leaf, fit_leaves
+from bridgegen.search.regions.box import Box, joined, readable, whole
 
 EVERY = load("crossroads-s4").space(tuple(Axis))
 OUTER = whole(EVERY)

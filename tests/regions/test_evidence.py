@@ -2,7 +2,8 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from bridgegen.regions.evidence import Evidence, clopper_pearson, wilson
+from bridgegen.base.statistics import clopper_pearson, wilson
+from bridgegen.search.regions.box import Evidence
 
 
 @pytest.mark.parametrize(

@@ -1,11 +1,10 @@
 import numpy as np
 import pytest
 
-from bridgegen.errors import InputError
-from bridgegen.odd.within import in_box
-from bridgegen.regions.box import whole
-from bridgegen.regions.find import MOST_CONDITIONS, find_regions
-from bridgegen.regions.words import ANYWHERE, rule
+from bridgegen.base.errors import InputError
+from bridgegen.scenario.language.within import in_box
+from bridgegen.search.regions.box import ANYWHERE, rule, whole
+from bridgegen.search.regions.find import MOST_CONDITIONS, find_regions
 
 
 def planted(v):

@@ -6,15 +6,13 @@ import numpy as np
 import pyoxigraph as ox
 import pytest
 
-from bridgegen.odd.reader import load
-from bridgegen.ontology.individuals import build
-from bridgegen.ontology.vocabulary import OWL, RDF
-from bridgegen.regions.box import Box, whole
-from bridgegen.regions.evidence import Evidence
-from bridgegen.regions.find import Found, Region
-from bridgegen.regions.owl import carriers, classes, statable
-from bridgegen.regions.record import to_json
-from bridgegen.regions.words import conditions
+from bridgegen.scenario.language.reader import load
+from bridgegen.scenario.ontology.individuals import build
+from bridgegen.scenario.ontology.vocabulary import OWL, RDF
+from bridgegen.search.regions.box import Box, Evidence, conditions, whole
+from bridgegen.search.regions.find import Found, Region
+from bridgegen.search.regions.owl import carriers, classes, statable
+from bridgegen.search.regions.record import to_json
 
 SCENARIO = load(Path(__file__).parents[2] / "docs/examples/braking-manner.yaml")
 SPACE = SCENARIO.space()

@@ -2,17 +2,16 @@ import numpy as np
 import pyoxigraph as ox
 import pytest
 
-from bridgegen.odd.kinds import INTEGER
-from bridgegen.odd.parameters import Axis
-from bridgegen.odd.reader import load as load_scenario
-from bridgegen.ontology.files import from_bytes, load, save, to_bytes
-from bridgegen.ontology.graph import Individuals
-from bridgegen.ontology.individuals import build
-from bridgegen.ontology.vocabulary import LABEL, OWL, RDF, RDFS, XSD, local_name, tbox
-from bridgegen.regions.box import Box, whole
-from bridgegen.regions.evidence import Evidence
-from bridgegen.regions.find import Region
-from bridgegen.regions.owl import carriers, classes, statable
+from bridgegen.scenario.language.kinds import INTEGER
+from bridgegen.scenario.language.parameters import Axis
+from bridgegen.scenario.language.reader import load as load_scenario
+from bridgegen.scenario.ontology.files import from_bytes, load, save, to_bytes
+from bridgegen.scenario.ontology.graph import Individuals
+from bridgegen.scenario.ontology.individuals import build
+from bridgegen.scenario.ontology.vocabulary import LABEL, OWL, RDF, RDFS, XSD, local_name, tbox
+from bridgegen.search.regions.box import Box, Evidence, whole
+from bridgegen.search.regions.find import Region
+from bridgegen.search.regions.owl import carriers, classes, statable
 
 SCENARIO = load_scenario("crossroads-s4")
 SPACE = SCENARIO.space(tuple(Axis))
@@ -219,8 +218,8 @@ def test_terms_are_the_ontology_s():
 
 @pytest.mark.reasoner
 def test_a_reasoner_tells_which_region_a_scenario_lies_in(tmp_path):
-    from bridgegen.errors import InputError
-    from bridgegen.ontology.reasoner import reason, require
+    from bridgegen.base.errors import InputError
+    from bridgegen.scenario.ontology.reasoner import reason, require
 
     try:
         require()

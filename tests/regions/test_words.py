@@ -5,11 +5,18 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bridgegen.odd.parameters import Axis
-from bridgegen.odd.reader import load
-from bridgegen.regions.box import Box, whole
-from bridgegen.regions.evidence import Evidence
-from bridgegen.regions.words import ANYWHERE, number, percent, rule, sentence
+from bridgegen.scenario.language.parameters import Axis
+from bridgegen.scenario.language.reader import load
+from bridgegen.search.regions.box import (
+    ANYWHERE,
+    Box,
+    Evidence,
+    number,
+    percent,
+    rule,
+    sentence,
+    whole,
+)
 
 EVERY = load("crossroads-s4").space(tuple(Axis))
 OUTER = whole(EVERY)

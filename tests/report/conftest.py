@@ -11,14 +11,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from bridgegen.odd.coverage import CoverageMap, coverage_map
-from bridgegen.odd.reader import load
-from bridgegen.odd.scenario import LogicalScenario
-from bridgegen.ontology.graph import Individuals
-from bridgegen.ontology.individuals import build as build_individuals
-from bridgegen.report.data import Column, Evaluations, ReportData, RunSummary
-from bridgegen.report.page import write_report
-from bridgegen.report.playback import Entity, Outline, Playback
+from bridgegen.pages.data import Column, Evaluations, ReportData, RunSummary
+from bridgegen.pages.page import write_report
+from bridgegen.pages.playback import Entity, Outline, Playback
+from bridgegen.scenario.language.coverage import CoverageMap, coverage_map
+from bridgegen.scenario.language.reader import load
+from bridgegen.scenario.language.scenario import LogicalScenario
+from bridgegen.scenario.ontology.graph import Individuals
+from bridgegen.scenario.ontology.individuals import build as build_individuals
 
 ARM, HALF, LANE, LANES = 60.0, 13.0, 3.5, 2
 CAR = {"length": 4.6, "width": 1.9, "center_ahead": 1.4}

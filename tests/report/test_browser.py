@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from bridgegen.report.playback import Entity, Lamp
+from bridgegen.pages.playback import Entity, Lamp
 
 pytestmark = pytest.mark.browser
 

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from bridgegen.report.playback import Entity
+from bridgegen.pages.playback import Entity
 
 pytestmark = pytest.mark.browser
 

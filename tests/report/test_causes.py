@@ -6,10 +6,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bridgegen.cause import Cause
-from bridgegen.report.page import write_report
-from bridgegen.report.payload import payload
-from bridgegen.report.sentences import sentences
+from bridgegen.assess.cause import Cause
+from bridgegen.pages.page import write_report
+from bridgegen.pages.payload import payload
+from bridgegen.pages.sentences import sentences
 
 
 @pytest.fixture(scope="module")

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from bridgegen.report.data import Column, ReportData
-from bridgegen.report.page import write_report
+from bridgegen.pages.data import Column, ReportData
+from bridgegen.pages.page import write_report
 
 pytestmark = pytest.mark.browser
 

@@ -6,14 +6,21 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bridgegen.confirmation.differences import Contact, Parting, Track
-from bridgegen.confirmation.schema import Change, Course, Differences, Outcome, Record, Scenario
-from bridgegen.odd.thresholds import Thresholds
-from bridgegen.report import confirmation_payload
-from bridgegen.report.confirmation_payload import confirmations_payload
-from bridgegen.report.page import write_report
-from bridgegen.report.payload import news, payload
-from bridgegen.report.series import unpacked
+from bridgegen.pages import confirmation_payload
+from bridgegen.pages.confirmation_payload import confirmations_payload
+from bridgegen.pages.page import write_report
+from bridgegen.pages.payload import news, payload
+from bridgegen.pages.series import unpacked
+from bridgegen.results.confirmation.differences import Contact, Parting, Track
+from bridgegen.results.confirmation.record import (
+    Change,
+    Course,
+    Differences,
+    Outcome,
+    Record,
+    Scenario,
+)
+from bridgegen.scenario.language.thresholds import Thresholds
 
 HOSTILE = '</script><img src=x onerror="window.hacked=1">'
 
@@ -107,7 +114,7 @@ def test_where_there_is_no_room_the_most_critical_keep_theirs(found, record, mon
 
 
 def test_confirmed_rows_of_a_long_run_are_on_its_page(found, record, monkeypatch):
-    monkeypatch.setattr("bridgegen.report.payload.ROWS", 10)
+    monkeypatch.setattr("bridgegen.pages.payload.ROWS", 10)
     shown = payload(found)["rows"]["evaluation"]
     assert {one.evaluation for one in record.scenarios} <= {*shown}
     assert len(shown) < 30

@@ -6,8 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.stats import ks_2samp
 
-from bridgegen.report.convergence import batches, telling_parameters, trend
-from bridgegen.report.data import Column, Evaluations
+from bridgegen.pages.convergence import batches, telling_parameters, trend
+from bridgegen.pages.data import Column, Evaluations
 
 
 def rows(iteration, critical=None, status=None):

@@ -6,10 +6,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from bridgegen.odd.coverage import CoverageMap, coverage_map
-from bridgegen.odd.kinds import INTEGER
-from bridgegen.odd.reader import load
-from bridgegen.report.page import write_report
+from bridgegen.pages.page import write_report
+from bridgegen.scenario.language.coverage import CoverageMap, coverage_map
+from bridgegen.scenario.language.kinds import INTEGER
+from bridgegen.scenario.language.reader import load
 
 pytestmark = pytest.mark.browser
 

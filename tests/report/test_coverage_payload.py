@@ -7,12 +7,12 @@ from itertools import combinations, pairwise
 import numpy as np
 import pytest
 
-from bridgegen.errors import ScenarioError
-from bridgegen.odd.coverage import CoverageMap, coverage_map
-from bridgegen.odd.reader import load
-from bridgegen.report import build as build_module
-from bridgegen.report.coverage_payload import IMPOSSIBLE, coverage_payload
-from bridgegen.report.payload import payload
+from bridgegen.base.errors import ScenarioError
+from bridgegen.pages import build as build_module
+from bridgegen.pages.payload import payload
+from bridgegen.pages.sections import IMPOSSIBLE, coverage_payload
+from bridgegen.scenario.language.coverage import CoverageMap, coverage_map
+from bridgegen.scenario.language.reader import load
 
 
 @pytest.fixture(scope="module")

@@ -8,15 +8,15 @@ import numpy as np
 import pytest
 from tests.report.conftest import make_report
 
-from bridgegen.criteria import headline, summarise_criteria
-from bridgegen.criteria.monitor import LARGEST
-from bridgegen.odd.criteria import Criterion
-from bridgegen.report.criteria_payload import criteria_payload, histogram, margins_shown
-from bridgegen.report.data import Column, ReportData
-from bridgegen.report.page import write_report
-from bridgegen.report.payload import payload
-from bridgegen.report.sentences import sentences, summary_table
-from bridgegen.stl import TINY
+from bridgegen.assess.criteria import headline, summarise_criteria
+from bridgegen.assess.criteria.monitor import LARGEST
+from bridgegen.pages.confirmation_payload import criteria_payload, histogram, margins_shown
+from bridgegen.pages.data import Column, ReportData
+from bridgegen.pages.page import write_report
+from bridgegen.pages.payload import payload
+from bridgegen.pages.sentences import sentences, summary_table
+from bridgegen.scenario.language.criteria import Criterion
+from bridgegen.scenario.stl import TINY
 
 HOSTILE = "</script><script>window.hacked = 1</script><img src=x onerror='window.hacked = 2'>"
 
@@ -160,7 +160,7 @@ def test_headlines():
 
 def test_what_violates_a_criterion_is_no_near_miss(data):
     """By the rule of criteria a scenario without any conflict may be critical."""
-    from bridgegen.conflict.findings import Findings
+    from bridgegen.assess.conflict.findings import Findings
 
     e = data.evaluations
     findings = Findings.none(120)

@@ -3,8 +3,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bridgegen.report.data import Column
-from bridgegen.report.playback import Entity, Outline
+from bridgegen.pages.data import Column
+from bridgegen.pages.playback import Entity, Outline
 
 
 def test_a_column_of_another_length_is_named(report):

@@ -5,21 +5,21 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bridgegen.conflict.findings import Findings
-from bridgegen.conflict.summary import ConflictSummary
-from bridgegen.objective import Objective
-from bridgegen.report import payload, sentences
-from bridgegen.report.build import rule_in_words
-from bridgegen.report.data import Column
-from bridgegen.report.findings_payload import (
+from bridgegen.assess.conflict.findings import Findings
+from bridgegen.assess.conflict.summary import ConflictSummary
+from bridgegen.assess.objective import Objective
+from bridgegen.pages import payload, sentences
+from bridgegen.pages.build import rule_in_words
+from bridgegen.pages.data import Column
+from bridgegen.pages.findings_payload import (
     FINDING_FIELDS,
     conflict_payload,
     findings_payload,
     implausible_payload,
     triage_payload,
 )
-from bridgegen.report.playback import Conflict
-from bridgegen.triage.record import (
+from bridgegen.pages.playback import Conflict
+from bridgegen.search.triage.record import (
     Bound,
     Estimate,
     Least,
@@ -219,7 +219,7 @@ def test_what_is_critical_in_words():
 
 @pytest.fixture
 def page(browser, harmful, tmp_path):
-    from bridgegen.report.page import write_report
+    from bridgegen.pages.page import write_report
 
     kept = tuple(replace(one, evaluation=k, conflict=conflict()) for k, one in
                  enumerate(harmful.kept))  # fmt: skip
@@ -338,7 +338,7 @@ def test_the_table_has_the_conflict_s_columns(page):
 
 @pytest.mark.browser
 def test_where_nothing_was_found_the_nearest_scenario_plays(browser, report, tmp_path):
-    from bridgegen.report.page import write_report
+    from bridgegen.pages.page import write_report
 
     near = replace(report.kept[0], name="evaluation 4", evaluation=3, files=(), critical=False)
     e = replace(report.evaluations, critical=np.zeros(120, bool))

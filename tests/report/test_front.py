@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bridgegen.report.data import Column
-from bridgegen.report.page import write_report
-from bridgegen.report.payload import payload
+from bridgegen.pages.data import Column
+from bridgegen.pages.page import write_report
+from bridgegen.pages.payload import payload
 
 
 @pytest.fixture(scope="module")

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from bridgegen.report.further import spread_evenly
+from bridgegen.pages.further import spread_evenly
 
 
 def test_numbers_are_those_of_van_der_corput():

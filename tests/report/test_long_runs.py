@@ -1,8 +1,8 @@
 import numpy as np
 
-from bridgegen.report import payload
-from bridgegen.report.batches_payload import batches_payload
-from bridgegen.report.data import Column, Evaluations
+from bridgegen.pages import payload
+from bridgegen.pages.data import Column, Evaluations
+from bridgegen.pages.sections import batches_payload
 
 
 def test_a_long_run_is_thinned_evenly_and_keeps_the_kept(monkeypatch):

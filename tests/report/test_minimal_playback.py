@@ -3,8 +3,8 @@
 import pytest
 
 import bridgegen as bg
-from bridgegen.campaign.restored import pipeline_of
-from bridgegen.report.playbacks import minimal_playbacks
+from bridgegen.jobs.search.restored import pipeline_of
+from bridgegen.pages.playbacks import minimal_playbacks
 
 
 def test_it_is_the_exported_scenario(tmp_path):

@@ -9,8 +9,8 @@ from itertools import pairwise
 
 import pytest
 
-from bridgegen.report import page
-from bridgegen.report.modules import Module, ModuleError, bundle, in_order
+from bridgegen.pages import page
+from bridgegen.pages.page import Module, ModuleError, bundle, in_order
 
 ENTRIES = (*page.SERVED, "show.js", "runs.js", "suite.js")
 OURS = {

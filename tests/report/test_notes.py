@@ -5,10 +5,10 @@ from dataclasses import replace
 
 import pytest
 
-from bridgegen.odd.reader import load
-from bridgegen.report.notes import MOST, NoteTable, box_in_words, tables
-from bridgegen.report.page import write_report
-from bridgegen.report.payload import payload
+from bridgegen.pages.notes import MOST, NoteTable, box_in_words, tables
+from bridgegen.pages.page import write_report
+from bridgegen.pages.payload import payload
+from bridgegen.scenario.language.reader import load
 
 
 @pytest.fixture(scope="module")

@@ -11,12 +11,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bridgegen.report import packed
-from bridgegen.report import payload as payloads
-from bridgegen.report.data import Column, Evaluations
-from bridgegen.report.page import report_page, write_report
-from bridgegen.report.payload import payload
-from bridgegen.report.playback_payload import playback_payload, road_payload
+from bridgegen.pages import packed
+from bridgegen.pages import payload as payloads
+from bridgegen.pages.data import Column, Evaluations
+from bridgegen.pages.page import report_page, write_report
+from bridgegen.pages.payload import payload
+from bridgegen.pages.playback_payload import playback_payload, road_payload
 
 LIMIT = 6_000_000
 

@@ -8,11 +8,11 @@ from html.parser import HTMLParser
 
 import pytest
 
-from bridgegen.errors import StorageError
-from bridgegen.report import page
-from bridgegen.report.page import write_report
-from bridgegen.report.payload import to_json
-from bridgegen.report.sections import SECTIONS
+from bridgegen.base.errors import StorageError
+from bridgegen.pages import page
+from bridgegen.pages.page import write_report
+from bridgegen.pages.payload import to_json
+from bridgegen.pages.sections import SECTIONS
 
 PAGES = ("page.html", "show.html", "runs.html", "suite.html", "scenario.html", "pair.html")
 STILL = ("scenario.css", "pair.css")
@@ -174,7 +174,7 @@ def test_the_size_stays_in_bounds(tmp_path, build):
 
 def test_a_page_needs_no_heavy_package():
     code = (
-        "import sys; from bridgegen.report import page;"
+        "import sys; from bridgegen.pages import page;"
         "heavy = {'plotly', 'pandas', 'pymoo', 'numba'} & set(sys.modules); assert not heavy, heavy"
     )
     subprocess.run([sys.executable, "-c", code], check=True)

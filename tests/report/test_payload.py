@@ -8,11 +8,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from bridgegen.report.data import Column
-from bridgegen.report.payload import payload, to_json
-from bridgegen.report.playback_payload import SCALE
-from bridgegen.report.rounding import decimals, significant
-from bridgegen.report.series import unpacked
+from bridgegen.pages.data import Column
+from bridgegen.pages.payload import payload, to_json
+from bridgegen.pages.playback_payload import SCALE
+from bridgegen.pages.series import decimals, significant, unpacked
 
 HOSTILE = [
     "</script><script>window.hacked = 1</script>", "<!-- <script>", "\"'`\\", "\u2028\u2029\x00",

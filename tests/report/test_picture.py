@@ -7,12 +7,12 @@ from dataclasses import replace
 import pyoxigraph as ox
 import pytest
 
-from bridgegen.ontology.check import check
-from bridgegen.ontology.graph import Individuals
-from bridgegen.ontology.individuals import build
-from bridgegen.ontology.vocabulary import EQUIVALENT_CLASS, SCENARIOS, TYPE, bg
-from bridgegen.report.painter import FEW, paint
-from bridgegen.report.picture_payload import FOLD, pictures_payload
+from bridgegen.pages.painter import FEW, paint
+from bridgegen.pages.picture_payload import FOLD, pictures_payload
+from bridgegen.scenario.ontology.check import check
+from bridgegen.scenario.ontology.graph import Individuals
+from bridgegen.scenario.ontology.individuals import build
+from bridgegen.scenario.ontology.vocabulary import EQUIVALENT_CLASS, SCENARIOS, TYPE, bg
 
 NARROW = "\N{NARROW NO-BREAK SPACE}"
 
@@ -263,7 +263,7 @@ def test_ten_scenarios_take_little_room(layered):
 
 
 def test_the_playbacks_pictures_are_sent_with_them(report, picture):
-    from bridgegen.report.payload import payload
+    from bridgegen.pages.payload import payload
 
     first, second, *rest = report.kept
     sent = payload(replace(report, kept=(first, replace(second, picture=picture), *rest)))

@@ -6,10 +6,10 @@ from typing import Any
 
 import pytest
 
-from bridgegen.ontology.files import save
-from bridgegen.report.page import write_report
-from bridgegen.report.painter import paint
-from bridgegen.report.show import show_file
+from bridgegen.pages.page import write_report
+from bridgegen.pages.painter import paint
+from bridgegen.pages.scenario_page import show_file
+from bridgegen.scenario.ontology.files import save
 
 pytestmark = pytest.mark.browser
 DESK, PHONE = {"width": 1280, "height": 720}, {"width": 400, "height": 800}

@@ -8,15 +8,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-from bridgegen.ego import _weather_columns as column
-from bridgegen.metrics.perceived import perceived
-from bridgegen.metrics.ttc import ttc_over_time
-from bridgegen.odd.reader import load
-from bridgegen.options import PipelineOptions
-from bridgegen.pipeline import Pipeline
-from bridgegen.report.page import write_report
-from bridgegen.report.playbacks import playbacks
-from bridgegen.simulation.embedded.weathers import weathers
+from bridgegen.assess.metrics.perceived import perceived
+from bridgegen.assess.metrics.ttc import ttc_over_time
+from bridgegen.drivers import _weather_columns as column
+from bridgegen.engine.options import PipelineOptions
+from bridgegen.engine.pipeline import Pipeline
+from bridgegen.pages.page import write_report
+from bridgegen.pages.playbacks import playbacks
+from bridgegen.scenario.language.reader import load
+from bridgegen.simulation.embedded.simulator import weathers
 
 pytestmark = pytest.mark.browser
 

@@ -9,11 +9,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from bridgegen.participants import PARTICIPANTS
-from bridgegen.report.playback import Course, Planned, Sensed, Weather
-from bridgegen.report.playback_payload import ROAD_SCALE, SCALE, playback_payload, road_payload
-from bridgegen.report.series import unpacked
-from bridgegen.weather import COLUMNS
+from bridgegen.pages.playback import Course, Planned, Sensed, Weather
+from bridgegen.pages.playback_payload import ROAD_SCALE, SCALE, playback_payload, road_payload
+from bridgegen.pages.series import unpacked
+from bridgegen.scenario.participants import PARTICIPANTS
+from bridgegen.scenario.weather import COLUMNS
 
 KINDS = ("car", "truck")
 ANYWHERE = st.floats(-5000.0, 5000.0)

@@ -7,14 +7,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from bridgegen.errors import FileFormatError
-from bridgegen.regions.record import read_record
-from bridgegen.report.page import write_report
-from bridgegen.report.payload import payload
+from bridgegen.base.errors import FileFormatError
+from bridgegen.pages.page import write_report
+from bridgegen.pages.payload import payload
+from bridgegen.search.regions.record import read_record
 
 
 def region(number: int, confirmed: bool, **box: tuple[float, float]) -> dict[str, Any]:
-    """One as `bridgegen.regions.record` writes it."""
+    """One as `bridgegen.search.regions.record` writes it."""
     evidence = {"rows": 300, "critical": 206, "failed": 0, "share": 0.687, "interval": [0.63, 0.74]}
     return {
         "number": number,

@@ -8,15 +8,14 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-from bridgegen.errors import InputError, StorageError, UnknownNameError
-from bridgegen.odd.reader import load, names
-from bridgegen.odd.starter import start_scenario
-from bridgegen.pipeline import Pipeline
-from bridgegen.report import page
-from bridgegen.report.playbacks import playbacks
-from bridgegen.report.scenario_words import story_lines
-from bridgegen.report.show import show_scenario
-from bridgegen.report.sketch import HEIGHT, WIDTH, sketch
+from bridgegen.base.errors import InputError, StorageError, UnknownNameError
+from bridgegen.engine.pipeline import Pipeline
+from bridgegen.pages import page
+from bridgegen.pages.playbacks import playbacks
+from bridgegen.pages.scenario_page import show_scenario, story_lines
+from bridgegen.pages.sketch import HEIGHT, WIDTH, sketch
+from bridgegen.scenario.language.reader import load, names
+from bridgegen.scenario.language.starter import start_scenario
 
 SVG = "{http://www.w3.org/2000/svg}"
 

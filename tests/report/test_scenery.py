@@ -3,10 +3,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bridgegen.odd.reader import load
+from bridgegen.engine.pipeline import Pipeline
 from bridgegen.openx.opendrive.furniture import Object
-from bridgegen.pipeline import Pipeline
-from bridgegen.report.scenery import street_lights
+from bridgegen.pages.scenery import street_lights
+from bridgegen.scenario.language.reader import load
 
 
 @pytest.fixture(scope="module")

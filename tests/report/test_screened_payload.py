@@ -5,13 +5,8 @@ from types import SimpleNamespace
 
 import pytest
 
-from bridgegen.odd.reader import load
-from bridgegen.report.screened_payload import (
-    in_a_line,
-    place_in_words,
-    screened_payload,
-    sentences,
-)
+from bridgegen.pages.screened_payload import in_a_line, place_in_words, screened_payload, sentences
+from bridgegen.scenario.language.reader import load
 from bridgegen.search.screened import NOTE, Agreement
 from bridgegen.search.screened.agreement import Place
 
@@ -71,7 +66,7 @@ def test_a_run_without_a_screen_has_no_section(space):
 
 
 def test_the_summary_has_a_line(capsys):
-    from bridgegen.screen.search import screen_rows
+    from bridgegen.cli.terminal.search import screen_rows
 
     assert screen_rows(SimpleNamespace(screened=None)) == []
     assert screen_rows(SimpleNamespace(screened=FOUND)) == [("screen", in_a_line(FOUND))]

@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from bridgegen.ego.detections import DETECTION
-from bridgegen.metrics.e_position import e_position
-from bridgegen.metrics.perceived import perceived
-from bridgegen.odd.reader import load
-from bridgegen.options import PipelineOptions
-from bridgegen.pipeline import Pipeline
-from bridgegen.report.sensing import TOLERANCE, sensed
+from bridgegen.assess.metrics.e_position import e_position
+from bridgegen.assess.metrics.perceived import perceived
+from bridgegen.drivers.detections import DETECTION
+from bridgegen.engine.options import PipelineOptions
+from bridgegen.engine.pipeline import Pipeline
+from bridgegen.pages.sensing import TOLERANCE, sensed
+from bridgegen.scenario.language.reader import load
 
 
 @pytest.fixture(scope="module")

@@ -3,8 +3,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bridgegen.report import sentences
-from bridgegen.report.data import ReportData
+from bridgegen.pages import sentences
+from bridgegen.pages.data import ReportData
 
 THIN = "\N{NARROW NO-BREAK SPACE}"
 

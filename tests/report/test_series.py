@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from bridgegen.report.series import LARGEST, packed, unpacked
+from bridgegen.pages.series import LARGEST, packed, unpacked
 
 SCALES = st.sampled_from([1, 100, 1000, 10_000])
 VALUES = arrays(

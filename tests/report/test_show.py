@@ -5,9 +5,9 @@ import sys
 
 import pytest
 
-from bridgegen.errors import FileFormatError, InputError, StorageError
-from bridgegen.ontology.files import save
-from bridgegen.report.show import show_file
+from bridgegen.base.errors import FileFormatError, InputError, StorageError
+from bridgegen.pages.scenario_page import show_file
+from bridgegen.scenario.ontology.files import save
 
 
 @pytest.fixture

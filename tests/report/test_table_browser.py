@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from bridgegen.report.data import ReportData
-from bridgegen.report.page import write_report
+from bridgegen.pages.data import ReportData
+from bridgegen.pages.page import write_report
 
 pytestmark = pytest.mark.browser
 

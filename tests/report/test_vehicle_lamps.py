@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from bridgegen.ego.lamps import BLUE, BRAKE, HAZARD, LEFT, RIGHT
-from bridgegen.odd.reader import load
-from bridgegen.options import PipelineOptions
-from bridgegen.pipeline import Pipeline
-from bridgegen.report.frames import FINE, Film
-from bridgegen.report.playbacks import playbacks
+from bridgegen.drivers.lamps import BLUE, BRAKE, HAZARD, LEFT, RIGHT
+from bridgegen.engine.options import PipelineOptions
+from bridgegen.engine.pipeline import Pipeline
+from bridgegen.pages.frames import FINE, Film
+from bridgegen.pages.playbacks import playbacks
+from bridgegen.scenario.language.reader import load
 
 LIT, UNLIT = 96, 104  # instants: 4.80 s is within a flash of 1.5 a second, 5.20 s between two
 CORNERS = {

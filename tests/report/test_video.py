@@ -10,10 +10,10 @@ import pytest
 from lxml import etree
 from PIL import Image, ImageColor
 
-from bridgegen.errors import InputError, StorageError
-from bridgegen.report import ffmpeg
-from bridgegen.report.frames import FINE, PLAYERS, Film, _overlap
-from bridgegen.report.video import write_video
+from bridgegen.base.errors import InputError, StorageError
+from bridgegen.pages import video as ffmpeg
+from bridgegen.pages.frames import FINE, PLAYERS, Film, _overlap
+from bridgegen.pages.video import write_video
 
 
 def ego_pixels(image):

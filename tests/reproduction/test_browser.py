@@ -2,7 +2,7 @@
 
 import pytest
 
-from bridgegen.comparison.drawing import DARK, LIGHT, blank, png
+from bridgegen.jobs.compare.figures import DARK, LIGHT, blank, png
 from bridgegen_reproduction.document import Document, Folded, Picture, Points, Section, Shown
 from bridgegen_reproduction.page import html
 from bridgegen_reproduction.table import Table

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from matplotlib.patches import FancyBboxPatch
 
-from bridgegen.comparison.drawing import DARK, LIGHT, blank, pdf, png
-from bridgegen.odd.reader import load
-from bridgegen.ontology.layers import LAYERS
+from bridgegen.jobs.compare.figures import DARK, LIGHT, blank, pdf, png
+from bridgegen.scenario.language.reader import load
+from bridgegen.scenario.ontology.structure import LAYERS
 from bridgegen_reproduction.figures.causes import causes
 from bridgegen_reproduction.figures.distributions import Violin, by_iteration, iterations, violins
 from bridgegen_reproduction.figures.ontology import blocks, ontology, picture_of

@@ -19,12 +19,12 @@ from shapely.affinity import rotate, translate
 from shapely.geometry import Point, box
 
 import bridgegen as bg
-from bridgegen.campaign.restored import pipeline_of
+from bridgegen.base.errors import InputError, Interrupted, StorageError
 from bridgegen.cli import main
-from bridgegen.comparison.drawing import DARK
-from bridgegen.errors import InputError, Interrupted, StorageError
-from bridgegen.search.pso import PSO
-from bridgegen.store import Store
+from bridgegen.jobs.compare.figures import DARK
+from bridgegen.jobs.search.restored import pipeline_of
+from bridgegen.results.store import Store
+from bridgegen.search.algorithms.evolved import PSO
 from bridgegen_reproduction import (
     ReproductionCallbacks,
     paper,

@@ -116,7 +116,7 @@ def test_hostile_text_is_data_on_the_page(text):
 def test_numbers_as_people_read_them():
     from math import inf, nan
 
-    from bridgegen.comparison.statistics import Quartiles
+    from bridgegen.base.statistics import Quartiles
 
     assert [number(v, 2) for v in (1234.5, -0.58, -0.001, nan, inf)] == [
         "1,234.50", "−0.58", "0.00", "–", "never"]  # fmt: skip

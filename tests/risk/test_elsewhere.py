@@ -10,14 +10,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 from tests.campaign.biased import biased_kind, not_finite
 
-from bridgegen.errors import InputError, Interrupted
-from bridgegen.regions.evidence import clopper_pearson
-from bridgegen.risk import elsewhere
-from bridgegen.risk.elsewhere import Group, compare, look_elsewhere, share_of
-from bridgegen.risk.estimators import subset
-from bridgegen.risk.estimators.problem import Aim
-from bridgegen.risk.outcomes import Column
-from bridgegen.risk.risk import RiskCallbacks, estimate_risk
+from bridgegen.base.errors import InputError, Interrupted
+from bridgegen.base.statistics import clopper_pearson
+from bridgegen.jobs.risk import elsewhere
+from bridgegen.jobs.risk.elsewhere import Group, compare, look_elsewhere, share_of
+from bridgegen.jobs.risk.estimators import subset
+from bridgegen.jobs.risk.estimators.problem import Aim
+from bridgegen.jobs.risk.outcomes import Column
+from bridgegen.jobs.risk.risk import RiskCallbacks, estimate_risk
 from bridgegen.simulation import choice
 
 SCENARIO, DRIVER = "paper/crossroads-s1", "route-follower"
@@ -146,9 +146,9 @@ def test_a_biased_copy_is_found_out_and_the_same_is_not(simulators, tmp_path):
 
 def counted_faster(found):
     """Return the factor that counting the same rows in both finds."""
-    from bridgegen.options import PipelineOptions
-    from bridgegen.pipeline import Pipeline
-    from bridgegen.risk.outcomes import outcomes
+    from bridgegen.engine.options import PipelineOptions
+    from bridgegen.engine.pipeline import Pipeline
+    from bridgegen.jobs.risk.outcomes import outcomes
 
     met = found.exposure
     X = met.sample(3000, 3).X

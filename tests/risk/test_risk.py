@@ -9,15 +9,15 @@ import numpy as np
 import pytest
 
 import bridgegen as bg
-from bridgegen.conflict.harm import NEAR_MISS
-from bridgegen.errors import InputError, StorageError
-from bridgegen.options import PipelineOptions
-from bridgegen.pipeline import Pipeline
-from bridgegen.risk.experiment import Experiment
-from bridgegen.risk.ledger import BATCHES
-from bridgegen.risk.outcomes import Column, outcomes
-from bridgegen.risk.risk import RiskCallbacks, estimate_risk
-from bridgegen.risk.text import number
+from bridgegen.assess.conflict.harm import NEAR_MISS
+from bridgegen.base.errors import InputError, StorageError
+from bridgegen.engine.options import PipelineOptions
+from bridgegen.engine.pipeline import Pipeline
+from bridgegen.jobs.risk.experiment import Experiment
+from bridgegen.jobs.risk.ledger import BATCHES
+from bridgegen.jobs.risk.outcomes import Column, outcomes
+from bridgegen.jobs.risk.risk import RiskCallbacks, estimate_risk
+from bridgegen.jobs.risk.text import number
 
 SCENARIO, DRIVER = "crossroads-s1", "route-follower"
 GIVEN = {"ego": DRIVER, "exposure": "uniform", "method": "mc", "precision": 0.0, "budget": 1200}

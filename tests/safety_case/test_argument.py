@@ -6,9 +6,16 @@ import sqlite3
 import pytest
 
 import bridgegen as bg
-from bridgegen.confirmation.record import digest_of, write_record
-from bridgegen.confirmation.schema import Change, Differences, Outcome, Record, Scenario
-from bridgegen.odd.thresholds import Thresholds
+from bridgegen.results.confirmation.record import (
+    Change,
+    Differences,
+    Outcome,
+    Record,
+    Scenario,
+    digest_of,
+    write_record,
+)
+from bridgegen.scenario.language.thresholds import Thresholds
 
 RUNS = ["fails", "unlucky", "clean", "judged", "all"]
 PREFIXES = {

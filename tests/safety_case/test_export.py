@@ -9,8 +9,8 @@ import jsonschema
 import pytest
 
 import bridgegen as bg
-from bridgegen.errors import FileFormatError, InputError, StorageError
-from bridgegen.safety_case.model import SafetyCase, json_schema
+from bridgegen.base.errors import FileFormatError, InputError, StorageError
+from bridgegen.jobs.safety_case.model import SafetyCase, json_schema
 
 
 def forget(folder: Path, sql: str) -> None:

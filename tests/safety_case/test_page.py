@@ -8,9 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bridgegen.safety_case.drawing import drawing
-from bridgegen.safety_case.layout import MOST_LINES, layout, wrapped
-from bridgegen.safety_case.numbers import written
+from bridgegen.jobs.safety_case.drawing import MOST_LINES, drawing, layout, wrapped
+from bridgegen.jobs.safety_case.numbers import written
 
 RUNS = ["fails", "unlucky", "clean", "judged", "all"]
 

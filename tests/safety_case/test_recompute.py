@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.stats import binom, binomtest
 
-from bridgegen.safety_case import recompute
+from bridgegen.jobs.safety_case import recompute
 
 
 @st.composite

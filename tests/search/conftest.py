@@ -5,7 +5,7 @@ from dataclasses import fields
 import numpy as np
 import pytest
 
-from bridgegen.search import Algorithm, Results
+from bridgegen.search.algorithms import Algorithm, Results
 
 
 class Late:

@@ -4,10 +4,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
-from bridgegen.errors import InputError
-from bridgegen.search import Problem, get
-from bridgegen.search.algorithm import resolve
-from bridgegen.search.penalty import Penalty
+from bridgegen.base.errors import InputError
+from bridgegen.search.algorithms import Problem, get
+from bridgegen.search.algorithms.algorithm import Penalty, resolve
 
 
 def test_penalty_by_hand():

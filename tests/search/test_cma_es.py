@@ -2,10 +2,9 @@ import cma
 import numpy as np
 import pytest
 
-from bridgegen.arrays import Float
-from bridgegen.search import Problem, Results
-from bridgegen.search._cma import Distribution
-from bridgegen.search.cma_es import CMAES, reflected
+from bridgegen.base.arrays import Float
+from bridgegen.search.algorithms import Problem, Results
+from bridgegen.search.algorithms.cma_es import CMAES, Distribution, reflected
 
 TARGET = 1e-9
 

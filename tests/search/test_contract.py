@@ -12,13 +12,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bridgegen.arrays import Float
-from bridgegen.campaign.loop import Reason, run_loop
-from bridgegen.errors import InputError, UnknownNameError
-from bridgegen.extras import is_installed
-from bridgegen.search import ALGORITHMS, Algorithm, Problem, Results
-from bridgegen.search.algorithm import asynchronous, resolve
-from bridgegen.store import Store
+from bridgegen.base.arrays import Float
+from bridgegen.base.errors import InputError, UnknownNameError
+from bridgegen.base.extras import is_installed
+from bridgegen.jobs.search.loop import Reason, run_loop
+from bridgegen.results.store import Store
+from bridgegen.search.algorithms import ALGORITHMS, Algorithm, Problem, Results
+from bridgegen.search.algorithms.algorithm import asynchronous, resolve
 
 Kind = type[Algorithm]
 

@@ -8,12 +8,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.stats import qmc
 
-from bridgegen.arrays import Float
-from bridgegen.search import Algorithm, Problem
-from bridgegen.search.grid import Grid
-from bridgegen.search.pairwise import Pairwise
-from bridgegen.search.random import Random
-from bridgegen.search.sobol import Sobol
+from bridgegen.base.arrays import Float
+from bridgegen.search.algorithms import Algorithm, Problem
+from bridgegen.search.algorithms.pairwise import Pairwise
+from bridgegen.search.algorithms.sampling import Grid, Random, Sobol
 
 
 def rows(search: Algorithm) -> Float:

@@ -3,7 +3,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
-from bridgegen.search.dominance import crowding, non_dominated, thin
+from bridgegen.search.algorithms.dominance import crowding, non_dominated, thin
 
 
 def test_a_front_by_hand():

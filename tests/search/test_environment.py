@@ -8,12 +8,12 @@ import pytest
 from gymnasium.utils.env_checker import check_env as gymnasium_check
 from gymnasium.vector import AutoresetMode
 
-from bridgegen.errors import InputError, UnknownNameError
-from bridgegen.odd.reader import load
-from bridgegen.options import PipelineOptions
-from bridgegen.pipeline import Pipeline
-from bridgegen.search.environment import ScenarioEnv, ScenarioVectorEnv
-from bridgegen.search.observation import ENCODINGS
+from bridgegen.base.errors import InputError, UnknownNameError
+from bridgegen.engine.options import PipelineOptions
+from bridgegen.engine.pipeline import Pipeline
+from bridgegen.scenario.language.reader import load
+from bridgegen.search.algorithms.environment import ScenarioEnv, ScenarioVectorEnv
+from bridgegen.search.algorithms.observation import ENCODINGS
 
 
 @pytest.fixture(scope="module")
@@ -154,7 +154,7 @@ def test_stable_baselines_has_nothing_to_say(pipeline):
 
 def test_stable_baselines_learns_in_the_forty(pipeline):
     models = pytest.importorskip("stable_baselines3")
-    from bridgegen.search.environment_sb3 import ScenarioVecEnv
+    from bridgegen.search.algorithms.environment_sb3 import ScenarioVecEnv
 
     environment = ScenarioVecEnv(pipeline, num_envs=8, horizon=2)
     environment.seed(3)

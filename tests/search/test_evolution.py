@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from bridgegen.search import Problem, Results, get
+from bridgegen.search.algorithms import Problem, Results, get
 
 
 def best_of(search, budget: int = 2000) -> float:

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from pymoo.indicators.hv import HV
 
-from bridgegen.arrays import Float
-from bridgegen.search import Problem, Results, get
+from bridgegen.base.arrays import Float
+from bridgegen.search.algorithms import Problem, Results, get
 
 METHODS = ["nsga2", "spea2", "mopso"]
 

@@ -6,11 +6,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bridgegen.arrays import Float
-from bridgegen.errors import InputError, UnknownNameError
-from bridgegen.search import Problem, Results
-from bridgegen.search.map_elites import MAPElites, _Archive
-from bridgegen.search.random import Random
+from bridgegen.base.arrays import Float
+from bridgegen.base.errors import InputError, UnknownNameError
+from bridgegen.search.algorithms import Problem, Results
+from bridgegen.search.algorithms.map_elites import MAPElites, _Archive
+from bridgegen.search.algorithms.sampling import Random
 
 PROBLEM = Problem(("speed", "gap", "fog"), ("d_min", "ttc"))
 

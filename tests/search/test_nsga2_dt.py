@@ -4,10 +4,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bridgegen.arrays import Bool, Float
-from bridgegen.search import Problem, Results
-from bridgegen.search.nsga2_dt import NSGA2DT
-from bridgegen.search.random import Random
+from bridgegen.base.arrays import Bool, Float
+from bridgegen.search.algorithms import Problem, Results
+from bridgegen.search.algorithms.nsga2_dt import NSGA2DT
+from bridgegen.search.algorithms.sampling import Random
 
 N_VAR = 3
 

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 import bridgegen as bg
-from bridgegen.cause import Cause
-from bridgegen.errors import InputError
-from bridgegen.extras import is_installed
-from bridgegen.search import Problem, Results, get
+from bridgegen.assess.cause import Cause
+from bridgegen.base.errors import InputError
+from bridgegen.base.extras import is_installed
+from bridgegen.search.algorithms import Problem, Results, get
 
 pytestmark = pytest.mark.skipif(not is_installed("rl"), reason="the extra rl is not installed")
 

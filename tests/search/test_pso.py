@@ -1,9 +1,9 @@
 import numpy as np
 import pytest
 
-from bridgegen.search import Problem, Results
-from bridgegen.search.pso import PSO
-from bridgegen.search.random import Random
+from bridgegen.search.algorithms import Problem, Results
+from bridgegen.search.algorithms.evolved import PSO
+from bridgegen.search.algorithms.sampling import Random
 
 
 def search(algorithm, function, n_batches=25, n_var=10):

@@ -1,7 +1,7 @@
 import numpy as np
 
-from bridgegen.search import Problem
-from bridgegen.search.random import Random
+from bridgegen.search.algorithms import Problem
+from bridgegen.search.algorithms.sampling import Random
 
 
 def test_the_stream_is_pcg64():

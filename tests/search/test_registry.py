@@ -4,9 +4,9 @@ from importlib.metadata import EntryPoint, EntryPoints
 
 import pytest
 
-from bridgegen.errors import InputError, UnknownNameError
-from bridgegen.search import ALGORITHMS, Problem, get, names
-from bridgegen.search.random import Random
+from bridgegen.base.errors import InputError, UnknownNameError
+from bridgegen.search.algorithms import ALGORITHMS, Problem, get, names
+from bridgegen.search.algorithms.sampling import Random
 
 
 class Lazy(Random):
@@ -81,7 +81,7 @@ def test_two_packages_may_not_share_a_name(installed):
 def test_the_import_is_light():
     """Listing the algorithms must not cost the import of those that are not used."""
     code = (
-        "import sys, bridgegen.search as s; s.get('pso');"
+        "import sys, bridgegen.search.algorithms as s; s.get('pso');"
         "print([m for m in ('pymoo', 'pandas', 'scipy', 'numba') if m in sys.modules])"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

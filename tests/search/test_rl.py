@@ -14,13 +14,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from bridgegen.campaign.loop import Reason, run_loop
-from bridgegen.errors import InputError
-from bridgegen.extras import EXTRAS, Extra
-from bridgegen.search import Problem, Results, get
-from bridgegen.search.observation import Observer, Reward, step_from
+from bridgegen.base.errors import InputError
+from bridgegen.base.extras import EXTRAS, Extra
+from bridgegen.jobs.search.loop import Reason, run_loop
+from bridgegen.results.store import Store
+from bridgegen.search.algorithms import Problem, Results, get
+from bridgegen.search.algorithms.observation import Observer, Reward, step_from
 from bridgegen.search.rl.walkers import Walkers
-from bridgegen.store import Store
 
 NAMES = ("dqn", "ddpg", "ppo")
 SMALL = {"epochs": 2, "width": 8, "population": 10}
@@ -166,7 +166,7 @@ def test_without_the_extra_one_sentence(name, monkeypatch):
 
 def test_nobody_else_pays_for_torch():
     code = (
-        "import sys; from bridgegen.search import ALGORITHMS, Problem, get; "
+        "import sys; from bridgegen.search.algorithms import ALGORITHMS, Problem, get; "
         "get('random')(Problem.unnamed(3), 0).ask(); [one.settings for one in ALGORITHMS.values()];"
         "sys.exit(any(one in sys.modules for one in ('torch', 'gymnasium', 'stable_baselines3')))"
     )

@@ -8,10 +8,10 @@ import sys
 import numpy as np
 import pytest
 
-from bridgegen.comparison.distinct import distinct
-from bridgegen.search import Problem, Results
-from bridgegen.search.surrogate import Surrogate
-from bridgegen.search.turbo import TuRBO
+from bridgegen.jobs.compare.distinct import distinct
+from bridgegen.search.algorithms import Problem, Results
+from bridgegen.search.algorithms.surrogate import Surrogate
+from bridgegen.search.algorithms.turbo import TuRBO
 
 both = pytest.mark.parametrize("kind", [TuRBO, Surrogate])
 
@@ -220,7 +220,7 @@ def test_a_region_with_rows_that_are_not_known_is_refused(kind):
 
 SCRIPT = """
 import numpy as np
-from bridgegen.search import Problem, Results, get
+from bridgegen.search.algorithms import Problem, Results, get
 for name in ("turbo", "surrogate"):
     search = get(name)(Problem.unnamed(10), 0)
     for _ in range(6):

@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from sklearn.tree import DecisionTreeClassifier
 
-from bridgegen.search.tree import Leaf, fit_leaves
+from bridgegen.search.algorithms.tree import Leaf, fit_leaves
 
 CUBE2 = {"low": [0.0, 0.0], "high": [1.0, 1.0]}
 

@@ -1,9 +1,9 @@
 import numpy as np
 import pytest
 
-from bridgegen.errors import InputError
-from bridgegen.search import Problem, Results
-from bridgegen.search.turbo import TuRBO
+from bridgegen.base.errors import InputError
+from bridgegen.search.algorithms import Problem, Results
+from bridgegen.search.algorithms.turbo import TuRBO
 
 
 def told(search: TuRBO, value: float, critical: bool = False) -> np.ndarray:

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import bridgegen as bg
-from bridgegen.errors import InputError, UnknownNameError
+from bridgegen.base.errors import InputError, UnknownNameError
 from bridgegen.simulation import choice
 from bridgegen.simulation.choice import Kind, SimulatorChoice
 

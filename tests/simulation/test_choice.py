@@ -2,9 +2,9 @@
 
 import pytest
 
-from bridgegen.errors import InputError, UnknownNameError
-from bridgegen.odd.reader import load
-from bridgegen.pipeline import Pipeline
+from bridgegen.base.errors import InputError, UnknownNameError
+from bridgegen.engine.pipeline import Pipeline
+from bridgegen.scenario.language.reader import load
 from bridgegen.simulation.choice import EMBEDDED, SIMULATORS, SimulatorChoice
 
 

@@ -2,10 +2,10 @@
 
 import pytest
 
-from bridgegen.campaign.validate import validate_file
-from bridgegen.errors import FileFormatError, InputError
+from bridgegen.base.errors import FileFormatError, InputError
+from bridgegen.engine.simulate import simulate_file
+from bridgegen.jobs.search.validate import validate_file
 from bridgegen.openx.opendrive.write import to_xml
-from bridgegen.simulate import simulate_file
 
 from .embedded.storyboards import after, crossroads, lane, scenario, speed_action, start
 

@@ -6,8 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bridgegen.ontology.individuals import build_static
 from bridgegen.openx.opendrive.from_owl import opendrive_from_owl
+from bridgegen.scenario.ontology.individuals import build_static
 from bridgegen.simulation.accidents import Accident, accidents
 from bridgegen.simulation.queues import Queue, find_queues, queues
 from bridgegen.simulation.rollout import Rollout

@@ -10,13 +10,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bridgegen.campaign.scenario_files import write_scenario
+from bridgegen.assess.conflict.recorded import measure_recording
+from bridgegen.base.errors import BridgeGenError, FileFormatError, InputError, UnknownNameError
 from bridgegen.cli import main
-from bridgegen.conflict.recorded import measure_recording
-from bridgegen.errors import BridgeGenError, FileFormatError, InputError, UnknownNameError
-from bridgegen.odd.reader import load
-from bridgegen.pipeline import Pipeline
-from bridgegen.simulate import simulate_file
+from bridgegen.engine.pipeline import Pipeline
+from bridgegen.engine.simulate import simulate_file
+from bridgegen.jobs.search.scenario_files import write_scenario
+from bridgegen.scenario.language.reader import load
 from bridgegen.simulation import recording as module
 from bridgegen.simulation.recording import boxes_of, read_recording
 from bridgegen.simulation.trace import write_trace

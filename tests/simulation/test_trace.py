@@ -5,12 +5,12 @@ import csv
 import numpy as np
 import pytest
 
-from bridgegen.campaign.scenario_files import write_scenario
+from bridgegen.base.errors import InputError, StorageError
 from bridgegen.cli import main
-from bridgegen.errors import InputError, StorageError
-from bridgegen.odd.reader import load
-from bridgegen.pipeline import Pipeline
-from bridgegen.simulate import simulate_file
+from bridgegen.engine.pipeline import Pipeline
+from bridgegen.engine.simulate import simulate_file
+from bridgegen.jobs.search.scenario_files import write_scenario
+from bridgegen.scenario.language.reader import load
 from bridgegen.simulation.trace import COLUMNS, MORE, write_trace
 
 

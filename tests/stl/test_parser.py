@@ -6,10 +6,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bridgegen.errors import InputError
-from bridgegen.stl import check_units, dimension_of_unit, parse, readings
-from bridgegen.stl.formula import Comparison, Constant
-from bridgegen.stl.parser import MAX_DEPTH, MAX_TEXT, MAX_TOKENS
+from bridgegen.base.errors import InputError
+from bridgegen.scenario.stl import check_units, dimension_of_unit, parse, readings
+from bridgegen.scenario.stl.formula import Comparison, Constant
+from bridgegen.scenario.stl.parser import MAX_DEPTH, MAX_TEXT, MAX_TOKENS
 
 
 @pytest.mark.parametrize(

@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bridgegen.stl import horizon, parse, robustness
-from bridgegen.stl.robustness import TINY
+from bridgegen.scenario.stl import horizon, parse, robustness
+from bridgegen.scenario.stl.robustness import TINY
 
 STEP = 0.5
 

@@ -4,9 +4,9 @@ import sqlite3
 
 import pytest
 
-from bridgegen.errors import InputError
-from bridgegen.store import Checkpoint
-from bridgegen.store.checkpoint import read_checkpoint, write_checkpoint
+from bridgegen.base.errors import InputError
+from bridgegen.results.store import Checkpoint
+from bridgegen.results.store.sqlite import read_checkpoint, write_checkpoint
 
 ONE = Checkpoint(40, 3, b"state \0\xff")
 

@@ -12,15 +12,15 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from bridgegen.errors import StorageError
-from bridgegen.store import Recorded, Store, sqlite
+from bridgegen.base.errors import StorageError
+from bridgegen.results.store import Recorded, Store, sqlite
 
 HEAD = """
 import os, sys
 from types import SimpleNamespace
 import numpy as np
-from bridgegen.errors import StorageError
-from bridgegen.store import Recorded, Store
+from bridgegen.base.errors import StorageError
+from bridgegen.results.store import Recorded, Store
 
 def append(store, n=40, n_x=50):
     result = SimpleNamespace(messages={}, cause=None, findings=None,
@@ -100,7 +100,7 @@ def test_settings_must_be_json(tmp_path):
 def test_killed_while_it_is_made(tmp_path):
     """Neither half a run nor an obstacle is left."""
     code = """
-        from bridgegen.store import run_file
+        from bridgegen.results.store import run_file
         run_file.os.replace = lambda *_: os.kill(os.getpid(), 9)
         create(sys.argv[1])
     """
@@ -220,7 +220,7 @@ def test_two_writers(tmp_path, monkeypatch):
             Store.open(tmp_path / "run", write=True)
         said = child(
             """
-            from bridgegen.store import sqlite
+            from bridgegen.results.store import sqlite
             sqlite.LOCK_SECONDS = 0.0
             try:
                 Store.open(sys.argv[1], write=True)

@@ -9,8 +9,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from bridgegen.errors import StorageError
-from bridgegen.store import Checkpoint, Store
+from bridgegen.base.errors import StorageError
+from bridgegen.results.store import Checkpoint, Store
 
 ENDLESS = "WITH RECURSIVE n(i) AS (SELECT 0 UNION ALL SELECT i + 1 FROM n) "
 

@@ -5,11 +5,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from bridgegen.cause import CAUSES, Cause
-from bridgegen.conflict.findings import COLUMNS, Findings
-from bridgegen.errors import StorageError
-from bridgegen.store import Recorded, Store
-from bridgegen.store import store as module
+from bridgegen.assess.cause import CAUSES, Cause
+from bridgegen.assess.conflict.findings import COLUMNS, Findings
+from bridgegen.base.errors import StorageError
+from bridgegen.results.store import Recorded, Store
+from bridgegen.results.store import store as module
 
 NAMES = ("batch", "status", "critical", "cause", "F")
 
@@ -123,7 +123,7 @@ def use(found):
 def test_the_digest_of_as_many_rows_is_known(store, monkeypatch):
     first = Recorded(store)
     want = first.digest()
-    monkeypatch.setattr("bridgegen.store.recorded.digest_of", lambda rows: "anew")
+    monkeypatch.setattr("bridgegen.results.store.recorded.digest_of", lambda rows: "anew")
     assert Recorded(store, first).digest() == want
     append(store, 1, 8)
     assert Recorded(store, first).digest() == "anew"

@@ -6,10 +6,10 @@ from pathlib import Path
 
 import pytest
 
-from bridgegen.errors import StorageError
-from bridgegen.store.rows import Columns
-from bridgegen.store.run_file import KEYS, write_run
-from bridgegen.store.sqlite import storage_errors
+from bridgegen.base.errors import StorageError
+from bridgegen.results.store.rows import Columns
+from bridgegen.results.store.run_file import KEYS, write_run
+from bridgegen.results.store.sqlite import storage_errors
 
 
 def test_an_error_of_sqlite_has_its_name():

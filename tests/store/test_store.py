@@ -8,10 +8,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
-from bridgegen.conflict.findings import COLUMNS, Findings
-from bridgegen.errors import InputError, StorageError
-from bridgegen.store import Recorded, Store
-from bridgegen.store.rows import Columns, quoted
+from bridgegen.assess.conflict.findings import COLUMNS, Findings
+from bridgegen.base.errors import InputError, StorageError
+from bridgegen.results.store import Recorded, Store
+from bridgegen.results.store.rows import Columns, quoted
 
 PARAMETERS, METRICS = ["ego_speed", "fog_density"], ["d_min", "v_d", "ttc"]
 SETTINGS = {"scenario": "crossroads-s4", "seed": 0, "algorithm": {"name": "pso", "w": 0.8}}

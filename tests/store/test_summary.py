@@ -4,8 +4,8 @@ import math
 
 import numpy as np
 
-from bridgegen.cause import Cause
-from bridgegen.store.summary import summarise
+from bridgegen.assess.cause import Cause
+from bridgegen.results.store.summary import summarise
 
 
 def test_five_evaluations_of_which_one_failed_by_hand():

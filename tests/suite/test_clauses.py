@@ -5,14 +5,14 @@ from xml.etree import ElementTree
 
 import pytest
 
-from bridgegen import packs
-from bridgegen.preventability import CellClass, map_preventability
-from bridgegen.suite.clauses import clause_results
-from bridgegen.suite.page import write_suite_page
-from bridgegen.suite.results import EntryResult, RowResult
-from bridgegen.suite.sentences import clause_in_words
-from bridgegen.suite.suite import run_suite
-from bridgegen.verdict.of_suite import SuiteCriteria, figures_of
+from bridgegen.cli.verdict.of_suite import SuiteCriteria, figures_of
+from bridgegen.jobs.preventability import CellClass, map_preventability
+from bridgegen.jobs.suite.clauses import clause_results
+from bridgegen.jobs.suite.page import write_suite_page
+from bridgegen.jobs.suite.results import EntryResult, RowResult
+from bridgegen.jobs.suite.sentences import clause_in_words
+from bridgegen.jobs.suite.suite import run_suite
+from bridgegen.scenario import packs
 
 PACK = Path(packs.__path__[0]) / "r157"
 

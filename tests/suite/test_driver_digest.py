@@ -2,7 +2,7 @@
 
 import hashlib
 
-from bridgegen.suite.driver_digest import driver_digest
+from bridgegen.jobs.suite.evaluate import driver_digest
 
 
 def test_a_class_is_known_by_its_file(tmp_path):

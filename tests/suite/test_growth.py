@@ -7,22 +7,22 @@ import pytest
 from tests.campaign.braking import USUAL, value_sets, write_pair
 
 import bridgegen as bg
-from bridgegen.errors import InputError, StorageError, UnknownNameError
-from bridgegen.options import CommonOptions
-from bridgegen.simulate import simulate_file
-from bridgegen.suite import growth
-from bridgegen.suite.growth import add_failures
-from bridgegen.suite.index import FILE, read_index
-from bridgegen.suite.results import counts
-from bridgegen.suite.suite import run_suite
-from bridgegen.verdict.of_suite import SuiteCriteria, figures_of
+from bridgegen.base.errors import InputError, StorageError, UnknownNameError
+from bridgegen.cli.verdict.of_suite import SuiteCriteria, figures_of
+from bridgegen.engine.options import CommonOptions
+from bridgegen.engine.simulate import simulate_file
+from bridgegen.jobs.suite import growth
+from bridgegen.jobs.suite.growth import add_failures
+from bridgegen.jobs.suite.index import FILE, read_index
+from bridgegen.jobs.suite.results import counts
+from bridgegen.jobs.suite.suite import run_suite
 
 FAST = "R-1: always(ego.v < 13 m/s)"
 """A rule that faster scenarios violate."""
 
 BLIND = """
 import numpy as np
-from bridgegen.ego.interface import Control
+from bridgegen.drivers.interface import Control
 
 class Blind:
     def reset(self, n, scene):

@@ -4,8 +4,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bridgegen.errors import FileFormatError
-from bridgegen.suite.index import FILE, Failure, Index, read_index, write_index
+from bridgegen.base.errors import FileFormatError
+from bridgegen.jobs.suite.index import FILE, Failure, Index, read_index, write_index
 
 MODE = {
     "title": "runs into the rear of a car (ego responsible: did not brake)",

@@ -3,8 +3,8 @@
 import pytest
 from tests.suite.test_index import failure
 
-from bridgegen.suite.known_failures import KnownFailures, words
-from bridgegen.suite.results import EntryResult, RowResult
+from bridgegen.jobs.suite.known_failures import KnownFailures, words
+from bridgegen.jobs.suite.results import EntryResult, RowResult
 
 WAY = {"conflict": "contact", "conflict_type": "front-to-rear striking", "responsible": "ego"}
 KEPT = RowResult(d_min=3.0)

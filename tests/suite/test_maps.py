@@ -7,15 +7,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bridgegen import packs
 from bridgegen.cli import main
-from bridgegen.odd.reader import load
-from bridgegen.preventability import CellClass, preventability
-from bridgegen.preventability.grid import DEFAULT_GRIDS, Grid, coarse_axes
-from bridgegen.suite import maps as module
-from bridgegen.suite.maps import map_suite
-from bridgegen.suite.page import write_suite_page
-from bridgegen.suite.suite import run_suite
+from bridgegen.jobs.preventability import CellClass, preventability
+from bridgegen.jobs.preventability.grid import DEFAULT_GRIDS, Grid, coarse_axes
+from bridgegen.jobs.suite import maps as module
+from bridgegen.jobs.suite.maps import map_suite
+from bridgegen.jobs.suite.page import write_suite_page
+from bridgegen.jobs.suite.suite import run_suite
+from bridgegen.scenario import packs
+from bridgegen.scenario.language.reader import load
 
 PACK = Path(packs.__path__[0]) / "r157"
 CELLS = 200

@@ -5,17 +5,16 @@ from dataclasses import replace
 import pytest
 from tests.suite.test_page import unpacked
 
-from bridgegen.errors import InputError
-from bridgegen.odd.reader import pack_names
-from bridgegen.suite.entries import find_entries, of_edition
-from bridgegen.suite.page import command_of
-from bridgegen.suite.page_payload import payload
-from bridgegen.suite.rating import colour_of, points_of
-from bridgegen.suite.replay import replay
-from bridgegen.suite.results import EntryResult, GridResult, RowResult
-from bridgegen.suite.sentences import outcomes, points
-from bridgegen.suite.suite import run_suite
-from bridgegen.verdict.of_suite import SuiteCriteria, figures_of
+from bridgegen.base.errors import InputError
+from bridgegen.cli.verdict.of_suite import SuiteCriteria, figures_of
+from bridgegen.jobs.suite.entries import find_entries, of_edition
+from bridgegen.jobs.suite.page import command_of
+from bridgegen.jobs.suite.page_payload import payload
+from bridgegen.jobs.suite.replay import replay
+from bridgegen.jobs.suite.results import EntryResult, GridResult, RowResult
+from bridgegen.jobs.suite.sentences import colour_of, outcomes, points, points_of
+from bridgegen.jobs.suite.suite import run_suite
+from bridgegen.scenario.language.reader import pack_names
 
 
 def test_the_name_of_a_pack_stands_for_its_scenarios():

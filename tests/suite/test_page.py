@@ -14,14 +14,14 @@ import numpy as np
 import pytest
 from tests.suite.test_index import failure
 
-from bridgegen.options import CommonOptions
-from bridgegen.suite import page
-from bridgegen.suite.index import Index, write_index
-from bridgegen.suite.page import FILE, write_suite_page
-from bridgegen.suite.page_payload import payload
-from bridgegen.suite.results import EntryResult, RowResult
-from bridgegen.suite.sentences import difference, differences, headline
-from bridgegen.suite.suite import SuiteRun, run_suite
+from bridgegen.engine.options import CommonOptions
+from bridgegen.jobs.suite import page
+from bridgegen.jobs.suite.index import Index, write_index
+from bridgegen.jobs.suite.page import FILE, write_suite_page
+from bridgegen.jobs.suite.page_payload import payload
+from bridgegen.jobs.suite.results import EntryResult, RowResult
+from bridgegen.jobs.suite.sentences import difference, differences, headline
+from bridgegen.jobs.suite.suite import SuiteRun, run_suite
 
 CRITERIA = CommonOptions(criteria=["C-1: always(ego.v < 12 m/s)"])
 HIT = RowResult(critical=True, harm=0.5, severity=0.1, collisions=1.0, d_min=0.0)

@@ -4,10 +4,10 @@ from pathlib import Path
 
 import pytest
 
-from bridgegen.options import CommonOptions
-from bridgegen.suite.page import write_suite_page
-from bridgegen.suite.results import EntryResult, RowResult
-from bridgegen.suite.suite import SuiteRun, run_suite
+from bridgegen.engine.options import CommonOptions
+from bridgegen.jobs.suite.page import write_suite_page
+from bridgegen.jobs.suite.results import EntryResult, RowResult
+from bridgegen.jobs.suite.suite import SuiteRun, run_suite
 
 pytestmark = pytest.mark.browser
 

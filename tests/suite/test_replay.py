@@ -7,16 +7,16 @@ import sys
 import pytest
 from tests.campaign.braking import deterministic, value_sets, write_pair
 
-from bridgegen.errors import InputError, StorageError, UnknownNameError
+from bridgegen.base.errors import InputError, StorageError, UnknownNameError
+from bridgegen.engine.options import CommonOptions
+from bridgegen.engine.simulate import simulate_file
+from bridgegen.jobs.suite.entries import find_entries
+from bridgegen.jobs.suite.page import FILE as PAGE
+from bridgegen.jobs.suite.page import write_replay_page
+from bridgegen.jobs.suite.replay import replay, replay_command
+from bridgegen.jobs.suite.suite import FILE, read_suite, run_suite
 from bridgegen.openx.openscenario.parameters import numbers
 from bridgegen.openx.openscenario.read import read
-from bridgegen.options import CommonOptions
-from bridgegen.simulate import simulate_file
-from bridgegen.suite.entries import find_entries
-from bridgegen.suite.page import FILE as PAGE
-from bridgegen.suite.page import write_replay_page
-from bridgegen.suite.replay import replay, replay_command
-from bridgegen.suite.suite import FILE, read_suite, run_suite
 
 SETS = value_sets(
     {"EgoSpeed": 8.123456789012345, "Gap": 40}, {"EgoSpeed": 14 + 1 / 3, "Gap": 15.000000000000002}

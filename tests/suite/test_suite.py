@@ -8,15 +8,15 @@ import numpy as np
 import pytest
 from tests.campaign.braking import scenario_text, value_sets, write_pair
 
-from bridgegen.errors import InputError, StorageError
-from bridgegen.options import CommonOptions
-from bridgegen.suite.difference import difference
-from bridgegen.suite.entries import find_entries
-from bridgegen.suite.results import EntryResult, RowResult, counts
-from bridgegen.suite.suite import FILE, read_suite, run_suite
-from bridgegen.verdict.fail_if import Comparison
-from bridgegen.verdict.of_difference import figures_of as figures_of_difference
-from bridgegen.verdict.of_suite import SuiteCriteria, figures_of
+from bridgegen.base.errors import InputError, StorageError
+from bridgegen.cli.verdict.fail_if import Comparison
+from bridgegen.cli.verdict.of_difference import figures_of as figures_of_difference
+from bridgegen.cli.verdict.of_suite import SuiteCriteria, figures_of
+from bridgegen.engine.options import CommonOptions
+from bridgegen.jobs.suite.difference import difference
+from bridgegen.jobs.suite.entries import find_entries
+from bridgegen.jobs.suite.results import EntryResult, RowResult, counts
+from bridgegen.jobs.suite.suite import FILE, read_suite, run_suite
 
 CRITERIA = CommonOptions(criteria=["C-1: always(ego.v < 12 m/s)"])
 
@@ -99,7 +99,7 @@ def test_a_changed_file_is_run_again(folder, tmp_path):
     path = folder / "plain.xosc"
     path.write_text(path.read_text("utf-8").replace('name="s"', 'name="t"'), "utf-8")
     ran = []
-    from bridgegen.suite.suite import SuiteCallbacks
+    from bridgegen.jobs.suite.suite import SuiteCallbacks
 
     run_suite(
         folder, egos=["reference"], out=tmp_path / "a", workers=1,

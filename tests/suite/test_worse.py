@@ -5,15 +5,14 @@ from pathlib import Path
 import pytest
 from lxml import etree
 
-from bridgegen.campaign import Run
-from bridgegen.errors import InputError
-from bridgegen.options import CommonOptions
-from bridgegen.suite.difference import difference
-from bridgegen.suite.page import write_suite_page
-from bridgegen.suite.sentences import changes
-from bridgegen.suite.suite import SuiteCallbacks, run_suite
-from bridgegen.suite.worse import WorseCallbacks, WorseThan, search_worse
-from bridgegen.verdict.of_difference import DifferenceCriteria
+from bridgegen.base.errors import InputError
+from bridgegen.cli.verdict.of_difference import DifferenceCriteria
+from bridgegen.engine.options import CommonOptions
+from bridgegen.jobs.search import Run
+from bridgegen.jobs.suite.difference import WorseCallbacks, WorseThan, difference, search_worse
+from bridgegen.jobs.suite.page import write_suite_page
+from bridgegen.jobs.suite.sentences import changes
+from bridgegen.jobs.suite.suite import SuiteCallbacks, run_suite
 
 EGOS = ("careful", "route-follower")
 HARM = CommonOptions(objective={"harm": None})

@@ -6,12 +6,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from bridgegen.cause import Cause
-from bridgegen.conflict.findings import Findings
-from bridgegen.evaluation import EVENT, Trials
-from bridgegen.odd.parameters import Axis
-from bridgegen.odd.reader import load
-from bridgegen.odd.space import SearchSpace
+from bridgegen.assess.cause import Cause
+from bridgegen.assess.conflict.findings import Findings
+from bridgegen.engine.evaluation import EVENT, Trials
+from bridgegen.scenario.language.parameters import Axis
+from bridgegen.scenario.language.reader import load
+from bridgegen.scenario.language.space import SearchSpace
 
 METRICS = ("harm", "severity", "course_ttc", "course_braking")
 

@@ -2,9 +2,9 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from bridgegen.conflict.findings import Findings
-from bridgegen.conflict.happening import Happening, Share
-from bridgegen.triage.bound import NotCounted, bound, estimate, least_margins
+from bridgegen.assess.conflict.findings import Findings
+from bridgegen.assess.conflict.happening import Happening, Share
+from bridgegen.search.triage.bound import NotCounted, bound, estimate, least_margins
 
 ALL_COUNT = NotCounted({}, {}, 0, 0)
 

@@ -3,9 +3,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bridgegen.conflict.summary import ConflictSummary
-from bridgegen.triage.judgement import judgement
-from bridgegen.triage.neighbours import neighbourhoods
+from bridgegen.assess.conflict.summary import ConflictSummary
+from bridgegen.search.triage.judgement import judgement
+from bridgegen.search.triage.neighbours import neighbourhoods
 
 BRAKING = "braking 0.75 s after the risk arose"
 

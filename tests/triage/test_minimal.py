@@ -3,13 +3,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bridgegen.triage.conditions import INSIDE, sentence
-from bridgegen.triage.effort import FULL
-from bridgegen.triage.minimal import Minimiser
-from bridgegen.triage.modes import Key
-from bridgegen.triage.moves import nearest, ranges, searched
-from bridgegen.triage.neighbours import RADIUS
-from bridgegen.triage.record import Condition, Probes
+from bridgegen.search.triage.conditions import INSIDE, sentence
+from bridgegen.search.triage.effort import FULL
+from bridgegen.search.triage.minimal import Minimiser
+from bridgegen.search.triage.modes import Key
+from bridgegen.search.triage.moves import nearest, ranges, searched
+from bridgegen.search.triage.neighbours import RADIUS
+from bridgegen.search.triage.record import Condition, Probes
 
 WAY = Key("contact", "front-to-rear striking", "ego", "truck", "")
 

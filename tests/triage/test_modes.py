@@ -1,9 +1,17 @@
 import numpy as np
 import pytest
 
-from bridgegen.conflict.findings import Findings
-from bridgegen.conflict.types import RULES, ConflictType
-from bridgegen.triage.modes import Key, by_frequency, clusters, group, keys_of, rekeyed, title
+from bridgegen.assess.conflict.findings import Findings
+from bridgegen.assess.conflict.types import RULES, ConflictType
+from bridgegen.search.triage.modes import (
+    Key,
+    by_frequency,
+    clusters,
+    group,
+    keys_of,
+    rekeyed,
+    title,
+)
 
 CAR = Key("contact", "front-to-rear striking", "ego", "car", "", "planning")
 

@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
-from bridgegen.triage.neighbours import NEIGHBOURS, PLACEBO, cause_of, neighbourhoods
-from bridgegen.triage.record import Treatment
+from bridgegen.search.triage.neighbours import NEIGHBOURS, PLACEBO, cause_of, neighbourhoods
+from bridgegen.search.triage.record import Treatment
 
 
 def at(space, **values):

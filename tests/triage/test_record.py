@@ -3,9 +3,9 @@ import json
 import numpy as np
 import pytest
 
-from bridgegen.errors import FileFormatError, StorageError
-from bridgegen.triage import JSON_FILE, read_record, write_record
-from bridgegen.triage.triage import triage
+from bridgegen.base.errors import FileFormatError, StorageError
+from bridgegen.search.triage import JSON_FILE, read_record, write_record
+from bridgegen.search.triage.triage import triage
 
 
 def planted(v, fix):

@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 
 import bridgegen as bg
-from bridgegen.campaign.restored import pipeline_of
-from bridgegen.conflict.harm import NEAR_MISS
-from bridgegen.store import Store
-from bridgegen.triage import JSON_FILE
-from bridgegen.triage.minimal import Ladder
-from bridgegen.triage.modes import keys_of
-from bridgegen.triage.moves import nearest
-from bridgegen.verdict.of_run import figures_of
+from bridgegen.assess.conflict.harm import NEAR_MISS
+from bridgegen.cli.verdict.of_run import figures_of
+from bridgegen.jobs.search.restored import pipeline_of
+from bridgegen.results.store import Store
+from bridgegen.search.triage import JSON_FILE
+from bridgegen.search.triage.minimal import Ladder
+from bridgegen.search.triage.modes import keys_of
+from bridgegen.search.triage.moves import nearest
 
 GIVEN = {
     "algorithm": "random", "budget": 150, "seed": 0, "ego": "route-follower", "keep": 4,
@@ -143,7 +143,7 @@ def test_rows_are_driven_again_as_they_were(run, pipeline):
 
 
 def test_the_summary_ends_with_what_matters(run, capsys):
-    from bridgegen.screen.search import print_summary
+    from bridgegen.cli.terminal.search import print_summary
 
     print_summary(run, 1.0)
     brief = capsys.readouterr().out
@@ -181,7 +181,7 @@ def test_figures_of_the_triage_are_judged(run, tmp_path, cli):
 
 
 def test_a_driver_without_failures_leaves_an_empty_export_and_a_bound(tmp_path, capsys):
-    from bridgegen.screen.search import print_summary
+    from bridgegen.cli.terminal.search import print_summary
 
     run = bg.run_search(
         "crossroads-s1", ego="reference", objective={"harm": None}, algorithm="random", budget=60,
@@ -201,7 +201,7 @@ def test_a_driver_without_failures_leaves_an_empty_export_and_a_bound(tmp_path, 
 
 
 def test_only_failures_are_exported_also_with_the_paper_s_rule(tmp_path, capsys):
-    from bridgegen.screen.search import print_summary
+    from bridgegen.cli.terminal.search import print_summary
 
     run = bg.run_search(
         "crossroads-s3", ego="route-follower", algorithm="random", budget=100, keep=8,
@@ -222,7 +222,7 @@ def test_only_failures_are_exported_also_with_the_paper_s_rule(tmp_path, capsys)
 
 
 def test_a_run_without_failures_exports_none_and_says_so(tmp_path, capsys):
-    from bridgegen.screen.search import print_summary
+    from bridgegen.cli.terminal.search import print_summary
 
     run = bg.run_search(
         "crossroads-s2", ego="reference", algorithm="random", budget=60, objective="paper",
@@ -238,9 +238,9 @@ def test_a_run_without_failures_exports_none_and_says_so(tmp_path, capsys):
 
 
 def test_neighbours_of_a_noisy_driver_have_its_random_numbers():
-    from bridgegen.odd.reader import load
-    from bridgegen.options import PipelineOptions
-    from bridgegen.pipeline import Pipeline
+    from bridgegen.engine.options import PipelineOptions
+    from bridgegen.engine.pipeline import Pipeline
+    from bridgegen.scenario.language.reader import load
 
     scenario = load("crossroads-s4")
     space = scenario.space()
@@ -276,7 +276,7 @@ def test_a_minimal_file_of_a_noisy_driver_gives_the_recorded_metrics_to_the_last
 
 
 def test_a_minimal_scenario_that_is_not_harmful_as_exported_is_not_exported(tmp_path):
-    from bridgegen.campaign.critical import _write_minimal
+    from bridgegen.jobs.search.critical import _write_minimal
 
     run = bg.run_search("crossroads-s4", **GIVEN, workers=2, out=tmp_path / "s4")
     pipeline = pipeline_of(run, "resume", causes=True)

@@ -3,7 +3,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
 
-from bridgegen.triage.statistics import paired_drop
+from bridgegen.base.statistics import paired_drop
 
 counts = st.integers(0, 40)
 

@@ -3,10 +3,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bridgegen.triage.effort import FULL, NONE, SHORT
-from bridgegen.triage.influence import ends_in_words, in_words
-from bridgegen.triage.triage import harmful_rows, triage
-from bridgegen.triage.words import headline, mode_in_words
+from bridgegen.search.triage.effort import FULL, NONE, SHORT
+from bridgegen.search.triage.influence import ends_in_words, in_words
+from bridgegen.search.triage.triage import harmful_rows, triage
+from bridgegen.search.triage.words import headline, mode_in_words
 
 
 def two_ways(v, fix):

@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bridgegen.errors import InputError
-from bridgegen.verdict.fail_if import Comparison, read_conditions
+from bridgegen.base.errors import InputError
+from bridgegen.cli.verdict.fail_if import Comparison, read_conditions
 
 KNOWN = ("r_critic", "d_min", "v_d", "map", "and_x")
 SIGNS = {

@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bridgegen.errors import StorageError
-from bridgegen.verdict.junit import Case, Suite, junit_xml, refuse_junit, write_junit
+from bridgegen.base.errors import StorageError
+from bridgegen.cli.verdict.junit import Case, Suite, junit_xml, refuse_junit, write_junit
 
 # Jenkins' xunit-plugin, junit-10.xsd: attributes (required ones first) and children.
 SCHEMA = {

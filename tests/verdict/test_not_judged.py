@@ -9,18 +9,18 @@ from tests.campaign.braking import deterministic, scenario_text, write_pair
 from tests.suite.test_index import failure
 
 import bridgegen as bg
-from bridgegen.conflict.happening import Happening, Share
-from bridgegen.suite.difference import difference
-from bridgegen.suite.entries import RESULTS
-from bridgegen.suite.index import Index, write_index
-from bridgegen.suite.known_failures import KnownFailures
-from bridgegen.suite.replay import replay
-from bridgegen.suite.results import EntryResult, RowResult
-from bridgegen.suite.suite import SuiteRun, read_suite, run_suite
-from bridgegen.verdict.of_difference import DifferenceCriteria
-from bridgegen.verdict.of_run import PassFailCriteria
-from bridgegen.verdict.of_suite import SuiteCriteria, figures_of
-from bridgegen.view.folder_view import FolderView
+from bridgegen.assess.conflict.happening import Happening, Share
+from bridgegen.cli.verdict.of_difference import DifferenceCriteria
+from bridgegen.cli.verdict.of_run import PassFailCriteria
+from bridgegen.cli.verdict.of_suite import SuiteCriteria, figures_of
+from bridgegen.jobs.suite.difference import difference
+from bridgegen.jobs.suite.entries import RESULTS
+from bridgegen.jobs.suite.index import Index, write_index
+from bridgegen.jobs.suite.known_failures import KnownFailures
+from bridgegen.jobs.suite.replay import replay
+from bridgegen.jobs.suite.results import EntryResult, RowResult
+from bridgegen.jobs.suite.suite import SuiteRun, read_suite, run_suite
+from bridgegen.jobs.view.folder_view import FolderView
 
 DOUBLE_PARKED = Path(__file__).parents[1] / "campaign" / "double-parked.yaml"
 

@@ -4,10 +4,10 @@ from xml.etree import ElementTree
 
 import pytest
 
+from bridgegen.base.errors import InputError
 from bridgegen.cli import main
-from bridgegen.errors import InputError
-from bridgegen.preventability import map_preventability
-from bridgegen.verdict.of_map import FIGURES, MapCriteria, figures_of
+from bridgegen.cli.verdict.of_map import FIGURES, MapCriteria, figures_of
+from bridgegen.jobs.preventability import map_preventability
 
 GRID = ["gap=36:46:2", "lateral_speed=1.7:1.8:2"]
 FIX = {"relative_speed": "40 km/h"}

@@ -7,10 +7,10 @@ from xml.etree import ElementTree
 import pytest
 
 import bridgegen as bg
-from bridgegen.cause import CAUSES
-from bridgegen.errors import InputError
-from bridgegen.store.summary import Summary
-from bridgegen.verdict.of_run import FIGURES, PassFailCriteria, figures_of
+from bridgegen.assess.cause import CAUSES
+from bridgegen.base.errors import InputError
+from bridgegen.cli.verdict.of_run import FIGURES, PassFailCriteria, figures_of
+from bridgegen.results.store.summary import Summary
 
 
 @pytest.fixture(scope="module")

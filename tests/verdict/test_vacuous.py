@@ -7,8 +7,8 @@ from typing import Any
 import pytest
 import yaml
 
-from bridgegen.campaign import Run, run_search
-from bridgegen.verdict.of_run import PassFailCriteria
+from bridgegen.cli.verdict.of_run import PassFailCriteria
+from bridgegen.jobs.search import Run, run_search
 
 EGO = {"type": "car", "start": {"distance": 50.0}, "end": {"distance": 780.0}, "speed": "ego_speed"}
 ROAD = {

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import bridgegen as bg
-from bridgegen.store import Store
+from bridgegen.results.store import Store
 
 BUDGET, KEEP = 120, 2
 

@@ -13,12 +13,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import bridgegen as bg
-from bridgegen.errors import StorageError
-from bridgegen.store import Store
-from bridgegen.view import folder_view
-from bridgegen.view.folder_view import FolderView, _by_key, _count
-from bridgegen.view.overview import DEEPEST, find_runs, read_line
-from bridgegen.view.server import Server, answer
+from bridgegen.base.errors import StorageError
+from bridgegen.jobs.view import folder_view
+from bridgegen.jobs.view.folder_view import FolderView, _by_key, _count
+from bridgegen.jobs.view.overview import DEEPEST, find_runs, read_line
+from bridgegen.jobs.view.server import Server, answer
+from bridgegen.results.store import Store
 
 HOSTILE = '<img src=x onerror="alert(1)">'
 

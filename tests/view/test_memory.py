@@ -6,12 +6,12 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from bridgegen.campaign import Run
-from bridgegen.campaign.restored import pipeline_of
-from bridgegen.campaign.settings import Settings
-from bridgegen.report import payload
-from bridgegen.store import Store
-from bridgegen.view.run_view import RunView
+from bridgegen.jobs.search import Run
+from bridgegen.jobs.search.restored import pipeline_of
+from bridgegen.jobs.search.settings import Settings
+from bridgegen.jobs.view.run_view import RunView
+from bridgegen.pages import payload
+from bridgegen.results.store import Store
 
 A_ROW = 300
 """Bytes; 500 where all columns of a row are held."""

@@ -14,13 +14,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bridgegen.campaign import Run
-from bridgegen.campaign.report import rewrite_report
+from bridgegen.base.errors import InputError, StorageError
 from bridgegen.cli import main
-from bridgegen.errors import InputError, StorageError
-from bridgegen.report.payload import ROWS
-from bridgegen.store import Store
-from bridgegen.view.run_view import RunView
+from bridgegen.jobs.search import Run
+from bridgegen.jobs.search.report import rewrite_report
+from bridgegen.jobs.view.run_view import RunView
+from bridgegen.pages.payload import ROWS
+from bridgegen.results.store import Store
 
 
 @pytest.fixture(scope="module")
@@ -136,7 +136,7 @@ def test_a_run_with_no_row_yet_can_be_looked_at(growing):
 
 
 def test_a_long_run_comes_thinned_as_a_whole(growing, monkeypatch):
-    monkeypatch.setattr("bridgegen.report.payload.ROWS", 50)
+    monkeypatch.setattr("bridgegen.pages.payload.ROWS", 50)
     assert ROWS == 20_000
     growing.grow(120)
     told = RunView(growing.folder).news(100)

@@ -11,8 +11,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bridgegen.errors import InputError, StorageError
-from bridgegen.view.server import LOOPBACK, Server, answer
+from bridgegen.base.errors import InputError, StorageError
+from bridgegen.jobs.view.server import LOOPBACK, Server, answer
 
 
 class Site:

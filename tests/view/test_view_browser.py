@@ -3,12 +3,11 @@
 import numpy as np
 import pytest
 
-from bridgegen.confirmation.record import digest_of, write_record
-from bridgegen.confirmation.schema import Outcome, Record, Scenario
-from bridgegen.odd.thresholds import Thresholds
-from bridgegen.screen.view import _redirect
-from bridgegen.view.run_view import RunView
-from bridgegen.view.server import Server
+from bridgegen.cli.terminal.view import _redirect
+from bridgegen.jobs.view.run_view import RunView
+from bridgegen.jobs.view.server import Server
+from bridgegen.results.confirmation.record import Outcome, Record, Scenario, digest_of, write_record
+from bridgegen.scenario.language.thresholds import Thresholds
 
 pytestmark = pytest.mark.browser
 

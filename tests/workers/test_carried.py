@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from bridgegen.workers import CarriedDriver
+from bridgegen.engine.workers import CarriedDriver
 
 
 @pytest.fixture

@@ -3,7 +3,7 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bridgegen.workers.chunks import cut
+from bridgegen.engine.workers.workers import cut
 
 
 @given(st.integers(0, 500), st.integers(1, 40), st.integers(1, 200))

@@ -18,11 +18,11 @@ import numpy as np
 import pytest
 
 import bridgegen as bg
-from bridgegen.campaign import SearchCallbacks
-from bridgegen.errors import UnknownNameError, WorkersError
-from bridgegen.store import Store
-from bridgegen.workers import Lost, open_workers
-from bridgegen.workers.cluster import Cluster
+from bridgegen.base.errors import UnknownNameError, WorkersError
+from bridgegen.engine.workers import Lost, open_workers
+from bridgegen.engine.workers.cluster import Cluster
+from bridgegen.jobs.search import SearchCallbacks
+from bridgegen.results.store import Store
 
 pytestmark = [
     pytest.mark.ray,

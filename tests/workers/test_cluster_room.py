@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from bridgegen import extras
-from bridgegen.workers import cluster
-from bridgegen.workers.cluster import Cluster
+from bridgegen.base import extras
+from bridgegen.engine.workers import cluster
+from bridgegen.engine.workers.cluster import Cluster
 
 X = np.arange(1.0)
 

@@ -2,9 +2,9 @@
 
 import pytest
 
-from bridgegen.workers import compile_ahead
-from bridgegen.workers.compile_ahead import compiled_ahead
-from bridgegen.workers.recipe import Recipe
+from bridgegen.engine.workers import compile_ahead
+from bridgegen.engine.workers.compile_ahead import compiled_ahead
+from bridgegen.engine.workers.recipe import Recipe
 
 
 def touch(path: str) -> None:
@@ -69,9 +69,9 @@ def test_where_no_process_can_begin_this_one_goes_on_alone(beside, tmp_path):
 
 def test_a_pipeline_s_recipe_compiles_in_another_process_what_is_needed_later(tmp_path):
     """The real thing, with kernels that are compiled: it ends without an error."""
-    from bridgegen.odd.reader import load
-    from bridgegen.options import PipelineOptions
-    from bridgegen.pipeline import Pipeline, _compile_ahead
+    from bridgegen.engine.options import PipelineOptions
+    from bridgegen.engine.pipeline import Pipeline, _compile_ahead
+    from bridgegen.scenario.language.reader import load
 
     scenario = load("crossroads-s4")
     pipeline = Pipeline(scenario, scenario.space(), PipelineOptions(ego="reference", causes=True))

@@ -5,15 +5,15 @@ from types import MappingProxyType
 import numpy as np
 import pytest
 
-from bridgegen.errors import InputError
-from bridgegen.odd.reader import load
-from bridgegen.pipeline import FAR_ROWS, Pipeline
+from bridgegen.adapters.carla.settings import Access
+from bridgegen.base.errors import InputError
+from bridgegen.engine.pipeline import FAR_ROWS, Pipeline
+from bridgegen.engine.workers import Lost, Part
+from bridgegen.engine.workers.workers import cut
+from bridgegen.scenario.language.reader import load
 from bridgegen.simulation import choice
-from bridgegen.simulation.carla.settings import Access
 from bridgegen.simulation.choice import Kind, SimulatorChoice
 from bridgegen.simulation.rollout import WORKER_ENDED
-from bridgegen.workers import Lost, Part
-from bridgegen.workers.chunks import cut
 
 
 class Elsewhere:

@@ -8,10 +8,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bridgegen.errors import WorkersError
-from bridgegen.workers import Lost, Recipe
-from bridgegen.workers.pipeline_cache import NotPrepared, PipelineCache
-from bridgegen.workers.pool import MAX_START_FAILURES, Chunk, WorkerPool
+from bridgegen.base.errors import WorkersError
+from bridgegen.engine.workers import Lost, Recipe
+from bridgegen.engine.workers.pipeline_cache import NotPrepared, PipelineCache
+from bridgegen.engine.workers.pool import MAX_START_FAILURES, Chunk, WorkerPool
 
 
 class Tripler:

@@ -11,9 +11,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bridgegen.errors import InputError, UnknownNameError, WorkersError
-from bridgegen.workers import Lost, Part, Threads, open_workers, read_choice
-from bridgegen.workers.processes import Processes, ending
+from bridgegen.base.errors import InputError, UnknownNameError, WorkersError
+from bridgegen.engine.workers import Lost, Part, Threads, open_workers, read_choice
+from bridgegen.engine.workers.processes import Processes, ending
 
 
 @pytest.fixture

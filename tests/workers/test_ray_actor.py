@@ -6,12 +6,12 @@ import time
 import numpy as np
 import pytest
 
-from bridgegen import extras
-from bridgegen.errors import InputError
-from bridgegen.workers import open_workers
-from bridgegen.workers.pipeline_cache import CAPACITY, NotPrepared, PipelineCache
-from bridgegen.workers.ray_actor import RayActor
-from bridgegen.workers.recipe import Recipe
+from bridgegen.base import extras
+from bridgegen.base.errors import InputError
+from bridgegen.engine.workers import open_workers
+from bridgegen.engine.workers.pipeline_cache import CAPACITY, NotPrepared, PipelineCache
+from bridgegen.engine.workers.ray_bridge import RayActor
+from bridgegen.engine.workers.recipe import Recipe
 
 
 class Sleeper:

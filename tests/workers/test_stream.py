@@ -11,9 +11,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bridgegen.errors import WorkersError
-from bridgegen.workers import Lost, Threads, Workers
-from bridgegen.workers.processes import Processes
+from bridgegen.base.errors import WorkersError
+from bridgegen.engine.workers import Lost, Threads, Workers
+from bridgegen.engine.workers.processes import Processes
 
 
 @pytest.fixture

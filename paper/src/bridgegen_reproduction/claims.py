@@ -5,10 +5,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bridgegen.arrays import Float
-from bridgegen.comparison.measures import Measured
-from bridgegen.comparison.statistics import a12, holm, mann_whitney, quartiles
-from bridgegen.comparison.words import SURE, p_value
+from bridgegen.base.arrays import Float
+from bridgegen.base.statistics import a12, holm, mann_whitney, quartiles
+from bridgegen.jobs.compare.measures import Measured
+from bridgegen.jobs.compare.words import SURE, p_value
 from bridgegen_reproduction import paper
 from bridgegen_reproduction.numbers import number
 from bridgegen_reproduction.results import Results

@@ -2,7 +2,7 @@
 
 from math import isinf, isnan
 
-from bridgegen.comparison.statistics import Quartiles
+from bridgegen.base.statistics import Quartiles
 
 
 def number(value: float, digits: int) -> str:

@@ -24,7 +24,7 @@ from bridgegen_reproduction.table import to_html
 
 def html(document: Document) -> str:
     """Return the page; text is data in it, never markup."""
-    css = _own("bridgegen.comparison", "page.css") + _own("bridgegen_reproduction", "page.css")
+    css = _own("bridgegen.jobs.compare", "page.css") + _own("bridgegen_reproduction", "page.css")
     fill = {
         "title": escape(document.title),
         "css": css,

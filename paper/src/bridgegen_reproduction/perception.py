@@ -9,9 +9,9 @@ from dataclasses import astuple, dataclass
 
 import numpy as np
 
-from bridgegen import cause
-from bridgegen.cause import Cause
-from bridgegen.comparison.statistics import quartiles
+from bridgegen.assess import cause
+from bridgegen.assess.cause import Cause
+from bridgegen.base.statistics import quartiles
 from bridgegen_reproduction.numbers import number, share, spread
 from bridgegen_reproduction.paper import METHODS, RS, TITLES
 from bridgegen_reproduction.protocol import IDEAL, PERCEIVING, Protocol

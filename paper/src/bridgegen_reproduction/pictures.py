@@ -6,12 +6,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bridgegen.comparison.drawing import DARK, LIGHT, Theme, pdf, png
-from bridgegen.comparison.record import points
-from bridgegen.comparison.result import Comparison
-from bridgegen.odd.reader import load
-from bridgegen.odd.scenario import LogicalScenario
-from bridgegen.ontology.layers import LAYERS
+from bridgegen.jobs.compare.figures import DARK, LIGHT, Theme, pdf, png
+from bridgegen.jobs.compare.record import points
+from bridgegen.jobs.compare.result import Comparison
+from bridgegen.scenario.language.reader import load
+from bridgegen.scenario.language.scenario import LogicalScenario
+from bridgegen.scenario.ontology.structure import LAYERS
 from bridgegen_reproduction import paper
 from bridgegen_reproduction.document import Picture
 from bridgegen_reproduction.figures.causes import causes

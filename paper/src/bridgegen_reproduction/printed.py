@@ -4,11 +4,11 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from bridgegen import search as toolkit
-from bridgegen.objective import Objective
-from bridgegen.odd.objectives import PAPERS
-from bridgegen.odd.reader import load
-from bridgegen.odd.story import Participant
+from bridgegen.assess.objective import Objective
+from bridgegen.scenario.language.objectives import PAPERS
+from bridgegen.scenario.language.reader import load
+from bridgegen.scenario.language.story import Participant
+from bridgegen.search import algorithms as toolkit
 from bridgegen_reproduction import paper
 from bridgegen_reproduction.numbers import number, spread
 from bridgegen_reproduction.protocol import PRINTED, Protocol

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from bridgegen.comparison.plan import MAX_SEEDS, RUNS, Cell
-from bridgegen.errors import InputError
+from bridgegen.base.errors import InputError
+from bridgegen.jobs.compare.plan import MAX_SEEDS, RUNS, Cell
 from bridgegen_reproduction.paper import (
     ITERATIONS,
     MAIN,

@@ -7,13 +7,13 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from bridgegen.comparison.comparison import ComparisonCallbacks, compare
-from bridgegen.comparison.plan import RUNS, Cell
-from bridgegen.comparison.result import Comparison
-from bridgegen.comparison.runs import evaluations_of
-from bridgegen.disk import write_whole
-from bridgegen.errors import Interrupted, StorageError
-from bridgegen.workers import read_choice
+from bridgegen.base.disk import write_whole
+from bridgegen.base.errors import Interrupted, StorageError
+from bridgegen.engine.workers import read_choice
+from bridgegen.jobs.compare.comparison import ComparisonCallbacks, compare
+from bridgegen.jobs.compare.plan import RUNS, Cell
+from bridgegen.jobs.compare.result import Comparison
+from bridgegen.jobs.compare.runs import evaluations_of
 from bridgegen_reproduction import paper
 from bridgegen_reproduction.claims import judge, of_fronts
 from bridgegen_reproduction.document import FIGURES, TABLES, Document, Picture, markdown

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bridgegen.arrays import Float
-from bridgegen.comparison.measures import waited_for
-from bridgegen.comparison.statistics import Quartiles, quartiles
+from bridgegen.base.arrays import Float
+from bridgegen.base.statistics import Quartiles, quartiles
+from bridgegen.jobs.compare.measures import waited_for
 from bridgegen_reproduction.paper import GROUPS
 from bridgegen_reproduction.protocol import PRINTED, Protocol
 from bridgegen_reproduction.runs import Run, Runs, of

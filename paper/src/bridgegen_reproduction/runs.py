@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from bridgegen import campaign
-from bridgegen.arrays import Bool, Float
-from bridgegen.comparison.plan import Cell
-from bridgegen.objective import PAPER_FACTOR, Objective
-from bridgegen.store import Store
+from bridgegen.assess.objective import PAPER_FACTOR, Objective
+from bridgegen.base.arrays import Bool, Float
+from bridgegen.jobs import search as campaign
+from bridgegen.jobs.compare.plan import Cell
+from bridgegen.results.store import Store
 from bridgegen_reproduction.paper import WEIGHTS
 from bridgegen_reproduction.protocol import Part
 
@@ -35,7 +35,7 @@ class Run:
         fitness: ``(n,)`` float64, the paper's, likewise; larger is more critical.
         critical: ``(n,)`` bool.
         collision: ``(n,)`` bool, whether the ego collided.
-        cause: ``(n,)`` int8, a `bridgegen.cause.Cause` each.
+        cause: ``(n,)`` int8, a `bridgegen.assess.cause.Cause` each.
         seconds: [s] of search.
         seconds_at: ``(n,)`` float64 [s], when each was done.
     """

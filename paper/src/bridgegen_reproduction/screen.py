@@ -4,7 +4,7 @@ from typing import Any
 
 from rich.console import Console
 
-from bridgegen.screen.comparison import RunsScreen
+from bridgegen.cli.terminal.comparison import RunsScreen
 from bridgegen_reproduction.protocol import Protocol
 from bridgegen_reproduction.reproduction import Reproduction, ReproductionCallbacks, reproduce
 

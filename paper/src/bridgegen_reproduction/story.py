@@ -4,7 +4,7 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from bridgegen.comparison.plan import Cell
+from bridgegen.jobs.compare.plan import Cell
 from bridgegen_reproduction import paper
 from bridgegen_reproduction.claims import CLAIMS, Verdict, table_claims
 from bridgegen_reproduction.document import (

@@ -1,4 +1,7 @@
-"""The command line: parse, call, print; no logic. Commands are in the order of these imports."""
+"""The command line: parse, call, print; no logic. Commands are in the order of these imports.
+
+`terminal` prints, `verdict` judges (`--fail-if`, JUnit). Imports `jobs` and below.
+"""
 
 # ruff: noqa: I001
 from bridgegen.cli import (

@@ -10,9 +10,9 @@ from typing import Annotated
 
 import typer
 
+from bridgegen.base.errors import BridgeGenError, Interrupted
+from bridgegen.base.processes.child import collect_rarely
 from bridgegen.cli.groups import ONTOLOGY, SEARCH, Application, PanelledGroup, WithDefault
-from bridgegen.errors import BridgeGenError, Interrupted
-from bridgegen.garbage import collect_rarely
 
 FAILED = 3
 """The exit status if a criterion of ``--fail-if`` holds; 1 is Python's for a bug, 2 a user's error,

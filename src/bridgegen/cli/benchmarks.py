@@ -7,7 +7,7 @@ import typer
 
 from bridgegen.cli.app import benchmarks
 from bridgegen.cli.completion import completing
-from bridgegen.options.option import DRIVER, OUTPUT, SEARCH, WHAT
+from bridgegen.engine.options.option import DRIVER, OUTPUT, SEARCH, WHAT
 
 
 @benchmarks.command("planners")
@@ -93,8 +93,8 @@ def planners(
     Each driver drives each scenario within its domain, with perfect perception and with perception.
     Writes tables, a page, and scripts that reproduce the failures.
     """
-    from bridgegen.benchmark import benchmark_planners
-    from bridgegen.screen.benchmark import BenchmarkScreen, print_benchmark
+    from bridgegen.cli.terminal.benchmark import BenchmarkScreen, print_benchmark
+    from bridgegen.jobs.benchmark import benchmark_planners
 
     with BenchmarkScreen() as screen:
         result = benchmark_planners(

@@ -8,13 +8,13 @@ import typer
 from bridgegen.cli import options as common
 from bridgegen.cli.app import app
 from bridgegen.cli.completion import completing
+from bridgegen.cli.connection import with_map_folder
 from bridgegen.cli.declared import with_declared_options
 from bridgegen.cli.groups import SEARCH
-from bridgegen.cli.map_folder import with_map_folder
-from bridgegen.options import CommonOptions
-from bridgegen.options.forms import read_names
-from bridgegen.options.option import OUTPUT, WHAT
-from bridgegen.options.option import SEARCH as HOW
+from bridgegen.engine.options import CommonOptions
+from bridgegen.engine.options.forms import read_names
+from bridgegen.engine.options.option import OUTPUT, WHAT
+from bridgegen.engine.options.option import SEARCH as HOW
 
 
 @app.command(rich_help_panel=SEARCH)
@@ -84,8 +84,8 @@ def compare(
 
     Writes a table, tests, figures and a page.
     """
-    from bridgegen import comparison
-    from bridgegen.screen.comparison import ComparisonScreen, print_comparison
+    from bridgegen.cli.terminal.comparison import ComparisonScreen, print_comparison
+    from bridgegen.jobs import compare as comparison
 
     with ComparisonScreen() as screen:
         result = comparison.compare(

@@ -34,7 +34,7 @@ def completing(kind: str) -> Complete | None:
 
 
 def _scenarios(_: typer.Context) -> Iterable[str]:
-    from bridgegen.odd.reader import names, pack_names
+    from bridgegen.scenario.language.reader import names, pack_names
 
     return (*names(), *pack_names())
 
@@ -48,39 +48,39 @@ def _scenarios_of_suite(ctx: typer.Context) -> Iterable[str]:
 
 
 def _algorithms(_: typer.Context) -> Iterable[str]:
-    from bridgegen.search import names
-    from bridgegen.search.automatic import AUTO
+    from bridgegen.search.algorithms import names
+    from bridgegen.search.algorithms.automatic import AUTO
 
     return (*names(), AUTO)
 
 
 def _settings(ctx: typer.Context) -> Iterable[str]:
-    from bridgegen.search import get
+    from bridgegen.search.algorithms import get
 
     return [f"{name}=" for name in get(ctx.params.get("algorithm") or "surrogate").settings]
 
 
 def _drivers(_: typer.Context) -> Iterable[str]:
-    from bridgegen.ego import DRIVERS
-    from bridgegen.ego.planners.registry import planners
+    from bridgegen.drivers import DRIVERS
+    from bridgegen.drivers.planners import planners
 
     return (*DRIVERS, *planners())
 
 
 def _others(_: typer.Context) -> Iterable[str]:
-    from bridgegen.ego import OTHERS
+    from bridgegen.drivers import OTHERS
 
     return OTHERS
 
 
 def _stages(_: typer.Context) -> Iterable[str]:
-    from bridgegen.ego import STAGES
+    from bridgegen.drivers import STAGES
 
     return STAGES
 
 
 def _metrics(_: typer.Context) -> Iterable[str]:
-    from bridgegen.conflict.quantities import QUANTITIES
+    from bridgegen.assess.conflict.quantities import QUANTITIES
 
     return QUANTITIES
 
@@ -90,14 +90,14 @@ def _objectives(ctx: typer.Context) -> Iterable[str]:
 
 
 def _critical(_: typer.Context) -> Iterable[str]:
-    from bridgegen.objective import RULES
+    from bridgegen.assess.objective import RULES
 
     return RULES
 
 
 def _parameters(ctx: typer.Context) -> Iterable[str]:
     """Return the parameters of the scenario that the command line names."""
-    from bridgegen.odd.reader import load
+    from bridgegen.scenario.language.reader import load
 
     given = ctx.params.get("scenario") or ctx.params.get("scenarios") or ctx.args
     first = given if isinstance(given, str) else given[0]  # after an option without its value
@@ -105,7 +105,7 @@ def _parameters(ctx: typer.Context) -> Iterable[str]:
 
 
 def _axes(_: typer.Context) -> Iterable[str]:
-    from bridgegen.odd.parameters import Axis
+    from bridgegen.scenario.language.parameters import Axis
 
     return [str(axis) for axis in Axis]
 
@@ -123,19 +123,19 @@ def _vehicles(_: typer.Context) -> Iterable[str]:
 
 
 def _causes(_: typer.Context) -> Iterable[str]:
-    from bridgegen.cause import CAUSES
+    from bridgegen.assess.cause import CAUSES
 
     return [one.label for one in CAUSES]
 
 
 def _triages(_: typer.Context) -> Iterable[str]:
-    from bridgegen.triage.effort import EFFORTS
+    from bridgegen.search.triage.effort import EFFORTS
 
     return EFFORTS
 
 
 def _flavours(_: typer.Context) -> Iterable[str]:
-    from bridgegen.campaign.export import FLAVOURS
+    from bridgegen.jobs.search.export import FLAVOURS
 
     return FLAVOURS
 

@@ -8,10 +8,14 @@ import typer
 from bridgegen.cli import options
 from bridgegen.cli.app import FAILED, app
 from bridgegen.cli.completion import completing
-from bridgegen.cli.connection import NO_CONNECTION, Connection, with_connection_options
+from bridgegen.cli.connection import (
+    NO_CONNECTION,
+    Connection,
+    with_connection_options,
+    with_map_folder,
+)
 from bridgegen.cli.groups import RESULTS
-from bridgegen.cli.map_folder import with_map_folder
-from bridgegen.options.option import SIMULATOR
+from bridgegen.engine.options.option import SIMULATOR
 
 
 @app.command(rich_help_panel=RESULTS)
@@ -47,10 +51,10 @@ def confirm(
 
     Are its critical scenarios critical there, too?
     """
-    from bridgegen.campaign.confirm import confirm as confirm_run
-    from bridgegen.screen.confirmation import ConfirmationScreen, print_confirmation
-    from bridgegen.screen.verdict import print_outcomes
-    from bridgegen.verdict.of_confirmation import ConfirmationCriteria
+    from bridgegen.cli.terminal.confirmation import ConfirmationScreen, print_confirmation
+    from bridgegen.cli.terminal.verdict import print_outcomes
+    from bridgegen.cli.verdict.of_confirmation import ConfirmationCriteria
+    from bridgegen.jobs.search.confirm import confirm as confirm_run
 
     criteria = ConfirmationCriteria.read(fail_if or (), junit)
     choice = options.read_simulator(simulator, simulator_set, connection)

@@ -49,10 +49,10 @@ def dashboard(
     operational design domain. The statuses of failure modes are those of failure-modes.yaml in
     the folder, which is yours.
     """
-    from bridgegen.dashboard import build_dashboard
-    from bridgegen.screen.dashboard import DashboardScreen, print_dashboard
-    from bridgegen.screen.verdict import print_outcomes
-    from bridgegen.verdict.of_dashboard import DashboardCriteria
+    from bridgegen.cli.terminal.dashboard import DashboardScreen, print_dashboard
+    from bridgegen.cli.terminal.verdict import print_outcomes
+    from bridgegen.cli.verdict.of_dashboard import DashboardCriteria
+    from bridgegen.jobs.dashboard import build_dashboard
 
     judges = DashboardCriteria.read(fail_if or ())
     with DashboardScreen() as screen:

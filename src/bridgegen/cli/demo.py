@@ -26,8 +26,8 @@ def demo(
 
     The run is a new folder, runs/demo or runs/demo-2 …; it takes about 20 seconds.
     """
-    from bridgegen import campaign
-    from bridgegen.screen.search import SearchScreen, print_summary
+    from bridgegen.cli.terminal.search import SearchScreen, print_summary
+    from bridgegen.jobs import search as campaign
 
     folder = next(one for one in _folders(Path("runs")) if not one.exists())
     print(

@@ -13,8 +13,8 @@ def doctor(as_json: options.Json = False) -> None:
 
     Ends with status 2 if something keeps a search from working, or compiles at each start.
     """
-    from bridgegen.installation import examine
-    from bridgegen.screen.tables import print_table
+    from bridgegen.cli.installation import examine
+    from bridgegen.cli.terminal.tables import print_table
 
     found = list(examine())
     rows = [(one.subject, one.value, one.advice) for one in found]

@@ -61,8 +61,8 @@ def fit(
     Chooses a form for each parameter, tests it, measures how they depend on each other, and
     writes an exposure, and a page that shows how well it fits.
     """
-    from bridgegen.exposure.files import write_fit
-    from bridgegen.screen.exposure import FitScreen, print_fit
+    from bridgegen.cli.terminal.exposure import FitScreen, print_fit
+    from bridgegen.jobs.fit import write_fit
 
     notes: list[str] = []
     with FitScreen() as screen:
@@ -79,8 +79,8 @@ def fit(
 @listing.command("exposures")
 def list_exposures(as_json: common.Json = False) -> None:
     """Examples of exposures; none is used unless named."""
-    from bridgegen.exposure import example_names, read_exposure
-    from bridgegen.screen.tables import print_entries
+    from bridgegen.cli.terminal.tables import print_entries
+    from bridgegen.scenario.exposure import example_names, read_exposure
 
     made = [(name, read_exposure(name)) for name in example_names()]
     rows = [(name, f"of {one.scenario.name}", one.source) for name, one in made]

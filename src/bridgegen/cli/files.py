@@ -6,13 +6,13 @@ from typing import Annotated
 
 import typer
 
+from bridgegen.base.errors import InputError
 from bridgegen.cli import options
 from bridgegen.cli.app import app, ontology
 from bridgegen.cli.completion import completing
+from bridgegen.cli.connection import with_map_folder
 from bridgegen.cli.groups import FILES, ONTOLOGY, RESULTS
-from bridgegen.cli.map_folder import with_map_folder
-from bridgegen.errors import InputError
-from bridgegen.options.forms import read_names
+from bridgegen.engine.options.forms import read_names
 
 
 @app.command(rich_help_panel=RESULTS)
@@ -46,7 +46,7 @@ def export(
 
     Each with its map.
     """
-    from bridgegen.campaign.export import export as export_scenarios
+    from bridgegen.jobs.search.export import export as export_scenarios
 
     notes: list[str] = []
     for path in export_scenarios(
@@ -73,7 +73,7 @@ def table(
 
     DuckDB, Polars and pandas read them as one table.
     """
-    from bridgegen.campaign.table import write_tables
+    from bridgegen.jobs.search.table import write_tables
 
     for path in write_tables(runs, out, sample=sample):
         print(path)
@@ -152,7 +152,7 @@ def validate(
     The exit status is 2 if one breaks any. A map that can be imported and searched although
     something is odd about it is valid, with warnings.
     """
-    from bridgegen.campaign.validate import notes_on, validate_file
+    from bridgegen.jobs.search.validate import notes_on, validate_file
 
     broken: list[str] = []
     for file in files:
@@ -190,8 +190,8 @@ def schema(
     programs which read them.
     """
     from bridgegen.cli.runs import run_file_schema
-    from bridgegen.odd.json_schema import as_text, schema_of, write_schema
-    from bridgegen.safety_case.model import json_schema
+    from bridgegen.jobs.safety_case.model import json_schema
+    from bridgegen.scenario.language.json_schema import as_text, schema_of, write_schema
 
     if None not in (kind, of) and kind != of:
         raise InputError(f"the schema of one kind of file is printed, got {kind} and --of {of}")
@@ -222,7 +222,7 @@ def show(
 
     Violated constraints are red; a logical scenario is explained.
     """
-    from bridgegen.report.show import show_file, show_scenario
+    from bridgegen.pages.scenario_page import show_file, show_scenario
 
     file = Path(what)
     if file.suffix.lower() != ".owl":
@@ -247,8 +247,8 @@ def ask(
     as_json: options.Json = False,
 ) -> None:
     """Answer a question about a scenario's individuals."""
-    from bridgegen.ontology.questions import ask_file
-    from bridgegen.screen.tables import print_table
+    from bridgegen.cli.terminal.tables import print_table
+    from bridgegen.scenario.ontology.questions import ask_file
 
     answer = ask_file(file, question, sparql)
     print_table(answer.columns, answer.rows, as_json=as_json)
@@ -277,8 +277,8 @@ def metrics(
 
     Also prints its decisive conflict. The recording is of another simulator or a real drive.
     """
-    from bridgegen.conflict.recorded import measure_recording
-    from bridgegen.screen.files import print_measured
+    from bridgegen.assess.conflict.recorded import measure_recording
+    from bridgegen.cli.terminal.files import print_measured
 
     measured = measure_recording(
         file, ego=ego, boxes=boxes, metrics=read_names(only) or None, time_step=dt
@@ -293,7 +293,7 @@ def ontology_docs(
     out: Annotated[Path, typer.Option(help="The page (.html).")] = Path("bridgegen-ontology.html"),
 ) -> None:
     """Write all classes and properties as one page."""
-    from bridgegen.ontology.docs import write_docs
+    from bridgegen.scenario.ontology.docs import write_docs
 
     write_docs(out)
     print(out)

@@ -6,8 +6,8 @@ from typing import Any, TypeVar
 import typer
 from typer.core import TyperCommand, TyperGroup
 
-from bridgegen.errors import InputError
-from bridgegen.options.option import GROUPS
+from bridgegen.base.errors import InputError
+from bridgegen.engine.options.option import GROUPS
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 

@@ -13,8 +13,8 @@ from bridgegen.cli.completion import completing
 @listing.command("scenarios")
 def list_scenarios(as_json: options.Json = False) -> None:
     """Logical scenarios of the catalogue."""
-    from bridgegen.odd.reader import load, names
-    from bridgegen.screen.tables import print_table
+    from bridgegen.cli.terminal.tables import print_table
+    from bridgegen.scenario.language.reader import load, names
 
     rows = [(name, load(name).title) for name in names()]
     print_table(("scenario", "title"), rows, as_json=as_json)
@@ -23,8 +23,8 @@ def list_scenarios(as_json: options.Json = False) -> None:
 @listing.command("packs")
 def list_packs(as_json: options.Json = False) -> None:
     """Logical scenarios of the packs, by regulation."""
-    from bridgegen.odd.reader import load, pack_names
-    from bridgegen.screen.tables import print_table
+    from bridgegen.cli.terminal.tables import print_table
+    from bridgegen.scenario.language.reader import load, pack_names
 
     rows = [(name, load(name).title) for name in pack_names()]
     print_table(("scenario", "title"), rows, as_json=as_json)
@@ -33,8 +33,8 @@ def list_packs(as_json: options.Json = False) -> None:
 @listing.command("algorithms")
 def list_algorithms(as_json: options.Json = False) -> None:
     """Search algorithms."""
-    from bridgegen import search as toolkit
-    from bridgegen.screen.tables import print_table
+    from bridgegen.cli.terminal.tables import print_table
+    from bridgegen.search import algorithms as toolkit
 
     rows = []
     for one in (toolkit.get(name) for name in toolkit.names()):
@@ -49,8 +49,8 @@ def list_drivers(as_json: options.Json = False) -> None:
 
     Of planners that others wrote: whether they are installed, or how to get them.
     """
-    from bridgegen.ego.listed import HEAD, listed
-    from bridgegen.screen.tables import print_entries
+    from bridgegen.cli.terminal.tables import print_entries
+    from bridgegen.drivers.drivers import HEAD, listed
 
     print_entries(HEAD, listed(), as_json=as_json)
 
@@ -58,7 +58,7 @@ def list_drivers(as_json: options.Json = False) -> None:
 @listing.command("simulators")
 def list_simulators(as_json: options.Json = False) -> None:
     """Simulators that can run the scenarios."""
-    from bridgegen.screen.tables import print_table
+    from bridgegen.cli.terminal.tables import print_table
     from bridgegen.simulation.choice import SIMULATORS
 
     rows = [
@@ -74,9 +74,9 @@ def list_simulators(as_json: options.Json = False) -> None:
 @listing.command("metrics")
 def list_metrics(as_json: options.Json = False) -> None:
     """Criticality metrics."""
-    from bridgegen.conflict.quantities import MEASURED, QUANTITIES
-    from bridgegen.metrics import TABLE_I
-    from bridgegen.screen.tables import print_table
+    from bridgegen.assess.conflict.quantities import MEASURED, QUANTITIES
+    from bridgegen.assess.metrics import TABLE_I
+    from bridgegen.cli.terminal.tables import print_table
 
     rows = [
         (
@@ -95,8 +95,8 @@ def list_sight(as_json: options.Json = False) -> None:
 
     A car and a pedestrian, in each weather [m].
     """
-    from bridgegen.ego.sight import HEAD, table
-    from bridgegen.screen.tables import print_table
+    from bridgegen.cli.terminal.tables import print_table
+    from bridgegen.drivers.sight import HEAD, table
 
     print_table(HEAD, list(table()), as_json=as_json)
 
@@ -113,7 +113,7 @@ def list_parameters(
     as_json: options.Json = False,
 ) -> None:
     """Parameters of a scenario: ranges and constraints."""
-    from bridgegen.odd.reader import load
-    from bridgegen.screen.tables import print_parameters
+    from bridgegen.cli.terminal.tables import print_parameters
+    from bridgegen.scenario.language.reader import load
 
     print_parameters(load(scenario).table(), as_json=as_json)

@@ -9,11 +9,11 @@ import typer
 from bridgegen.cli import options
 from bridgegen.cli.app import app
 from bridgegen.cli.completion import completing
+from bridgegen.cli.connection import with_map_folder
 from bridgegen.cli.groups import FILES
-from bridgegen.cli.map_folder import with_map_folder
 
 if TYPE_CHECKING:
-    from bridgegen.campaign.places import PlaceFit
+    from bridgegen.jobs.search.places import PlaceFit
 
 
 @app.command(rich_help_panel=FILES)
@@ -41,10 +41,10 @@ def places(
     rotations of its legs), and what the others lack. What fits can be searched (search SCENARIO
     --map MAP --place ID).
     """
-    from bridgegen.campaign.places import places_of
-    from bridgegen.odd.reader import load
-    from bridgegen.report.map_picture import write_map_picture
-    from bridgegen.screen.tables import print_table
+    from bridgegen.cli.terminal.tables import print_table
+    from bridgegen.jobs.search.places import places_of
+    from bridgegen.pages.map_picture import write_map_picture
+    from bridgegen.scenario.language.reader import load
 
     found, model, warnings = places_of(road_map, load(scenario) if scenario else None)
     for warning in warnings:

@@ -6,12 +6,12 @@ from typing import Annotated
 
 import typer
 
+from bridgegen.base.errors import InputError
 from bridgegen.cli.completion import completing
 from bridgegen.cli.connection import Connection
 from bridgegen.cli.declared import declaration
-from bridgegen.errors import InputError
-from bridgegen.options.forms import read_settings, read_value
-from bridgegen.options.option import DRIVER, OBJECTIVE, OUTPUT, SEARCH, SIMULATOR
+from bridgegen.engine.options.forms import read_settings, read_value
+from bridgegen.engine.options.option import DRIVER, OBJECTIVE, OUTPUT, SEARCH, SIMULATOR
 from bridgegen.simulation.choice import SIMULATORS, SimulatorChoice, Value
 
 Json = Annotated[

@@ -9,8 +9,8 @@ from bridgegen.cli import options as common
 from bridgegen.cli.app import FAILED, app
 from bridgegen.cli.completion import completing
 from bridgegen.cli.groups import SEARCH
-from bridgegen.options.forms import read_fixed, read_names
-from bridgegen.options.option import DRIVER, OUTPUT, WHAT
+from bridgegen.engine.options.forms import read_fixed, read_names
+from bridgegen.engine.options.option import DRIVER, OUTPUT, WHAT
 
 
 @app.command(rich_help_panel=SEARCH)
@@ -83,10 +83,10 @@ def preventability(
 
     And which of its collisions the driver models of UN R157 avoid. Writes arrays and a page.
     """
-    from bridgegen.preventability import map_preventability
-    from bridgegen.screen.preventability import MapScreen, print_map
-    from bridgegen.screen.verdict import print_outcomes
-    from bridgegen.verdict.of_map import MapCriteria
+    from bridgegen.cli.terminal.preventability import MapScreen, print_map
+    from bridgegen.cli.terminal.verdict import print_outcomes
+    from bridgegen.cli.verdict.of_map import MapCriteria
+    from bridgegen.jobs.preventability import map_preventability
 
     judges = MapCriteria.read(fail_if or (), junit)
     with MapScreen() as screen:

@@ -60,8 +60,8 @@ def mine(
     scenario of those with enough events: ranges, exposure, distribution.
     With --update, prints and writes new ranges for a file of yours as a diff.
     """
-    from bridgegen.mining.mine import mine as mine_recordings
-    from bridgegen.screen.recordings import RecordingsScreen, print_mined
+    from bridgegen.cli.terminal.recordings import RecordingsScreen, print_mined
+    from bridgegen.jobs.mine.mine import mine as mine_recordings
 
     with RecordingsScreen() as screen:
         mined = mine_recordings(

@@ -8,9 +8,14 @@ import typer
 from bridgegen.cli import options as common
 from bridgegen.cli.app import FAILED, suites
 from bridgegen.cli.completion import completing
-from bridgegen.cli.connection import NO_CONNECTION, Connection, read_access, with_connection_options
-from bridgegen.cli.map_folder import with_map_folder
-from bridgegen.options.option import DRIVER, OUTPUT, WHAT
+from bridgegen.cli.connection import (
+    NO_CONNECTION,
+    Connection,
+    read_access,
+    with_connection_options,
+    with_map_folder,
+)
+from bridgegen.engine.options.option import DRIVER, OUTPUT, WHAT
 
 Results = Annotated[
     Path, typer.Argument(metavar="FOLDER", help="Folder of a suite's results, suites/NAME.")
@@ -57,8 +62,8 @@ def add(
     Of each failure mode that is not there yet, the worst robust scenario and its minimal form; each
     is run again there. The index failures.yaml holds a status for each, which you set.
     """
-    from bridgegen.screen.growth import print_additions
-    from bridgegen.suite.growth import add_failures
+    from bridgegen.cli.terminal.growth import print_additions
+    from bridgegen.jobs.suite.growth import add_failures
 
     made = add_failures(given, to, egos=ego or (), replace_worse=replace_worse)
     print_additions(made, to, as_json=as_json)
@@ -96,9 +101,9 @@ def replay(
     Exports it as scenario files, and plays it on a page. The exit status is 3 if its result is not
     the recorded one.
     """
-    from bridgegen.screen.growth import print_replayed
-    from bridgegen.suite.page import write_replay_page
-    from bridgegen.suite.replay import replay as run_again
+    from bridgegen.cli.terminal.growth import print_replayed
+    from bridgegen.jobs.suite.page import write_replay_page
+    from bridgegen.jobs.suite.replay import replay as run_again
 
     made = run_again(
         folder, scenario, variation, ego=ego, out=out, simulator=read_access(connection)

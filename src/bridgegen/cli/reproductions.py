@@ -7,11 +7,11 @@ from typing import Annotated
 
 import typer
 
+from bridgegen.base.errors import InputError
 from bridgegen.cli import options
 from bridgegen.cli.app import app
 from bridgegen.cli.groups import SEARCH
-from bridgegen.errors import InputError
-from bridgegen.options.forms import read_names
+from bridgegen.engine.options.forms import read_names
 
 PACKAGE = "bridgegen_reproduction"
 

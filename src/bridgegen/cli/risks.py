@@ -10,7 +10,7 @@ from bridgegen.cli.app import FAILED, app
 from bridgegen.cli.completion import completing
 from bridgegen.cli.connection import NO_CONNECTION, Connection, with_connection_options
 from bridgegen.cli.groups import SEARCH
-from bridgegen.options.option import DRIVER, OUTPUT, SIMULATOR, WHAT
+from bridgegen.engine.options.option import DRIVER, OUTPUT, SIMULATOR, WHAT
 
 
 @app.command(rich_help_panel=SEARCH)
@@ -134,10 +134,10 @@ def risk(
     And per hour and kilometre, where the exposure says how often the scenario is met. Writes a
     record, a page, the harmful rows, and the most likely one of each failure mode as a scenario.
     """
-    from bridgegen.risk import estimate_risk
-    from bridgegen.screen.risk import RiskScreen, print_risk
-    from bridgegen.screen.verdict import print_outcomes
-    from bridgegen.verdict.of_risk import RiskCriteria
+    from bridgegen.cli.terminal.risk import RiskScreen, print_risk
+    from bridgegen.cli.terminal.verdict import print_outcomes
+    from bridgegen.cli.verdict.of_risk import RiskCriteria
+    from bridgegen.jobs.risk import estimate_risk
 
     judges = RiskCriteria.read(fail_if or (), junit)
     elsewhere = common.read_simulator(simulator, simulator_set, connection)

@@ -14,14 +14,14 @@ from typing import TYPE_CHECKING, Annotated, Any, get_args, get_origin
 
 import typer
 
-from bridgegen.disk import write_whole
-from bridgegen.ego import is_remote
-from bridgegen.errors import BridgeGenError, FileFormatError, InputError, StorageError
-from bridgegen.options import SearchOptions, file_forms, options_of
-from bridgegen.options.file_forms import FileForm
+from bridgegen.base.disk import write_whole
+from bridgegen.base.errors import BridgeGenError, FileFormatError, InputError, StorageError
+from bridgegen.drivers import is_remote
+from bridgegen.engine.options import SearchOptions, file_forms, options_of
+from bridgegen.engine.options.file_forms import FileForm
 
 if TYPE_CHECKING:  # the command line starts without them
-    from bridgegen.odd.plain_yaml import Document
+    from bridgegen.scenario.language.plain_yaml import Document
 
 Values = Mapping[str, Any]
 """Of parameters of the command ``search``, by name, as its parser returns them."""
@@ -119,7 +119,7 @@ def read_run_document(path: Path) -> "Document":
     Raises:
         FileFormatError: it cannot be read, or is no plain YAML.
     """
-    from bridgegen.odd.plain_yaml import MAX_BYTES, read_plain_yaml
+    from bridgegen.scenario.language.plain_yaml import MAX_BYTES, read_plain_yaml
 
     try:
         with path.open("rb") as file:
@@ -134,7 +134,7 @@ def read_runs(path: Path, keys: Mapping[str, Key]) -> list[FiledRun]:
     Raises:
         InputError: it breaks rules; all of them, with file and line.
     """
-    from bridgegen.odd.parameters import nearest
+    from bridgegen.scenario.language.parameters import nearest
 
     document = read_run_document(path)
     data = document.data if isinstance(document.data, dict) else {}
@@ -173,7 +173,7 @@ def _read_run(
     keys: Mapping[str, Key],
     problems: list[str],
 ) -> Values:
-    from bridgegen.odd.parameters import nearest
+    from bridgegen.scenario.language.parameters import nearest
 
     label = ".".join(place)
     if not isinstance(data, dict):
@@ -248,7 +248,7 @@ def is_recorded(out: Path, values: Values, keys: Mapping[str, Key]) -> bool:
     Raises:
         StorageError: it is recorded with other options.
     """
-    from bridgegen.odd.plain_yaml import read_plain_yaml
+    from bridgegen.scenario.language.plain_yaml import read_plain_yaml
 
     record = out.parent / f"{out.name}.yaml"
     text = _text(record, values, keys)

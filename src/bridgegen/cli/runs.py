@@ -17,20 +17,20 @@ from bridgegen.cli.connection import (
     Connection,
     read_access,
     with_connection_options,
+    with_map_folder,
 )
 from bridgegen.cli.declared import with_declared_options
 from bridgegen.cli.groups import FILES, RESULTS, SEARCH
-from bridgegen.cli.map_folder import with_map_folder
 from bridgegen.cli.run_files import keys_of, schema, with_run_files
 from bridgegen.cli.several_runs import search_all
-from bridgegen.ego import split
-from bridgegen.options import SearchOptions
-from bridgegen.options.forms import read_names
-from bridgegen.options.option import DRIVER, OUTPUT, WHAT
+from bridgegen.drivers import split
+from bridgegen.engine.options import SearchOptions
+from bridgegen.engine.options.forms import read_names
+from bridgegen.engine.options.option import DRIVER, OUTPUT, WHAT
 from bridgegen.simulation.choice import EMBEDDED
 
 if TYPE_CHECKING:
-    from bridgegen.verdict.fail_if import Outcome
+    from bridgegen.cli.verdict.fail_if import Outcome
 
 
 @app.command(rich_help_panel=SEARCH)
@@ -76,10 +76,10 @@ def search(
     In place of a scenario, a run file (docs/run-files.md) may give the scenario and all options;
     those of the command line override the file's.
     """
-    from bridgegen import campaign
-    from bridgegen.campaign.scenarios import margins_of
-    from bridgegen.screen.search import SearchScreen, print_summary
-    from bridgegen.verdict.of_run import PassFailCriteria
+    from bridgegen.cli.terminal.search import SearchScreen, print_summary
+    from bridgegen.cli.verdict.of_run import PassFailCriteria
+    from bridgegen.jobs import search as campaign
+    from bridgegen.jobs.search.scenarios import margins_of
 
     assert save is None  # written by the run file's reader, which knows what was given
     criteria = PassFailCriteria.read(
@@ -116,7 +116,7 @@ def new(
     ] = None,
 ) -> None:
     """Write a commented scenario file to start from."""
-    from bridgegen.odd.starter import start_scenario
+    from bridgegen.scenario.language.starter import start_scenario
 
     path = start_scenario(name, like=like)
     print(f"{path}: check it with 'bridgegen validate {path}', then 'bridgegen search {path}'")
@@ -140,9 +140,9 @@ def resume(
 
     The result is as if it had not been interrupted.
     """
-    from bridgegen import campaign
-    from bridgegen.screen.search import SearchScreen, print_summary
-    from bridgegen.verdict.of_run import PassFailCriteria
+    from bridgegen.cli.terminal.search import SearchScreen, print_summary
+    from bridgegen.cli.verdict.of_run import PassFailCriteria
+    from bridgegen.jobs import search as campaign
 
     criteria = PassFailCriteria.of_run(fail_if or (), junit, folder)
     with SearchScreen() as screen:
@@ -176,8 +176,8 @@ def coverage(
     Also shows which combinations of bins, and which of them are critical; with an
     exposure, how much of what is met on the road these are.
     """
-    from bridgegen.campaign.coverage import coverage_of
-    from bridgegen.screen.coverage import print_coverage
+    from bridgegen.cli.terminal.coverage import print_coverage
+    from bridgegen.jobs.search.coverage import coverage_of
 
     settings, found = coverage_of(run, bins=bins, strength=strength, exposure=exposure)
     print_coverage(run, settings, found, as_json=as_json)
@@ -213,8 +213,8 @@ def regions(
     Each is a readable rule, verified by fresh scenarios; with an exposure, with the
     share of encounters that lie in it.
     """
-    from bridgegen.campaign.regions import regions_of
-    from bridgegen.screen.regions import RegionsScreen, print_regions
+    from bridgegen.cli.terminal.regions import RegionsScreen, print_regions
+    from bridgegen.jobs.search.regions import regions_of
 
     with RegionsScreen() as screen:
         found = regions_of(
@@ -277,10 +277,10 @@ def simulate(
 
     Also prints its decisive conflict.
     """
-    from bridgegen.screen.files import conflict_facts, criteria_facts, print_file_result
-    from bridgegen.simulate import simulate_file
+    from bridgegen.cli.terminal.files import conflict_facts, criteria_facts, print_file_result
+    from bridgegen.cli.verdict.of_file import FileCriteria
+    from bridgegen.engine.simulate import simulate_file
     from bridgegen.simulation.trace import write_trace
-    from bridgegen.verdict.of_file import FileCriteria
 
     criteria = FileCriteria.read(fail_if or (), junit, criterion or ())
     stages = None if ideal is None else split(ideal)
@@ -352,8 +352,8 @@ def check_driver(
 
     A scenario's result must depend on that scenario alone.
     """
-    from bridgegen.campaign.driver_contract import SCENARIOS, check_driver
-    from bridgegen.screen.files import print_checks
+    from bridgegen.cli.terminal.files import print_checks
+    from bridgegen.jobs.search.driver_contract import SCENARIOS, check_driver
 
     checks = check_driver(driver, scenario or SCENARIOS, time_limit=time_limit)
     if not print_checks(checks, as_json=as_json):
@@ -362,7 +362,7 @@ def check_driver(
 
 def _end(outcomes: "Sequence[Outcome]") -> None:
     """Print the outcomes of the criteria; exit with their status if one failed."""
-    from bridgegen.screen.verdict import print_outcomes
+    from bridgegen.cli.terminal.verdict import print_outcomes
 
     if not print_outcomes(outcomes):
         raise typer.Exit(FAILED)

@@ -7,8 +7,8 @@ import typer
 
 from bridgegen.cli import options as common
 from bridgegen.cli.app import FAILED, app
+from bridgegen.cli.connection import with_map_folder
 from bridgegen.cli.groups import RESULTS
-from bridgegen.cli.map_folder import with_map_folder
 
 
 @app.command("safety-case", rich_help_panel=RESULTS)
@@ -29,8 +29,8 @@ def safety_case(
     As Goal Structuring Notation, JSON and a page, with a script that recomputes every number. Ends
     with exit status 3 if a run could not be judged: it supports nothing.
     """
-    from bridgegen.safety_case import export_safety_case
-    from bridgegen.screen.safety_case import print_safety_case
+    from bridgegen.cli.terminal.safety_case import print_safety_case
+    from bridgegen.jobs.safety_case import export_safety_case
 
     exported = export_safety_case(runs, out)
     print_safety_case(exported, as_json=as_json)

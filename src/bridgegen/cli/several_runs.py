@@ -6,8 +6,8 @@ from pathlib import Path
 
 import typer
 
+from bridgegen.base.errors import BridgeGenError, Interrupted
 from bridgegen.cli.run_files import FiledRun, Key, Values, is_recorded
-from bridgegen.errors import BridgeGenError, Interrupted
 
 
 def search_all(
@@ -24,8 +24,8 @@ def search_all(
         keys: of a run.
         command: searches with some options.
     """
-    from bridgegen.campaign import Run, resume
-    from bridgegen.screen.search import SearchScreen, conclusion, print_summary
+    from bridgegen.cli.terminal.search import SearchScreen, conclusion, print_summary
+    from bridgegen.jobs.search import Run, resume
 
     ends: dict[str, str] = {}
     status = 0

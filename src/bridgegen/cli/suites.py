@@ -5,17 +5,21 @@ from typing import Annotated
 
 import typer
 
+from bridgegen.base.errors import InputError
 from bridgegen.cli import options as common
 from bridgegen.cli.app import FAILED, app, suites
 from bridgegen.cli.completion import completing
-from bridgegen.cli.connection import NO_CONNECTION, Connection, with_connection_options
+from bridgegen.cli.connection import (
+    NO_CONNECTION,
+    Connection,
+    with_connection_options,
+    with_map_folder,
+)
 from bridgegen.cli.declared import with_options
 from bridgegen.cli.groups import DEFAULT, SEARCH, DefaultCommand
-from bridgegen.cli.map_folder import with_map_folder
-from bridgegen.errors import InputError
-from bridgegen.options import CommonOptions
-from bridgegen.options.option import DRIVER, OUTPUT, WHAT
-from bridgegen.options.option import SEARCH as HOW
+from bridgegen.engine.options import CommonOptions
+from bridgegen.engine.options.option import DRIVER, OUTPUT, WHAT
+from bridgegen.engine.options.option import SEARCH as HOW
 from bridgegen.simulation.choice import EMBEDDED
 
 Files = Annotated[
@@ -115,12 +119,12 @@ def suite(
     Finds scenarios and distributions in folders, runs them in parallel, and judges each variation:
     the ego fails if it is critical, or if a pass criterion is violated.
     """
-    from bridgegen.screen.suite import SuiteScreen, print_suite
-    from bridgegen.screen.verdict import print_outcomes
-    from bridgegen.suite.maps import map_suite
-    from bridgegen.suite.page import write_suite_page
-    from bridgegen.suite.suite import run_suite
-    from bridgegen.verdict.of_suite import SuiteCriteria
+    from bridgegen.cli.terminal.suite import SuiteScreen, print_suite
+    from bridgegen.cli.terminal.verdict import print_outcomes
+    from bridgegen.cli.verdict.of_suite import SuiteCriteria
+    from bridgegen.jobs.suite.maps import map_suite
+    from bridgegen.jobs.suite.page import write_suite_page
+    from bridgegen.jobs.suite.suite import run_suite
 
     judges = SuiteCriteria.read(
         fail_if or (), junit, [f"criterion:{one['id']}" for one in options.criteria]
@@ -193,13 +197,12 @@ def diff(
     Lists what the second breaks and fixes, with the confidence of either share. Then searches the
     logical scenarios for where the second is worse.
     """
-    from bridgegen.screen.suite import SuiteScreen, print_difference
-    from bridgegen.screen.verdict import print_outcomes
-    from bridgegen.suite.difference import difference
-    from bridgegen.suite.page import write_suite_page
-    from bridgegen.suite.suite import run_suite
-    from bridgegen.suite.worse import search_worse
-    from bridgegen.verdict.of_difference import DifferenceCriteria
+    from bridgegen.cli.terminal.suite import SuiteScreen, print_difference
+    from bridgegen.cli.terminal.verdict import print_outcomes
+    from bridgegen.cli.verdict.of_difference import DifferenceCriteria
+    from bridgegen.jobs.suite.difference import difference, search_worse
+    from bridgegen.jobs.suite.page import write_suite_page
+    from bridgegen.jobs.suite.suite import run_suite
 
     if len(ego) != 2 or ego[0] == ego[1]:
         raise InputError(f"two different drivers are compared: --ego A --ego B, got {len(ego)}")

@@ -5,6 +5,7 @@ from typing import Annotated
 
 import typer
 
+from bridgegen.base.errors import InputError
 from bridgegen.cli import options
 from bridgegen.cli.app import app
 from bridgegen.cli.connection import (
@@ -12,10 +13,9 @@ from bridgegen.cli.connection import (
     Connection,
     read_access,
     with_connection_options,
+    with_map_folder,
 )
 from bridgegen.cli.groups import RESULTS
-from bridgegen.cli.map_folder import with_map_folder
-from bridgegen.errors import InputError
 
 
 @app.command(rich_help_panel=RESULTS)
@@ -43,11 +43,11 @@ def view(
     A report updates while the search runs, and plays any scenario of the run. Of a folder that
     holds runs, the page lists them, leads to their reports and shows two side by side.
     """
-    from bridgegen.screen.view import serve
-    from bridgegen.view.folder_view import FolderView
-    from bridgegen.view.overview import is_run
-    from bridgegen.view.run_view import RunView
-    from bridgegen.view.server import Server
+    from bridgegen.cli.terminal.view import serve
+    from bridgegen.jobs.view.folder_view import FolderView
+    from bridgegen.jobs.view.overview import is_run
+    from bridgegen.jobs.view.run_view import RunView
+    from bridgegen.jobs.view.server import Server
 
     access = read_access(connection)
     if run.is_dir() and not is_run(run):
@@ -92,7 +92,7 @@ def video(
 
     The view is the report's. It frames the ego and the participant that it meets.
     """
-    from bridgegen.campaign.video import film
+    from bridgegen.jobs.search.video import film
 
     width, _, height = size.partition("x")
     if not (width.isascii() and width.isdigit() and height.isascii() and height.isdigit()):

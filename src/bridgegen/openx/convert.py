@@ -3,30 +3,28 @@
 import os
 from pathlib import Path
 
-from bridgegen.errors import InputError, StorageError
-from bridgegen.odd.reader import load as load_scenario
-from bridgegen.odd.reader import names as scenario_names
-from bridgegen.odd.reader import pack_names
-from bridgegen.odd.scenario import LogicalScenario
-from bridgegen.ontology.check import check
-from bridgegen.ontology.files import load, save
-from bridgegen.ontology.graph import Individuals
-from bridgegen.openx.logic_file import logic_path, roads_of
+from bridgegen.base.errors import InputError, StorageError
 from bridgegen.openx.opendrive import read as opendrive_read
 from bridgegen.openx.opendrive import write as opendrive_write
-from bridgegen.openx.opendrive.carla_maps import map_path
 from bridgegen.openx.opendrive.from_owl import opendrive_from_owl
-from bridgegen.openx.opendrive.road_map import digest_of
+from bridgegen.openx.opendrive.road_map import digest_of, map_path
 from bridgegen.openx.opendrive.to_owl import individuals_from_opendrive
-from bridgegen.openx.opendrive.to_owl.losses import losses
+from bridgegen.openx.opendrive.to_owl.network import losses
 from bridgegen.openx.openscenario import read as openscenario_read
 from bridgegen.openx.openscenario import write as openscenario_write
 from bridgegen.openx.openscenario.empty_triggers import NEVER, read_empty_triggers
 from bridgegen.openx.openscenario.from_owl.scenario import openscenario_from_owl
 from bridgegen.openx.openscenario.renaming import EGO, ego_of, rename_entity
 from bridgegen.openx.openscenario.to_owl import individuals_from_openscenario
-from bridgegen.openx.prepared import prepared
+from bridgegen.openx.prepared import logic_path, prepared, roads_of
 from bridgegen.openx.xml import read_bytes
+from bridgegen.scenario.language.reader import load as load_scenario
+from bridgegen.scenario.language.reader import names as scenario_names
+from bridgegen.scenario.language.reader import pack_names
+from bridgegen.scenario.language.scenario import LogicalScenario
+from bridgegen.scenario.ontology.check import check
+from bridgegen.scenario.ontology.files import load, save
+from bridgegen.scenario.ontology.graph import Individuals
 
 
 def convert_file(owl: Path, folder: Path | None = None) -> tuple[list[Path], list[str]]:

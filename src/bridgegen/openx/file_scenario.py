@@ -12,34 +12,33 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
-from bridgegen.arrays import Float
-from bridgegen.errors import FileFormatError, InputError, ScenarioError
-from bridgegen.odd.constraints import Constraints
-from bridgegen.odd.objectives import HARM
-from bridgegen.odd.parameters import Axis, Bound
-from bridgegen.odd.scenario import SearchedScenario, content_of
-from bridgegen.odd.space import SearchSpace
-from bridgegen.ontology.graph import Individuals
-from bridgegen.ontology.site import Site
-from bridgegen.openx.logic_file import logic_path
+from bridgegen.base.arrays import Float
+from bridgegen.base.errors import FileFormatError, InputError, ScenarioError
 from bridgegen.openx.opendrive.model import OpenDrive
 from bridgegen.openx.opendrive.read import read as read_roads
 from bridgegen.openx.openscenario import distributions as dst
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario import parameters, validate
+from bridgegen.openx.openscenario.bodies import kind_of
 from bridgegen.openx.openscenario.declarations import DRIVER, IDEAL
 from bridgegen.openx.openscenario.element import Element
 from bridgegen.openx.openscenario.empty_triggers import read_empty_triggers
 from bridgegen.openx.openscenario.fixed_texts import fixed_texts
-from bridgegen.openx.openscenario.participant_kinds import kind_of
 from bridgegen.openx.openscenario.ranges import FileParameter, Ranges, ranges_of
 from bridgegen.openx.openscenario.read import read
 from bridgegen.openx.openscenario.renaming import EGO, ego_of, rename_entity
 from bridgegen.openx.openscenario.stated_criteria import stated_criteria
 from bridgegen.openx.openscenario.to_owl import individuals_from_openscenario
 from bridgegen.openx.openscenario.values import Kind, format_double
-from bridgegen.openx.prepared import prepared
+from bridgegen.openx.prepared import logic_path, prepared
 from bridgegen.openx.xml import read_bytes
+from bridgegen.scenario.language.constraints import Constraints
+from bridgegen.scenario.language.objectives import HARM
+from bridgegen.scenario.language.parameters import Axis, Bound
+from bridgegen.scenario.language.scenario import SearchedScenario, content_of
+from bridgegen.scenario.language.space import SearchSpace
+from bridgegen.scenario.ontology.graph import Individuals
+from bridgegen.scenario.ontology.site import Site
 
 MAX_SEED = 2**32 - 1
 

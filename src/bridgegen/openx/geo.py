@@ -4,8 +4,8 @@ import math
 from collections.abc import Callable
 from dataclasses import replace
 
-from bridgegen.errors import FileFormatError
-from bridgegen.extras import require
+from bridgegen.base.errors import FileFormatError
+from bridgegen.base.extras import require
 from bridgegen.openx.opendrive.model import Header, OpenDrive
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.element import Element, rewritten, walk

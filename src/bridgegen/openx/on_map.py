@@ -6,22 +6,22 @@ from dataclasses import replace
 
 import numpy as np
 
-from bridgegen.arrays import Float
-from bridgegen.errors import InputError
-from bridgegen.odd.expression import Lookup, lookup
-from bridgegen.odd.kinds import MOST_NAMES, Category, slack
-from bridgegen.odd.parameters import Axis, Bound, Derived, Parameter
-from bridgegen.odd.roads import Quantity
-from bridgegen.odd.rules import bend_bounds, speed_bounds
-from bridgegen.odd.scenario import LogicalScenario
-from bridgegen.odd.space import SearchSpace, probes
-from bridgegen.odd.story import LaneChange
-from bridgegen.ontology.site import Site
+from bridgegen.base.arrays import Float
+from bridgegen.base.errors import InputError
 from bridgegen.openx.opendrive.merges import RAMP, through
 from bridgegen.openx.opendrive.model import OpenDrive
 from bridgegen.openx.opendrive.road_map import RoadMap
 from bridgegen.openx.opendrive.site_adapted import adapted
 from bridgegen.openx.opendrive.site_fit import fitting_sites
+from bridgegen.scenario.language.expression import Lookup, lookup
+from bridgegen.scenario.language.kinds import MOST_NAMES, Category, slack
+from bridgegen.scenario.language.parameters import Axis, Bound, Derived, Parameter
+from bridgegen.scenario.language.roads import Quantity
+from bridgegen.scenario.language.rules import bend_bounds, speed_bounds
+from bridgegen.scenario.language.scenario import LogicalScenario
+from bridgegen.scenario.language.space import SearchSpace, probes
+from bridgegen.scenario.language.story import LaneChange
+from bridgegen.scenario.ontology.site import Site
 
 PLACE = "place"
 """The parameter that says at which place on a map a scenario takes place."""

@@ -6,15 +6,8 @@ from functools import cached_property
 from itertools import product
 from typing import Protocol
 
-from bridgegen.arrays import Float
-from bridgegen.errors import InputError
-from bridgegen.named_models import MODELS, type_of
-from bridgegen.odd.parameters import Axis
-from bridgegen.odd.scenario import LogicalScenario, SearchedScenario
-from bridgegen.odd.story import Participant
-from bridgegen.ontology.graph import Individuals
-from bridgegen.ontology.individuals import build, build_static
-from bridgegen.ontology.site import Site
+from bridgegen.base.arrays import Float
+from bridgegen.base.errors import InputError
 from bridgegen.openx.file_scenario import FileScenario, FileSource
 from bridgegen.openx.on_map import PLACE, at_site
 from bridgegen.openx.opendrive.from_owl import opendrive_from_owl
@@ -24,6 +17,13 @@ from bridgegen.openx.opendrive.write import to_xml as road_xml
 from bridgegen.openx.openscenario.from_owl import openscenario_from_owl
 from bridgegen.openx.openscenario.model import OpenScenario
 from bridgegen.openx.openscenario.ranges import MOST_VARIANTS
+from bridgegen.scenario.language.parameters import Axis
+from bridgegen.scenario.language.scenario import LogicalScenario, SearchedScenario
+from bridgegen.scenario.language.story import Participant
+from bridgegen.scenario.named_models import MODELS, type_of
+from bridgegen.scenario.ontology.graph import Individuals
+from bridgegen.scenario.ontology.individuals import build, build_static
+from bridgegen.scenario.ontology.site import Site
 
 
 class ConcreteScenario(Protocol):
@@ -210,7 +210,7 @@ class OntologySource:
         Args:
             values: of every parameter, by name.
             road_file: what its OpenDRIVE file will be called.
-            courses: see `bridgegen.ontology.individuals.build`.
+            courses: see `bridgegen.scenario.ontology.individuals.build`.
         """
         site, scenario = self.place(values), self._settled(values)
         if site and self._map and self._map.sites:

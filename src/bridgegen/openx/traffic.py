@@ -13,9 +13,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from bridgegen.arrays import Float
-from bridgegen.errors import FileFormatError, InputError
-from bridgegen.odd.others import ATTENTIVE
+from bridgegen.base.arrays import Float
+from bridgegen.base.errors import FileFormatError, InputError
 from bridgegen.openx.opendrive.geometry import reference_line
 from bridgegen.openx.opendrive.lanes import borders, section_end
 from bridgegen.openx.opendrive.model import OpenDrive
@@ -23,7 +22,8 @@ from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.declarations import DRIVER
 from bridgegen.openx.openscenario.element import Element, references
 from bridgegen.openx.openscenario.to_owl.starts import Starts
-from bridgegen.participants import PARTICIPANTS, Body
+from bridgegen.scenario.language.others import ATTENTIVE
+from bridgegen.scenario.participants import PARTICIPANTS, Body
 
 MOST = 100
 """Vehicles that all traffic of a file may have."""

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from lxml import etree
 
-from bridgegen.errors import FileFormatError
+from bridgegen.base.errors import FileFormatError
 
 MAX_BYTES = 64 * 2**20
 MAX_DEPTH = 64

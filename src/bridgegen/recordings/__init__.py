@@ -1,1 +1,5 @@
-"""Recorded traffic: files of many formats become one table of trajectories, cleaned."""
+"""Recorded traffic: readers, cleaning, lanes, events, conflicts, and scenarios made of them.
+
+`excerpt.py` makes a rollout of recorded traffic, so that every analysis applies to it. Imports
+`search` and below.
+"""

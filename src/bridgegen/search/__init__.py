@@ -1,20 +1,4 @@
-"""The search algorithms, one file each, behind one ask/tell protocol over the unit cube.
+"""How the next row is chosen, and what was found: algorithms, surrogates, triage, regions.
 
-``get(name)`` returns an algorithm's class, ``names()`` lists them; an installed package adds its
-own through the entry-point group ``bridgegen.algorithms``.
+An algorithm is one file of `algorithms`. Imports `results` and below.
 """
-
-from bridgegen.search.algorithm import Algorithm, Problem, Restorable, Results, Setting, TakesNotes
-from bridgegen.search.registry import ALGORITHMS, get, names
-
-__all__ = [
-    "ALGORITHMS",
-    "Algorithm",
-    "Problem",
-    "Restorable",
-    "Results",
-    "Setting",
-    "TakesNotes",
-    "get",
-    "names",
-]

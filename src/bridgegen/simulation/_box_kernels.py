@@ -8,8 +8,8 @@ import math
 
 import numpy as np
 
-from bridgegen.arrays import Float, Int
-from bridgegen.compiled import kernel
+from bridgegen.base.arrays import Float, Int
+from bridgegen.base.compiled import kernel
 
 
 @kernel

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bridgegen.arrays import Bool, Float
+from bridgegen.base.arrays import Bool, Float
 from bridgegen.simulation.boxes import box_distance
 from bridgegen.simulation.rollout import Rollout
 

@@ -3,7 +3,7 @@
 import numpy as np
 import numpy.typing as npt
 
-from bridgegen.arrays import Float, Int, as_float
+from bridgegen.base.arrays import Float, Int, as_float
 
 
 def box_distance(

@@ -4,16 +4,12 @@ from collections.abc import Callable, Mapping, MutableMapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from bridgegen.errors import InputError, UnknownNameError
-from bridgegen.plugins import PlugIns, Registry
-from bridgegen.simulation.carla.settings import MEANINGS as CARLA_SETTINGS
-from bridgegen.simulation.carla.settings import OPTIONS as CARLA_OPTIONS
-from bridgegen.simulation.carla.settings import Access as CarlaAccess
-from bridgegen.simulation.carla.settings import CarlaSettings
+from bridgegen.base.errors import InputError, UnknownNameError
+from bridgegen.base.plugins import PlugIns, Registry
 from bridgegen.simulation.vehicles import KINEMATIC
 
 if TYPE_CHECKING:  # it is part of the command line, which starts fast
-    from bridgegen.ego import Driver
+    from bridgegen.drivers import Driver
     from bridgegen.openx.openscenario.model import OpenScenario
     from bridgegen.simulation.embedded.simulator import EmbeddedSimulator
     from bridgegen.simulation.simulator import Simulator
@@ -70,18 +66,6 @@ def _esmini(
     return EsminiSimulator(embedded, storyboard, library_of(access), steps=steps_of(settings))
 
 
-def _carla(
-    embedded: "EmbeddedSimulator",
-    storyboard: "OpenScenario",
-    settings: Mapping[str, Value],
-    access: Mapping[str, Value],
-) -> "Simulator[Any]":
-    from bridgegen.simulation.carla.simulator import CarlaSimulator
-
-    chosen, where = CarlaSettings.of(settings), CarlaAccess.of(access)
-    return CarlaSimulator(embedded, storyboard, settings=chosen, access=where)
-
-
 _OURS = {
     one.name: one
     for one in (
@@ -96,14 +80,6 @@ _OURS = {
             _esmini,
             settings={"steps": "how many steps of esmini's make one of the scenario's, 1 to 100"},
             access={"--esmini-lib": "esmini's library, libesminiLib.so; or set ESMINI_LIB"},
-        ),
-        Kind(
-            "carla",
-            "A CARLA server, 0.9.13 to 0.9.16: its physics, light and weather (docs/carla.md).",
-            _carla,
-            settings=CARLA_SETTINGS,
-            access=CARLA_OPTIONS,
-            device="GPU",  # a server each
         ),
     )
 }
@@ -130,7 +106,7 @@ def _checked(found: object, name: str) -> Kind:
 
 
 SIMULATORS: MutableMapping[str, Kind] = Registry(_OURS, ADDED, _checked)
-"""Ours, then those of installed packages."""
+"""Ours, then those found by entry points: CARLA (`adapters`), and those of other packages."""
 
 
 @dataclass(frozen=True)

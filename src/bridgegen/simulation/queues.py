@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bridgegen.arrays import Bool, Float, Int
+from bridgegen.base.arrays import Bool, Float, Int
 from bridgegen.openx.opendrive.lanes import borders, section_end
 from bridgegen.openx.opendrive.lanes import points as road_points
 from bridgegen.openx.opendrive.model import OpenDrive, Road

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from bridgegen.arrays import Bool, Float, Int
+from bridgegen.base.arrays import Bool, Float, Int
 
 STATUS_MESSAGES = {
     0: "ok",
@@ -89,19 +89,19 @@ class Rollout:
         event_actors: the entities that each of the V events moves; empty where unknown.
         present: ``(N, E, T)`` bool, which entity is present at which instant; where one is
             absent, its states are finite but meaningless. ``(0, 0, 0)`` where all always are.
-        lamps: ``(N, E, T)`` int8, indicators and brake lights that show, see `bridgegen.ego.lamps`;
-            ``(0, 0, 0)`` where no scenario switches any.
-        kinds: ``(E,)`` int64, what each entity is, as `bridgegen.ego.kinds` numbers it; empty where
-            unknown.
+        lamps: ``(N, E, T)`` int8, indicators and brake lights that show, see
+            `bridgegen.drivers.lamps`; ``(0, 0, 0)`` where no scenario switches any.
+        kinds: ``(E,)`` int64, what each entity is, as `bridgegen.drivers.kinds` numbers it; empty
+            where unknown.
         detections: ``(N, E, T, 8)`` float64, what the ego's sensors made of each entity at each
-            instant, in the columns of `bridgegen.ego.detections`; rows of the ego itself
+            instant, in the columns of `bridgegen.drivers.detections`; rows of the ego itself
             are zeros. ``(0, 0, 0, 8)`` where its driver perceives nothing.
         stop_lines: ``(N, L, 3)`` float64: x, y [m] and heading [rad] of each point where a route
             crosses the stop line of a traffic light, the heading in travel direction.
         stop_lights: ``(L,)`` int64, each stop line's light, an index into ``light_names``.
         stop_entities: ``(L,)`` int64, whose route it is.
         claims: ``(N, E, E)`` int64, which of two participants' routes goes first; see
-            `bridgegen.ego.right_of_way.claim`. ``(0, 0, 0)`` where no map is known.
+            `bridgegen.drivers.right_of_way.claim`. ``(0, 0, 0)`` where no map is known.
         crosswalks: ``(N, C, 5)`` float64, the crosswalks that the ego's route leads over: x, y of
             the centre [m], the route's heading [rad], half the extent along and across the route
             [m]; NaN where a road network has fewer.
@@ -112,7 +112,8 @@ class Rollout:
         progress: ``(N, 2)`` float64 [m], how far the ego's driver drove, and how far it then was
             from the end of its route; ``(0, 2)`` where unknown.
         corridors: ``(P, L, 8)`` float64, the room beside the ego's route on each road network, at
-            every sample of it, see `bridgegen.ego.lane_tables.corridor_along`; +inf beyond its end.
+            every sample of it, see `bridgegen.drivers.lane_tables.corridor_along`; +inf beyond its
+            end.
         corridor_of: ``(N,)`` int64, the one of each row; -1 where it is unknown, and where the ego
             has stayed so near to its route that it does not matter. Empty where all are unknown.
         messages: details of failures, by row.

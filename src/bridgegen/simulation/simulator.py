@@ -5,9 +5,10 @@ from typing import TYPE_CHECKING, Protocol, TypeVar
 
 import numpy.typing as npt
 
-from bridgegen.arrays import Float, Int
-from bridgegen.ego import Driver
+from bridgegen.base.arrays import Float, Int
+from bridgegen.drivers import Driver
 from bridgegen.openx.opendrive.model import OpenDrive
+from bridgegen.simulation.embedded.simulator import EmbeddedSimulator
 from bridgegen.simulation.rollout import Rollout
 
 if TYPE_CHECKING:
@@ -90,3 +91,45 @@ class Simulator(Protocol[Roads]):
 
     def stop(self) -> None:
         """Let what is being rolled out in other threads end soon; it is of no use afterwards."""
+
+
+# --- What a simulator beside the embedded one says of a storyboard just as that one does ---
+
+
+class AroundEmbedded:
+    """The part of `Simulator` that the embedded one answers for any other.
+
+    Args:
+        embedded: the embedded one of the same storyboard and driver.
+
+    Attributes:
+        embedded: see `Simulator`.
+    """
+
+    def __init__(self, embedded: EmbeddedSimulator) -> None:
+        self.embedded = embedded
+
+    @property
+    def driver(self) -> str:
+        """See `Simulator`."""
+        return self.embedded.driver
+
+    @property
+    def time_step(self) -> float:
+        """See `Simulator`."""
+        return self.embedded.time_step
+
+    @property
+    def duration(self) -> float:
+        """See `Simulator`."""
+        return self.embedded.duration
+
+    @property
+    def fixed(self) -> Mapping[str, str]:
+        """See `Simulator`."""
+        return self.embedded.fixed
+
+    @property
+    def parameters(self) -> Mapping[str, float]:
+        """See `Simulator`."""
+        return self.embedded.parameters

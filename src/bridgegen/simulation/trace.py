@@ -3,8 +3,8 @@
 from collections.abc import Iterator
 from pathlib import Path
 
-from bridgegen.disk import write_whole
-from bridgegen.errors import InputError, StorageError
+from bridgegen.base.disk import write_whole
+from bridgegen.base.errors import InputError, StorageError
 from bridgegen.simulation.rollout import Rollout
 
 COLUMNS = ("time", "entity", "x", "y", "h", "speed")

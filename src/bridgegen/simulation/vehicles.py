@@ -1,6 +1,6 @@
 """How the ego's body moves: the vehicles that ``--vehicle`` names."""
 
-from bridgegen.errors import UnknownNameError
+from bridgegen.base.errors import UnknownNameError
 
 KINEMATIC, SINGLE_TRACK, MULTI_BODY = "kinematic", "single-track", "multi-body"
 

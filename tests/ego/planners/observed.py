@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from bridgegen.ego import kinds
-from bridgegen.ego.interface import (
+from bridgegen.drivers import kinds
+from bridgegen.drivers.interface import (
     PIECE_POINTS,
     ROUTE_POINTS,
     ROUTE_STEP,

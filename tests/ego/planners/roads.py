@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from bridgegen.ego.interface import (
+from bridgegen.drivers.interface import (
     PIECE_POINTS,
     ROUTE_POINTS,
     ROUTE_STEP,

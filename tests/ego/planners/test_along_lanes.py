@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bridgegen.ego.planners._along_lanes import AlongLanes
+from bridgegen.adapters.planners._along_lanes import AlongLanes
 
 from .two_lane_road import LENGTH, WIDTH, along, lane, road_map, track
 

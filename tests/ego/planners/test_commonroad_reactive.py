@@ -8,10 +8,10 @@ from importlib import metadata
 import numpy as np
 import pytest
 
-from bridgegen.ego.planners import commonroad_reactive as adapter
-from bridgegen.ego.planners._along_lanes import AlongLanes
-from bridgegen.ego.planners.commonroad_reactive import CommonroadReactive
-from bridgegen.errors import InputError
+from bridgegen.adapters.planners import commonroad_reactive as adapter
+from bridgegen.adapters.planners._along_lanes import AlongLanes
+from bridgegen.adapters.planners.commonroad_reactive import CommonroadReactive
+from bridgegen.base.errors import InputError
 
 from .two_lane_road import LENGTH, WIDTH, along, observation, road_map, scene, track
 
@@ -91,7 +91,7 @@ def test_a_package_that_lacks_is_one_sentence(monkeypatch):
     def none(name):
         raise metadata.PackageNotFoundError(name)
 
-    monkeypatch.setattr("bridgegen.ego.planners.registry.version", none)
+    monkeypatch.setattr("bridgegen.drivers.planners.version", none)
     with pytest.raises(InputError, match=r"commonroad-reactive-planner==2025\.1.*pip") as error:
         CommonroadReactive()
     assert "\n" not in str(error.value)

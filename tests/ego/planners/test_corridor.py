@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from tests.ego.planners.roads import LANE_WIDTH, road_map
 
-from bridgegen.ego.planners._corridor import Corridor
-from bridgegen.errors import InputError
+from bridgegen.adapters.planners._corridor import Corridor
+from bridgegen.base.errors import InputError
 
 RADIUS = 800.0
 

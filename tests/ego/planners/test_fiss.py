@@ -23,9 +23,9 @@ from tests.ego.planners.observed import (
     track,
 )
 
-from bridgegen.ego import kinds
-from bridgegen.ego.planners import fiss
-from bridgegen.errors import InputError
+from bridgegen.adapters.planners import fiss
+from bridgegen.base.errors import InputError
+from bridgegen.drivers import kinds
 
 needs_planner = pytest.mark.skipif(
     importlib.util.find_spec("fiss_planner") is None, reason="fiss-planner is not installed"

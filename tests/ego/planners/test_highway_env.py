@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from tests.ego.planners.roads import CENTRE, DT, World, drive, road_map, scene
 
-from bridgegen.ego.planners import highway_env
-from bridgegen.ego.planners._corridor import Corridor
-from bridgegen.ego.planners.highway_env import ARC, POINTS, STRAIGHT
-from bridgegen.errors import InputError
+from bridgegen.adapters.planners import highway_env
+from bridgegen.adapters.planners._corridor import Corridor
+from bridgegen.adapters.planners.highway_env import ARC, POINTS, STRAIGHT
+from bridgegen.base.errors import InputError
 
 
 def installed() -> bool:
@@ -231,7 +231,7 @@ def test_a_row_does_not_depend_on_its_batch():
 @pytest.mark.skipif(not installed(), reason="needs highway-env")
 def test_the_planner_is_imported_before_the_first_call():
     code = (
-        "import sys; from bridgegen.ego.planners import highway_env as adapter; "
+        "import sys; from bridgegen.adapters.planners import highway_env as adapter; "
         "adapter.HighwayEnvDriver(); print('highway_env.vehicle.behavior' in sys.modules)"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

@@ -9,9 +9,9 @@ from types import ModuleType, SimpleNamespace
 import numpy as np
 import pytest
 
-from bridgegen.ego.planners import metadrive_expert
-from bridgegen.ego.planners.metadrive_expert import MetadriveExpert, control
-from bridgegen.errors import InputError
+from bridgegen.adapters.planners import metadrive_expert
+from bridgegen.adapters.planners.metadrive_expert import MetadriveExpert, control
+from bridgegen.base.errors import InputError
 
 from .two_lane_road import observation, scene, track
 
@@ -42,11 +42,11 @@ def test_a_package_that_lacks_is_one_sentence(monkeypatch):
     def none(name):
         raise metadata.PackageNotFoundError(name)
 
-    monkeypatch.setattr("bridgegen.ego.planners.registry.version", none)
+    monkeypatch.setattr("bridgegen.drivers.planners.version", none)
     with pytest.raises(InputError, match=r"metadrive-simulator==0\.4\.3.*pip install") as error:
         MetadriveExpert()
     assert "\n" not in str(error.value)
-    monkeypatch.setattr("bridgegen.ego.planners.registry.version", lambda name: "0.3.0")
+    monkeypatch.setattr("bridgegen.drivers.planners.version", lambda name: "0.3.0")
     with pytest.raises(InputError, match=r"is 0\.3\.0"):
         MetadriveExpert()
 

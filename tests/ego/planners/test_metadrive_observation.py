@@ -7,9 +7,9 @@ import pytest
 from shapely import affinity
 from shapely.geometry import LineString, Point, box
 
-from bridgegen.ego.interface import Lanes, Observation
-from bridgegen.ego.kinds import PEDESTRIAN
-from bridgegen.ego.planners import _metadrive_observation as its
+from bridgegen.adapters.planners import _metadrive_observation as its
+from bridgegen.drivers.interface import Lanes, Observation
+from bridgegen.drivers.kinds import PEDESTRIAN
 
 from .two_lane_road import BODY, WIDTH, observation, track
 

@@ -20,10 +20,10 @@ from tests.ego.planners.observed import (
     track,
 )
 
-from bridgegen.ego.interface import ROUTE_POINTS, ROUTE_STEP
-from bridgegen.ego.planners import _openpilot_checkout as checkout
-from bridgegen.ego.planners import openpilot_longitudinal as openpilot
-from bridgegen.errors import InputError
+from bridgegen.adapters.planners import _openpilot_checkout as checkout
+from bridgegen.adapters.planners import openpilot_longitudinal as openpilot
+from bridgegen.base.errors import InputError
+from bridgegen.drivers.interface import ROUTE_POINTS, ROUTE_STEP
 
 needs_planner = pytest.mark.skipif(
     checkout.VARIABLE not in os.environ or importlib.util.find_spec("acados") is None,
@@ -233,7 +233,7 @@ def test_its_demands_are_openpilots_own_called_alone(tmp_path):
     runs = (
         "import runpy, sys\n"
         "from pathlib import Path\n"
-        "from bridgegen.ego.planners import _openpilot_checkout as checkout\n"
+        "from bridgegen.adapters.planners import _openpilot_checkout as checkout\n"
         "with checkout.imported_from(checkout.checkout()):\n"
         "    import openpilot.selfdrive.controls.lib.longitudinal_mpc_lib.long_mpc as mpc\n"
         "    mpc.AcadosOcpSolverCython = checkout.solver(mpc)\n"

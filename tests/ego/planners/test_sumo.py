@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 from tests.ego.planners.roads import CENTRE, DT, LENGTH, World, drive, road_map, scene
 
-from bridgegen.ego.planners import sumo
-from bridgegen.ego.planners._corridor import Corridor
-from bridgegen.ego.planners._sumo_road import Eyes, StraightRoad, network_text
-from bridgegen.ego.planners._sumo_simulation import MIN_GAP, types_text
-from bridgegen.errors import InputError
+from bridgegen.adapters.planners import sumo
+from bridgegen.adapters.planners._corridor import Corridor
+from bridgegen.adapters.planners._sumo_road import Eyes, StraightRoad, network_text
+from bridgegen.adapters.planners._sumo_simulation import MIN_GAP, types_text
+from bridgegen.base.errors import InputError
 
 FRONT = 0.5 * LENGTH  # from the body's centre
 
@@ -333,7 +333,7 @@ def test_a_time_step_that_sumo_has_not_is_refused():
 @needs_planner
 def test_the_planner_is_imported_before_the_first_call():
     code = (
-        "import sys; from bridgegen.ego.planners import sumo as adapter; "
+        "import sys; from bridgegen.adapters.planners import sumo as adapter; "
         "adapter.KraussDriver(); print('libsumo' in sys.modules)"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

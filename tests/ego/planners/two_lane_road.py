@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from bridgegen.ego.interface import Lane, Lanes, Observation, RoadMap, Scene
+from bridgegen.drivers.interface import Lane, Lanes, Observation, RoadMap, Scene
 
 WIDTH = 3.5
 LENGTH = 400.0

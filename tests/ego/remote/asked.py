@@ -8,7 +8,7 @@ from itertools import chain, cycle
 
 import numpy as np
 
-from bridgegen.ego.interface import (
+from bridgegen.drivers.interface import (
     ROUTE_POINTS,
     Conflicts,
     Lane,
@@ -18,7 +18,7 @@ from bridgegen.ego.interface import (
     RoadMap,
     Scene,
 )
-from bridgegen.ego.remote.messages import pack
+from bridgegen.drivers.remote.messages import pack
 
 N = 3
 

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from tests.ego.remote.asked import N, observation, scene
 
-from bridgegen.ego.remote.messages import MAX_FRAME, pack, unpack
+from bridgegen.drivers.remote.messages import MAX_FRAME, pack, unpack
 
 CPP = Path(__file__).parents[3] / "docs" / "examples" / "cpp"
 PROBE = """

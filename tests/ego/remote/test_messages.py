@@ -12,8 +12,8 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from bridgegen.ego.remote import messages, server
-from bridgegen.ego.remote.messages import DTYPES, MAX_DEPTH, ProtocolError, length, pack, unpack
+from bridgegen.drivers.remote import messages, server
+from bridgegen.drivers.remote.messages import DTYPES, MAX_DEPTH, ProtocolError, length, pack, unpack
 
 PLAIN = st.recursive(
     st.none() | st.booleans() | st.integers(-(2**63), 2**63 - 1) | st.floats() | st.text(),
@@ -161,7 +161,7 @@ def test_the_driver_s_end_needs_numpy_alone_and_an_older_python(module):
     }
     roots = {name.partition(".")[0] for name in names}
     assert roots - sys.stdlib_module_names <= {"numpy", "bridgegen", "messages"}
-    assert {name for name in names if name.startswith("bridgegen")} <= {"bridgegen.ego.remote"}
+    assert {name for name in names if name.startswith("bridgegen")} <= {"bridgegen.drivers.remote"}
 
 
 @pytest.mark.parametrize("shape", [[0, 2**26, 2**26, 2**26], [2**26, 2**26, 0], [0, 2**24]])

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from tests.ego.remote.asked import N, observation, scene
 
-from bridgegen.ego.driver_process import DriverProcess
+from bridgegen.drivers.driver_process import DriverProcess
 
 PAGE = Path(__file__).parents[3] / "docs" / "remote-drivers.md"
 

@@ -14,18 +14,18 @@ import numpy as np
 import pytest
 from tests.ego.remote.asked import CONTROL, HELLO, READY, N, Server, observation, scene, with_all
 
-from bridgegen.ego import get
-from bridgegen.ego.address import address_of
-from bridgegen.ego.driver_process import DriverError, DriverProcess
-from bridgegen.ego.remote import process as remote_process
-from bridgegen.ego.remote import serve
-from bridgegen.ego.remote.messages import pack
-from bridgegen.ego.remote.wire import ClosedError, connected
-from bridgegen.errors import InputError
+from bridgegen.base.errors import InputError
+from bridgegen.drivers import get
+from bridgegen.drivers.address import address_of
+from bridgegen.drivers.driver_process import DriverError, DriverProcess
+from bridgegen.drivers.remote import process as remote_process
+from bridgegen.drivers.remote import serve
+from bridgegen.drivers.remote.messages import pack
+from bridgegen.drivers.remote.wire import ClosedError, connected
 
 HERE = Path(__file__).parent
 DRIVERS = HERE.parent / "drivers.py"
-SERVE = shlex.join([sys.executable, "-m", "bridgegen.ego.remote"])
+SERVE = shlex.join([sys.executable, "-m", "bridgegen.drivers.remote"])
 TRAJECTORY = {"time": np.ones(1), **dict.fromkeys("xyhv", np.zeros((N, 1)))}
 
 
@@ -62,7 +62,7 @@ def served():
 
     def make(name, address="127.0.0.1:0"):
         one = subprocess.Popen(
-            [sys.executable, "-m", "bridgegen.ego.remote", name, address],
+            [sys.executable, "-m", "bridgegen.drivers.remote", name, address],
             stderr=subprocess.PIPE, text=True,
         )  # fmt: skip
         made.append(one)
@@ -318,7 +318,8 @@ def test_no_process_of_a_program_is_left(driver, tmp_path):
 def test_a_trajectory_comes_as_one(server, driver, monkeypatch):
     found = []
     monkeypatch.setattr(
-        "bridgegen.ego.driver_process.checked", lambda answer, *_: found.append(answer) or answer
+        "bridgegen.drivers.driver_process.checked",
+        lambda answer, *_: found.append(answer) or answer,
     )
     one = driver(server(HELLO, READY, pack({"type": "trajectory", **TRAJECTORY})).spec)
     one.reset(N, scene())

@@ -14,11 +14,11 @@ from tests.ego.drivers import Cruises, Raises
 from tests.ego.remote.asked import N, observation, road_map, scene, with_all
 from tests.ego.remote.remote_drivers import Plans
 
-from bridgegen.ego import views
-from bridgegen.ego.driver_process import DriverError
-from bridgegen.ego.remote import messages, server
-from bridgegen.ego.remote.messages import pack, unpack
-from bridgegen.ego.remote.process import RemoteDriver
+from bridgegen.drivers import views
+from bridgegen.drivers.driver_process import DriverError
+from bridgegen.drivers.remote import messages, server
+from bridgegen.drivers.remote.messages import pack, unpack
+from bridgegen.drivers.remote.process import RemoteDriver
 
 DOCS = Path(__file__).parents[3] / "docs"
 FILE = Path(messages.__file__).with_name("protocol.json")

@@ -10,10 +10,10 @@ import pytest
 from tests.ego.remote import ros2_stub
 from tests.ego.remote.asked import observation, scene
 
-from bridgegen.ego.remote import serve
-from bridgegen.odd.reader import load
-from bridgegen.options import PipelineOptions
-from bridgegen.pipeline import Pipeline
+from bridgegen.drivers.remote import serve
+from bridgegen.engine.options import PipelineOptions
+from bridgegen.engine.pipeline import Pipeline
+from bridgegen.scenario.language.reader import load
 
 TESTS = Path(__file__).parents[2]
 BRIDGE = TESTS.parent / "docs" / "examples" / "ros2_bridge.py"

@@ -6,17 +6,17 @@ import numpy as np
 import pytest
 from tests.recordings.test_clean import drive, traffic
 
-from bridgegen.campaign.scenarios import load
-from bridgegen.conflict.analysis import CONTACT, NEAR_MISS, analyse
-from bridgegen.conflict.harm import harm_of_pairs
-from bridgegen.ego.kinds import CAR, PEDESTRIAN
-from bridgegen.mining.conflicts import find
-from bridgegen.mining.conflicts.find import candidates, conflicts_of
-from bridgegen.mining.excerpt import clock_of, excerpt
-from bridgegen.options import PipelineOptions
-from bridgegen.pipeline import Pipeline
-from bridgegen.recordings.clean import clean
-from bridgegen.recordings.formats import read
+from bridgegen.assess.conflict.analysis import CONTACT, NEAR_MISS, analyse
+from bridgegen.assess.conflict.harm import harm_of_pairs
+from bridgegen.drivers.kinds import CAR, PEDESTRIAN
+from bridgegen.engine.options import PipelineOptions
+from bridgegen.engine.pipeline import Pipeline
+from bridgegen.jobs.search.scenarios import load
+from bridgegen.recordings.conflicts import find
+from bridgegen.recordings.conflicts.find import candidates, conflicts_of
+from bridgegen.recordings.excerpt import clock_of, excerpt
+from bridgegen.recordings.readers.clean import clean
+from bridgegen.recordings.readers.formats import read
 from bridgegen.simulation.trace import write_trace
 
 

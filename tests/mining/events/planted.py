@@ -2,12 +2,11 @@
 
 import numpy as np
 
-from bridgegen.ego.kinds import CAR
-from bridgegen.mining.events.find import find_events
-from bridgegen.mining.lanes.find import locate
-from bridgegen.recordings.clean import clean
-from bridgegen.recordings.lights import RecordedLight
-from bridgegen.recordings.table import Facts, build
+from bridgegen.drivers.kinds import CAR
+from bridgegen.recordings.events.find import find_events
+from bridgegen.recordings.lanes.find import locate
+from bridgegen.recordings.readers.clean import clean
+from bridgegen.recordings.readers.table import Facts, RecordedLight, build
 
 T = np.arange(0.0, 14.0, 0.1)
 CAR_BOX, PERSON_BOX = (4.5, 1.8), (0.5, 0.5)

@@ -6,20 +6,19 @@ from functools import lru_cache
 import numpy as np
 from tests.recordings.writers import Track
 
-from bridgegen.ego.kinds import NAMES
-from bridgegen.mining.events.find import find_events
-from bridgegen.mining.lanes.find import Located
-from bridgegen.mining.lanes.fit import fit_of
-from bridgegen.mining.lanes.placing import place
-from bridgegen.mining.lanes.road_map import lanes_of_map
-from bridgegen.odd.others import with_others
-from bridgegen.odd.reader import load
-from bridgegen.options import PipelineOptions
-from bridgegen.pipeline import Pipeline
-from bridgegen.recordings.clean import clean
-from bridgegen.recordings.lights import RecordedLight, changes_of
-from bridgegen.recordings.table import Facts, build
-from bridgegen.suite.rows import rows_of
+from bridgegen.drivers.kinds import NAMES
+from bridgegen.engine.options import PipelineOptions
+from bridgegen.engine.pipeline import Pipeline
+from bridgegen.jobs.suite.rows import rows_of
+from bridgegen.recordings.events.find import find_events
+from bridgegen.recordings.lanes.find import Located
+from bridgegen.recordings.lanes.fit import fit_of
+from bridgegen.recordings.lanes.placing import place
+from bridgegen.recordings.lanes.road_map import lanes_of_map
+from bridgegen.recordings.readers.clean import clean
+from bridgegen.recordings.readers.table import Facts, RecordedLight, build, changes_of
+from bridgegen.scenario.language.others import with_others
+from bridgegen.scenario.language.reader import load
 
 STEP = 0.01
 """So that events begin when their conditions hold [s]."""

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from tests.mining.events.planted import T, found, line, rows_of, turning
 
-from bridgegen.ego.kinds import BICYCLE, CAR, PEDESTRIAN
-from bridgegen.mining.events.event import NO_CHANGE
-from bridgegen.mining.events.meetings import TOUCH
+from bridgegen.drivers.kinds import BICYCLE, CAR, PEDESTRIAN
+from bridgegen.recordings.events.event import NO_CHANGE
+from bridgegen.recordings.events.meetings import TOUCH
 
 RIGHT_TURN, SWINGS_OUT = "right-turn-with-bicycle", "bicycle-swings-out"
 

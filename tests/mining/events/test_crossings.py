@@ -5,13 +5,13 @@ import pytest
 from tests.mining.events.planted import T, found, line, rows_of, turning
 from tests.mining.lanes.planted import highway
 
-from bridgegen.ego.kinds import BICYCLE, CAR, PEDESTRIAN
-from bridgegen.mining.events.event import NOT_WHOLE
-from bridgegen.mining.events.find import find_events
-from bridgegen.mining.events.meetings import TOUCH
-from bridgegen.mining.events.of_scenarios import encounters_of
-from bridgegen.mining.lanes.find import locate
-from bridgegen.recordings.clean import clean
+from bridgegen.drivers.kinds import BICYCLE, CAR, PEDESTRIAN
+from bridgegen.recordings.events.event import NOT_WHOLE
+from bridgegen.recordings.events.find import find_events
+from bridgegen.recordings.events.meetings import TOUCH
+from bridgegen.recordings.events.of_scenarios import encounters_of
+from bridgegen.recordings.lanes.find import locate
+from bridgegen.recordings.readers.clean import clean
 
 MEETINGS = ("crossing", "oncoming-left-turn", "vru-crossing")
 

@@ -4,18 +4,18 @@ import numpy as np
 import pytest
 from tests.mining.lanes.planted import BOX, on_road, recorded
 
-from bridgegen.ego.kinds import CAR
-from bridgegen.mining.events.event import EGO_CHANGES, OVERLAP
-from bridgegen.mining.events.find import DETECTORS, find_events
-from bridgegen.mining.events.of_scenarios import encounters_of, scenario_events, whole_share
-from bridgegen.mining.lanes.find import Located
-from bridgegen.mining.lanes.fit import fit_of
-from bridgegen.mining.lanes.model import Strip, assemble
-from bridgegen.mining.lanes.placing import place
-from bridgegen.odd.event_kinds import EVENT_KINDS
-from bridgegen.odd.reader import load
-from bridgegen.recordings.bodies import centre_ahead
-from bridgegen.recordings.clean import clean
+from bridgegen.drivers.kinds import CAR
+from bridgegen.recordings.events.event import EGO_CHANGES, OVERLAP
+from bridgegen.recordings.events.find import DETECTORS, find_events
+from bridgegen.recordings.events.of_scenarios import encounters_of, scenario_events, whole_share
+from bridgegen.recordings.lanes.find import Located
+from bridgegen.recordings.lanes.fit import fit_of
+from bridgegen.recordings.lanes.model import Strip, assemble
+from bridgegen.recordings.lanes.placing import place
+from bridgegen.recordings.readers.clean import clean
+from bridgegen.recordings.readers.motion import centre_ahead
+from bridgegen.scenario.language.event_kinds import EVENT_KINDS
+from bridgegen.scenario.language.reader import load
 
 WIDTH = 3.6
 T = np.arange(0.0, 14.0, 0.1)

@@ -6,15 +6,15 @@ from tests.mining.events.planted import T, found, line, rows_of, turning
 from tests.mining.lanes.planted import highway
 from tests.mining.lanes.planted import recorded as on_lanes
 
-from bridgegen.ego.kinds import BICYCLE, CAR
-from bridgegen.mining.events.event import NO_CHANGE, NOT_WHOLE
-from bridgegen.mining.events.find import find_events
-from bridgegen.mining.events.meetings import TOUCH
-from bridgegen.mining.lanes.find import Located, locate
-from bridgegen.mining.lanes.fit import fit_of
-from bridgegen.mining.lanes.model import Strip, assemble
-from bridgegen.mining.lanes.placing import place
-from bridgegen.recordings.clean import clean
+from bridgegen.drivers.kinds import BICYCLE, CAR
+from bridgegen.recordings.events.event import NO_CHANGE, NOT_WHOLE
+from bridgegen.recordings.events.find import find_events
+from bridgegen.recordings.events.meetings import TOUCH
+from bridgegen.recordings.lanes.find import Located, locate
+from bridgegen.recordings.lanes.fit import fit_of
+from bridgegen.recordings.lanes.model import Strip, assemble
+from bridgegen.recordings.lanes.placing import place
+from bridgegen.recordings.readers.clean import clean
 
 LENGTH = 4.5
 

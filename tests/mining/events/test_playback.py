@@ -5,9 +5,9 @@ from collections import Counter
 import numpy as np
 from tests.mining.events.test_find import LEFT, RIGHT, T, change, placed
 
-from bridgegen.mining.events.find import find_events, named
-from bridgegen.mining.events.playback import MOST_OTHERS, SHOWN, closest, playback_section
-from bridgegen.mining.excerpt import clock_of
+from bridgegen.recordings.events.find import find_events, named
+from bridgegen.recordings.events.playback import MOST_OTHERS, SHOWN, closest, playback_section
+from bridgegen.recordings.excerpt import clock_of
 
 
 def played(recordings):

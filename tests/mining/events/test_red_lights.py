@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 from tests.mining.events.planted import found, line, rows_of, turning
 
-from bridgegen.ego.kinds import BICYCLE
-from bridgegen.mining.events.event import NOT_WHOLE
-from bridgegen.mining.events.of_scenarios import encounters_of
-from bridgegen.mining.events.red_light import RIGHT_ON_RED
-from bridgegen.odd.reader import load
-from bridgegen.recordings.lights import RecordedLight
+from bridgegen.drivers.kinds import BICYCLE
+from bridgegen.recordings.events.event import NOT_WHOLE
+from bridgegen.recordings.events.of_scenarios import encounters_of
+from bridgegen.recordings.events.red_light import RIGHT_ON_RED
+from bridgegen.recordings.readers.table import RecordedLight
+from bridgegen.scenario.language.reader import load
 
 KIND = "red-light-violation"
 FRONT = 2.25  # m, half a length

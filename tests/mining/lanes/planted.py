@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from bridgegen.recordings.table import Facts, RecordedTraffic, build
+from bridgegen.recordings.readers.table import Facts, RecordedTraffic, build
 
 STEP = 0.1
 BOX = (4.5, 1.8)

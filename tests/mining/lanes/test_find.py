@@ -8,12 +8,12 @@ from tests.mining.lanes.planted import recorded
 from tests.mining.lanes.test_road_map import drive
 from tests.openx.opendrive.kinds import model
 
-from bridgegen.errors import InputError
-from bridgegen.mining.lanes.find import locate, read_map
+from bridgegen.base.errors import InputError
 from bridgegen.openx.opendrive.model import Offset
 from bridgegen.openx.opendrive.write import to_xml
-from bridgegen.recordings.clean import clean
-from bridgegen.recordings.lanelets import Lanelet
+from bridgegen.recordings.lanes.find import locate, read_map
+from bridgegen.recordings.readers.clean import clean
+from bridgegen.recordings.readers.table import Lanelet
 
 
 @pytest.fixture(scope="module")

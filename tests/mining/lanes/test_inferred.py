@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from tests.mining.lanes.planted import highway, on_road, recorded
 
-from bridgegen.mining.lanes.find import locate
-from bridgegen.mining.lanes.inferred import infer_lanes
-from bridgegen.recordings.clean import clean
+from bridgegen.recordings.lanes.find import locate
+from bridgegen.recordings.lanes.inferred import infer_lanes
+from bridgegen.recordings.readers.clean import clean
 
 ROADS = {
     "straight": {},

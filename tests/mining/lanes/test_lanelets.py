@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 from tests.recordings import writers as w
 
-from bridgegen.errors import FileFormatError
-from bridgegen.mining.lanes.find import locate
-from bridgegen.mining.lanes.lanelets import lanes_of_lanelets
-from bridgegen.recordings.clean import clean
-from bridgegen.recordings.formats import read
-from bridgegen.recordings.lanelets import Lanelet
+from bridgegen.base.errors import FileFormatError
+from bridgegen.recordings.lanes.find import locate
+from bridgegen.recordings.lanes.lanelets import lanes_of_lanelets
+from bridgegen.recordings.readers.clean import clean
+from bridgegen.recordings.readers.formats import read
+from bridgegen.recordings.readers.table import Lanelet
 
 UPPER, LOWER = "-12.0;-8.0;-4.0", "2.0;6.0;10.0;13.5"
 

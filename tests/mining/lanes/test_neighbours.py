@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from tests.mining.lanes.planted import BOX, recorded
 
-from bridgegen.mining.lanes.lanelets import lanes_of_lanelets
-from bridgegen.mining.lanes.neighbours import HORIZON, Neighbours
-from bridgegen.mining.lanes.placing import place
-from bridgegen.recordings.lanelets import Lanelet
+from bridgegen.recordings.lanes.lanelets import lanes_of_lanelets
+from bridgegen.recordings.lanes.neighbours import HORIZON, Neighbours
+from bridgegen.recordings.lanes.placing import place
+from bridgegen.recordings.readers.table import Lanelet
 
 PIECE, PIECES, LANES, WIDTH = 60.0, 5, 3, 3.5
 

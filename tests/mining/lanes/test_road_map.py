@@ -8,10 +8,10 @@ import pytest
 from tests.mining.lanes.planted import STEP, recorded
 from tests.openx.opendrive.kinds import KINDS, model
 
-from bridgegen.mining.lanes.placing import place
-from bridgegen.mining.lanes.road_map import lanes_of_map
 from bridgegen.openx.opendrive.lane_graph import LaneGraph
 from bridgegen.openx.opendrive.lanes import lane_pose
+from bridgegen.recordings.lanes.placing import place
+from bridgegen.recordings.lanes.road_map import lanes_of_map
 
 NAMES = ("signals", "turn-lanes", "straight", "curved", "merge-3", "roundabout-3")
 

@@ -9,14 +9,13 @@ import pytest
 from tests.mining.conflicts.test_find import braking
 from tests.recordings.test_clean import drive, traffic
 
-from bridgegen.mining.conflicts.find import conflicts_of
-from bridgegen.mining.excerpt import clock_of
-from bridgegen.mining.replays.picture import moving_picture
-from bridgegen.mining.replays.road import BEFORE, along
-from bridgegen.mining.replays.write import prepare, write
+from bridgegen.engine.simulate import simulate_file
 from bridgegen.openx.opendrive.geometry import pose
-from bridgegen.recordings.clean import clean
-from bridgegen.simulate import simulate_file
+from bridgegen.recordings.conflicts.find import conflicts_of
+from bridgegen.recordings.excerpt import clock_of
+from bridgegen.recordings.readers.clean import clean
+from bridgegen.recordings.replays.scenario import BEFORE, along
+from bridgegen.recordings.replays.write import moving_picture, prepare, write
 
 
 def bend(n=80, v=8.0, radius=25.0, y=0.0):

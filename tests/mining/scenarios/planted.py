@@ -4,11 +4,11 @@ import csv
 
 import numpy as np
 
-from bridgegen.mining.events.event import Events
-from bridgegen.mining.events.find import FoundEvents
-from bridgegen.mining.events.of_scenarios import Sought, encounters_of, scenario_events
-from bridgegen.odd.event_kinds import EVENT_KINDS
-from bridgegen.odd.reader import build, document_of
+from bridgegen.recordings.events.event import Events
+from bridgegen.recordings.events.find import FoundEvents
+from bridgegen.recordings.events.of_scenarios import Sought, encounters_of, scenario_events
+from bridgegen.scenario.language.event_kinds import EVENT_KINDS
+from bridgegen.scenario.language.reader import build, document_of
 
 HOURS, KM = 12.0, 700.0
 

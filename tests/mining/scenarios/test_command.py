@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bridgegen.exposure import exposure_of
-from bridgegen.mining.scenarios import mined
-from bridgegen.odd.reader import load
+from bridgegen.recordings.scenarios import mined
+from bridgegen.scenario.exposure import exposure_of
+from bridgegen.scenario.language.reader import load
 
 SLOWER = Path(__file__).parents[3] / "docs" / "examples" / "slower-lead.yaml"
 PAIRS, STEP = 52, 0.2

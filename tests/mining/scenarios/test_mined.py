@@ -9,16 +9,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 from tests.mining.scenarios.planted import HOURS, KM, approaches, events, met, sought
 
-from bridgegen.exposure import exposure_of
-from bridgegen.mining.events.event import NOT_WHOLE
-from bridgegen.mining.scenarios import mined
-from bridgegen.mining.scenarios.mined import MinedScenario, Unmade, mined_scenario
-from bridgegen.mining.scenarios.ranges import Range, around, bounds_of_speeds, with_room
-from bridgegen.odd.constraints import Constraints
-from bridgegen.odd.expression import parse
-from bridgegen.odd.parameters import Axis, Bound, Parameter
-from bridgegen.odd.reader import load
-from bridgegen.odd.space import SearchSpace
+from bridgegen.recordings.events.event import NOT_WHOLE
+from bridgegen.recordings.scenarios import mined
+from bridgegen.recordings.scenarios.mined import MinedScenario, Unmade, mined_scenario
+from bridgegen.recordings.scenarios.ranges import Range, around, bounds_of_speeds, with_room
+from bridgegen.scenario.exposure import exposure_of
+from bridgegen.scenario.language.constraints import Constraints
+from bridgegen.scenario.language.expression import parse
+from bridgegen.scenario.language.parameters import Axis, Bound, Parameter
+from bridgegen.scenario.language.reader import load
+from bridgegen.scenario.language.space import SearchSpace
 
 DOCS = Path(__file__).parents[3] / "docs"
 SLOWER = DOCS / "examples" / "slower-lead.yaml"

@@ -6,12 +6,12 @@ import rdflib
 from tests.mining.scenarios.planted import approaches, met, sought
 from tests.mining.scenarios.test_mined import SLOWER
 
-from bridgegen.mining.scenarios import mined
-from bridgegen.mining.scenarios.mined import mined_scenario
-from bridgegen.mining.scenarios.ontology import mined_individuals
-from bridgegen.ontology.check import check
-from bridgegen.ontology.files import load, save
-from bridgegen.ontology.vocabulary import BG
+from bridgegen.recordings.scenarios import mined
+from bridgegen.recordings.scenarios.files import mined_individuals
+from bridgegen.recordings.scenarios.mined import mined_scenario
+from bridgegen.scenario.ontology.check import check
+from bridgegen.scenario.ontology.files import load, save
+from bridgegen.scenario.ontology.vocabulary import BG
 
 
 @pytest.fixture(scope="module")

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from tests.mining.scenarios.planted import approaches, events, met, sought
 
-from bridgegen.mining.scenarios.update import in_words, proposed_update
-from bridgegen.odd.reader import load, shipped_text
+from bridgegen.recordings.scenarios.update import in_words, proposed_update
+from bridgegen.scenario.language.reader import load, shipped_text
 
 SLOWER = Path(__file__).parents[3] / "docs" / "examples" / "slower-lead.yaml"
 TEXT = SLOWER.read_text(encoding="utf-8")

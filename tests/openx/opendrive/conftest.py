@@ -8,11 +8,11 @@ from typing import Literal
 import pytest
 from hypothesis import strategies as st
 
-from bridgegen.ontology.individuals import build_static
-from bridgegen.ontology.site import ArmRoad, Leg, Site, SiteLane
 from bridgegen.openx.opendrive.from_owl import opendrive_from_owl
 from bridgegen.openx.opendrive.model import OpenDrive
 from bridgegen.openx.opendrive.read import read
+from bridgegen.scenario.ontology.individuals import build_static
+from bridgegen.scenario.ontology.site import ArmRoad, Leg, Site, SiteLane
 
 Values = Mapping[str, float]
 

@@ -3,13 +3,13 @@
 from dataclasses import replace
 from typing import Any
 
-from bridgegen.odd.roads import LegSpec, RoadsSpec, Segment, usual
-from bridgegen.ontology.graph import Individuals
-from bridgegen.ontology.individuals import build_static
-from bridgegen.ontology.site import Facility
-from bridgegen.ontology.templates import site_of
 from bridgegen.openx.opendrive.from_owl import opendrive_from_owl
 from bridgegen.openx.opendrive.model import OpenDrive
+from bridgegen.scenario.language.roads import LegSpec, RoadsSpec, Segment, usual
+from bridgegen.scenario.ontology.graph import Individuals
+from bridgegen.scenario.ontology.individuals import build_static
+from bridgegen.scenario.ontology.site import Facility
+from bridgegen.scenario.ontology.templates import site_of
 
 
 def town(template: Any, legs: dict[str, LegSpec], **knobs: float) -> RoadsSpec:

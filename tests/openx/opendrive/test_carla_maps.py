@@ -4,10 +4,9 @@ from pathlib import Path
 
 import pytest
 
-from bridgegen.errors import FileFormatError
+from bridgegen.base.errors import FileFormatError
 from bridgegen.openx.convert import import_file
-from bridgegen.openx.opendrive.carla_maps import map_path
-from bridgegen.openx.opendrive.road_map import map_of
+from bridgegen.openx.opendrive.road_map import map_of, map_path
 
 from .test_read import DOCUMENT
 

@@ -11,12 +11,12 @@ from typing import Any
 import pytest
 from lxml import etree
 
-from bridgegen.ontology.individuals import build_static
-from bridgegen.ontology.site import ArmRoad, Leg, Site, SiteLane
 from bridgegen.openx.opendrive.from_owl import opendrive_from_owl
 from bridgegen.openx.opendrive.model import OpenDrive
 from bridgegen.openx.opendrive.read import read
 from bridgegen.openx.opendrive.write import to_xml
+from bridgegen.scenario.ontology.individuals import build_static
+from bridgegen.scenario.ontology.site import ArmRoad, Leg, Site, SiteLane
 
 from .kinds import FURNISHED, KINDS
 from .kinds import model as kind

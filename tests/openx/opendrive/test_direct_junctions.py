@@ -2,7 +2,7 @@
 
 import pytest
 
-from bridgegen.errors import UnsupportedError
+from bridgegen.base.errors import UnsupportedError
 from bridgegen.openx.opendrive.lane_graph import LaneGraph
 from bridgegen.openx.opendrive.read import read
 from bridgegen.openx.opendrive.routes import plan_route

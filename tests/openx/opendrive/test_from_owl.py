@@ -12,15 +12,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bridgegen.errors import BridgeGenError, InputError, OntologyError
-from bridgegen.ontology.files import load, save
-from bridgegen.ontology.graph import Individuals
-from bridgegen.ontology.individuals import build_static
-from bridgegen.ontology.site import ArmRoad, Leg, Site, SiteLane
-from bridgegen.ontology.templates import crossroads
-from bridgegen.ontology.vocabulary import bg
+from bridgegen.base.errors import BridgeGenError, InputError, OntologyError
 from bridgegen.openx.opendrive.from_owl import opendrive_from_owl
-from bridgegen.openx.opendrive.from_owl.turns import Ray, joining
+from bridgegen.openx.opendrive.from_owl.arms import Ray, joining
 from bridgegen.openx.opendrive.geometry import along_arc
 from bridgegen.openx.opendrive.lanes import lane_pose
 from bridgegen.openx.opendrive.model import OpenDrive
@@ -28,6 +22,12 @@ from bridgegen.openx.opendrive.plan_view import Arc, Line
 from bridgegen.openx.opendrive.read import read
 from bridgegen.openx.opendrive.validate import problems
 from bridgegen.openx.opendrive.write import to_xml
+from bridgegen.scenario.ontology.files import load, save
+from bridgegen.scenario.ontology.graph import Individuals
+from bridgegen.scenario.ontology.individuals import build_static
+from bridgegen.scenario.ontology.site import ArmRoad, Leg, Site, SiteLane
+from bridgegen.scenario.ontology.templates import crossroads
+from bridgegen.scenario.ontology.vocabulary import bg
 
 # From which leg's lane to which: the default crossroads has two lanes each way, A is south.
 LEFT = {"A": "B", "B": "C", "C": "D", "D": "A"}

@@ -6,14 +6,14 @@ import re
 
 import pytest
 
-from bridgegen.errors import InputError
-from bridgegen.ontology.check import check
+from bridgegen.base.errors import InputError
 from bridgegen.openx.opendrive.lanes import lane_pose
 from bridgegen.openx.opendrive.plan_view import Arc
 from bridgegen.openx.opendrive.read import read
 from bridgegen.openx.opendrive.routes import plan_route
 from bridgegen.openx.opendrive.validate import problems
 from bridgegen.openx.opendrive.write import to_xml
+from bridgegen.scenario.ontology.check import check
 
 from .kinds import KINDS, individuals, model
 
@@ -142,10 +142,10 @@ def test_the_acceleration_lane_ends():
 def test_a_sign_in_the_road_and_a_light_off_an_intersection_are_refused():
     import pyoxigraph as ox
 
-    from bridgegen.errors import OntologyError
-    from bridgegen.ontology.graph import Individuals
-    from bridgegen.ontology.vocabulary import bg
+    from bridgegen.base.errors import OntologyError
     from bridgegen.openx.opendrive.from_owl import opendrive_from_owl
+    from bridgegen.scenario.ontology.graph import Individuals
+    from bridgegen.scenario.ontology.vocabulary import bg
 
     def moved(quad):
         sign = quad.subject.value.endswith("yield_sign_A") and quad.predicate == bg("has_t")

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bridgegen.errors import InputError
+from bridgegen.base.errors import InputError
 from bridgegen.openx.opendrive.lane_changes import USUAL, plan_with_changes
 from bridgegen.openx.opendrive.lanes import lane_pose
 from bridgegen.openx.opendrive.model import OpenDrive, Width

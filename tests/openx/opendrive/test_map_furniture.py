@@ -2,13 +2,13 @@
 
 import pytest
 
-from bridgegen.ontology.check import check
-from bridgegen.ontology.graph import Individuals
 from bridgegen.openx.opendrive.from_owl.furniture import ranges
 from bridgegen.openx.opendrive.model import OpenDrive
 from bridgegen.openx.opendrive.read import read
 from bridgegen.openx.opendrive.to_owl import individuals_from_opendrive
-from bridgegen.openx.opendrive.to_owl.losses import losses
+from bridgegen.openx.opendrive.to_owl.network import losses
+from bridgegen.scenario.ontology.check import check
+from bridgegen.scenario.ontology.graph import Individuals
 
 WIDTH = '<width sOffset="0" a="3" b="0" c="0" d="0"/>'
 LANES = f"""<lanes><laneSection s="0"><left>

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from shapely.geometry import LineString, Polygon
 
-from bridgegen.errors import InputError
+from bridgegen.base.errors import InputError
 from bridgegen.openx.opendrive.model import Lane, OpenDrive, RoadMark, Width
 from bridgegen.openx.opendrive.outline import AREAS, LINES, outline
 

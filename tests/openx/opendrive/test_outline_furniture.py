@@ -7,11 +7,10 @@ import numpy as np
 import pytest
 from shapely.geometry import Polygon
 
-from bridgegen.ontology.individuals import build_static
 from bridgegen.openx.opendrive.from_owl import opendrive_from_owl
 from bridgegen.openx.opendrive.furniture import CornerLocal, Object, Outline
-from bridgegen.openx.opendrive.outline import outline
-from bridgegen.openx.opendrive.outline_furniture import crosswalk_stripes, lights, outline_of
+from bridgegen.openx.opendrive.outline import crosswalk_stripes, lights, outline, outline_of
+from bridgegen.scenario.ontology.individuals import build_static
 
 from .kinds import KINDS, model
 

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bridgegen.errors import BridgeGenError, FileFormatError, UnsupportedError
+from bridgegen.base.errors import BridgeGenError, FileFormatError, UnsupportedError
 from bridgegen.openx.opendrive.model import OpenDrive
 from bridgegen.openx.opendrive.plan_view import Arc, Line
 from bridgegen.openx.opendrive.read import read

@@ -5,14 +5,14 @@ from pathlib import Path
 
 import pytest
 
-from bridgegen.errors import FileFormatError
-from bridgegen.odd.reader import load as load_scenario
-from bridgegen.ontology.files import load, save
-from bridgegen.ontology.graph import Individuals
-from bridgegen.ontology.vocabulary import bg
+from bridgegen.base.errors import FileFormatError
 from bridgegen.openx.convert import import_file
 from bridgegen.openx.opendrive.road_map import load_map
 from bridgegen.openx.opendrive.write import to_xml
+from bridgegen.scenario.language.reader import load as load_scenario
+from bridgegen.scenario.ontology.files import load, save
+from bridgegen.scenario.ontology.graph import Individuals
+from bridgegen.scenario.ontology.vocabulary import bg
 
 from .kinds import individuals, model
 

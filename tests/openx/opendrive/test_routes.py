@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bridgegen.errors import InputError
+from bridgegen.base.errors import InputError
 from bridgegen.openx.opendrive.lanes import borders, lane_pose, points
 from bridgegen.openx.opendrive.model import (
     Connection,

@@ -10,20 +10,19 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bridgegen.errors import InputError, UnsupportedError
-from bridgegen.odd.reader import load
-from bridgegen.odd.roads import LegSpec
-from bridgegen.odd.scenario import LogicalScenario
-from bridgegen.ontology.individuals import build_static
-from bridgegen.ontology.site import Site
-from bridgegen.ontology.templates import crossroads, site_of
+from bridgegen.base.errors import InputError, UnsupportedError
 from bridgegen.openx.opendrive.from_owl import opendrive_from_owl
 from bridgegen.openx.opendrive.lanes import lane_pose
 from bridgegen.openx.opendrive.model import Junction, LaneSection, OpenDrive, Road
 from bridgegen.openx.opendrive.site import find_site
 from bridgegen.openx.opendrive.site_adapted import adapted
-from bridgegen.openx.opendrive.site_fit import site_for
-from bridgegen.openx.opendrive.site_lacks import missing
+from bridgegen.openx.opendrive.site_fit import missing, site_for
+from bridgegen.scenario.language.reader import load
+from bridgegen.scenario.language.roads import LegSpec
+from bridgegen.scenario.language.scenario import LogicalScenario
+from bridgegen.scenario.ontology.individuals import build_static
+from bridgegen.scenario.ontology.site import Site
+from bridgegen.scenario.ontology.templates import crossroads, site_of
 
 from .kinds import KINDS
 from .kinds import model as kind

@@ -7,18 +7,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bridgegen.odd.reader import load
-from bridgegen.odd.scenario import LogicalScenario
-from bridgegen.ontology.site import Site
+from bridgegen.engine.pipeline import Pipeline
 from bridgegen.openx.on_map import on_map
 from bridgegen.openx.opendrive.furniture import Signal, SignalReference
 from bridgegen.openx.opendrive.model import OpenDrive
 from bridgegen.openx.opendrive.road_map import load_map
 from bridgegen.openx.opendrive.site_adapted import adapted
-from bridgegen.openx.opendrive.site_fit import site_for
-from bridgegen.openx.opendrive.site_lacks import missing
+from bridgegen.openx.opendrive.site_fit import missing, site_for
 from bridgegen.openx.opendrive.write import to_xml
-from bridgegen.pipeline import Pipeline
+from bridgegen.scenario.language.reader import load
+from bridgegen.scenario.language.scenario import LogicalScenario
+from bridgegen.scenario.ontology.site import Site
 
 
 @pytest.fixture

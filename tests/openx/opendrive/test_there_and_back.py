@@ -24,20 +24,20 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bridgegen.odd.roads import RoadsSpec, usual
-from bridgegen.ontology.check import check
-from bridgegen.ontology.files import from_bytes, to_bytes
-from bridgegen.ontology.graph import Individuals
-from bridgegen.ontology.individuals import build_static
-from bridgegen.ontology.site import Facility
-from bridgegen.ontology.templates import site_of
-from bridgegen.ontology.vocabulary import OWL, OWL_ONTOLOGY, TYPE, VERSION_INFO, bg
 from bridgegen.openx.opendrive.from_owl import opendrive_from_owl
 from bridgegen.openx.opendrive.model import OpenDrive
 from bridgegen.openx.opendrive.read import read
 from bridgegen.openx.opendrive.to_owl import individuals_from_opendrive
 from bridgegen.openx.opendrive.validate import problems
 from bridgegen.openx.opendrive.write import to_xml
+from bridgegen.scenario.language.roads import RoadsSpec, usual
+from bridgegen.scenario.ontology.check import check
+from bridgegen.scenario.ontology.files import from_bytes, to_bytes
+from bridgegen.scenario.ontology.graph import Individuals
+from bridgegen.scenario.ontology.individuals import build_static
+from bridgegen.scenario.ontology.site import Facility
+from bridgegen.scenario.ontology.templates import site_of
+from bridgegen.scenario.ontology.vocabulary import OWL, OWL_ONTOLOGY, TYPE, VERSION_INFO, bg
 
 from .kinds import FURNISHED, KINDS, individuals
 
@@ -240,7 +240,7 @@ def test_user_data_is_the_last_child() -> None:
 
 
 def test_maps_that_others_made_are_not_made_again(town05: OpenDrive) -> None:
-    from bridgegen.errors import UnsupportedError
+    from bridgegen.base.errors import UnsupportedError
 
     imported = individuals_from_opendrive(town05, "Town05.xodr")
     with pytest.raises(UnsupportedError, match="one intersection in this version, got 21"):

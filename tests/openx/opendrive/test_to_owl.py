@@ -11,20 +11,20 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bridgegen.campaign.validate import validate_file
+from bridgegen.base.errors import StorageError
 from bridgegen.cli import main
-from bridgegen.errors import StorageError
-from bridgegen.ontology.check import check
-from bridgegen.ontology.files import from_bytes, load, to_bytes
-from bridgegen.ontology.graph import Individuals
-from bridgegen.ontology.individuals import build_static
-from bridgegen.ontology.vocabulary import BG, tbox
+from bridgegen.jobs.search.validate import validate_file
 from bridgegen.openx.convert import import_file
 from bridgegen.openx.opendrive.from_owl import opendrive_from_owl
 from bridgegen.openx.opendrive.model import Lane, OpenDrive, Road
 from bridgegen.openx.opendrive.read import read
 from bridgegen.openx.opendrive.to_owl import individuals_from_opendrive
 from bridgegen.openx.opendrive.write import to_xml
+from bridgegen.scenario.ontology.check import check
+from bridgegen.scenario.ontology.files import from_bytes, load, to_bytes
+from bridgegen.scenario.ontology.graph import Individuals
+from bridgegen.scenario.ontology.individuals import build_static
+from bridgegen.scenario.ontology.vocabulary import BG, tbox
 
 FURNISHED = b"""<OpenDRIVE><header revMajor="1" revMinor="7"/>
 <road id="a:b" name="High Street" length="20" junction="-1"><type s="0" type="town">

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bridgegen.errors import BridgeGenError
+from bridgegen.base.errors import BridgeGenError
 from bridgegen.openx.opendrive import furniture
 from bridgegen.openx.opendrive.model import (
     Junction,

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bridgegen.errors import InputError
+from bridgegen.base.errors import InputError
 from bridgegen.openx.opendrive import furniture, model, plan_view, user_data
 from bridgegen.openx.opendrive.declaration import Field, plan
 from bridgegen.openx.opendrive.model import OpenDrive

@@ -8,16 +8,16 @@ import pyoxigraph as ox
 import pytest
 from tests.openx.openscenario.strangers import FILE, changed
 
-from bridgegen.odd.reader import load
-from bridgegen.ontology.graph import Individuals
-from bridgegen.ontology.individuals import build
-from bridgegen.ontology.site import ArmRoad, Leg, Site, SiteLane
-from bridgegen.ontology.vocabulary import TYPE, bg
 from bridgegen.openx.opendrive.from_owl import opendrive_from_owl
 from bridgegen.openx.opendrive.write import to_xml as roads_to_xml
 from bridgegen.openx.openscenario.from_owl import openscenario_from_owl
 from bridgegen.openx.openscenario.from_owl.weather import time_of_day
 from bridgegen.openx.openscenario.write import to_xml
+from bridgegen.scenario.language.reader import load
+from bridgegen.scenario.ontology.graph import Individuals
+from bridgegen.scenario.ontology.individuals import build
+from bridgegen.scenario.ontology.site import ArmRoad, Leg, Site, SiteLane
+from bridgegen.scenario.ontology.vocabulary import TYPE, bg
 
 _SCENARIOS = ("crossroads-s1", "crossroads-s2", "crossroads-s3", "crossroads-s4")
 

@@ -5,9 +5,9 @@ from typing import Any
 
 import pyoxigraph as ox
 
-from bridgegen.ontology.builder import Builder
-from bridgegen.ontology.graph import Individuals
-from bridgegen.ontology.vocabulary import BG, local_name
+from bridgegen.scenario.ontology.builder import Builder
+from bridgegen.scenario.ontology.graph import Individuals
+from bridgegen.scenario.ontology.vocabulary import BG, local_name
 
 Thing = tuple[str, dict[str, Any]]
 

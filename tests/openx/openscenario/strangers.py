@@ -4,8 +4,8 @@ from pathlib import Path
 
 import numpy as np
 
+from bridgegen.engine.simulate import simulate_file
 from bridgegen.openx.convert import convert_file
-from bridgegen.simulate import simulate_file
 
 CAR = """
       <Vehicle name="car" vehicleCategory="car"><ParameterDeclarations/>

@@ -5,7 +5,7 @@ from itertools import pairwise
 
 import pytest
 
-from bridgegen.errors import FileFormatError, UnsupportedError
+from bridgegen.base.errors import FileFormatError, UnsupportedError
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario import validate
 from bridgegen.openx.openscenario.element import walk

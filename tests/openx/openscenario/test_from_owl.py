@@ -6,11 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bridgegen import weather as laws
-from bridgegen.errors import OntologyError, UnsupportedError
-from bridgegen.odd.expression import parse
-from bridgegen.odd.reader import load
-from bridgegen.ontology.graph import Individuals
+from bridgegen.base.errors import OntologyError, UnsupportedError
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario import parameters
 from bridgegen.openx.openscenario.element import references, walk
@@ -18,6 +14,10 @@ from bridgegen.openx.openscenario.from_owl import openscenario_from_owl, weather
 from bridgegen.openx.openscenario.read import read
 from bridgegen.openx.openscenario.values import Expr, resolve
 from bridgegen.openx.openscenario.write import to_xml
+from bridgegen.scenario import weather as laws
+from bridgegen.scenario.language.expression import parse
+from bridgegen.scenario.language.reader import load
+from bridgegen.scenario.ontology.graph import Individuals
 
 
 def only(scenario, cls):

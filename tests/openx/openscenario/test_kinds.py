@@ -8,14 +8,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from bridgegen.errors import FileFormatError, OntologyError
-from bridgegen.odd.expression import parse
-from bridgegen.odd.parameters import Axis
-from bridgegen.odd.reader import load
-from bridgegen.ontology.check import check
-from bridgegen.ontology.files import from_bytes, to_bytes
-from bridgegen.ontology.graph import Individuals
-from bridgegen.ontology.individuals import build
+from bridgegen.base.errors import FileFormatError, OntologyError
 from bridgegen.openx.opendrive.from_owl import opendrive_from_owl
 from bridgegen.openx.openscenario import distributions as dst
 from bridgegen.openx.openscenario import model as osc
@@ -23,6 +16,13 @@ from bridgegen.openx.openscenario.from_owl import openscenario_from_owl
 from bridgegen.openx.openscenario.ranges import ranges_of
 from bridgegen.openx.openscenario.to_owl import individuals_from_openscenario
 from bridgegen.openx.openscenario.validate import problems
+from bridgegen.scenario.language.expression import parse
+from bridgegen.scenario.language.parameters import Axis
+from bridgegen.scenario.language.reader import load
+from bridgegen.scenario.ontology.check import check
+from bridgegen.scenario.ontology.files import from_bytes, to_bytes
+from bridgegen.scenario.ontology.graph import Individuals
+from bridgegen.scenario.ontology.individuals import build
 
 SCENARIO = load(Path(__file__).parents[3] / "docs/examples/braking-manner.yaml")
 SPACE = SCENARIO.space(tuple(Axis))

@@ -5,14 +5,14 @@ from typing import Any
 import pytest
 from lxml import etree
 
-from bridgegen.errors import OntologyError
-from bridgegen.ontology.vocabulary import bg, local_name, tbox
+from bridgegen.base.errors import OntologyError
 from bridgegen.openx.opendrive.from_owl import opendrive_from_owl
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.element import walk
 from bridgegen.openx.openscenario.from_owl import openscenario_from_owl
 from bridgegen.openx.openscenario.read import read
 from bridgegen.openx.openscenario.write import to_xml
+from bridgegen.scenario.ontology.vocabulary import bg, local_name, tbox
 from bridgegen.simulation.embedded.compiler import compile_storyboard
 
 from . import stories

@@ -1,6 +1,6 @@
 import pytest
 
-from bridgegen.errors import FileFormatError, UnsupportedError
+from bridgegen.base.errors import FileFormatError, UnsupportedError
 from bridgegen.openx.openscenario import parameters
 from bridgegen.openx.openscenario.read import read
 

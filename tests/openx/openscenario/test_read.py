@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bridgegen.errors import FileFormatError, InputError, UnsupportedError
+from bridgegen.base.errors import FileFormatError, InputError, UnsupportedError
 from bridgegen.openx.openscenario.read import read
 from bridgegen.openx.openscenario.reader import MAX_PROBLEMS
 

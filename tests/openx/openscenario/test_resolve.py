@@ -2,7 +2,7 @@
 
 import pytest
 
-from bridgegen.errors import FileFormatError
+from bridgegen.base.errors import FileFormatError
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.element import references, values_of, walk
 from bridgegen.openx.openscenario.read import read

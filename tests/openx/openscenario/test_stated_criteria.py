@@ -3,8 +3,8 @@
 import pytest
 from tests.campaign.braking import scenario_text, write_pair
 
-from bridgegen.campaign.scenarios import load
-from bridgegen.simulate import simulate_file
+from bridgegen.engine.simulate import simulate_file
+from bridgegen.jobs.search.scenarios import load
 
 _STATED = (
     ("criteria_CollisionTest", "", ""),

@@ -9,10 +9,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from lxml import etree
 
-from bridgegen.odd.reader import load, names
-from bridgegen.ontology.check import check
-from bridgegen.ontology.graph import Individuals
-from bridgegen.ontology.individuals import build
 from bridgegen.openx.convert import convert_file, import_file, scenario_of
 from bridgegen.openx.opendrive.from_owl import opendrive_from_owl
 from bridgegen.openx.opendrive.model import OpenDrive
@@ -23,6 +19,10 @@ from bridgegen.openx.openscenario.from_owl import openscenario_from_owl
 from bridgegen.openx.openscenario.read import read
 from bridgegen.openx.openscenario.to_owl import individuals_from_openscenario
 from bridgegen.openx.openscenario.write import to_xml
+from bridgegen.scenario.language.reader import load, names
+from bridgegen.scenario.ontology.check import check
+from bridgegen.scenario.ontology.graph import Individuals
+from bridgegen.scenario.ontology.individuals import build
 
 from . import stories
 
@@ -73,8 +73,8 @@ def test_what_comes_back_obeys_the_constraints(name):
 
 def test_the_files_do_it_too(individuals, tmp_path):
     """By way of the disk: .owl → .xodr and .xosc → .owl → the same .xodr and .xosc."""
-    from bridgegen.ontology.files import load as load_owl
-    from bridgegen.ontology.files import save
+    from bridgegen.scenario.ontology.files import load as load_owl
+    from bridgegen.scenario.ontology.files import save
 
     save(individuals(), tmp_path / "s4.owl")
     first, _ = convert_file(tmp_path / "s4.owl")

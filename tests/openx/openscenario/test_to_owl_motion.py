@@ -9,17 +9,17 @@ from hypothesis import strategies as st
 from lxml import etree
 from tests.openx.openscenario.strangers import FILE, KNOWN, changed, moves_as, over_time
 
+from bridgegen.base.errors import BridgeGenError, FileFormatError, UnsupportedError
 from bridgegen.cli import main
-from bridgegen.errors import BridgeGenError, FileFormatError, UnsupportedError
-from bridgegen.ontology.check import check
-from bridgegen.ontology.files import load as load_owl
+from bridgegen.engine.simulate import simulate_file
 from bridgegen.openx.convert import convert_file, import_file
 from bridgegen.openx.opendrive.from_owl import opendrive_from_owl
 from bridgegen.openx.openscenario.from_owl import openscenario_from_owl
 from bridgegen.openx.openscenario.read import read
 from bridgegen.openx.openscenario.to_owl import individuals_from_openscenario
 from bridgegen.openx.openscenario.write import to_xml
-from bridgegen.simulate import simulate_file
+from bridgegen.scenario.ontology.check import check
+from bridgegen.scenario.ontology.files import load as load_owl
 
 BESIDE = '<LanePosition roadId="2" laneId="1" s="12.25" offset="0"/>'
 FIRST = '<LanePosition roadId="1" laneId="1" s="30" offset="0"/>'

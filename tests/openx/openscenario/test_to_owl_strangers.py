@@ -5,12 +5,12 @@ import re
 import pytest
 from tests.openx.openscenario.strangers import KNOWN, line_of, moves_as, over_time
 
-from bridgegen.errors import InputError, UnsupportedError
-from bridgegen.ontology.check import check
-from bridgegen.ontology.files import load as load_owl
+from bridgegen.base.errors import InputError, UnsupportedError
 from bridgegen.openx.convert import convert_file, import_file
 from bridgegen.openx.openscenario.read import read
 from bridgegen.openx.openscenario.renaming import rename_entity
+from bridgegen.scenario.ontology.check import check
+from bridgegen.scenario.ontology.files import load as load_owl
 
 # -- what comes in ---------------------------------------------------------------------------------
 

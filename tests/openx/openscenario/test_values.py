@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bridgegen.errors import FileFormatError
+from bridgegen.base.errors import FileFormatError
 from bridgegen.openx.openscenario.values import (
     Expr,
     Kind,

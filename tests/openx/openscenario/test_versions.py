@@ -6,13 +6,12 @@ import pytest
 from hypothesis import HealthCheck, assume, given, settings
 from lxml import etree
 
-from bridgegen.errors import UnsupportedError
+from bridgegen.base.errors import UnsupportedError
 from bridgegen.openx.openscenario import model as osc
-from bridgegen.openx.openscenario import versions
+from bridgegen.openx.openscenario import write as versions
 from bridgegen.openx.openscenario.element import references, rewritten, walk
 from bridgegen.openx.openscenario.read import read
-from bridgegen.openx.openscenario.versions import VERSIONS, to_version
-from bridgegen.openx.openscenario.write import to_xml
+from bridgegen.openx.openscenario.write import VERSIONS, to_version, to_xml
 
 from .test_round_trip import elements
 

@@ -11,8 +11,8 @@ import scipy.stats
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bridgegen.risk.estimators.problem import Aim
-from bridgegen.risk.methods import METHODS, estimate
+from bridgegen.jobs.risk.estimators.problem import Aim
+from bridgegen.jobs.risk.experiment import METHODS, estimate
 
 _spec = importlib.util.spec_from_file_location(
     "risk_problems", Path(__file__).with_name("problems.py")

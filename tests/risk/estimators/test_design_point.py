@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from bridgegen.risk.estimators import design_point
-from bridgegen.risk.estimators.problem import SCORE, block_of
+from bridgegen.jobs.risk.estimators import exploration as design_point
+from bridgegen.jobs.risk.estimators.problem import SCORE, block_of
 
 from .problems import Analytic, bent, linear, product, two_sides
 

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from bridgegen.risk.estimators.learning import learn
-from bridgegen.risk.estimators.problem import SCORE, Aim, block_of
-from bridgegen.risk.estimators.proposals import Proposals
+from bridgegen.jobs.risk.estimators.importance import learn
+from bridgegen.jobs.risk.estimators.problem import SCORE, Aim, block_of
+from bridgegen.jobs.risk.estimators.proposals import Proposals
 
 from .problems import Analytic, normal
 

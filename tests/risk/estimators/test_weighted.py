@@ -6,12 +6,7 @@ import scipy.stats
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bridgegen.risk.estimators.weighted import (
-    Weighted,
-    of_counts,
-    of_repetitions,
-    of_weights,
-)
+from bridgegen.jobs.risk.estimators.weighted import Weighted, of_counts, of_repetitions, of_weights
 
 NONE = np.empty(0, np.int64)
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy.stats import mannwhitneyu
 
-from bridgegen.cause import Cause
-from bridgegen.search import ALGORITHMS, Problem, Results
+from bridgegen.assess.cause import Cause
+from bridgegen.search.algorithms import ALGORITHMS, Problem, Results
 from bridgegen.search.screened import Screened
 from bridgegen.search.screened.screened import CHECKS, LEAST
 

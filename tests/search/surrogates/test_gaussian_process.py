@@ -4,8 +4,13 @@ from sklearn.gaussian_process import GaussianProcessRegressor
 from sklearn.gaussian_process.kernels import ConstantKernel, Matern
 
 from bridgegen.search.surrogates import _gaussian_process_kernels as kernels
-from bridgegen.search.surrogates.gaussian_process import GaussianProcess, _density, learnt
-from bridgegen.search.surrogates.parameters import Parameters, prior
+from bridgegen.search.surrogates.gaussian_process import (
+    GaussianProcess,
+    Parameters,
+    _density,
+    learnt,
+    prior,
+)
 
 
 @pytest.fixture

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from bridgegen.search import Problem
+from bridgegen.search.algorithms import Problem
 from bridgegen.search.surrogates.columns import Columns
 from bridgegen.search.surrogates.known import Known, distances
 

@@ -7,11 +7,11 @@ import pytest
 
 carla = pytest.importorskip("carla", reason="the package 'carla' is not installed")
 
-from bridgegen.odd.reader import load  # noqa: E402
+from bridgegen.adapters.carla import server  # noqa: E402
+from bridgegen.engine.options import PipelineOptions  # noqa: E402
+from bridgegen.engine.pipeline import Pipeline  # noqa: E402
 from bridgegen.openx.opendrive.write import to_xml  # noqa: E402
-from bridgegen.options import PipelineOptions  # noqa: E402
-from bridgegen.pipeline import Pipeline  # noqa: E402
-from bridgegen.simulation.carla import server  # noqa: E402
+from bridgegen.scenario.language.reader import load  # noqa: E402
 from bridgegen.simulation.choice import SimulatorChoice  # noqa: E402
 
 from .stand_in import DEFAULT_MAP, MACHINES, Client, Machine  # noqa: E402

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from bridgegen.ego.detector import Boxes
-from bridgegen.ego.kinds import CAR
+from bridgegen.drivers.detector import Boxes
+from bridgegen.drivers.kinds import CAR
 
 
 class SeesRed:

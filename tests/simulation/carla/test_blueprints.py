@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from bridgegen.ego.kinds import ANIMAL, CAR, NAMES, TRUCK
-from bridgegen.errors import InputError
-from bridgegen.odd.reader import load, names
-from bridgegen.participants import OBJECT_CLASSES
-from bridgegen.pipeline import Pipeline
-from bridgegen.simulation.carla.blueprints import choose
+from bridgegen.adapters.carla.stage import choose
+from bridgegen.base.errors import InputError
+from bridgegen.drivers.kinds import ANIMAL, CAR, NAMES, TRUCK
+from bridgegen.engine.pipeline import Pipeline
+from bridgegen.scenario.language.reader import load, names
+from bridgegen.scenario.participants import OBJECT_CLASSES
 
 from .stand_in_actors import blueprints
 

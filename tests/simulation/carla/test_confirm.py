@@ -3,7 +3,7 @@
 import pytest
 
 import bridgegen as bg
-from bridgegen.errors import InputError
+from bridgegen.base.errors import InputError
 
 
 @pytest.fixture(scope="module")

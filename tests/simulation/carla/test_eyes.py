@@ -9,15 +9,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bridgegen import metrics
-from bridgegen.ego.detector import Boxes, checked, load
-from bridgegen.ego.kinds import CAR
-from bridgegen.errors import InputError
-from bridgegen.odd.reader import load as logical_of
-from bridgegen.options import PipelineOptions
-from bridgegen.pipeline import Pipeline
-from bridgegen.simulation.carla.matching import Truth, matched
-from bridgegen.simulation.carla.view import View, overlap
+from bridgegen.adapters.carla.matching import Truth, matched
+from bridgegen.adapters.carla.view import View, overlap
+from bridgegen.assess import metrics
+from bridgegen.base.errors import InputError
+from bridgegen.drivers.detector import Boxes, checked, load
+from bridgegen.drivers.kinds import CAR
+from bridgegen.engine.options import PipelineOptions
+from bridgegen.engine.pipeline import Pipeline
+from bridgegen.scenario.language.reader import load as logical_of
 from bridgegen.simulation.choice import SimulatorChoice
 
 HERE = Path(__file__).with_name("detectors.py")

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bridgegen.simulation.carla import frame
+from bridgegen.adapters.carla import frame
 
 metres = st.floats(-500.0, 500.0)
 turns = st.floats(-np.pi + 1e-3, np.pi - 1e-3)

@@ -7,12 +7,12 @@ import carla
 import numpy as np
 import pytest
 
-from bridgegen.ego import DRIVERS, GUESTS, get
-from bridgegen.errors import InputError, UnknownNameError
-from bridgegen.odd.reader import load
-from bridgegen.options import PipelineOptions
-from bridgegen.pipeline import Pipeline
-from bridgegen.simulation.carla import guests
+from bridgegen.adapters.carla import guests
+from bridgegen.base.errors import InputError, UnknownNameError
+from bridgegen.drivers import DRIVERS, GUESTS, get
+from bridgegen.engine.options import PipelineOptions
+from bridgegen.engine.pipeline import Pipeline
+from bridgegen.scenario.language.reader import load
 
 from . import stand_in
 from .stand_in_actors import TrafficManager, Vehicle

@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from bridgegen import metrics
+from bridgegen.adapters.carla.incidents import red_lights
+from bridgegen.assess import metrics
 from bridgegen.openx.openscenario.read import read
-from bridgegen.simulation.carla.incidents import red_lights
 from bridgegen.simulation.choice import SimulatorChoice
 
 from ..embedded.storyboards import after, crossroads, events, lane, lateral, scenario, start

@@ -4,8 +4,8 @@ import carla
 import numpy as np
 import pytest
 
-from bridgegen.errors import InputError
-from bridgegen.simulation.carla.lights import matched
+from bridgegen.adapters.carla.lights import matched
+from bridgegen.base.errors import InputError
 
 WORDS = {0: "Off", 1: "Red", 2: "Red", 3: "Yellow", 4: "Green"}
 
@@ -23,7 +23,7 @@ def test_a_light_that_is_not_there_is_named():
 
 def test_they_show_what_the_storyboard_says(made, machine, monkeypatch):
     """At every tick, those that it drives; the others are out; all are frozen, and free again."""
-    from bridgegen.simulation.carla import lights
+    from bridgegen.adapters.carla import lights
 
     pipeline = made("red-light-runner", "route-follower", ego="kinematic")
     shown = []

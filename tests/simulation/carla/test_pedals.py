@@ -8,9 +8,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bridgegen.simulation.carla import frame
-from bridgegen.simulation.carla.pedals import Car, Pedals
-from bridgegen.simulation.carla.settings import TIME_STEP
+from bridgegen.adapters.carla import frame
+from bridgegen.adapters.carla.pedals import Car, Pedals
+from bridgegen.adapters.carla.settings import TIME_STEP
 
 from .stand_in_actors import blueprints
 

@@ -7,16 +7,16 @@ import carla
 import numpy as np
 import pytest
 
-from bridgegen.ego import get
-from bridgegen.errors import InputError, UnknownNameError
-from bridgegen.odd.reader import load
+from bridgegen.adapters.carla import frame, server
+from bridgegen.adapters.carla.server import turn_at
+from bridgegen.base.errors import InputError, UnknownNameError
+from bridgegen.drivers import get
+from bridgegen.engine.options import PipelineOptions
+from bridgegen.engine.pipeline import Pipeline
 from bridgegen.openx.on_map import on_map
 from bridgegen.openx.opendrive.road_map import load_map
 from bridgegen.openx.openscenario.read import read
-from bridgegen.options import PipelineOptions
-from bridgegen.pipeline import Pipeline
-from bridgegen.simulation.carla import frame, server
-from bridgegen.simulation.carla.turn import turn_at
+from bridgegen.scenario.language.reader import load
 from bridgegen.simulation.choice import SimulatorChoice
 
 from ..embedded.storyboards import crossroads, lane, scenario, start
@@ -155,7 +155,7 @@ def test_a_world_is_loaded_once_for_the_same_roads(made, machine):
 
 def test_who_is_not_there_is_not_seen(made, machine, monkeypatch):
     """Under the road, until it is added."""
-    from bridgegen.simulation.carla.stage import BELOW
+    from bridgegen.adapters.carla.stage import BELOW
 
     assert BELOW < -10
     heights, tick = [], machine.tick
@@ -464,7 +464,7 @@ def test_another_time_step_is_refused(machine):
 def test_processes_take_turns_at_a_server(machine):
     """Another one waits for the row to end; in this one, turns nest."""
     code = (
-        "from bridgegen.simulation.carla.turn import turn_at\n"
+        "from bridgegen.adapters.carla.server import turn_at\n"
         "print('waits', flush=True)\n"
         f"with turn_at('localhost:{machine.port}'): print('has it', flush=True)"
     )

@@ -6,16 +6,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bridgegen.ego import get
-from bridgegen.odd.reader import load
+from bridgegen.adapters.carla.weather import Weather, clamped, of_quantities
+from bridgegen.drivers import get
+from bridgegen.engine.options import PipelineOptions
+from bridgegen.engine.pipeline import Pipeline
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.element import walk
 from bridgegen.openx.openscenario.read import read
-from bridgegen.options import PipelineOptions
-from bridgegen.pipeline import Pipeline
-from bridgegen.simulation.carla.weather import Weather, clamped, of_quantities
+from bridgegen.scenario.language.reader import load
+from bridgegen.scenario.weather import CARLA_FIELDS
 from bridgegen.simulation.choice import SimulatorChoice
-from bridgegen.weather import CARLA_FIELDS
 
 from ..embedded.storyboards import crossroads, lane, scenario, start
 from ..embedded.test_weathers import raining, weather_event

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from bridgegen import ego as egos
-from bridgegen.ego.drivers import is_spec
+from bridgegen import drivers as egos
+from bridgegen.drivers.drivers import is_spec
 from bridgegen.openx.opendrive.write import to_xml
 from bridgegen.openx.openscenario.read import read
 from bridgegen.simulation.choice import EMBEDDED, SimulatorChoice

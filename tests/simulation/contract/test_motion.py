@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from bridgegen.odd.reader import load
 from bridgegen.openx.source import source_of
+from bridgegen.scenario.language.reader import load
 
 from ..embedded.storyboards import (
     after,

@@ -6,10 +6,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bridgegen import ego as egos
-from bridgegen import metrics as measures
-from bridgegen.ego import DRIVERS
-from bridgegen.errors import InputError
+from bridgegen import drivers as egos
+from bridgegen.assess import metrics as measures
+from bridgegen.base.errors import InputError
+from bridgegen.drivers import DRIVERS
 from bridgegen.openx.openscenario.read import read
 from bridgegen.simulation.choice import EMBEDDED
 from bridgegen.simulation.embedded.simulator import EmbeddedSimulator

@@ -5,12 +5,12 @@ from functools import cache
 
 import numpy as np
 
-from bridgegen.ego import DRIVERS
-from bridgegen.ontology.individuals import build_static
+from bridgegen.drivers import DRIVERS
 from bridgegen.openx.opendrive.from_owl import opendrive_from_owl
 from bridgegen.openx.opendrive.model import Header, OpenDrive
 from bridgegen.openx.openscenario.read import read
 from bridgegen.openx.prepared import prepared
+from bridgegen.scenario.ontology.individuals import build_static
 from bridgegen.simulation.embedded.simulator import EmbeddedSimulator
 from bridgegen.simulation.rollout import Rollout
 

@@ -9,7 +9,7 @@ import math
 import numpy as np
 import pytest
 
-from bridgegen.errors import UnsupportedError
+from bridgegen.base.errors import UnsupportedError
 from bridgegen.simulation.rollout import STATUS_MESSAGES
 
 from .storyboards import after, events, lane, lateral, run, scenario, simulator, speeding, start

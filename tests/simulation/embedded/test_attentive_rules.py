@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from bridgegen.odd.others import with_others
-from bridgegen.odd.reader import load
-from bridgegen.options import PipelineOptions
-from bridgegen.pipeline import Pipeline
+from bridgegen.engine.options import PipelineOptions
+from bridgegen.engine.pipeline import Pipeline
+from bridgegen.scenario.language.others import with_others
+from bridgegen.scenario.language.reader import load
 from bridgegen.simulation.boxes import box_distance
 
 from .storyboards import lane, run, scenario, start

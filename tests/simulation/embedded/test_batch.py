@@ -6,10 +6,10 @@ import numba
 import numpy as np
 import pytest
 
-from bridgegen.compiled import address_of, kernel, row_type
-from bridgegen.odd.reader import load
-from bridgegen.options import PipelineOptions
-from bridgegen.pipeline import Pipeline
+from bridgegen.base.compiled import address_of, kernel, row_type
+from bridgegen.engine.options import PipelineOptions
+from bridgegen.engine.pipeline import Pipeline
+from bridgegen.scenario.language.reader import load
 from bridgegen.simulation.embedded.batch import Batch
 
 from .storyboards import crossroads, lane, scenario, simulator, start

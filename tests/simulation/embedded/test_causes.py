@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bridgegen import metrics
-from bridgegen.cause import Cause, Counterfactual, causes, counterfactuals
-from bridgegen.ego import DRIVERS
-from bridgegen.objective import CLASSIFYING, Objective
+from bridgegen.assess import metrics
+from bridgegen.assess.cause import Cause, Counterfactual, causes, counterfactuals
+from bridgegen.assess.objective import CLASSIFYING, Objective
+from bridgegen.drivers import DRIVERS
 
 from .storyboards import crossroads, friction, lane, scenario, simulator, start
 from .test_timed import timed, vertex

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from bridgegen.errors import ScenarioError, UnsupportedError
-from bridgegen.odd.reader import load
+from bridgegen.base.errors import ScenarioError, UnsupportedError
+from bridgegen.engine.pipeline import Pipeline
 from bridgegen.openx.opendrive.site_fit import site_for
-from bridgegen.pipeline import Pipeline
-from bridgegen.report.scenario_words import story_lines
+from bridgegen.pages.scenario_page import story_lines
+from bridgegen.scenario.language.reader import load
 
 HEAD = """
 scenario: two

@@ -9,7 +9,7 @@ import math
 
 import pytest
 
-from bridgegen.errors import UnsupportedError
+from bridgegen.base.errors import UnsupportedError
 
 from .storyboards import (
     after,

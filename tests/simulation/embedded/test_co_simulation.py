@@ -5,10 +5,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bridgegen.ego.driver_process import DriverError
-from bridgegen.odd.reader import load
-from bridgegen.options import PipelineOptions
-from bridgegen.pipeline import Pipeline
+from bridgegen.drivers.driver_process import DriverError
+from bridgegen.engine.options import PipelineOptions
+from bridgegen.engine.pipeline import Pipeline
+from bridgegen.scenario.language.reader import load
 
 EGO = Path(__file__).parents[2] / "ego"
 FIELDS = ("x", "y", "h", "v", "a", "offset", "n_steps", "status", "detections", "lights", "began")

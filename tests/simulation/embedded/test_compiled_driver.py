@@ -6,12 +6,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bridgegen.cause import Cause, counterfactuals
-from bridgegen.ego.driver_process import DriverError
-from bridgegen.errors import InputError
-from bridgegen.odd.reader import load
-from bridgegen.options import PipelineOptions
-from bridgegen.pipeline import Pipeline
+from bridgegen.assess.cause import Cause, counterfactuals
+from bridgegen.base.errors import InputError
+from bridgegen.drivers.driver_process import DriverError
+from bridgegen.engine.options import PipelineOptions
+from bridgegen.engine.pipeline import Pipeline
+from bridgegen.scenario.language.reader import load
 
 DRIVERS = Path(__file__).parents[2] / "ego"
 FIELDS = ("x", "y", "h", "v", "a", "offset", "n_steps", "status", "detections", "lights", "began")

@@ -9,7 +9,7 @@ import re
 import numpy as np
 import pytest
 
-from bridgegen.errors import UnsupportedError
+from bridgegen.base.errors import UnsupportedError
 
 from .storyboards import after, events, lane, lateral, run, scenario, simulator, speeding, start
 

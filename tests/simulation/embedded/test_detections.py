@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from bridgegen.ego.detections import BOTH, CAMERA, LIDAR, MISSED, NO_FRAME, SEEN_BY, X, Y
-from bridgegen.odd.reader import load
-from bridgegen.options import PipelineOptions
-from bridgegen.pipeline import Pipeline
+from bridgegen.drivers.detections import BOTH, CAMERA, LIDAR, MISSED, NO_FRAME, SEEN_BY, X, Y
+from bridgegen.engine.options import PipelineOptions
+from bridgegen.engine.pipeline import Pipeline
+from bridgegen.scenario.language.reader import load
 
 ROWS = 24
 

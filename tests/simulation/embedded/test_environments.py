@@ -5,12 +5,12 @@ import math
 import numpy as np
 import pytest
 
-from bridgegen.ego import _weather_columns as column
-from bridgegen.errors import UnsupportedError
-from bridgegen.odd.reader import load
+from bridgegen.base.errors import UnsupportedError
+from bridgegen.drivers import _weather_columns as column
+from bridgegen.engine.pipeline import Pipeline
 from bridgegen.openx.openscenario.from_owl.weather import time_of_day
-from bridgegen.pipeline import Pipeline
-from bridgegen.simulation.embedded.compiler.environments import sun_at
+from bridgegen.scenario.language.reader import load
+from bridgegen.simulation.embedded.compiler.global_actions import sun_at
 
 from .storyboards import after, crossroads, lane, scenario, simulator, start
 

@@ -6,8 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from bridgegen import ego, simulation
-from bridgegen.ego.drivers import DRIVERS, GUESTS
+from bridgegen import drivers as ego
+from bridgegen import simulation
+from bridgegen.drivers.drivers import DRIVERS, GUESTS
 from bridgegen.simulation.embedded.drivers import DEMANDS
 
 NAME = "bridgegen.simulation.embedded"

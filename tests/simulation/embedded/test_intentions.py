@@ -6,10 +6,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bridgegen.odd.reader import load
-from bridgegen.options import PipelineOptions
-from bridgegen.pipeline import Pipeline
-from bridgegen.report.playbacks import _plans
+from bridgegen.engine.options import PipelineOptions
+from bridgegen.engine.pipeline import Pipeline
+from bridgegen.pages.playbacks import _plans
+from bridgegen.scenario.language.reader import load
 from bridgegen.simulation.embedded.batch import Batch
 from bridgegen.simulation.embedded.intentions import EVERY
 

@@ -12,8 +12,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.interpolate import BSpline
 
-from bridgegen.errors import UnsupportedError
-from bridgegen.simulation.embedded.compiler.splines import basis
+from bridgegen.base.errors import UnsupportedError
+from bridgegen.simulation.embedded.compiler.curves import basis
 from bridgegen.simulation.rollout import STATUS_MESSAGES
 
 from .storyboards import after, events, lane, run, scenario, simulator, speeding, start

@@ -6,19 +6,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bridgegen import participants as participant_types
-from bridgegen.conflict.plausibility import plausibility
-from bridgegen.ego import lamps
-from bridgegen.errors import ScenarioError
-from bridgegen.named_models import MODELS
-from bridgegen.odd.reader import load
-from bridgegen.ontology.check import check
+from bridgegen.assess.conflict.plausibility import plausibility
+from bridgegen.base.errors import ScenarioError
+from bridgegen.base.physics import GRAVITY, GRIP
+from bridgegen.drivers import lamps
+from bridgegen.engine.pipeline import Pipeline
 from bridgegen.openx.openscenario.from_owl import openscenario_from_owl
 from bridgegen.openx.openscenario.to_owl import individuals_from_openscenario
 from bridgegen.openx.openscenario.write import to_xml
-from bridgegen.physics import GRAVITY, GRIP
-from bridgegen.pipeline import Pipeline
-from bridgegen.report.scenario_words import story_lines
+from bridgegen.pages.scenario_page import story_lines
+from bridgegen.scenario import participants as participant_types
+from bridgegen.scenario.language.reader import load
+from bridgegen.scenario.named_models import MODELS
+from bridgegen.scenario.ontology.check import check
 
 HEAD = """
 scenario: mine

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from bridgegen.errors import InputError
+from bridgegen.base.errors import InputError
 from bridgegen.openx.openscenario.read import read
 from bridgegen.simulation.embedded.simulator import EmbeddedSimulator
 

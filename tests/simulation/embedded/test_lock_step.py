@@ -5,10 +5,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bridgegen.errors import InputError
-from bridgegen.odd.reader import load
-from bridgegen.options import PipelineOptions
-from bridgegen.pipeline import Pipeline
+from bridgegen.base.errors import InputError
+from bridgegen.engine.options import PipelineOptions
+from bridgegen.engine.pipeline import Pipeline
+from bridgegen.scenario.language.reader import load
 
 DRIVERS = Path(__file__).parents[2] / "ego" / "drivers.py"
 FIELDS = ("x", "y", "h", "v", "a", "offset", "n_steps", "status")

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from bridgegen.errors import UnsupportedError
+from bridgegen.base.errors import UnsupportedError
 
 from .storyboards import (
     after,

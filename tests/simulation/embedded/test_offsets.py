@@ -7,7 +7,7 @@ is left of the road's direction (north, away from the junction) is west of it.
 import numpy as np
 import pytest
 
-from bridgegen.errors import InputError
+from bridgegen.base.errors import InputError
 
 from .storyboards import after, events, lane, lateral, run, scenario, start
 

@@ -3,16 +3,16 @@
 import numpy as np
 import pytest
 
-from bridgegen.conflict.analysis import analyse
-from bridgegen.conflict.plausibility import plausibility
-from bridgegen.conflict.types import Rule
-from bridgegen.errors import ScenarioError
-from bridgegen.odd.reader import load
-from bridgegen.ontology.check import check
+from bridgegen.assess.conflict.analysis import analyse
+from bridgegen.assess.conflict.plausibility import plausibility
+from bridgegen.assess.conflict.types import Rule
+from bridgegen.base.errors import ScenarioError
+from bridgegen.engine.pipeline import Pipeline
 from bridgegen.openx.openscenario.from_owl import openscenario_from_owl
 from bridgegen.openx.openscenario.to_owl import individuals_from_openscenario
 from bridgegen.openx.openscenario.write import to_xml
-from bridgegen.pipeline import Pipeline
+from bridgegen.scenario.language.reader import load
+from bridgegen.scenario.ontology.check import check
 
 DRIVEWAY = """
 scenario: driveway

@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from bridgegen.errors import UnsupportedError
-from bridgegen.physics import GRIP
+from bridgegen.base.errors import UnsupportedError
+from bridgegen.base.physics import GRIP
 from bridgegen.simulation.embedded.motion._pedal_kernels import PARKED, RATIO
 
 from .storyboards import after, crossroads, events, lane, run, scenario, speeding, start

@@ -9,8 +9,8 @@ import math
 import numpy as np
 import pytest
 
-from bridgegen.errors import InputError, UnsupportedError
-from bridgegen.simulate import simulate_file
+from bridgegen.base.errors import InputError, UnsupportedError
+from bridgegen.engine.simulate import simulate_file
 from bridgegen.simulation.rollout import STATUS_MESSAGES
 
 from .storyboards import (

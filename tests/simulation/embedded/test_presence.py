@@ -7,8 +7,8 @@ the instants are 0.05 s apart. A car is 4 m long, its front 3.4 m ahead of its r
 import numpy as np
 import pytest
 
-from bridgegen.ego import DRIVERS
-from bridgegen.errors import InputError, UnsupportedError
+from bridgegen.base.errors import InputError, UnsupportedError
+from bridgegen.drivers import DRIVERS
 from bridgegen.openx.openscenario.read import read
 from bridgegen.simulation.embedded.simulator import EmbeddedSimulator
 

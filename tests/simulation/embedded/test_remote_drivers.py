@@ -11,11 +11,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bridgegen.ego.remote import process as remote_process
-from bridgegen.errors import InputError
-from bridgegen.odd.reader import load
-from bridgegen.options import PipelineOptions
-from bridgegen.pipeline import Pipeline
+from bridgegen.base.errors import InputError
+from bridgegen.drivers.remote import process as remote_process
+from bridgegen.engine.options import PipelineOptions
+from bridgegen.engine.pipeline import Pipeline
+from bridgegen.scenario.language.reader import load
 
 TESTS = Path(__file__).parents[2]
 DRIVERS = TESTS / "ego" / "drivers.py"
@@ -31,7 +31,9 @@ def made(ego, scenario="crossroads-s1", **kwargs):
 
 
 def command(name, file=DRIVERS):
-    return "exec:" + shlex.join([sys.executable, "-m", "bridgegen.ego.remote", f"{file}:{name}"])
+    return "exec:" + shlex.join(
+        [sys.executable, "-m", "bridgegen.drivers.remote", f"{file}:{name}"]
+    )
 
 
 def rows(pipeline, n=N):
@@ -40,7 +42,7 @@ def rows(pipeline, n=N):
 
 def serve(path, name):
     process = subprocess.Popen(
-        [sys.executable, "-m", "bridgegen.ego.remote", f"{DRIVERS}:{name}", f"unix:{path}"],
+        [sys.executable, "-m", "bridgegen.drivers.remote", f"{DRIVERS}:{name}", f"unix:{path}"],
         stderr=subprocess.PIPE, text=True,
     )  # fmt: skip
     assert process.stderr.readline() == f"serving on unix:{path}\n"

@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bridgegen.errors import InputError, UnsupportedError
+from bridgegen.base.errors import InputError, UnsupportedError
 from bridgegen.simulation.rollout import STATUS_MESSAGES, joined
 
 from .storyboards import (

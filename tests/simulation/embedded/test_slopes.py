@@ -8,10 +8,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from bridgegen.base.physics import GRAVITY, GRIP
 from bridgegen.openx.opendrive.model import OpenDrive
 from bridgegen.openx.opendrive.plan_view import Cubic
 from bridgegen.openx.opendrive.routes import plan_route
-from bridgegen.physics import GRAVITY, GRIP
 from bridgegen.simulation.embedded._motion_kernels import SLOW, bicycle
 from bridgegen.simulation.embedded.places.slopes import LEVEL, slopes
 

@@ -6,7 +6,7 @@ Source of the expected values: ASAM OpenSCENARIO XML 1.3.1, 8.4, worked by hand 
 import numpy as np
 import pytest
 
-from bridgegen.errors import UnsupportedError
+from bridgegen.base.errors import UnsupportedError
 from bridgegen.openx.openscenario.read import read
 from bridgegen.simulation.embedded._codes import COMPLETE, OFF, RUNNING, STANDBY
 from bridgegen.simulation.embedded.compiler.nodes import nodes

@@ -7,7 +7,7 @@ from typing import Annotated, Union, get_args, get_origin, get_type_hints
 
 import pytest
 
-from bridgegen.errors import UnsupportedError
+from bridgegen.base.errors import UnsupportedError
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.element import Element
 

@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bridgegen.ego import DRIVERS
-from bridgegen.errors import InputError, UnsupportedError
+from bridgegen.base.errors import InputError, UnsupportedError
+from bridgegen.drivers import DRIVERS
 from bridgegen.openx.openscenario.read import read
 from bridgegen.simulation.embedded.compiler.trajectories import timetable
 from bridgegen.simulation.embedded.motion._follow_kernels import at_time

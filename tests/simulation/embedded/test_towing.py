@@ -10,11 +10,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bridgegen.conflict.analysis import Responsible, analyse
-from bridgegen.conflict.plausibility import plausibility
-from bridgegen.conflict.sentences import sentence
-from bridgegen.errors import UnsupportedError
-from bridgegen.metrics.n_collision import n_collision
+from bridgegen.assess.conflict.analysis import Responsible, analyse
+from bridgegen.assess.conflict.plausibility import plausibility
+from bridgegen.assess.conflict.sentences import sentence
+from bridgegen.assess.metrics.n_collision import n_collision
+from bridgegen.base.errors import UnsupportedError
 from bridgegen.simulation.accidents import accidents
 from bridgegen.simulation.embedded.motion._towing_kernels import drawn
 from bridgegen.simulation.rollout import Rollout

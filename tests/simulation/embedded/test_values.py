@@ -2,7 +2,7 @@
 
 import pytest
 
-from bridgegen.errors import UnsupportedError
+from bridgegen.base.errors import UnsupportedError
 
 from .storyboards import after, lane, run, scenario, simulator, speeding, start
 

@@ -9,14 +9,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import bridgegen as bg
-from bridgegen.campaign.scenario_files import with_vehicle, write_scenario
-from bridgegen.cause import Cause
-from bridgegen.errors import InputError, UnknownNameError
-from bridgegen.odd.reader import load
+from bridgegen.assess.cause import Cause
+from bridgegen.base.errors import InputError, UnknownNameError
+from bridgegen.engine.options import PipelineOptions
+from bridgegen.engine.pipeline import Pipeline
+from bridgegen.engine.simulate import simulate_file
+from bridgegen.jobs.search.scenario_files import with_vehicle, write_scenario
 from bridgegen.openx.openscenario.read import read
-from bridgegen.options import PipelineOptions
-from bridgegen.pipeline import Pipeline
-from bridgegen.simulate import simulate_file
+from bridgegen.scenario.language.reader import load
 from bridgegen.simulation.choice import SimulatorChoice
 from bridgegen.simulation.embedded import simulator as embedded
 from bridgegen.simulation.embedded.drivers._chassis_kernels import lagged
@@ -160,7 +160,7 @@ def test_where_it_cannot_be():
 def changed(tmp_path, old, new):
     """Return a file of the catalogue's lead-brakes that says something else."""
     path = tmp_path / "changed.yaml"
-    text = files("bridgegen.catalogue").joinpath("lead-brakes.yaml").read_text("utf-8")
+    text = files("bridgegen.scenario.catalogue").joinpath("lead-brakes.yaml").read_text("utf-8")
     assert old in text
     path.write_text(text.replace(old, new, 1), "utf-8")
     return path

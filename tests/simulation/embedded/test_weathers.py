@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bridgegen.ego import _weather_columns as column
+from bridgegen.drivers import _weather_columns as column
 from bridgegen.simulation.embedded.batch import Batch
 
 from .storyboards import after, crossroads, lane, scenario, simulator, start

@@ -11,11 +11,11 @@ from pathlib import Path
 import numpy as np
 from lxml import etree
 
-from bridgegen.ego import DRIVERS
-from bridgegen.errors import InputError
-from bridgegen.openx.logic_file import roads_of
+from bridgegen.base.errors import InputError
+from bridgegen.drivers import DRIVERS
 from bridgegen.openx.openscenario import parameters
 from bridgegen.openx.openscenario.read import read
+from bridgegen.openx.prepared import roads_of
 from bridgegen.simulation.embedded.simulator import EmbeddedSimulator
 from bridgegen.simulation.esmini import process
 from bridgegen.simulation.esmini.files import ScenarioFile

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from lxml import etree
 
-from bridgegen.odd.reader import load
 from bridgegen.openx.opendrive.read import read as read_roads
 from bridgegen.openx.openscenario.read import read
 from bridgegen.openx.source import source_of
+from bridgegen.scenario.language.reader import load
 from bridgegen.simulation.esmini.files import RoadFiles, ScenarioFile
-from bridgegen.simulation.esmini.log import error_in
+from bridgegen.simulation.esmini.process import error_in
 
 from ..embedded.storyboards import (
     after,

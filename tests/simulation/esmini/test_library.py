@@ -4,9 +4,9 @@ from pathlib import Path
 
 import pytest
 
-from bridgegen.errors import InputError
-from bridgegen.odd.reader import load
-from bridgegen.pipeline import Pipeline
+from bridgegen.base.errors import InputError
+from bridgegen.engine.pipeline import Pipeline
+from bridgegen.scenario.language.reader import load
 from bridgegen.simulation.choice import SimulatorChoice
 
 

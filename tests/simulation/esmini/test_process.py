@@ -11,12 +11,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bridgegen.ego import DRIVERS
-from bridgegen.errors import InputError
-from bridgegen.isolated import CallError
+from bridgegen.base.errors import InputError
+from bridgegen.base.processes.isolated import CallError
+from bridgegen.drivers import DRIVERS
+from bridgegen.engine.simulate import simulate_file
 from bridgegen.openx.opendrive.write import to_xml
 from bridgegen.openx.openscenario.read import read
-from bridgegen.simulate import simulate_file
 from bridgegen.simulation.embedded.simulator import EmbeddedSimulator
 from bridgegen.simulation.esmini import process
 from bridgegen.simulation.esmini.simulator import EsminiSimulator
@@ -134,8 +134,8 @@ def test_whoever_is_killed_leaves_nothing_behind(library, tmp_path):
         "import os, signal\n"
         "from pathlib import Path\n"
         "import numpy as np\n"
-        "from bridgegen.ego import DRIVERS\n"
-        "from bridgegen.openx.logic_file import roads_of\n"
+        "from bridgegen.drivers import DRIVERS\n"
+        "from bridgegen.openx.prepared import roads_of\n"
         "from bridgegen.openx.openscenario.read import read\n"
         "from bridgegen.simulation.embedded.simulator import EmbeddedSimulator\n"
         "from bridgegen.simulation.esmini import process\n"

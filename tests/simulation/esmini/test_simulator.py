@@ -5,12 +5,12 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 import pytest
 
-from bridgegen.odd.adversary import adversarial
-from bridgegen.odd.reader import load
+from bridgegen.engine.options import PipelineOptions
+from bridgegen.engine.pipeline import Pipeline
+from bridgegen.engine.simulate import simulate_file
 from bridgegen.openx.opendrive.write import to_xml
-from bridgegen.options import PipelineOptions
-from bridgegen.pipeline import Pipeline
-from bridgegen.simulate import simulate_file
+from bridgegen.scenario.language.adversary import adversarial
+from bridgegen.scenario.language.reader import load
 
 from ..embedded.storyboards import crossroads, lane, scenario, start
 

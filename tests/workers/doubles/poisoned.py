@@ -5,8 +5,8 @@ import signal
 
 import numpy as np
 
-from bridgegen.pipeline import Pipeline
-from bridgegen.workers import Recipe, Threads
+from bridgegen.engine.pipeline import Pipeline
+from bridgegen.engine.workers import Recipe, Threads
 
 
 class Poisoned(Pipeline):

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from bridgegen.errors import UnknownNameError
-from bridgegen.workers import Recipe
+from bridgegen.base.errors import UnknownNameError
+from bridgegen.engine.workers import Recipe
 
 
 class Doubler:

@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from bridgegen.arrays import Float
-from bridgegen.comparison.drawing import Theme
-from bridgegen.comparison.statistics import Quartiles, quartiles
+from bridgegen.base.arrays import Float
+from bridgegen.base.statistics import Quartiles, quartiles
+from bridgegen.jobs.compare.figures import Theme
 from bridgegen_reproduction.figures.look import SIZE, legend, looks, panels, title_of
 from bridgegen_reproduction.paper import POPULATION
 from bridgegen_reproduction.runs import Run

@@ -5,13 +5,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bridgegen.arrays import Float
-from bridgegen.comparison.drawing import Theme
-from bridgegen.comparison.fronts import spread
-from bridgegen.comparison.measures import Measured
-from bridgegen.comparison.plan import Cell
-from bridgegen.comparison.record import Record
-from bridgegen.comparison.statistics import quartiles
+from bridgegen.base.arrays import Float
+from bridgegen.base.statistics import quartiles
+from bridgegen.jobs.compare.figures import Theme
+from bridgegen.jobs.compare.fronts import spread
+from bridgegen.jobs.compare.measures import Measured
+from bridgegen.jobs.compare.plan import Cell
+from bridgegen.jobs.compare.record import Record
 from bridgegen_reproduction.figures.look import legend, looks, panels, title_of
 
 if TYPE_CHECKING:

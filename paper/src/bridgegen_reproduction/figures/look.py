@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from bridgegen.comparison.drawing import Theme, blank, dress
+from bridgegen.jobs.compare.figures import Theme, blank, dress
 from bridgegen_reproduction.paper import METHODS, TITLES
 
 if TYPE_CHECKING:

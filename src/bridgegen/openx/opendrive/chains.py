@@ -9,12 +9,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bridgegen.arrays import Float
-from bridgegen.ontology.site import ArmRoad, Direction, JunctionEnd, LaneType, SiteLane
+from bridgegen.base.arrays import Float
 from bridgegen.openx.opendrive.geometry import reference_line
 from bridgegen.openx.opendrive.lanes import section_end, values
 from bridgegen.openx.opendrive.legs import leads_to
 from bridgegen.openx.opendrive.model import LaneSection, OpenDrive, Road
+from bridgegen.scenario.ontology.site import ArmRoad, Direction, JunctionEnd, LaneType, SiteLane
 
 ROAD_TYPES = ("town", "rural", "motorway")
 """Types of road that a scenario distinguishes."""

@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from bridgegen.arrays import Float
+from bridgegen.base.arrays import Float
 from bridgegen.openx.opendrive.model import Road
 from bridgegen.openx.opendrive.plan_view import Arc, Geometry, Line, ParamPoly3, Poly3, Spiral
 

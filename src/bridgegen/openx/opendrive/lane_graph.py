@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from bridgegen.arrays import Float, Int
+from bridgegen.base.arrays import Float, Int
 from bridgegen.openx.opendrive.geometry import reference_line, reference_pose
 from bridgegen.openx.opendrive.lanes import borders, lane_at, section_end, section_index
 from bridgegen.openx.opendrive.model import OpenDrive

@@ -9,8 +9,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from bridgegen.arrays import Float
-from bridgegen.errors import InputError
+from bridgegen.base.arrays import Float
+from bridgegen.base.errors import InputError
 from bridgegen.openx.opendrive.geometry import geometry_index, pose, reference_line
 from bridgegen.openx.opendrive.model import Lane, LaneSection, Road
 from bridgegen.openx.opendrive.plan_view import Cubic

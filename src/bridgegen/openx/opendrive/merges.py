@@ -4,12 +4,12 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from bridgegen.ontology.site import Leg, Site
 from bridgegen.openx.opendrive.chains import chain, run_at
 from bridgegen.openx.opendrive.legs import heading, leads_to
 from bridgegen.openx.opendrive.model import Junction, OpenDrive, Road
 from bridgegen.openx.opendrive.routes import Stretch, next_stretches, plan_route
 from bridgegen.openx.opendrive.site import map_stem
+from bridgegen.scenario.ontology.site import Leg, Site
 
 ASIDE = 45.0
 """Who joins a carriageway comes from a direction that differs from its own by less [deg]; ours."""

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import ClassVar
 
-from bridgegen.errors import InputError
+from bridgegen.base.errors import InputError
 from bridgegen.openx.opendrive.declaration import attribute, child, children, ids, only_child, text
 from bridgegen.openx.opendrive.furniture import Controller, Object, Signal, SignalReference
 from bridgegen.openx.opendrive.plan_view import LENGTH_LIMIT, Cubic, Geometry

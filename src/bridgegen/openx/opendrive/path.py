@@ -13,8 +13,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from bridgegen.arrays import Float
-from bridgegen.errors import InputError
+from bridgegen.base.arrays import Float
+from bridgegen.base.errors import InputError
 from bridgegen.openx.opendrive.geometry import (
     Curve,
     evaluate,

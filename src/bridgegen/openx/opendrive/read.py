@@ -12,7 +12,7 @@ from typing import Any
 
 from lxml import etree
 
-from bridgegen.errors import FileFormatError, UnsupportedError
+from bridgegen.base.errors import FileFormatError, UnsupportedError
 from bridgegen.openx.opendrive.declaration import DECORATION, ID, Field, plan
 from bridgegen.openx.opendrive.geometry import impossible_shape
 from bridgegen.openx.opendrive.model import (
@@ -24,9 +24,9 @@ from bridgegen.openx.opendrive.model import (
     Road,
 )
 from bridgegen.openx.opendrive.plan_view import SHARP_CURVATURE, Arc, Geometry, Spiral
-from bridgegen.openx.opendrive.references import broken_references, misnumbered
 from bridgegen.openx.opendrive.repair import Lines, Notes, repair, repair_section
 from bridgegen.openx.opendrive.user_data import PREFIX, UserData
+from bridgegen.openx.opendrive.validate import broken_references, misnumbered
 from bridgegen.openx.xml import parse_xml
 
 NUMBER_LIMIT = 1e9

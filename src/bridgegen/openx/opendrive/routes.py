@@ -12,8 +12,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from bridgegen.arrays import Float
-from bridgegen.errors import InputError
+from bridgegen.base.arrays import Float
+from bridgegen.base.errors import InputError
 from bridgegen.openx.opendrive.lanes import Coefficients, lane_at, section_end, section_index
 from bridgegen.openx.opendrive.model import OpenDrive, Road
 from bridgegen.openx.opendrive.path import LanePath, Piece, joined, pieces_of, sample

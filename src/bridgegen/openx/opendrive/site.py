@@ -4,13 +4,13 @@ import math
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 
-from bridgegen.errors import InputError, UnsupportedError
-from bridgegen.odd.roads import HEADINGS
-from bridgegen.ontology.site import ArmRoad, Leg, Site
+from bridgegen.base.errors import InputError, UnsupportedError
 from bridgegen.openx.opendrive.chains import chain, run_at
 from bridgegen.openx.opendrive.legs import heading
 from bridgegen.openx.opendrive.model import Junction, OpenDrive, Road
 from bridgegen.openx.opendrive.rings import Ring
+from bridgegen.scenario.language.roads import HEADINGS
+from bridgegen.scenario.ontology.site import ArmRoad, Leg, Site
 
 KNOWN_SITES = {"Town05": "965"}
 """The default junction of a map, by the map's name.

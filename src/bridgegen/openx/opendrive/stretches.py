@@ -9,12 +9,12 @@ reference line with ``-back`` (``12-back``, ``12.2-back``).
 import math
 from collections.abc import Iterator
 
-from bridgegen.ontology.site import Leg, Site
 from bridgegen.openx.opendrive.chains import Run, chain, runs
 from bridgegen.openx.opendrive.geometry import reference_pose
 from bridgegen.openx.opendrive.legs import leads_to
 from bridgegen.openx.opendrive.model import OpenDrive
 from bridgegen.openx.opendrive.site import map_stem
+from bridgegen.scenario.ontology.site import Leg, Site
 
 SHORTEST = 20.0
 """Shorter stretches are left out [m]: the shortest road of a scenario file."""

@@ -4,7 +4,7 @@ from typing import Any
 
 from lxml import etree
 
-from bridgegen.errors import InputError
+from bridgegen.base.errors import InputError
 from bridgegen.openx.opendrive.declaration import plan
 from bridgegen.openx.opendrive.model import OpenDrive
 

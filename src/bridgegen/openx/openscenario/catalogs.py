@@ -13,8 +13,8 @@ from pathlib import Path
 
 from lxml import etree
 
-from bridgegen.errors import FileFormatError
-from bridgegen.openx.openscenario.catalog_files import CatalogLocations
+from bridgegen.base.errors import FileFormatError
+from bridgegen.openx.openscenario.declarations import CatalogLocations
 from bridgegen.openx.openscenario.element import Element, rewritten
 from bridgegen.openx.openscenario.entities import Controller, MiscObject, Pedestrian, Vehicle
 from bridgegen.openx.openscenario.environment import Environment

@@ -8,22 +8,21 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
-from bridgegen.errors import FileFormatError, InputError, UnsupportedError
-from bridgegen.odd.distributions import (
+from bridgegen.base.errors import FileFormatError, InputError, UnsupportedError
+from bridgegen.openx.openscenario.declarations import File, FileHeader, ParameterAssignment
+from bridgegen.openx.openscenario.element import AtLeast, Element, Tag
+from bridgegen.openx.openscenario.read import DISTRIBUTION
+from bridgegen.openx.openscenario.reader import element_of
+from bridgegen.openx.openscenario.values import Kind, LiteralString, parse_literal
+from bridgegen.openx.xml import parse_xml
+from bridgegen.scenario.language.distributions import (
     Discrete,
     Distribution,
     LogNormal,
     Normal,
     Uniform,
 )
-from bridgegen.odd.distributions import Histogram as Bins
-from bridgegen.openx.openscenario.catalog_files import ParameterAssignment
-from bridgegen.openx.openscenario.declarations import File, FileHeader
-from bridgegen.openx.openscenario.element import AtLeast, Element, Tag
-from bridgegen.openx.openscenario.read import DISTRIBUTION
-from bridgegen.openx.openscenario.reader import element_of
-from bridgegen.openx.openscenario.values import Kind, LiteralString, parse_literal
-from bridgegen.openx.xml import parse_xml
+from bridgegen.scenario.language.distributions import Histogram as Bins
 
 VERSIONS = ("1.1", "1.2", "1.3")
 

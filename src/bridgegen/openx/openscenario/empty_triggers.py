@@ -6,7 +6,7 @@ conditions, evaluates to false; esmini's own scenarios rely on the other reading
 
 from dataclasses import replace
 
-from bridgegen.errors import UnknownNameError
+from bridgegen.base.errors import UnknownNameError
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.element import Element, rewritten
 

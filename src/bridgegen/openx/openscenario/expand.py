@@ -11,31 +11,153 @@ All of it happens in this one place, when a file is read, so that users of a sce
 Elements from a catalogue are marked in their lines (`catalogs.CatalogLine`).
 """
 
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
-from bridgegen.errors import FileFormatError, UnsupportedError
-from bridgegen.openx.openscenario.catalog_files import CatalogLocations, CatalogReference
+from bridgegen.base.errors import FileFormatError, UnsupportedError
 from bridgegen.openx.openscenario.catalogs import Catalogs, NoEntryError
-from bridgegen.openx.openscenario.declarations import ParameterDeclaration, ParameterDeclarations
+from bridgegen.openx.openscenario.declarations import (
+    CatalogLocations,
+    CatalogReference,
+    ParameterDeclaration,
+    ParameterDeclarations,
+)
 from bridgegen.openx.openscenario.element import (
     PARAMETER,
     Child,
     Element,
     declaration,
+    rewritten,
     values_of,
     walk,
 )
-from bridgegen.openx.openscenario.entities import EntityRef, Trailer
+from bridgegen.openx.openscenario.entities import (
+    Entities,
+    EntityRef,
+    ExternalObjectReference,
+    MiscObject,
+    Pedestrian,
+    ScenarioObject,
+    Trailer,
+    Vehicle,
+)
+from bridgegen.openx.openscenario.enumerations import ObjectType
 from bridgegen.openx.openscenario.pruning import without
 from bridgegen.openx.openscenario.reader import shorten
 from bridgegen.openx.openscenario.scopes import Binding, Scope, is_made, reads_as_number
-from bridgegen.openx.openscenario.selections import without_selections
-from bridgegen.openx.openscenario.storyboard import OpenScenario
-from bridgegen.openx.openscenario.towing import with_trailers_apart
+from bridgegen.openx.openscenario.storyboard import InitActions, OpenScenario
 from bridgegen.openx.openscenario.values import Expr, Kind, Value
 from bridgegen.openx.xml import MAX_DEPTH
+
+# --- Several entities under one name, replaced by their names wherever there may be several ---
+
+
+_KINDS: dict[type[Element], ObjectType] = {
+    Vehicle: ObjectType.VEHICLE,
+    Pedestrian: ObjectType.PEDESTRIAN,
+    MiscObject: ObjectType.MISCELLANEOUS,
+    ExternalObjectReference: ObjectType.EXTERNAL,
+}
+
+
+def without_selections(scenario: OpenScenario) -> OpenScenario:
+    """Return a scenario in which the members of each selection stand for it.
+
+    They do wherever an element lists entities, and as actors of initial actions. Elsewhere the
+    name stays, and refers to no entity.
+    """
+    selections = scenario.entities.entity_selections
+    if not selections:
+        return scenario
+    objects = scenario.entities.scenario_objects
+    members: dict[Any, tuple[Any, ...]] = {}
+    for one in selections:
+        found: dict[Any, None] = {}
+        for member in one.members.members:
+            if isinstance(member, EntityRef):
+                found |= dict.fromkeys(members.get(member.entity_ref, (member.entity_ref,)))
+            else:
+                found |= dict.fromkeys(_of_kind(objects, member.object_type))
+        members[one.name] = tuple(found)
+
+    def change(element: Element) -> Element:
+        if isinstance(element, InitActions):
+            privates = tuple(
+                replace(private, entity_ref=name)
+                for private in element.privates
+                for name in members.get(private.entity_ref, (private.entity_ref,))
+            )
+            return replace(element, privates=privates)
+        refs = getattr(element, "entity_refs", None)
+        if refs is None:
+            return element
+        several: tuple[EntityRef, ...] = tuple(
+            replace(ref, entity_ref=name)
+            for ref in refs
+            for name in members.get(ref.entity_ref, (ref.entity_ref,))
+        )
+        changes: dict[str, Any] = {"entity_refs": several}
+        return replace(element, **changes)
+
+    made = rewritten(scenario, change)
+    return replace(made, entities=Entities(made.entities.scenario_objects))
+
+
+def _of_kind(objects: tuple[ScenarioObject, ...], kind: Any) -> list[Any]:
+    return [one.name for one in objects if _KINDS[type(one.entity_object)] == kind]
+
+
+# --- Vehicles that tow others: each trailer an entity of its own ---
+
+
+def with_trailers_apart(scenario: OpenScenario) -> OpenScenario:
+    """Return a scenario in which no vehicle contains another: it names the one that it tows.
+
+    The trailers stand behind all other entities. One keeps its name unless another entity has it;
+    then its towing vehicle's stands before it ("Lorry.trailer").
+    """
+    objects = scenario.entities.scenario_objects
+    if not any(_towed(one) for one in objects):
+        return scenario
+    taken = {str(one.name) for one in objects}
+    apart: list[ScenarioObject] = []
+    trailers: list[ScenarioObject] = []
+    for one in objects:
+        first, *others = _uncoupled(one, taken)
+        apart.append(first)
+        trailers += others
+    entities = Entities((*apart, *trailers), scenario.entities.entity_selections)
+    return replace(scenario, entities=entities)
+
+
+def _towed(one: ScenarioObject) -> ScenarioObject | None:
+    """Return the trailer that an entity contains, if it contains one."""
+    vehicle = one.entity_object
+    if not isinstance(vehicle, Vehicle) or vehicle.trailer is None:
+        return None
+    inner = vehicle.trailer.trailer
+    return inner if isinstance(inner, ScenarioObject) else None
+
+
+def _uncoupled(one: ScenarioObject, taken: set[str]) -> Iterator[ScenarioObject]:
+    """Yield an entity, and those that it tows, one behind the other."""
+    inner, vehicle = _towed(one), one.entity_object
+    if inner is None:
+        yield one
+        return
+    assert isinstance(vehicle, Vehicle)
+    assert vehicle.trailer is not None
+    name, number = str(inner.name), 1
+    while name in taken:
+        name = f"{one.name}.{inner.name}" + (f"_{number}" if number > 1 else "")
+        number += 1
+    taken.add(name)
+    named = Trailer(EntityRef(name, line=inner.line), line=vehicle.trailer.line)
+    yield replace(one, entity_object=replace(vehicle, trailer=named))
+    yield from _uncoupled(replace(inner, name=name), taken)
+
 
 MAX_ELEMENTS = 200_000
 """Elements from catalogues, counted wherever they are put."""

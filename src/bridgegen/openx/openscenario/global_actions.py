@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Annotated
 
-from bridgegen.openx.openscenario.catalog_files import CATALOG
+from bridgegen.openx.openscenario.declarations import CATALOG
 from bridgegen.openx.openscenario.element import (
     ENTITY,
     MONITOR,

@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import Literal
 
-from bridgegen.errors import FileFormatError
+from bridgegen.base.errors import FileFormatError
 from bridgegen.openx.openscenario.read import DISTRIBUTION
 from bridgegen.openx.xml import parse_xml
 

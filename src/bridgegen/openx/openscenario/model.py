@@ -8,23 +8,15 @@ Source: ASAM OpenSCENARIO XML 1.0 to 1.3. An attribute or child is required here
 requires it; where versions differ in meaning, the newest counts.
 """
 
-from bridgegen.openx.openscenario.actions import *  # noqa: F403
-from bridgegen.openx.openscenario.appearance import *  # noqa: F403
-from bridgegen.openx.openscenario.catalog_files import *  # noqa: F403
-from bridgegen.openx.openscenario.conditions import *  # noqa: F403
-from bridgegen.openx.openscenario.controllers import *  # noqa: F403
-from bridgegen.openx.openscenario.declarations import *  # noqa: F403
-from bridgegen.openx.openscenario.entities import *  # noqa: F403
-from bridgegen.openx.openscenario.entity_conditions import *  # noqa: F403
+from bridgegen.openx.openscenario.actions import *  # noqa: F403  # noqa: F403
+from bridgegen.openx.openscenario.conditions import *  # noqa: F403  # noqa: F403  # noqa: F403
+from bridgegen.openx.openscenario.declarations import *  # noqa: F403  # noqa: F403
+from bridgegen.openx.openscenario.entities import *  # noqa: F403  # noqa: F403
 from bridgegen.openx.openscenario.enumerations import *  # noqa: F403
 from bridgegen.openx.openscenario.environment import *  # noqa: F403
 from bridgegen.openx.openscenario.global_actions import *  # noqa: F403
-from bridgegen.openx.openscenario.lateral import *  # noqa: F403
-from bridgegen.openx.openscenario.longitudinal import *  # noqa: F403
-from bridgegen.openx.openscenario.positions import *  # noqa: F403
-from bridgegen.openx.openscenario.road_network import *  # noqa: F403
-from bridgegen.openx.openscenario.storyboard import *  # noqa: F403
+from bridgegen.openx.openscenario.movement import *  # noqa: F403  # noqa: F403
+from bridgegen.openx.openscenario.positions import *  # noqa: F403  # noqa: F403
+from bridgegen.openx.openscenario.storyboard import *  # noqa: F403  # noqa: F403
 from bridgegen.openx.openscenario.traffic import *  # noqa: F403
-from bridgegen.openx.openscenario.trajectories import *  # noqa: F403
-from bridgegen.openx.openscenario.value_conditions import *  # noqa: F403
 from bridgegen.openx.openscenario.values import *  # noqa: F403

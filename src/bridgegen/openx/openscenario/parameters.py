@@ -13,9 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from bridgegen.errors import FileFormatError
-from bridgegen.odd.kinds import slack
-from bridgegen.openx.openscenario import expression_types
+from bridgegen.base.errors import FileFormatError
+from bridgegen.openx.openscenario import values as expression_types
 from bridgegen.openx.openscenario.conditions import Condition
 from bridgegen.openx.openscenario.declarations import ParameterDeclaration, ValueConstraint
 from bridgegen.openx.openscenario.element import (
@@ -35,6 +34,7 @@ from bridgegen.openx.openscenario.values import (
     parse_literal,
     parse_value,
 )
+from bridgegen.scenario.language.kinds import slack
 
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 _COMPARE = {

@@ -9,12 +9,8 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from itertools import product
 
-from bridgegen.arrays import Float
-from bridgegen.errors import FileFormatError, InputError
-from bridgegen.odd.distributions import Discrete, Distribution, Uniform, shares_within
-from bridgegen.odd.expression import lookup, parse
-from bridgegen.odd.kinds import FLOAT, INTEGER, Category
-from bridgegen.odd.parameters import Axis, Bound, Derived, Parameter, nearest
+from bridgegen.base.arrays import Float
+from bridgegen.base.errors import FileFormatError, InputError
 from bridgegen.openx.openscenario import distributions as dst
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.element import Element, values_of, walk
@@ -27,6 +23,10 @@ from bridgegen.openx.openscenario.values import (
     parse_literal,
     parse_value,
 )
+from bridgegen.scenario.language.distributions import Discrete, Distribution, Uniform, shares_within
+from bridgegen.scenario.language.expression import lookup, parse
+from bridgegen.scenario.language.kinds import FLOAT, INTEGER, Category
+from bridgegen.scenario.language.parameters import Axis, Bound, Derived, Parameter, nearest
 
 MOST_VARIANTS = 200
 """Combinations of texts, each of which is read, checked and compiled by itself."""

@@ -1,16 +1,19 @@
 """From an OpenSCENARIO file to the model: a scenario that stands by itself."""
 
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
 from lxml import etree
 
-from bridgegen.errors import FileFormatError, UnsupportedError
+from bridgegen.base.errors import FileFormatError, UnsupportedError
 from bridgegen.openx.openscenario import parameters
+from bridgegen.openx.openscenario.element import Element
 from bridgegen.openx.openscenario.expand import expanded
 from bridgegen.openx.openscenario.pruning import strays, without
 from bridgegen.openx.openscenario.reader import element_of, shorten
 from bridgegen.openx.openscenario.storyboard import OpenScenario
+from bridgegen.openx.openscenario.write import fill
 from bridgegen.openx.xml import parse_xml
 
 VERSIONS = ("1.0", "1.1", "1.2", "1.3")
@@ -118,3 +121,33 @@ def verbatim(
             f"(line {header.line})"
         )
     return scenario
+
+
+# --- Single elements of OpenSCENARIO as text: what the ontology keeps in OpenSCENARIO's own words -
+
+
+def fragment_of(element: Element) -> str:
+    """Return an element and all below it as XML, on one line."""
+    tag = type(element).__name__
+    node = etree.Element(tag)
+    fill(node, tag, element, bare=False)
+    return str(etree.tostring(node, encoding="unicode"))
+
+
+def element_from(text: str, options: Mapping[str, type[Element]], place: str) -> Element:
+    """Return the element that a fragment is.
+
+    Args:
+        text: the XML.
+        options: tag → class, all that it may be.
+        place: what to call it in messages.
+
+    Raises:
+        FileFormatError: not well-formed, hostile, malformed, or another element.
+        UnsupportedError: elements or attributes that this version of BridgeGen cannot run.
+    """
+    root = parse_xml(text.encode("utf-8"), place)
+    cls = options.get(str(root.tag))
+    if cls is None:
+        raise FileFormatError(f"{place}: must be {' or '.join(options)}, got {root.tag!s}")
+    return element_of(cls, root, place)

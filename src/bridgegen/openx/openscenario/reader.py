@@ -11,7 +11,7 @@ from typing import Any, TypeVar, cast
 
 from lxml import etree
 
-from bridgegen.errors import FileFormatError, UnsupportedError
+from bridgegen.base.errors import FileFormatError, UnsupportedError
 from bridgegen.openx.openscenario.element import RAW, Attribute, Declaration, Element, declaration
 from bridgegen.openx.openscenario.pruning import prune
 from bridgegen.openx.openscenario.values import Expr, ParameterRef, parse_value

@@ -13,10 +13,10 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import numpy.typing as npt
 
-from bridgegen.arrays import Bool, Float
+from bridgegen.base.arrays import Bool, Float
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.element import walk
-from bridgegen.openx.openscenario.versions import at, at_once
+from bridgegen.openx.openscenario.write import at, at_once
 
 _TURNING = "plineInterpolation"
 

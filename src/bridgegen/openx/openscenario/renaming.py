@@ -3,7 +3,7 @@
 from dataclasses import replace
 from typing import Any, TypeVar
 
-from bridgegen.errors import InputError
+from bridgegen.base.errors import InputError
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.element import Element, declaration
 

@@ -6,7 +6,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from bridgegen.errors import FileFormatError
+from bridgegen.base.errors import FileFormatError
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario import parameters
 from bridgegen.openx.openscenario.element import Attribute, Element, rewritten, values_of

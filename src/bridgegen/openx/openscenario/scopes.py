@@ -15,7 +15,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from bridgegen.errors import FileFormatError
+from bridgegen.base.errors import FileFormatError
 from bridgegen.openx.openscenario.declarations import ParameterDeclaration, ValueConstraint
 from bridgegen.openx.openscenario.element import Attribute, Element
 from bridgegen.openx.openscenario.enumerations import ParameterType

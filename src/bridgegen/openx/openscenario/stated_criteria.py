@@ -5,10 +5,10 @@ It writes them as conditions of the stop trigger on parameters, named ``criteria
 
 from collections.abc import Callable
 
-from bridgegen.errors import InputError
-from bridgegen.odd.criteria import Criterion
+from bridgegen.base.errors import InputError
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.element import walk
+from bridgegen.scenario.language.criteria import Criterion
 
 _FORMULAS: dict[str, tuple[str, Callable[[float], str]]] = {
     "CollisionTest": ("The ego does not collide.", lambda _: "n_collision == 0"),

@@ -3,8 +3,7 @@
 from dataclasses import dataclass, field
 from typing import Annotated
 
-from bridgegen.openx.openscenario.catalog_files import CATALOG
-from bridgegen.openx.openscenario.declarations import Properties
+from bridgegen.openx.openscenario.declarations import CATALOG, Properties
 from bridgegen.openx.openscenario.element import (
     ENTITY,
     ROAD,

@@ -4,7 +4,7 @@ import math
 from collections.abc import Iterator
 from typing import Any
 
-from bridgegen.errors import InputError
+from bridgegen.base.errors import InputError
 from bridgegen.openx.opendrive.lane_changes import plan_with_changes
 from bridgegen.openx.opendrive.lanes import lane_pose
 from bridgegen.openx.opendrive.model import OpenDrive

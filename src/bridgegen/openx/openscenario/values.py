@@ -7,6 +7,7 @@ a ``StrEnum`` and needs no kind.
 Source: ASAM OpenSCENARIO XML 1.2, sections 9.1 (parameters) and 9.2 (expressions), and its XSD.
 """
 
+import ast
 import math
 import re
 from collections.abc import Mapping
@@ -17,16 +18,19 @@ from enum import Enum
 from functools import lru_cache
 from typing import Annotated, TypeVar
 
-from bridgegen.arrays import Float
-from bridgegen.errors import FileFormatError, InputError
-from bridgegen.odd.expression import RESERVED, Expression, parse
+from bridgegen.base.arrays import Float
+from bridgegen.base.errors import FileFormatError, InputError
+from bridgegen.scenario.language.expression import RESERVED, Expression, parse
 
 V = TypeVar("V")
 
 _REFERENCE = re.compile(r"\$[A-Za-z_][A-Za-z0-9_]*")
 _EXPRESSION = re.compile(r"\$\{[ A-Za-z0-9_+\-*/%$().,]*\}")
 _WORD = re.compile(r"\$?[A-Za-z_][A-Za-z0-9_]*|(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?")
-_TRUTHS = {"true": "(0<1)", "false": "(1<0)"}  # as `bridgegen.odd.expression` has no such words
+_TRUTHS = {
+    "true": "(0<1)",
+    "false": "(1<0)",
+}  # as `bridgegen.scenario.language.expression` has no such words
 _TRUTH = re.compile(r"(?<![$A-Za-z0-9_])(true|false)(?![A-Za-z0-9_])")
 _WORDS = RESERVED | {"not", "and", "or", *_TRUTHS}  # of an expression besides parameters
 
@@ -303,3 +307,60 @@ def format_value(kind: Kind, value: Value) -> str:
     if not isinstance(value, int):
         raise TypeError(f"a whole number is expected, got {value!r}")
     return str(value)
+
+
+# --- Whether an expression is a number or a boolean, and whether it makes sense ---
+# Source: ASAM OpenSCENARIO XML 1.3, section 9.2.1: arithmetic takes and gives numbers; ``not``,
+# ``and`` and ``or`` take and give booleans; nothing turns one into the other.
+
+
+def problem(expression: Expr, is_boolean: Mapping[str, bool], want: Kind) -> str | None:
+    """Return what is wrong with the types in an expression, or None.
+
+    Args:
+        expression: whose parameters are all known.
+        is_boolean: of each parameter, whether it is a boolean; else it is a number.
+        want: the type that it is needed as; a text is content with both.
+    """
+    try:
+        truth = _is_truth(expression.expression.tree, is_boolean)
+    except _MixedError as error:
+        return str(error)
+    if want is Kind.BOOLEAN and not truth:
+        return f"must be a boolean, {expression} is a number"
+    if want.is_number and truth:
+        return f"must be of type {want.value}, {expression} is a boolean"
+    return None
+
+
+class _MixedError(Exception):
+    """A boolean where a number is needed, or the other way round."""
+
+
+def _is_truth(node: ast.expr, is_boolean: Mapping[str, bool]) -> bool:
+    match node:
+        case ast.Name(id=name):
+            return is_boolean[name]
+        case ast.Compare():  # true and false
+            return True
+        case ast.BoolOp(values=operands):
+            return _all(operands, is_boolean, truth=True)
+        case ast.UnaryOp(op=ast.Not(), operand=operand):
+            return _all([operand], is_boolean, truth=True)
+        case ast.UnaryOp(operand=operand):
+            return _all([operand], is_boolean, truth=False)
+        case ast.BinOp(left=left, right=right):
+            return _all([left, right], is_boolean, truth=False)
+        case ast.Call(args=arguments):
+            return _all(arguments, is_boolean, truth=False)
+    return False
+
+
+def _all(nodes: list[ast.expr], is_boolean: Mapping[str, bool], *, truth: bool) -> bool:
+    for node in nodes:
+        if _is_truth(node, is_boolean) is not truth:
+            names = sorted(one.id for one in ast.walk(node) if isinstance(one, ast.Name))
+            of = f" of ${', $'.join(names)}" if names else ""
+            what = ("not, and, or", "number") if truth else ("arithmetic", "boolean")
+            raise _MixedError(f"takes a {what[1]}{of} for {what[0]}")
+    return truth

@@ -7,10 +7,9 @@ import numpy as np
 import numpy.typing as npt
 import torch
 
-from bridgegen.arrays import Bool, Float
-from bridgegen.search.algorithm import Arena
-from bridgegen.search.rl.models import Arrays, arrays_of
-from bridgegen.search.rl.on_policy import model_of
+from bridgegen.base.arrays import Bool, Float
+from bridgegen.search.algorithms.algorithm import Arena
+from bridgegen.search.rl.models import Arrays, arrays_of, model_of
 
 
 class Duel:

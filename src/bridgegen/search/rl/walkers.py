@@ -3,9 +3,9 @@
 import numpy as np
 import numpy.typing as npt
 
-from bridgegen.arrays import Float
-from bridgegen.search.algorithm import Problem, Results
-from bridgegen.search.observation import Observation, Observer, Reward
+from bridgegen.base.arrays import Float
+from bridgegen.search.algorithms.algorithm import Problem, Results
+from bridgegen.search.algorithms.observation import Observation, Observer, Reward
 
 
 class Walkers:

@@ -5,7 +5,7 @@ from typing import Self
 
 import numpy as np
 
-from bridgegen.arrays import Bool, Float
+from bridgegen.base.arrays import Bool, Float
 
 WIDTHS = (0.03, 0.06, 0.12, 0.25, 0.5)
 """Widths of the kernel that are tried: root mean square distance in the unit cube."""

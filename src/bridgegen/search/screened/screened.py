@@ -5,12 +5,26 @@ from typing import ClassVar, Protocol
 
 import numpy as np
 
-from bridgegen.arrays import Bool, Float
-from bridgegen.search.algorithm import JSON, Algorithm, Arity, Problem, Results, Setting, TakesNotes
-from bridgegen.search.screened.agreement import NOTE, Agreement, counts, place_of, rank_correlation
-from bridgegen.search.screened.compared import Compared
+from bridgegen.base.arrays import Bool, Float
+from bridgegen.search.algorithms.algorithm import (
+    JSON,
+    Algorithm,
+    Arity,
+    Problem,
+    Results,
+    Setting,
+    TakesNotes,
+)
+from bridgegen.search.screened.agreement import (
+    NOTE,
+    Agreement,
+    Compared,
+    Pool,
+    counts,
+    place_of,
+    rank_correlation,
+)
 from bridgegen.search.screened.correction import Correction
-from bridgegen.search.screened.pool import Pool
 
 LEAD = 0.25
 """Share of the screen's budget that is spent before the first row is asked for."""

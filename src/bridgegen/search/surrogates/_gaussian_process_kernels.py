@@ -6,8 +6,8 @@ threads; these do not.
 
 import numpy as np
 
-from bridgegen.arrays import Float
-from bridgegen.compiled import kernel
+from bridgegen.base.arrays import Float
+from bridgegen.base.compiled import kernel
 
 ROOT5 = 5.0**0.5
 

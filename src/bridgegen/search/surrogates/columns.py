@@ -4,7 +4,7 @@ from math import prod
 
 import numpy as np
 
-from bridgegen.arrays import Float
+from bridgegen.base.arrays import Float
 
 
 class Columns:

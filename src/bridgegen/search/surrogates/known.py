@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from bridgegen.arrays import Bool, Float, Int
-from bridgegen.search.algorithm import Problem
+from bridgegen.base.arrays import Bool, Float, Int
+from bridgegen.search.algorithms.algorithm import Problem
 from bridgegen.search.surrogates.columns import Columns
 from bridgegen.search.surrogates.transform import compressed
 

@@ -7,8 +7,8 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from bridgegen.search.surrogates.gaussian_process import Parameters
 from bridgegen.search.surrogates.known import Known
-from bridgegen.search.surrogates.parameters import Parameters
 
 
 class Saved(ABC):

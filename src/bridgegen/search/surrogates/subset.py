@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from bridgegen.arrays import Float, Int
+from bridgegen.base.arrays import Float, Int
 
 
 def telling(values: Float, count: int) -> Int:

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from bridgegen.arrays import Float
+from bridgegen.base.arrays import Float
 
 
 def compressed(F: Float) -> Float:

@@ -5,8 +5,8 @@
 
 import math
 
-from bridgegen.compiled import kernel
-from bridgegen.ego._emergency_kernels import boxes_meet
+from bridgegen.base.compiled import kernel
+from bridgegen.drivers._emergency_kernels import boxes_meet
 
 SHRUNK = 0.01
 """m, by which half lengths and widths of boxes are smaller here: two that meet all the same overlap

@@ -5,8 +5,8 @@
 
 import math
 
-from bridgegen.compiled import inlined_kernel, kernel, run_kernel_at
-from bridgegen.ego.drivers import SCRIPTED
+from bridgegen.base.compiled import inlined_kernel, kernel, run_kernel_at
+from bridgegen.drivers.drivers import SCRIPTED
 from bridgegen.simulation.embedded._codes import LATERALLY, LONGITUDINALLY
 from bridgegen.simulation.embedded._collision_kernels import collides
 from bridgegen.simulation.embedded._memory_kernels import (

@@ -15,7 +15,7 @@ from typing import Annotated, Any, NamedTuple, get_args, get_type_hints
 import numpy as np
 import numpy.typing as npt
 
-from bridgegen.arrays import Bool, Float, Int
+from bridgegen.base.arrays import Bool, Float, Int
 
 N_STEPS, STATUS, STOPS, TICKS = 0, 1, 2, 3  # columns of State.ending
 
@@ -99,12 +99,13 @@ class Plan(NamedTuple):
 class Roads(NamedTuple):
     """The paths on a road network, and what the driver knows of it.
 
-    `Network` and `bridgegen.ego.scene.Scene` document the shapes. ``slopes`` are ``(K, L, 3)``:
+    `Network` and `bridgegen.drivers.scene.Scene` document the shapes. ``slopes`` are ``(K, L, 3)``:
     of gravity [m/s²] what acts against the motion, and to the right, and the share [1] by which it
     presses less on the road; L is 0 on a network whose roads are level. ``bends`` ``(K, L)`` and
     ``drops`` ``(L,)`` are where the next bend of each path is, and the next lower speed limit; see
     ``ego._speed_kernels``. ``lanes`` is ``lane_tables.lanes_along``, and ``pieces`` and
-    what follows them are `bridgegen.ego.map_grid.Grid`; without rows unless a driver wants them.
+    what follows them are `bridgegen.drivers.map_grid.Grid`; without rows unless a driver wants
+    them.
     """
 
     paths: Float
@@ -184,7 +185,8 @@ class State(NamedTuple):
         hidden: ``(E, 2)`` bool, from whom; see ``_codes``,
         visible: ``(E,)`` bool, whether the ego's sensors may see it,
         minded: ``(E,)`` bool, and attentive drivers may,
-        switched: ``(E,)`` int64, its lamps as the storyboard has them; see `bridgegen.ego.lamps`,
+        switched: ``(E,)`` int64, its lamps as the storyboard has them; see
+            `bridgegen.drivers.lamps`,
         lamps: ``(E,)`` int64, and what shows,
         holds: ``(E,)`` int64, which pedals are held, as bits; see ``_pedal_kernels``,
         pedals: ``(E, 5, 4)`` where they are,
@@ -233,13 +235,13 @@ class State(NamedTuple):
         profile_rows: ``(E,)`` int64, how many rows of it count.
         waits: ``(E,)`` int64, the change of lane that waits for a gap; -1: none,
         allowed: ``(E,)`` [m/s²], the most that its driver allows; +inf: the storyboard's,
-        minds: ``(E, MIND)`` state of that driver; see `bridgegen.ego._attentive_kernels`.
+        minds: ``(E, MIND)`` state of that driver; see `bridgegen.drivers._attentive_kernels`.
         seen: ``(SEEN, E)`` what those drivers see; likewise,
         far: ``(E,)`` scratch of one driver.
         attention: ``(E, 3)``, a careful driver's state per body; see its kernel.
         chassis: ``(MOTION,)`` how the ego's vehicle moves, if it has dynamics; see
             ``_chassis_columns`` and ``_multi_body_columns``.
-        key: ``(1,)`` uint64, of the row's random numbers; see `bridgegen.ego.noise`.
+        key: ``(1,)`` uint64, of the row's random numbers; see `bridgegen.drivers.noise`.
         sensors: ``(E, MEMORY)``, between two frames; see ``ego._perception_kernels``.
         tracks: ``(E, TRACK)`` what the ego perceives; see ``ego._tracking_kernels``.
         around: ``(E, AROUND)`` the same from its route; see ``ego._surroundings_kernels``.

@@ -5,8 +5,8 @@
 
 import math
 
-from bridgegen.compiled import kernel
-from bridgegen.ego._path_kernels import X, Y, project
+from bridgegen.base.compiled import kernel
+from bridgegen.drivers._path_kernels import X, Y, project
 
 STEP, LINEAR, CUBIC, SINUSOIDAL = 0, 1, 2, 3
 RATE, TIME, DISTANCE = 0, 1, 2

@@ -8,7 +8,7 @@ Both ways run the same functions on the same arrays, so they give the same bits.
 
 from numba import float64, int64
 
-from bridgegen.compiled import bundled, bundled_row, kernel
+from bridgegen.base.compiled import bundled, bundled_row, kernel
 from bridgegen.simulation.embedded._instant_kernels import after_driver, before_driver
 from bridgegen.simulation.embedded._memory_kernels import (
     N_STEPS,

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numba import types
 
-from bridgegen.compiled import address_of, row_type
+from bridgegen.base.compiled import address_of, row_type
 from bridgegen.simulation.embedded._codes import (
     BY_TRAJECTORY,
     DOES,

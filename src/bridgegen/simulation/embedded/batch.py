@@ -6,26 +6,26 @@ from typing import Any, TypeVar
 import numpy as np
 import numpy.typing as npt
 
-from bridgegen.arrays import Bool, Float, Int
-from bridgegen.compiled import compile_for_kernels, row_type
-from bridgegen.ego._attentive_kernels import MIND as HEED
-from bridgegen.ego._attentive_kernels import SEEN
-from bridgegen.ego._kind_tables import NEEDS_ROOM
-from bridgegen.ego._perception_kernels import MEMORY
-from bridgegen.ego._prediction_kernels import LOST, PASSAGE
-from bridgegen.ego._reference_kernels import MIND
-from bridgegen.ego._surroundings_kernels import AROUND
-from bridgegen.ego._tracking_kernels import TRACK
-from bridgegen.ego._weather_columns import FRICTION, WEATHER
-from bridgegen.ego.compiled import CONFLICT
-from bridgegen.ego.detections import DETECTION
-from bridgegen.ego.drivers import STAGES, STORYBOARD
-from bridgegen.ego.interface import CONFLICT_WAYS, HISTORY, NEAR_PIECES, ROUTE_POINTS, RoadMap
-from bridgegen.ego.lane_tables import STRAYS
-from bridgegen.ego.noise import noise_key
-from bridgegen.ego.traits import Traits
-from bridgegen.ego.views import frames
-from bridgegen.errors import InputError
+from bridgegen.base.arrays import Bool, Float, Int
+from bridgegen.base.compiled import compile_for_kernels, row_type
+from bridgegen.base.errors import InputError
+from bridgegen.drivers._attentive_kernels import MIND as HEED
+from bridgegen.drivers._attentive_kernels import SEEN
+from bridgegen.drivers._kind_tables import NEEDS_ROOM
+from bridgegen.drivers._perception_kernels import MEMORY
+from bridgegen.drivers._prediction_kernels import LOST, PASSAGE
+from bridgegen.drivers._reference_kernels import MIND
+from bridgegen.drivers._surroundings_kernels import AROUND
+from bridgegen.drivers._tracking_kernels import TRACK
+from bridgegen.drivers._weather_columns import FRICTION, WEATHER
+from bridgegen.drivers.compiled import CONFLICT
+from bridgegen.drivers.detections import DETECTION
+from bridgegen.drivers.drivers import STAGES, STORYBOARD
+from bridgegen.drivers.interface import CONFLICT_WAYS, HISTORY, NEAR_PIECES, ROUTE_POINTS, RoadMap
+from bridgegen.drivers.lane_tables import STRAYS
+from bridgegen.drivers.noise import noise_key
+from bridgegen.drivers.user_drivers import Traits
+from bridgegen.drivers.views import frames
 from bridgegen.simulation.embedded import _memory_kernels as memory
 from bridgegen.simulation.embedded import _rollout_kernels as kernels
 from bridgegen.simulation.embedded import drivers

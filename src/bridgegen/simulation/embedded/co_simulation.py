@@ -10,7 +10,7 @@ from collections.abc import Callable, Collection, Sequence
 import numpy as np
 import numpy.typing as npt
 
-from bridgegen.arrays import Bool, Float, Int
+from bridgegen.base.arrays import Bool, Float, Int
 from bridgegen.simulation.embedded import _memory_kernels as memory
 from bridgegen.simulation.embedded.batch import Batch
 from bridgegen.simulation.rollout import Rollout

@@ -10,8 +10,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from bridgegen.arrays import Float, Int
-from bridgegen.ego.drivers import REFERENCE, STORYBOARD
+from bridgegen.base.arrays import Float, Int
+from bridgegen.drivers.drivers import REFERENCE, STORYBOARD
 from bridgegen.simulation.embedded.places.network import Network
 from bridgegen.simulation.embedded.program import Program
 from bridgegen.simulation.rollout import Rollout
@@ -91,8 +91,8 @@ def _ask(
     values: Mapping[str, npt.ArrayLike],
     out: Intentions,
 ) -> None:
-    from bridgegen.ego._lane_change_kernels import AFTER, BEFORE, BEGINS, LENGTH
-    from bridgegen.ego._reference_kernels import PLANNED
+    from bridgegen.drivers._lane_change_kernels import AFTER, BEFORE, BEGINS, LENGTH
+    from bridgegen.drivers._reference_kernels import PLANNED
     from bridgegen.simulation.embedded.batch import Batch  # numba is slow to import
 
     for i, k in enumerate(out.steps.tolist()):

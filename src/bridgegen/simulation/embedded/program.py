@@ -12,11 +12,11 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
-from bridgegen.arrays import Float, Int
-from bridgegen.ego import STORYBOARD, Driver
-from bridgegen.ego._weather_columns import FRICTION_SCALE
-from bridgegen.ego.drivers import SCRIPTED
-from bridgegen.errors import InputError
+from bridgegen.base.arrays import Float, Int
+from bridgegen.base.errors import InputError
+from bridgegen.drivers import STORYBOARD, Driver
+from bridgegen.drivers._weather_columns import FRICTION_SCALE
+from bridgegen.drivers.drivers import SCRIPTED
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.values import Expr, Value
 from bridgegen.simulation.embedded._codes import (
@@ -203,7 +203,7 @@ class Program:
         names: E entities, the ego first.
         bodies: ``(E, 8)``: length, width, centre ahead of the reference point [m], maximum speed
             [m/s], acceleration and deceleration [m/s²], curvature at full lock [1/m], height [m].
-        kinds: ``(E,)``: what they are, see `bridgegen.ego.kinds`.
+        kinds: ``(E,)``: what they are, see `bridgegen.drivers.kinds`.
         sirens: ``(E,)``: 1 of an emergency vehicle on a call, to which all give way.
         objects: ``(E,)``: OpenSCENARIO's ObjectType of each: vehicle, pedestrian, miscellaneous.
         parameters: the numeric parameters with their declared values.
@@ -278,7 +278,7 @@ class Program:
         chassis: of a vehicle with dynamics, see ``_chassis_columns`` and ``_multi_body_columns``;
             else empty.
         others: ``(E,)`` who drives each of the others, a code of
-            `bridgegen.ego.drivers`; the ego's is not looked at.
+            `bridgegen.drivers.drivers`; the ego's is not looked at.
         time_step: [s].
         n_steps: recorded instants at most.
         fixed: parameters that rows may not vary, and what they are used for.

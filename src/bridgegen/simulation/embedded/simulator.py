@@ -9,22 +9,74 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from bridgegen.arrays import Float, Int
-from bridgegen.ego import Driver
-from bridgegen.ego.traits import Traits
-from bridgegen.errors import InputError
+from bridgegen.base.arrays import Float, Int
+from bridgegen.base.errors import InputError
+from bridgegen.drivers import Driver
+from bridgegen.drivers._weather_columns import WEATHER
+from bridgegen.drivers.user_drivers import Traits
 from bridgegen.openx.opendrive.model import OpenDrive
 from bridgegen.openx.openscenario.model import OpenScenario
+from bridgegen.simulation.embedded._codes import (
+    DOES,
+    EVENT,
+    EVENT_NUMBER,
+    FIRST,
+    KIND,
+    LAST,
+    ROW,
+    WEATHER_CHANGE,
+)
 from bridgegen.simulation.embedded.compiler import compile_storyboard
 from bridgegen.simulation.embedded.intentions import Intentions, intentions
 from bridgegen.simulation.embedded.places.network import Network
-from bridgegen.simulation.embedded.weathers import weathers
+from bridgegen.simulation.embedded.program import Program
 from bridgegen.simulation.rollout import Rollout
 
 if TYPE_CHECKING:
     from bridgegen.simulation.embedded.batch import Batch
     from bridgegen.simulation.embedded.co_simulation import CoSimulation
     from bridgegen.simulation.embedded.own_drivers import OwnDriver
+
+# --- The weather of rows as a rollout went through it, from what the storyboard states and did ---
+
+
+def weathers(
+    program: Program, values: Mapping[str, npt.ArrayLike], rollout: Rollout, row: int
+) -> list[tuple[int, Float]]:
+    """Return one row's weather: from which instant on, and ``(WEATHER,)`` as sensors feel it.
+
+    The first is the start's; then one for each event that changes it. Of an event that takes place
+    more than once, the last time counts, as the rollout records it.
+
+    Args:
+        program: the compiled storyboard.
+        values: ``(N,)`` float64 per parameter, as of the rollout.
+        rollout: of these N rows.
+        row: which of them.
+    """
+    from bridgegen.drivers._weather_kernels import change, set_clear  # numba is slow to import
+
+    slots = program.fill(values, rollout.shape[0])[row]
+    changes = [(0, 0)]
+    for j in program.initial.tolist():
+        if program.actions[j, DOES] == WEATHER_CHANGE:
+            changes.append((0, int(program.actions[j, ROW])))
+    for element in program.elements.tolist():
+        if element[KIND] != EVENT:
+            continue
+        began = int(rollout.began[row, element[EVENT_NUMBER]])
+        for j in range(element[FIRST], element[LAST]) if began >= 0 else ():
+            if program.actions[j, DOES] == WEATHER_CHANGE:
+                changes.append((began, int(program.actions[j, ROW])))
+    now = np.zeros(WEATHER)
+    set_clear(now)
+    found: list[tuple[int, Float]] = []
+    for k, environment in sorted(changes, key=lambda one: one[0]):
+        change(now, program.weathers, environment, slots)
+        if found and found[-1][0] == k:
+            found.pop()
+        found.append((k, now.copy()))
+    return found
 
 
 CHUNK = 128

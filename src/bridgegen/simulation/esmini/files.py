@@ -16,9 +16,9 @@ from shutil import rmtree
 import numpy as np
 from lxml import etree
 
-from bridgegen.arrays import Float
-from bridgegen.disk import write_whole
-from bridgegen.errors import FileFormatError
+from bridgegen.base.arrays import Float
+from bridgegen.base.disk import write_whole
+from bridgegen.base.errors import FileFormatError
 from bridgegen.openx.opendrive.model import OpenDrive
 from bridgegen.openx.opendrive.write import to_xml as road_xml
 from bridgegen.openx.openscenario.model import OpenScenario

@@ -12,7 +12,7 @@ import re
 from collections.abc import Callable
 from pathlib import Path
 
-from bridgegen.errors import InputError
+from bridgegen.base.errors import InputError
 
 OLDEST = 3
 """The oldest major version with these functions and structures."""

@@ -10,18 +10,42 @@ from pathlib import Path
 from shutil import rmtree
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from bridgegen.errors import BridgeGenError, InputError, StorageError
-from bridgegen.isolated import Answer, CallError, IsolatedProcess, serve
+from bridgegen.base.errors import BridgeGenError, InputError, StorageError
+from bridgegen.base.processes.isolated import Answer, CallError, IsolatedProcess, serve
 from bridgegen.simulation.esmini.library import Library
-from bridgegen.simulation.esmini.log import error_in
 
-if TYPE_CHECKING:  # the process answers as soon as it has loaded the library
-    from bridgegen.ego import Driver
+if TYPE_CHECKING:
+    from bridgegen.drivers import Driver
     from bridgegen.simulation.embedded.own_drivers import Layout
     from bridgegen.simulation.embedded.places.network import Network
     from bridgegen.simulation.embedded.simulator import EmbeddedSimulator
     from bridgegen.simulation.esmini.files import RoadFiles, ScenarioFile
     from bridgegen.simulation.rollout import Rollout
+
+# --- What esmini writes about a scenario: it may fail, and say so nowhere else ---
+
+
+_MARK = "[error] "
+_REMARK = "INFO: "  # esmini marks elements of a map that it skips as errors, with this word
+_LONGEST = 300
+
+
+def error_in(log: Path) -> str | None:
+    """Return the first error in a log; None if there is none, or no log.
+
+    Warnings are ignored, and remarks on elements of the map that esmini does not draw: it warns of
+    missing 3D models, for example.
+    """
+    try:
+        text = log.read_text(encoding="utf-8", errors="replace")
+    except OSError:
+        return None
+    for line in text.splitlines():
+        _, mark, said = line.partition(_MARK)
+        if mark and not said.startswith(_REMARK):
+            return said.strip()[:_LONGEST]
+    return None
+
 
 PROGRAM = "bridgegen.simulation.esmini.process"
 """The module that the process runs: this one."""
@@ -205,7 +229,7 @@ class Answers:
 
     def _warm(self, roads: "tuple[Network, RoadFiles] | None", network: int) -> None:
         """Compile or load the kernels that a row needs; esmini's time limit excludes it."""
-        from bridgegen.ego import DRIVERS
+        from bridgegen.drivers import DRIVERS
 
         self._hold(roads)
         embedded = self._job.embedded
@@ -219,7 +243,7 @@ class Answers:
             joint.move(k, *joint.demand(k))
 
     def _run(self, roads: "tuple[Network, RoadFiles] | None", row: EsminiRow) -> "Rollout":
-        from bridgegen.ego.driver_process import DriverError
+        from bridgegen.drivers.driver_process import DriverError
         from bridgegen.simulation.esmini.together import EsminiError, run_together
         from bridgegen.simulation.rollout import FAILURES, SIMULATOR_FAILURES
 

@@ -10,18 +10,18 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from bridgegen.arrays import Float, Int
-from bridgegen.ego import STORYBOARD, Driver
-from bridgegen.errors import InputError
-from bridgegen.isolated import CallError
+from bridgegen.base.arrays import Float, Int
+from bridgegen.base.errors import InputError
+from bridgegen.base.processes.isolated import CallError
+from bridgegen.drivers import STORYBOARD, Driver
 from bridgegen.openx.opendrive.model import OpenDrive
 from bridgegen.openx.openscenario.model import OpenScenario
-from bridgegen.simulation.around import AroundEmbedded
 from bridgegen.simulation.embedded.places.network import Network
 from bridgegen.simulation.embedded.simulator import EmbeddedSimulator
 from bridgegen.simulation.esmini.files import RoadFiles, ScenarioFile
 from bridgegen.simulation.esmini.process import EsminiProcess, EsminiRow, Job
 from bridgegen.simulation.rollout import SIMULATOR_FAILURES, Rollout, joined
+from bridgegen.simulation.simulator import AroundEmbedded
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

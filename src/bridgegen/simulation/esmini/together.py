@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-from bridgegen.arrays import Float
+from bridgegen.base.arrays import Float
 from bridgegen.simulation.embedded.co_simulation import CoSimulation
 from bridgegen.simulation.esmini.library import Library
 

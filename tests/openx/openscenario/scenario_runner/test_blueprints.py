@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.scenario_runner.blueprints import SIZES, blueprint
-from bridgegen.participants import PARTICIPANTS
+from bridgegen.scenario.participants import PARTICIPANTS
 
 AXLE = osc.Axle(0.6, 0.65, 1.6, 2.8, 0.3)
 

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bridgegen.errors import UnsupportedError
+from bridgegen.base.errors import UnsupportedError
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.scenario_runner.environment import (
     CLEAR,

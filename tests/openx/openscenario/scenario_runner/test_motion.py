@@ -8,7 +8,7 @@ from hypothesis.extra.numpy import arrays
 
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.recorded import Recording
-from bridgegen.openx.openscenario.scenario_runner.motion import centred, course
+from bridgegen.openx.openscenario.scenario_runner.story import centred, course
 
 from .test_blueprints import box, vehicle
 

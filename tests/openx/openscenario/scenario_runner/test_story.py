@@ -8,9 +8,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from bridgegen.errors import UnsupportedError
+from bridgegen.base.errors import UnsupportedError
 from bridgegen.openx.opendrive.model import Header, OpenDrive
-from bridgegen.openx.opendrive.outline_furniture import Light
+from bridgegen.openx.opendrive.outline import Light
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.element import walk
 from bridgegen.openx.openscenario.recorded import Recording

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from bridgegen.arrays import Float
+from bridgegen.base.arrays import Float
 from bridgegen.simulation.embedded.chassis._single_track_kernels import advance, sub_steps
 from bridgegen.simulation.embedded.chassis.parameters import Tyre, VehicleClass, chassis
 

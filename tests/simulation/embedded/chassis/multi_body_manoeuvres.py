@@ -12,7 +12,7 @@ from vehiclemodels import vehicle_dynamics_mb as commonroad
 from vehiclemodels.init_mb import init_mb
 from vehiclemodels.utils import tire_model
 
-from bridgegen.arrays import Float
+from bridgegen.base.arrays import Float
 from bridgegen.simulation.embedded.chassis import _chassis_columns as common
 from bridgegen.simulation.embedded.chassis import _multi_body_columns as columns
 from bridgegen.simulation.embedded.chassis._multi_body_kernels import (

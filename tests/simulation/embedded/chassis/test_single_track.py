@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bridgegen.physics import GRAVITY
+from bridgegen.base.physics import GRAVITY
 from bridgegen.simulation.embedded.chassis import _chassis_columns as columns
 from bridgegen.simulation.embedded.chassis._single_track_kernels import (
     SLIPPING,

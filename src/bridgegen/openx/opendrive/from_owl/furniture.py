@@ -3,8 +3,6 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
-from bridgegen.ontology.graph import Individuals
-from bridgegen.ontology.vocabulary import Subject
 from bridgegen.openx.opendrive.furniture import (
     Control,
     Controller,
@@ -15,6 +13,8 @@ from bridgegen.openx.opendrive.furniture import (
     Validity,
 )
 from bridgegen.openx.opendrive.user_data import UserData, user_datum
+from bridgegen.scenario.ontology.graph import Individuals
+from bridgegen.scenario.ontology.vocabulary import Subject
 
 Reach = tuple[tuple[float, float], ...]
 """How far a road reaches to its left and to its right [m]: its driving lanes, all of it."""

@@ -9,8 +9,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Literal
 
-from bridgegen.openx.opendrive.from_owl.arms import LEVEL, NONE, Arm, arm_road, types_of
-from bridgegen.openx.opendrive.from_owl.turns import joining
+from bridgegen.openx.opendrive.from_owl.arms import LEVEL, NONE, Arm, arm_road, joining, types_of
 from bridgegen.openx.opendrive.furniture import Controller
 from bridgegen.openx.opendrive.model import (
     Connection,

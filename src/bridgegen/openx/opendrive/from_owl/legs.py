@@ -4,12 +4,12 @@ import math
 from collections.abc import Iterator
 from typing import Literal
 
-from bridgegen.errors import OntologyError
-from bridgegen.ontology.graph import Individuals
-from bridgegen.ontology.vocabulary import Subject
+from bridgegen.base.errors import OntologyError
 from bridgegen.openx.opendrive.from_owl.arms import Arm, Strips
 from bridgegen.openx.opendrive.from_owl.furniture import objects_on, signals_on
 from bridgegen.openx.opendrive.user_data import UserData, user_datum
+from bridgegen.scenario.ontology.graph import Individuals
+from bridgegen.scenario.ontology.vocabulary import Subject
 
 _SLACK = 1e-9
 _CLOSES = ("closes_above_fog_density", "closes_above_precipitation")

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 
-from bridgegen.errors import OntologyError
+from bridgegen.base.errors import OntologyError
 from bridgegen.openx.opendrive.from_owl.arms import Arm, road_of
 from bridgegen.openx.opendrive.geometry import pose
 from bridgegen.openx.opendrive.model import Header, OpenDrive

@@ -7,18 +7,20 @@ at a shallow angle and becomes the acceleration lane in one bend.
 import math
 from dataclasses import replace
 
-from bridgegen.errors import OntologyError
+from bridgegen.base.errors import OntologyError
 from bridgegen.openx.opendrive.from_owl.arms import (
     EDGE,
     LEVEL,
     Arm,
+    Ray,
+    along,
     centre,
+    joining,
     lanes_of,
     road_of,
     types_of,
 )
 from bridgegen.openx.opendrive.from_owl.intersection import connecting_sections
-from bridgegen.openx.opendrive.from_owl.turns import Ray, along, joining
 from bridgegen.openx.opendrive.model import (
     Connection,
     Header,

@@ -7,15 +7,15 @@ from collections import Counter
 from collections.abc import Sequence
 from itertools import pairwise
 
-from bridgegen.errors import InputError, OntologyError, UnsupportedError
-from bridgegen.ontology.graph import Individuals
-from bridgegen.ontology.vocabulary import Subject
+from bridgegen.base.errors import InputError, OntologyError, UnsupportedError
 from bridgegen.openx.opendrive.from_owl import intersection, lone_road, merge, roundabout
 from bridgegen.openx.opendrive.from_owl.arms import Arm
 from bridgegen.openx.opendrive.from_owl.furniture import controllers_of
 from bridgegen.openx.opendrive.from_owl.legs import corner, read_arm, read_id, refuse
 from bridgegen.openx.opendrive.model import OpenDrive
 from bridgegen.openx.opendrive.user_data import UserData, user_datum
+from bridgegen.scenario.ontology.graph import Individuals
+from bridgegen.scenario.ontology.vocabulary import Subject
 
 MOST_LEGS = 5
 KINDS = ("Crossroads", "TJunction", "Roundabout", "Merge", "Intersection")

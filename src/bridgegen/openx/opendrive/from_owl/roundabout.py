@@ -7,10 +7,18 @@ lead on: out to the leg, on around the ring, and from the leg into the ring.
 import math
 from itertools import pairwise
 
-from bridgegen.errors import OntologyError
-from bridgegen.openx.opendrive.from_owl.arms import EDGE, LEVEL, Arm, arm_road, types_of
+from bridgegen.base.errors import OntologyError
+from bridgegen.openx.opendrive.from_owl.arms import (
+    EDGE,
+    LEVEL,
+    Arm,
+    Ray,
+    along,
+    arm_road,
+    joining,
+    types_of,
+)
 from bridgegen.openx.opendrive.from_owl.intersection import connecting_sections
-from bridgegen.openx.opendrive.from_owl.turns import Ray, along, joining
 from bridgegen.openx.opendrive.model import (
     Connection,
     Header,

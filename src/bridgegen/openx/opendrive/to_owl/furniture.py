@@ -5,7 +5,6 @@ from collections.abc import Iterable, Iterator, Sequence
 
 import pyoxigraph as ox
 
-from bridgegen.ontology.builder import Builder
 from bridgegen.openx.opendrive.from_owl.furniture import LAMP, SIGNS, STATES, STOP_LINE
 from bridgegen.openx.opendrive.furniture import (
     Controller,
@@ -20,6 +19,7 @@ from bridgegen.openx.opendrive.legs import junction_end
 from bridgegen.openx.opendrive.map_names import lane_name, part_name
 from bridgegen.openx.opendrive.model import SPEED_UNITS, Road
 from bridgegen.openx.opendrive.user_data import exact, number, values_of
+from bridgegen.scenario.ontology.builder import Builder
 
 _CLASSES = {code: cls for cls, code in SIGNS.items()}
 _GERMAN = ("", "DE", "DEU", "GER", "GERMANY", "OPENDRIVE")

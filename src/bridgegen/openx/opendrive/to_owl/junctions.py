@@ -2,13 +2,13 @@
 
 import pyoxigraph as ox
 
-from bridgegen.errors import UnsupportedError
-from bridgegen.ontology.builder import Builder
-from bridgegen.ontology.vocabulary import tbox
+from bridgegen.base.errors import UnsupportedError
 from bridgegen.openx.opendrive.from_owl.network import KINDS, MEASURES
 from bridgegen.openx.opendrive.map_names import junction_name, lane_name, part_name, road_name
 from bridgegen.openx.opendrive.model import Connection, Junction, OpenDrive, Road
 from bridgegen.openx.opendrive.user_data import number, values_of
+from bridgegen.scenario.ontology.builder import Builder
+from bridgegen.scenario.ontology.vocabulary import tbox
 
 _BY_LEGS = {3: "TJunction", 4: "Crossroads"}
 _NEEDED = {"Roundabout": ("has_radius",), "Merge": ("has_merge_length", "has_taper_length")}

@@ -2,26 +2,27 @@
 
 Every road, lane, junction, crosswalk, traffic light, sign, line and lamp becomes an individual,
 linked as the map links them. What the ontology cannot express stays in the map's own file, which
-the road network names; `bridgegen.openx.opendrive.to_owl.losses` lists it.
+the road network names; `bridgegen.openx.opendrive.to_owl.network` lists it.
 """
 
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Iterator, Sequence
 from pathlib import PurePath
 
 import pyoxigraph as ox
 
-from bridgegen.ontology.builder import Builder
-from bridgegen.ontology.graph import Individuals
-from bridgegen.ontology.vocabulary import tbox
 from bridgegen.openx.opendrive.geometry import pose
 from bridgegen.openx.opendrive.lanes import section_end, width_of
 from bridgegen.openx.opendrive.legs import heading, junction_end
 from bridgegen.openx.opendrive.map_names import lane_name, part_name, road_name
 from bridgegen.openx.opendrive.model import Lane, OpenDrive, Road, RoadLink
-from bridgegen.openx.opendrive.plan_view import Arc, Line, Spiral
-from bridgegen.openx.opendrive.to_owl.furniture import Furniture
+from bridgegen.openx.opendrive.plan_view import Arc, Line, ParamPoly3, Poly3, Spiral
+from bridgegen.openx.opendrive.to_owl.furniture import Furniture, class_of
 from bridgegen.openx.opendrive.to_owl.junctions import Junctions
 from bridgegen.openx.opendrive.user_data import number, values_of
+from bridgegen.scenario.ontology.builder import Builder
+from bridgegen.scenario.ontology.graph import Individuals
+from bridgegen.scenario.ontology.vocabulary import tbox
 
 STRIPS = {"shoulder": "Shoulder", "sidewalk": "Sidewalk", "walking": "Sidewalk"}
 """The class of a lane that cars do not travel on, by its type; of all others, ``RoadStrip``."""
@@ -251,3 +252,54 @@ def _speed_limit(road: Road) -> float | None:
     """Return the first speed limit of a road [m/s], where it has one above 0."""
     speeds = [one.speed.metres_per_second for one in road.types if one.speed is not None]
     return speeds[0] if speeds and speeds[0] else None
+
+
+# --- Contents of a map that its individuals lack: they stay in the map's own file, which they name
+
+
+def losses(model: OpenDrive) -> Iterator[str]:
+    """Yield a sentence for each kind of content of a map that its individuals lack in part.
+
+    Left out of every import, and not reported here: elevations but an even grade, lateral profiles,
+    lane offsets, widths but at the start and the middle of a lane section, where along a lane its
+    lines begin, the shapes and heights of objects, and lane speed limits.
+
+    Args:
+        model: the road network.
+    """
+    known = {
+        name: frozenset(tbox().allowed[name]) for name in ("has_road_type", "has_marking_type")
+    }
+    curves = sum(
+        isinstance(one.shape, Poly3 | ParamPoly3) for road in model.roads for one in road.plan_view
+    )
+    if curves:
+        yield (
+            f"{curves} stretches of reference line are cubics: their lengths and their curvatures "
+            "at both ends are kept, their course between is not"
+        )
+    objects = Counter(
+        one.type or "none" for road in model.roads for one in road.objects if class_of(one) is None
+    )
+    if objects:
+        listed = ", ".join(f"{kind} ({count})" for kind, count in sorted(objects.items()))
+        yield f"objects that the ontology has no class for are left out: {listed}"
+    several = sum(len({(one.type, one.speed) for one in road.types}) > 1 for road in model.roads)
+    if several:
+        yield f"{several} roads change their type or speed limit: the first is kept"
+    lines = Counter(
+        mark.type
+        for road in model.roads
+        for section in road.sections
+        for lane in (*section.center, *section.lanes)
+        for mark in lane.road_marks
+        if mark.type not in known["has_marking_type"]
+    )
+    if lines:
+        listed = ", ".join(f"{kind} ({count})" for kind, count in sorted(lines.items()))
+        yield f"lines of unknown kinds are left out: {listed}"
+    types = sorted(
+        {one.type for road in model.roads for one in road.types} - known["has_road_type"]
+    )
+    if types:
+        yield f"road types that the standard does not have are left out: {', '.join(types)}"

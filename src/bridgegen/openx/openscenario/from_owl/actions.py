@@ -2,9 +2,7 @@
 
 from collections.abc import Callable
 
-from bridgegen.errors import OntologyError, UnsupportedError
-from bridgegen.ontology.graph import Individuals
-from bridgegen.ontology.vocabulary import Subject
+from bridgegen.base.errors import OntologyError, UnsupportedError
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.from_owl.entities import Cast, plain_text
 from bridgegen.openx.openscenario.from_owl.places import Places
@@ -13,6 +11,8 @@ from bridgegen.openx.openscenario.from_owl.quoted import quoted_element
 from bridgegen.openx.openscenario.from_owl.signals import lamp_states
 from bridgegen.openx.openscenario.from_owl.weather import environment
 from bridgegen.openx.openscenario.splines import uniform_knots
+from bridgegen.scenario.ontology.graph import Individuals
+from bridgegen.scenario.ontology.vocabulary import Subject
 
 
 class Actions:

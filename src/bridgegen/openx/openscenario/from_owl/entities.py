@@ -4,14 +4,14 @@ from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from functools import partial
 
-from bridgegen.errors import OntologyError, UnsupportedError
-from bridgegen.ontology.graph import Individuals
-from bridgegen.ontology.vocabulary import Subject
+from bridgegen.base.errors import OntologyError, UnsupportedError
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.bodies import EntityBody, entity_body
 from bridgegen.openx.openscenario.declarations import DRIVER, IDEAL, SIREN
 from bridgegen.openx.openscenario.values import format_double
-from bridgegen.participants import PARTICIPANTS, Body, ParticipantKind
+from bridgegen.scenario.ontology.graph import Individuals
+from bridgegen.scenario.ontology.vocabulary import Subject
+from bridgegen.scenario.participants import PARTICIPANTS, Body, ParticipantKind
 
 MAX_SPEED = "max_speed"
 """Property of a pedestrian: the greatest speed [m/s]; the standard has it for vehicles."""

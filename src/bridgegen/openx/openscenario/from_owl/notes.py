@@ -20,7 +20,7 @@ about, which one, and what is said of it; what may be said several times is numb
 ``event.NAME.on_road.1``              a road that it is on
 ``event.NAME.time``                   when it happens [s]
 ``signals.NAME.offset``               of a controller: time of its first phase that has passed [s]
-``cause``                             of its harm, as `bridgegen.cause` names it
+``cause``                             of its harm, as `bridgegen.assess.cause` names it
 ``conflict_type``                     of its decisive conflict
 ``responsible``                       for it: ego, other, shared or none
 ``severity``                          of it: probability of a MAIS3+ injury
@@ -30,10 +30,7 @@ about, which one, and what is said of it; what may be said several times is numb
 from collections.abc import Iterator
 from urllib.parse import quote
 
-from bridgegen.errors import OntologyError
-from bridgegen.odd.parameters import Axis
-from bridgegen.ontology.graph import Individuals
-from bridgegen.ontology.vocabulary import Subject
+from bridgegen.base.errors import OntologyError
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.declarations import (
     CAUSE,
@@ -48,6 +45,9 @@ from bridgegen.openx.openscenario.from_owl.places import Places
 from bridgegen.openx.openscenario.from_owl.quantities import Quantities
 from bridgegen.openx.openscenario.from_owl.signals import Signals
 from bridgegen.openx.openscenario.values import format_double
+from bridgegen.scenario.language.parameters import Axis
+from bridgegen.scenario.ontology.graph import Individuals
+from bridgegen.scenario.ontology.vocabulary import Subject
 
 CHANGES = ("TrafficJam", "RoadWorks", "TrafficAccident", "NearMiss", "TemporaryChange")
 """The classes of temporary changes, a class before those above it."""

@@ -7,13 +7,13 @@ roads, and a road's reference line may run towards the junction or away from it.
 import math
 from dataclasses import dataclass
 
-from bridgegen.errors import OntologyError
-from bridgegen.ontology.graph import Individuals
-from bridgegen.ontology.vocabulary import Subject
+from bridgegen.base.errors import OntologyError
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.from_owl.quantities import Quantities, Quantity
 from bridgegen.openx.openscenario.from_owl.quoted import quoted_element
 from bridgegen.openx.openscenario.values import Double, format_double
+from bridgegen.scenario.ontology.graph import Individuals
+from bridgegen.scenario.ontology.vocabulary import Subject
 
 RADIANS = repr(math.pi / 180.0)
 """In a degree, as a part of a formula."""

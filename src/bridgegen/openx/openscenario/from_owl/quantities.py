@@ -11,14 +11,14 @@ from keyword import iskeyword
 
 import pyoxigraph as ox
 
-from bridgegen.errors import OntologyError
-from bridgegen.odd.expression import RESERVED, Expression, parse
-from bridgegen.odd.kinds import slack
-from bridgegen.odd.parameters import Axis
-from bridgegen.ontology.graph import Individuals
-from bridgegen.ontology.vocabulary import Subject, bg
+from bridgegen.base.errors import OntologyError
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.values import format_double
+from bridgegen.scenario.language.expression import RESERVED, Expression, parse
+from bridgegen.scenario.language.kinds import slack
+from bridgegen.scenario.language.parameters import Axis
+from bridgegen.scenario.ontology.graph import Individuals
+from bridgegen.scenario.ontology.vocabulary import Subject, bg
 
 Quantity = float | osc.ParameterRef
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
@@ -128,7 +128,8 @@ class Quantities:
         """Return a formula of ``x`` at a quantity: its value, or an expression over the parameter.
 
         Args:
-            formula: in what OpenSCENARIO 1.2 and `bridgegen.odd.expression` have in common.
+            formula: in what OpenSCENARIO 1.2 and `bridgegen.scenario.language.expression` have in
+                common.
             quantity: what ``x`` stands for.
 
         Raises:

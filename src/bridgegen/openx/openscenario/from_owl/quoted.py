@@ -2,11 +2,11 @@
 
 from collections.abc import Mapping
 
-from bridgegen.errors import FileFormatError, OntologyError
-from bridgegen.ontology.graph import Individuals
-from bridgegen.ontology.vocabulary import Subject
+from bridgegen.base.errors import FileFormatError, OntologyError
 from bridgegen.openx.openscenario.element import Element
-from bridgegen.openx.openscenario.fragments import element_from
+from bridgegen.openx.openscenario.read import element_from
+from bridgegen.scenario.ontology.graph import Individuals
+from bridgegen.scenario.ontology.vocabulary import Subject
 
 
 def quoted_element(

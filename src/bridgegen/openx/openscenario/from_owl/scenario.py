@@ -10,14 +10,11 @@ What other tools need (found by reading and running esmini): orientations always
 
 from itertools import count
 
-from bridgegen.errors import OntologyError
-from bridgegen.ontology.graph import Individuals
-from bridgegen.ontology.vocabulary import Subject
+from bridgegen.base.errors import OntologyError
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.from_owl.actions import Actions
-from bridgegen.openx.openscenario.from_owl.conditions import Conditions
 from bridgegen.openx.openscenario.from_owl.entities import Cast, plain_text, scenario_object
-from bridgegen.openx.openscenario.from_owl.events import Events
+from bridgegen.openx.openscenario.from_owl.events import Conditions, Events
 from bridgegen.openx.openscenario.from_owl.notes import Notes
 from bridgegen.openx.openscenario.from_owl.places import Places
 from bridgegen.openx.openscenario.from_owl.quantities import Quantities
@@ -25,7 +22,9 @@ from bridgegen.openx.openscenario.from_owl.quoted import quoted_element
 from bridgegen.openx.openscenario.from_owl.signals import Signals
 from bridgegen.openx.openscenario.from_owl.weather import environment
 from bridgegen.openx.openscenario.renaming import EGO
-from bridgegen.openx.openscenario.versions import least_version, to_version
+from bridgegen.openx.openscenario.write import least_version, to_version
+from bridgegen.scenario.ontology.graph import Individuals
+from bridgegen.scenario.ontology.vocabulary import Subject
 
 DATE = "2025-01-01T00:00:00"
 """The header's date unless another is given: the same individuals give the same bytes."""

@@ -7,10 +7,10 @@ esmini and others run only these.
 import math
 from collections.abc import Iterator
 
-from bridgegen.errors import OntologyError
-from bridgegen.ontology.graph import Individuals
-from bridgegen.ontology.vocabulary import Subject
+from bridgegen.base.errors import OntologyError
 from bridgegen.openx.openscenario import model as osc
+from bridgegen.scenario.ontology.graph import Individuals
+from bridgegen.scenario.ontology.vocabulary import Subject
 
 LAMPS = {
     "red": "on;off;off",

@@ -2,8 +2,9 @@
 
 The ontology keeps the paper's weather parameters (percent and degrees, as CARLA has them); the
 standard wants physical quantities. A bound parameter is converted by an expression in the file, so
-it stays searchable; `bridgegen.weather.Law` says what expressions know. What has no expression
-(classes, a time of day) is declared as a parameter of text, made from the present values.
+it stays searchable; `bridgegen.scenario.weather.Law` says what expressions know. What has no
+expression (classes, a time of day) is declared as a parameter of text, made from the present
+values.
 
 The originals are kept too, as properties of the road condition, for readers that know them.
 """
@@ -13,13 +14,13 @@ from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Any
 
-from bridgegen.errors import OntologyError
-from bridgegen.ontology.graph import Individuals
-from bridgegen.ontology.vocabulary import Subject
+from bridgegen.base.errors import OntologyError
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.from_owl.quantities import Quantities, Quantity
 from bridgegen.openx.openscenario.values import format_double
-from bridgegen.weather import PARAMETERS, PARTS, PHYSICAL, SAME
+from bridgegen.scenario.ontology.graph import Individuals
+from bridgegen.scenario.ontology.vocabulary import Subject
+from bridgegen.scenario.weather import PARAMETERS, PARTS, PHYSICAL, SAME
 
 _ELEMENTS: Mapping[str, Callable[..., Any]] = {
     "sun": osc.Sun,

@@ -12,8 +12,8 @@ from collections.abc import Mapping
 from typing import Any
 
 from bridgegen.openx.openscenario import model as osc
-from bridgegen.openx.openscenario.participant_kinds import kind_of
-from bridgegen.participants import PARTICIPANTS
+from bridgegen.openx.openscenario.bodies import kind_of
+from bridgegen.scenario.participants import PARTICIPANTS
 
 Sizes = Mapping[str, tuple[float, float, float]]
 """Length, width and height [m] by blueprint."""

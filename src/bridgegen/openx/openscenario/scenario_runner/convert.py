@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from bridgegen.errors import UnsupportedError
+from bridgegen.base.errors import UnsupportedError
 from bridgegen.openx.opendrive.lanes import lane_pose, values
 from bridgegen.openx.opendrive.model import OpenDrive
 from bridgegen.openx.openscenario import model as osc
@@ -28,7 +28,7 @@ from bridgegen.openx.openscenario.scenario_runner.environment import (
     carla_fields,
     environment,
 )
-from bridgegen.openx.openscenario.scenario_runner.motion import Body, Course, centred, course
+from bridgegen.openx.openscenario.scenario_runner.story import Body, Course, centred, course
 
 CONTROL = "bridgegen_control.py"
 """The controller's module, beside the file; in this package, as ScenarioRunner loads it."""

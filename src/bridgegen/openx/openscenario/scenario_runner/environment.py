@@ -12,10 +12,10 @@ Source: ScenarioRunner 0.9.16, srunner/tools/openscenario_parser.py, get_weather
 import math
 from typing import Any
 
-from bridgegen.errors import UnsupportedError
+from bridgegen.base.errors import UnsupportedError
 from bridgegen.openx.openscenario import cloudiness as cloud_classes
 from bridgegen.openx.openscenario import model as osc
-from bridgegen.weather import CARLA_FIELDS, CARLA_NAMES, rain_share
+from bridgegen.scenario.weather import CARLA_FIELDS, CARLA_NAMES, rain_share
 
 CLEAR = osc.Environment(
     "environment",

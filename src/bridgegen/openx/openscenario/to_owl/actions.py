@@ -9,14 +9,15 @@ from bridgegen.openx.openscenario.element import Element
 from bridgegen.openx.openscenario.from_owl.signals import LAMPS
 from bridgegen.openx.openscenario.splines import is_uniform
 from bridgegen.openx.openscenario.to_owl.build import (
+    ACTION,
     StoryBuilder,
     UnsayableError,
+    node_of,
     numbered,
     plain_name,
 )
 from bridgegen.openx.openscenario.to_owl.lights import known_light
 from bridgegen.openx.openscenario.to_owl.places import add_position, same_place
-from bridgegen.openx.openscenario.to_owl.quoted import ACTION, node_of
 from bridgegen.openx.openscenario.to_owl.weather import add_weather
 
 Start = tuple[ox.NamedNode, osc.Position]

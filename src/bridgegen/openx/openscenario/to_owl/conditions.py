@@ -4,10 +4,15 @@ import pyoxigraph as ox
 
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.element import Element
-from bridgegen.openx.openscenario.from_owl.conditions import USUAL_RULES
+from bridgegen.openx.openscenario.from_owl.events import USUAL_RULES
 from bridgegen.openx.openscenario.to_owl.actions import put_place, signal_state
-from bridgegen.openx.openscenario.to_owl.build import StoryBuilder, UnsayableError, numbered
-from bridgegen.openx.openscenario.to_owl.quoted import CONDITION, said_or_quoted
+from bridgegen.openx.openscenario.to_owl.build import (
+    CONDITION,
+    StoryBuilder,
+    UnsayableError,
+    numbered,
+    said_or_quoted,
+)
 
 Relative = osc.RelativeDistanceCondition | osc.TimeHeadwayCondition | osc.TimeToCollisionCondition
 

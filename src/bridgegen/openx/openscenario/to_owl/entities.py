@@ -4,11 +4,10 @@ from functools import partial
 
 import pyoxigraph as ox
 
-from bridgegen.named_models import MODELS
 from bridgegen.openx.openscenario import model as osc
+from bridgegen.openx.openscenario.bodies import kind_of
 from bridgegen.openx.openscenario.declarations import DRIVER, IDEAL
 from bridgegen.openx.openscenario.from_owl.entities import LIFTED, MAX_SPEED
-from bridgegen.openx.openscenario.participant_kinds import kind_of
 from bridgegen.openx.openscenario.to_owl.actions import (
     add_action,
     add_route,
@@ -16,16 +15,18 @@ from bridgegen.openx.openscenario.to_owl.actions import (
     put_speed,
 )
 from bridgegen.openx.openscenario.to_owl.build import (
+    ACTION,
     Lost,
     StoryBuilder,
     UnsayableError,
     numbered,
+    said_or_quoted,
 )
 from bridgegen.openx.openscenario.to_owl.differences import is_detail
 from bridgegen.openx.openscenario.to_owl.lights import known_light
 from bridgegen.openx.openscenario.to_owl.places import add_position
-from bridgegen.openx.openscenario.to_owl.quoted import ACTION, said_or_quoted
-from bridgegen.participants import PARTICIPANTS
+from bridgegen.scenario.named_models import MODELS
+from bridgegen.scenario.participants import PARTICIPANTS
 
 _AS_IN_EVENTS = (
     osc.LongitudinalDistanceAction

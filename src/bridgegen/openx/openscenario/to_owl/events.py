@@ -12,7 +12,7 @@ from urllib.parse import unquote
 
 import pyoxigraph as ox
 
-from bridgegen.errors import InputError
+from bridgegen.base.errors import InputError
 from bridgegen.openx.opendrive.lanes import lane_at, section_index
 from bridgegen.openx.opendrive.map_names import lane_name, road_name
 from bridgegen.openx.openscenario import model as osc

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 
 import pyoxigraph as ox
 
-from bridgegen.ontology.vocabulary import bg
 from bridgegen.openx.opendrive.model import Junction, OpenDrive, Road
+from bridgegen.scenario.ontology.vocabulary import bg
 
 
 @dataclass(frozen=True)

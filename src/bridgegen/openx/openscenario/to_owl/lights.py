@@ -2,8 +2,8 @@
 
 from collections.abc import Callable
 
-from bridgegen.ontology.vocabulary import tbox
 from bridgegen.openx.openscenario import model as osc
+from bridgegen.scenario.ontology.vocabulary import tbox
 
 
 def known_light(action: object, text: Callable[[osc.ParameterRef | str], str]) -> str | None:

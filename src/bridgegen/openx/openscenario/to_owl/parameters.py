@@ -10,15 +10,15 @@ from collections.abc import Iterable, Iterator, Mapping
 
 import pyoxigraph as ox
 
-from bridgegen.odd.parameters import Axis
-from bridgegen.ontology.vocabulary import bg, tbox
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.declarations import ROAD_END, SEVERITY, TIME_STEP
 from bridgegen.openx.openscenario.from_owl.notes import EVENT, FINDINGS, PARAMETER, SIGNALS
 from bridgegen.openx.openscenario.parameters import refers
 from bridgegen.openx.openscenario.to_owl.build import StoryBuilder, UnsayableError
 from bridgegen.openx.openscenario.to_owl.entities import as_number
-from bridgegen.weather import PARAMETERS
+from bridgegen.scenario.language.parameters import Axis
+from bridgegen.scenario.ontology.vocabulary import bg, tbox
+from bridgegen.scenario.weather import PARAMETERS
 
 _WEATHER = frozenset(one.owl_property for one in PARAMETERS.values())
 _LIMITS = {osc.Rule.GREATER_OR_EQUAL: "has_low", osc.Rule.LESS_OR_EQUAL: "has_high"}

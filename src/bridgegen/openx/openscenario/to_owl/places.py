@@ -11,7 +11,7 @@ from typing import Any
 
 import pyoxigraph as ox
 
-from bridgegen.errors import InputError
+from bridgegen.base.errors import InputError
 from bridgegen.openx.opendrive.lanes import lane_at, section_index
 from bridgegen.openx.opendrive.legs import junction_end
 from bridgegen.openx.opendrive.map_names import lane_name
@@ -19,13 +19,14 @@ from bridgegen.openx.opendrive.model import Road
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.from_owl.places import RADIANS
 from bridgegen.openx.openscenario.to_owl.build import (
+    POSITION,
     StoryBuilder,
     UnsayableError,
+    node_of,
     shortest,
     simplest,
 )
 from bridgegen.openx.openscenario.to_owl.legs import Stretch
-from bridgegen.openx.openscenario.to_owl.quoted import POSITION, node_of
 
 _LENGTH_SLACK = 1e-6  # [m]
 _NAME = r"\(?\s*\$(?P<name>[A-Za-z_][A-Za-z0-9_]*)\s*\)?"

@@ -22,22 +22,20 @@ from pathlib import PurePath
 
 import pyoxigraph as ox
 
-from bridgegen.errors import InputError, UnsupportedError
-from bridgegen.ontology.graph import Individuals
-from bridgegen.ontology.vocabulary import bg
+from bridgegen.base.errors import InputError, UnsupportedError
 from bridgegen.openx.opendrive.map_names import road_name
 from bridgegen.openx.opendrive.model import OpenDrive
 from bridgegen.openx.opendrive.to_owl import individuals_from_opendrive
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario import parameters
 from bridgegen.openx.openscenario.declarations import DEFAULT_TIME_STEP
-from bridgegen.openx.openscenario.fragments import fragment_of
 from bridgegen.openx.openscenario.from_owl.notes import EVENT, FINDINGS, SIGNALS
 from bridgegen.openx.openscenario.from_owl.scenario import ARRIVAL, openscenario_from_owl
 from bridgegen.openx.openscenario.from_owl.signals import Signals
+from bridgegen.openx.openscenario.read import fragment_of
 from bridgegen.openx.openscenario.renaming import EGO
 from bridgegen.openx.openscenario.resolve import part_resolved
-from bridgegen.openx.openscenario.to_owl.build import Lost, StoryBuilder, numbered
+from bridgegen.openx.openscenario.to_owl.build import ACTION, Lost, StoryBuilder, numbered, quoted
 from bridgegen.openx.openscenario.to_owl.conditions import add_trigger
 from bridgegen.openx.openscenario.to_owl.entities import (
     add_begun,
@@ -55,10 +53,11 @@ from bridgegen.openx.openscenario.to_owl.foregone import without_foregone
 from bridgegen.openx.openscenario.to_owl.legs import stretches, with_legs
 from bridgegen.openx.openscenario.to_owl.losses import losses
 from bridgegen.openx.openscenario.to_owl.parameters import Notes, add_parameters
-from bridgegen.openx.openscenario.to_owl.quoted import ACTION, quoted
 from bridgegen.openx.openscenario.to_owl.signals import add_controllers
 from bridgegen.openx.openscenario.to_owl.simplified import simplified
 from bridgegen.openx.openscenario.to_owl.weather import add_weather
+from bridgegen.scenario.ontology.graph import Individuals
+from bridgegen.scenario.ontology.vocabulary import bg
 
 DURATION = 60.0
 """The duration [s] of a file whose stop trigger names no time, if that is put up with."""

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from bridgegen.errors import InputError
+from bridgegen.base.errors import InputError
 from bridgegen.openx.opendrive.geometry import reference_line
 from bridgegen.openx.opendrive.lanes import borders, lane_along, lane_at, lane_pose, section_index
 from bridgegen.openx.opendrive.model import OpenDrive, Road

@@ -1,8 +1,8 @@
 """OpenSCENARIO2OWL, its weather: from the standard's units to CARLA's percentages and degrees.
 
 Our files keep the originals as properties of the road condition; where these are, they count. From
-other people's files the laws of `bridgegen.weather` are solved for the percentage; what lies beyond
-its 0 to 100 the comparison of the whole finds.
+other people's files the laws of `bridgegen.scenario.weather` are solved for the percentage; what
+lies beyond its 0 to 100 the comparison of the whole finds.
 """
 
 import math
@@ -11,11 +11,11 @@ from typing import Any
 
 import pyoxigraph as ox
 
-from bridgegen.odd.expression import parse
 from bridgegen.openx.openscenario import cloudiness
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.to_owl.build import StoryBuilder, UnsayableError, shortest
-from bridgegen.weather import PARAMETERS, PARTS, PHYSICAL, Parameter
+from bridgegen.scenario.language.expression import parse
+from bridgegen.scenario.weather import PARAMETERS, PARTS, PHYSICAL, Parameter
 
 CLASSES = {part.link: part.owl_class for part in PARTS}
 """The class of each part of the weather."""

@@ -12,8 +12,8 @@ on forces that make it so, and in between both count by a smooth weight.
 
 import math
 
-from bridgegen.compiled import kernel
-from bridgegen.physics import GRAVITY
+from bridgegen.base.compiled import kernel
+from bridgegen.base.physics import GRAVITY
 from bridgegen.simulation.embedded.chassis._chassis_columns import (
     BRAKE_FRONT,
     C_X,

@@ -10,8 +10,8 @@ to the kinematic bicycle, and in between both count by a smooth weight.
 
 import math
 
-from bridgegen.compiled import inlined_kernel, kernel
-from bridgegen.physics import GRAVITY
+from bridgegen.base.compiled import inlined_kernel, kernel
+from bridgegen.base.physics import GRAVITY
 from bridgegen.simulation.embedded.chassis._chassis_columns import (
     AGILITY,
     BRAKE_FRONT,

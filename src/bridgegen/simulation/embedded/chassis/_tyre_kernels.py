@@ -9,7 +9,7 @@ and with camber where said. Friction scales the peak, and not the stiffness.
 
 import math
 
-from bridgegen.compiled import inlined_kernel, kernel
+from bridgegen.base.compiled import inlined_kernel, kernel
 from bridgegen.simulation.embedded.chassis._chassis_columns import (
     B_XA,
     B_XA2,

@@ -5,14 +5,14 @@ from dataclasses import dataclass, field, fields
 
 import numpy as np
 
-from bridgegen.arrays import Float
+from bridgegen.base.arrays import Float
 from bridgegen.simulation.embedded.chassis import _chassis_columns as common
 from bridgegen.simulation.embedded.chassis import _multi_body_columns as columns
 from bridgegen.simulation.embedded.chassis.parameters import CLASSES, Tyre
 from bridgegen.simulation.vehicles import KINEMATIC, MULTI_BODY, SINGLE_TRACK
 
 CLASS = "car"
-"""The only object class with parameters; see `bridgegen.participants.OBJECT_CLASSES`."""
+"""The only object class with parameters; see `bridgegen.scenario.participants.OBJECT_CLASSES`."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, fields
 
 import numpy as np
 
-from bridgegen.arrays import Float
+from bridgegen.base.arrays import Float
 from bridgegen.simulation.embedded.chassis import _chassis_columns as columns
 
 
@@ -120,7 +120,7 @@ CLASSES = {
         brake_lag=0.43, drive_lag=0.4, drive_front=0.0,
     ),
 }  # fmt: skip
-"""By the name of an object class, see `bridgegen.participants.OBJECT_CLASSES`."""
+"""By the name of an object class, see `bridgegen.scenario.participants.OBJECT_CLASSES`."""
 
 
 def chassis_of(name: str, wheelbase: float, body: Float) -> Float:

@@ -4,12 +4,12 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from bridgegen.arrays import Float, Int
-from bridgegen.ego import STORYBOARD, Driver
-from bridgegen.ego._kind_tables import IS_VEHICLE
-from bridgegen.ego.drivers import CODES, SCRIPTED
-from bridgegen.ego.kinds import NAMES
-from bridgegen.errors import InputError, UnsupportedError
+from bridgegen.base.arrays import Float, Int
+from bridgegen.base.errors import InputError, UnsupportedError
+from bridgegen.drivers import STORYBOARD, Driver
+from bridgegen.drivers._kind_tables import IS_VEHICLE
+from bridgegen.drivers.drivers import CODES, SCRIPTED
+from bridgegen.drivers.kinds import NAMES
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.element import walk
 from bridgegen.openx.openscenario.pruning import strays, without
@@ -27,6 +27,7 @@ from bridgegen.simulation.embedded.compiler import declared
 from bridgegen.simulation.embedded.compiler.actions import Actions
 from bridgegen.simulation.embedded.compiler.bodies import (
     Body,
+    Towing,
     has_siren,
     kind,
     measures,
@@ -39,7 +40,6 @@ from bridgegen.simulation.embedded.compiler.positions import Positions
 from bridgegen.simulation.embedded.compiler.start import Start
 from bridgegen.simulation.embedded.compiler.storyboard import elements
 from bridgegen.simulation.embedded.compiler.tables import Tables, table
-from bridgegen.simulation.embedded.compiler.towing import Towing
 from bridgegen.simulation.embedded.compiler.triggers import MAX_STEPS, Triggers
 from bridgegen.simulation.embedded.program import (
     AlongLanes,
@@ -70,7 +70,7 @@ def compile_storyboard(
         place: its name, for messages.
         driver: who drives the ego, whatever the file says.
         ideal: its stages that are ideal, whatever the driver or the file says.
-        others: a name of `bridgegen.ego.drivers.OTHERS`: who drives all other participants,
+        others: a name of `bridgegen.drivers.drivers.OTHERS`: who drives all other participants,
             whatever the file says; those that cannot look ahead are scripted.
         vehicle: how the ego moves, whatever the file says; see `bridgegen.simulation.vehicles`.
         time_step: [s], whatever the file says.

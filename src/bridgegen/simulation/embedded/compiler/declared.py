@@ -2,18 +2,9 @@
 
 import shlex
 
-from bridgegen.ego import (
-    DRIVERS,
-    GUESTS,
-    STORYBOARD,
-    Driver,
-    get,
-    is_planner,
-    is_spec,
-    split,
-)
-from bridgegen.ego.drivers import OTHERS
-from bridgegen.errors import InputError, UnknownNameError, UnsupportedError
+from bridgegen.base.errors import InputError, UnknownNameError, UnsupportedError
+from bridgegen.drivers import DRIVERS, GUESTS, STORYBOARD, Driver, get, is_planner, is_spec, split
+from bridgegen.drivers.drivers import OTHERS
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.declarations import (
     DEFAULT_TIME_STEP,

@@ -10,14 +10,13 @@ from itertools import pairwise
 
 import numpy as np
 
-from bridgegen.arrays import Float, Int
-from bridgegen.errors import InputError
+from bridgegen.base.arrays import Float, Int
+from bridgegen.base.errors import InputError
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.values import Value
 from bridgegen.simulation.embedded._codes import LAYOUT_WIDTH, RIGID, THROUGH, WEIGHTED
-from bridgegen.simulation.embedded.compiler.clothoids import bends, sampled
+from bridgegen.simulation.embedded.compiler.curves import basis, bends, sampled
 from bridgegen.simulation.embedded.compiler.positions import Positions, is_fixed
-from bridgegen.simulation.embedded.compiler.splines import basis
 from bridgegen.simulation.embedded.compiler.tables import Tables, table
 from bridgegen.simulation.embedded.compiler.trajectories import check_times
 

@@ -6,7 +6,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from bridgegen.arrays import Int
+from bridgegen.base.arrays import Int
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.element import Element
 from bridgegen.openx.openscenario.parameters import numbers, values

@@ -9,11 +9,11 @@ from itertools import pairwise
 
 import numpy as np
 
-from bridgegen.arrays import Float
-from bridgegen.errors import InputError
+from bridgegen.base.arrays import Float
+from bridgegen.base.errors import InputError
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.element import Element
-from bridgegen.simulation.embedded.compiler.clothoids import bends
+from bridgegen.simulation.embedded.compiler.curves import bends
 from bridgegen.simulation.embedded.compiler.tables import Tables
 from bridgegen.simulation.embedded.program import AlongTrajectory, Bend, LanePoint, Point
 

@@ -9,8 +9,8 @@ it. A cell's node leads along its lane's traffic.
 
 import math
 
-from bridgegen.compiled import kernel
-from bridgegen.ego._path_kernels import project
+from bridgegen.base.compiled import kernel
+from bridgegen.drivers._path_kernels import project
 from bridgegen.simulation.embedded._codes import (
     BOXES,
     COUNTS,

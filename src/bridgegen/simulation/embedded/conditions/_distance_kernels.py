@@ -5,8 +5,8 @@
 
 import math
 
-from bridgegen.compiled import kernel
-from bridgegen.ego._path_kernels import COS, SIN, X, Y, pose, project
+from bridgegen.base.compiled import kernel
+from bridgegen.drivers._path_kernels import COS, SIN, X, Y, pose, project
 from bridgegen.simulation._box_kernels import box_gap
 from bridgegen.simulation.embedded._codes import (
     AT_MARK,

@@ -9,7 +9,7 @@ of ``_relation_kernels``, where all is that is seldom asked for.
 
 import math
 
-from bridgegen.compiled import inlined_kernel, kernel
+from bridgegen.base.compiled import inlined_kernel, kernel
 from bridgegen.simulation.embedded._codes import (
     COMPLETE,
     DISTANCE,

@@ -8,8 +8,8 @@ One function, for the code of all instants would grow by it.
 
 import math
 
-from bridgegen.compiled import kernel
-from bridgegen.ego._path_kernels import pose, project
+from bridgegen.base.compiled import kernel
+from bridgegen.drivers._path_kernels import pose, project
 from bridgegen.simulation.embedded._codes import (
     ACCELERATING,
     ANGLE,

@@ -5,9 +5,9 @@
 
 import math
 
-from bridgegen.compiled import kernel
-from bridgegen.ego._weather_columns import FRICTION
-from bridgegen.physics import GRAVITY
+from bridgegen.base.compiled import kernel
+from bridgegen.base.physics import GRAVITY
+from bridgegen.drivers._weather_columns import FRICTION
 from bridgegen.simulation.embedded.chassis._chassis_columns import (
     BRAKE_LAG,
     DRIVE_LAG,

@@ -5,10 +5,10 @@
 
 import math
 
-from bridgegen.compiled import bundled, bundled_row, kernel
-from bridgegen.ego._prediction_kernels import predict
-from bridgegen.ego._reference_kernels import reach_of
-from bridgegen.ego._yielding_kernels import (
+from bridgegen.base.compiled import bundled, bundled_row, kernel
+from bridgegen.drivers._prediction_kernels import predict
+from bridgegen.drivers._reference_kernels import reach_of
+from bridgegen.drivers._yielding_kernels import (
     ENTER,
     ENTITY,
     FRONT,
@@ -20,7 +20,7 @@ from bridgegen.ego._yielding_kernels import (
     REAR,
     STATION,
 )
-from bridgegen.ego.interface import HISTORY_STEP
+from bridgegen.drivers.interface import HISTORY_STEP
 from bridgegen.simulation.embedded._memory_kernels import N_STEPS
 
 

@@ -9,9 +9,9 @@ storyboard does the rest, as for any other entity.
 
 import math
 
-from bridgegen.compiled import inlined_kernel, kernel
-from bridgegen.ego._path_kernels import project
-from bridgegen.ego._weather_columns import FRICTION
+from bridgegen.base.compiled import inlined_kernel, kernel
+from bridgegen.drivers._path_kernels import project
+from bridgegen.drivers._weather_columns import FRICTION
 from bridgegen.simulation.embedded._codes import LATERALLY, LONGITUDINALLY, SETS_SPEED, STEERS
 from bridgegen.simulation.embedded.drivers._ego_kernels import move_ego
 from bridgegen.simulation.embedded.motion import move_along_path, stop_follow, stop_longitudinal

@@ -3,9 +3,9 @@
 # mypy: allow-untyped-defs
 # Numba infers what kernels take; their wrappers are typed.
 
-from bridgegen.compiled import call_kernel_at, inlined_kernel, kernel, run_kernel_at
-from bridgegen.ego._path_kernels import project
-from bridgegen.ego._weather_columns import FRICTION
+from bridgegen.base.compiled import call_kernel_at, inlined_kernel, kernel, run_kernel_at
+from bridgegen.drivers._path_kernels import project
+from bridgegen.drivers._weather_columns import FRICTION
 from bridgegen.simulation.embedded._motion_kernels import bicycle, standing
 from bridgegen.simulation.embedded.chassis._chassis_columns import SPEED, H, X, Y
 from bridgegen.simulation.embedded.motion import ENDS, pass_end

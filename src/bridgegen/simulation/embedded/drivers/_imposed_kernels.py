@@ -5,8 +5,8 @@
 
 import math
 
-from bridgegen.compiled import bundled, bundled_row, kernel
-from bridgegen.ego._path_kernels import project
+from bridgegen.base.compiled import bundled, bundled_row, kernel
+from bridgegen.drivers._path_kernels import project
 from bridgegen.simulation.embedded._memory_kernels import (
     N_STEPS,
 )

@@ -1,6 +1,6 @@
 """Observations of a user's own driver that wants "lanes": the road along its route.
 
-A view is a row of ``LANES`` numbers in the order of `bridgegen.ego.compiled.LANES`.
+A view is a row of ``LANES`` numbers in the order of `bridgegen.drivers.compiled.LANES`.
 """
 
 # mypy: allow-untyped-defs
@@ -8,10 +8,10 @@ A view is a row of ``LANES`` numbers in the order of `bridgegen.ego.compiled.LAN
 
 import math
 
-from bridgegen.compiled import bundled_row, kernel
-from bridgegen.ego._path_kernels import H, X, Y
-from bridgegen.ego.interface import ROUTE_POINTS, ROUTE_STEP
-from bridgegen.ego.lane_tables import BESIDE, JUNCTION, LANE, LIMIT, WIDTH
+from bridgegen.base.compiled import bundled_row, kernel
+from bridgegen.drivers._path_kernels import H, X, Y
+from bridgegen.drivers.interface import ROUTE_POINTS, ROUTE_STEP
+from bridgegen.drivers.lane_tables import BESIDE, JUNCTION, LANE, LIMIT, WIDTH
 from bridgegen.simulation.embedded._memory_kernels import N_STEPS
 
 LIMITS, WIDTHS, JUNCTIONS, BESIDES = 0, ROUTE_POINTS, 2 * ROUTE_POINTS, 3 * ROUTE_POINTS

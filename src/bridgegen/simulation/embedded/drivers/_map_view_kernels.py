@@ -2,7 +2,7 @@
 
 The distance of a piece is that of its middle, of two alike the first one is nearer. Pieces that
 may be among the nearest until the ego has moved by ``SLACK`` are kept in a memory ``(MEMORY,)``;
-they are searched in the cells of a grid, see `bridgegen.ego.map_grid`.
+they are searched in the cells of a grid, see `bridgegen.drivers.map_grid`.
 """
 
 # mypy: allow-untyped-defs
@@ -10,9 +10,9 @@ they are searched in the cells of a grid, see `bridgegen.ego.map_grid`.
 
 import math
 
-from bridgegen.compiled import bundled_row, kernel
-from bridgegen.ego.interface import CENTRE, NEAR_PIECES, PIECE_POINTS
-from bridgegen.ego.map_grid import ACROSS, BOTTOM, LEFT, REACH, UP, WIDTH
+from bridgegen.base.compiled import bundled_row, kernel
+from bridgegen.drivers.interface import CENTRE, NEAR_PIECES, PIECE_POINTS
+from bridgegen.drivers.map_grid import ACROSS, BOTTOM, LEFT, REACH, UP, WIDTH
 from bridgegen.simulation.embedded._memory_kernels import N_STEPS
 
 SLACK = 8.0  # m

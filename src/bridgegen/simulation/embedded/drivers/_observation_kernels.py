@@ -5,9 +5,9 @@
 
 import math
 
-from bridgegen.compiled import bundled, bundled_row, kernel
-from bridgegen.ego._path_kernels import CURVATURE, locate, pose
-from bridgegen.ego._perception_kernels import perceive
+from bridgegen.base.compiled import bundled, bundled_row, kernel
+from bridgegen.drivers._path_kernels import CURVATURE, locate, pose
+from bridgegen.drivers._perception_kernels import perceive
 from bridgegen.simulation.embedded._memory_kernels import (
     N_STEPS,
 )

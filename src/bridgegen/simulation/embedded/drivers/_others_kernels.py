@@ -1,8 +1,8 @@
 """Participants other than the ego that have a driver, which limits their script.
 
 The storyboard commands a speed, and when a change of lane begins; the driver
-(`bridgegen.ego._attentive_kernels`) may slow them, and delay the change. All drivers decide by the
-states at instant k, before any entity moves, so the order of the entities does not matter.
+(`bridgegen.drivers._attentive_kernels`) may slow them, and delay the change. All drivers decide by
+the states at instant k, before any entity moves, so the order of the entities does not matter.
 """
 
 # mypy: allow-untyped-defs
@@ -10,12 +10,12 @@ states at instant k, before any entity moves, so the order of the entities does 
 
 import math
 
-from bridgegen.compiled import kernel
-from bridgegen.ego._attentive_kernels import ASKED, LOOK, look, react, see
-from bridgegen.ego._following_kernels import COMFORT_ACCELERATION
-from bridgegen.ego._weather_columns import FRICTION
-from bridgegen.ego.drivers import SCRIPTED
-from bridgegen.physics import CAREFUL_JERK
+from bridgegen.base.compiled import kernel
+from bridgegen.base.physics import CAREFUL_JERK
+from bridgegen.drivers._attentive_kernels import ASKED, LOOK, look, react, see
+from bridgegen.drivers._following_kernels import COMFORT_ACCELERATION
+from bridgegen.drivers._weather_columns import FRICTION
+from bridgegen.drivers.drivers import SCRIPTED
 from bridgegen.simulation.embedded._codes import DOES, KEEP_ASIDE
 from bridgegen.simulation.embedded._memory_kernels import STOPS
 from bridgegen.simulation.embedded._motion_kernels import SAME_SPEED

@@ -5,8 +5,8 @@
 
 import math
 
-from bridgegen.compiled import bundled, bundled_row, call_at, kernel
-from bridgegen.ego.interface import ROUTE_STEP
+from bridgegen.base.compiled import bundled, bundled_row, call_at, kernel
+from bridgegen.drivers.interface import ROUTE_STEP
 from bridgegen.simulation.embedded._memory_kernels import (
     N_STEPS,
     NO_CONTROL,
@@ -20,7 +20,7 @@ from bridgegen.simulation.embedded.drivers._map_view_kernels import see_map
 from bridgegen.simulation.embedded.drivers._observation_kernels import observe
 
 EGO, SCENE = 10, 9  # inputs on the ego, and after them on the scene
-N_INPUTS = EGO + SCENE  # as `bridgegen.ego.compiled` names them
+N_INPUTS = EGO + SCENE  # as `bridgegen.drivers.compiled` names them
 ACCELERATION, CURVATURE, RETURNED = 0, 1, 2
 ANSWER = 3
 

@@ -5,8 +5,8 @@ from typing import Any
 
 from numba import types
 
-from bridgegen.compiled import address_of, row_type
-from bridgegen.ego import (
+from bridgegen.base.compiled import address_of, row_type
+from bridgegen.drivers import (
     _careful_fsm_kernels,
     _careful_kernels,
     _fsm_kernels,

@@ -6,12 +6,12 @@
 # mypy: allow-untyped-defs
 # Numba infers what kernels take; their wrappers are typed.
 
-from bridgegen.compiled import kernel
-from bridgegen.ego._attentive_kernels import gap_is_free
-from bridgegen.ego._conflict_kernels import LEAST_PACE
-from bridgegen.ego._path_kernels import project
-from bridgegen.ego._weather_columns import FRICTION
-from bridgegen.ego.drivers import SCRIPTED
+from bridgegen.base.compiled import kernel
+from bridgegen.drivers._attentive_kernels import gap_is_free
+from bridgegen.drivers._conflict_kernels import LEAST_PACE
+from bridgegen.drivers._path_kernels import project
+from bridgegen.drivers._weather_columns import FRICTION
+from bridgegen.drivers.drivers import SCRIPTED
 from bridgegen.simulation.embedded._codes import DIMENSION, LASTS, ROW, SHAPE, TARGET, WHOM
 from bridgegen.simulation.embedded._memory_kernels import NO_LANE
 from bridgegen.simulation.embedded._motion_kernels import DISTANCE, nearest

@@ -9,8 +9,8 @@ fast it moves to its left [m/s].
 
 import math
 
-from bridgegen.compiled import kernel
-from bridgegen.ego._path_kernels import pose, project
+from bridgegen.base.compiled import kernel
+from bridgegen.drivers._path_kernels import pose, project
 from bridgegen.simulation.embedded._codes import (
     BY_BODY,
     CONTINUOUS,

@@ -9,7 +9,7 @@ What they do from then on: ``_speed_kernels`` and ``_travel_kernels``.
 from collections.abc import Callable
 from typing import Any
 
-from bridgegen.compiled import kernel, run_kernel_at
+from bridgegen.base.compiled import kernel, run_kernel_at
 from bridgegen.simulation.embedded._codes import (
     ACQUIRE,
     ADD_ENTITY,

@@ -9,7 +9,7 @@ the standard leaves open are in docs/decisions.md.
 
 import math
 
-from bridgegen.compiled import kernel
+from bridgegen.base.compiled import kernel
 from bridgegen.simulation.embedded._motion_kernels import (
     CUBIC,
     RATE,

@@ -8,7 +8,7 @@ A trajectory's timetable is ``(V, 10)`` float64, a row per segment with the colu
 
 import math
 
-from bridgegen.compiled import inlined_kernel, kernel
+from bridgegen.base.compiled import inlined_kernel, kernel
 from bridgegen.simulation.embedded._codes import ACQUIRE, DETAIL, DOES, ROW, TARGET, WHOM
 from bridgegen.simulation.embedded._memory_kernels import NO_WAY, STOPS
 from bridgegen.simulation.embedded._motion_kernels import standing

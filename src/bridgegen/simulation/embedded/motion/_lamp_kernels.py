@@ -3,9 +3,9 @@
 # mypy: allow-untyped-defs
 # Numba infers what kernels take; their wrappers are typed.
 
-from bridgegen.compiled import kernel
-from bridgegen.ego._kind_tables import IS_VEHICLE
-from bridgegen.ego.lamps import BRAKE, BRAKE_LIGHTS_FROM, HAZARD, SWITCHED
+from bridgegen.base.compiled import kernel
+from bridgegen.drivers._kind_tables import IS_VEHICLE
+from bridgegen.drivers.lamps import BRAKE, BRAKE_LIGHTS_FROM, HAZARD, SWITCHED
 from bridgegen.simulation.embedded._codes import IS_LIT, LAMP, WHOM
 
 

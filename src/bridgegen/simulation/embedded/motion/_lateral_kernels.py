@@ -10,7 +10,7 @@ however long the change may take: it moves across no faster than its steering al
 
 import math
 
-from bridgegen.compiled import kernel
+from bridgegen.base.compiled import kernel
 from bridgegen.simulation.embedded._motion_kernels import (
     CUBIC,
     DISTANCE,

@@ -9,7 +9,7 @@ of a timetable (``_follow_kernels``), for those without times, too.
 
 import math
 
-from bridgegen.compiled import kernel
+from bridgegen.base.compiled import kernel
 from bridgegen.simulation.embedded._codes import (
     ALONG,
     DETAIL,

@@ -11,8 +11,8 @@ engine or brakes make of it. The wheel turns the front wheels by its angle over 
 
 import math
 
-from bridgegen.compiled import kernel
-from bridgegen.ego._weather_columns import FRICTION
+from bridgegen.base.compiled import kernel
+from bridgegen.drivers._weather_columns import FRICTION
 from bridgegen.simulation.embedded._codes import (
     BRAKE,
     COLUMN,

@@ -8,9 +8,9 @@ not, its states are those of its last instant, and its actions are over before t
 # mypy: allow-untyped-defs
 # Numba infers what kernels take; their wrappers are typed.
 
-from bridgegen.compiled import kernel, run_kernel_at
-from bridgegen.ego._prediction_kernels import LOST
-from bridgegen.ego._tracking_kernels import forget
+from bridgegen.base.compiled import kernel, run_kernel_at
+from bridgegen.drivers._prediction_kernels import LOST
+from bridgegen.drivers._tracking_kernels import forget
 from bridgegen.simulation.embedded._codes import (
     ADD_ENTITY,
     ALL,

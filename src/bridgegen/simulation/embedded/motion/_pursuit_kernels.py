@@ -11,8 +11,8 @@ import math
 
 import numpy as np
 
-from bridgegen.compiled import kernel
-from bridgegen.ego._path_kernels import pose, project
+from bridgegen.base.compiled import kernel
+from bridgegen.drivers._path_kernels import pose, project
 from bridgegen.simulation.embedded._codes import (
     ACCELERATION,
     BY_BODY,

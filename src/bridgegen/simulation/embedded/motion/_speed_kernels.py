@@ -5,7 +5,7 @@
 
 import math
 
-from bridgegen.compiled import inlined_kernel, kernel, run_kernel_at
+from bridgegen.base.compiled import inlined_kernel, kernel, run_kernel_at
 from bridgegen.simulation.embedded._codes import (
     DIMENSION,
     DOES,

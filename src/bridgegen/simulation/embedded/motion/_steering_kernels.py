@@ -9,8 +9,8 @@ Its state is ``(5,)`` float64, the columns below; its course ``(·, 4)``: time [
 
 import math
 
-from bridgegen.compiled import kernel
-from bridgegen.ego._path_kernels import locate, pose
+from bridgegen.base.compiled import kernel
+from bridgegen.drivers._path_kernels import locate, pose
 from bridgegen.simulation.embedded._motion_kernels import shifted
 
 STATION, ASIDE, SPEED, SLIDE, TURN = range(5)

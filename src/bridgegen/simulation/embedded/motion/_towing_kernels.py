@@ -13,7 +13,7 @@ Source: Lockwood, A Book of Curves (Cambridge 1961), chapter 13.
 
 import math
 
-from bridgegen.compiled import kernel
+from bridgegen.base.compiled import kernel
 from bridgegen.simulation.embedded._codes import TOWED, WHOM
 from bridgegen.simulation.embedded.motion._follow_kernels import end_quest
 from bridgegen.simulation.embedded.motion._presence_kernels import leave, look_round, stay_away

@@ -5,8 +5,8 @@
 
 import math
 
-from bridgegen.compiled import kernel
-from bridgegen.ego._path_kernels import shrinks
+from bridgegen.base.compiled import kernel
+from bridgegen.drivers._path_kernels import shrinks
 from bridgegen.simulation.embedded._codes import DIMENSION, DOES, KEEP_ASIDE, ROW, SHAPE
 from bridgegen.simulation.embedded._motion_kernels import SAME_TIME, standing
 from bridgegen.simulation.embedded.motion._across_kernels import CONTINUOUS

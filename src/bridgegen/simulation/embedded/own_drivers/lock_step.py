@@ -11,11 +11,11 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from bridgegen.arrays import Bool, Float, Int
-from bridgegen.ego._tracking_kernels import TRACK
-from bridgegen.ego.compiled import CONFLICT
-from bridgegen.ego.driver_process import DriverError, DriverProcess
-from bridgegen.ego.interface import (
+from bridgegen.base.arrays import Bool, Float, Int
+from bridgegen.drivers._tracking_kernels import TRACK
+from bridgegen.drivers.compiled import CONFLICT
+from bridgegen.drivers.driver_process import DriverError, DriverProcess
+from bridgegen.drivers.interface import (
     CONFLICT_WAYS,
     NEAR_PIECES,
     ROUTE_POINTS,
@@ -23,7 +23,7 @@ from bridgegen.ego.interface import (
     Observation,
     Scene,
 )
-from bridgegen.ego.trajectory import Follower, Plans
+from bridgegen.drivers.trajectory import Follower, Plans
 from bridgegen.simulation.embedded.batch import Batch
 from bridgegen.simulation.embedded.drivers import LANES, MEMORY
 from bridgegen.simulation.embedded.program import Program

@@ -14,12 +14,12 @@ from typing import Any
 
 import numpy as np
 
-from bridgegen.arrays import Bool, Float, Int
-from bridgegen.compiled import call_from_python
-from bridgegen.ego import Driver
-from bridgegen.ego.driver_process import START_SECONDS, DriverError, DriverProcess
-from bridgegen.ego.traits import Traits
-from bridgegen.ego.trajectory import Plans
+from bridgegen.base.arrays import Bool, Float, Int
+from bridgegen.base.compiled import call_from_python
+from bridgegen.drivers import Driver
+from bridgegen.drivers.driver_process import START_SECONDS, DriverError, DriverProcess
+from bridgegen.drivers.trajectory import Plans
+from bridgegen.drivers.user_drivers import Traits
 from bridgegen.simulation.embedded._memory_kernels import (
     N_STEPS,
     NO_CONTROL,

@@ -11,7 +11,7 @@ its road].
 
 import math
 
-from bridgegen.compiled import kernel
+from bridgegen.base.compiled import kernel
 
 ROAD, FIRST, PAST, LANE, WAY, STRAIGHT, TRAFFIC = 0, 1, 2, 3, 4, 5, 6
 """Number of its road; first and past-the-last node of its section; lane id; its direction of

@@ -9,8 +9,8 @@ begins, the row ends, and is run again from its start when it is there.
 
 import math
 
-from bridgegen.compiled import kernel, run_kernel_at
-from bridgegen.ego._path_kernels import pose, project
+from bridgegen.base.compiled import kernel, run_kernel_at
+from bridgegen.drivers._path_kernels import pose, project
 from bridgegen.simulation.embedded._codes import (
     ABSOLUTE,
     ACROSS,

@@ -3,7 +3,7 @@
 # mypy: allow-untyped-defs
 # Numba infers what kernels take; their wrappers are typed.
 
-from bridgegen.compiled import kernel
+from bridgegen.base.compiled import kernel
 
 UPHILL, ASIDE, RELIEF = 0, 1, 2  # columns of Roads.slopes
 

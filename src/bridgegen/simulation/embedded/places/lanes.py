@@ -11,8 +11,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from bridgegen.arrays import Float, Int
-from bridgegen.errors import InputError
+from bridgegen.base.arrays import Float, Int
+from bridgegen.base.errors import InputError
 from bridgegen.openx.opendrive.lane_changes import change_lanes
 from bridgegen.openx.opendrive.lane_graph import LaneGraph
 from bridgegen.openx.opendrive.lanes import borders, lane_along, lane_at, section_index

@@ -5,9 +5,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from bridgegen.arrays import Float, Int
-from bridgegen.ego.drivers import ATTENTIVE
-from bridgegen.ego.scene import stop_lines, stop_signs
+from bridgegen.base.arrays import Float, Int
+from bridgegen.drivers.drivers import ATTENTIVE
+from bridgegen.drivers.scene import stop_lines, stop_signs
 from bridgegen.openx.opendrive.model import OpenDrive
 from bridgegen.simulation.embedded.places.ways import Ways
 from bridgegen.simulation.embedded.program import Program
@@ -19,7 +19,7 @@ class Meetings(NamedTuple):
     Attributes:
         meets: ``(P, E)`` int64, whether there is anything in the following.
         meetings: ``(P, E, E, ZONE)`` where an attentive participant's first path meets each
-            other's, see ``bridgegen.ego._yielding_kernels``; infinite where it does not.
+            other's, see ``bridgegen.drivers._yielding_kernels``; infinite where it does not.
         lines: ``(P, E, S)`` [m], the stations of the stop lines of S lights on its path, else +inf.
         signs: ``(P, E, H)`` [m], the stations of the lines of stop signs on it; +inf pads.
     """
@@ -32,7 +32,7 @@ class Meetings(NamedTuple):
 
 def meetings(program: Program, models: Sequence[OpenDrive], ways: Sequence[Ways]) -> Meetings:
     """Return what the attentive participants of a storyboard know of its road networks."""
-    from bridgegen.ego._yielding_kernels import ZONE  # numba is slow to import
+    from bridgegen.drivers._yielding_kernels import ZONE  # numba is slow to import
 
     p, e, lights = len(models), len(program.names), len(program.lights)
     if not program.attends.size:
@@ -62,7 +62,7 @@ def meetings(program: Program, models: Sequence[OpenDrive], ways: Sequence[Ways]
 
 def _find_zones(zones: Float, one: int, program: Program, ways: Ways) -> None:
     """Fill ``(E, ZONE)`` with where a participant's path meets the others'."""
-    from bridgegen.ego._yielding_kernels import find_zone  # numba is slow to import
+    from bridgegen.drivers._yielding_kernels import find_zone  # numba is slow to import
 
     own, bodies = ways.paths[one], program.bodies
     for other in range(len(program.names)):

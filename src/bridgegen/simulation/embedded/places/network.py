@@ -6,12 +6,12 @@ from typing import Any
 
 import numpy as np
 
-from bridgegen.arrays import Float, Int
-from bridgegen.ego.interface import RoadMap
-from bridgegen.ego.lane_tables import CORRIDOR, LANE, corridor_along, lanes_along
-from bridgegen.ego.map_grid import grid_of, no_grid
-from bridgegen.ego.road_map import road_map
-from bridgegen.ego.scene import Scene, beside, stacked, stop_lines, survey
+from bridgegen.base.arrays import Float, Int
+from bridgegen.drivers.interface import RoadMap
+from bridgegen.drivers.lane_tables import CORRIDOR, LANE, corridor_along, lanes_along
+from bridgegen.drivers.map_grid import grid_of, no_grid
+from bridgegen.drivers.road_map import road_map
+from bridgegen.drivers.scene import Scene, beside, stacked, stop_lines, survey
 from bridgegen.openx.opendrive.lane_graph import Cells, Ground
 from bridgegen.openx.opendrive.lanes import section_index
 from bridgegen.openx.opendrive.model import OpenDrive
@@ -147,7 +147,7 @@ class Network:
 
         See `Rollout.corridors`; it has no samples off the lanes.
         """
-        from bridgegen.ego._speed_kernels import FAST_ROAD  # numba is slow to import
+        from bridgegen.drivers._speed_kernels import FAST_ROAD  # numba is slow to import
 
         found: list[Float] = []
         for p in networks:
@@ -190,7 +190,7 @@ class Network:
         return zones
 
     def provide(self, wants: Iterable[str]) -> None:
-        """Make the tables that a driver wants, once; see `bridgegen.ego.interface.WANTS`."""
+        """Make the tables that a driver wants, once; see `bridgegen.drivers.interface.WANTS`."""
         with self._lock:
             new = frozenset(wants) - self._provided
             if not new:
@@ -283,7 +283,7 @@ class Network:
 
     def _find_zones(self, paths: Float, counts: Int, steps: Float) -> Float:
         """Return where the ego's first path meets each other one, ``(P, K, ZONE)``."""
-        from bridgegen.ego._yielding_kernels import ZONE, find_zone  # numba is slow to import
+        from bridgegen.drivers._yielding_kernels import ZONE, find_zone  # numba is slow to import
 
         bodies = self._program.bodies
         widest = bodies[int(np.argmax(bodies[:, 1]))]
@@ -305,8 +305,8 @@ class Network:
 
 def next_bends(paths: Float) -> Int:
     """Return the first row from each on that is in a bend, ``(P, K, L)`` int64; L: none is."""
-    from bridgegen.ego._path_kernels import CURVATURE  # numba is slow to import
-    from bridgegen.ego._speed_kernels import STRAIGHT
+    from bridgegen.drivers._path_kernels import CURVATURE  # numba is slow to import
+    from bridgegen.drivers._speed_kernels import STRAIGHT
 
     length = paths.shape[2]
     found = np.where(np.abs(paths[..., CURVATURE]) > STRAIGHT, np.arange(length), length)
@@ -316,7 +316,7 @@ def next_bends(paths: Float) -> Int:
 
 def next_drops(roads: Float) -> Int:
     """Return the first row after each with a lower speed limit, ``(P, L)`` int64; L: none has."""
-    from bridgegen.ego._speed_kernels import LIMIT
+    from bridgegen.drivers._speed_kernels import LIMIT
 
     limits = roads[..., LIMIT]
     length = limits.shape[1]

@@ -2,12 +2,12 @@
 
 import numpy as np
 
-from bridgegen.arrays import Float
+from bridgegen.base.arrays import Float
+from bridgegen.base.physics import GRAVITY
 from bridgegen.openx.opendrive.lanes import values
 from bridgegen.openx.opendrive.model import OpenDrive, Road
 from bridgegen.openx.opendrive.plan_view import Cubic
 from bridgegen.openx.opendrive.routes import Route
-from bridgegen.physics import GRAVITY
 
 LEVEL = np.empty((0, 3))
 """The slopes of a path on which gravity does nothing."""

@@ -5,10 +5,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from bridgegen.arrays import Float, Int
-from bridgegen.ego._kind_tables import IS_CYCLE, IS_VEHICLE
-from bridgegen.ego.right_of_way import is_off_road
-from bridgegen.errors import InputError
+from bridgegen.base.arrays import Float, Int
+from bridgegen.base.errors import InputError
+from bridgegen.drivers._kind_tables import IS_CYCLE, IS_VEHICLE
+from bridgegen.drivers.right_of_way import is_off_road
 from bridgegen.openx.opendrive.lane_changes import plan_with_changes
 from bridgegen.openx.opendrive.lane_graph import LaneGraph, Node
 from bridgegen.openx.opendrive.lanes import lane_pose, section_index
@@ -21,7 +21,7 @@ from bridgegen.openx.opendrive.routes import (
     plan_route,
 )
 from bridgegen.openx.openscenario.values import Expr, ParameterRef, Value
-from bridgegen.simulation.embedded.compiler import clothoids
+from bridgegen.simulation.embedded.compiler import curves as clothoids
 from bridgegen.simulation.embedded.compiler.trajectories import Corner, polyline, timetable
 from bridgegen.simulation.embedded.places.lanes import Lanes, Path, sampled
 from bridgegen.simulation.embedded.places.slopes import slopes

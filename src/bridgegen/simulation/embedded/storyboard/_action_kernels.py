@@ -3,7 +3,7 @@
 # mypy: allow-untyped-defs
 # Numba infers what kernels take; their wrappers are typed.
 
-from bridgegen.compiled import kernel
+from bridgegen.base.compiled import kernel
 from bridgegen.simulation.embedded._codes import (
     CONTROL,
     DOES,

@@ -5,9 +5,9 @@
 
 import math
 
-from bridgegen.compiled import kernel, run_kernel_at
-from bridgegen.ego._path_kernels import pose
-from bridgegen.ego._weather_kernels import change, set_clear
+from bridgegen.base.compiled import kernel, run_kernel_at
+from bridgegen.drivers._path_kernels import pose
+from bridgegen.drivers._weather_kernels import change, set_clear
 from bridgegen.simulation.embedded._memory_kernels import N_STEPS, OFF_ROUTE, STATUS, STOPS
 from bridgegen.simulation.embedded._motion_kernels import shifted
 from bridgegen.simulation.embedded.motion import LANDS, at_time, look_round

@@ -8,7 +8,7 @@ before children). Source: ASAM OpenSCENARIO XML 1.3.1, 8.4, storyboard element e
 # mypy: allow-untyped-defs
 # Numba infers what kernels take; their wrappers are typed.
 
-from bridgegen.compiled import inlined_kernel
+from bridgegen.base.compiled import inlined_kernel
 from bridgegen.simulation.embedded._codes import (
     ACT,
     ACTION,

@@ -5,8 +5,8 @@
 
 import numpy as np
 
-from bridgegen.compiled import kernel
-from bridgegen.ego._weather_kernels import change
+from bridgegen.base.compiled import kernel
+from bridgegen.drivers._weather_kernels import change
 from bridgegen.simulation.embedded._codes import (
     DOES,
     LIGHT,

@@ -3,7 +3,7 @@
 # mypy: allow-untyped-defs
 # Numba infers what kernels take; their wrappers are typed.
 
-from bridgegen.compiled import kernel
+from bridgegen.base.compiled import kernel
 
 FIRST, LAST, DELAY, REFERENCE = range(4)  # columns of Plan.controllers
 DURATION, CHANGE, CHANGE_END = range(3)  # columns of Plan.phases

@@ -1,0 +1,246 @@
+"""Compiled circumstances of a conflict: lights, crosswalks, braking and steering."""
+
+# mypy: allow-untyped-defs
+# Numba infers what kernels take; their wrappers are typed.
+
+import math
+
+from bridgegen.assess.conflict._geometry_kernels import turned
+from bridgegen.assess.conflict._limits import (
+    AHEAD,
+    AHEAD_TIME,
+    ALIKE,
+    ASIDE,
+    CROSSWALK_MARGIN,
+    HORIZON,
+    JUNCTION,
+    JUST_NOW,
+    KERB,
+    LATELY,
+    LINE_REACH,
+    LOOKED_BACK,
+    REACTION,
+    SAME_WAY,
+    SIGHT,
+    STANDS,
+    TURN_TIME,
+)
+from bridgegen.base.compiled import kernel
+
+RED, RED_AND_YELLOW = 1, 2
+"""States of a light, as ``Rollout.lights`` has them."""
+
+
+@kernel
+def passes_line(scene, e, j, since, last):
+    """Return at which instants body e passes stop line j: the last at red, and the last; -1: none.
+
+    ``since`` and ``last`` limit the instants.
+    """
+    lines, x, y, c, s = scene.stop_lines, scene.x, scene.y, scene.c, scene.s
+    lc, ls = math.cos(lines[j, 2]), math.sin(lines[j, 2])
+    reach, before, at_red, at_all = scene.half[e, 0], math.inf, -1, -1
+    for i in range(since, last + 1):
+        px = x[e, i] + reach * c[e, i] - lines[j, 0]
+        py = y[e, i] + reach * s[e, i] - lines[j, 1]
+        past = px * lc + py * ls
+        if before <= 0.0 < past and abs(py * lc - px * ls) <= LINE_REACH:
+            at_all = i
+            state = scene.lights[scene.stop_lights[j], i - 1]
+            if state in (RED, RED_AND_YELLOW):
+                at_red = i
+        before = past
+    return at_red, at_all
+
+
+@kernel
+def ran_red(scene, e, k, last):
+    """Return the instant up to ``last`` at which body e passed a red light just before k; or -1."""
+    found = -1
+    since = max(k - int(LOOKED_BACK / scene.dt), scene.first if e > 0 else 0)
+    for j in range(len(scene.stop_entities)):
+        if scene.stop_entities[j] != e or not math.isfinite(scene.stop_lines[j, 0]):
+            continue
+        at_red, _ = passes_line(scene, e, j, since, last)
+        if at_red >= 0 and scene.gone[e, k] - scene.gone[e, at_red] <= JUNCTION:
+            found = max(found, at_red)
+    return found
+
+
+@kernel
+def ahead_until(scene, k, time):
+    """Return the instant up to which motion after a near miss at k belongs to it."""
+    return min(k + int((time + REACTION) / scene.dt) + 1, scene.n - 1)
+
+
+@kernel
+def stops_at_red(scene, e, k, time):
+    """Return whether body e heads for a red light at instant k and does not pass it afterwards."""
+    for j in range(len(scene.stop_entities)):
+        if scene.stop_entities[j] != e or not math.isfinite(scene.stop_lines[j, 0]):
+            continue
+        line = scene.stop_lines[j]
+        lc, ls = math.cos(line[2]), math.sin(line[2])
+        px = scene.x[e, k] + scene.half[e, 0] * scene.c[e, k] - line[0]
+        py = scene.y[e, k] + scene.half[e, 0] * scene.s[e, k] - line[1]
+        state = scene.lights[scene.stop_lights[j], k]
+        before = -SIGHT <= px * lc + py * ls <= 0.0 and abs(py * lc - px * ls) <= LINE_REACH
+        if before and (state in (RED, RED_AND_YELLOW)):
+            _, passes = passes_line(scene, e, j, k, ahead_until(scene, k, time))
+            if passes < 0:
+                return True
+    return False
+
+
+@kernel
+def on_crosswalk(scene, e, k):
+    """Return whether the centre of body e is on a crosswalk of the ego's route at instant k."""
+    walks = scene.crosswalks
+    for j in range(len(walks)):
+        if not math.isfinite(walks[j, 0]):
+            continue
+        c, s = math.cos(walks[j, 2]), math.sin(walks[j, 2])
+        dx, dy = scene.x[e, k] - walks[j, 0], scene.y[e, k] - walks[j, 1]
+        along, across = abs(dx * c + dy * s), abs(dy * c - dx * s)
+        if along <= walks[j, 3] + CROSSWALK_MARGIN and across <= walks[j, 4] + KERB:
+            return True
+    return False
+
+
+@kernel
+def on_crosswalk_since(scene, e, k):
+    """Return the instant since which body e is on a crosswalk; k + 1 if it is not at k."""
+    while k >= scene.first and on_crosswalk(scene, e, k):
+        k -= 1
+    return k + 1
+
+
+@kernel
+def slowing_since(v, first, k, dt):
+    """Return the last instant before k at which a body began to slow down.
+
+    -1 if it has not slowed down within ``JUST_NOW`` before.
+    """
+    j = k
+    while j > first and (k - j) * dt < JUST_NOW and v[j - 1] <= v[j] + 1e-9:
+        j -= 1
+    if j <= first or v[j - 1] <= v[j] + 1e-9:
+        return -1
+    while j > first and v[j - 1] > v[j] + 1e-9:
+        j -= 1
+    return j
+
+
+@kernel
+def still_since(v, first, k):
+    """Return the instant since which a body stands at instant k; k + 1 if it moves."""
+    while k >= first and v[k] <= STANDS:
+        k -= 1
+    return k + 1
+
+
+@kernel
+def has_set_off(scene, e, k):
+    """Return whether body e, which moves at instant k, stood within `HORIZON` before."""
+    for i in range(max(k - int(HORIZON / scene.dt), scene.first), k + 1):
+        if scene.v[e, i] <= STANDS:
+            return True
+    return False
+
+
+@kernel
+def ego_moved(scene, k, way):
+    """Return whether the ego has moved across its route just before instant k.
+
+    Only to the left for ``way`` 1, to the right for -1, to either side for 0. An ego that turns off
+    meanwhile has not: its offset may be that from the road that it leaves.
+    """
+    offset, c, s = scene.offset, scene.c, scene.s
+    begin = max(k - int(JUST_NOW / scene.dt), 0)
+    if c[0, k] * c[0, begin] + s[0, k] * s[0, begin] < SAME_WAY:
+        return False
+    for i in range(begin, k):
+        moved = offset[0, k] - offset[0, i]
+        if (abs(moved) if way == 0 else way * moved) > ASIDE:
+            return True
+    return False
+
+
+@kernel
+def ego_came_over(scene, e, k, way):
+    """Return whether it is the ego that has changed course when it and body e meet at instant k.
+
+    It has moved, see `ego_moved`; and body e has not steered more ``LATELY``: a vehicle that has
+    arrived on a lane has the right to go straight on there.
+    """
+    if not ego_moved(scene, k, way):
+        return False
+    mine, its = steering(scene, e, k, LATELY)
+    return mine >= its - 1e-9  # m: rounding does not decide between two that go straight
+
+
+@kernel
+def steering(scene, e, k, within):
+    """Return how much the ego and body e have steered beyond their common bend [m].
+
+    Both are compared over the same length of path before instant k, that of the slower one
+    ``within`` so many seconds. A constant bend over a length L that turns a body by phi moves it
+    aside by L phi / 2. The lesser bend, if both go the same way, is taken for that of the road.
+    """
+    x, y, c, s, gone = scene.x, scene.y, scene.c, scene.s, scene.gone
+    begin = max(k - int(within / scene.dt), scene.first)
+    length = min(gone[0, k] - gone[0, begin], gone[e, k] - gone[e, begin])
+    aside_ego, bend_ego, aside_other, bend_other = 0.0, 0.0, 0.0, 0.0
+    for b in (0, e):
+        j = k
+        while j > begin and gone[b, k] - gone[b, j] < length - 1e-9:
+            j -= 1
+        dx, dy = x[b, k] - x[b, j], y[b, k] - y[b, j]
+        aside = dy * c[b, j] - dx * s[b, j]
+        bend = 0.5 * length * turned(c[b], s[b], j, k, k - j)
+        if b == 0:
+            aside_ego, bend_ego = aside, bend
+        else:
+            aside_other, bend_other = aside, bend
+    if c[0, k] * c[e, k] + s[0, k] * s[e, k] < 0.0:  # they drive through the bend the other way
+        aside_other, bend_other = -aside_other, -bend_other
+    road = 0.0
+    if bend_ego * bend_other > 0.0:
+        road = bend_ego if abs(bend_ego) < abs(bend_other) else bend_other
+    mine = abs(aside_ego - road) + abs(bend_ego - road)
+    return mine, abs(aside_other - road) + abs(bend_other - road)
+
+
+@kernel
+def side_of(scene, e, k):
+    """Return on which side of the ego body e is: 1 left, -1 right."""
+    dx, dy = scene.x[e, k] - scene.x[0, k], scene.y[e, k] - scene.y[0, k]
+    return 1 if dy * scene.c[0, k] - dx * scene.s[0, k] > 0.0 else -1
+
+
+@kernel
+def same_road(scene, e, k):
+    """Return whether both were on one road, in the same or in opposite directions."""
+    j = max(k - int(TURN_TIME / scene.dt), scene.first)
+    c, s = scene.c, scene.s
+    return abs(c[0, j] * c[e, j] + s[0, j] * s[e, j]) > ALIKE
+
+
+@kernel
+def has_reason(scene, k):
+    """Return whether the ego has a reason to brake hard at instant k: an actor ahead or a light."""
+    x, y, c, s = scene.x, scene.y, scene.c, scene.s
+    reach = AHEAD_TIME * scene.v[0, k] + AHEAD
+    for o in range(1, x.shape[0]):
+        if not scene.distance[o, k] < reach:
+            continue
+        if (x[o, k] - x[0, k]) * c[0, k] + (y[o, k] - y[0, k]) * s[0, k] > 0.0:
+            return True
+    for j in range(len(scene.stop_entities)):
+        if scene.stop_entities[j] != 0 or not math.isfinite(scene.stop_lines[j, 0]):
+            continue
+        state = scene.lights[scene.stop_lights[j], k]
+        dx, dy = scene.stop_lines[j, 0] - x[0, k], scene.stop_lines[j, 1] - y[0, k]
+        if RED <= state <= RED_AND_YELLOW + 1 and 0.0 < dx * c[0, k] + dy * s[0, k] < SIGHT:
+            return True
+    return False

@@ -1,0 +1,286 @@
+"""Compiled conflict analysis of the ego with each other body; public wrapper: ``analysis.analyse``.
+
+Each pair gets a row of whole numbers and one of floats; ``_codes`` names their columns. Only events
+up to the ego's first contact with any body count.
+"""
+
+# mypy: allow-untyped-defs
+# Numba infers what kernels take; their wrappers are typed.
+
+import math
+
+from bridgegen.assess.conflict._careful_driver_kernels import gains
+from bridgegen.assess.conflict._circumstances_kernels import stops_at_red
+from bridgegen.assess.conflict._codes import (
+    ACROSS,
+    ALONG,
+    CONTACT,
+    COURSE,
+    FRONT,
+    FRONT_LEFT,
+    FRONT_RIGHT,
+    INSTANT,
+    KIND,
+    LEADS_EGO,
+    NEAR_MISS,
+    NEARNESS,
+    NEEDED,
+    OVERLAP,
+    REAR_END_STRIKING,
+    REAR_END_STRUCK,
+    STOOD_EGO,
+    STOOD_OTHER,
+    TTC,
+    TYPE,
+    V_EGO,
+    V_OTHER,
+    ZONE_EGO,
+    ZONE_OTHER,
+)
+from bridgegen.assess.conflict._geometry_kernels import (
+    Scene,
+    displaced,
+    lengths,
+    meeting,
+    meets_at,
+    normal_of,
+    overlap,
+    presence,
+    shallow_axis,
+    time_along_paths,
+    velocity,
+    zones,
+)
+from bridgegen.assess.conflict._limits import (
+    COMFORT,
+    CREEPS,
+    FRONT_PART,
+    GUIDANCE,
+    GUIDANCE_STEP,
+    HORIZON,
+    MOVES,
+    NEAR,
+    SERIOUS_DECELERATION,
+    SERIOUS_TTC,
+    SOON,
+    STANDS,
+)
+from bridgegen.assess.conflict._responsibility_kernels import judge
+from bridgegen.assess.conflict._type_kernels import type_of
+from bridgegen.assess.metrics._ttc_kernels import STANDSTILL, time_to_contact
+from bridgegen.base.compiled import kernel
+
+
+@kernel
+def stood_for(v, first, k, dt):
+    """Return how long a body has been standing at instant k [s]."""
+    j = k
+    while j >= first and v[j] <= STANDS:
+        j -= 1
+    return (k - j) * dt
+
+
+@kernel
+def first_contact(distance, n):
+    """Return the first instant at which the ego touches a body, n if it never does."""
+    first = n
+    for e in range(1, distance.shape[0]):
+        for k in range(min(n, first)):
+            if distance[e, k] == 0.0:
+                first = k
+                break
+    return first
+
+
+@kernel
+def nearness(half, x, y, c, s, v, distance, e, n):
+    """Return how near two bodies come, at constant velocity from any instant on; in [0, 1].
+
+    A smooth measure for rows without a conflict: the distance of the closest encounter within
+    ``GUIDANCE`` and the time to it, in circles around the bodies.
+    """
+    radii = half[0, 1] + half[e, 1]
+    best = math.inf
+    for k in range(0, n, GUIDANCE_STEP):
+        if distance[k] == math.inf:
+            continue
+        dx, dy = x[e, k] - x[0, k], y[e, k] - y[0, k]
+        wx = v[e, k] * c[e, k] - v[0, k] * c[0, k]
+        wy = v[e, k] * s[e, k] - v[0, k] * s[0, k]
+        square, t = wx * wx + wy * wy, 0.0
+        if square > 0.0:
+            t = min(max(-(dx * wx + dy * wy) / square, 0.0), GUIDANCE)
+        gap = max(math.hypot(dx + t * wx, dy + t * wy) - radii, 0.0)
+        best = min(best, gap / NEAR + t / SOON)
+    return math.exp(-best)
+
+
+@kernel
+def urgency(time, needed):
+    """Return how urgent a collision course is, 0 to 1; ``harm`` has the same formula."""
+    return (1.0 - time / HORIZON) * (1.0 - math.exp(-needed / SERIOUS_DECELERATION))
+
+
+@kernel
+def most_urgent(half, x, y, c, s, v, gone, distance, e, n, end, dt):
+    """Return (time to collision, deceleration needed, instant) of the worst collision course.
+
+    Both predictions must lead to contact within ``HORIZON``: constant velocity, and constant speed
+    along the tracks. The later of the two times counts. Of all instants before ``end``, that of the
+    greatest `urgency` counts; near misses take precedence. The instant is -1 if there is none.
+    """
+    la, wa, lb, wb = half[0, 0], half[0, 1], half[e, 0], half[e, 1]
+    circles = (math.sqrt(la * la + wa * wa) + math.sqrt(lb * lb + wb * wb)) ** 2 * (1.0 + 1e-9)
+    best, best_time, best_needed, at, nearest = -1.0, HORIZON, 0.0, -1, 0
+    always = True
+    for k in range(end):
+        if distance[k] < distance[nearest]:
+            nearest = k
+        always &= distance[k] < math.inf
+    limit, until = HORIZON, n
+    for m in range(end):
+        k = nearest - m if m <= nearest else m
+        speeds = v[0, k] + v[e, k]
+        if not distance[k] < limit * speeds:
+            continue
+        ca, sa, cb, sb = c[0, k], s[0, k], c[e, k], s[e, k]
+        dx, dy = x[e, k] - x[0, k], y[e, k] - y[0, k]
+        wx, wy = v[e, k] * cb - v[0, k] * ca, v[e, k] * sb - v[0, k] * sa
+        if dx * dx + dy * dy > circles:
+            across = dx * wy - dy * wx
+            if dx * wx + dy * wy >= 0.0 or across * across > circles * (wx * wx + wy * wy):
+                continue
+        time = time_to_contact(dx, dy, wx, wy, ca, sa, cb, sb, la, wa, lb, wb, STANDSTILL * speeds)
+        if time >= limit:
+            continue
+        faster = gains(v[0, k], v[e, k], ca, sa, cb, sb)
+        for prediction in range(2):
+            if prediction == 1:
+                if not always:
+                    _, until = presence(distance, k, n)
+                along = time_along_paths(half, x, y, c, s, v, gone, e, k, n, until, limit)
+                time = max(time, along)
+            if time >= limit:
+                break
+            needed = faster / (2.0 * max(time, dt))
+            worth = urgency(time, needed)
+            if is_serious(time, needed, v[0], k, dt):
+                worth += 1.0
+            if worth < best or (worth == best and time >= best_time):
+                break
+            if prediction == 1:
+                best, best_time, best_needed, at = worth, time, needed, k
+                # more time than this cannot be more urgent
+                if best < 1.0:
+                    limit = max(HORIZON * (1.0 - best), SERIOUS_TTC)
+                else:
+                    limit = min(HORIZON * (2.0 - best), SERIOUS_TTC)
+                limit = min(limit * (1.0 + 1e-9) + 1e-9, HORIZON)
+    return best_time, best_needed, at
+
+
+@kernel
+def is_serious(time, needed, v, k, dt):
+    """Return whether a collision course at instant k is a near miss of an ego with speeds v.
+
+    It is not if the ego already brakes as hard as needed.
+    """
+    if time > SERIOUS_TTC or needed < SERIOUS_DECELERATION or v[k] < MOVES:
+        return False
+    return k == 0 or needed > (v[k - 1] - v[k]) / dt
+
+
+@kernel
+def analyse_pair(
+    e, n, dt, end, half, kinds, x, y, c, s, v, a, offset, distance, gone, claims, crosswalks,
+    friction, stop_entities, stop_lights, stop_lines, lights, lamps, routed, whole, real,
+):  # fmt: skip
+    """Fill the rows of the ego and body e."""
+    contact = end < n and distance[e, end] == 0.0
+    at, time, needed = end, 0.0, 0.0
+    if not contact:
+        time, needed, at = most_urgent(half, x, y, c, s, v, gone, distance[e], e, n, end, dt)
+        if at < 0:
+            return
+    first, until = presence(distance[e], at, n)
+    # the bodies at contact: in the step before it, or at constant velocity
+    steps = contact and at > first
+    k = at - 1 if steps else at
+    la, wa, lb, wb = half[0, 0], half[0, 1], half[e, 0], half[e, 1]
+    ca, sa, cb, sb = c[0, k], s[0, k], c[e, k], s[e, k]
+    dx, dy = x[e, k] - x[0, k], y[e, k] - y[0, k]
+    ux, uy, wx, wy = v[0, k] * ca, v[0, k] * sa, v[e, k] * cb, v[e, k] * sb
+    appears = contact and not steps
+    if steps:
+        ux, uy = velocity(x, y, c, s, v, 0, k, dt)
+        wx, wy = velocity(x, y, c, s, v, e, k, dt)
+        appears = displaced(x, y, v, 0, k, dt) or displaced(x, y, v, e, k, dt)
+    wx, wy = wx - ux, wy - uy
+    still = STANDSTILL * (v[0, k] + v[e, k])
+    after, axis = meeting(dx, dy, wx, wy, ca, sa, cb, sb, la, wa, lb, wb, still)
+    if contact and (appears or after > 2.0 * dt):  # or they turn into each other
+        ca, sa, cb, sb = c[0, at], s[0, at], c[e, at], s[e, at]
+        dx, dy, after = x[e, at] - x[0, at], y[e, at] - y[0, at], 0.0
+        axis = shallow_axis(dx, dy, ca, sa, cb, sb, la, wa, lb, wb)
+    dx, dy = dx + after * wx, dy + after * wy
+    nx, ny = normal_of(axis, dx, dy, ca, sa, cb, sb)
+    own, its = zones(axis, nx, ny, ca, sa, cb, sb)
+    own_part = max(ux * nx + uy * ny, 0.0)
+    if contact:
+        needed = gains(v[0, k], v[e, k], ca, sa, cb, sb) / (2.0 * dt)
+    near = not contact and is_serious(time, needed, v[0], k, dt)
+    whole[KIND] = CONTACT if contact else NEAR_MISS if near else COURSE
+    whole[INSTANT], whole[ZONE_EGO], whole[ZONE_OTHER] = at, own, its
+    leads = (1.0 - 2.0 * FRONT_PART) * la
+    whole[LEADS_EGO] = own in (FRONT, FRONT_LEFT, FRONT_RIGHT) or (
+        meets_at(nx, ny, dx, dy, ca, sa, cb, sb, la, lb, wb) >= leads
+    )
+    real[TTC], real[NEEDED] = time, needed
+    real[ACROSS], real[ALONG] = max(-(wx * nx + wy * ny), 0.0), abs(wx * ny - wy * nx)
+    real[V_EGO], real[V_OTHER] = v[0, k], v[e, k]
+    if not contact and not near:
+        return
+    stood = stood_for(v[0], 0, k, dt)
+    if stood == 0.0 and v[0, k] <= CREEPS and a[0, k] <= -COMFORT:
+        stood = dt
+    kind = type_of(e, first, until, k, dt, kinds, c, s, own, its, own_part, stood)
+    scene = Scene(
+        half, kinds, x, y, c, s, v, a, offset, distance, gone, claims, crosswalks, friction,
+        stop_entities, stop_lights, stop_lines, lights, lamps, routed, first, until, dt,
+        until - 1 if contact else at, at, near,
+    )  # fmt: skip
+    crosses = near and kind != REAR_END_STRIKING and kind != REAR_END_STRUCK
+    if crosses and (stops_at_red(scene, 0, at, time) or stops_at_red(scene, e, at, time)):
+        whole[KIND] = COURSE
+        return
+    whole[TYPE] = kind
+    real[STOOD_EGO], real[STOOD_OTHER] = stood, stood_for(v[e], first, k, dt)
+    real[OVERLAP] = overlap(-ny, nx, dx, dy, ca, sa, cb, sb, la, wa, lb, wb)
+    judge(scene, e, k, at, kind, own, own_part, appears, whole, real)
+
+
+@kernel
+def analyse_rows(
+    half, kinds, x, y, c, s, v, a, offset, distance, n_steps, dt, claims, crosswalks, friction,
+    stop_entities, stop_lights, stop_lines, lights, lamps, routed, gone, whole, real,
+):  # fmt: skip
+    """Fill ``whole`` ``(N, E, INTEGERS)`` and ``real`` ``(N, E, FLOATS)`` of N rows.
+
+    ``gone`` ``(E, T)`` is scratch.
+    """
+    n_rows, n_entities, _ = x.shape
+    for i in range(n_rows):
+        n = n_steps[i]
+        end = first_contact(distance[i], n)
+        for e in range(n_entities):
+            lengths(x[i, e], y[i, e], n, gone[e])
+        for e in range(1, n_entities):
+            real[i, e, TTC] = math.inf
+            real[i, e, NEARNESS] = nearness(
+                half, x[i], y[i], c[i], s[i], v[i], distance[i, e], e, min(end + 1, n)
+            )
+            analyse_pair(
+                e, n, dt, end, half, kinds, x[i], y[i], c[i], s[i], v[i], a[i], offset[i],
+                distance[i], gone, claims[i, 0], crosswalks[i], friction[i], stop_entities,
+                stop_lights, stop_lines[i], lights[i], lamps[i], routed, whole[i, e], real[i, e],
+            )  # fmt: skip

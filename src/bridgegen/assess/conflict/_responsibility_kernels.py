@@ -1,0 +1,502 @@
+"""Compiled rules of responsibility; ``types.RULES`` has their descriptions and sources.
+
+One question recurs: could a careful driver, from some instant on, have avoided the other by braking
+on its own path? See ``_careful_driver_kernels``.
+"""
+
+# mypy: allow-untyped-defs
+# Numba infers what kernels take; their wrappers are typed.
+
+import math
+
+from bridgegen.assess.conflict._careful_driver_kernels import (
+    CLEAR,
+    COLLIDES,
+    COMES_NEAR,
+    braked,
+    braked_and_stood,
+)
+from bridgegen.assess.conflict._circumstances_kernels import (
+    ahead_until,
+    ego_came_over,
+    ego_moved,
+    has_reason,
+    has_set_off,
+    on_crosswalk_since,
+    ran_red,
+    same_road,
+    side_of,
+    slowing_since,
+    steering,
+    still_since,
+)
+from bridgegen.assess.conflict._codes import (
+    ASSUMED_RIGHT_BEFORE_LEFT,
+    BRAKED_HARD_AHEAD,
+    BRAKED_WITHOUT_REASON,
+    COULD_HAVE_STOPPED,
+    CROSSING,
+    CROSSWALK,
+    CUT_IN,
+    CUT_IN_PREVENTABLE,
+    DECIDED,
+    EGO,
+    EGO_STANDING,
+    EMERGENCY_VEHICLE,
+    FROM_OFF_ROAD,
+    FRONT,
+    FRONT_LEFT,
+    FRONT_RIGHT,
+    HEAD_ON,
+    INTO_THE_SIDE,
+    JUNCTION_OCCUPIED,
+    LEFT_ITS_LANE,
+    LEFT_TO_ACT,
+    MAP_PRIORITY,
+    NEITHER,
+    OBJECT,
+    OTHER,
+    PASSED_TOO_CLOSE,
+    PREVENTABLE,
+    REAR,
+    REAR_DISTANCE,
+    REAR_END_STRIKING,
+    REAR_END_STRUCK,
+    REAR_LEFT,
+    REAR_RIGHT,
+    RED_LIGHT,
+    RESPONSIBLE,
+    REVEALED_LATE,
+    RULE,
+    SHARED,
+    SIDE_SWIPE,
+    STANDING_AHEAD,
+    STEPPED_OUT,
+    STOOD_EGO,
+    STOOD_OTHER,
+    STRUCK_STANDING,
+    TTC,
+    TURNING,
+    TURNING_GIVES_WAY,
+    UNSAFE_START,
+    VRU_BY_FRONT,
+    VRU_INTO_SIDE,
+    WRONG_SIDE,
+)
+from bridgegen.assess.conflict._geometry_kernels import (
+    entered,
+    hidden,
+    time_along_paths,
+    visible_from,
+)
+from bridgegen.assess.conflict._limits import (
+    ASIDE,
+    BRAKING,
+    COMFORT,
+    DOUBTS,
+    EVIDENT_EVERY,
+    HARD,
+    HORIZON,
+    JUST_NOW,
+    LATELY,
+    MARGIN,
+    MARGIN_ON_FOOT,
+    MOVES,
+    OFF_LANE,
+    STANDS,
+    STOOD,
+    TURN_TIME,
+    UNSURE,
+)
+from bridgegen.assess.conflict._type_kernels import strikes_with_front, turns
+from bridgegen.base.compiled import kernel
+from bridgegen.drivers._claims import SIREN
+from bridgegen.drivers._kind_tables import IS_ANIMAL, IS_CYCLE, IS_PEDESTRIAN, IS_VULNERABLE
+from bridgegen.drivers.kinds import BUS
+from bridgegen.drivers.lamps import HAZARD, LEFT, RIGHT
+
+
+@kernel
+def judge(scene, e, k, at, kind, own, own_part, appears, whole, real):
+    """Decide responsibility for the conflict of the ego and body e, which meet after k.
+
+    ``at`` is the instant of the contact, or k itself; ``own`` the ego's zone, ``own_part`` [m/s]
+    its share of the closing speed; ``appears``: one of the two appears inside the other.
+    """
+    on_foot = IS_VULNERABLE[scene.kinds[e]]
+    entry, side = entered(scene, 0, e, k, MARGIN_ON_FOOT if on_foot else MARGIN)
+    risk = visible_from(scene, e, entry, k)
+    since, stands = risk, still_since(scene.v[e], scene.first, k)
+    if stands > risk + 1:  # a moving body is a risk only once the two are near in time, or it stops
+        since = max(risk, min(stands, k - int(HORIZON / scene.dt)))
+    seen = since
+    signal = 0
+    if kind in (SIDE_SWIPE, REAR_END_STRIKING) and scene.kinds[e] == BUS and side != 0:
+        signal = RIGHT if side > 0 else LEFT  # it leaves its stop
+    if kind in (CROSSING, TURNING) or IS_CYCLE[scene.kinds[e]] or signal > 0:
+        early = evident_since(scene, e, k, entry, signal)
+        seen = min(since, early) if early < entry else since
+        if signal > 0:
+            since = seen
+    comes = kind == HEAD_ON and not scene.near  # standing does not avoid it unless it stops, too
+    level = braked_and_stood(scene, 0, e, seen, seen, BRAKING, comes)
+    if comes and level != CLEAR and risk < seen < stands:
+        seen = foreseen_since(scene, e, risk, seen)
+        level = braked_and_stood(scene, 0, e, seen, seen, BRAKING, comes)
+    avoidable = real[STOOD_EGO] <= 0.0 and level == CLEAR and not appears
+    whole[DECIDED], whole[PREVENTABLE] = seen, avoidable
+    if appears:
+        whole[RESPONSIBLE], whole[RULE] = NEITHER, UNSAFE_START
+    else:
+        whole[RESPONSIBLE], whole[RULE] = decide(
+            scene,
+            e,
+            k,
+            kind,
+            own,
+            own_part,
+            risk,
+            since,
+            side,
+            risk > entry,
+            stands,
+            avoidable,
+            whole,
+            real,
+        )
+    real[LEFT_TO_ACT] = max(at - whole[DECIDED], 0) * scene.dt + real[TTC]
+
+
+@kernel
+def foreseen_since(scene, e, risk, since):
+    """Return the instant, not before ``risk``, since which the two are to touch within `HORIZON`.
+
+    By the speeds of each instant: an ego that brakes, or another that does, meets it later.
+    """
+    every = max(int(EVIDENT_EVERY / scene.dt + 0.5), 1)
+    while since - every >= risk:
+        time = time_along_paths(
+            scene.half, scene.x, scene.y, scene.c, scene.s, scene.v, scene.gone, e, since - every,
+            scene.n, scene.n, HORIZON,
+        )  # fmt: skip
+        if time == math.inf:
+            break
+        since -= every
+    return since
+
+
+@kernel
+def evident_since(scene, e, k, entry, signal):
+    """Return the instant since which body e, in sight, is on a collision course along the routes.
+
+    Both drive on at their speeds, each on its own track, and touch within `HORIZON`; without a
+    break of more than `UNSURE` up to ``entry``, when e comes into the ego's way (``entry`` if they
+    do not before). A bus that leaves its stop must show a ``signal``, see
+    `bridgegen.drivers.lamps`;
+    0: none is asked for. From one that must give way, or that runs a red light, the ego may expect
+    that it stops, before the ego's way or at its line: it is a danger once that would take more
+    than `COMFORT`, or if they would touch within `DOUBTS`.
+
+    Source: of the trust in others: StVO § 1 and the case law on it (Vertrauensgrundsatz); IEEE
+    2846-2022, reasonably foreseeable behaviour. Of buses: StVO § 20 (5).
+    """
+    line = ran_red(scene, e, k, k)
+    expected = scene.claims[e] > 0 or line >= 0
+    stops_at = scene.gone[e, entry if line < 0 else min(line, entry)]
+    every = max(int(EVIDENT_EVERY / scene.dt + 0.5), 1)
+    begin = max(entry - int(HORIZON / scene.dt), scene.first)
+    since, i = entry, entry - every
+    while i >= begin:
+        v = scene.v[e, i]
+        left = stops_at - scene.gone[e, i]
+        if hidden(scene, e, i) or (signal > 0 and not shows(scene, e, i, signal)):
+            break
+        time = time_along_paths(
+            scene.half, scene.x, scene.y, scene.c, scene.s, scene.v, scene.gone, e, i, scene.n,
+            scene.n, HORIZON,
+        )  # fmt: skip
+        if expected and time > DOUBTS and v * v <= 2.0 * COMFORT * left:
+            break
+        if time < math.inf:
+            since = i
+        elif (since - i) * scene.dt > UNSURE:
+            break
+        i -= every
+    return since
+
+
+@kernel
+def shows(scene, e, k, signal):
+    """Return whether body e, which moves, indicates to that side alone at instant k."""
+    if not len(scene.lamps) or scene.v[e, k] <= STANDS:
+        return False
+    return scene.lamps[e, k] & HAZARD == signal
+
+
+@kernel
+def decide(
+    scene, e, k, kind, own, own_part, risk, since, side, late, stands, avoidable, whole, real
+):  # fmt: skip
+    """Return the responsible party, and the rule.
+
+    The other has been visible in the ego's way from ``risk`` on, a danger from ``since`` on, and
+    stands from ``stands`` on (k + 1: it moves); ``late``: it was hidden before ``risk``.
+    """
+    if kind == EGO_STANDING:
+        return OTHER, STRUCK_STANDING
+    if kind != REAR_END_STRIKING and kind != REAR_END_STRUCK:
+        last = ahead_until(scene, k, real[TTC]) if scene.near else k
+        mine, its = ran_red(scene, 0, k, last), ran_red(scene, e, k, last)
+        if scene.claims[e] == -SIREN:
+            its = -1  # with due regard, it may
+        if mine >= 0 or its >= 0:
+            if mine >= 0:
+                whole[DECIDED] = min(max(mine, its), k)
+            if mine >= 0 and its >= 0:
+                return SHARED, RED_LIGHT
+            return (EGO if mine >= 0 else OTHER), RED_LIGHT
+    if kind in (VRU_BY_FRONT, VRU_INTO_SIDE):
+        return of_vulnerable(scene, e, k, kind, own, since, avoidable, whole)
+    if kind == REAR_END_STRUCK:
+        return of_struck(scene, e, k, whole)
+    if kind == OBJECT and scene.v[e, k] > STANDS and not strikes_with_front(own, own_part):
+        return OTHER, LEFT_ITS_LANE
+    if kind in (REAR_END_STRIKING, OBJECT):
+        return of_striking(scene, e, k, risk, since, side, late, stands, avoidable, whole)
+    if real[STOOD_OTHER] >= STOOD and could_stop_since(scene, e, risk, since, stands, avoidable):
+        if stands > risk + 1:
+            whole[DECIDED] = stands
+        whole[PREVENTABLE] = True
+        return EGO, STANDING_AHEAD
+    if kind in (SIDE_SWIPE, HEAD_ON):
+        return of_leaving(scene, e, k, kind, own, since, avoidable)
+    return of_crossing(scene, e, k, own, since, avoidable, whole)
+
+
+@kernel
+def could_stop_since(scene, e, risk, since, stands, avoidable):
+    """Return whether the careful driver could stop before body e since that stands.
+
+    Before, it was no standing obstacle, however long it was to be seen.
+    """
+    if stands <= max(risk + 1, since):
+        return avoidable
+    return braked(scene, 0, e, stands, stands, BRAKING) == CLEAR
+
+
+@kernel
+def rule_of(claim):
+    """Return the rule of a claim that is not 0."""
+    if abs(claim) >= SIREN:
+        return EMERGENCY_VEHICLE if abs(claim) == SIREN else FROM_OFF_ROAD
+    return MAP_PRIORITY + abs(claim) - 1
+
+
+@kernel
+def of_vulnerable(scene, e, k, kind, own, since, avoidable, whole):
+    """Decide where the ego and a pedestrian, a cyclist or an animal meet."""
+    what = scene.kinds[e]
+    if IS_PEDESTRIAN[what]:
+        since = on_crosswalk_since(scene, e, k)
+        if since <= k:
+            since = visible_from(scene, e, since, k)
+            could = braked(scene, 0, e, since, since, BRAKING) == CLEAR
+            whole[DECIDED], whole[PREVENTABLE] = since, could
+            return (EGO, CROSSWALK) if could else (NEITHER, STEPPED_OUT)
+    if IS_CYCLE[what]:
+        claim = scene.claims[e]
+        if claim < 0:
+            return EGO, rule_of(claim)
+        mine, its = turns(scene.c, scene.s, e, scene.first, scene.n, k, scene.dt)
+        if mine and not its and claim == 0 and same_road(scene, e, k):
+            return EGO, TURNING_GIVES_WAY
+        one, other = steering(scene, e, k, JUST_NOW)
+        if kind == VRU_INTO_SIDE and claim == 0 and one > ASIDE and one > other:
+            return EGO, LEFT_ITS_LANE
+        if claim > 0 and not avoidable:
+            return OTHER, rule_of(claim)
+    if IS_PEDESTRIAN[what] and avoidable:
+        mine, _ = turns(scene.c, scene.s, e, scene.first, scene.n, k, scene.dt)
+        if mine:
+            return EGO, TURNING_GIVES_WAY
+    if leaves_route(scene, k):
+        return EGO, LEFT_ITS_LANE
+    if kind == VRU_INTO_SIDE:
+        if (
+            avoidable
+            and IS_CYCLE[what]
+            and same_road(scene, e, k)
+            and runs_into(scene, e, own, since)
+        ):
+            return EGO, PASSED_TOO_CLOSE
+        if not IS_ANIMAL[what] and ego_moved(scene, k, side_of(scene, e, k)):
+            return EGO, LEFT_ITS_LANE
+        return (NEITHER if IS_ANIMAL[what] else OTHER), INTO_THE_SIDE
+    if avoidable:
+        return EGO, COULD_HAVE_STOPPED
+    return (NEITHER if IS_ANIMAL[what] else OTHER), STEPPED_OUT
+
+
+@kernel
+def leaves_route(scene, k):
+    """Return whether the ego is on its way off its lane: sliding, or cutting a bend.
+
+    Unknown of recordings, which state no friction: their offset may be from the road that the ego
+    leaves when it turns off.
+    """
+    if scene.friction == math.inf:
+        return False
+    before = max(k - int(LATELY / scene.dt), 0)
+    aside = abs(scene.offset[0, k])
+    return aside > OFF_LANE and aside - abs(scene.offset[0, before]) > ASIDE
+
+
+@kernel
+def of_struck(scene, e, k, whole):
+    """Decide where the other drives into the rear of the ego."""
+    since, side = entered(scene, e, 0, k, MARGIN)
+    mine, _ = turns(scene.c, scene.s, e, scene.first, scene.n, k, scene.dt)
+    moved = ego_came_over(scene, e, since, 0)
+    if side != 0 and (mine or moved):
+        whole[DECIDED] = since
+        if braked(scene, e, 0, since, since, COMFORT) == CLEAR:
+            return OTHER, REAR_DISTANCE
+        claim = scene.claims[e]
+        if claim < 0:
+            return EGO, rule_of(claim)
+        if claim == 0:
+            return EGO, (CUT_IN if moved else TURNING_GIVES_WAY)
+        return OTHER, rule_of(claim)
+    for i in range(max(k - int(JUST_NOW / scene.dt), 0), k):
+        if scene.a[0, i] <= -HARD and scene.v[0, i] > STANDS and not has_reason(scene, i):
+            whole[DECIDED] = i
+            return SHARED, BRAKED_WITHOUT_REASON
+    return OTHER, REAR_DISTANCE
+
+
+@kernel
+def of_striking(scene, e, k, risk, since, side, late, stands, avoidable, whole):
+    """Decide where the ego drives into the rear of the other, or into an object."""
+    in_time = since != risk and braked(scene, 0, e, risk, risk, BRAKING) == CLEAR
+    if late and not avoidable and not in_time:
+        return NEITHER, REVEALED_LATE
+    v = scene.v
+    mine, its = turns(scene.c, scene.s, e, scene.first, scene.n, k, scene.dt)
+    moved = ego_came_over(scene, e, min(risk + 1, k), 0)
+    claim = scene.claims[e]
+    if mine and not its and claim < 0:  # the ego turned into the way of one that had priority
+        return EGO, rule_of(claim)
+    if stands <= risk + 1 and stands <= k:  # it stood when it came into the way
+        if avoidable or moved:
+            return EGO, STANDING_AHEAD
+        return NEITHER, UNSAFE_START
+    if side != 0 and not moved and not mine:
+        begins, _ = entered(scene, 0, e, k, 0.0)  # UN R157: the bodies overlap across the way
+        begins = visible_from(scene, e, begins, k)
+        if scene.kinds[e] == BUS:  # it is to be let go, see `evident_since`
+            begins = min(begins, since)
+        could = braked(scene, 0, e, begins, begins, BRAKING) == CLEAR
+        whole[DECIDED], whole[PREVENTABLE] = begins, could
+        if could:
+            return EGO, CUT_IN_PREVENTABLE
+        return OTHER, (rule_of(claim) if its and claim > 0 else CUT_IN)
+    start = max(slowing_since(v[e], scene.first, min(stands, k), scene.dt), risk)
+    level = braked(scene, 0, e, start, start, BRAKING)
+    if level == CLEAR:
+        whole[DECIDED], whole[PREVENTABLE] = start, True
+        return EGO, REAR_DISTANCE
+    if level == COMES_NEAR and scene.near and not moved:
+        whole[DECIDED], whole[PREVENTABLE] = start, False
+        return NEITHER, BRAKED_HARD_AHEAD
+    # had it time to open the gap before the other braked, since that was ahead of it?
+    kept = braked(scene, 0, e, risk, start, BRAKING) == CLEAR
+    if avoidable and v[0, start] > v[e, start] + MOVES:  # it drove up to one that was slower
+        return EGO, REAR_DISTANCE
+    whole[DECIDED], whole[PREVENTABLE] = start, kept
+    if kept or moved:
+        return EGO, REAR_DISTANCE
+    return NEITHER, UNSAFE_START
+
+
+@kernel
+def runs_into(scene, e, own, since):
+    """Return whether the ego has driven up to a slower body that was ahead and in its way.
+
+    Ahead: its rear was beyond the ego's front at the instant ``since``, when it was in the way. One
+    that drives into the ego's rear has come from behind meanwhile.
+    """
+    c, s, half = scene.c, scene.s, scene.half
+    along = scene.v[e, since] * (c[e, since] * c[0, since] + s[e, since] * s[0, since])
+    if own in (REAR, REAR_LEFT, REAR_RIGHT) or scene.v[0, since] <= along:
+        return False
+    dx, dy = scene.x[e, since] - scene.x[0, since], scene.y[e, since] - scene.y[0, since]
+    return dx * c[0, since] + dy * s[0, since] >= half[0, 0] + half[e, 0]
+
+
+@kernel
+def of_leaving(scene, e, k, kind, own, since, avoidable):
+    """Decide where two meet side by side, or head on: which one has left its lane?"""
+    if ego_came_over(scene, e, k, side_of(scene, e, k)):
+        return EGO, LEFT_ITS_LANE
+    claim, late = scene.claims[e], kind == SIDE_SWIPE and avoidable
+    late = late and runs_into(scene, e, own, since)
+    if claim != 0:
+        return (SHARED if late else OTHER) if claim > 0 else EGO, rule_of(claim)
+    if late:
+        return EGO, CUT_IN_PREVENTABLE
+    if not scene.routed:
+        mine, its = steering(scene, e, k, JUST_NOW)
+        if max(mine, its) < ASIDE:
+            return NEITHER, LEFT_ITS_LANE
+        if mine > its:
+            return EGO, LEFT_ITS_LANE
+    if kind == HEAD_ON and scene.routed:
+        _, its = steering(scene, e, k, JUST_NOW)
+        if its < ASIDE:  # it has come this way all the time
+            return OTHER, WRONG_SIDE
+    return OTHER, LEFT_ITS_LANE
+
+
+@kernel
+def of_crossing(scene, e, k, own, risk, avoidable, whole):
+    """Decide where two paths cross, or one turns into the other's."""
+    since, _ = entered(scene, e, 0, k, 0.0)
+    it_could = braked(scene, e, 0, since, since, COMFORT) != COLLIDES
+    ego_could = braked(scene, 0, e, risk, risk, COMFORT) != COLLIDES
+    claim = scene.claims[e]
+    front = own in (FRONT, FRONT_LEFT, FRONT_RIGHT)
+    if it_could and not ego_could and not (claim < 0 and avoidable and front):
+        whole[DECIDED] = since
+        return OTHER, JUNCTION_OCCUPIED
+    if ego_could and not it_could:
+        return EGO, JUNCTION_OCCUPIED
+    if claim == -SIREN:
+        return of_siren(scene, e, k, whole)
+    if claim < 0 and not avoidable and not front and has_set_off(scene, e, k):
+        return NEITHER, REVEALED_LATE  # struck as it had all but passed, by one that had waited
+    if claim != 0:
+        return (OTHER if claim > 0 else EGO), rule_of(claim)
+    mine, its = turns(scene.c, scene.s, e, scene.first, scene.n, k, scene.dt)
+    if same_road(scene, e, k):
+        if mine != its:
+            return (EGO if mine else OTHER), TURNING_GIVES_WAY
+        return SHARED, TURNING_GIVES_WAY
+    j = max(k - int(TURN_TIME / scene.dt), scene.first)
+    from_right = scene.c[0, j] * scene.s[e, j] - scene.s[0, j] * scene.c[e, j] > 0.0
+    return (EGO if from_right else OTHER), ASSUMED_RIGHT_BEFORE_LEFT
+
+
+@kernel
+def of_siren(scene, e, k, whole):
+    """Decide where the ego has not made way for body e, an emergency vehicle with a siren.
+
+    Siren and blue light say that it will come into the way, so the ego must act before it does.
+    """
+    earliest = k - int(HORIZON / scene.dt)
+    heard = visible_from(scene, e, scene.first, k)
+    since = max(heard, earliest)
+    could = braked(scene, 0, e, since, since, BRAKING) == CLEAR
+    whole[DECIDED], whole[PREVENTABLE] = since, could
+    if could or heard < earliest:
+        return EGO, EMERGENCY_VEHICLE
+    return NEITHER, (REVEALED_LATE if heard > scene.first else UNSAFE_START)

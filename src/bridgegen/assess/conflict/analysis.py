@@ -1,0 +1,306 @@
+"""The conflict analysis of rollouts: conflicts of the ego with each other participant."""
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from bridgegen.assess.conflict import _codes as codes
+from bridgegen.assess.conflict import severity as injury
+from bridgegen.assess.conflict._codes import CONTACT, COURSE, NEAR_MISS, NO_CONFLICT, VIOLATION
+from bridgegen.assess.conflict.types import ConflictType, Responsible, Rule, Zone
+from bridgegen.assess.metrics.metric import recorded, shared
+from bridgegen.assess.metrics.motion import motion
+from bridgegen.base.arrays import Bool, Float, Int
+from bridgegen.drivers._kind_tables import IS_OBSTACLE
+from bridgegen.simulation.rollout import Rollout
+
+_DIRECTION = np.array(
+    [injury.SIDE, injury.FRONT, injury.FRONT, injury.SIDE, injury.REAR, injury.REAR, injury.REAR,
+     injury.SIDE, injury.FRONT]
+)  # fmt: skip
+"""The direction of the force by `Zone`; a corner counts as its end."""
+
+
+_BY_OTHERS = (
+    ConflictType.REAR_END_STRUCK,
+    ConflictType.SIDE_SWIPE,
+    ConflictType.EGO_STANDING,
+    ConflictType.VRU_INTO_SIDE,
+)
+"""Types in which the other drives, rides or walks into the ego."""
+
+
+@dataclass(frozen=True)
+class Conflicts:
+    """The conflicts of N scenarios, pair by pair; the ego is entity 0.
+
+    Its own column has departures from its lane or from the road, which need no other participant.
+
+    Only events up to the ego's first contact count. Two bodies are on a collision course if two
+    predictions agree that they touch within 4 s: constant velocity, and constant speed along the
+    paths that both drive in the rollout (straight on beyond their ends). Where paths do not meet,
+    passing is no conflict, however near. A near miss is a collision course with at most 1.5 s left
+    and a needed deceleration of at least 3.35 m/s². Of all instants of a collision course the most
+    urgent one counts, near misses first; see ``harm``. Types, zones and responsibility exist for
+    near misses and contacts only.
+
+    Attributes:
+        names: E participants.
+        time_step: [s].
+        kind: ``(N, E)`` NO_CONFLICT, COURSE, NEAR_MISS, CONTACT or VIOLATION.
+        type: ``(N, E)`` of `ConflictType`.
+        responsible: ``(N, E)`` of `Responsible`.
+        rule: ``(N, E)`` of `Rule`.
+        instant: ``(N, E)`` of contact, or the most urgent of the collision course.
+        decided: ``(N, E)`` instant at which the risk arose that decides on responsibility.
+        zone_ego: ``(N, E)`` of `Zone`, on the ego.
+        zone_other: ``(N, E)`` of `Zone`, on the other.
+        leads_ego: ``(N, E)`` bool: they meet at the end of the ego that is ahead as it drives, or
+            at its side within 15 % of its length from there.
+        preventable: ``(N, E)`` bool: the careful driver of UN R157, Annex 3 (0.75 s, 0.774 g, or
+            what the tyres give on this road), braking on the ego's path since the other was
+            visibly in its way (or since the vehicle ahead braked), would have avoided the contact,
+            or the near miss.
+        ttc: ``(N, E)`` [s], time to collision at ``instant``; 0 of a contact, +inf without a
+            conflict.
+        needed: ``(N, E)`` [m/s²], the deceleration that the ego needed then; of a contact, as if
+            one time step had been left.
+        closing_normal: ``(N, E)`` [m/s], closing speed across the surfaces that meet.
+        closing_tangential: ``(N, E)`` [m/s], along them.
+        v_ego: ``(N, E)`` [m/s], speed of the ego then; just before a contact.
+        v_other: ``(N, E)`` [m/s], of the other.
+        stood_ego: ``(N, E)`` [s], how long the ego had been standing.
+        stood_other: ``(N, E)`` [s], likewise of the other.
+        overlap: ``(N, E)``, share of the ego's extent across the contact's normal that meets.
+        left: ``(N, E)`` [s], from the instant ``decided`` to the contact, or the predicted one.
+        nearness: ``(N, E)`` in [0, 1], closeness at constant velocity; see
+            ``_conflict_kernels.nearness``.
+        severity: ``(N, E)`` probability of MAIS3+ of the party at the higher risk; 0 unless they
+            touch.
+        potential: ``(N, E)`` likewise, of a near miss too, as if they had touched as predicted.
+        delta_v_ego: ``(N, E)`` [m/s], change of the ego's velocity; 0 unless they touch.
+        delta_v_other: ``(N, E)`` [m/s], of the other's.
+        ok: ``(N,)`` bool, False where the scenario failed; its rows are empty.
+        aside: ``(N, E)`` [m], of a departure how far the rear axle was beyond the border of its
+            lanes, or the edge of the road, at most, left positive; of a close pass the clearance;
+            else 0.
+        breach: ``(N, E)`` in [0, 1], of a violation: 1 where it is a failure; else 0.
+        body: ``(N, E)`` which of the ego's bodies it is, 0 or a trailer of its own.
+    """
+
+    names: tuple[str, ...]
+    time_step: float
+    kind: Int
+    type: Int
+    responsible: Int
+    rule: Int
+    instant: Int
+    decided: Int
+    zone_ego: Int
+    zone_other: Int
+    leads_ego: Bool
+    preventable: Bool
+    ttc: Float
+    needed: Float
+    closing_normal: Float
+    closing_tangential: Float
+    v_ego: Float
+    v_other: Float
+    stood_ego: Float
+    stood_other: Float
+    overlap: Float
+    left: Float
+    nearness: Float
+    severity: Float
+    potential: Float
+    delta_v_ego: Float
+    delta_v_other: Float
+    ok: Bool
+    body: Int
+    aside: Float
+    breach: Float
+
+    @cached_property
+    def at_fault(self) -> Bool:
+        """``(N, E)``: the ego has failed.
+
+        It is responsible, alone or with the other; or its front, or in reverse its rear, meets
+        another in a contact that it could have prevented.
+        """
+        blamed = (self.responsible == Responsible.EGO) | (self.responsible == Responsible.SHARED)
+        by_front = self.leads_ego & ~np.isin(self.type, _BY_OTHERS)
+        fault: Bool = blamed | ((self.kind == CONTACT) & self.preventable & by_front)
+        return fault
+
+
+def analyse(rollout: Rollout) -> Conflicts:
+    """Return the conflicts of a rollout, computed once.
+
+    Source: Najm et al., DOT HS 810 767 (types); docs/conflicts.md describes the rules.
+    """
+    return shared(rollout, _with_violations)
+
+
+def encounters(rollout: Rollout) -> Conflicts:
+    """Return the same without violations: what the ego and another are involved in."""
+    return shared(rollout, _analyse)
+
+
+def _with_violations(rollout: Rollout) -> Conflicts:
+    from bridgegen.assess.conflict.violations import with_violations  # which imports this module
+
+    return with_violations(rollout, encounters(rollout))
+
+
+def _analyse(rollout: Rollout) -> Conflicts:
+    own = [e for e in range(rollout.shape[1]) if rollout.is_ego_s(e)]
+    if len(own) == 1:
+        return _of_one_body(rollout)
+    found, *more = (_of_one_body(_seen_from(rollout, e, own)) for e in own)
+    for e, part in zip(own[1:], more, strict=True):
+        worse = part.kind > found.kind
+        worse |= (part.kind == found.kind) & (part.kind == CONTACT) & (part.instant < found.instant)
+        pairs: dict[str, Any] = {
+            name: np.where(worse, getattr(part, name), array)
+            for name, array in vars(found).items()
+            if isinstance(array, np.ndarray) and array.ndim == 2
+        }
+        pairs["body"] = np.where(worse, e, found.body)
+        found = replace(found, **pairs)
+    return found
+
+
+def _seen_from(rollout: Rollout, e: int, own: list[int]) -> Rollout:
+    """Return a rollout in which a body of the ego's stands for it, and its others are absent."""
+    there = np.ones(rollout.shape, np.bool_)
+    if rollout.present.size:
+        there = rollout.present.copy()
+    there[:, [one for one in own if one != e]] = False
+    order = np.arange(rollout.shape[1])
+    order[[0, e]] = e, 0
+    swapped = {
+        name: getattr(rollout, name)[:, order] for name in ("x", "y", "h", "v", "a", "offset")
+    }
+    kinds = rollout.kinds[order] if len(rollout.kinds) else rollout.kinds
+    return replace(
+        rollout, **swapped, box=rollout.box[order], kinds=kinds, present=there[:, order],
+        towed_by=np.zeros(0, np.int64),
+    )  # fmt: skip
+
+
+def _of_one_body(rollout: Rollout) -> Conflicts:
+    from bridgegen.assess.conflict import _conflict_kernels as kernels
+
+    n, e, t = rollout.shape
+    moving = motion(rollout)
+    whole = np.zeros((n, e, codes.INTEGERS), dtype=np.int64)
+    real = np.zeros((n, e, codes.FLOATS))
+    claims = rollout.claims if rollout.claims.size else np.zeros((n, e, e), np.int64)
+    crosswalks = rollout.crosswalks
+    if not crosswalks.size:
+        crosswalks = np.zeros((n, 0, 5))
+    friction = rollout.friction if rollout.friction.size else np.full(n, np.inf)
+    lines = rollout.stop_lines if rollout.stop_entities.size else np.zeros((n, 0, 3))
+    lights = rollout.lights if len(rollout.lights) else np.zeros((n, 0, 0), np.int8)
+    lamps = rollout.lamps if len(rollout.lamps) else np.zeros((n, 0, 0), np.int8)
+    kinds = rollout.kinds if rollout.kinds.size else np.zeros(e, np.int64)
+    kernels.analyse_rows(
+        moving.half, np.ascontiguousarray(kinds, dtype=np.int64), moving.x, moving.y,
+        moving.cosine, moving.sine, moving.v, moving.a, recorded(rollout, "offset"),
+        moving.distance, moving.n_steps, rollout.time_step,
+        np.ascontiguousarray(claims, dtype=np.int64), np.ascontiguousarray(crosswalks),
+        np.ascontiguousarray(friction),
+        np.ascontiguousarray(rollout.stop_entities, dtype=np.int64),
+        np.ascontiguousarray(rollout.stop_lights, dtype=np.int64), np.ascontiguousarray(lines),
+        np.ascontiguousarray(lights, dtype=np.int8), np.ascontiguousarray(lamps, dtype=np.int8),
+        _is_routed(rollout), np.empty((e, t)), whole,
+        real,
+    )  # fmt: skip
+    if moving.reverses is not None:
+        _turn_round(whole, moving.reverses)
+    ok = np.asarray(rollout.status) == 0
+    whole[~ok], real[~ok] = 0, 0.0
+    real[~ok, :, codes.TTC] = np.inf
+    real[:, :1, codes.TTC] = np.inf
+    own, other = np.broadcast_arrays(kinds[0], kinds)
+    touched = whole[:, :, codes.KIND] == CONTACT
+    rows, entities = np.nonzero(whole[:, :, codes.KIND] >= NEAR_MISS)
+    potential, dv_ego, dv_other = (np.zeros((n, e)) for _ in range(3))
+    if len(rows):
+        kind_a, kind_b = own[entities], other[entities]
+        normal = real[rows, entities, codes.ACROSS]
+        tangential = real[rows, entities, codes.ALONG]
+        fixed = np.array(IS_OBSTACLE)[kind_b] & _never_moves(rollout)[rows, entities]
+        potential[rows, entities] = injury.severity(
+            kind_a, kind_b, normal, tangential,
+            _DIRECTION[whole[rows, entities, codes.ZONE_EGO]],
+            _DIRECTION[whole[rows, entities, codes.ZONE_OTHER]], True, ~fixed,
+        )  # fmt: skip
+        dv_ego[rows, entities], dv_other[rows, entities] = injury.delta_v(
+            kind_a, kind_b, normal, tangential, True, ~fixed
+        )
+    columns = {
+        "kind": codes.KIND, "type": codes.TYPE, "responsible": codes.RESPONSIBLE,
+        "rule": codes.RULE, "instant": codes.INSTANT, "decided": codes.DECIDED,
+        "zone_ego": codes.ZONE_EGO, "zone_other": codes.ZONE_OTHER,
+    }  # fmt: skip
+    numbers = {
+        "ttc": codes.TTC, "needed": codes.NEEDED, "closing_normal": codes.ACROSS,
+        "closing_tangential": codes.ALONG, "v_ego": codes.V_EGO, "v_other": codes.V_OTHER,
+        "stood_ego": codes.STOOD_EGO, "stood_other": codes.STOOD_OTHER,
+        "overlap": codes.OVERLAP, "left": codes.LEFT_TO_ACT, "nearness": codes.NEARNESS,
+    }  # fmt: skip
+    found: dict[str, Any] = {name: whole[:, :, column] for name, column in columns.items()}
+    found |= {name: real[:, :, column] for name, column in numbers.items()}
+    return Conflicts(
+        names=rollout.names, time_step=rollout.time_step, **found,
+        leads_ego=whole[:, :, codes.LEADS_EGO] > 0,
+        preventable=whole[:, :, codes.PREVENTABLE] > 0,
+        severity=np.where(touched, potential, 0.0), potential=potential,
+        delta_v_ego=np.where(touched, dv_ego, 0.0), delta_v_other=np.where(touched, dv_other, 0.0),
+        ok=ok,
+        body=np.zeros((n, e), np.int64), aside=np.zeros((n, e)), breach=np.zeros((n, e)),
+    )  # fmt: skip
+
+
+def _turn_round(whole: Int, reverses: Bool) -> None:
+    """Name the zones of bodies that reverse: the analysis took their rear for the front."""
+    instant = whole[:, :, codes.INSTANT]
+    rows, entities = np.indices(instant.shape)
+    for column, backwards in (
+        (codes.ZONE_EGO, reverses[rows, 0, instant]),
+        (codes.ZONE_OTHER, reverses[rows, entities, instant]),
+    ):
+        zone = whole[:, :, column]
+        turned = (zone - Zone.FRONT + 4) % 8 + Zone.FRONT
+        whole[:, :, column] = np.where(backwards & (zone != Zone.NONE), turned, zone)
+
+
+def _is_routed(rollout: Rollout) -> bool:
+    """Return whether offsets are known: in a rollout on a map, or if a recording has them."""
+    return bool(rollout.claims.size) or bool(rollout.offset.any())
+
+
+def _never_moves(rollout: Rollout) -> Bool:
+    """``(N, E)``: which participants never move, like barriers."""
+    still: npt.NDArray[np.bool_] = (rollout.v == 0.0).all(axis=2)
+    return still
+
+
+__all__ = [
+    "CONTACT",
+    "COURSE",
+    "NEAR_MISS",
+    "NO_CONFLICT",
+    "VIOLATION",
+    "ConflictType",
+    "Conflicts",
+    "Responsible",
+    "Rule",
+    "Zone",
+    "analyse",
+    "encounters",
+]  # fmt: skip

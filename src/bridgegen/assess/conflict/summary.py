@@ -1,0 +1,196 @@
+"""The decisive conflict of one scenario, with all its figures."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from math import isfinite
+from typing import Any, Self
+
+from bridgegen.assess.conflict.analysis import COURSE, NEAR_MISS, VIOLATION, Conflicts
+from bridgegen.assess.conflict.findings import KINDS
+from bridgegen.assess.conflict.harm import Count, decisive, harm_of_pairs
+from bridgegen.assess.conflict.sentences import avoidance, sentence
+from bridgegen.assess.conflict.types import RULES, ConflictType, Responsible, Rule, Zone
+from bridgegen.base.physics import CAREFUL_BRAKING_G, CAREFUL_REACTION
+
+CAREFUL_DRIVER = f"the careful driver of UN R157 ({CAREFUL_REACTION:g} s, {CAREFUL_BRAKING_G:g} g)"
+"""The driver whose braking decides whether a contact was preventable."""
+
+UNITS: Mapping[str, str] = {
+    "time": "s", "decided": "s", "ttc": "s", "needed_deceleration": "m/s²", "left": "s",
+    "closing_normal": "m/s", "closing_tangential": "m/s", "v_ego": "m/s", "v_other": "m/s",
+    "stood_ego": "s", "stood_other": "s", "overlap": "1", "delta_v_ego": "m/s",
+    "delta_v_other": "m/s", "severity": "1", "harm": "1", "aside": "m",
+}  # fmt: skip
+"""The unit of each number of a summary."""
+
+
+@dataclass(frozen=True)
+class ConflictSummary:
+    """A conflict of the ego with one other participant, or a departure of its own.
+
+    A collision course has no type, zones, responsibility or rule: nothing happened.
+
+    Attributes:
+        conflict: "contact", "near miss", "violation" or "collision course".
+        sentence: the event, in one sentence.
+        partner: name of the other participant; "" of a departure.
+        type: label of its `ConflictType`; empty of a collision course, as are all texts below.
+        type_source: the typology's name for the type.
+        responsible: label of `Responsible`.
+        rule: label of the `Rule` that decides.
+        rule_says: the rule's statement on the responsible party.
+        rule_source: source of the rule.
+        zone_ego: edge or corner of the ego that meets the other.
+        zone_other: of the other.
+        preventable: whether the careful driver of UN R157 would have avoided it; None of a
+            violation.
+        time: of contact, or of the least time to collision [s].
+        decided: when the risk arose that decides on responsibility [s].
+        left: from then to the contact, or the predicted one [s].
+        ttc: least time to collision [s]; 0 of a contact.
+        needed_deceleration: that the ego needed then [m/s²].
+        closing_normal: closing speed across the surfaces that meet [m/s].
+        closing_tangential: along them [m/s].
+        v_ego: speed of the ego then [m/s].
+        v_other: speed of the other then [m/s].
+        stood_ego: how long the ego had been standing [s].
+        stood_other: how long the other had been standing [s].
+        overlap: share of the ego's extent that meets the other.
+        delta_v_ego: change of the ego's velocity in the collision [m/s].
+        delta_v_other: change of the other's velocity [m/s].
+        severity: probability of a MAIS3+ injury.
+        harm: in [0, 1], as the row's, but of this conflict alone.
+        aside: of a violation, see `Conflicts.aside` [m]; else 0.
+        avoidance: the end of ``sentence`` that says whether braking would have avoided it.
+    """
+
+    conflict: str
+    sentence: str
+    partner: str
+    type: str
+    type_source: str
+    responsible: str
+    rule: str
+    rule_says: str
+    rule_source: str
+    zone_ego: str
+    zone_other: str
+    preventable: bool | None
+    time: float
+    decided: float
+    left: float
+    ttc: float
+    needed_deceleration: float
+    closing_normal: float
+    closing_tangential: float
+    v_ego: float
+    v_other: float
+    stood_ego: float
+    stood_other: float
+    overlap: float
+    delta_v_ego: float
+    delta_v_other: float
+    severity: float
+    harm: float
+    aside: float = 0.0
+    avoidance: str = ""
+
+    @property
+    def bare(self) -> str:
+        """The sentence without its end on braking."""
+        return self.sentence.removesuffix(f"{self.avoidance}.").removesuffix(".")
+
+    def reconciled(self, judgement: str) -> Self:
+        """Return the same with the judgement of its finding in place of the end on braking.
+
+        Args:
+            judgement: a clause, see `bridgegen.search.triage.judgement`; "" changes nothing.
+        """
+        if not judgement:
+            return self
+        return replace(self, sentence=f"{self.bare}; {judgement}.", avoidance=f"; {judgement}")
+
+    @property
+    def happened(self) -> bool:
+        """Whether it is a contact, a near miss or a violation, not only a collision course."""
+        return self.conflict not in ("", KINDS[COURSE])
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return everything as JSON's types: texts, None where there is none; numbers with units.
+
+        Values that a conflict does not have are None.
+        """
+        texts: dict[str, Any] = {}
+        for name in (
+            "conflict", "sentence", "partner", "type", "type_source", "responsible", "rule",
+            "rule_says", "rule_source", "zone_ego", "zone_other",
+        ):  # fmt: skip
+            texts[name] = getattr(self, name) or None
+        texts["preventable"] = self.preventable if self.happened else None
+        return texts | {
+            name: {"value": value if isfinite(value) else None, "unit": unit}
+            for name, unit in UNITS.items()
+            for value in [getattr(self, name)]
+        }
+
+
+def summarise(conflicts: Conflicts, row: int = 0, count: Count = "ego") -> ConflictSummary | None:
+    """Return a scenario's decisive conflict; None if it has none, or failed.
+
+    Args:
+        conflicts: of N scenarios.
+        row: which of them.
+        count: whose conflicts decide; see `harm.decisive`.
+    """
+    others, _ = decisive(conflicts, count)
+    other = int(others[row])
+    if conflicts.kind[row, other] < COURSE:
+        return None
+    return of_pair(conflicts, row, other, count)
+
+
+def of_pair(conflicts: Conflicts, row: int, other: int, count: Count = "ego") -> ConflictSummary:
+    """Return the conflict of the ego with one other participant, of which there must be one.
+
+    Args:
+        conflicts: of N scenarios.
+        row: which of them.
+        other: number of the other participant; 0 for a departure of the ego's.
+        count: whose conflicts count as harm.
+    """
+    kind = int(conflicts.kind[row, other])
+    rule = Rule(conflicts.rule[row, other])
+    happened = kind >= NEAR_MISS
+    sort = ConflictType(conflicts.type[row, other])
+
+    def number(name: str) -> float:
+        return float(getattr(conflicts, name)[row, other])
+
+    numbers = {
+        name: number(name)
+        for name in (
+            "left", "ttc", "closing_normal", "closing_tangential", "v_ego", "v_other",
+            "stood_ego", "stood_other", "overlap", "delta_v_ego", "delta_v_other", "severity",
+            "aside",
+        )
+    }  # fmt: skip
+    return ConflictSummary(
+        conflict=KINDS[kind],
+        sentence=sentence(conflicts, row, other),
+        avoidance=avoidance(conflicts, row, other),
+        partner=conflicts.names[other] if other else "",
+        type=sort.label,
+        type_source=sort.source,
+        responsible=Responsible(conflicts.responsible[row, other]).label if happened else "",
+        rule=rule.label,
+        rule_says=RULES[rule][0],
+        rule_source=RULES[rule][1],
+        zone_ego=Zone(conflicts.zone_ego[row, other]).label if happened else "",
+        zone_other=Zone(conflicts.zone_other[row, other]).label if happened else "",
+        preventable=None if kind == VIOLATION else bool(conflicts.preventable[row, other]),
+        time=round(number("instant") * conflicts.time_step, 9),
+        decided=round(number("decided" if happened else "instant") * conflicts.time_step, 9),
+        needed_deceleration=number("needed"),
+        harm=float(harm_of_pairs(conflicts, count)[row, other]),
+        **numbers,
+    )

@@ -1,0 +1,359 @@
+"""The decorators for compiled code, and intrinsics that Numba lacks."""
+
+import ctypes
+import gc
+import hashlib
+from collections.abc import Callable, Sequence
+from typing import Any, cast
+
+import numba
+import numba.extending
+import numpy as np
+from llvmlite import ir
+from numba.core import cgutils, event
+from numba.core.imputils import lower_getattr_generic
+from numba.core.sigutils import normalize_signature
+from numba.core.typing.templates import AttributeTemplate, infer_getattr
+
+from bridgegen.base.compilation.cache import KernelCache
+from bridgegen.base.compilation.library import KernelCompiler, for_kernel, is_for_kernel
+
+
+class _RelaxGarbageCollection(event.Listener):  # type: ignore[misc]
+    """Collects garbage less often during a compilation, which keeps its millions of objects."""
+
+    depth, usual = 0, (0, 0, 0)
+
+    def on_start(self, _: Any) -> None:
+        if self.depth == 0:
+            self.usual = gc.get_threshold()
+            gc.set_threshold(50_000, 20, 50)
+        self.depth += 1
+
+    def on_end(self, _: Any) -> None:
+        self.depth -= 1
+        if self.depth == 0:
+            gc.set_threshold(*self.usual)
+
+
+event.register("numba:compile", _RelaxGarbageCollection())  # always under Numba's own lock
+
+
+def kernel(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Compile a function of arrays and numbers on its first call; it then runs without the GIL.
+
+    A kernel never raises, does not check its arguments (its wrapper does), divides by zero as
+    IEEE 754 says, and is not reordered (no fastmath), so its result is the same in any batch.
+    """
+    compiled = _compile(function)
+    if not numba.config.DISABLE_JIT:
+        _compile_by_ourselves(compiled)
+    return cast(Callable[..., Any], compiled)
+
+
+def inlined_kernel(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Compile a part of a kernel: as ``kernel`` does, but into each kernel that calls it.
+
+    For what runs at every instant, where a call is felt.
+    """
+    compiled = _compile(function, forceinline=True)
+    if not numba.config.DISABLE_JIT:
+        _compile_by_ourselves(compiled)
+    return cast(Callable[..., Any], compiled)
+
+
+def _compile_by_ourselves(compiled: Any) -> None:
+    """Have a kernel's code cached, and callable from Python only where Python calls it."""
+    compiled._cache = KernelCache(compiled.py_func)
+    compile_or_load, add = compiled.compile, compiled.add_overload
+
+    def compile_alone(signature: Any) -> Any:
+        with compiled._cache.compiling():
+            known = compiled.overloads.get(normalize_signature(signature)[0])
+            if known and known.library.inner and not is_for_kernel():
+                del compiled.overloads[known.signature.args]  # Python needs a wrapper
+            return compile_or_load(signature)
+
+    def add_overload(result: Any) -> None:
+        if result.library.inner:
+            compiled.overloads[result.signature.args] = result
+        else:
+            add(result)
+
+    compiled.compile, compiled.add_overload = compile_alone, add_overload
+
+
+def _compile(function: Callable[..., Any], **options: Any) -> Any:
+    options |= {"nogil": True, "error_model": "numpy", "no_cfunc_wrapper": True}
+    options["pipeline_class"] = KernelCompiler
+    compiled: Any = numba.njit(**options)(function)
+    if not numba.config.DISABLE_JIT:
+        resolve = compiled.get_call_template
+
+        def resolve_alike(given: Any, named: Any) -> Any:
+            """Compile a function once for any number, not once more for every constant given."""
+            plain = numba.types.unliteral
+            with for_kernel():
+                return resolve([plain(a) for a in given], {k: plain(a) for k, a in named.items()})
+
+        compiled.get_call_template = resolve_alike
+    return compiled
+
+
+class Bundle(numba.types.Type):  # type: ignore[misc]
+    """In a kernel: where a named tuple of arrays is described; its arrays are read as attributes.
+
+    A tuple itself would be copied whole wherever one of its arrays is read, and passed array by
+    array wherever a kernel calls another: a hundred arrays take the compiler minutes.
+    """
+
+    def __init__(self, held: Any) -> None:
+        self.held = held
+        digest = hashlib.sha256(str(held).encode()).hexdigest()[:12]  # a symbol names all its types
+        super().__init__(name=f"Bundle({held.instance_class.__name__}-{digest})")
+
+
+@numba.extending.register_model(Bundle)
+class _BundleModel(numba.extending.models.PrimitiveModel):  # type: ignore[misc]
+    def __init__(self, manager: Any, kind: Any) -> None:
+        super().__init__(manager, kind, cgutils.voidptr_t)
+
+
+@infer_getattr
+class _BundleAttributes(AttributeTemplate):  # type: ignore[misc]
+    key = Bundle
+
+    def generic_resolve(self, bundle: Bundle, name: str) -> Any:
+        fields = bundle.held.instance_class._fields
+        return bundle.held.types[fields.index(name)] if name in fields else None
+
+
+@lower_getattr_generic(Bundle)  # type: ignore[untyped-decorator]
+def _read(context: Any, builder: Any, bundle: Bundle, value: Any, name: str) -> Any:
+    held = bundle.held
+    i = held.instance_class._fields.index(name)
+    place = builder.bitcast(value, context.get_value_type(held).as_pointer())
+    at = cgutils.gep_inbounds(builder, place, 0, i)
+    if not isinstance(held.types[i], numba.types.Array):
+        return builder.load(at)
+    there = context.make_array(held.types[i])(context, builder, ref=at)
+    view = context.make_array(held.types[i])(context, builder)
+    view.meminfo, view.parent = view.meminfo.type(None), view.parent.type(None)
+    for part in ("nitems", "itemsize", "data", "shape", "strides"):
+        setattr(view, part, getattr(there, part))
+    return view._getvalue()
+
+
+def _bundled(_: Any, value: Any) -> Any:
+    """In a kernel: a bundle of a named tuple's arrays, borrowed; their owners must outlive it."""
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        place = cgutils.alloca_once(builder, arguments[0].type)
+        for i, member in enumerate(value.types):
+            at = cgutils.gep_inbounds(builder, place, 0, i)
+            part = builder.extract_value(arguments[0], i)
+            if not isinstance(member, numba.types.Array):
+                builder.store(part, at)
+                continue
+            here = context.make_array(member)(context, builder, part)
+            there = context.make_array(member)(context, builder, ref=at)
+            for name in ("nitems", "itemsize", "data", "shape", "strides"):
+                setattr(there, name, getattr(here, name))
+        return builder.bitcast(place, cgutils.voidptr_t)
+
+    return Bundle(value)(value), generate
+
+
+def _bundled_row(_: Any, rows: Any, i: Any) -> Any:
+    """In a kernel: a bundle of row i of a named tuple of N rows' arrays; see `bundled`.
+
+    Numbers in the tuple are all rows'.
+    """
+    row = _row_tuple(rows.types, rows.instance_class, 1)
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        place = cgutils.alloca_once(builder, context.get_value_type(row))
+        for at, member in enumerate(rows.types):
+            part = builder.extract_value(arguments[0], at)
+            slot = cgutils.gep_inbounds(builder, place, 0, at)
+            if not isinstance(member, numba.types.Array):
+                builder.store(part, slot)
+                continue
+            here = context.make_array(member)(context, builder, part)
+            there = context.make_array(row.types[at])(context, builder, ref=slot)
+            shape = cgutils.unpack_tuple(builder, here.shape)
+            strides = cgutils.unpack_tuple(builder, here.strides)
+            count = context.get_constant(numba.types.intp, 1)
+            for size in shape[1:]:
+                count = builder.mul(count, size)
+            start = builder.bitcast(here.data, cgutils.voidptr_t)
+            start = builder.gep(start, [builder.mul(arguments[1], strides[0])])
+            there.data = builder.bitcast(start, here.data.type)
+            there.nitems, there.itemsize = count, here.itemsize
+            there.shape = cgutils.pack_array(builder, shape[1:])
+            there.strides = cgutils.pack_array(builder, strides[1:])
+        return builder.bitcast(place, cgutils.voidptr_t)
+
+    return Bundle(row)(rows, numba.types.intp), generate
+
+
+def _called_at(_: Any, address: Any, arrays: Any) -> Any:
+    """In a kernel: call the machine code at an address with where each array lies, and how long.
+
+    Its signature in C is ``void f(void *, intptr_t, …)``, a pair for each array, which must be
+    contiguous.
+    """
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        values = []
+        for i, member in enumerate(arrays):
+            part = builder.extract_value(arguments[1], i)
+            view = context.make_array(member)(context, builder, part)
+            values += [
+                builder.bitcast(view.data, cgutils.voidptr_t),
+                builder.extract_value(view.shape, 0),
+            ]
+        code = ir.FunctionType(ir.VoidType(), [value.type for value in values])
+        builder.call(builder.inttoptr(arguments[0], code.as_pointer()), values)
+        return context.get_dummy_value()
+
+    return numba.types.void(address, arrays), generate
+
+
+DEMAND = numba.types.UniTuple(numba.types.float64, 2)
+"""What a kernel returns that is called by its address."""
+
+
+def _calls_kernel(returns: Any) -> Callable[..., Any]:
+    """Return an intrinsic that calls a kernel by its address, see ``address_of``.
+
+    So that what calls it is compiled without it, and it only where it is called.
+    """
+
+    def call(_: Any, address: Any, arguments: Any) -> Any:
+        def generate(context: Any, builder: Any, signature: Any, given: Any) -> Any:
+            kinds, convention = signature.args[1].types, context.call_conv
+            values = [builder.extract_value(given[1], i) for i in range(len(kinds))]
+            code = convention.get_function_type(returns, kinds)
+            answer = cgutils.alloca_once(builder, convention.get_return_type(returns).pointee)
+            error = cgutils.alloca_once_value(builder, ir.Constant(code.args[1].pointee, None))
+            packed = context.get_arg_packer(kinds).as_arguments(builder, values)
+            callee = builder.inttoptr(given[0], code.as_pointer())
+            builder.call(callee, [answer, error, *packed])
+            if returns == numba.types.none:
+                return context.get_dummy_value()
+            return context.get_returned_value(builder, returns, builder.load(answer))
+
+        return returns(address, arguments), generate
+
+    return call
+
+
+def compile_for_kernels(function: Callable[..., Any], kinds: tuple[Any, ...]) -> Any:
+    """Compile a kernel for other kernels to call, if need be; return its code.
+
+    Args:
+        function: a ``kernel``.
+        kinds: Numba's types of its arguments; see ``row_type`` for those of bundles.
+    """
+    compiled: Any = function
+    with for_kernel():
+        compiled.compile(kinds)
+    return compiled.overloads[kinds]
+
+
+def address_of(function: Callable[..., Any], kinds: tuple[Any, ...]) -> int:
+    """Compile a kernel for arguments of some types, if need be; return where its code lies.
+
+    Args:
+        function: a ``kernel``; `call_kernel_at` calls one that returns two float64, and
+            `run_kernel_at` one that returns nothing.
+        kinds: Numba's types of its arguments; see ``row_type`` for those of bundles.
+    """
+    if numba.config.DISABLE_JIT:
+        if function not in _INTERPRETED:
+            _INTERPRETED.append(function)
+        return 1 + _INTERPRETED.index(function)
+    key = (function, *map(id, kinds))  # to hash the types of a hundred arrays takes a millisecond
+    if key in _ADDRESSES:
+        return _ADDRESSES[key][0]
+    compiled: Any = function
+    with compiled._cache.compiling():
+        found = compile_for_kernels(function, kinds)
+        address: int = found.library.get_pointer_to_function(found.fndesc.llvm_func_name)
+    _ADDRESSES[key] = address, kinds
+    return address
+
+
+_ADDRESSES: dict[tuple[Any, ...], tuple[int, tuple[Any, ...]]] = {}
+"""Where kernels lie in this process; with the types, which must live as long as their ids count."""
+
+
+def row_type(rows: Any, axes: int = 1) -> Any:
+    """Return the type of the bundle of one row of a named tuple of arrays.
+
+    Args:
+        rows: its arrays, of N rows, and numbers of less than 64 bits.
+        axes: how many first axes a row has not.
+
+    Returns:
+        The same object for rows of the same types.
+    """
+    if numba.config.DISABLE_JIT:
+        return None
+    key = (type(rows), axes, *map(_look_of, rows))
+    if key not in _ROW_TYPES:
+        _ROW_TYPES[key] = Bundle(_row_tuple([numba.typeof(one) for one in rows], type(rows), axes))
+    return _ROW_TYPES[key]
+
+
+_ROW_TYPES: dict[tuple[Any, ...], Bundle] = {}
+
+
+def _look_of(one: Any) -> Any:
+    """Return all that Numba's type of an array or a number depends on."""
+    if isinstance(one, np.ndarray):
+        return one.dtype, one.ndim, one.flags.num
+    return type(one)
+
+
+def _row_tuple(kinds: Sequence[Any], named: type, axes: int) -> Any:
+    arrays = numba.types.Array
+    row = (one.copy(ndim=one.ndim - axes) if isinstance(one, arrays) else one for one in kinds)
+    return numba.types.NamedTuple(tuple(row), named)
+
+
+_INTERPRETED: list[Callable[..., Any]] = []
+"""The functions that have addresses where Numba does not compile, the first at 1."""
+
+
+def _interpreted_at(address: int, arguments: tuple[Any, ...]) -> Any:
+    return _INTERPRETED[address - 1](*arguments)
+
+
+def _itself(value: Any) -> Any:
+    return value
+
+
+def _row(rows: Any, i: int) -> Any:
+    return type(rows)(*(one[i] if isinstance(one, np.ndarray) else one for one in rows))
+
+
+def call_from_python(address: int, arrays: tuple[np.ndarray, ...]) -> None:
+    """Do in Python what ``call_at`` does in a kernel."""
+    kinds = [ctypes.c_void_p, ctypes.c_ssize_t] * len(arrays)
+    given = (one for array in arrays for one in (array.ctypes.data, len(array)))
+    ctypes.CFUNCTYPE(None, *kinds)(address)(*given)
+
+
+if numba.config.DISABLE_JIT:
+    bundled, bundled_row = _itself, _row
+    call_at, call_kernel_at, run_kernel_at = call_from_python, _interpreted_at, _interpreted_at
+else:
+    bundled, bundled_row, call_at, call_kernel_at, run_kernel_at = map(
+        numba.extending.intrinsic,
+        (
+            _bundled, _bundled_row, _called_at, _calls_kernel(DEMAND),
+            _calls_kernel(numba.types.none),
+        ),
+    )  # fmt: skip

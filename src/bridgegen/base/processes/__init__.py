@@ -1,0 +1,1 @@
+"""Processes that BridgeGen starts: supervised, called, ended with all that they started."""

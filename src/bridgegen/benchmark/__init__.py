@@ -1,5 +1,0 @@
-"""A benchmark of drivers: what a search finds of each, in the scenarios that it is made for."""
-
-from bridgegen.benchmark.benchmark import Benchmark, BenchmarkCallbacks, benchmark_planners
-
-__all__ = ["Benchmark", "BenchmarkCallbacks", "benchmark_planners"]

@@ -1,0 +1,283 @@
+"""A campaign: its bar, and its final figures."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from bridgegen.cli.terminal.live import Live
+from bridgegen.search.regions.box import percent
+
+if TYPE_CHECKING:
+    from bridgegen.engine.workers import Workers
+    from bridgegen.jobs.search import Run, SearchCallbacks
+    from bridgegen.jobs.search.loop import Progress
+    from bridgegen.jobs.search.settings import Settings
+    from bridgegen.search.triage import Triage
+
+_STAGES = {
+    "search": "",  # the bar shows it; a terminal has only 80 columns
+    "triage": "testing the findings",
+    "export": "writing the critical scenarios",
+    "report": "writing the report",
+}
+
+MOST_MODES = 10
+"""Maximum number of failure modes shown."""
+
+MOST_REASONS = 5
+"""Maximum number of lines with reasons of failed evaluations."""
+
+
+class SearchScreen(Live):
+    """A campaign's live progress: evaluations, critical so far, best d_min, rate.
+
+    Args:
+        budget: of evaluations, if it is known.
+    """
+
+    def __init__(self, budget: int | None = None) -> None:
+        super().__init__(budget)
+        self._critical, self._best = 0, float("inf")
+        self._workers: Workers | None = None
+
+    @property
+    def callbacks(self) -> "SearchCallbacks":
+        """The callbacks for a campaign."""
+        from bridgegen.jobs.search import SearchCallbacks
+
+        return SearchCallbacks(
+            stage=self._stage,
+            workers=self._set_workers,
+            batch=self._batch,
+            warning=lambda text: self.console.print(
+                f"bridgegen: warning: {text}", soft_wrap=True, markup=False, highlight=False
+            ),
+        )
+
+    def _set_workers(self, workers: "Workers") -> None:
+        self._workers = workers
+
+    def _stage(self, stage: str) -> None:
+        if stage == "compile":
+            self.say_compiling()
+        else:
+            self.show(what=_STAGES[stage])
+
+    def _by(self) -> str:
+        """Return the number of workers, unless they are threads; a cluster's may change."""
+        from bridgegen.engine.workers import Threads
+
+        workers = self._workers
+        if workers is None or isinstance(workers, Threads):
+            return ""
+        return f" by {workers.count} worker" + "s" * (workers.count != 1)
+
+    def _batch(self, progress: "Progress") -> None:
+        column = progress.result.metrics[:, progress.metrics.index("d_min")]
+        self._critical += int(progress.result.critical.sum())
+        good = column[progress.result.status == 0]
+        self._best = min(self._best, float(good.min())) if len(good) else self._best
+        rate = progress.evaluations / progress.seconds if progress.seconds > 0 else 0.0
+        self.show(
+            done=progress.evaluations,
+            total=progress.budget,
+            facts=f"{self._critical} critical · best d_min {self._best:.2f} m · {rate:.0f}/s"
+            f"{self._by()}",
+        )
+
+
+def print_summary(run: "Run", seconds: float, *, verbose: bool = False) -> None:
+    """Print a run's verdict, its failure modes, how common they are, and what to do next.
+
+    Args:
+        run: the run.
+        seconds: total time [s].
+        verbose: its figures and each mode in full first.
+    """
+    if verbose:
+        _print_figures(run, seconds)
+    print("\n".join(verdict_lines(run, seconds)))
+
+
+def _print_figures(run: "Run", seconds: float) -> None:
+    """Print a run's figures, and its failure modes with all that was measured of them."""
+    s, settings, found = run.summary, run.settings, run.triage
+    quick = "quick causes" if found is not None else "causes"
+    rows = [
+        ("scenario", f"{Path(settings.scenario).stem}, ego {settings.ego}{_worse(settings)}"),
+        ("search", f"{settings.algorithm}, seed {settings.seed}"),
+        ("evaluations", f"{s.evaluations}" + (f" ({s.failed} failed)" if s.failed else "")),
+        *screen_rows(run),
+        ("R_critic", f"{s.r_critic:.3f} ({s.critical} critical{_by(settings.cause)})"),
+        *([(quick, ", ".join(f"{k} {n}" for k, n in s.causes.items()))] if s.causes else []),
+        ("first critical after", _count(s.first)),
+        ("50th critical after", _count(s.fiftieth)),
+        ("d_min", f"best {s.d_min_best:.2f} m, median {s.d_min_median:.2f} m"),
+        ("v_d", f"best {s.v_d_best:.2f} m/s, median {s.v_d_median:.2f} m/s"),
+        *((f"criterion {one.criterion.id}", one.sentence) for one in run.criteria),
+        *([("what happened", said)] if (said := run.happening.sentence) else []),
+        ("wall time", f"{seconds:.2f} s, of which {s.seconds:.2f} s search"),
+        ("scenarios", _exported(run)),
+    ]
+    rows += [
+        ("not exported", f"{one.name}, evaluation {one.evaluation + 1}: {'; '.join(one.problems)}")
+        for one in run.not_exported
+    ]
+    reasons = run.failures.most_common(MOST_REASONS)
+    rows += [("failed", f"{count} × {reason}") for reason, count in reasons]
+    _print_rows(rows)
+    if found is not None and found.modes:
+        print()
+        _print_modes(found)
+    print()
+
+
+def screen_rows(run: "Run") -> list[tuple[str, str]]:
+    """Return how far the run's screen agrees; nothing without one."""
+    from bridgegen.pages.screened_payload import in_a_line
+
+    return [] if run.screened is None else [("screen", in_a_line(run.screened))]
+
+
+WORDS = {"fails": "FAILS", "no failure found": "NO FAILURE FOUND", "not judged": "NOT JUDGED"}
+"""The verdicts on the terminal."""
+
+WIDTH, BAR = 100, 5
+"""Characters of a mode's line at most, and of its bar."""
+
+
+def verdict_lines(run: "Run", seconds: float) -> list[str]:
+    """Return the verdict on the first line; then the modes, and what matters most of the run."""
+    from bridgegen.assess.criteria import headline as judged
+
+    s, settings, found = run.summary, run.settings, run.triage
+    lines = [f"{conclusion(run)} ({seconds:.0f} s)"]
+    if text := judged(settings.ego, run.criteria):
+        lines.append(f"Criteria: {text}")
+    if found is not None:
+        lines += _mode_lines(found)
+        lines += ["", *_found_lines(found)]
+    if not run.happening.happened or run.happening.stuck:
+        lines.append(f"What happened: {run.happening.sentence}")
+    elif run.happening.domain and run.verdict != "not judged":
+        lines.append(f"Domain: {run.happening.domain}")
+    if s.failed:
+        reasons = ", ".join(f"{n} × {why}" for why, n in run.failures.most_common(MOST_REASONS))
+        lines.append(f"Without a result: {reasons}")
+    lines += [
+        f"Not exported: {one.name}, evaluation {one.evaluation + 1}: {'; '.join(one.problems)}"
+        for one in run.not_exported
+    ]
+    folder = run.folder
+    lines.append(f"Report: {run.report} (-v prints all figures)")
+    if run.scenarios:
+        lines.append(
+            f"Keep: bridgegen suite add {folder} --to SUITE · compare drivers: bridgegen diff "
+            f"SUITE --ego {settings.ego} --ego OTHER"
+        )
+    return lines
+
+
+def conclusion(run: "Run") -> str:
+    """Return a run's verdict in a line: the word, the driver, the scenario, and why."""
+    from bridgegen.search.triage.record import NOT_JUDGED
+
+    settings, found = run.settings, run.triage
+    name = f"{settings.ego} in {Path(settings.scenario).stem}{_worse(settings)}"
+    word = WORDS[run.verdict]
+    if found is None:
+        return f"{word}  {name}: the run has not ended"
+    bound = found.bound
+    if run.verdict == "fails" and found.modes:
+        modes = len(found.modes) + found.unrecorded_modes
+        ways = f"{modes} failure mode" + "s" * (modes != 1)
+        return f"{word}  {name}: {ways} in {bound.harmful:,} of {bound.evaluations:,} evaluations"
+    if run.verdict == "fails":
+        violated = [one.criterion.id for one in run.criteria if one.violated]
+        return f"{word}  {name}: violates {', '.join(violated)}"
+    _, _, why = bound.sentence.rstrip(".").partition(": ")
+    if run.verdict == NOT_JUDGED:
+        return f"{word}  {name}: {why}"
+    return f"{word}  {name}: in {bound.evaluations:,} evaluations; {why.partition(';')[0]}"
+
+
+def _mode_lines(found: "Triage") -> list[str]:
+    """Return a line for each failure mode: its bar, count, event, rule, severity and cause."""
+    modes = found.modes[:MOST_MODES]
+    most = max((one.count for one in modes), default=1)
+    lines = ["         count  event · rule · worst MAIS3+ · root cause"] if modes else []
+    for one in modes:
+        bar = "█" * max(round(BAR * one.count / most), 1)
+        what, _, _ = one.title.partition(" (")
+        worst = percent(one.severity) if one.conflict == "contact" else one.conflict
+        about = " · ".join(filter(None, [one.rule, worst, one.cause]))
+        head = f"{one.number:>2} {bar:<{BAR}} {one.count:>5,}  "
+        room = max(WIDTH - len(head) - len(about) - 3, 12)
+        short = what if len(what) <= room else f"{what[: room - 1]}…"
+        lines.append(f"{head}{short} · {about}"[:WIDTH])
+    more = len(found.modes[MOST_MODES:]) + found.unrecorded_modes
+    return [*lines, f"    and {more} more"] if more else lines
+
+
+def _found_lines(found: "Triage") -> list[str]:
+    """Return how common failures are, the simplest one, what matters, and what does not count."""
+    from bridgegen.search.triage.words import parameters_in_words
+
+    space, lines = found.bound.space, []
+    if found.bound.judged and space.drawn and space.rows:
+        share = (
+            f"{percent(space.share or 0.0)} of random scenarios fail ({percent(space.low)} to "
+            f"{percent(space.high)})"
+            if space.harmful
+            else f"at most {percent(space.high)} of random scenarios fail"
+        )
+        lines.append(
+            f"How common: {share}; uniform over the ranges, 95 % confidence; not a rate on roads"
+        )
+    simplest = [one.minimal for one in found.modes if one.minimal is not None]
+    if simplest:
+        lines.append(f"Simplest: {simplest[0].sentence}")
+    if found.modes and (text := parameters_in_words(found)):
+        lines.append(f"What matters most: {text}")
+    if found.bound.not_counted:
+        lines.append(f"N{found.bound.not_counted[1:]}")
+    return lines
+
+
+def _print_rows(rows: list[tuple[str, str]]) -> None:
+    for name, value in rows:
+        print(f"{name:<21} {value}")
+
+
+def _print_modes(found: "Triage") -> None:
+    """Print the failure modes, with their simplest scenarios."""
+    from bridgegen.search.triage.words import mode_in_words, parameters_in_words
+
+    for one in found.modes[:MOST_MODES]:
+        print(mode_in_words(one, found))
+        if one.minimal is not None:
+            edge = " (knife-edge)" if one.minimal.knife_edge else ""
+            print(f"     simplest{edge}: {one.minimal.sentence}")
+    more = len(found.modes[MOST_MODES:]) + found.unrecorded_modes
+    if more:
+        print(f"     and {more} more")
+    if matter := parameters_in_words(found):
+        print(f"what matters most: {matter}")
+
+
+def _exported(run: "Run") -> str:
+    n, minimal = len(run.scenarios), len(run.minimal_scenarios)
+    if not (n or minimal or run.not_exported) and run.settings.keep:
+        return f"none exported: {run.verdict}" if run.verdict != "fails" else "none exported"
+    return f"{n} in {run.folder / 'critical'}" + (f", and {minimal} minimal" if minimal else "")
+
+
+def _worse(settings: "Settings") -> str:
+    return f", worse than {settings.worse_than}" if settings.worse_than else ""
+
+
+def _by(cause: str | None) -> str:
+    return f" by {cause}" if cause else ""
+
+
+def _count(value: int | None) -> str:
+    return "never" if value is None else f"{value} evaluations"

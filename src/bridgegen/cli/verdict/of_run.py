@@ -1,0 +1,286 @@
+"""Pass/fail criteria for a run, reported as JUnit XML and as an exit status.
+
+The XML contains a failed test if and only if the exit status is a failure.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Self
+
+from bridgegen.assess.cause import CAUSES
+from bridgegen.assess.criteria import CriterionSummary
+from bridgegen.base.errors import InputError, StorageError
+from bridgegen.cli.verdict.fail_if import (
+    FailCondition,
+    Outcome,
+    Verdict,
+    read_conditions,
+    unless_judged,
+    words_of,
+)
+from bridgegen.cli.verdict.junit import Case, Suite, case_of, refuse_junit, write_junit
+from bridgegen.drivers import STORYBOARD
+from bridgegen.jobs.search.exported import Facts, ParameterValue, Quantity, read_facts
+from bridgegen.jobs.search.run import Run
+from bridgegen.scenario.language.criteria import PREFIX, read_criterion
+from bridgegen.search.triage.record import NOT_JUDGED
+from bridgegen.search.triage.words import mode_in_words
+
+_CAUSES = {one.label.replace(" ", "_"): one.label for one in CAUSES}
+"""Figures, by the cause's label."""
+
+_TRIAGE = {
+    "modes": "failure modes",
+    "robust": "failure modes that persist in at least half of the neighbours",
+    "worst_severity": "the worst probability of MAIS3+ in a failure mode; 0 if there is none",
+    "harmful.upper": "upper end of the 95 % interval of the harmful share of the space",
+}
+
+FIGURES = {
+    "r_critic": "critical evaluations / all evaluations",
+    "critical": "critical evaluations",
+    "evaluations": "evaluations, failed ones included",
+    "failed": "evaluations without a result",
+    "first": "evaluations until the first critical one; infinite if there is none",
+    "fiftieth": "evaluations until the 50th critical one; infinite if there is none",
+    "d_min_best": "the smallest d_min [m]",
+    "d_min_median": "the median of d_min [m]",
+    "v_d_best": "the largest v_d [m/s]",
+    "v_d_median": "the median of v_d [m/s]",
+    "stuck": "evaluations whose ego stands for no reason before the end of its route",
+    "seconds": "duration of the search without compilation [s]",
+    **dict.fromkeys(_CAUSES, "critical scenarios of this cause (quick: one replay)"),
+    **_TRIAGE,
+}
+"""The figures of a run that ``--fail-if`` accepts."""
+
+_OF_THE_RUN = ("evaluations", "failed", "stuck", "seconds", "harmful.upper")
+"""Figures to which no single critical scenario contributes."""
+
+
+_NOT_OF_THE_EGO = ("evaluations", "failed", "seconds")
+
+
+@dataclass(frozen=True)
+class PassFailCriteria:
+    """The criteria for a run, checked before it starts.
+
+    Attributes:
+        conditions: each fails the run if it holds.
+        junit: path of the JUnit XML, or None.
+    """
+
+    conditions: tuple[FailCondition, ...]
+    junit: Path | None
+
+    @classmethod
+    def read(
+        cls,
+        texts: Sequence[str],
+        junit: Path | None,
+        *,
+        causes: bool = True,
+        criteria: Sequence[str] = (),
+    ) -> Self:
+        """Read the criteria.
+
+        Args:
+            texts: see `read_conditions`; their figures are FIGURES.
+            junit: a new file, or an earlier JUnit XML.
+            causes: whether the run determines causes.
+            criteria: the names of the margins of its pass criteria, figures too: each is the
+                number of evaluations that violate it.
+
+        Raises:
+            InputError: a text is not a condition; a figure is unknown, or is a cause although the
+                run determines none.
+            StorageError: the JUnit XML cannot be written.
+        """
+        found = cls(read_conditions(texts, (*FIGURES, *criteria)), junit)
+        if not causes and (named := sorted(found.figures & _CAUSES.keys())):
+            raise InputError(
+                f"--fail-if names {', '.join(named)}, but this run does not determine causes"
+            )
+        if junit is not None:
+            refuse_junit(junit)
+        return found
+
+    @classmethod
+    def of_run(cls, texts: Sequence[str], junit: Path | None, folder: Path) -> Self:
+        """Read the criteria for an existing run; see ``read``."""
+        if not texts and junit is None:
+            return cls((), None)
+        settings = Run(folder).settings
+        names = [read_criterion(one).quantity for one in settings.criteria]
+        return cls.read(texts, junit, causes=settings.causes, criteria=names)
+
+    @property
+    def figures(self) -> set[str]:
+        """The names of all figures in the criteria."""
+        return {name for one in self.conditions for name in one.figures}
+
+    def judge(self, run: Run) -> tuple[Outcome, ...]:
+        """Apply the criteria to a run, and write the JUnit XML if requested.
+
+        The first outcome is whether the run supports a verdict; without criteria and JUnit XML
+        there is none but that, and it only where the run was not judged.
+        """
+        if not self.conditions and self.junit is None:
+            return () if run.verdict != NOT_JUDGED else (_searched(run),)
+        figures = figures_of(run)
+        stated = (
+            *(one.judge(figures) for one in self.conditions),
+            *(_outcome_of(one) for one in run.criteria),
+        )
+        outcomes = (_searched(run), *unless_judged(stated, _why_not(run), _NOT_OF_THE_EGO))
+        if self.junit is not None:
+            write_junit(self.junit, _suites(run, outcomes))
+        return outcomes
+
+
+def figures_of(run: Run) -> dict[str, float]:
+    """Return FIGURES of a run; NaN is an unknown figure."""
+    s, nan = run.summary, float("nan")
+    sought = run.settings.causes and run.settings.ego != STORYBOARD.name
+    figures: dict[str, float] = {
+        "r_critic": s.r_critic,
+        "critical": s.critical,
+        "first": float("inf") if s.first is None else s.first,
+        "fiftieth": float("inf") if s.fiftieth is None else s.fiftieth,
+        "d_min_best": s.d_min_best,
+        "d_min_median": s.d_min_median,
+        "v_d_best": s.v_d_best,
+        "v_d_median": s.v_d_median,
+        "stuck": float("nan") if (stuck := run.happening.stuck) is None else stuck,
+        **{n: s.causes.get(one, 0) if sought else nan for n, one in _CAUSES.items()},
+        **_of_triage(run),
+    }
+    figures |= {one.criterion.quantity: one.violated for one in run.criteria}
+    if s.failed == s.evaluations:
+        figures = dict.fromkeys(figures, nan)
+    return figures | {"evaluations": s.evaluations, "failed": s.failed, "seconds": s.seconds}
+
+
+def _outcome_of(one: CriterionSummary) -> Outcome:
+    """Return whether all evaluations of a run meet a pass criterion, as an outcome."""
+    known = one.met + one.violated
+    verdict: Verdict = "unknown" if not known else "failed" if one.violated else "passed"
+    figures = (one.criterion.quantity,)
+    return Outcome(words_of(one.criterion), verdict, one.sentence, figures)
+
+
+def _of_triage(run: Run) -> dict[str, float]:
+    """Return the figures of a run's triage; NaN if there is none, or no estimate."""
+    found, nan = run.triage, float("nan")
+    if found is None:
+        return dict.fromkeys(_TRIAGE, nan)
+    space = found.bound.space
+    return {
+        "modes": len(found.modes) + found.unrecorded_modes,
+        "robust": found.robust + found.unrecorded_modes if found.neighbours else nan,
+        "worst_severity": max((one.severity for one in found.modes), default=0.0),
+        "harmful.upper": space.high if space.drawn and space.rows else nan,
+    }
+
+
+def _searched(run: Run) -> Outcome:
+    s = run.summary
+    details = f"{s.evaluations} evaluations, {s.critical} critical, {s.failed} failed"
+    if reasons := run.failures.most_common(3):
+        details += "; " + "; ".join(f"{count} x {reason}" for reason, count in reasons)
+    found = run.triage
+    if found is not None and found.bound.not_counted:
+        details += f"; {found.bound.not_counted}"
+    if why := _why_not(run):
+        return Outcome("the search has results", "unknown", f"{why}; {details}")
+    return Outcome("the search has results", "passed", details)
+
+
+def _why_not(run: Run) -> str:
+    """Return why a run is not judged; "" if it is."""
+    if run.verdict != NOT_JUDGED:
+        return ""
+    if run.triage is None:
+        return "the run has not ended"
+    return run.triage.bound.sentence.removeprefix("Not judged: ").rstrip(".")
+
+
+def _suites(run: Run, outcomes: Sequence[Outcome]) -> list[Suite]:
+    """Return the criteria as one suite, and each exported scenario as a suite."""
+    settings = run.settings
+    name = Path(settings.scenario).stem
+    group = f"bridgegen.{name}.{settings.ego.replace('.', '_')}"
+    facts = {
+        "scenario": settings.scenario,
+        "ego": settings.ego,
+        "algorithm": settings.algorithm,
+        "budget": str(settings.budget),
+        "seed": str(settings.seed),
+        "command": settings.command(run.folder),
+        "report": str(run.report),
+    } | {key: f"{value:.6g}" for key, value in figures_of(run).items()}
+    if run.triage is not None:
+        facts |= {"found": run.triage.bound.sentence}
+        facts |= {f"mode {one.number}": mode_in_words(one, run.triage) for one in run.modes}
+    cases = [case_of(group, one) for one in outcomes]
+    broken = [one for one in outcomes if one.verdict == "failed"]
+    scenarios = [_scenario(run, path, name, group, broken) for path in run.scenarios]
+    return [Suite(f"{name} criteria", cases, facts, run.summary.seconds), *scenarios]
+
+
+def _scenario(run: Run, path: Path, name: str, group: str, broken: Sequence[Outcome]) -> Suite:
+    """Return an exported scenario as a test, failed if it contributes to a failed criterion."""
+    facts = read_facts(path.with_suffix(".json"))
+    if missing := {"d_min", "v_d", "n_collision"} - facts.metrics.keys():
+        raise StorageError(
+            f"{path.with_suffix('.json')}: is not what was exported: it has no "
+            f"{', '.join(sorted(missing))}"
+        )
+    failed = [one.test for one in broken if _contributes(facts, one.figures)]
+    values = {key: _text_of(one) for key, one in facts.metrics.items()}
+    cause = f", cause: {facts.cause}" if facts.cause else ""
+    what = "collision" if facts.metrics["n_collision"].value else "failure without a collision"
+    message = f"{what}: d_min {values['d_min']} at v_d {values['v_d']}{cause}"
+    files = sorted(path.parent.glob(f"{path.stem}.*"))
+    text = "\n".join(
+        [
+            *(f"against: {one}" for one in failed),
+            f"again: bridgegen simulate {path}",
+            f"playback: {run.report}",
+            f"files: {' '.join(str(file) for file in files)}",
+            "parameters:",
+            *(f"  {key} = {_text_of(one)}" for key, one in facts.parameters.items()),
+            "metrics:",
+            *(f"  {key} = {value}" for key, value in values.items()),
+        ]
+    )
+    case = Case(group, f"critical {path.stem}", "failure" if failed else None, message, text)
+    properties = values | {key: _text_of(one) for key, one in facts.parameters.items()}
+    properties |= {"cause": facts.cause or "", "evaluation": str(facts.evaluation)}
+    if facts.robustness is not None:
+        properties |= {"mode": str(facts.mode), "robustness": f"{facts.robustness:.6g}"}
+    return Suite(f"{name} {path.stem}", [case], properties)
+
+
+def _contributes(facts: Facts, figures: Sequence[str]) -> bool:
+    """Return whether a critical scenario contributes to a failed criterion, by its quick cause."""
+    cause = facts.quick_cause if "quick_cause" in facts.model_fields_set else facts.cause
+    for name in figures:
+        if name.startswith(PREFIX):
+            margin = facts.metrics[name].value if name in facts.metrics else None
+            if margin is not None and margin < 0.0:
+                return True
+        elif _CAUSES[name] == cause if name in _CAUSES else name not in _OF_THE_RUN:
+            return True
+    return False
+
+
+def _text_of(one: ParameterValue | Quantity) -> str:
+    """Return a value with its unit; null is infinite, since exported values are never NaN."""
+    if one.value is None:
+        return "inf"
+    if isinstance(one.value, str):
+        return one.value
+    unit = "" if one.unit in ("1", "count") else f" {one.unit}"
+    return f"{one.value:.6g}{unit}"

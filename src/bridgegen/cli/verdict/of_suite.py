@@ -1,0 +1,257 @@
+"""Pass/fail criteria for a suite."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from bridgegen.assess.conflict.findings import with_whom
+from bridgegen.cli.verdict.conditions import Conditions
+from bridgegen.cli.verdict.fail_if import Outcome, Verdict, unless_judged, words_of
+from bridgegen.cli.verdict.junit import Case, Problem, Suite, case_of, write_junit
+from bridgegen.jobs.suite.clauses import clause_results
+from bridgegen.jobs.suite.known_failures import EXCUSED
+from bridgegen.jobs.suite.replay import replay_command
+from bridgegen.jobs.suite.results import FAILED, EntryResult, RowResult, counts
+from bridgegen.jobs.suite.sentences import clause_in_words
+from bridgegen.jobs.suite.suite import SuiteRun
+from bridgegen.scenario.language.criteria import read_criterion
+from bridgegen.scenario.language.protocols import read_clause
+
+FIGURES = {
+    "entries": "scenarios with their variations, of all egos",
+    "variations": "variations, of all egos",
+    "passed": "variations that pass",
+    "failed": "variations that fail: critical, or a pass criterion or clause is violated",
+    "known": "failed ones that the suite's index calls known or accepted",
+    "regressions": "failed ones that the suite's index calls fixed",
+    "new_failures": "the other failed ones",
+    "not_judged": "variations that could not be judged: they say nothing of the ego",
+    "not_judged_entries": "entries that could not be judged",
+    "not_run": "variations that did not run; an entry that cannot run is one",
+    "failed_entries": "entries in which a variation fails",
+    "failed_clauses": "clauses of a regulation that an ego fails",
+    "critical": "variations that are critical",
+    "collisions": "variations in which the ego collides",
+    "mitigated": "variations in which it hits something, slower than at the start",
+    "not_avoided": "variations in which it hits something, not slower than at the start",
+    "worst_impact": "the fastest impact [m/s]",
+    "worst_severity": "the worst probability of MAIS3+",
+}
+"""The figures of a suite that ``--fail-if`` accepts."""
+
+MOST_NAMED = 20
+"""Variations that a test's text names."""
+
+MOST_ENTRIES = 3
+"""Entries that an outcome names."""
+
+
+class SuiteCriteria(Conditions):
+    """The criteria for a suite.
+
+    Without conditions, a variation that fails or did not run fails it. An entry that could not be
+    judged leaves no condition passed, unless one of them states how many may be so.
+    """
+
+    known = FIGURES
+
+    def judge(self, suite: SuiteRun) -> tuple[Outcome, ...]:
+        """Apply the criteria to a suite, and write the JUnit XML if requested."""
+        figures = figures_of(suite)
+        outcomes = tuple(one.judge(figures) for one in self.conditions)
+        if not {"not_judged", "not_judged_entries"} & {f for one in outcomes for f in one.figures}:
+            outcomes = unless_judged(outcomes, unjudged_entries(suite.results))
+        if not outcomes:
+            outcomes = tuple(_all_pass(suite, ego) for ego in suite.egos)
+        if self.junit is not None:
+            write_junit(self.junit, _suites(suite, outcomes if self.conditions else ()))
+        return outcomes
+
+
+def figures_of(suite: SuiteRun) -> dict[str, float]:
+    """Return FIGURES of a suite, and of each criterion the variations that violate it."""
+    results = suite.results
+    standing = suite.known_failures.counts(results)
+    rows = [row for one in results for row in one.rows]
+    number = counts(results)
+    figures: dict[str, float] = {
+        "entries": len(results),
+        "variations": len(rows),
+        "passed": number["passed"],
+        "failed": number["failed"],
+        "known": sum(standing[one] for one in EXCUSED),
+        "regressions": standing["regression"],
+        "new_failures": standing["new"],
+        "not_judged": number["not judged"],
+        "not_judged_entries": sum(one.verdict == "not judged" for one in results),
+        "not_run": number["not run"],
+        "failed_entries": sum(one.verdict == "failed" for one in results),
+        "failed_clauses": sum(
+            one.verdict == "failed"
+            for ego in dict.fromkeys(each.ego for each in results)
+            for one in clause_results(results, ego)
+        ),
+        "critical": sum(row.critical for row in rows),
+        "collisions": sum(row.collisions > 0 for row in rows),
+        "mitigated": sum(row.outcome == "mitigated" for row in rows),
+        "not_avoided": sum(row.outcome == "not avoided" for row in rows),
+        "worst_impact": max((row.impact_speed for row in rows), default=0.0),
+        "worst_severity": max((row.severity for row in rows), default=0.0),
+    }
+    for one in results:
+        for number_of, given in enumerate(one.criteria):
+            name = read_criterion(given).quantity
+            violated = sum(number_of in row.violated for row in one.rows)
+            figures[name] = figures.get(name, 0.0) + violated
+    return figures
+
+
+def unjudged_entries(results: Sequence[EntryResult]) -> str:
+    """Return which entries could not be judged, and why, in words; "" without any."""
+    return named([f"{o.entry}: {o.unjudged}" for o in results if o.verdict == "not judged"])
+
+
+def named(entries: Sequence[str]) -> str:
+    """Return texts on entries as one, of at most `MOST_ENTRIES` of them."""
+    more = len(entries) - MOST_ENTRIES
+    some = [*entries[:MOST_ENTRIES], *([f"and {more} more entries"] if more > 0 else [])]
+    return "; ".join(some)
+
+
+def _all_pass(suite: SuiteRun, ego: str) -> Outcome:
+    results = suite.of_ego(ego)
+    number = counts(results)
+    total = sum(number.values())
+    details = f"{number['failed']} of {total} fail, {number['passed']} pass"
+    details += f", {number['not judged']} not judged" if number["not judged"] else ""
+    details += f", {number['not run']} not run" if number["not run"] else ""
+    standing = suite.known_failures.counts(results)
+    known = sum(standing[one] for one in EXCUSED)
+    if known:
+        details += f"; {known} of the failed {'is' if known == 1 else 'are'} known"
+    if again := suite.known_failures.regressions(results):
+        details += f"; regression: {', '.join(again)} {'was' if len(again) == 1 else 'were'} fixed"
+        details += f", and {'fails' if len(again) == 1 else 'fail'} again"
+    verdict: Verdict = "passed"
+    if number["failed"] > known:
+        verdict = "failed"
+    elif (why := unjudged_entries(results)) or number["not run"] or not number["passed"] + known:
+        verdict = "unknown"
+        details += f"; {why}" if why else ""
+    test = "variations" + (" but known failures" if suite.known_failures.failures else "")
+    return Outcome(test + (f" with {ego}" if ego else ""), verdict, details)
+
+
+def _suites(suite: SuiteRun, outcomes: Sequence[Outcome]) -> list[Suite]:
+    """Return each entry of each ego as a suite; the conditions, if any, as one more."""
+    found = []
+    if outcomes:
+        found.append(Suite("conditions", [case_of("bridgegen.suite", one) for one in outcomes]))
+    for one in suite.results:
+        group = f"bridgegen.{one.entry.replace('/', '.')}.{(one.ego or one.driver or 'ego')}"
+        facts = {
+            "scenario": one.scenario,
+            "distribution": one.distribution,
+            "ego": one.driver or one.ego,
+            "variations": str(len(one.rows)),
+            **{name.replace(" ", "_"): str(n) for name, n in one.outcomes().items()},
+        }
+        facts |= {
+            f"clause {clause.id}": clause_in_words(clause)
+            for clause in clause_results([one], one.ego)
+        }
+        failure = suite.known_failures.failures.get(one.entry)
+        if failure is not None:
+            facts |= {"failure": failure[0], "status": failure[1].status}
+        found.append(Suite(one.entry, _cases(suite, one, group), facts))
+    return found
+
+
+def _cases(suite: SuiteRun, one: EntryResult, group: str) -> list[Case]:
+    """Return the tests of an entry: that it runs, that no variation is critical, its criteria.
+
+    What fails as it is known to is skipped. Where the entry is not judged, none passes.
+    """
+    if one.problem:
+        return [Case(group, "runs", "error", one.problem)]
+    stated = suite.known_failures
+    failure = stated.failures.get(one.entry)
+    again = failure is not None and failure[1].status == "fixed"
+
+    def case(name: str, rows: Sequence[int], what: str, known: bool) -> Case:
+        if rows and known and failure is not None:
+            return case_of_rows(
+                group, name, one, rows, f"{what}: {failure[1].status} failure", "skipped"
+            )
+        what += ": regression, this failure was fixed" if again and rows else ""
+        return case_of_rows(group, name, one, rows, what, "failure", suite)
+
+    lost = [i for i, row in enumerate(one.rows) if row.problem]
+    cases = [case_of_rows(group, "runs", one, lost, "did not run", "error")]
+    odd = [i for i, verdict in enumerate(one.verdicts) if verdict == "not judged"]
+    critical = [i for i, row in enumerate(one.rows) if row.critical]
+    excused = all(stated.is_excused(one, one.rows[i]) for i in critical)
+    cases.append(case("no critical scenario", critical, "critical", excused))
+    for number, given in enumerate(one.criteria):
+        violating = [i for i, row in enumerate(one.rows) if number in row.violated]
+        words = words_of(read_criterion(given))
+        cases.append(case(words, violating, "violate it", stated.is_criterion_excused(one, number)))
+    for number, given in enumerate(one.clauses):
+        clause = read_clause(given)
+        failing = [i for i, letter in enumerate(one.letters(number)) if letter == FAILED]
+        name = f"clause {clause.id}: {clause.text}"
+        cases.append(case(name, failing, "fail it", known=False))
+    if one.verdict != "not judged":
+        return cases
+    why = case_of_rows(group, "", one, odd, f"not judged: {one.unjudged}", "error")
+    return [
+        each if each.problem or each.name == "runs"
+        else replace(why, name=each.name, message=f"not judged: {one.unjudged}")
+        for each in cases
+    ]  # fmt: skip
+
+
+def case_of_rows(
+    group: str,
+    name: str,
+    one: EntryResult,
+    rows: Sequence[int],
+    what: str,
+    problem: Problem,
+    suite: SuiteRun | None = None,
+) -> Case:
+    """Return a test that has a problem if there are such variations, and names them.
+
+    Args:
+        group: of tests.
+        name: of the test.
+        one: the entry's results.
+        rows: the numbers of these variations.
+        what: what is wrong with them, in words.
+        problem: that the test has.
+        suite: to say how to see the first again; not said without.
+    """
+    message = f"{len(rows)} of {len(one.rows)} variations {what}"
+    lines = [row_in_words(one, i, one.rows[i]) for i in rows[:MOST_NAMED]]
+    if len(rows) > MOST_NAMED:
+        lines.append(f"and {len(rows) - MOST_NAMED} more")
+    if rows and suite is not None:
+        lines.append(f"the first again: {replay_command(suite.folder, one, rows[0])}")
+    return Case(group, name, problem if rows else None, message, "\n".join(lines))
+
+
+def row_in_words(one: EntryResult, i: int, row: RowResult) -> str:
+    """Return a variation in a line: its values, and what happened."""
+    values = zip(one.parameters, row.x, one.units, strict=True)
+    named = ", ".join(
+        f"{name} = {value if isinstance(value, str) else f'{value:.6g}'}"
+        + (f" {unit}" if unit not in ("1", "count", "?") else "")
+        for name, value, unit in values
+    )
+    happened = row.problem or (
+        f"{with_whom(row.conflict, row.partner)} ({row.conflict_type}), severity {row.severity:.2g}"
+        if row.conflict
+        else "no conflict"
+    )
+    if row.outcome not in (None, "avoided"):
+        happened += f"; {row.outcome}, impact at {row.impact_speed:.3g} m/s"
+    return f"variation {i + 1}{f' ({named})' if named else ''}: {happened}"

@@ -1,0 +1,282 @@
+"""A user's driver in a process of its own, so that it cannot end a search.
+
+A driver that raises, times out or crashes its process costs only the row that it was driving: the
+process is ended, and another is started for the next batch.
+"""
+
+import os
+import sys
+import time
+import traceback
+from collections import deque
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from bridgegen.base.arrays import Float
+from bridgegen.base.errors import InputError
+from bridgegen.base.plugins import module_of
+from bridgegen.base.processes.child import ONE_THREAD
+from bridgegen.base.processes.isolated import Answer, CallError, IsolatedProcess, serve
+from bridgegen.drivers.address import is_remote
+from bridgegen.drivers.compiled import CompiledDriver
+from bridgegen.drivers.drivers import TIME_LIMIT, is_spec
+from bridgegen.drivers.interface import BatchDriver, Control, Observation, Scene, Trajectory
+from bridgegen.drivers.remote.process import RemoteProcess
+from bridgegen.drivers.trajectory import Plans, checked_plans
+from bridgegen.drivers.user_drivers import NAMES, Traits, traits_of
+from bridgegen.drivers.views import MapSender, Viewer, Views
+
+START_SECONDS = 120.0
+"""Time limit [s] to import and construct a driver, which may load a network."""
+
+TIMED_CALLS = 10_000
+"""Calls whose duration is kept."""
+
+
+class DriverError(CallError):
+    """A driver did not answer, or its answer is invalid.
+
+    Attributes:
+        kind: "raised", "timed out", "died" or "answered nonsense".
+    """
+
+
+class DriverProcess:
+    """A driver that runs in another process, which starts when it is first needed.
+
+    Args:
+        spec: ``package.module:Class``, ``file.py:Class``, the same of a compiled driver's function,
+            a co-simulation unit, ``file.fmu``; or a driver in a process of the user's own, see
+            `bridgegen.drivers.remote`.
+        time_limit: seconds that a call may take.
+
+    Attributes:
+        traits: what the driver says of itself. Known when the process has started.
+        answers_each_row: whether it has answered several rows at once in the right shape.
+        answers: what it has answered so far: "control", "trajectory" or both.
+        asked_at: the time of the last observation that it was shown [s].
+        call_seconds: how long its last calls took [s], the way there and back included.
+    """
+
+    traits: Traits
+    answers_each_row: bool = False
+
+    def __init__(self, spec: str, time_limit: float = TIME_LIMIT) -> None:
+        if not 0.0 < time_limit < float("inf"):
+            raise InputError(f"a driver's time limit [s] must be > 0 and finite, got {time_limit}")
+        if not is_spec(spec):
+            raise InputError(
+                "a driver is named package.module:Class, file.py:Class, file.fmu, "
+                f"connect:HOST:PORT, unix:PATH or exec:COMMAND; got '{spec}'"
+            )
+        self.spec = spec
+        self.time_limit = time_limit
+        self.answers: set[str] = set()
+        self.asked_at = 0.0
+        self.call_seconds: deque[float] = deque(maxlen=TIMED_CALLS)
+        self._process: IsolatedProcess | RemoteProcess
+        if is_remote(spec):
+            self._process = RemoteProcess(spec, DriverError, answering_of)
+        else:
+            # Threads change how products round, and slow a small network down.
+            own = {name: n for name, n in ONE_THREAD.items() if name not in os.environ}
+            self._process = IsolatedProcess(
+                "bridgegen.drivers.driver_process", [spec], DriverError, own
+            )
+
+    def start(self) -> None:
+        """Start the process, if it is not running, and construct the driver in it.
+
+        Raises:
+            InputError: there is no such module or class, or it cannot be constructed.
+        """
+        if self._process.runs:
+            return
+        self._maps = MapSender()
+        try:
+            self.traits = self._process.start(START_SECONDS)
+        except DriverError as error:
+            raise InputError(f"the driver '{self.spec}' cannot be made: {error}") from None
+
+    def reset(self, n: int, scene: Scene) -> None:
+        """See `BatchDriver`.
+
+        Raises:
+            DriverError: it raised, timed out or died.
+            InputError: it cannot be made.
+        """
+        self.start()
+        sent = self._maps.send(scene.maps) if scene.maps else None
+        scene = replace(scene, maps=())
+        self._process.ask("reset", n, scene, sent, seconds=self.time_limit)
+
+    def act(
+        self, observation: Observation, views: Views | None = None
+    ) -> tuple[Float, Float] | Plans:
+        """Return its control, ``(N,)`` acceleration [m/s²] and curvature [1/m], or its plans.
+
+        Args:
+            observation: without what the driver wants.
+            views: what it wants, for `Viewer.complete`.
+
+        Raises:
+            DriverError: it raised, timed out, died, or its answer is invalid: another shape, NaN or
+                an infinite value for a scenario that is running, or a trajectory that
+                `checked_plans` refuses.
+        """
+        self.asked_at, start = observation.time, time.perf_counter()
+        answer: tuple[Float, Float] | Plans = self._process.ask(
+            "act", observation, views or {}, seconds=self.time_limit
+        )
+        self.call_seconds.append(time.perf_counter() - start)
+        self.answers_each_row = self.answers_each_row or len(observation.x) > 1
+        self.answers.add("trajectory" if isinstance(answer, Plans) else "control")
+        return answer
+
+    def call(
+        self,
+        function: Callable[..., Any],
+        *arguments: Any,
+        progress: Callable[[], int] | None = None,
+        seconds: float | None = None,
+    ) -> Any:
+        """Call a function in the process, with the compiled driver's address first.
+
+        Args:
+            function: importable by its name.
+            arguments: its further arguments.
+            progress: returns a number that changes as it proceeds; the limit is for each change.
+            seconds: the limit; the driver's by default.
+
+        Raises:
+            DriverError: it raised, timed out or died.
+            InputError: the driver cannot be made.
+        """
+        self.start()
+        limit = seconds or self.time_limit
+        return self._process.ask("call", function, *arguments, progress=progress, seconds=limit)
+
+    def kill(self) -> None:
+        """End the process from another thread; pending calls raise a `DriverError`."""
+        self._process.kill()
+
+    def close(self) -> None:
+        """End the process, if it is running; deleting this object does so too."""
+        self._process.close()
+
+
+# --- In the other process -------------------------------------------------------------------------
+
+
+def make(spec: str) -> BatchDriver | CompiledDriver:
+    """Construct a driver.
+
+    Raises:
+        InputError: no such module, file or class, or the class lacks ``reset`` or ``act``; or a
+            function that is not a compiled driver, or that cannot be compiled.
+    """
+    if spec.endswith(".fmu"):
+        from bridgegen.drivers.fmu import FmuDriver
+
+        return FmuDriver(spec)
+    where, _, name = spec.rpartition(":")
+    try:
+        module = module_of(where)
+    except ImportError as error:
+        raise InputError(f"{where} cannot be imported: {error}") from error
+    found = getattr(module, name, None)
+    if isinstance(found, CompiledDriver):
+        assert found.address  # it compiles
+        return found
+    if not isinstance(found, type):
+        raise InputError(f"{where} must have a class, or a compiled driver, '{name}'")
+    lacking = [one for one in ("reset", "act") if not callable(getattr(found, one, None))]
+    if lacking:
+        raise InputError(f"{name} must have the methods reset and act, lacks {', '.join(lacking)}")
+    driver: BatchDriver = found()
+    return driver
+
+
+def checked(answer: Any, seen: Observation, period: float) -> tuple[Float, Float] | Plans:
+    """Return a driver's answer: plans, or two arrays ``(N,)``, 0 where a scenario has ended.
+
+    Args:
+        answer: of ``act``.
+        seen: what it was asked about.
+        period: the time until it is asked again [s].
+
+    Raises:
+        DriverError: another shape, not numbers, not finite, or a trajectory that cannot be driven.
+    """
+    if isinstance(answer, Trajectory):
+        try:
+            return checked_plans(answer, seen, period)
+        except InputError as error:
+            raise DriverError("answered nonsense", str(error)) from None
+    running = seen.running
+    pair = (answer.acceleration, answer.curvature) if isinstance(answer, Control) else answer
+    try:
+        acceleration, curvature = pair
+        arrays = [np.asarray(one, dtype=np.float64) for one in (acceleration, curvature)]
+    except (TypeError, ValueError) as error:
+        text = f"act must return a Control, (acceleration, curvature) or a Trajectory: {error}"
+        raise DriverError("answered nonsense", text) from None
+    for what, array in zip(("acceleration", "curvature"), arrays, strict=True):
+        if array.shape != running.shape:
+            raise DriverError(
+                "answered nonsense",
+                f"{what} must have the shape {running.shape}, got {array.shape}",
+            )
+        bad = running & ~np.isfinite(array)
+        if bad.any():
+            raise DriverError("answered nonsense", f"{what} must be finite, got {array[bad][0]}")
+    return np.where(running, arrays[0], 0.0), np.where(running, arrays[1], 0.0)
+
+
+def answering(spec: str) -> tuple[Traits, Answer]:
+    """Construct a driver; return what it says of itself, and its answering function."""
+    driver = make(spec)
+    if isinstance(driver, CompiledDriver):
+        address = driver.address
+
+        def call(_: str, function: Callable[..., Any], *arguments: Any) -> Any:
+            return function(address, *arguments)
+
+        return Traits(memory=driver.memory, wants=driver.wants), call
+
+    return answering_of(driver)
+
+
+def answering_of(driver: BatchDriver) -> tuple[Traits, Answer]:
+    """Return what a driver says of itself, and the function that answers requests to it."""
+    traits = traits_of({name: getattr(driver, name, None) for name in NAMES})
+    viewer = Viewer(traits.wants)
+    period = 0.0
+
+    def answer(what: str, *rest: Any) -> Any:
+        nonlocal period
+        if what == "reset":
+            period = traits.steps(rest[1].time_step) * rest[1].time_step
+            driver.reset(rest[0], viewer.reset(*rest))
+            return None
+        observation = viewer.complete(*rest)
+        return checked(driver.act(observation), observation, period)
+
+    return traits, answer
+
+
+def _described(error: Exception) -> str:
+    """Return an exception in one line, with the driver's line that raised it."""
+    if isinstance(error, InputError):
+        return str(error)
+    place = traceback.extract_tb(error.__traceback__)[-1]
+    return f"{type(error).__name__}: {error} ({Path(place.filename).name}:{place.lineno})"
+
+
+if __name__ == "__main__":
+    serve(partial(answering, sys.argv[1]), _described)

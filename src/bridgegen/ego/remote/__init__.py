@@ -1,5 +1,0 @@
-"""Drivers in other processes, in any language: the protocol, and both of its ends."""
-
-from bridgegen.ego.remote.server import serve
-
-__all__ = ["serve"]

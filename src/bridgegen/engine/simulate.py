@@ -1,0 +1,185 @@
+"""One scenario file, of any origin: read, simulated and measured.
+
+The stages are the pipeline's, without imports of the search: this must start fast.
+"""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from bridgegen import drivers as egos
+from bridgegen.assess import metrics as measures
+from bridgegen.assess.conflict import quantities
+from bridgegen.assess.conflict.analysis import Conflicts, analyse
+from bridgegen.assess.conflict.findings import Findings, is_unsafe_start, why_unjudged
+from bridgegen.assess.conflict.harm import decisive
+from bridgegen.assess.conflict.plausibility import plausibility
+from bridgegen.assess.criteria import CriterionResult, Monitor
+from bridgegen.base.errors import FileFormatError, UnknownNameError
+from bridgegen.engine.options import checked
+from bridgegen.openx.openscenario import validate as openscenario_validate
+from bridgegen.openx.openscenario.declarations import CAUSE
+from bridgegen.openx.openscenario.empty_triggers import NEVER, read_empty_triggers
+from bridgegen.openx.openscenario.model import OpenScenario
+from bridgegen.openx.openscenario.read import read as read_scenario
+from bridgegen.openx.openscenario.stated_criteria import stated_criteria
+from bridgegen.openx.prepared import prepared, roads_of
+from bridgegen.scenario.language.criteria import Criterion, joined
+from bridgegen.simulation.choice import EMBEDDED, SimulatorChoice
+from bridgegen.simulation.embedded.simulator import EmbeddedSimulator
+from bridgegen.simulation.rollout import STATUS_MESSAGES, Incident, Rollout
+
+
+@dataclass(frozen=True)
+class FileResult:
+    """The result of one scenario file.
+
+    Attributes:
+        driver: of the ego, by name.
+        status: "ok", or why there is no result.
+        seconds: simulated until the stop trigger fired [s].
+        parameters: the file's numeric parameters.
+        metrics: by name, in the metric's unit; the quantities of the conflict analysis too.
+        rollout: the motion, N = 1.
+        criteria: the pass criteria, those that the file states among them, with their margins.
+        conflicts: the conflict analysis, N = 1; `bridgegen.assess.conflict.summary.summarise` gives
+            the decisive conflict.
+        cause: of its harm, by the search that exported the file, as its header states; None where
+            it states none, or another driver than the file's drives.
+        notes: what runs otherwise than a reader of the file may expect, a sentence each.
+        unjudged: why the scenario says nothing of the ego: its traffic could not happen, or left no
+            time to act from the start on; "" if it does.
+    """
+
+    driver: str
+    status: str
+    seconds: float
+    parameters: Mapping[str, float]
+    metrics: Mapping[str, float]
+    rollout: Rollout
+    conflicts: Conflicts
+    criteria: tuple[CriterionResult, ...] = ()
+    cause: str | None = None
+    notes: tuple[str, ...] = ()
+    unjudged: str = ""
+
+    @property
+    def incidents(self) -> tuple[Incident, ...]:
+        """The incidents that the simulator itself reported."""
+        return self.rollout.incidents.get(0, ())
+
+
+@checked
+def simulate_file(
+    path: Path | str,
+    *,
+    ego: str | None = None,
+    ideal: Iterable[str] | None = None,
+    vehicle: str | None = None,
+    others: str | None = None,
+    empty_trigger: str = NEVER,
+    time_limit: float | None = None,
+    metrics: Sequence[str] | None = None,
+    also: Sequence[str] = (),
+    time_step: float | None = None,
+    skipped: list[str] | None = None,
+    simulator: SimulatorChoice = EMBEDDED,
+    criteria: Sequence[Criterion] = (),
+) -> FileResult:
+    """Run an OpenSCENARIO file with the OpenDRIVE map that it names.
+
+    Args:
+        path: the ``.xosc`` file.
+        ego: the ego's driver; what the file's controller says by default.
+        ideal: stages of the driver to be ideal; what the file's controller says by default, none
+            with another ``ego``.
+        vehicle: how the ego moves, see `bridgegen.simulation.vehicles`; what the file says by
+            default, or kinematically.
+        others: "attentive", "insistent" or "scripted": who drives the other participants; what
+            their controllers say by default.
+        empty_trigger: when acts and events start whose StartTrigger is empty: "never", or "now".
+        time_limit: [s] that one call of a user's own driver may take.
+        metrics: names; all that the driver gives rise to by default.
+        also: names of metrics that must be among them.
+        time_step: [s]; what the file's header says by default.
+        skipped: takes a sentence for each thing that is not supported, which is left out then
+            instead of refused, with the event, action, entity or condition group around it.
+        simulator: which one runs it.
+        criteria: pass criteria, besides those that the file states.
+
+    Raises:
+        InputError: a time step out of range, a stage that the driver has not, or a simulator that
+            is not where it should be.
+        FileFormatError: a file is missing, malformed or inconsistent.
+        UnsupportedError: an element that the simulator cannot run, by name and line.
+        UnknownNameError: no such driver, vehicle, stage, metric or reading of empty triggers.
+    """
+    path = Path(path)
+    if path.suffix.lower() in (".yaml", ".yml"):
+        raise FileFormatError(
+            f"{path}: one OpenSCENARIO file (.xosc) is simulated; a YAML file describes many "
+            f"scenarios, and is searched: bridgegen search {path}"
+        )
+    driver = egos.get(ego, time_limit=time_limit) if ego else None
+    if others is not None and others not in egos.OTHERS:
+        raise UnknownNameError("driver of other participants", others, egos.OTHERS)
+    warnings: list[str] = []
+    scenario = read_scenario(path, skipped=skipped, warnings=warnings)
+    scenario = read_empty_triggers(scenario, empty_trigger)
+    roads = roads_of(scenario, path)
+    scenario = prepared(scenario, roads, str(path))
+    problems = openscenario_validate.problems(scenario, roads)
+    if problems:
+        raise FileFormatError(*(f"{path}: {problem}" for problem in problems))
+    embedded = EmbeddedSimulator(
+        scenario,
+        str(path),
+        driver=driver,
+        ideal=ideal,
+        vehicle=vehicle,
+        others=others,
+        time_step=time_step,
+        skipped=skipped,
+    )
+    runs = simulator.around(embedded, scenario)
+    held = measures.held_by(embedded.program.driver, detects=simulator.detects)
+    names = (*measures.existing(tuple(measures.METRICS), held), *quantities.MEASURED)
+    asked = tuple(dict.fromkeys((*(metrics or names), *also)))
+    names = quantities.require(asked, held, f"the driver '{embedded.driver}'")
+    changes = any(one is not None for one in (ego, ideal, vehicle, others))
+    stated, unknown = stated_criteria(scenario)
+    monitor = Monitor(
+        joined(stated, criteria), embedded.program.names, held, embedded.duration,
+        f"the driver '{embedded.driver}'",
+    )  # fmt: skip
+    rollout = runs.run(runs.roads([roads]), np.zeros(1, dtype=np.int64), {})
+    values = quantities.evaluate(rollout, names)[0]
+    conflicts = analyse(rollout)
+    return FileResult(
+        driver=embedded.driver,
+        status=": ".join([STATUS_MESSAGES[int(rollout.status[0])], *rollout.messages.values()]),
+        seconds=float(rollout.n_steps[0] - 1) * rollout.time_step,
+        parameters=embedded.parameters,
+        metrics=dict(zip(names, values.tolist(), strict=True)),
+        rollout=rollout,
+        conflicts=conflicts,
+        criteria=monitor.results(rollout, 0),
+        cause=None if changes else _stated_cause(scenario),
+        notes=(*warnings, *(f"{path}: {one}" for one in unknown), *embedded.program.notes),
+        unjudged=_unjudged(rollout, conflicts),
+    )
+
+
+def _unjudged(rollout: Rollout, conflicts: Conflicts) -> str:
+    findings = Findings.of(conflicts, plausibility(rollout).labels)
+    _, harm = decisive(conflicts)
+    unsafe = bool(is_unsafe_start(findings, harm)[0])
+    return why_unjudged(str(findings.implausible[0]), unsafe)
+
+
+def _stated_cause(scenario: OpenScenario) -> str | None:
+    properties = scenario.file_header.properties
+    stated = properties.get(CAUSE) if properties else None
+    return None if stated is None else str(stated)

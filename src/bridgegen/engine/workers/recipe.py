@@ -1,0 +1,121 @@
+"""Plain data from which a worker builds its pipeline; no file has to exist on its machine."""
+
+import hashlib
+import io
+import os
+import pickle
+import tempfile
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any, Self
+
+from bridgegen.base.errors import InputError
+from bridgegen.drivers import file_of
+
+
+@dataclass(frozen=True)
+class Recipe:
+    """A call, pickled, with its arguments.
+
+    Attributes:
+        data: the pickled call.
+        key: a digest of it; recipes with the same key build the same.
+    """
+
+    data: bytes
+    key: str
+
+    @classmethod
+    def of(cls, make: Callable[..., Any], *arguments: Any, **more: Any) -> Self:
+        """Return the recipe of a call.
+
+        Args:
+            make: importable by its name.
+            arguments: its positional arguments, complete: files are passed by their bytes.
+            more: its keyword arguments.
+        """
+        file = io.BytesIO()
+        _Pickler(file, protocol=5).dump((make, arguments, more))
+        data = file.getvalue()
+        return cls(data, hashlib.blake2b(data, digest_size=16).hexdigest())
+
+    def make(self) -> Any:
+        """Call the function and return its result.
+
+        Raises:
+            Exception: raised by the function; ModuleNotFoundError if it is not installed here.
+        """
+        function, arguments, more = pickle.loads(self.data)
+        return function(*arguments, **more)
+
+
+class _Pickler(pickle.Pickler):
+    def reducer_override(self, obj: Any) -> Any:
+        if isinstance(obj, MappingProxyType):  # which pickle does not support
+            return _read_only, (dict(obj),)
+        return NotImplemented
+
+
+def _read_only(mapping: dict[Any, Any]) -> MappingProxyType[Any, Any]:
+    return MappingProxyType(mapping)
+
+
+# --- A user's driver with the contents of its file, sent to workers ---
+
+
+@dataclass(frozen=True)
+class CarriedDriver:
+    """The name of a driver, and the contents of its file.
+
+    A driver in a package is not sent: the package must be installed on the workers' machines, and
+    so must the modules that a driver's file imports.
+
+    Attributes:
+        name: the value of ``--ego``.
+        data: the file's bytes; None if the driver has no file.
+    """
+
+    name: str
+    data: bytes | None
+
+    @classmethod
+    def of(cls, name: str) -> Self:
+        """Return a driver with the contents of its file, if it has one.
+
+        Raises:
+            InputError: the file cannot be read.
+        """
+        path = file_of(name)
+        try:
+            return cls(name, path.read_bytes() if path and path.is_file() else None)
+        except OSError as error:
+            raise InputError(f"{path}: cannot be read: {error.strerror}") from None
+
+    @property
+    def digest(self) -> str | None:
+        """A digest of the file; None if the driver has none."""
+        return None if self.data is None else hashlib.sha256(self.data).hexdigest()
+
+    def here(self) -> str:
+        """Return its name here: unchanged if the same file exists, else that of a copy."""
+        path = file_of(self.name)
+        if path is None or self.data is None or _holds(path, self.data):
+            return self.name
+        home = Path(tempfile.gettempdir()) / f"bridgegen-drivers-{os.getuid()}"
+        folder = home / hashlib.blake2b(self.data, digest_size=16).hexdigest()
+        folder.mkdir(parents=True, exist_ok=True, mode=0o700)
+        copy = folder / path.name
+        if not _holds(copy, self.data):
+            part = folder / f".{path.name}.{os.getpid()}"
+            part.write_bytes(self.data)
+            part.replace(copy)
+        return f"{copy}{self.name.removeprefix(str(path))}"
+
+
+def _holds(path: Path, data: bytes) -> bool:
+    try:
+        return path.read_bytes() == data
+    except OSError:
+        return False

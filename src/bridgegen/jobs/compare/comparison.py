@@ -1,0 +1,246 @@
+"""A comparison from start to finish: make the missing runs, measure, test, draw, write."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from bridgegen.base.errors import Interrupted, StorageError
+from bridgegen.engine.options import CommonOptions, called_with
+from bridgegen.engine.workers import read_choice
+from bridgegen.engine.workers.processes import cores
+from bridgegen.jobs.compare.distinct import APART
+from bridgegen.jobs.compare.measures import counts, measure, measures
+from bridgegen.jobs.compare.page import write_page
+from bridgegen.jobs.compare.plan import Cell, Plan, begin, make_plan
+from bridgegen.jobs.compare.record import read, space_of, terms_of
+from bridgegen.jobs.compare.result import Comparison
+from bridgegen.jobs.compare.runs import RunCallbacks, Task, evaluations_of, run_all
+from bridgegen.jobs.compare.table import summarise, write_tables
+from bridgegen.results.store.sqlite import Lock
+from bridgegen.scenario.language.space import SearchSpace
+from bridgegen.search.algorithms.algorithm import Value
+
+LOCK = "compare.lock"
+
+
+@dataclass(frozen=True)
+class ComparisonCallbacks(RunCallbacks):
+    """Called as a comparison progresses.
+
+    Attributes:
+        begun: with the plan, the number of its runs that have ended already, and their evaluations.
+        stage: with the stage that begins when the runs are done: "read", "draw".
+    """
+
+    begun: Callable[[Plan, int, int], None] = lambda plan, ended, made: None
+    stage: Callable[[str], None] = lambda stage: None
+
+
+@dataclass(frozen=True, kw_only=True)
+class ComparisonArguments(CommonOptions):
+    """The arguments of ``compare``: the options that all runs share, and those of the grid."""
+
+    scenarios: str | Path | Sequence[str | Path] = field(
+        kw_only=False, metadata={"help": "One or several, each as for ``run_search``."}
+    )
+    algorithms: str | Sequence[str] = field(
+        default=("random", "pso"),
+        metadata={
+            "help": "One or several names of ``bridgegen list algorithms``, or your own: "
+            "``module:Class``, ``file.py:Class``."
+        },
+    )
+    settings: Mapping[str, Mapping[str, Value]] | None = field(
+        default=None,
+        metadata={"help": "Settings of algorithms, by their names, that differ from the defaults."},
+    )
+    seeds: int = field(
+        default=10,
+        metadata={"help": "Runs of each algorithm in each scenario, with the seeds 0, 1, 2 …"},
+    )
+    budget: int = field(default=1000, metadata={"help": "Evaluations of each run."})
+    baseline: str | None = field(
+        default=None,
+        metadata={"help": "Algorithm that the others are tested against; the first by default."},
+    )
+    apart: float = field(
+        default=APART,
+        metadata={
+            "help": "Critical scenarios are different if their searched parameters differ by "
+            "this share of their ranges, in root mean square."
+        },
+    )
+    workers: int | str | None = field(
+        default=None,
+        metadata={
+            "help": "Number of runs at a time, each in a process and one thread; as many as "
+            'there are cores by default. Or ``"ray"`` / ``"ray://HOST:PORT"``: that many, whose '
+            "scenarios are simulated in a Ray cluster. No result depends on it."
+        },
+    )
+    out: Path | str | None = field(
+        default=None,
+        metadata={"help": "Folder of the comparison; ``comparisons/SCENARIOS`` by default."},
+    )
+    deliver: bool = field(
+        default=True,
+        metadata={"help": "Whether to write tables, figures and page; a later call can do it."},
+    )
+    callbacks: ComparisonCallbacks | None = field(
+        default=None, metadata={"help": "Called as the comparison progresses."}
+    )
+
+
+@called_with(ComparisonArguments)
+def compare(given: ComparisonArguments) -> Comparison:
+    """Run algorithms on scenarios with several seeds, and test which is better in which measure.
+
+    A grid of runs, each an ordinary run's folder under ``OUT/runs`` (``resume`` exports its
+    critical scenarios); then ``runs.csv``, ``summary.csv``, ``times.csv``, figures and a page.
+    Killed at any moment and called again, it resumes; called with more scenarios, algorithms or
+    seeds, it adds their runs.
+
+    Returns:
+        The comparison. A run that failed is a gap in it.
+
+    Raises:
+        InputError: an invalid argument or file.
+        StorageError: the folder holds something else, is in use, or cannot be written.
+        Interrupted: Ctrl-C; every run keeps what it has done.
+    """
+    callbacks = given.callbacks or ComparisonCallbacks()
+    scenarios, algorithms = given.scenarios, given.algorithms
+    executor = read_choice(given.workers)
+    plan = make_plan(
+        [scenarios] if isinstance(scenarios, str | Path) else scenarios,
+        [algorithms] if isinstance(algorithms, str) else algorithms,
+        settings=given.settings or {},
+        seeds=given.seeds,
+        budget=given.budget,
+        baseline=given.baseline,
+        apart=given.apart,
+        out=None if given.out is None else Path(given.out),
+        options=CommonOptions.of(
+            given,
+            distribution=_absolute(given.distribution),
+            road_map=_absolute(given.road_map),
+            causes=given.causes or given.cause is not None,
+        ),
+    )
+    begin(plan)
+    lock = Lock(plan.out / LOCK)
+    done: list[str] = []
+    try:
+        failures = _run(plan, executor, callbacks, done)
+        return _conclude(plan, failures, callbacks, deliver=given.deliver)
+    except KeyboardInterrupt:
+        raise Interrupted(
+            plan.out, len(done), len(plan.cells), what="runs", command=plan.command()
+        ) from None
+    finally:
+        lock.release()
+
+
+def _run(
+    plan: Plan, executor: int | str | None, callbacks: ComparisonCallbacks, done: list[str]
+) -> dict[Cell, str]:
+    """Make the runs that are missing; return why some failed.
+
+    Args:
+        plan: the runs.
+        executor: of the runs, as ``read_choice`` returns it.
+        callbacks: called as it progresses.
+        done: gets the name of each run that has ended, this time or earlier.
+    """
+    failures, tasks, made = {}, [], 0
+    for cell in plan.cells:
+        folder = plan.folder(cell)
+        try:
+            evaluations, is_ended = evaluations_of(folder)
+        except StorageError as error:
+            failures[cell] = str(error)
+            continue
+        if is_ended:
+            done.append(cell.name)
+            made += evaluations
+        else:
+            tasks.append(_task(plan, cell))
+    callbacks.begun(plan, len(done), made)
+
+    def ended(name: str, failure: str | None) -> None:
+        done.append(name)
+        callbacks.ended(name, failure)
+
+    at_once, cluster = (executor, None) if isinstance(executor, int) else (cores(), executor)
+    of_runs = RunCallbacks(callbacks.compile, callbacks.batch, ended)
+    failed = run_all(tasks, at_once, of_runs, cluster)
+    return failures | {cell: failed[cell.name] for cell in plan.cells if cell.name in failed}
+
+
+def _conclude(
+    plan: Plan, failures: Mapping[Cell, str], callbacks: ComparisonCallbacks, *, deliver: bool
+) -> Comparison:
+    """Read the runs, measure and test them, and write the results if requested."""
+    callbacks.stage("read")
+    gaps, records = dict(failures), {}
+    spaces: dict[tuple[str, str], SearchSpace] = {}  # an adversary has other parameters
+    terms = _common_terms(plan, gaps)
+    for cell in plan.cells:
+        if cell in gaps:
+            continue
+        folder = plan.folder(cell)
+        try:
+            kind = (cell.scenario, cell.algorithm)
+            if kind not in spaces:
+                spaces[kind] = space_of(folder)
+            space = spaces[kind]
+            records[cell] = read(
+                folder, space, terms[cell.scenario], plan.budget, counts(plan.budget), plan.apart
+            )
+        except StorageError as error:
+            gaps[cell] = str(error)
+    measured = {
+        scenario: measure(of_it, plan.budget, plan.baseline)
+        for scenario in plan.scenarios
+        if (of_it := {c: one for c, one in records.items() if c.scenario == scenario})
+    }
+    values = {cell: row for one in measured.values() for cell, row in one.values.items()}
+    kinds = measures(plan.budget)
+    lines = summarise(values, plan.scenarios, list(plan.algorithms), plan.baseline, kinds)
+    result = Comparison(plan, records, measured, gaps, lines, kinds)
+    if deliver:
+        write_tables(plan, records, values, gaps, lines, kinds)
+        callbacks.stage("draw")
+        write_page(result)
+    return result
+
+
+def _common_terms(plan: Plan, gaps: dict[Cell, str]) -> dict[str, tuple[str, ...]]:
+    """Return, by scenario, the terms of the objective that all of its runs have.
+
+    Algorithms of many objectives get one beside harm, which those of one objective lack.
+
+    Args:
+        plan: of the comparison.
+        gaps: why runs cannot be read; gets those that are damaged.
+    """
+    found: dict[str, tuple[str, ...]] = {}
+    for cell in plan.cells:
+        if cell in gaps:
+            continue
+        try:
+            own = terms_of(plan.folder(cell))
+        except StorageError as error:
+            gaps[cell] = str(error)
+            continue
+        found[cell.scenario] = tuple(one for one in found.get(cell.scenario, own) if one in own)
+    return found
+
+
+def _task(plan: Plan, cell: Cell) -> Task:
+    scenario, options = plan.scenarios[cell.scenario], plan.options_of(cell)
+    return Task(cell.name, plan.folder(cell), scenario, options)
+
+
+def _absolute(path: Path | str | None) -> str | None:
+    return None if path is None else str(Path(path).resolve())

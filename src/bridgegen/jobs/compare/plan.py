@@ -1,0 +1,309 @@
+"""The grid of runs of a comparison: scenarios × algorithms × seeds, and its identity."""
+
+import hashlib
+import json
+import shlex
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+from bridgegen.base.disk import write_whole
+from bridgegen.base.errors import InputError, StorageError, UnknownNameError
+from bridgegen.base.plugins import file_of, label_of
+from bridgegen.base.records import parse_json, read_bytes
+from bridgegen.engine.options import CommonOptions, SearchOptions, options_of
+from bridgegen.jobs.compare.distinct import APART
+from bridgegen.jobs.search.scenarios import is_file, load
+from bridgegen.results.store.run_file import FILE as RUN_FILE
+from bridgegen.search import algorithms as toolkit
+from bridgegen.search.algorithms.algorithm import Problem, Value, resolve
+
+FILE = "compare.json"
+"""In a comparison's folder: the settings of all its runs."""
+
+RUNS = "runs"
+"""In a comparison's folder: the folders of its runs."""
+
+MAX_SEEDS = 1000
+
+
+@dataclass(frozen=True)
+class Cell:
+    """One run of the grid.
+
+    Attributes:
+        scenario: the logical scenario's name.
+        algorithm: that searches it, by its name in the comparison.
+        seed: of the run.
+    """
+
+    scenario: str
+    algorithm: str
+    seed: int
+
+    @property
+    def name(self) -> str:
+        """The name of the run and of its folder."""
+        return f"{self.scenario}-{self.algorithm}-{self.seed}"
+
+
+@dataclass(frozen=True)
+class Plan:
+    """The plan of a comparison.
+
+    Attributes:
+        out: the comparison's folder.
+        scenarios: by name, as the user refers to each.
+        fingerprints: digests of their contents, by name.
+        algorithms: the user's settings of each, by its name; in the user's order.
+        methods: what the user called each, by its name: the same, or where the user's own is.
+        seeds: runs of each algorithm in each scenario; their seeds are 0, 1, 2 …
+        budget: evaluations of each run.
+        baseline: the algorithm that the others are tested against.
+        apart: minimum distance of two different critical scenarios.
+        options: of all runs.
+    """
+
+    out: Path
+    scenarios: Mapping[str, str]
+    fingerprints: Mapping[str, str]
+    algorithms: Mapping[str, Mapping[str, Value]]
+    methods: Mapping[str, str]
+    seeds: int
+    budget: int
+    baseline: str
+    apart: float
+    options: CommonOptions
+
+    @property
+    def cells(self) -> tuple[Cell, ...]:
+        """Every run, in execution order: seed by seed, so that intermediate results compare."""
+        return tuple(
+            Cell(scenario, algorithm, seed)
+            for seed in range(self.seeds)
+            for scenario in self.scenarios
+            for algorithm in self.algorithms
+        )
+
+    @property
+    def cells_in_order(self) -> tuple[Cell, ...]:
+        """Every run, in display order: by scenario, algorithm and seed."""
+        scenarios, algorithms = list(self.scenarios), list(self.algorithms)
+
+        def place(cell: Cell) -> tuple[int, int, int]:
+            return scenarios.index(cell.scenario), algorithms.index(cell.algorithm), cell.seed
+
+        return tuple(sorted(self.cells, key=place))
+
+    def folder(self, cell: Cell) -> Path:
+        """Return the folder of a run."""
+        return self.out / RUNS / cell.name
+
+    def options_of(self, cell: Cell) -> SearchOptions:
+        """Return the options of a run.
+
+        Weights are for algorithms that minimise one sum; a multi-objective one does not get any,
+        unless the user chooses many objectives for all algorithms.
+        """
+        options = self.options
+        method = self.methods[cell.algorithm]
+        of_many = toolkit.get(method).objectives == "many"
+        if of_many and options.objectives is None:
+            terms = options.objective and dict.fromkeys(options.objective)
+            options = replace(options, weights=None, objective=terms)
+        return SearchOptions.of(
+            options,
+            algorithm=method,
+            settings=self.algorithms[cell.algorithm],
+            budget=self.budget,
+            seed=cell.seed,
+        )
+
+    def command(self) -> str:
+        """Return the command line that starts or resumes this comparison."""
+        words = ["bridgegen", "compare", *self.scenarios.values()]
+        words += ["--algorithms", ",".join(self.methods.values())]
+        words += ["--seeds", str(self.seeds), "--budget", str(self.budget)]
+        if self.baseline != next(iter(self.algorithms)):
+            words += ["--baseline", self.baseline]
+        for name, settings in self.algorithms.items():
+            for key, value in settings.items():
+                words += ["--set", f"{name}.{key}={json.dumps(value)}"]
+        for one in options_of(CommonOptions):
+            words += one.words(getattr(self.options, one.name))
+        if self.apart != APART:
+            words += ["--distinct", repr(self.apart)]
+        return shlex.join([*words, "--out", str(self.out)])
+
+    def identity(self) -> dict[str, Any]:
+        """Return what must be equal in all runs of one folder, as JSON's types."""
+        given = asdict(self.options)
+        road_map = given.pop("road_map")
+        same = {
+            "version": version("bridgegen"),
+            "budget": self.budget,
+            **given,
+            "map": None if road_map is None else _digest(Path(road_map)),
+        }
+        same |= {f"scenario {name}": mark for name, mark in self.fingerprints.items()}
+        for name, settings in self.algorithms.items():
+            method = self.methods[name]
+            known = {key: one.default for key, one in toolkit.get(method).settings.items()}
+            same[f"settings of {name}"] = {**known, **settings}
+            if (file := file_of(method)) is not None:
+                same[f"algorithm {name}"] = _digest(file)
+        return _plain(same)
+
+
+def make_plan(
+    scenarios: Sequence[str | Path],
+    algorithms: Sequence[str],
+    *,
+    settings: Mapping[str, Mapping[str, Value]],
+    seeds: int,
+    budget: int,
+    baseline: str | None,
+    apart: float,
+    out: Path | None,
+    options: CommonOptions,
+) -> Plan:
+    """Return a plan, its names and numbers checked.
+
+    Raises:
+        InputError: a name twice or missing, a value out of range; a scenario that breaks a rule.
+        UnknownNameError: no such scenario, algorithm or setting.
+    """
+    methods = {label_of(one): one for one in algorithms}
+    problems = _twice("scenario", [str(one) for one in scenarios])
+    problems += _twice("algorithm", [label_of(one) for one in algorithms])
+    problems += [
+        f"{low} <= {name} <= {high} must hold, got {value}"
+        for name, value, low, high in (("seeds", seeds, 1, MAX_SEEDS), ("budget", budget, 1, 10**7))
+        if not low <= value <= high
+    ]
+    if not 0.0 < apart <= 1.0:
+        problems.append(f"0 < distinct <= 1 must hold, got {apart:g}")
+    if options.distribution and len(scenarios) > 1:
+        problems.append("a distribution belongs to one scenario file; compare that one alone")
+    if problems:
+        raise InputError(*problems)
+    first = label_of(baseline or algorithms[0])
+    for name, method in methods.items():
+        resolve(toolkit.get(method), Problem.unnamed(1), 0, settings.get(name, {}))
+    for name in [*settings, first]:
+        if name not in methods:
+            raise UnknownNameError("algorithm of this comparison", name, methods)
+    loaded = [(str(one), load(one, options.distribution)) for one in scenarios]
+    if problems := _twice("scenario called", [one.name for _, one in loaded]):
+        raise InputError(*problems)
+    return Plan(
+        out=out or Path("comparisons") / "-".join(one.name for _, one in loaded),
+        scenarios={
+            one.name: str(Path(given).resolve()) if is_file(given) else given
+            for given, one in loaded
+        },
+        fingerprints={one.name: one.fingerprint for _, one in loaded},
+        algorithms={name: dict(settings.get(name, {})) for name in methods},
+        methods=methods,
+        seeds=seeds,
+        budget=budget,
+        baseline=first,
+        apart=apart,
+        options=options,
+    )
+
+
+def begin(plan: Plan) -> None:
+    """Create a comparison's folder, or check that it holds this comparison.
+
+    The plan may have more scenarios, algorithms and seeds than before: the grid grows.
+
+    Raises:
+        StorageError: the folder holds something else, or runs with other settings.
+    """
+    claim(plan.out, FILE, plan.identity(), "comparison", asdict(CommonOptions()))
+
+
+def claim(
+    out: Path, name: str, mine: Mapping[str, Any], what: str, defaults: Mapping[str, Any]
+) -> None:
+    """Create the folder of a grid of runs, or check that it holds this grid.
+
+    Args:
+        out: the folder; its runs are in ``RUNS``.
+        name: of the file in it that says what is equal in all runs.
+        mine: what that is, as JSON's types; it may say more than before.
+        what: a comparison, say, for messages.
+        defaults: of what did not exist when the folder was made.
+
+    Raises:
+        StorageError: the folder holds something else, or runs with other settings.
+    """
+    file = out / name
+    try:
+        before = parse_json(read_bytes(file)) if file.exists() else None
+        if before is not None and not isinstance(before, dict):
+            raise ValueError("it must hold an object")
+        if before is None and out.exists() and any(out.iterdir()):
+            raise StorageError(
+                f"{out}: is not empty and holds no {what}, so it is left alone; "
+                "choose another --out"
+            )
+        out.joinpath(RUNS).mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise StorageError(f"{out}: cannot be used: {error.strerror}") from None
+    except ValueError as error:
+        raise StorageError(f"{file}: the file is damaged: {error}") from None
+    if not any(out.glob(f"{RUNS}/*/{RUN_FILE}")):
+        before = None  # there is no run yet that must match
+    before = before or {}
+    # An option that did not exist then had its default.
+    made_with = {**_plain(defaults), **before} if before else {}
+    differ = [name for name in mine if name in made_with and made_with[name] != mine[name]]
+    if differ:
+        differences = ", ".join(_difference(name, made_with[name], mine[name]) for name in differ)
+        raise StorageError(
+            f"{out}: holds a {what} with other settings, and runs of both cannot be "
+            f"compared: {differences}; choose another --out"
+        )
+    text = json.dumps({**before, **mine}, indent=1)
+    write_whole(file, [text.encode()])
+
+
+def _plain(value: Any) -> dict[str, Any]:
+    """Return an object as JSON's types."""
+    plain: dict[str, Any] = json.loads(json.dumps(value))
+    return plain
+
+
+def _difference(name: str, before: Any, now: Any) -> str:
+    if name.startswith(("algorithm ", "scenario ")):
+        return f"{name} has changed"
+    if name == "map":
+        return "the map has changed"
+    if isinstance(before, dict) and isinstance(now, dict):
+        keys = [key for key in {**before, **now} if before.get(key) != now.get(key)]
+        before, now = ({key: one.get(key) for key in keys} for one in (before, now))
+    return f"{name} was {_shown(before)}, is {_shown(now)}"
+
+
+def _shown(value: Any) -> str:
+    text = json.dumps(value)
+    return text if len(text) <= 1000 else f"{text[:1000]} …"
+
+
+def _twice(what: str, names: Iterable[str]) -> list[str]:
+    names = list(names)
+    if not names:
+        return [f"a comparison needs at least one {what}"]
+    again = {name for name in names if names.count(name) > 1}
+    return [f"{what} {name} must be named once" for name in sorted(again)]
+
+
+def _digest(path: Path) -> str:
+    try:
+        return hashlib.sha256(path.read_bytes()).hexdigest()
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read: {error.strerror}") from None

@@ -1,0 +1,245 @@
+"""A compact record of one run for a comparison, however long the run is."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from bridgegen.assess.conflict.findings import Findings
+from bridgegen.assess.objective import Objective, positivised
+from bridgegen.base.arrays import Bool, Float, Int
+from bridgegen.jobs.compare.distinct import distinct, normalised
+from bridgegen.jobs.compare.fronts import front
+from bridgegen.jobs.search.restored import searched
+from bridgegen.jobs.search.run import Run
+from bridgegen.results.store import Store
+from bridgegen.results.store.rows import Rows
+from bridgegen.scenario.language.coverage import coverage
+from bridgegen.scenario.language.space import SearchSpace
+
+POINTS = 50
+"""Of a curve over the evaluations."""
+
+
+@dataclass(frozen=True)
+class Record:
+    """A run that has ended.
+
+    Attributes:
+        terms: the metrics by which the scenario's runs are compared.
+        parameters: what it searched.
+        command: the command line that repeats the run, into the folder ``replay``.
+        ended: why it ended: "budget", "exhausted" or "converged".
+        evaluations: number of evaluations.
+        failed: number of those whose simulation failed.
+        critical: number of critical ones.
+        reached: by k, the evaluations until the k-th critical one; +inf if there is none.
+        seconds: [s] that it took.
+        seconds_reached: [s] by k, likewise.
+        distinct: how many different critical scenarios it found.
+        distinct_reached: by k, the evaluations until the k-th different one; likewise.
+        distinct_found: ``(c,)`` int64, different critical scenarios by the c points of its curve.
+        modes: how many different conflicts its critical scenarios have: type, responsible, rule,
+            partner.
+        modes_reached: by k, the evaluations until the k-th different conflict; likewise.
+        critical_bins: bins of parameters that hold a critical scenario.
+        critical_pairs: pairs of bins of two parameters that do.
+        found: ``(c,)`` int64, critical scenarios by the c points of its curve.
+        fronts: c arrays ``(n, m)`` of positivised terms, larger is more critical: the front at each
+            point.
+        low: ``(m,)`` the least critical value of each term; None where every simulation failed.
+        high: ``(m,)`` the most critical one; likewise.
+    """
+
+    terms: tuple[str, ...]
+    parameters: tuple[str, ...]
+    command: str
+    ended: str
+    evaluations: int
+    failed: int
+    critical: int
+    reached: Mapping[int, float]
+    seconds: float
+    seconds_reached: Mapping[int, float]
+    distinct: int
+    distinct_reached: Mapping[int, float]
+    distinct_found: Int
+    modes: int
+    modes_reached: Mapping[int, float]
+    critical_bins: int
+    critical_pairs: int
+    found: Int
+    fronts: tuple[Float, ...]
+    low: Float | None
+    high: Float | None
+
+
+MODE = ("conflict_type", "responsible", "rule", "partner")
+"""The fields in which conflicts of different modes differ."""
+
+
+DISTINCT, MODES = 5, 2
+"""The k of the times to the k-th different critical scenario, and to the k-th conflict."""
+
+
+def points(budget: int) -> Int:
+    """Return the evaluations after which a curve has a point, ascending; the last is the budget."""
+    return np.unique(np.ceil(budget * np.arange(1, POINTS + 1) / POINTS).astype(np.int64))
+
+
+def space_of(folder: Path) -> SearchSpace:
+    """Return the search space of a run, the same for all runs of a scenario.
+
+    Raises:
+        StorageError: not a run, or its scenario or map has changed.
+        InputError: the scenario or the map is missing.
+    """
+    return searched(Run(folder))[1]
+
+
+def terms_of(folder: Path) -> tuple[str, ...]:
+    """Return the metrics that a run's objective is made of.
+
+    Raises:
+        StorageError: not a run, or damaged.
+    """
+    return Objective.from_dict(Run(folder).settings.optimised).names
+
+
+def read(
+    folder: Path,
+    space: SearchSpace,
+    terms: Sequence[str],
+    budget: int,
+    ks: Sequence[int],
+    apart: float,
+) -> Record:
+    """Read a run that has ended.
+
+    Args:
+        folder: of the run.
+        space: its search space.
+        terms: metrics of its objective by which the scenario's runs are compared.
+        budget: its maximum number of evaluations.
+        ks: of the times to the k-th critical scenario.
+        apart: minimum distance of two different critical scenarios.
+
+    Raises:
+        StorageError: not a run, or damaged.
+    """
+    with Store.open(folder) as store:
+        settings = Run.of(store).settings
+        reader = _Reader(terms, store.metrics, points(budget))
+        for rows in store.rows():
+            reader.take(rows)
+        seconds, ended = store.seconds, store.finished or "not yet"
+    critical = (
+        np.concatenate(reader.critical) if reader.critical else np.empty((0, len(space.names)))
+    )
+    n = len(critical)
+    is_new = distinct(normalised(space, critical), apart, n_var=space.n_var)
+    new_at = [reader.hits[k][0] for k in np.flatnonzero(is_new).tolist()]
+    bins = coverage(space, critical, np.ones(n, np.bool_), strength=2, sample=0).ways
+    hits = reader.hits
+    return Record(
+        terms=tuple(terms),
+        parameters=space.variables,
+        command=settings.command(Path("replay") / folder.name),
+        ended=ended,
+        evaluations=reader.count,
+        failed=reader.failed,
+        critical=n,
+        reached={k: float(hits[k - 1][0]) if k <= n else float("inf") for k in ks},
+        seconds=seconds,
+        seconds_reached={k: hits[k - 1][1] if k <= n else float("inf") for k in ks},
+        distinct=len(new_at),
+        distinct_reached={DISTINCT: _reached(new_at, DISTINCT)},
+        distinct_found=np.searchsorted(new_at, points(budget), side="right").astype(np.int64),
+        modes=len(reader.modes),
+        modes_reached={MODES: _reached(list(reader.modes.values()), MODES)},
+        critical_bins=bins[0].critical,
+        critical_pairs=bins[1].critical if len(bins) > 1 else 0,
+        found=np.array(reader.found, np.int64),
+        fronts=tuple(reader.fronts),
+        low=reader.low,
+        high=reader.high,
+    )
+
+
+def _reached(evaluations: Sequence[int], k: int) -> float:
+    """Return the k-th of ascending numbers of evaluations; +inf if there is none."""
+    return float(evaluations[k - 1]) if k <= len(evaluations) else float("inf")
+
+
+def modes_of(findings: Findings) -> dict[tuple[str, ...], int]:
+    """Return the different conflicts of some rows, and the first row of each.
+
+    Conflicts differ in type, responsible, rule or partner. Rows without a near miss or a contact
+    have none.
+    """
+    columns = findings.columns()
+    found: dict[tuple[str, ...], int] = {}
+    for row, key in enumerate(zip(*(columns[name].tolist() for name in MODE), strict=True)):
+        if key[0]:
+            found.setdefault(key, row)
+    return found
+
+
+class _Reader:
+    """Reads a run chunk by chunk; memory grows only with the critical rows."""
+
+    def __init__(self, terms: Sequence[str], metrics: Sequence[str], points: Int) -> None:
+        self._terms, self._metrics, self._points = terms, metrics, points
+        self.count = self.failed = 0
+        self.hits: list[tuple[int, float]] = []
+        self.critical: list[Float] = []
+        self.modes: dict[tuple[str, ...], int] = {}  # with the evaluations until the first of it
+        self._front = np.empty((0, len(terms)))
+        self.low: Float | None = None
+        self.high: Float | None = None
+        self._found: list[int] = []
+        self._fronts: list[Float] = []
+
+    @property
+    def found(self) -> list[int]:
+        """Number of critical scenarios at each point; constant after the end of the run."""
+        return self._found + [len(self.hits)] * (len(self._points) - len(self._found))
+
+    @property
+    def fronts(self) -> list[Float]:
+        """The front at each point, likewise."""
+        return self._fronts + [self._front] * (len(self._points) - len(self._fronts))
+
+    def take(self, rows: Rows) -> None:
+        """Add the next rows."""
+        x = positivised(rows.metrics, self._metrics, self._terms)
+        ok: Bool = (rows.status == 0) & np.isfinite(x).all(axis=1)
+        self.failed += int(np.count_nonzero(rows.status != 0))
+        at = np.flatnonzero(rows.critical)
+        numbers = (self.count + at + 1).tolist()
+        before = len(self.hits)
+        self.hits += zip(numbers, rows.seconds[at].tolist(), strict=True)
+        self.critical.append(rows.X[at])
+        for mode, row in modes_of(rows.findings.take(at)).items():
+            self.modes.setdefault(mode, numbers[row])
+        if ok.any():
+            low, high = x[ok].min(axis=0), x[ok].max(axis=0)
+            self.low = low if self.low is None else np.minimum(self.low, low)
+            self.high = high if self.high is None else np.maximum(self.high, high)
+        start, end = 0, self.count + len(rows)
+        for point in self._points[len(self._found) :].tolist():
+            stop = min(point, end) - self.count
+            self._see(x[start:stop][ok[start:stop]])
+            start = stop
+            if point > end:
+                break
+            self._found.append(before + int(np.searchsorted(at, stop)))
+            self._fronts.append(self._front)
+        self.count = end
+
+    def _see(self, x: Float) -> None:
+        if len(x):
+            seen = -front(-np.concatenate([self._front, x]))
+            if not np.array_equal(seen, self._front):
+                self._front = seen

@@ -1,0 +1,96 @@
+"""The results of a comparison, for tables, pages and notebooks."""
+
+import csv
+import html
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from itertools import islice
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from bridgegen.base.extras import require
+from bridgegen.jobs.compare.measures import Measure, Measured
+from bridgegen.jobs.compare.plan import Cell, Plan
+from bridgegen.jobs.compare.record import Record
+from bridgegen.jobs.compare.table import RUNS_FILE, SUMMARY_FILE, TIMES_FILE, Line
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+PAGE = "compare.html"
+MOST_SHOWN = 60
+"""Maximum number of lines of a table in a notebook."""
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """The results of a comparison.
+
+    Attributes:
+        plan: of the comparison.
+        records: of the runs that have ended.
+        measured: by scenario.
+        gaps: reasons why the other runs failed.
+        lines: every measure of every algorithm over its runs, tested against the baseline.
+        measures: all measures.
+    """
+
+    plan: Plan
+    records: Mapping[Cell, Record]
+    measured: Mapping[str, Measured]
+    gaps: Mapping[Cell, str]
+    lines: tuple[Line, ...]
+    measures: tuple[Measure, ...]
+
+    @property
+    def folder(self) -> Path:
+        """The comparison's folder, which holds the runs' folders."""
+        return self.plan.out
+
+    @property
+    def page(self) -> Path:
+        """The HTML page with all results."""
+        return self.folder / PAGE
+
+    def line(self, scenario: str, algorithm: str, measure: str) -> Line:
+        """Return one measure of one algorithm in one scenario.
+
+        Raises:
+            KeyError: no such line.
+        """
+        wanted = (scenario, algorithm, measure)
+        found = (one for one in self.lines if (one.scenario, one.algorithm, one.measure) == wanted)
+        for one in found:
+            return one
+        raise KeyError(wanted)
+
+    def _repr_html_(self) -> str:
+        """Return what a notebook shows: the table of all measures, and where the page is."""
+        with (self.folder / SUMMARY_FILE).open(encoding="utf-8", newline="") as file:
+            head, *rows = csv.reader(islice(file, MOST_SHOWN + 1))
+        table = _tr("th", head) + "".join(_tr("td", row) for row in rows)
+        page = html.escape(str(self.page))
+        return f"<table>{table}</table><p>Whole comparison: <code>{page}</code></p>"
+
+    def frame(self) -> "pd.DataFrame":
+        """Return every measure of every run, one a row: ``runs.csv``. Needs pandas."""
+        return self._frame(RUNS_FILE)
+
+    def summary(self) -> "pd.DataFrame":
+        """Return every measure over an algorithm's runs: ``summary.csv``. Needs pandas."""
+        return self._frame(SUMMARY_FILE)
+
+    def times(self) -> "pd.DataFrame":
+        """Return each run's duration, which is not repeatable: ``times.csv``. Needs pandas."""
+        return self._frame(TIMES_FILE)
+
+    def _frame(self, name: str) -> "pd.DataFrame":
+        require("pandas", "a data frame")
+        import pandas as pd
+
+        return pd.read_csv(self.folder / name)
+
+
+def _tr(kind: str, cells: Iterable[str]) -> str:
+    inner = "".join(f"<{kind}>{html.escape(cell)}</{kind}>" for cell in cells)
+    return f"<tr>{inner}</tr>"

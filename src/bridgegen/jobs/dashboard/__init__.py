@@ -1,0 +1,9 @@
+"""All results of a project as one page: runs, suites, comparisons and preventability maps.
+
+``project.py`` finds and reads them; ``modes.py``, ``requirements.py``, ``trends.py`` and ``odd.py``
+say what follows; ``page.py`` writes it; ``status_file.py`` keeps what a person decides.
+"""
+
+from bridgegen.jobs.dashboard.dashboard import Dashboard, build_dashboard
+
+__all__ = ["Dashboard", "build_dashboard"]

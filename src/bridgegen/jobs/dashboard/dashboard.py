@@ -1,0 +1,184 @@
+"""A dashboard: what a project's results say together, and the page that shows it."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+from bridgegen.base.disk import refuse_other
+from bridgegen.jobs.dashboard.modes import OpenMode, decisions_of, failure_modes, unseen
+from bridgegen.jobs.dashboard.odd import Coverage, coverage
+from bridgegen.jobs.dashboard.project import Project, read_project
+from bridgegen.jobs.dashboard.requirements import Matrix, matrices
+from bridgegen.jobs.dashboard.status_file import (
+    FILE,
+    Decision,
+    StatusFile,
+    add_decisions,
+    read_status_file,
+)
+from bridgegen.jobs.dashboard.trends import Series, trends
+from bridgegen.scenario.language.criteria import Criterion, read_criteria
+
+PAGE = "dashboard.html"
+GENERATOR = "bridgegen dashboard"
+
+
+@dataclass(frozen=True)
+class Dashboard:
+    """What the results of a project say together.
+
+    Attributes:
+        project: all that was found.
+        page: path of the page.
+        file: what the person decides about failure modes.
+        status_path: path of that file.
+        modes: all failure modes, those that fail now first.
+        requirements: a matrix for each driver.
+        declared: the requirements that are named for the project.
+        trends: a series for each scenario or suite, and driver.
+        coverage: of the taxonomy, and by parameter.
+        added: number of failure modes that were added to the file.
+    """
+
+    project: Project
+    page: Path
+    file: StatusFile
+    status_path: Path
+    modes: tuple[OpenMode, ...]
+    requirements: tuple[Matrix, ...]
+    declared: tuple[Criterion, ...]
+    trends: tuple[Series, ...]
+    coverage: Coverage
+    added: int = 0
+
+    @cached_property
+    def failing(self) -> tuple[OpenMode, ...]:
+        """The failure modes that current results have."""
+        return tuple(one for one in self.modes if one.fails_now)
+
+    @cached_property
+    def regressions(self) -> tuple[OpenMode, ...]:
+        """Those of them that are called fixed."""
+        return tuple(one for one in self.failing if one.is_regression)
+
+    @cached_property
+    def unseen(self) -> list[Decision]:
+        """What the file decides about modes that no result has."""
+        return unseen(self.modes, self.file)
+
+    @cached_property
+    def criteria(self) -> tuple[Criterion, ...]:
+        """All requirements, the gravest first."""
+        if self.requirements:
+            return self.requirements[0].requirements
+        return self.declared
+
+    @cached_property
+    def violated(self) -> dict[str, list[tuple[Matrix, list[str]]]]:
+        """By violated requirement, the drivers that violate it, each with the scenarios."""
+        found: dict[str, list[tuple[Matrix, list[str]]]] = {}
+        for one in self.criteria:
+            some = [(each, each.violated(one.id)) for each in self.requirements]
+            if any(names for _, names in some):
+                found[one.id] = [(each, names) for each, names in some if names]
+        return found
+
+    @cached_property
+    def untested(self) -> list[str]:
+        """The ids of the requirements that no driver is tested by with a result."""
+        found = [set(one.untested) for one in self.requirements]
+        return [one.id for one in self.criteria if all(one.id in each for each in found)]
+
+    @cached_property
+    def without_requirement(self) -> list[str]:
+        """The scenarios that test no requirement with any driver."""
+        tested = {name for one in self.requirements for name, _ in one.cells}
+        return [name for name in self.scenarios if name not in tested]
+
+    @cached_property
+    def scenarios(self) -> list[str]:
+        """The names of all scenarios that were tested."""
+        return sorted({one.scenario for one in self.project.results})
+
+    @cached_property
+    def drivers(self) -> list[str]:
+        """The labels of all drivers, each version by itself."""
+        return sorted({one.driver.label for one in self.project.results})
+
+    @cached_property
+    def figures(self) -> dict[str, float]:
+        """The figures that ``--fail-if`` judges, see ``of_dashboard.FIGURES``."""
+        failing = [one.status for one in self.failing]
+        project = self.project
+        return {
+            "new": failing.count("new"),
+            "known": failing.count("known"),
+            "accepted": failing.count("accepted"),
+            "fixed": sum(one.status == "fixed" and not one.fails_now for one in self.modes),
+            "regressions": len(self.regressions),
+            "failing": len(failing),
+            "worst_severity": max((one.severity for one in self.failing), default=0.0),
+            "requirements": len(self.criteria),
+            "violated_requirements": len(self.violated),
+            "untested_requirements": len(self.untested),
+            "scenarios_without_requirement": len(self.without_requirement),
+            "runs": len(project.runs),
+            "suites": len(project.suites),
+            "maps": len(project.maps),
+            "comparisons": len(project.comparisons),
+            "scenarios": len(self.scenarios),
+            "drivers": len(self.drivers),
+            "evaluations": sum(one.evaluations for one in project.results),
+            "problems": len(project.problems),
+        }
+
+
+def build_dashboard(
+    folder: Path | str,
+    *,
+    out: Path | str | None = None,
+    criteria: Sequence[str] = (),
+    update: bool = False,
+    begun: Callable[[int, int], None] | None = None,
+) -> Dashboard:
+    """Read all results below a folder, and write one page that shows them together.
+
+    Args:
+        folder: of the project.
+        out: the page; ``dashboard.html`` in the folder by default.
+        criteria: requirements that the project has, tested or not: as of ``--criterion``.
+        update: whether to add failure modes to ``failure-modes.yaml`` that it does not name, with
+            the status "new".
+        begun: called with the number of folders that are read, and of all.
+
+    Raises:
+        StorageError: there are no results; or the page or the file cannot be written, or another
+            file is where the page is to be.
+        InputError: ``failure-modes.yaml`` or a requirement breaks a rule.
+    """
+    from bridgegen.jobs.dashboard.page import write_page
+
+    folder = Path(folder)
+    page = folder / PAGE if out is None else Path(out)
+    status_path = folder / FILE
+    file = read_status_file(status_path)
+    declared = read_criteria(criteria)
+    refuse_other(page, GENERATOR, "dashboard")
+    project = read_project(folder, begun)
+    modes = failure_modes(project.results, file)
+    added = add_decisions(status_path, file, decisions_of(modes)) if update else 0
+    found = Dashboard(
+        project,
+        page,
+        file,
+        status_path,
+        tuple(modes),
+        tuple(matrices(project.results, declared)),
+        declared,
+        tuple(trends(project.runs, project.suites)),
+        coverage(project.results, project.sceneries),
+        added,
+    )
+    write_page(found)
+    return found

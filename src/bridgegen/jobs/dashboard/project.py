@@ -1,0 +1,159 @@
+"""A project's folder → all that is found in it: runs, suites, maps, comparisons, and problems."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from bridgegen.base.errors import BridgeGenError, StorageError
+from bridgegen.jobs.compare.plan import FILE as COMPARISON_FILE
+from bridgegen.jobs.dashboard.results import Result
+from bridgegen.jobs.dashboard.results_of import (
+    ComparisonLine,
+    MapLine,
+    SuiteLine,
+    read_comparison,
+    read_map,
+    read_run,
+    read_suite_line,
+)
+from bridgegen.jobs.dashboard.scenery import Sceneries, Scenery
+from bridgegen.jobs.preventability.result import SETTINGS as MAP_FILE
+from bridgegen.jobs.suite.entries import RESULTS as SUITE_FILE
+from bridgegen.jobs.view.overview import MOST_RUNS, find_folders
+from bridgegen.results.store.run_file import FILE as RUN_FILE
+
+_FILES = (RUN_FILE, SUITE_FILE, MAP_FILE, COMPARISON_FILE)
+
+
+@dataclass(frozen=True)
+class Problem:
+    """A folder, or a scenario, that cannot be read.
+
+    Attributes:
+        place: folder as seen from the project's, or the scenario.
+        why: in words.
+    """
+
+    place: str
+    why: str
+
+
+@dataclass(frozen=True)
+class Project:
+    """All that is found in a folder.
+
+    Attributes:
+        folder: absolute.
+        runs: each with its result.
+        suites: each with those of its entries.
+        maps: of preventability.
+        comparisons: of algorithms; their runs are not among ``runs``.
+        sceneries: what each scenario states, by the name that results have it under.
+        problems: what cannot be read.
+    """
+
+    folder: Path
+    runs: tuple[Result, ...]
+    suites: tuple[SuiteLine, ...]
+    maps: tuple[MapLine, ...]
+    comparisons: tuple[ComparisonLine, ...]
+    sceneries: dict[str, Scenery]
+    problems: tuple[Problem, ...]
+
+    @property
+    def results(self) -> tuple[Result, ...]:
+        """Of all runs and of all entries of suites."""
+        return (*self.runs, *(one for suite in self.suites for one in suite.results))
+
+
+def read_project(folder: Path, begun: Callable[[int, int], None] | None = None) -> Project:
+    """Read all runs, suites, maps and comparisons below a folder.
+
+    Args:
+        folder: of the project.
+        begun: called with the number of folders that are read, and of all.
+
+    Raises:
+        StorageError: there is no such folder, or none of these is in it.
+    """
+    root = folder.resolve()
+    if not root.is_dir():
+        raise StorageError(f"{folder}: there is no such folder")
+    found = find_folders(root, lambda one: _kind(one) is not None)
+    if not found:
+        raise StorageError(
+            f"{folder}: contains no run, suite, preventability map or comparison, nor does any "
+            "folder below it"
+        )
+    reader = _Reader(root)
+    for number, one in enumerate(found):
+        if begun is not None:
+            begun(number, len(found))
+        reader.read(one)
+    if len(found) >= MOST_RUNS:
+        why = f"a dashboard reads at most {MOST_RUNS:,} folders; the others are left out"
+        reader.problems.append(Problem(".", why))
+    return reader.project()
+
+
+def _kind(folder: Path) -> str | None:
+    """Return the file that identifies a folder of results; None if it is another folder."""
+    for name in _FILES:
+        file = folder / name
+        if file.is_file() and not file.is_symlink():
+            return name
+    return None
+
+
+class _Reader:
+    def __init__(self, root: Path) -> None:
+        self.root = root
+        self.sceneries = Sceneries()
+        self.runs: list[Result] = []
+        self.suites: list[SuiteLine] = []
+        self.maps: list[MapLine] = []
+        self.comparisons: list[ComparisonLine] = []
+        self.problems: list[Problem] = []
+
+    def read(self, folder: Path) -> None:
+        """Read a folder; what is wrong with it is a problem of the project."""
+        place = folder.relative_to(self.root).as_posix()
+        try:
+            kind = _kind(folder)
+            if kind == RUN_FILE:
+                self.runs.append(read_run(self.root, folder, self.sceneries))
+            elif kind == SUITE_FILE:
+                suite = read_suite_line(self.root, folder, self.sceneries)
+                self.suites.append(suite)
+                self.problems += [Problem(f"{place}: {name}", why) for name, why in suite.lost]
+            elif kind == MAP_FILE:
+                self.maps.append(read_map(self.root, folder))
+            else:
+                self.comparisons.append(read_comparison(self.root, folder))
+        except BridgeGenError as error:
+            self.problems.append(Problem(place, self._short("; ".join(error.problems))))
+        except OSError as error:  # it was removed meanwhile
+            self.problems.append(Problem(place, f"cannot be read: {error.strerror}"))
+
+    def project(self) -> Project:
+        """Return all that was read."""
+        results = (*self.runs, *(one for suite in self.suites for one in suite.results))
+        unread = sorted({one.scenario for one in results if one.seen is None and one.finished})
+        problems = [*self.problems]
+        for name in unread:
+            why = "is missing, or has changed since it was tested; its coverage is not counted"
+            problems.append(Problem(f"scenario {name}", why))
+        return Project(
+            self.root,
+            tuple(self.runs),
+            tuple(self.suites),
+            tuple(self.maps),
+            tuple(self.comparisons),
+            self.sceneries.by_name(self.root),
+            tuple(problems),
+        )
+
+    def _short(self, text: str) -> str:
+        """Return a message without the path of the project, cut where it is long."""
+        text = text.replace(f"{self.root}/", "")
+        return text if len(text) <= 400 else f"{text[:400]} …"

@@ -1,0 +1,443 @@
+"""Folders of a project become results: runs, suites, and those that test no driver for failures."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from math import isfinite
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field
+
+from bridgegen.assess.criteria import CriterionSummary, unit_of
+from bridgegen.base.arrays import Float
+from bridgegen.base.errors import FileFormatError, StorageError
+from bridgegen.base.records import parse_json, read_bytes, read_model
+from bridgegen.drivers.drivers import join
+from bridgegen.jobs.compare.plan import FILE as COMPARISON_FILE
+from bridgegen.jobs.compare.result import PAGE as COMPARISON_PAGE
+from bridgegen.jobs.dashboard.results import (
+    Driver,
+    Failure,
+    Judged,
+    ModeKey,
+    Result,
+    Seen,
+    driver_of,
+    scenario_name,
+)
+from bridgegen.jobs.dashboard.scenery import Sceneries, Scenery
+from bridgegen.jobs.preventability.result import PAGE as MAP_PAGE
+from bridgegen.jobs.preventability.result import SETTINGS as MAP_FILE
+from bridgegen.jobs.preventability.result import SUMMARY
+from bridgegen.jobs.search.run import REPORT
+from bridgegen.jobs.search.settings import Settings
+from bridgegen.jobs.suite.difference import Difference, difference
+from bridgegen.jobs.suite.entries import RESULTS
+from bridgegen.jobs.suite.page import FILE as PAGE
+from bridgegen.jobs.suite.results import EntryResult, RowResult
+from bridgegen.jobs.suite.suite import SuiteRun, read_suite
+from bridgegen.jobs.view.overview import RunLine, find_folders, is_run, read_line
+from bridgegen.results.store import Store
+from bridgegen.scenario.language.criteria import read_criterion
+from bridgegen.search.triage.modes import Key, title
+from bridgegen.search.triage.record import Mode
+
+# --- A run's folder → a result ---
+
+
+def read_run(project: Path, folder: Path, sceneries: Sceneries) -> Result:
+    """Return the result of a run.
+
+    Raises:
+        StorageError: it cannot be read.
+    """
+    seen: list[Seen | None] = []
+    line = read_line(
+        project, folder, lambda store, settings: seen.append(_seen(store, settings, sceneries))
+    )
+    settings = line.settings
+    if settings is None:
+        raise StorageError(line.problem)
+    distribution = str(settings.distribution or "")
+    scenario = scenario_name(settings.scenario, project, distribution)
+    driver = driver_of(settings.ego, project, line.version)
+    if settings.ideal:
+        stages = f" (ideal {join(settings.ideal)})"
+        driver = Driver(driver.name + stages, driver.version, driver.label + stages)
+    bound = line.triage.bound if line.triage else None
+    judged = tuple(map(_judged, line.criteria))
+    other = settings.worse_than
+    return Result(
+        "run" if other is None else "difference",
+        line.path,
+        f"{line.path}/{REPORT}" if (folder / REPORT).is_file() else "",
+        line.changed,
+        scenario,
+        driver,
+        line.evaluations,
+        bound.harmful if bound else 0,
+        bound.failed if bound else 0,
+        line.finished,
+        bound.space if bound and other is None else None,
+        (*_failures(line, scenario, driver), *violations(judged, scenario, driver.name)),
+        judged,
+        seen[0],
+        worse_than="" if other is None else driver_of(other, project, line.version).label,
+        unjudged=bound is not None and not bound.judged,
+    )
+
+
+def violations(judged: tuple[Judged, ...], scenario: str, driver: str) -> Iterator[Failure]:
+    """Yield each violated requirement as a failure mode."""
+    for one in judged:
+        if one.violated:
+            key = ModeKey(scenario, driver, requirement=one.criterion.id)
+            words = one.criterion.text or one.criterion.states
+            yield Failure(key, f"violates {one.criterion.id}: {words}", one.violated)
+
+
+def _failures(line: RunLine, scenario: str, driver: Driver) -> Iterator[Failure]:
+    """Yield the failure modes of a run; those that differ in cause or cluster alone are one."""
+    held: dict[ModeKey, list[Mode]] = {}
+    for one in line.modes:
+        key = ModeKey(
+            scenario, driver.name, one.conflict, one.conflict_type, one.responsible,
+            one.partner, one.place,
+        )  # fmt: skip
+        held.setdefault(key, []).append(one)
+    for key, modes in held.items():
+        yield Failure(
+            key,
+            modes[0].title,
+            sum(one.count for one in modes),
+            max(one.severity for one in modes),
+            all(one.knife_edge for one in modes),
+        )
+
+
+def _judged(one: CriterionSummary) -> Judged:
+    worst = one.worst if isfinite(one.worst) else None
+    return Judged(one.criterion, one.met, one.violated, one.unknown, worst, one.unit)
+
+
+def _seen(store: Store, settings: Settings, sceneries: Sceneries) -> Seen | None:
+    """Count a run's evaluations, a chunk at a time; None where its scenario cannot be read.
+
+    Raises:
+        StorageError: the database is damaged.
+    """
+    source = (
+        settings.scenario,
+        str(settings.distribution or ""),
+        settings.empty_trigger or "",
+        settings.road_map is not None,
+    )
+    scenery = sceneries.of(source, settings.fingerprint)
+    if scenery is None:
+        return None
+    found = Seen()
+    stored = dict(zip(store.parameters, store.columns.X, strict=True))
+    column = {name: stored[name] for name in sorted(scenery.columns & stored.keys())}
+    for rows in store.select(["status", *column.values()], 0, len(store)):
+        with store.damage():
+            table: Float = np.array(rows, dtype=np.float64)
+        table = table[table[:, 0] == 0.0]
+        columns = {name: table[:, k] for k, name in enumerate(column, 1)}
+        found.add(scenery.seen(columns, len(table)))
+    return found
+
+
+# --- A suite's folder → a result for each of its entries and egos, and the difference of two egos -
+
+
+_NO_CONFLICT = ("", "none")
+
+
+@dataclass(frozen=True)
+class SuiteLine:
+    """A suite in a line.
+
+    Attributes:
+        source: folder, as seen from the project's.
+        page: of the suite, or "".
+        time: when its file was last written [s since 1970].
+        egos: labels of its drivers.
+        results: of each entry and ego.
+        difference: of its two drivers; None where it has another number of them.
+        lost: entries that did not run, with the reason.
+    """
+
+    source: str
+    page: str
+    time: float
+    egos: tuple[str, ...]
+    results: tuple[Result, ...]
+    difference: Difference | None
+    lost: tuple[tuple[str, str], ...]
+
+
+def read_suite_line(project: Path, folder: Path, sceneries: Sceneries) -> SuiteLine:
+    """Return a suite.
+
+    Raises:
+        StorageError: it cannot be read.
+    """
+    suite = read_suite(folder)
+    source, time = folder.relative_to(project).as_posix(), (folder / RESULTS).stat().st_mtime
+    page = f"{source}/{PAGE}" if (folder / PAGE).is_file() else ""
+    made = str(suite.settings.get("version", ""))
+    results = tuple(  # the file has them as they ended
+        _result(project, source, page, time, made, one, sceneries)
+        for one in sorted(suite.results, key=lambda one: (one.entry, one.ego))
+    )
+    egos = tuple(dict.fromkeys(one.driver.label for one in results))
+    lost = tuple(
+        (f"{one.entry} ({one.ego})" if one.ego else one.entry, one.problem)
+        for one in suite.results
+        if one.problem
+    )
+    return SuiteLine(source, page, time, egos, results, _difference(project, suite, made), lost)
+
+
+def _difference(project: Path, suite: SuiteRun, made: str) -> Difference | None:
+    """Compare two egos, in the order of names: results do not say which was given first."""
+    if len(suite.egos) != 2:
+        return None
+    egos = sorted(suite.egos)
+    labels = [driver_of(ego or "the scenarios' own", project, made).label for ego in egos]
+    first, second = (
+        {one.entry: one for one in suite.of_ego(ego)} for ego in egos
+    )  # a suite that was stopped lacks some
+    both = sorted(name for name in first if name in second)
+    return difference(
+        [first[name] for name in both], [second[name] for name in both],
+        (labels[0], labels[1]),
+    )  # fmt: skip
+
+
+def _result(
+    project: Path,
+    source: str,
+    page: str,
+    time: float,
+    made: str,
+    one: EntryResult,
+    sceneries: Sceneries,
+) -> Result:
+    scenario = scenario_name(one.scenario, project, one.distribution)
+    driver = driver_of(one.ego or one.driver or "the scenario's own", project, made)
+    judged = tuple(_judged_of_suites(one))
+    return Result(
+        "suite",
+        source,
+        page,
+        time,
+        scenario,
+        driver,
+        len(one.rows),
+        one.count("failed"),
+        one.count("not run"),
+        finished=not one.problem,
+        failures=(
+            *_failures_of_suites(one, scenario, driver.name),
+            *violations(judged, scenario, driver.name),
+        ),
+        judged=judged,
+        unjudged=one.verdict == "not judged",
+        seen=_seen_of_suites(one, _scenery(project, one, sceneries)),
+        entry=one.entry,
+    )
+
+
+def _judged_of_suites(one: EntryResult) -> Iterator[Judged]:
+    for i, given in enumerate(one.criteria):
+        criterion = read_criterion(given)
+        margins = [
+            row.margins[i]
+            for row, verdict in zip(one.rows, one.verdicts, strict=True)
+            if i < len(row.margins) and verdict != "not judged"
+        ]
+        violated = sum(margin < 0.0 for margin in margins)
+        yield Judged(
+            criterion,
+            len(margins) - violated,
+            violated,
+            len(one.rows) - len(margins),
+            min(margins, default=None),
+            unit_of(criterion),
+        )
+
+
+def _failures_of_suites(one: EntryResult, scenario: str, driver: str) -> Iterator[Failure]:
+    """Yield the critical variations, grouped by what happens."""
+    held: dict[ModeKey, list[RowResult]] = {}
+    for row in one.rows:
+        if row.critical:
+            key = ModeKey(
+                scenario, driver, row.conflict, row.conflict_type, row.responsible,
+                partner=row.partner,
+            )  # fmt: skip
+            held.setdefault(key, []).append(row)
+    for key, rows in held.items():
+        severity = max(row.severity for row in rows)
+        yield Failure(key, _title(rows[0]), len(rows), severity)
+
+
+def _title(row: RowResult) -> str:
+    if row.conflict in _NO_CONFLICT:
+        return "is critical without a conflict"
+    key = Key(row.conflict, row.conflict_type, row.responsible, "", "")
+    return title(key).replace("another participant", f"'{row.partner}'")
+
+
+def _scenery(project: Path, one: EntryResult, sceneries: Sceneries) -> Scenery | None:
+    """Return the scenery of an entry; its file may be relative to the project's folder."""
+    paths = []
+    for text in (one.scenario, one.distribution):
+        path = next(
+            (base / text for base in (project, project.parent) if text and (base / text).is_file()),
+            None,
+        )
+        paths.append(str(path) if path else text)
+    return sceneries.of((paths[0], paths[1], "", False))
+
+
+def _seen_of_suites(one: EntryResult, scenery: Scenery | None) -> Seen | None:
+    """Count an entry's variations."""
+    if scenery is None or one.problem:
+        return None
+    rows = [row for row in one.rows if not row.problem and len(row.x) == len(one.parameters)]
+    columns: dict[str, Float] = {}
+    for k, name in enumerate(one.parameters):
+        values = [row.x[k] for row in rows]
+        if name in scenery.edges:
+            columns[name] = np.array([scenery.inner(name, value) for value in values])
+        elif not any(isinstance(value, str) for value in values):
+            columns[name] = np.array(values, dtype=np.float64)
+    return scenery.seen(columns, len(rows))
+
+
+# --- The folders of a project that test no driver for failures: preventability maps, comparisons --
+
+
+Count = Annotated[int, Field(ge=0, le=10**12)]
+Text = Annotated[str, Field(max_length=4096)]
+
+
+class MapFigures(BaseModel):
+    """A driver's numbers of cells, as ``summary.json`` states them."""
+
+    model_config = ConfigDict(frozen=True, extra="ignore", allow_inf_nan=False)
+
+    driver: Text
+    avoided: Count
+    preventable: Count
+    unpreventable: Count
+    not_applicable: Count
+    no_result: Count
+
+    @property
+    def judged(self) -> int:
+        """The number of cells that apply and have a result."""
+        return self.avoided + self.preventable + self.unpreventable
+
+
+class _Summary(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="ignore", allow_inf_nan=False)
+
+    scenario: Text
+    cells: Count
+    drivers: Annotated[tuple[MapFigures, ...], Field(max_length=1000)]
+
+
+@dataclass(frozen=True)
+class MapLine:
+    """A preventability map in a line.
+
+    Attributes:
+        source: folder, as seen from the project's.
+        page: of the map, or "".
+        scenario: its name; "" of a map that is not finished.
+        cells: number of them.
+        drivers: the figures of each.
+    """
+
+    source: str
+    page: str
+    scenario: str = ""
+    cells: int = 0
+    drivers: tuple[MapFigures, ...] = ()
+
+
+@dataclass(frozen=True)
+class ComparisonLine:
+    """A comparison of algorithms in a line.
+
+    Attributes:
+        source: folder, as seen from the project's.
+        page: of the comparison, or "".
+        scenarios: their names.
+        algorithms: their names.
+        runs: number of its runs.
+    """
+
+    source: str
+    page: str
+    scenarios: tuple[str, ...]
+    algorithms: tuple[str, ...]
+    runs: int
+
+
+def read_map(project: Path, folder: Path) -> MapLine:
+    """Return a map.
+
+    Raises:
+        FileFormatError: its figures are damaged.
+        StorageError: they cannot be read.
+    """
+    source = folder.relative_to(project).as_posix()
+    summary = read_model(folder / SUMMARY, _Summary, _no_map)
+    page = f"{source}/{MAP_PAGE}" if (folder / MAP_PAGE).is_file() else ""
+    if summary is None:
+        _object(folder / MAP_FILE)
+        return MapLine(source, page)
+    return MapLine(source, page, summary.scenario, summary.cells, summary.drivers)
+
+
+def read_comparison(project: Path, folder: Path) -> ComparisonLine:
+    """Return a comparison.
+
+    Raises:
+        FileFormatError: its record is damaged.
+        StorageError: it cannot be read.
+    """
+    source, record = folder.relative_to(project).as_posix(), _object(folder / COMPARISON_FILE)
+    page = f"{source}/{COMPARISON_PAGE}" if (folder / COMPARISON_PAGE).is_file() else ""
+    return ComparisonLine(
+        source,
+        page,
+        _behind("scenario ", record),
+        _behind("settings of ", record),
+        len(find_folders(folder, is_run)),
+    )
+
+
+def _behind(prefix: str, record: dict[str, Any]) -> tuple[str, ...]:
+    return tuple(key.removeprefix(prefix) for key in record if key.startswith(prefix))
+
+
+def _object(path: Path) -> dict[str, Any]:
+    try:
+        value = parse_json(read_bytes(path))
+    except OSError as error:
+        raise StorageError(f"{path}: cannot be read: {error.strerror}") from None
+    except ValueError as error:
+        raise FileFormatError(f"{path}: is damaged: {error}") from None
+    if not isinstance(value, dict):
+        raise FileFormatError(f"{path}: is damaged: it must hold an object")
+    return value
+
+
+def _no_map(path: Path, why: str) -> FileFormatError:
+    return FileFormatError(f"{path}: is damaged: {why}")

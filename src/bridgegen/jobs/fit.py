@@ -1,0 +1,81 @@
+"""From a table of events to the files of a fit."""
+
+from collections.abc import Sequence
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Literal, cast
+
+from bridgegen.base.disk import write_whole
+from bridgegen.base.errors import InputError, StorageError
+from bridgegen.openx.openscenario.exposure import distribution_xml, left_out
+from bridgegen.scenario.exposure.fit import Fit, Progress, fit_exposure
+from bridgegen.scenario.exposure.page import refuse_other_page, write_page
+from bridgegen.scenario.exposure.reader import refuse_other_file, write_exposure
+from bridgegen.scenario.language.reader import load
+
+_OTHERS = ("uniform", "default")
+
+
+def write_fit(
+    scenario: str,
+    events: Path,
+    *,
+    out: Path,
+    page: Path | None = None,
+    xosc: Path | None = None,
+    hours: float | None = None,
+    km: float | None = None,
+    ignore: Sequence[str] = (),
+    others: str | None = None,
+    source: str | None = None,
+    replicates: int = 200,
+    seed: int = 0,
+    progress: Progress | None = None,
+    notes: list[str] | None = None,
+) -> tuple[Fit, tuple[Path, ...]]:
+    """Fit a scenario's exposure to events, and write it, its page and its distribution.
+
+    Args:
+        scenario: a name, or the path of a YAML file.
+        events: a table (.csv).
+        out: the exposure's file.
+        page: of the fit; ``out`` with the ending ``.html`` by default.
+        xosc: an OpenSCENARIO file with the distributions; none by default.
+        hours: see `bridgegen.scenario.exposure.fit.fit_exposure`, as all that follow.
+        km: likewise.
+        ignore: likewise.
+        others: likewise.
+        source: likewise.
+        replicates: likewise.
+        seed: likewise.
+        progress: likewise.
+        notes: takes what the OpenSCENARIO file leaves out, a sentence each.
+
+    Returns:
+        The fit, and the files that were written.
+
+    Raises:
+        InputError: what cannot be fitted.
+        StorageError: another file is in a place, or it cannot be written.
+    """
+    if others is not None and others not in _OTHERS:
+        raise InputError(f"others must be {' or '.join(_OTHERS)}, got '{others}'")
+    page = page or out.with_suffix(".html")
+    refuse_other_file(out)
+    refuse_other_page(page)
+    if xosc is not None and xosc.exists():
+        raise StorageError(f"{xosc}: exists already, and is not overwritten")
+    made = fit_exposure(
+        load(scenario), events, hours=hours, km=km, ignore=ignore,
+        others=cast(Literal["uniform", "default"] | None, others), source=source,
+        replicates=replicates, seed=seed, progress=progress,
+    )  # fmt: skip
+    write_exposure(out, made.text)
+    write_page(page, made)
+    if xosc is None:
+        return made, (out, page)
+    date = datetime.now(UTC).strftime("%Y-%m-%dT%H:%M:%S")
+    write_whole(xosc, [distribution_xml(made.exposure, date=date)])
+    if notes is not None:
+        notes += left_out(made.exposure)
+    return made, (out, page, xosc)

@@ -1,0 +1,288 @@
+"""``bridgegen mine``: read recordings, clean and place them, find near misses, account for all."""
+
+from collections import Counter
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from bridgegen import drivers as egos
+from bridgegen.base.arrays import Float
+from bridgegen.base.errors import FileFormatError, InputError, StorageError
+from bridgegen.recordings.conflicts.find import RecordedConflict, conflicts_of, order
+from bridgegen.recordings.events.find import FoundEvents, find_events
+from bridgegen.recordings.events.of_scenarios import (
+    ScenarioEvents,
+    recorded_scenarios,
+    scenario_events,
+)
+from bridgegen.recordings.events.playback import PlayedEvent, closest
+from bridgegen.recordings.events.tables import write_events
+from bridgegen.recordings.excerpt import Clock, clock_of
+from bridgegen.recordings.lanes.account import LanesFound, account_of
+from bridgegen.recordings.lanes.find import Located, locate, read_map
+from bridgegen.recordings.readers.clean import TIME_STEP, Cleaned, clean
+from bridgegen.recordings.readers.formats import files_of, read
+from bridgegen.recordings.readers.quality import Finding
+from bridgegen.recordings.readers.table import Facts, RecordedTraffic, kind_in_words
+from bridgegen.recordings.replays.write import Prepared, Replay, prepare, write
+from bridgegen.recordings.scenarios.files import FOLDER as MINED
+from bridgegen.recordings.scenarios.files import write_mined
+from bridgegen.recordings.scenarios.mined import MinedScenario, Unmade
+from bridgegen.recordings.scenarios.update import ENDING as DIFF
+from bridgegen.recordings.scenarios.update import Update, refuse_same_names, write_updates
+
+PATHS_SHOWN = 300
+POINTS_SHOWN = 40
+"""Of a path in the picture."""
+MARGIN = 10.0
+"""Around the paths in the picture [m]."""
+KEEP = 10
+"""Events that are written as scenarios."""
+CRITICAL, SUFFIXES = "critical", (".xosc", ".xodr", ".owl")
+"""The folder of these, as of a run, and what its files end in."""
+
+
+@dataclass(frozen=True)
+class Summary:
+    """What one recording holds.
+
+    Attributes:
+        facts: as it was read; its time step is the recording's own.
+        participants: number by kind, most frequent first.
+        states: number of states read.
+        duration: from the first instant to the last [s].
+        hours: driven or walked, of all participants, after cleaning.
+        kilometres: the same.
+        read_hours: before cleaning.
+        read_kilometres: before cleaning, jumps included.
+        tracks: after cuts.
+        findings: of cleaning, all rules.
+        paths: for the picture: kind and points ``(n, 2)`` [m] of at most `PATHS_SHOWN` tracks.
+        lanes: on which it was.
+        events: in it.
+        conflicts: near misses, then contacts, the most harmful first.
+        names: of the participants in them, by number.
+    """
+
+    facts: Facts
+    participants: dict[str, int]
+    states: int
+    duration: float
+    hours: float
+    kilometres: float
+    read_hours: float
+    read_kilometres: float
+    tracks: int
+    findings: tuple[Finding, ...]
+    paths: tuple[tuple[int, Float], ...]
+    lanes: LanesFound
+    events: FoundEvents
+    conflicts: tuple[RecordedConflict, ...]
+    names: dict[int, str]
+
+
+@dataclass(frozen=True)
+class Mined:
+    """What was recorded, and what was left out.
+
+    Attributes:
+        recordings: in the order of the files.
+        skipped: with ``lenient``: files left out, or what of them could not be read, and why.
+        others: files of folders that are no recordings.
+        time_step: after cleaning [s].
+        out: the folder.
+        warnings: of reading the map.
+        replays: the most critical events, as files.
+        played: the closest events of each kind.
+        scenarios: the events that are a scenario, per scenario.
+        mined: what was made of each of these.
+        updates: ranges proposed for scenario files.
+    """
+
+    recordings: tuple[Summary, ...]
+    skipped: tuple[tuple[Path, tuple[str, ...]], ...]
+    others: tuple[Path, ...]
+    time_step: float
+    out: Path
+    warnings: tuple[str, ...] = ()
+    replays: tuple[Replay, ...] = ()
+    played: tuple[PlayedEvent, ...] = ()
+    scenarios: tuple[ScenarioEvents, ...] = ()
+    mined: tuple[MinedScenario | Unmade, ...] = ()
+    updates: tuple[Update, ...] = ()
+
+
+def mine(
+    paths: Sequence[Path],
+    *,
+    out: Path,
+    road_map: Path | None = None,
+    lenient: bool = False,
+    time_step: float = TIME_STEP,
+    scenarios: Sequence[Path] = (),
+    update: Sequence[Path] = (),
+    keep: int = KEEP,
+    ego: str | None = None,
+    progress: Callable[[int, int], None] = lambda done, total: None,
+    fitting: Callable[[int, int], None] = lambda done, total: None,
+) -> Mined:
+    """Read and clean recordings, place them on lanes, find near misses, and write all that.
+
+    Args:
+        paths: files, or folders of files.
+        out: a folder, new or of an earlier call; gets recordings.html, recordings.csv, lanes.csv,
+            quality.csv, events.csv, conflicts.csv, in the folder ``events`` the parameters of
+            scenarios, in the folder ``scenarios`` logical scenarios made of them, and in the folder
+            ``critical`` the most critical near misses as concrete ones.
+        road_map: the OpenDRIVE map of all of them; without one the lanes are those that come with
+            the recording, or inferred from its paths.
+        lenient: leave out what cannot be read, and list it.
+        time_step: to resample at [s].
+        scenarios: files of scenarios that declare their events, besides those that ship.
+        update: files of scenarios that declare their events, for which ranges are proposed that
+            hold them: ``NAME.yaml.diff``. The files stay as they are.
+        keep: how many of the most critical events are written as scenarios.
+        ego: driver that takes the ego's place in these; by default it does what was recorded.
+        progress: is told how many of how many files are done.
+        fitting: is told how many of how many scenarios are made of the events.
+
+    Raises:
+        FileFormatError: a file that is no recording, or breaks its format's rules.
+        InputError: no recordings, a time step or a number out of range, a map of another place, or
+            a scenario that declares no events.
+        UnknownNameError: no such driver.
+        StorageError: the folder holds other files of these names, or cannot be written.
+    """
+    from bridgegen.jobs.mine.page import refuse_foreign, write_all
+
+    if keep < 0:
+        raise InputError(f"0 <= keep must hold, got {keep}")
+    if ego is not None:
+        egos.get(ego)
+    _refuse_replaced([*update, *scenarios], out / MINED)
+    refuse_same_names(update)
+    refuse_foreign(out, [f"{path.name}{DIFF}" for path in update])
+    sought = recorded_scenarios([*update, *(path for path in scenarios if path not in update)])
+    on_map = read_map(road_map) if road_map is not None else None
+    files, others = _files(paths)
+    found: list[Summary] = []
+    skipped: list[tuple[Path, tuple[str, ...]]] = []
+    kept: list[Prepared] = []
+    played: list[PlayedEvent] = []
+    counts: Counter[str] = Counter()
+    for number, file in enumerate(files):
+        progress(number, len(files))
+        try:
+            for traffic in read(file):
+                cleaned = clean(traffic, time_step)
+                located = locate(cleaned.traffic, on_map)
+                conflicts = conflicts_of(cleaned.traffic)
+                one = summarise(traffic, cleaned, located, conflicts)
+                found.append(one)
+                clock = clock_of(cleaned.traffic)
+                played = closest(played, cleaned.traffic, clock, one.events, counts)
+                counts.update({each.kind.name: len(each) for each in one.events.kinds})
+                kept = _most_critical(kept, cleaned.traffic, clock, conflicts, keep)
+        except FileFormatError as error:
+            if not lenient:
+                if len(files) == 1:
+                    raise
+                raise FileFormatError(
+                    *error.problems,
+                    "--lenient leaves out files that cannot be read, and lists them",
+                ) from None
+            skipped.append((file, error.problems))
+    progress(len(files), len(files))
+    if not found:
+        problems = [text for _, texts in skipped for text in texts]
+        raise FileFormatError(*problems, "no recording could be read")
+    replays = _written(kept, out / CRITICAL, ego)
+    warnings = on_map.warnings if on_map is not None else ()
+    events = [one.events for one in found]
+    met = tuple(scenario_events(one.scenario, one.spec, events) for one in sought)
+    write_events(out, events, met)
+    made = write_mined(out, sought, met, events, time_step, fitting)
+    updates = write_updates(out, sought, met, update)
+    mined = Mined(
+        tuple(found), tuple(skipped), tuple(others), time_step, out, warnings, replays,
+        tuple(played), met, made,
+        updates,
+    )  # fmt: skip
+    write_all(mined)
+    return mined
+
+
+def _refuse_replaced(paths: Sequence[Path], folder: Path) -> None:
+    """Refuse scenario files that lie where mined scenarios are written."""
+    for path in paths:
+        if path.resolve().parent == folder.resolve():
+            raise InputError(
+                f"{path}: lies in the folder {folder}, whose scenarios are replaced: copy it "
+                "elsewhere"
+            )
+
+
+def _most_critical(
+    kept: list[Prepared],
+    traffic: RecordedTraffic,
+    clock: Clock,
+    conflicts: tuple[RecordedConflict, ...],
+    keep: int,
+) -> list[Prepared]:
+    """Return the most critical events of earlier recordings and of one more."""
+    more = [prepare(traffic, clock, one) for one in conflicts[:keep]]
+    return sorted([*kept, *more], key=lambda one: order(one.event))[:keep]
+
+
+def _written(kept: list[Prepared], folder: Path, ego: str | None) -> tuple[Replay, ...]:
+    """Write events in the place of those of an earlier call."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        for old in folder.glob("[0-9][0-9][0-9][0-9].*"):
+            if old.suffix in SUFFIXES:
+                old.unlink()
+    except OSError as error:
+        raise StorageError(f"{folder}: cannot be made: {error.strerror}") from None
+    return tuple(write(one, folder / f"{k:04}", ego) for k, one in enumerate(kept, 1))
+
+
+def _files(paths: Sequence[Path]) -> tuple[list[Path], list[Path]]:
+    files, others = [], []
+    for path in paths:
+        recordings, beside = files_of(path)
+        files += recordings
+        others += beside
+    twice = [path for path, count in Counter(path.resolve() for path in files).items() if count > 1]
+    if twice:
+        raise InputError(f"{twice[0]}: is named twice; its traffic would count twice")
+    return files, others
+
+
+def summarise(
+    traffic: RecordedTraffic,
+    cleaned: Cleaned,
+    located: Located,
+    conflicts: tuple[RecordedConflict, ...],
+) -> Summary:
+    """Return what a recording holds, and where."""
+    after = cleaned.traffic
+    kinds = Counter(kind_in_words(kind) for kind in cleaned.kinds.tolist())
+    shown = np.linspace(0, len(after.names) - 1, min(PATHS_SHOWN, len(after.names))).astype(int)
+    paths = []
+    for p in np.unique(shown).tolist():
+        first, last = int(after.first[p]), int(after.first[p + 1]) - 1
+        at = np.unique(np.linspace(first, last, POINTS_SHOWN).astype(int))
+        paths.append((int(after.kind[p]), np.column_stack([after.x[at], after.y[at]])))
+    points = np.concatenate([path for _, path in paths])
+    lanes = account_of(located, points.min(axis=0) - MARGIN, points.max(axis=0) + MARGIN)
+    return Summary(
+        facts=traffic.facts, participants=dict(kinds.most_common()), states=len(traffic.time),
+        duration=float(np.ptp(traffic.time)), hours=after.hours, kilometres=after.kilometres,
+        read_hours=traffic.hours, read_kilometres=traffic.kilometres, tracks=len(after.names),
+        findings=cleaned.quality.findings, paths=tuple(paths), lanes=lanes,
+        events=find_events(after, located),
+        conflicts=conflicts,
+        names={p: after.names[p] for one in conflicts for p in (one.ego, one.other)},
+    )  # fmt: skip

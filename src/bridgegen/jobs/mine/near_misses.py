@@ -1,0 +1,124 @@
+"""Near misses on the page of recordings, and as a table."""
+
+from collections.abc import Iterator, Sequence
+from html import escape
+
+from bridgegen.jobs.mine.mine import CRITICAL, Mined, Summary
+from bridgegen.recordings.conflicts.find import RecordedConflict
+from bridgegen.recordings.replays.write import Replay, moving_picture
+
+HEAD = (
+    "recording", "file", "ego", "other", "time_s", "conflict", "type", "responsible", "ttc_s",
+    "needed_mps2", "v_ego_mps", "v_other_mps", "harm", "doubt", "sentence", "scenario",
+    "position_off_m", "speed_off_mps",
+)  # fmt: skip
+TRUSTED = 0.02
+"""Share of vehicles whose boxes touch another's up to which a recording's near misses count."""
+
+
+def rows(mined: Mined) -> Iterator[list[object]]:
+    """Yield a row for each conflict, under `HEAD`."""
+    written = {id(one.event.event): one for one in mined.replays}
+    for one in mined.recordings:
+        for each in one.conflicts:
+            found, replay = each.found, written.get(id(each))
+            yield [
+                one.facts.name, one.facts.source, one.names[each.ego], one.names[each.other],
+                f"{each.instant * mined.time_step:.2f}", found.conflict, found.type,
+                found.responsible, f"{found.ttc:.3f}", f"{found.needed_deceleration:.2f}",
+                f"{found.v_ego:.2f}", f"{found.v_other:.2f}", f"{found.harm:.3f}", each.doubt,
+                found.sentence,
+                f"{CRITICAL}/{replay.scenario.name}" if replay else "",
+                f"{replay.off:.4f}" if replay else "",
+                f"{replay.too_fast:.3f}" if replay else "",
+            ]  # fmt: skip
+
+
+def in_words(one: Summary) -> str:
+    """Return how many conflicts a recording has, and whether to trust them."""
+    near = [each for each in one.conflicts if not each.is_contact]
+    doubtful = sum(each.doubt != "" for each in near)
+    touching = {p for each in one.conflicts if each.is_contact for p in (each.ego, each.other)}
+    text = f"{len(near):,} near miss{'' if len(near) == 1 else 'es'}"
+    if doubtful:
+        text += f", {doubtful:,} of them with motion that could not happen"
+    if touching:
+        share = len(touching) / max(one.tracks, 1)
+        text += f"; boxes of {len(touching):,} participants ({share:.0%}) touch"
+        if share > TRUSTED:
+            text += ": unless these are accidents, boxes or positions are wrong, near misses too"
+    return text
+
+
+def section(mined: Mined) -> str:
+    """Return the section with the events that are written, each with its picture."""
+    lines = "".join(
+        f"<li>{escape(one.facts.name)}: {escape(in_words(one))}</li>" for one in mined.recordings
+    )
+    events = "".join(_event(number, one) for number, one in enumerate(mined.replays, 1))
+    return (
+        f"<section><h2>Near misses</h2><div class='card'><ul>{lines}</ul>"
+        "<p class='muted'>By the conflict analysis of a search, with every motor vehicle as the "
+        "ego; of each pair the more harmful view. All are in conflicts.csv.</p></div>"
+        f"{events}</section>"
+    )
+
+
+def _event(number: int, one: Replay) -> str:
+    event, found = one.event, one.event.event.found
+    ego, other = (escape(name) for name in event.names)
+    facts = [
+        f"the ego is {ego}, the other {other}, of {escape(event.recording)}",
+        f"responsible: {escape(found.responsible or 'unknown')}; {escape(found.type)}",
+        f"time to collision {found.ttc:.2f} s, {found.needed_deceleration:.1f} m/s² needed",
+        _proof(one),
+    ]
+    if event.event.doubt:
+        facts.append(f"doubtful: {escape(event.event.doubt)}")
+    stem = one.scenario.stem
+    links = ", ".join(
+        f"<a href='{CRITICAL}/{path.name}'>{path.name}</a>"
+        for path in (one.scenario.with_suffix(end) for end in (".xosc", ".xodr", ".owl"))
+        if path.exists()
+    )
+    picture = moving_picture(event.motion, 1, event.when, found.sentence)
+    return (
+        f"<div class='card event' id='{stem}'><h3>{number}. {escape(found.sentence)}</h3>{picture}"
+        f"<ul>{''.join(f'<li>{fact}</li>' for fact in facts)}<li>{links}</li></ul></div>"
+    )
+
+
+def _proof(one: Replay) -> str:
+    if one.problem:
+        return f"not simulated: {escape(one.problem)}"
+    return (
+        f"simulated here, all participants are within {max(one.off, 0.001):.3f} m of where they "
+        f"were recorded, and within {max(one.too_fast, 0.01):.2f} m/s of their speed"
+    )
+
+
+def screen_rows(mined: Mined) -> Iterator[tuple[str, str, str, str, float, float, str]]:
+    """Yield what the terminal shows of the events that are written."""
+    for one in mined.replays:
+        found = one.event.event.found
+        yield (
+            one.scenario.name, one.event.recording, " and ".join(one.event.names), found.type,
+            round(found.ttc, 2), round(found.needed_deceleration, 1), found.responsible,
+        )  # fmt: skip
+
+
+def conflicts_as_json(one: Summary, time_step: float) -> list[dict[str, object]]:
+    """Return a recording's conflicts as plain data."""
+    return [_as_json(one, each, time_step) for each in one.conflicts]
+
+
+def _as_json(one: Summary, each: RecordedConflict, time_step: float) -> dict[str, object]:
+    return {
+        "ego": one.names[each.ego], "other": one.names[each.other],
+        "time": each.instant * time_step, "doubt": each.doubt or None, **each.found.to_dict(),
+    }  # fmt: skip
+
+
+def recordings_in_words(mined: Mined) -> Sequence[tuple[str, str]]:
+    """Return each recording's name and its conflicts in words."""
+    return [(one.facts.name, in_words(one)) for one in mined.recordings]

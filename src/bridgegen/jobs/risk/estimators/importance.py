@@ -1,0 +1,185 @@
+"""Importance sampling: rows are drawn where the event happens, and weighted by how likely they are.
+
+Where it happens, subset simulation says, and rows that are spread over the ranges: they also find
+what its levels do not lead to (`exploration`). For what rows are drawn from, see `proposals` and
+`learning`; for whether the result is believed, `evidence`.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from bridgegen.base.arrays import Float
+from bridgegen.jobs.risk.estimators import exploration, subset
+from bridgegen.jobs.risk.estimators.evidence import Evidence
+from bridgegen.jobs.risk.estimators.exploration import SinglePoints
+from bridgegen.jobs.risk.estimators.problem import SCORE, Aim, Problem, block_of
+from bridgegen.jobs.risk.estimators.proposals import DEFENSIVE, OF_CHAIN, Proposals
+from bridgegen.jobs.risk.estimators.weighted import Weighted
+
+# --- Fits proposals again and again, to the points of the event that they draw themselves ---
+# A point's weight is its density on the road over the mean density of all proposals so far. A point
+# that the first proposals seldom draw therefore does not outweigh all others. Rows of the result
+# are # drawn afterwards, so learning does not bias it.
+#
+# Source: Cornuet, Marin, Mira and Robert, Scandinavian Journal of Statistics 39 (2012) 798-812
+# (adaptive multiple importance sampling).
+
+
+OF_ROUND, FEWEST_ROWS = 2000, 100
+"""Rows of a round at most, and at least."""
+ROUNDS, MOST_ROUNDS = 10, 20
+"""Number of rounds that a small budget is divided into, and maximum number of rounds."""
+OF_BUDGET = 4
+"""All rounds together take at most this part of the budget: a quarter."""
+ENOUGH = 400.0
+"""Effective number of points of the event at which learning ends."""
+
+
+def learn(
+    problem: Problem, aim: Aim, first: Proposals, budget: int, random: np.random.Generator
+) -> tuple[Proposals, int]:
+    """Return fitted proposals, and the number of evaluations spent.
+
+    Args:
+        problem: the experiment.
+        aim: the event.
+        first: initial proposals; their kernels are kept, so that no known region is lost.
+        budget: remaining evaluations.
+        random: source of all random numbers.
+    """
+    most = budget // OF_BUDGET
+    rows = min(OF_ROUND, most // ROUNDS)
+    rounds = min(MOST_ROUNDS, most // rows) if rows >= FEWEST_ROWS else 0
+    proposals, spent = first, 0
+    drawn: list[Proposals] = []
+    found: list[Float] = []
+    for _ in range(rounds):
+        Z, _ = proposals.draw(rows, random)
+        Z = Z[problem.feasible(Z)]
+        drawn.append(proposals)
+        found.append(Z[problem.evaluate(Z, aim.least)[:, SCORE] >= aim.threshold])
+        spent += len(Z)
+        points = np.concatenate(found)
+        if not len(points):
+            continue
+        weights = 1.0 / np.mean([1.0 / one.weights(points) for one in drawn], axis=0)
+        size = float(weights.sum() ** 2 / np.sum(weights * weights))
+        proposals = replace(Proposals.of(points, weights, size, random), kernels=first.kernels)
+        if size >= ENOUGH:
+            break
+    return proposals, spent
+
+
+PREPARED, FOUND = 0.6, 0.5
+"""The share of the budget that subset simulation may take, and the precision at which it stops."""
+EXPLORED, CHECKED = 0.5, 0.1
+"""The share of what is left that exploration may take, if subset simulation is in doubt or not."""
+STRANGE = 0.25
+"""Of the first proposals at most are around spread points, beside those of levels."""
+FEW = 50
+"""Spread points at most that rows are drawn around where they are too few for more."""
+BLOCK, FIRST = 16_384, 1024
+
+
+def estimate(problem: Problem, aim: Aim, seed: int, start: Float | None = None) -> Weighted:
+    """Find the event by subset simulation, fit proposals, and draw rows from them.
+
+    Until the precision or the budget is reached.
+
+    Args:
+        problem: the experiment.
+        aim: the event.
+        seed: of all random numbers.
+        start: ``(M, d)`` further points of the event, from a search say.
+    """
+    less = replace(aim, budget=max(int(PREPARED * aim.budget), 1), precision=FOUND)
+    levels = subset.simulate(problem, less, seed)
+    left = aim.budget - levels.evaluations
+    check = min(int(CHECKED * left), levels.evaluations)
+    rest = replace(aim, budget=int(EXPLORED * left) if levels.doubts else check)
+    spread = exploration.explore(problem, rest, seed)
+    Z, weights = seen = _points(levels, spread, aim)
+    helped = start is not None and len(start) > 0
+    if start is not None and helped:
+        more = (weights.sum() if len(Z) else 1.0) / len(start)  # half of the rows look there
+        Z, weights = np.concatenate([Z, start]), np.append(weights, np.full(len(start), more))
+    spent = levels.evaluations + spread.evaluations
+    if not len(Z):
+        return replace(levels, evaluations=spent)
+    random = block_of(seed, 0, 1)
+    explored = levels.doubts and not helped
+    size = spread.hits(spread.there(aim.threshold)) if explored else len(Z) / OF_CHAIN
+    proposals = Proposals.of(Z, weights, size, random)
+    if spread.doubts and not levels.doubts:
+        proposals = proposals.also_around(_heaviest_points(spread, aim))
+    single = SinglePoints.of(problem, aim, seed, *seen, proposals.kernels)
+    spent += single.evaluations
+    if single.doubt:
+        known, facts = spread if levels.doubts else levels, {"single": single.share, "reached": 0.0}
+        doubts = (single.doubt, *known.doubts)
+        return replace(known, evaluations=spent, doubts=doubts, facts=facts)
+    proposals, took = learn(problem, aim, proposals, aim.budget - spent, random)
+    spent += took
+    evidence = Evidence(levels, spread, helped, single.share)
+    return _drawn(problem, aim, seed, proposals, spent, evidence)
+
+
+def _points(levels: Weighted, spread: Weighted, aim: Aim) -> tuple[Float, Float]:
+    """Return points of the event that proposals begin with, ``(M, d)``, and weights, ``(M,)``."""
+    Z, weights = (part[spread.scores >= aim.threshold] for part in (spread.Z, spread.weights))
+    if levels.doubts or not levels.repetitions:
+        return Z, weights
+    there = levels.scores >= aim.threshold
+    known = levels.weights[there]
+    if spread.doubts:
+        return levels.Z[there], known
+    most = STRANGE / (1.0 - STRANGE) * float(known.sum())
+    weights = weights * min(most / float(weights.sum()), 1.0)
+    return np.concatenate([levels.Z[there], Z]), np.append(known, weights)
+
+
+def _heaviest_points(spread: Weighted, aim: Aim) -> Float:
+    """Return the points of the event that are likeliest on the road, `FEW` at most."""
+    order = np.argsort(-spread.weights * spread.there(aim.threshold), kind="stable")
+    found: Float = spread.Z[order[: min(FEW, int(spread.there(aim.threshold).sum()))]]
+    return found
+
+
+def _drawn(
+    problem: Problem, aim: Aim, seed: int, proposals: Proposals, spent: int, evidence: Evidence
+) -> Weighted:
+    """Draw rows until the result is believed and precise, or the budget is spent."""
+    kept: list[tuple[Float, Float, Float]] = []
+    drawn = used = block = 0
+    check, limit = FIRST, max(aim.budget - spent, 1)
+    while used < limit:
+        block += 1
+        n = min(check - drawn, BLOCK, limit - used)
+        Z, weights = proposals.draw(n, block_of(seed, 0, 2, block))
+        drawn += n
+        good = problem.feasible(Z)
+        found = problem.evaluate(Z[good], aim.least)
+        used += len(found)
+        hit = found[:, SCORE] >= aim.least
+        kept.append((Z[good][hit], found[hit], weights[good][hit]))
+        if drawn == check:
+            check *= 2
+            result = evidence.judge(_result(problem, kept, drawn, spent + used), aim)
+            if not result.doubts and result.probability(aim.threshold).precision <= aim.precision:
+                break
+    result = evidence.judge(_result(problem, kept, drawn, spent + used), aim)
+    components = float(len(proposals.fitted.weights))
+    return replace(result, facts={"components": components, **result.facts})
+
+
+def _result(
+    problem: Problem, kept: list[tuple[Float, Float, Float]], drawn: int, spent: int
+) -> Weighted:
+    Z, found, weight = (np.concatenate(one) for one in zip(*kept, strict=True))
+    low, share, high = problem.share
+    factor = 1.0 / (drawn * share)
+    return Weighted(
+        Z, found, weight * factor, drawn, np.empty(0, np.int64), 0, factor / DEFENSIVE,
+        (1.0 / high, 1.0 / share, 1.0 / low), spent,
+    )  # fmt: skip

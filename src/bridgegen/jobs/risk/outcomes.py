@@ -1,0 +1,221 @@
+"""What becomes of rows: how close each comes to harm, in numbers that an estimator sums up."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import Self
+
+import numpy as np
+import numpy.typing as npt
+
+from bridgegen.assess.conflict.analysis import encounters
+from bridgegen.assess.conflict.findings import Findings
+from bridgegen.assess.conflict.harm import NEAR_MISS, Count, closeness_of_pairs, decisive
+from bridgegen.assess.conflict.plausibility import Implausible, plausibility
+from bridgegen.base.arrays import Float
+from bridgegen.base.errors import UnknownNameError
+from bridgegen.engine.pipeline import Pipeline
+from bridgegen.jobs.risk.estimators.weighted import Weighted
+from bridgegen.scenario.exposure import Exposure
+from bridgegen.scenario.exposure.fit import Fit
+
+ALMOST = 0.999  # of the least harm that counts: conflicts that do not count lead to those that do
+
+
+class Column(IntEnum):
+    """The columns of an outcome; the first is what `estimators` call the score."""
+
+    SCORE = 0
+    """`conflict.harm.closeness_of_pairs` of the worst pair, from a near miss on; below, how near
+    the row comes to any conflict, whether it counts or not. 0 of a row without a result.
+    """
+    OWN = 1
+    """Likewise, where only conflicts count that the ego is responsible for or could prevent.
+    """
+    SEVERITY = 2
+    """Probability of a MAIS3+ injury in the ego's collision."""
+    RESULT = 3
+    """1; 0 where the simulation failed; −1 where the traffic is implausible."""
+    MODE = 4
+    """Number of the failure mode among `Outcomes.modes`; −1 of a harmless row."""
+
+
+@dataclass(frozen=True)
+class Outcomes:
+    """The outcomes of N rows.
+
+    Attributes:
+        values: ``(N, len(Column))``.
+        modes: the words of each failure mode: type of conflict, rule, participant.
+    """
+
+    values: Float
+    modes: tuple[str, ...]
+
+    @classmethod
+    def join(cls, parts: list[Self]) -> "Outcomes":
+        """Return the outcomes of several parts, at least one, in their order."""
+        modes: dict[str, int] = {}
+        values = []
+        for one in parts:
+            numbers = np.array([modes.setdefault(mode, len(modes)) for mode in one.modes], float)
+            found = one.values.copy()
+            has = found[:, Column.MODE] >= 0.0
+            found[has, Column.MODE] = numbers[found[has, Column.MODE].astype(np.int64)]
+            values.append(found)
+        return cls(np.concatenate(values), tuple(modes))
+
+    @classmethod
+    def lost(cls, n: int) -> "Outcomes":
+        """Return those of N rows without a result."""
+        values = np.zeros((n, len(Column)))
+        values[:, Column.MODE] = -1.0
+        return cls(values, ())
+
+
+def outcomes(pipeline: Pipeline, X: Float, count: Count) -> Outcomes:
+    """Simulate N rows, in this thread.
+
+    Args:
+        pipeline: of the driver.
+        X: ``(N, len(space.names))`` feasible rows.
+        count: whose conflicts count.
+    """
+    values = np.zeros((len(X), len(Column)))
+    words = np.full(len(X), "", dtype=object)
+    for at, one in pipeline.by_variant(X):
+        values[at], words[at] = _outcomes(one, X[at], count)
+    harmful = values[:, Column.SCORE] >= NEAR_MISS
+    modes = dict.fromkeys(words[harmful])
+    numbers = {mode: number for number, mode in enumerate(modes)}
+    values[:, Column.MODE] = -1.0
+    values[harmful, Column.MODE] = [numbers[mode] for mode in words[harmful]]
+    return Outcomes(values, tuple(modes))
+
+
+def _outcomes(pipeline: Pipeline, X: Float, count: Count) -> tuple[Float, npt.NDArray[np.object_]]:
+    rollout = pipeline.rollout(X)
+    conflicts = encounters(rollout)
+    gate = plausibility(rollout)
+    other, _ = decisive(conflicts, count)
+    score, own, near = (
+        closeness_of_pairs(conflicts, of).max(axis=1) for of in (count, "ego", "any")
+    )
+    rows = np.arange(len(X))
+    values = np.zeros((len(X), len(Column)))
+    ok = (rollout.status == 0) & (gate.code == Implausible.NONE)
+    led = np.where(score >= NEAR_MISS, score, ALMOST * np.minimum(near, NEAR_MISS))
+    values[ok, Column.SCORE], values[ok, Column.OWN] = led[ok], own[ok]
+    values[ok, Column.SEVERITY] = conflicts.severity[rows, other][ok]
+    values[:, Column.RESULT] = np.where(rollout.status != 0, 0.0, np.where(ok, 1.0, -1.0))
+    found = Findings.of(conflicts, gate.labels, count)
+    words = found.conflict_type + ", " + found.rule + ", with " + found.partner
+    return values, words
+
+
+# --- The events whose probability is estimated, by severity ---
+
+
+LEAST = NEAR_MISS
+"""The score from which outcomes are kept."""
+
+INJURY = "mais3"
+"""A serious injury: the mean probability of MAIS3+ in collisions, and no event of its own."""
+
+
+@dataclass(frozen=True)
+class Event:
+    """An event.
+
+    Attributes:
+        score: it happens from this score on; see `outcomes.Column`.
+        description: in words.
+    """
+
+    score: float
+    description: str
+
+
+EVENTS: Mapping[str, Event] = {
+    "conflict": Event(NEAR_MISS, "a near miss or a collision"),
+    "collision": Event(2.0 * NEAR_MISS, "a collision"),
+}
+"""By name; the last one is the default aim."""
+
+WORDS: Mapping[str, str] = {
+    **{name: one.description for name, one in EVENTS.items()},
+    INJURY: "a collision with a serious injury (MAIS3+)",
+}
+"""All that a risk states, by name."""
+
+
+def require(name: str) -> Event:
+    """Return the event of that name.
+
+    Raises:
+        UnknownNameError: there is none.
+    """
+    if name not in EVENTS:
+        raise UnknownNameError("event", name, EVENTS)
+    return EVENTS[name]
+
+
+# --- How much few data leave open: the same outcomes, weighted for exposures of resampled events --
+
+
+FEWEST = 10.0
+"""Effective hits that a resampled exposure must leave, or its weights say too little."""
+MOST_LEFT_OUT = 0.1  # of the exposures
+MOST_ROWS = 5000  # outcomes that are weighted
+
+
+@dataclass(frozen=True)
+class DataBand:
+    """Between which probabilities the exposures of resampled events lie.
+
+    Attributes:
+        low: the 2.5 % quantile; None if that cannot be said.
+        high: the 97.5 % quantile; likewise.
+        exposures: how many there are.
+        left_out: how many have their harmful encounters where too few rows were simulated.
+    """
+
+    low: float | None
+    high: float | None
+    exposures: int
+    left_out: int
+
+
+def data_band(exposure: Exposure, weighted: Weighted, threshold: float, fit: Fit) -> DataBand:
+    """Return how the probability of an event varies with the exposure.
+
+    An outcome's weight is multiplied by how much likelier its row is in an exposure than in the
+    fitted one.
+
+    Args:
+        exposure: of the outcomes: the fitted one, or one like it.
+        weighted: the outcomes.
+        threshold: the event's.
+        fit: to the events.
+    """
+    replicates = fit.replicates
+    hits = np.flatnonzero(weighted.there(threshold))
+    at = hits[:: max(1, len(hits) // MOST_ROWS)]
+    if not len(at):
+        return DataBand(None, None, len(replicates), len(replicates))
+    X = exposure.from_normal(weighted.Z[at])
+    weights, before = weighted.weights[at], fit.exposure.log_density(X)
+    good = np.isfinite(before)
+    X, weights, before = X[good], weights[good], before[good]
+    factors = []
+    for one in replicates:
+        parts: Float = weights * np.exp(np.minimum(one.log_density(X) - before, 50.0))
+        total, squares = float(parts.sum()), float(np.sum(parts * parts))
+        if squares > 0.0 and total * total / squares >= FEWEST:
+            factors.append(total / float(weights.sum()))
+    left_out = len(replicates) - len(factors)
+    if left_out > MOST_LEFT_OUT * len(replicates):
+        return DataBand(None, None, len(replicates), left_out)
+    p = weighted.probability(threshold).estimate
+    low, high = np.quantile(factors, [0.025, 0.975]).tolist()
+    return DataBand(p * low, min(p * high, 1.0), len(replicates), left_out)

@@ -1,0 +1,330 @@
+"""A risk: probabilities with intervals, rates, what carries them; and its files."""
+
+import io
+import json
+import math
+from collections.abc import Mapping
+from csv import writer
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from bridgegen.base.arrays import Float
+from bridgegen.base.disk import write_whole
+from bridgegen.jobs.risk.elsewhere import Elsewhere
+from bridgegen.jobs.risk.estimators.weighted import FEWEST_HITS, Probability, Weighted
+from bridgegen.jobs.risk.experiment import Estimated
+from bridgegen.jobs.risk.outcomes import EVENTS, INJURY, WORDS, Column, DataBand
+from bridgegen.scenario.exposure import Exposure
+from bridgegen.scenario.exposure.exposure import Rate
+
+RECORD, PAGE, TABLE = "risk.json", "risk.html", "harmful.csv"
+MOST_ROWS = 100_000  # of the table
+BINS = 10  # equally likely classes of a parameter
+COMPARED = 20_000  # rows of the exposure, which harmful ones are compared with
+
+
+@dataclass(frozen=True)
+class Finding:
+    """A probability, or why it is not known.
+
+    Attributes:
+        probability: None where it is not believed.
+        hits: the effective number of rows behind it.
+        doubt: why it is not believed; empty where it is.
+    """
+
+    probability: Probability | None
+    hits: float
+    doubt: str = ""
+
+
+@dataclass(frozen=True)
+class ParameterShare:
+    """How a parameter's values differ between harmful rows and the road.
+
+    Attributes:
+        name: of the parameter.
+        unit: of its values.
+        distance: of both distributions, 0 (harm does not depend on it) to 1: the share of the
+            probability that would have to move (total variation, by tenths of the road's values).
+        harmful: its 5 %, 50 % and 95 % quantiles among harmful rows.
+        road: likewise, on the road.
+        shares: ``(BINS,)`` of harmful rows in each tenth of the road's values.
+    """
+
+    name: str
+    unit: str
+    distance: float
+    harmful: tuple[float, float, float]
+    road: tuple[float, float, float]
+    shares: Float
+
+
+@dataclass(frozen=True)
+class Likely:
+    """The harmful encounter of a failure mode that is most likely on the road.
+
+    Attributes:
+        mode: the failure mode's words.
+        x: its row, ``(len(space.names),)``.
+        name: of its scenario's files, without suffix.
+        picture: it as a moving picture, SVG.
+    """
+
+    mode: str
+    x: Float
+    name: str
+    picture: str
+
+
+@dataclass(frozen=True)
+class Risk:
+    """How likely harm is in a scenario, for one driver.
+
+    Attributes:
+        exposure: how its parameters are distributed.
+        driver: of the ego.
+        event: the event that was aimed at, of `events.EVENTS`.
+        count: whose conflicts count.
+        estimated: the method and what it found.
+        seed: of all random numbers.
+        budget: evaluations, at most.
+        modes: the words of failure modes, by their number in outcomes.
+        failed: rows without a result; they count as harmless.
+        implausible: rows whose traffic could not happen; likewise.
+        check: the same event by Monte Carlo, if that was asked for.
+        data: how much few data leave open, if the events of the exposure are known.
+        elsewhere: the event in another simulator, if that was asked for.
+        most_likely: the most likely harmful encounters, of each failure mode one, the likeliest
+            failure mode first.
+        command: makes it again.
+        folder: of its files.
+    """
+
+    exposure: Exposure
+    driver: str
+    event: str
+    count: str
+    estimated: Estimated
+    seed: int
+    budget: int
+    modes: tuple[str, ...]
+    failed: int
+    implausible: int
+    check: Weighted | None
+    data: DataBand | None
+    elsewhere: Elsewhere | None
+    most_likely: tuple[Likely, ...]
+    command: str
+    folder: Path
+
+    @property
+    def weighted(self) -> Weighted:
+        """The outcomes with their weights."""
+        return self.estimated.weighted
+
+    @property
+    def believed(self) -> bool:
+        """Whether the event's interval is believed."""
+        return self.probability(self.event) is not None
+
+    @cached_property
+    def findings(self) -> dict[str, Finding]:
+        """The probability of each event per encounter, by name; and of a serious injury."""
+        return {name: self._finding(self._values(name)) for name in (*EVENTS, INJURY)}
+
+    def probability(self, name: str) -> Probability | None:
+        """Return the probability of an event per encounter; None where it is not believed."""
+        return self.findings[name].probability
+
+    @property
+    def preventable(self) -> Finding | None:
+        """The event where the ego is responsible or could prevent it; None if only those count."""
+        if self.count == "ego":
+            return None
+        own = self.weighted.outcomes[:, Column.OWN] >= EVENTS[self.event].score
+        return self._finding(self._values(self.event) * own)
+
+    @cached_property
+    def by_mode(self) -> dict[str, Finding]:
+        """The probability of the event by failure mode, most likely first."""
+        values, number = self._values(self.event), self.weighted.outcomes[:, Column.MODE]
+        parts = self.weighted.weights * values
+        sums = {words: float(parts[number == k].sum()) for k, words in enumerate(self.modes)}
+        order = sorted((one for one in sums if sums[one] > 0.0), key=lambda one: -sums[one])
+        return {one: self._finding(values * (number == self.modes.index(one))) for one in order}
+
+    @property
+    def stated(self) -> tuple[tuple[str, str | None, Finding], ...]:
+        """What is stated, in order: words, the event's name for its rate, and the finding."""
+        found = [(WORDS[name], name, one) for name, one in self.findings.items()]
+        if self.preventable is not None:
+            words = f"{WORDS[self.event]}, preventable"
+            return (*found, (words, None, self.preventable))
+        return tuple(found)
+
+    def rate(self, name: str, unit: str) -> Rate | None:
+        """Return how often an event happens per hour or km; None where that is not known.
+
+        The intervals of both factors are combined as if their logarithms were independent.
+
+        Args:
+            name: of the event.
+            unit: "h" or "km".
+        """
+        met, p = self.exposure.encounters, self.probability(name)
+        each = None if met is None else met.per_hour if unit == "h" else met.per_km
+        if each is None or p is None:
+            return None
+        estimate = each.estimate * p.estimate
+        if not (estimate > 0.0 and each.low > 0.0 and p.low > 0.0):
+            return Rate(estimate, 0.0, each.high * p.high)
+        low = math.hypot(math.log(each.estimate / each.low), math.log(p.estimate / p.low))
+        high = math.hypot(math.log(each.high / each.estimate), math.log(p.high / p.estimate))
+        return Rate(estimate, estimate * math.exp(-low), estimate * math.exp(high))
+
+    @cached_property
+    def parameters(self) -> tuple[ParameterShare, ...]:
+        """How harmful rows differ from the road, the most different parameter first."""
+        there = self._values(self.event) > 0.0
+        X, weights = self._rows(self.event), self.weighted.weights[there]
+        if self.weighted.doubts or self.weighted.hits(self._values(self.event)) < FEWEST_HITS:
+            return ()
+        road = self.exposure.sample(COMPARED, self.seed).X
+        found = [
+            _share(name, self.exposure.space.parameters[name].unit, X[:, k], weights, road[:, k])
+            for k, name in enumerate(self.exposure.space.names)
+            if name in self.exposure.marginals
+        ]
+        return tuple(sorted(found, key=lambda one: -one.distance))
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return what ``risk.json`` says."""
+        exposure, weighted = self.exposure, self.weighted
+        share = exposure.feasible_share
+        return {
+            "scenario": exposure.scenario.name,
+            "driver": self.driver,
+            "exposure": {"source": exposure.source, "feasible_share": share.estimate},
+            "event": self.event,
+            "count": self.count,
+            "method": self.estimated.method,
+            "why": self.estimated.why,
+            "believed": self.believed,
+            "doubts": list(weighted.doubts),
+            "evaluations": weighted.evaluations,
+            "budget": self.budget,
+            "seed": self.seed,
+            "failed": self.failed,
+            "implausible": self.implausible,
+            "per_encounter": {name: _finding(one) for name, one in self.findings.items()},
+            "preventable": None if self.preventable is None else _finding(self.preventable),
+            "by_mode": {words: _finding(one) for words, one in self.by_mode.items()},
+            "per_hour": {name: _rate(self.rate(name, "h")) for name in self.findings},
+            "per_km": {name: _rate(self.rate(name, "km")) for name in self.findings},
+            "parameters": {
+                one.name: {
+                    "unit": one.unit, "distance": one.distance, "harmful": list(one.harmful),
+                    "road": list(one.road),
+                }
+                for one in self.parameters
+            },
+            "most_likely": [
+                {"mode": one.mode, "files": one.name, "values": exposure.space.values(one.x)}
+                for one in self.most_likely
+            ],
+            "diagnostics": weighted.facts,
+            "check": None
+            if self.check is None
+            else {
+                **vars(self.check.probability(EVENTS[self.event].score)),
+                "evaluations": self.check.evaluations,
+            },
+            "data": None if self.data is None else vars(self.data),
+            "elsewhere": None if self.elsewhere is None else self.elsewhere.to_dict(),
+            "command": self.command,
+        }  # fmt: skip
+
+    def write(self) -> tuple[Path, ...]:
+        """Write the record, the page and the table of harmful rows.
+
+        Raises:
+            StorageError: they cannot be written.
+        """
+        from bridgegen.jobs.risk.page import write_page
+
+        paths = tuple(self.folder / name for name in (RECORD, PAGE, TABLE))
+        write_whole(paths[0], [json.dumps(self.to_dict(), indent=1).encode()])
+        write_page(paths[1], self)
+        write_whole(paths[2], [self._table().encode()])
+        return paths
+
+    def _table(self) -> str:
+        text = io.StringIO()
+        out = writer(text, lineterminator="\n")
+        names = self.exposure.space.names
+        out.writerow([*names, "conflict", "severity", "mode", "weight"])
+        Z, found = self.weighted.Z[:MOST_ROWS], self.weighted.outcomes[:MOST_ROWS]
+        X = self.exposure.from_normal(Z) if len(Z) else np.empty((0, len(names)))
+        for x, one, weight in zip(X, found, self.weighted.weights[:MOST_ROWS], strict=True):
+            number = int(one[Column.MODE])
+            mode = self.modes[number] if number >= 0 else ""
+            kind = "collision" if one[Column.SCORE] >= EVENTS["collision"].score else "near miss"
+            severity = repr(float(one[Column.SEVERITY]))
+            out.writerow([*map(repr, x.tolist()), kind, severity, mode, repr(float(weight))])
+        return text.getvalue()
+
+    def _values(self, name: str) -> Float:
+        """Return what an event's probability is the mean of, ``(M,)``."""
+        if name == INJURY:
+            return self.weighted.outcomes[:, Column.SEVERITY] * self._values("collision")
+        return self.weighted.there(EVENTS[name].score)
+
+    def _rows(self, name: str) -> Float:
+        Z = self.weighted.Z[self._values(name) > 0.0]
+        return (
+            self.exposure.from_normal(Z)
+            if len(Z)
+            else np.empty((0, len(self.exposure.space.names)))
+        )
+
+    def _finding(self, values: Float) -> Finding:
+        hits, one = self.weighted.hits(values), self.weighted
+        if one.doubts:  # of the aim; what comes with it is no surer
+            return Finding(None, hits, one.doubts[0])
+        counted = bool(one.rows) and (not one.weights.size or np.ptp(one.weights) == 0.0)
+        if counted or hits >= FEWEST_HITS:
+            return Finding(one.mean(values), hits)
+        return Finding(None, hits, f"{hits:.0f} effective rows, and {FEWEST_HITS:.0f} are needed")
+
+
+def _share(name: str, unit: str, values: Float, weights: Float, road: Float) -> ParameterShare:
+    edges = np.quantile(road, np.linspace(0.0, 1.0, BINS + 1)[1:-1])
+    total = weights.sum()
+    mine = np.bincount(np.searchsorted(edges, values), weights, BINS) / total
+    usual = np.bincount(np.searchsorted(edges, road), minlength=BINS) / len(road)
+    order = np.argsort(values)
+    sums = np.cumsum(weights[order]) / total
+    ends = (0.05, 0.5, 0.95)
+    low, middle, high = values[order][np.minimum(np.searchsorted(sums, ends), len(values) - 1)]
+    first, second, third = np.quantile(road, ends)
+    distance = 0.5 * float(np.abs(mine - usual).sum())
+    return ParameterShare(
+        name, unit, distance, (float(low), float(middle), float(high)),
+        (float(first), float(second), float(third)), mine,
+    )  # fmt: skip
+
+
+def _finding(one: Finding) -> Mapping[str, Any]:
+    found: dict[str, Any] = {"hits": one.hits}
+    if one.probability is None:
+        return found | {"estimate": None, "doubt": one.doubt}
+    return found | vars(one.probability)
+
+
+def _rate(one: Rate | None) -> Mapping[str, float] | None:
+    return None if one is None else vars(one)

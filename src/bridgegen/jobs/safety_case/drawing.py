@@ -1,0 +1,323 @@
+"""A layout as SVG, in the shapes of the notation; colours are the page's."""
+
+import textwrap
+from collections.abc import Sequence
+from dataclasses import dataclass
+from html import escape
+from itertools import pairwise
+
+from bridgegen.jobs.safety_case.model import Element, RelationKind, SafetyCase
+
+# --- Where the elements of an argument are drawn: a head, and a column for each goal below it ---
+
+
+Point = tuple[float, float]
+
+LINE, PAD, CHARACTER = 14.5, 8.0, 6.1
+"""Height of a line, margin of a text, and width of a character [pixels]."""
+GAP, INDENT, TRUNK = 12.0, 15.0, 6.0
+BADGE = 48.0
+"""Width of a solution, assumption or justification whose text stands beside it."""
+WIDTH, LEAST, MOST = 1356.0, 140.0, 340.0
+"""Width of a drawing, if its columns are neither narrower nor wider than this."""
+HEAD, SIDE = 330.0, 380.0
+"""Width of the elements in the middle of the head, and of those beside them."""
+MOST_LINES = 9
+"""Maximum number of lines of a text; the table has all of it."""
+ROUND = ("Solution", "CounterSolution", "Assumption", "Justification")
+
+
+@dataclass(frozen=True)
+class Box:
+    """An element as it is drawn; lengths in pixels.
+
+    Attributes:
+        element: it.
+        x: left edge.
+        y: upper edge.
+        width: of all, its text included.
+        height: likewise.
+        lines: of its text.
+        badge: whether its text stands beside its shape, not in it.
+    """
+
+    element: Element
+    x: float
+    y: float
+    width: float
+    height: float
+    lines: tuple[str, ...]
+    badge: bool
+
+    @property
+    def bottom(self) -> float:
+        """The lower edge."""
+        return self.y + self.height
+
+
+@dataclass(frozen=True)
+class Edge:
+    """A relation as it is drawn: corners of a line, the arrow at the last."""
+
+    kind: RelationKind
+    points: tuple[Point, ...]
+
+
+@dataclass(frozen=True)
+class Layout:
+    """A drawing of an argument."""
+
+    width: float
+    height: float
+    boxes: tuple[Box, ...]
+    edges: tuple[Edge, ...]
+
+
+def layout(case: SafetyCase, top: str, *, deep: bool = True) -> Layout:
+    """Return the drawing of the argument below a goal, which a strategy supports.
+
+    Args:
+        case: all of it.
+        top: id of the goal.
+        deep: whether what is below the strategy's goals is drawn, too.
+    """
+    return _Layout(case).place(case.element(top), deep)
+
+
+class _Layout:
+    def __init__(self, case: SafetyCase) -> None:
+        self._case = case
+        self._boxes: list[Box] = []
+        self._edges: list[Edge] = []
+
+    def place(self, goal: Element, deep: bool) -> Layout:
+        (strategy,) = self._case.targets(goal.id, "SupportedBy")
+        goals = list(self._case.targets(strategy.id, "SupportedBy"))
+        weights = [self._weight(one) if deep else 1.0 for one in goals]
+        gaps = GAP * (len(goals) - 1)
+        unit = min(max((WIDTH - gaps) / sum(weights), LEAST), MOST)
+        widths = [unit * one for one in weights]
+        columns = sum(widths) + gaps
+        width = max(columns, HEAD + 2.0 * SIDE + 4.0 * GAP)
+        upper, below = self._head(goal, 0.0, width)
+        lower, below = self._head(strategy, below + 2.0 * GAP, width)
+        middle = 0.5 * width
+        self._edge("SupportedBy", (middle, upper.bottom), (middle, lower.y))
+        bus = below + 1.5 * GAP
+        x, height = 0.5 * (width - columns), 0.0
+        for one, own in zip(goals, widths, strict=True):
+            box, bottom = self._tree(one, x, bus + 2.0 * GAP, own, deep)
+            end = x + 0.5 * own
+            self._edge(
+                "SupportedBy", (middle, lower.bottom), (middle, bus), (end, bus), (end, box.y)
+            )
+            x, height = x + own + GAP, max(height, bottom)
+        return Layout(width, height + 2.0, tuple(self._boxes), tuple(self._edges))
+
+    def _weight(self, goal: Element) -> float:
+        """Return how wide a goal's column is to others: deep ones need room, leaves do not."""
+        if next(self._case.challengers(goal.id), None) is not None:
+            return 1.4
+        return {1: 0.8, 2: 1.0}.get(self._depth(goal), 1.1)
+
+    def _depth(self, one: Element) -> int:
+        return 1 + max((self._depth(other) for other in self._below(one)), default=0)
+
+    def _below(self, one: Element) -> list[Element]:
+        return [
+            *self._case.targets(one.id, "InContextOf"),
+            *self._case.challengers(one.id),
+            *self._case.targets(one.id, "SupportedBy"),
+        ]
+
+    def _head(self, one: Element, y: float, width: float) -> tuple[Box, float]:
+        """Place an element in the middle, its contexts on both sides; return the lower edge."""
+        box = self._box(one, 0.5 * (width - HEAD), y, HEAD)
+        context = list(self._case.targets(one.id, "InContextOf"))
+        half = (len(context) + 1) // 2
+        bottom = box.bottom
+        sides = (
+            (context[:half], 0.0, SIDE, box.x),
+            (context[half:], width - SIDE, 0.0, box.x + HEAD),
+        )
+        for some, x, inner, edge in sides:
+            at = y
+            for each in some:
+                beside = self._box(each, x, at, SIDE)
+                end, middle = (x + inner, 0.5 * (edge + x + inner))
+                line = at + min(0.5 * beside.height, 0.5 * BADGE)
+                start = y + min(0.5 * box.height, 24.0)
+                self._edge(
+                    "InContextOf", (edge, start), (middle, start), (middle, line), (end, line)
+                )
+                at = beside.bottom + 0.75 * GAP
+            bottom = max(bottom, at - 0.75 * GAP)
+        return box, bottom
+
+    def _tree(
+        self, one: Element, x: float, y: float, width: float, deep: bool = True
+    ) -> tuple[Box, float]:
+        """Place an element and all below it in a column; return the lower edge of all."""
+        box = self._box(one, x, y, width)
+        bottom = box.bottom + (10.0 if one.undeveloped else 0.0)
+        if not deep:
+            return box, bottom
+        for kind in ("InContextOf", "Challenges", "SupportedBy"):
+            found = (
+                self._case.challengers(one.id)
+                if kind == "Challenges"
+                else self._case.targets(one.id, kind)
+            )
+            for other in found:
+                child, end = self._tree(other, x + INDENT, bottom + GAP, width - INDENT)
+                line = child.y + min(0.5 * child.height, 0.5 * BADGE)
+                points = ((x + TRUNK, box.bottom), (x + TRUNK, line), (child.x, line))
+                self._edge(kind, *(points[::-1] if kind == "Challenges" else points))
+                bottom = end
+        return box, bottom
+
+    def _box(self, one: Element, x: float, y: float, width: float) -> Box:
+        badge = one.kind in ROUND
+        inside = (
+            width
+            - 2.0 * PAD
+            - (BADGE if badge else 0.0)
+            - (24.0 if one.kind == "Strategy" else 0.0)
+        )
+        lines = wrapped(one.statement.text, inside)
+        rows = len(lines) if badge else len(lines) + 1  # and its id
+        height = rows * LINE + (4.0 if badge else 2.0 * PAD)
+        if badge:
+            height = max(height, BADGE)
+        box = Box(one, x, y, width, height, lines, badge)
+        self._boxes.append(box)
+        return box
+
+    def _edge(self, kind: RelationKind, *points: Point) -> None:
+        self._edges.append(Edge(kind, points))
+
+
+def wrapped(text: str, width: float) -> tuple[str, ...]:
+    """Return the lines of a text that fit into a width [pixels], at most ``MOST_LINES``."""
+    characters = max(8, int(width / CHARACTER))
+    lines: Sequence[str] = textwrap.wrap(text, characters, break_on_hyphens=False) or [""]
+    if len(lines) > MOST_LINES:
+        last = lines[MOST_LINES - 1][: characters - 2].rstrip(" ,;.")
+        lines = [*lines[: MOST_LINES - 1], f"{last} …"]
+    return tuple(lines)
+
+
+SLANT = 12.0
+"""By how much a strategy's sides lean [pixels]."""
+
+_CLASS = {
+    "supported": "ok",
+    "not supported": "bad",
+    "incomplete": "open",
+    "undeveloped": "open",
+    "": "",
+}
+
+
+def drawing(found: Layout, label: str) -> str:
+    """Return an inline SVG.
+
+    Args:
+        found: what is drawn.
+        label: of the whole, for people who do not see it.
+    """
+    parts = [
+        f'<svg class="gsn" role="img" aria-label="{escape(label)}" width="{found.width + 4:.0f}" '
+        f'height="{found.height + 4:.0f}" viewBox="-2 -2 {found.width + 4:.0f} '
+        f'{found.height + 4:.0f}">',
+        *map(_edge, found.edges),
+        *map(_element, found.boxes),
+        "</svg>",
+    ]
+    return "".join(parts)
+
+
+def _edge(edge: Edge) -> str:
+    line = " ".join(f"{x:.1f},{y:.1f}" for x, y in edge.points)
+    (x0, y0), (x, y) = next(
+        pair for pair in reversed([*pairwise(edge.points)]) if pair[0] != pair[1]
+    )
+    dx, dy = (x > x0) - (x < x0), (y > y0) - (y < y0)
+    back = [(x - 9 * dx - 4 * dy, y - 9 * dy - 4 * dx), (x - 9 * dx + 4 * dy, y - 9 * dy + 4 * dx)]
+    tip = " ".join(f"{a:.1f},{b:.1f}" for a, b in (back[0], (x, y), back[1]))
+    kind = edge.kind.lower()
+    return f'<polyline class="{kind}" points="{line}"/><polygon class="tip {kind}" points="{tip}"/>'
+
+
+def _element(box: Box) -> str:
+    one = box.element
+    kind = one.kind.removeprefix("Counter").lower()
+    counter = " counter" if one.kind.startswith("Counter") else ""
+    words = f"{one.id}: {one.statement.text}" + (f" ({one.status})" if one.status else "")
+    return (
+        f'<a href="#{escape(one.id)}" class="{kind}{counter} {_CLASS[one.status]}">'
+        f"<title>{escape(words)}</title>{_shape(box)}{_text(box)}{_marks(box)}</a>"
+    )
+
+
+def _shape(box: Box) -> str:
+    x, y, w, h = box.x, box.y, box.width, box.height
+    kind = box.element.kind
+    if box.badge:
+        r = 0.5 * BADGE - 2.0
+        cx, cy = x + 0.5 * BADGE, y + 0.5 * BADGE
+        if kind in ("Solution", "CounterSolution"):
+            return f'<circle class="shape" cx="{cx:.1f}" cy="{cy:.1f}" r="{r:.1f}"/>'
+        letter = kind[0]
+        return (
+            f'<ellipse class="shape" cx="{cx:.1f}" cy="{cy:.1f}" rx="{r:.1f}" ry="{0.7 * r:.1f}"/>'
+            f'<text class="letter" x="{cx + r - 6:.1f}" y="{cy + 0.7 * r + 7:.1f}">{letter}</text>'
+        )
+    if kind == "Strategy":
+        corners = ((x + SLANT, y), (x + w, y), (x + w - SLANT, y + h), (x, y + h))
+        points = " ".join(f"{a:.1f},{b:.1f}" for a, b in corners)
+        return f'<polygon class="shape" points="{points}"/>'
+    rounded = ' rx="16"' if kind == "Context" else ""
+    return (
+        f'<rect class="shape" x="{x:.1f}" y="{y:.1f}" width="{w:.1f}" height="{h:.1f}"{rounded}/>'
+    )
+
+
+def _text(box: Box) -> str:
+    one = box.element
+    if box.badge:
+        x, y = box.x + BADGE + 4.0, box.y + 13.0
+        middle, height = box.x + 0.5 * BADGE, box.y + 0.5 * BADGE
+        letters = one.id.rstrip("0123456789.")
+        name = "".join(
+            f'<text class="badge" x="{middle:.1f}" y="{height + drop:.1f}">{escape(part)}</text>'
+            for part, drop in ((letters, -1.5), (one.id.removeprefix(letters), 9.0))
+        )
+    else:
+        x = box.x + PAD + (SLANT if one.kind == "Strategy" else 0.0)
+        y = box.y + PAD + 10.0
+        word = f' <tspan class="status">{one.status}</tspan>' if one.status else ""
+        name = f'<text class="id" x="{x:.1f}" y="{y:.1f}">{escape(one.id)}{word}</text>'
+        y += LINE
+    lines = "".join(
+        f'<tspan x="{x:.1f}" y="{y + k * LINE:.1f}">{escape(line)}</tspan>'
+        for k, line in enumerate(box.lines)
+    )
+    return f"{name}<text>{lines}</text>"
+
+
+def _marks(box: Box) -> str:
+    """Return the diamond of an undeveloped goal, and the cross of a defeated one."""
+    x, y, one = box.x + 0.5 * box.width, box.bottom, box.element
+    marks = ""
+    if one.undeveloped:
+        corners = ((x, y), (x + 9, y + 9), (x, y + 18), (x - 9, y + 9))
+        points = " ".join(f"{a:.1f},{b:.1f}" for a, b in corners)
+        marks += f'<polygon class="diamond" points="{points}"/>'
+    if one.defeated:
+        left, right = box.x, box.x + box.width
+        for a, b in ((box.y, y), (y, box.y)):
+            marks += (
+                f'<line class="cross" x1="{left:.1f}" y1="{a:.1f}" x2="{right:.1f}" y2="{b:.1f}"/>'
+            )
+    return marks

@@ -1,0 +1,44 @@
+"""The coverage of the search space by a run on disk."""
+
+from pathlib import Path
+
+from bridgegen.jobs.search.restored import searched
+from bridgegen.jobs.search.run import Run
+from bridgegen.jobs.search.settings import Settings
+from bridgegen.scenario.exposure import Exposure
+from bridgegen.scenario.exposure.reader import chosen_exposure, rows_on_the_road
+from bridgegen.scenario.language.coverage import MAX_STRENGTH, Coverage, coverage
+
+
+def coverage_of(
+    folder: Path | str,
+    *,
+    bins: int = 5,
+    strength: int = MAX_STRENGTH,
+    exposure: str | Path | Exposure | None = None,
+) -> tuple[Settings, Coverage]:
+    """Return a run's settings, and the bins and t-way combinations that it evaluated.
+
+    A row whose simulation failed covers nothing.
+
+    Args:
+        folder: of a run, finished or not.
+        bins: equal bins per parameter; an integer has one for each value.
+        strength: the largest t.
+        exposure: how parameters are distributed on the road, see `chosen_exposure`.
+
+    Raises:
+        StorageError: not a run, or its scenario or map is not what it was.
+        FileFormatError: the exposure's file cannot be read.
+        ScenarioError: the exposure breaks a rule.
+        InputError: the scenario or the map is missing; bins or strength out of range; the exposure
+            contradicts the scenario.
+    """
+    run = Run(folder)
+    scenario, space, _ = searched(run)
+    distribution = chosen_exposure(scenario, exposure)
+    met = None if distribution is None else rows_on_the_road(distribution, space)
+    rows = run.rows()
+    ok = rows.status == 0
+    found = coverage(space, rows.X[ok], rows.critical[ok], bins=bins, strength=strength, met=met)
+    return run.settings, found

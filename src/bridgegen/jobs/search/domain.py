@@ -1,0 +1,143 @@
+"""The part of an operational design domain that a scenario needs, from its map and its actors."""
+
+import math
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+
+from bridgegen.base.arrays import Bool, Float
+from bridgegen.drivers.planners import DOMAINS
+from bridgegen.engine.options import PipelineOptions
+from bridgegen.engine.pipeline import Pipeline
+from bridgegen.engine.workers import Threads
+from bridgegen.jobs.search.scenarios import load
+from bridgegen.openx.opendrive.geometry import reference_pose
+from bridgegen.openx.opendrive.model import OpenDrive, Road
+from bridgegen.scenario.participants import PARTICIPANTS
+
+CROSSES = math.radians(45.0)
+"""Ways through a junction whose directions differ by more cross or turn; those of a merge do
+not."""
+
+AGAINST = math.radians(135.0)
+"""A participant whose heading at the start differs by more from the ego's comes towards it."""
+
+VULNERABLE = frozenset({"pedestrian", "bicycle"})
+"""Conduct of vulnerable participants."""
+
+
+def domain_of(scenario: str) -> frozenset[str]:
+    """Return which of `DOMAINS` a logical scenario needs, at its nominal values.
+
+    One of "junction" (the ego's route leads through one in which ways cross or turn), "road" (there
+    are opposite lanes) and "motorway"; "oncoming" if on the latter somebody drives against the
+    ego's direction; and "vulnerable" if a pedestrian or a cyclist takes part.
+
+    Args:
+        scenario: name of the catalogue, or path of a file.
+
+    Raises:
+        InputError: no such scenario, or an invalid one.
+    """
+    logical = load(scenario)
+    options = PipelineOptions(ego="route-follower")
+    return _needed_by(Pipeline(logical, logical.space(), options, workers=Threads(1)))[0]
+
+
+def outside(pipeline: Pipeline) -> str:
+    """Return a sentence if the ego's driver says that it is not made for the scenario; else "".
+
+    A driver for motorways may also follow a road on which there are lanes, but at first nobody,
+    the other way.
+    """
+    domain = pipeline.driver.domain
+    if not domain:
+        return ""
+    needs, is_met = _needed_by(pipeline)
+    odd = needs - domain
+    if "motorway" in domain and not is_met:
+        odd -= {"road"}
+    if not odd:
+        return ""
+    there = " and ".join(what for word, what in DOMAINS.items() if word in odd)
+    return (
+        f"outside the domain of {pipeline.driver.name} ({in_words(domain)}): "
+        f"{pipeline.scenario.name} has {there}"
+    )
+
+
+def _needed_by(pipeline: Pipeline) -> tuple[frozenset[str], bool]:
+    """Return what the nominal scenario needs, and whether another starts against the ego."""
+    nominal = pipeline.space.row({})[np.newaxis]
+    _, one = next(pipeline.by_variant(nominal))
+    model = one.source.roads(one.space.values(nominal[0]))
+    embedded = one.simulator.embedded
+    roads = embedded.roads([model])
+    names = [(i, name) for i, name in enumerate(one.space.names) if name not in one.simulator.fixed]
+    columns = {name: nominal[:, i] for i, name in names}
+    batch = embedded.batch(roads, np.zeros(1, np.int64), columns)
+    batch.start()
+    headings = batch.record.h[0, :, 0]
+    kinds = [kind for text in pipeline.kinds.values() for kind in text.split(" or ")]
+    against = _against(headings)
+    return needed(model, roads.roads_ahead(0), headings, kinds), bool(against.any())
+
+
+def needed(
+    model: OpenDrive, ahead: Sequence[str], headings: Float, kinds: Iterable[str]
+) -> frozenset[str]:
+    """Return which of `DOMAINS` a concrete scenario needs.
+
+    Args:
+        model: its road network.
+        ahead: ids of the roads of the ego's route.
+        headings: ``(E,)`` [rad] at the start, the ego first.
+        kinds: of the other participants, see `PARTICIPANTS`.
+    """
+    roads = {one.id: one for one in model.roads}
+    own = [roads[one] for one in ahead]
+    known = [PARTICIPANTS[kind] for kind in kinds if kind in PARTICIPANTS]
+    beside = any(one.seen_as.conduct in VULNERABLE for one in known)
+    needs = {"vulnerable"} if beside else set()
+    if any(
+        _crosses(model, junction) for junction in {one.junction for one in own if one.is_connecting}
+    ):
+        return frozenset(needs | {"junction"})
+    if any(_has_opposite_lanes(one) for one in own):
+        return frozenset(needs | {"road"})
+    if _against(headings).any():
+        needs.add("oncoming")
+    return frozenset(needs | {"motorway"})
+
+
+def in_words(domain: Iterable[str]) -> str:
+    """Return words of `DOMAINS` in their order."""
+    return ", ".join(word for word in DOMAINS if word in {*domain})
+
+
+def _crosses(model: OpenDrive, junction: str) -> bool:
+    """Return whether the ways through a junction cross or turn."""
+    ends: list[float] = []
+    for road in model.roads:
+        if road.junction == junction:
+            ends += [reference_pose(road, s).h for s in (0.0, road.length)]
+            if _has_opposite_lanes(road):
+                return True
+    angles = np.array(ends)
+    return bool((np.abs(_wrapped(angles[:, np.newaxis] - angles)) > CROSSES).any())
+
+
+def _against(headings: Float) -> Bool:
+    """Return which of the others start against the ego's direction, ``(E - 1,)``."""
+    against: Bool = np.abs(_wrapped(headings[1:] - headings[0])) > AGAINST
+    return against
+
+
+def _has_opposite_lanes(road: Road) -> bool:
+    ways = {road.direction(one.id) for part in road.sections for one in part.lanes if one.drivable}
+    return len(ways) > 1
+
+
+def _wrapped(angle: Float) -> Float:
+    wrapped: Float = (angle + math.pi) % (2.0 * math.pi) - math.pi
+    return wrapped

@@ -1,0 +1,279 @@
+"""Exported scenarios in the flavours that other tools ask for, each with its map."""
+
+import os
+import re
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from functools import partial
+from importlib.resources import files as resources
+from pathlib import Path
+
+import numpy as np
+
+from bridgegen.base.errors import (
+    FileFormatError,
+    InputError,
+    StorageError,
+    UnknownNameError,
+    UnsupportedError,
+)
+from bridgegen.drivers.drivers import CODES
+from bridgegen.drivers.noise import noise_key
+from bridgegen.engine.simulate import simulate_file
+from bridgegen.jobs.search.exported import FOLDER, MINIMAL
+from bridgegen.jobs.search.run import Run
+from bridgegen.jobs.search.scenario_files import keyed
+from bridgegen.openx.opendrive.model import OpenDrive
+from bridgegen.openx.openscenario import model as osc
+from bridgegen.openx.openscenario import validate
+from bridgegen.openx.openscenario.parameters import numbers
+from bridgegen.openx.openscenario.read import read
+from bridgegen.openx.openscenario.recorded import Recording, recorded
+from bridgegen.openx.openscenario.resolve import resolved
+from bridgegen.openx.openscenario.scenario_runner.convert import CONTROL, for_scenario_runner
+from bridgegen.openx.openscenario.write import VERSIONS, least_version, to_version, to_xml
+from bridgegen.openx.prepared import logic_path, prepared, roads_of
+from bridgegen.openx.xml import read_bytes
+from bridgegen.simulation.embedded.compiler import compile_storyboard
+
+EXPORT = "export"
+
+Flavour = Callable[[osc.OpenScenario, Path], osc.OpenScenario]
+
+
+def export(
+    source: Path,
+    flavour: str,
+    *,
+    scenarios: Sequence[str] = (),
+    out: Path | None = None,
+    town: str | None = None,
+    notes: list[str] | None = None,
+) -> list[Path]:
+    """Write scenarios in another flavour, each beside a copy of its map.
+
+    The same source gives the same bytes. Files of the same names are replaced, but never the
+    source's own.
+
+    Args:
+        source: the folder of a run, for its exported scenarios, or one ``.xosc`` file.
+        flavour: one of `FLAVOURS`.
+        scenarios: names of a run's scenarios ("0001", "minimal-01"); all but the minimal ones by
+            default.
+        out: the folder to write to; ``export/FLAVOUR`` in the run's or the file's by default.
+        town: for the flavour "carla", CARLA's own map to run on, which is then named instead of
+            a file; that of a run on a map called ``TownNN.xodr`` by default.
+        notes: takes a sentence for each file in which participants other than the ego have a
+            driver that the tools which read the flavour do not know.
+
+    Returns:
+        The files written: an ``.xosc`` and its ``.xodr`` each, and what the flavour needs besides.
+
+    Raises:
+        UnknownNameError: no such flavour, or no such scenario in the run.
+        InputError: a run that kept no scenario; scenarios chosen of a file; a scenario that cannot
+            be recorded because its simulation fails; a town that is not asked for.
+        FileFormatError: a scenario or its map is missing, malformed or inconsistent.
+        UnsupportedError: what the reader, the version or the simulator cannot do, by name and line.
+        StorageError: not a run, or the files cannot be written.
+    """
+    if flavour not in FLAVOURS:
+        raise UnknownNameError("flavour", flavour, FLAVOURS)
+    if town is not None and flavour != CARLA:
+        raise InputError(f"a town is for the flavour '{CARLA}' only, got '{town}' for '{flavour}'")
+    if town is not None and not _LEVEL.fullmatch(town):
+        raise InputError(f"a town must be the name of one of CARLA's maps, got '{town}'")
+    paths = _chosen(source, scenarios)
+    if flavour == CARLA and town is None and source.suffix.lower() != ".xosc":
+        town = _town_of(source)
+    base = source.parent if source.suffix.lower() == ".xosc" else source
+    folder = out or base / EXPORT / flavour
+    found = []
+    for path in paths:
+        found += _export(path, FLAVOURS[flavour], folder, town)
+        if notes is not None:
+            notes += _ignored_drivers(path, flavour)
+    beside = {folder / name: data() for name, data in _BESIDE.get(flavour, {}).items()}
+    _write(beside, folder, ())
+    return [*found, *beside]
+
+
+def _ignored_drivers(path: Path, flavour: str) -> list[str]:
+    """Return what a flavour cannot say of who drives the participants other than the ego."""
+    if flavour == RECORDED:  # their motion is in the file
+        return []
+    scenario, _ = _read(path)
+    program = compile_storyboard(scenario, str(path))
+    names = ", ".join(f"'{program.names[e]}'" for e in program.attends.tolist())
+    if not names:
+        return []
+    codes = {code: name for name, code in CODES.items()}
+    driver = "' or '".join(codes[code] for code in np.unique(program.others[program.attends]))
+    what = (
+        f"other tools than BridgeGen ignore their driver '{driver}' and move them as the "
+        f"storyboard says; --flavour {RECORDED} has them move as they did"
+    )
+    if flavour == CARLA:
+        what = (
+            f"they repeat the motion that their driver '{driver}' gave them when the exported ego "
+            "drove; they do not react to another one"
+        )
+    return [f"{path}: participants {names}: {what}"]
+
+
+def _town_of(run: Path) -> str | None:
+    """Return the town that a run was made on; None if it was made on another map."""
+    made_on = Run(run).settings.road_map
+    stem = Path(made_on).stem if made_on else ""
+    return stem if _TOWN.fullmatch(stem) else None
+
+
+def _chosen(source: Path, scenarios: Sequence[str]) -> list[Path]:
+    """Return the files to export, in the order of their names."""
+    if source.suffix.lower() == ".xosc":
+        if scenarios:
+            raise InputError(f"{source}: scenarios are chosen of a run; this is one scenario")
+        return [source]
+    Run(source)  # refuses what is not a run
+    kept = {path.stem: path for path in sorted((source / FOLDER).glob("*.xosc"))}
+    if not kept:
+        raise InputError(
+            f"{source}: no scenario was exported ({FOLDER}/ has none): the run found nothing "
+            f"critical, or is to be finished first: bridgegen resume {source}"
+        )
+    for name in scenarios:
+        if name not in kept:
+            raise UnknownNameError(f"scenario of {source}", name, kept)
+    if scenarios:
+        return [path for name, path in kept.items() if name in scenarios]
+    return [path for name, path in kept.items() if not name.startswith(MINIMAL)]
+
+
+def _read(path: Path) -> tuple[osc.OpenScenario, OpenDrive]:
+    """Return a scenario file with its map, as it is simulated."""
+    scenario = read(path)
+    roads = roads_of(scenario, path)
+    return prepared(scenario, roads, str(path)), roads
+
+
+def _export(path: Path, flavour: Flavour, folder: Path, town: str | None) -> list[Path]:
+    scenario, roads = _read(path)
+    if problems := validate.problems(scenario, roads):
+        raise FileFormatError(*(f"{path}: {problem}" for problem in problems))
+    made, maps = flavour(scenario, path), []
+    if scenario.road_network.logic_file is not None and town is None:
+        maps = [logic_path(scenario, path)]
+    made = _moved(made, path, [one.name for one in maps], folder)
+    if town is not None:
+        made = replace(made, road_network=osc.RoadNetwork(osc.File(town)))
+    if flavour is _carla and made.road_network.logic_file is None:
+        raise InputError(f"{path}: a map, or a town, must be named for ScenarioRunner")
+    files = {folder / path.name: to_xml(made)} | {
+        folder / one.name: read_bytes(one) for one in maps
+    }
+    _write(files, folder, (path, *maps))
+    return list(files)
+
+
+def _write(files: Mapping[Path, bytes], folder: Path, sources: Sequence[Path]) -> None:
+    """Write files, but over none of the sources."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        for target in files:
+            if target.exists() and any(target.samefile(one) for one in sources):
+                raise StorageError(f"{target}: is what is exported, and is not overwritten")
+        for target, data in files.items():
+            target.write_bytes(data)
+    except OSError as error:
+        raise StorageError(f"{folder}: cannot be written: {error.strerror}") from None
+
+
+def _moved(
+    scenario: osc.OpenScenario, path: Path, maps: Sequence[str], folder: Path
+) -> osc.OpenScenario:
+    """Return a scenario for another folder, where its map, if it has one, lies beside it."""
+    roads = scenario.road_network
+    scene = roads.scene_graph_file
+    if scene is not None and isinstance(scene.filepath, str) and scene.filepath:
+        scene = osc.File(Path(os.path.relpath(path.parent / scene.filepath, folder)).as_posix())
+    return replace(
+        scenario,
+        road_network=replace(
+            roads, logic_file=osc.File(maps[0]) if maps else None, scene_graph_file=scene
+        ),
+    )
+
+
+def _resolved(scenario: osc.OpenScenario, path: Path) -> osc.OpenScenario:
+    made = resolved(_keyed(scenario), str(path))
+    return to_version(made, least_version(made), str(path))
+
+
+def _keyed(scenario: osc.OpenScenario) -> osc.OpenScenario:
+    """Return a scenario that says the key of its driver's random numbers.
+
+    Without parameters it would follow from nothing, and the driver would see other things.
+    """
+    return keyed(scenario, str(noise_key(numbers(scenario), 1)[0]))
+
+
+def _recorded(scenario: osc.OpenScenario, path: Path) -> osc.OpenScenario:
+    """Return a scenario as its own ego drives it in the embedded simulator."""
+    return recorded(_resolved(scenario, path), _recording(path))
+
+
+def _recording(path: Path) -> Recording:
+    """Return what the embedded simulator records of a file until it stops."""
+    result = simulate_file(path)
+    if result.status != "ok":
+        raise InputError(f"{path}: its simulation must succeed to be recorded: {result.status}")
+    rollout = result.rollout
+    n = rollout.n_steps[0]
+    x, y, h, v = (array[0, :, :n] for array in (rollout.x, rollout.y, rollout.h, rollout.v))
+    return Recording(
+        names=rollout.names,
+        time_step=rollout.time_step,
+        x=x,
+        y=y,
+        h=h,
+        v=v,
+        began=rollout.began[0].tolist(),
+        present=rollout.present[0, :, :n] if rollout.present.size else None,
+        light_names=rollout.light_names,
+        lights=rollout.lights[0, :, :n],
+    )
+
+
+def _in_version(version: str, scenario: osc.OpenScenario, path: Path) -> osc.OpenScenario:
+    return to_version(scenario, version, str(path))
+
+
+def _carla(scenario: osc.OpenScenario, path: Path) -> osc.OpenScenario:
+    """Return a scenario for CARLA's ScenarioRunner, which all but its ego go through again."""
+    plain = _resolved(scenario, path)
+    name = f"{plain.file_header.description}-{path.stem}"
+    try:
+        return for_scenario_runner(plain, _recording(path), roads_of(scenario, path), name)
+    except UnsupportedError as error:
+        raise UnsupportedError(*(f"{path}: {problem}" for problem in error.problems)) from None
+
+
+def _control() -> bytes:
+    package = "bridgegen.openx.openscenario.scenario_runner"
+    return (resources(package) / CONTROL).read_bytes()
+
+
+CARLA, RECORDED = "carla", "recorded"
+_BESIDE: Mapping[str, Mapping[str, Callable[[], bytes]]] = {CARLA: {CONTROL: _control}}
+"""What a flavour needs beside its files."""
+_LEVEL = re.compile(r"\w+")
+_TOWN = re.compile(r"Town\d\d(HD)?(_Opt)?")
+
+FLAVOURS: dict[str, Flavour] = {
+    **{version: partial(_in_version, version) for version in VERSIONS},
+    "resolved": _resolved,
+    RECORDED: _recorded,
+    CARLA: _carla,
+}
+"""What can be written: a version of the standard with parameters; 1.2 without; the motion as the
+embedded simulator recorded it, in 1.2; or 1.0 for CARLA's ScenarioRunner."""

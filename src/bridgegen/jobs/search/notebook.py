@@ -1,0 +1,210 @@
+"""A run as a notebook shows it: figures, a few sentences, and the worst scenario's playback."""
+
+import base64
+import html
+import io
+import json
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from bridgegen.assess.criteria import headline as judged
+from bridgegen.assess.metrics.metric import distance
+from bridgegen.base.arrays import Bool, Float
+from bridgegen.base.errors import BridgeGenError
+from bridgegen.drivers import is_spec
+from bridgegen.engine.simulate import simulate_file
+from bridgegen.simulation.choice import EMBEDDED
+from bridgegen.simulation.rollout import Rollout
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from bridgegen.jobs.search.run import Run
+
+# --- A run as a figure: its critical scenarios in parameter space, and the worst one over time ---
+
+
+MOST_POINTS = 5000
+"""Maximum number of evaluations drawn, evenly spread; all critical ones up to as many."""
+
+GREY, RED, BLUE = "#9aa5b1", "#d55e00", "#0072b2"
+
+
+class ShownFigure(Figure):
+    """A figure that a notebook shows, whether it has set up matplotlib or not."""
+
+    def _repr_png_(self) -> bytes:
+        image = io.BytesIO()
+        self.savefig(image, format="png", dpi=100)
+        return image.getvalue()
+
+
+def draw(run: "Run") -> ShownFigure:
+    """Return the figure of a run; see `bridgegen.Run.plot`."""
+    worst = worst_rollout(run)
+    figure = ShownFigure(figsize=(9.0 if worst else 5.0, 3.8), layout="constrained")
+    axes = figure.subplots(1, 2 if worst else 1, squeeze=False)[0]
+    _draw_space(run, axes[0])
+    if worst is not None:
+        _draw_worst(worst, run.scenarios[0].stem, axes[1])
+    return figure
+
+
+def worst_rollout(run: "Run") -> Rollout | None:
+    """Return the motion of the most critical exported scenario, simulated again.
+
+    None where there is none, where another simulator ran it, or where a driver of the user's own
+    would have to be imported, which happens only if it is asked for.
+    """
+    if not run.scenarios or is_spec(run.settings.ego) or run.settings.simulator != EMBEDDED:
+        return None
+    try:
+        return simulate_file(run.scenarios[0]).rollout
+    except BridgeGenError:
+        return None  # files that were edited or moved: the rest of the figure stands
+
+
+def _draw_space(run: "Run", axes: "Axes") -> None:
+    """Draw the evaluations over the two parameters that matter most for their failures."""
+    rows = run.rows()
+    names = run.parameters
+    first, second = _telling(rows.X, rows.critical, [names.index(name) for name in _needed(run)])
+    for chosen, colour, label in (
+        (~rows.critical, GREY, "not critical"),
+        (rows.critical, RED, "critical"),
+    ):
+        at = np.flatnonzero(chosen)
+        at = at[:: max(1, -(-len(at) // MOST_POINTS))]
+        x, y = rows.X[at, first], rows.X[at, second]
+        axes.plot(x, y, ".", color=colour, markersize=4, label=label)
+    axes.set(xlabel=names[first], ylabel=names[second])
+    n = int(rows.critical.sum())
+    axes.set_title(f"{n} critical of {len(rows)} evaluations", fontsize="medium")
+    axes.legend(fontsize="small", frameon=False)
+
+
+def _needed(run: "Run") -> list[str]:
+    """Return the parameters that the worst failure mode needs, most important first."""
+    if not run.modes:
+        return []
+    worst = max(run.modes, key=lambda one: (one.severity, one.harm))
+    return [] if worst.minimal is None else [one.name for one in worst.minimal.conditions]
+
+
+def _telling(X: Float, critical: Bool, needed: Sequence[int]) -> tuple[int, int]:
+    """Return two columns: those needed; then those whose critical values' mean differs most."""
+    spread = X.std(axis=0)
+    score = np.where(spread > 0.0, 0.0, -1.0)
+    if critical.any() and not critical.all():
+        apart = np.abs(X[critical].mean(axis=0) - X[~critical].mean(axis=0))
+        score = np.where(spread > 0.0, apart / np.where(spread > 0.0, spread, 1.0), -1.0)
+    score[needed] = np.inf
+    first = [*needed, *np.argsort(-score, kind="stable").tolist()]
+    columns = list(dict.fromkeys(first))
+    return columns[0], columns[min(1, len(columns) - 1)]
+
+
+def _draw_worst(rollout: Rollout, name: str, axes: "Axes") -> None:
+    """Draw speeds and the distance to the nearest participant over time."""
+    n = int(rollout.n_steps[0])
+    time = np.arange(n) * rollout.time_step
+    axes.plot(time, rollout.v[0, 0, :n], color=BLUE, label="speed of the ego [m/s]")
+    gap = distance(rollout)[0, 1:, :n].min(axis=0, initial=np.inf)
+    if np.isfinite(gap).any():
+        axes.plot(time, np.where(np.isfinite(gap), gap, np.nan), color=RED, label="distance [m]")
+    axes.set(xlabel="time [s]", ylim=(0.0, 1.5 * max(float(rollout.v[0, 0, :n].max()), 5.0)))
+    axes.set_title(f"the worst scenario, {name}", fontsize="medium")
+    axes.legend(fontsize="small", frameon=False)
+
+
+MOST_FRAMES = 300
+MOST_ENTITIES = 30
+"""Of a playback, so that a notebook stays small."""
+
+_PLAYER = """<!doctype html><meta charset="utf-8"><style>
+body{margin:0;font:13px system-ui,sans-serif;color:#17202c;background:#fff}
+canvas{display:block;width:100%;height:260px;background:#eef1f5}
+div{display:flex;gap:.6em;align-items:center;padding:.4em}input{flex:1}
+</style><canvas id="c"></canvas><div><button id="b">Play</button>
+<input id="t" type="range" min="0" value="0" aria-label="time"><span id="s"></span></div>
+<script>
+const d=DATA,c=document.getElementById("c"),g=c.getContext("2d"),t=document.getElementById("t");
+const b=document.getElementById("b"),s=document.getElementById("s"),n=d.frames.length;
+t.max=n-1;t.value=d.first;let timer=0;
+function paint(){const k=+t.value,f=d.frames[k],w=c.clientWidth,h=c.clientHeight;
+const r=devicePixelRatio||1;c.width=w*r;c.height=h*r;g.setTransform(r,0,0,r,0,0);
+const z=h/d.metres;g.font="11px system-ui";
+g.strokeStyle="#b8c2cf";f.forEach((e,i)=>{g.beginPath();d.frames.forEach(o=>{if(o[i])
+g.lineTo(w/2+(o[i][0]-f[0][0])*z,h/2-(o[i][1]-f[0][1])*z)});g.stroke()});
+f.forEach((e,i)=>{if(!e)return;const[l,q,a]=d.box[i];
+const X=w/2+(e[0]-f[0][0])*z,Y=h/2-(e[1]-f[0][1])*z;
+g.save();g.translate(X,Y);g.rotate(-e[2]);g.fillStyle=i?"#d55e00":"#0072b2";
+g.fillRect((a-l/2)*z,-q/2*z,Math.max(l*z,2),Math.max(q*z,2));g.restore();
+g.fillStyle="#17202c";g.fillText(d.names[i],X+6,Y-8)});
+s.textContent=(k*d.step).toFixed(2)+" s"}
+t.oninput=paint;onresize=paint;
+b.onclick=()=>{if(timer){clearInterval(timer);timer=0;b.textContent="Play";return}
+if(+t.value>=n-1)t.value=0;b.textContent="Stop";
+timer=setInterval(()=>{if(+t.value>=n-1){b.click();return}t.value=+t.value+1;paint()},d.step*1000)};
+paint()</script>"""
+
+
+def run_html(run: "Run") -> str:
+    """Return a run as HTML: its size is bounded whatever the run's is."""
+    from bridgegen.search.triage.words import headline, shortly
+
+    s, found = run.summary, run.triage
+    parts = [f"<p><b>{html.escape(run.settings.scenario)}</b>, ego {html.escape(run.settings.ego)}"]
+    parts.append(f": {s.critical} critical of {s.evaluations} evaluations.</p>")
+    if text := judged(run.settings.ego, run.criteria):
+        parts.append(f"<p><b>{html.escape(text)}</b></p>")
+    if found is not None:
+        parts.append(f"<p>{html.escape(headline(found))}</p>")
+        modes = [f"<li>{html.escape(shortly(one))}</li>" for one in found.modes[:10]]
+        parts.append(f"<ul>{''.join(modes)}</ul>" if modes else "")
+    data = base64.b64encode(draw(run)._repr_png_()).decode()
+    parts.append(f'<img alt="The run in figures" src="data:image/png;base64,{data}">')
+    worst = worst_rollout(run)
+    if worst is not None:
+        page = html.escape(player(worst), quote=True)
+        parts.append(
+            '<iframe sandbox="allow-scripts" title="Playback of the worst scenario" '
+            f'style="width:100%;height:310px;border:1px solid #ccc" srcdoc="{page}"></iframe>'
+        )
+    parts.append(f"<p>Whole report: <code>{html.escape(str(run.report))}</code></p>")
+    return "".join(parts)
+
+
+def player(rollout: Rollout) -> str:
+    """Return a page that plays the first scenario of a rollout, seen from above."""
+    n = int(rollout.n_steps[0])
+    stride = -(-n // MOST_FRAMES)
+    steps = np.unique([*range(0, n, stride), n - 1])
+    names = rollout.names[:MOST_ENTITIES]
+    present = rollout.present[0] if rollout.present.size else None
+    frames = [
+        [
+            None
+            if present is not None and not present[i, k]
+            else [round(float(one[0, i, k]), 3) for one in (rollout.x, rollout.y, rollout.h)]
+            for i in range(len(names))
+        ]
+        for k in steps.tolist()
+    ]
+    data = {
+        "names": names,
+        "box": np.round(rollout.box[: len(names)], 3).tolist(),
+        "frames": frames,
+        "step": stride * rollout.time_step,
+        "metres": 40.0,
+        "first": int(np.argmin(np.abs(steps - _closest(rollout, n)))),
+    }
+    return _PLAYER.replace("DATA", json.dumps(data).replace("</", "<\\/"))
+
+
+def _closest(rollout: Rollout, n: int) -> int:
+    """Return the instant at which another participant is closest to the ego."""
+    return int(distance(rollout)[0, 1:, :n].min(axis=0, initial=np.inf).argmin())

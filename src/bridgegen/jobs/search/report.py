@@ -1,0 +1,140 @@
+"""The report of a run on disk."""
+
+import shlex
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+
+from bridgegen.base.disk import read_inside
+from bridgegen.engine.evaluation import Replays
+from bridgegen.engine.pipeline import Pipeline
+from bridgegen.jobs.search.exported import FOLDER, MINIMAL, Exported
+from bridgegen.jobs.search.run import Run
+from bridgegen.jobs.search.settings import Settings
+from bridgegen.pages.build import build_report
+from bridgegen.pages.data import WHOLE, ReportData
+from bridgegen.pages.page import write_report
+from bridgegen.results.confirmation.record import read_records
+from bridgegen.results.store import Recorded, Rows, Store
+from bridgegen.search.regions.record import JSON_FILE, read_record
+from bridgegen.search.triage.record import JSON_FILE as TRIAGE_FILE
+from bridgegen.search.triage.record import Triage
+from bridgegen.search.triage.record import read_record as read_triage
+
+
+def rewrite_report(run: Run, pipeline: Pipeline, stage: Callable[[str], None]) -> tuple[Path, ...]:
+    """Write the report of a run again, as it stands, if there is one; return the file.
+
+    Args:
+        run: on disk.
+        pipeline: the run's.
+        stage: called with "report" before it begins.
+
+    Raises:
+        StorageError, FileFormatError: see `write_run_report`.
+    """
+    if not run.report.is_file():
+        return ()
+    stage("report")
+    with Store.open(run.folder) as store:
+        rows = Recorded(store, whole=(*WHOLE, *pipeline.monitor.names))
+        return (write_run_report(pipeline, Run.of(store, rows), rows, run.exported(len(rows))),)
+
+
+def write_run_report(
+    pipeline: Pipeline,
+    run: Run,
+    rows: Rows | Recorded,
+    exported: Sequence[Exported],
+    replays: Replays | None = None,
+) -> Path:
+    """Write a run's report, its critical regions included if they are known; return its path.
+
+    Args:
+        pipeline: the run's.
+        run: as these rows stand.
+        rows: all of it, in order.
+        exported: its exported scenarios, most critical first.
+        replays: of these scenarios, if they have been simulated.
+
+    Raises:
+        StorageError: the page cannot be written.
+        FileFormatError: the regions' file, or a confirmation's, is damaged, or another run's.
+    """
+    names = [*(name for one in exported for name in one.files), *minimal_files(run.folder)]
+    files = {name: read_inside(run.folder, name) for name in names}
+    data = run_data(pipeline, run, rows, exported, files=files, more=True, replays=replays)
+    write_report(run.report, data)
+    return run.report
+
+
+def run_data(
+    pipeline: Pipeline,
+    run: Run,
+    rows: Rows | Recorded,
+    exported: Sequence[Exported],
+    *,
+    coverage: bool = True,
+    files: Mapping[str, bytes] | None = None,
+    more: bool = False,
+    replays: Replays | None = None,
+) -> ReportData:
+    """Return the data of a run's report.
+
+    Args:
+        pipeline: the run's.
+        run: as these rows stand.
+        rows: all of it, in order.
+        exported: its exported scenarios, most critical first.
+        coverage: whether to count the coverage of the search space.
+        files: the exported files, by their paths in the run's folder, if the page holds them.
+        more: whether the page holds the motion of other scenarios, too.
+        replays: of the exported scenarios, if they have been simulated.
+
+    Raises:
+        FileFormatError: the file of the triage, the regions or a confirmation is damaged, or
+            another run's.
+    """
+    settings, folder = run.settings, run.folder
+    # The results of a run that is being searched change before they are read; digesting is slow.
+    known = run.finished or (folder / TRIAGE_FILE).is_file()
+    results = rows.digest() if known else None
+    return build_report(
+        pipeline, rows, run.summary,
+        kept=[(one.name, one.evaluation, one.files) for one in exported], replays=replays,
+        algorithm=settings.algorithm, seed=settings.seed, budget=settings.budget,
+        command=settings.command(folder), finished=run.finished,
+        version=run.version, notes=run.notes, view=view_command(folder),
+        regions=read_record(folder / JSON_FILE),
+        confirmations=read_records(folder, rows.X, rows.metrics), coverage=coverage,
+        hashes=_hashes(settings, results), triage=_triage(folder, results),
+        minimal_files=minimal_files(folder),
+        files=files, more=more, happening=run.happening,
+    )  # fmt: skip
+
+
+def minimal_files(folder: Path) -> tuple[str, ...]:
+    """Return the files of a run's minimal scenarios, relative to its folder."""
+    found = {one.name for one in (folder / FOLDER).glob(f"{MINIMAL}*.*")}
+    stems = sorted({name.partition(".")[0] for name in found})
+    names = [f"{stem}.{kind}" for stem in stems for kind in ("owl", "xodr", "xosc", "json")]
+    return tuple(f"{FOLDER}/{name}" for name in names if name in found)
+
+
+def _triage(folder: Path, results: str | None) -> Triage | None:
+    """Return the triage of these results; None where the run has grown since it was made."""
+    found = read_triage(folder / TRIAGE_FILE)
+    return found if found is not None and found.results == results else None
+
+
+def _hashes(settings: Settings, results: str | None) -> dict[str, str]:
+    found = {"Scenario, SHA-256": settings.fingerprint}
+    if settings.map_digest is not None:
+        found["Map, SHA-256"] = settings.map_digest
+    if results is not None:
+        found["Results, SHA-256"] = f"{results} (the command above gives the same)"
+    return found
+
+
+def view_command(folder: Path) -> str:
+    """Return the command line that serves a run's page."""
+    return shlex.join(["bridgegen", "view", str(folder)])

@@ -1,0 +1,183 @@
+"""One row of X as files that other tools run: ontology, OpenDRIVE map, OpenSCENARIO storyboard."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pyoxigraph as ox
+
+from bridgegen.assess.cause import Cause
+from bridgegen.assess.conflict.analysis import analyse
+from bridgegen.assess.conflict.outcomes import with_outcomes
+from bridgegen.assess.conflict.summary import ConflictSummary, summarise
+from bridgegen.base.arrays import Float
+from bridgegen.base.errors import OntologyError
+from bridgegen.engine.pipeline import Pipeline
+from bridgegen.openx.openscenario import model as osc
+from bridgegen.openx.openscenario.declarations import (
+    CAUSE,
+    CONFLICT_TYPE,
+    DRIVER,
+    NOISE_KEY,
+    RESPONSIBLE,
+    SEVERITY,
+    VEHICLE,
+)
+from bridgegen.openx.openscenario.from_owl.notes import FINDINGS
+from bridgegen.openx.openscenario.renaming import ego_of
+from bridgegen.openx.openscenario.values import format_double
+from bridgegen.openx.openscenario.write import to_xml as scenario_xml
+from bridgegen.scenario.ontology.check import check
+from bridgegen.scenario.ontology.files import save
+from bridgegen.scenario.ontology.graph import Individuals
+from bridgegen.scenario.ontology.vocabulary import bg
+from bridgegen.simulation.rollout import Rollout
+from bridgegen.simulation.vehicles import KINEMATIC
+
+
+def write_scenario(
+    pipeline: Pipeline,
+    x: Float,
+    folder: Path,
+    name: str,
+    cause: Cause = Cause.NONE,
+    *,
+    rollout: Rollout | None = None,
+    row: int = 0,
+    noise: str | None = None,
+    conflict: ConflictSummary | None = None,
+) -> list[Path]:
+    """Write one row as ``name.owl``, ``name.xodr`` and ``name.xosc``; return their paths.
+
+    The ontology also holds the outcomes of the scenario's rollout (``has_outcome``), its cause, if
+    it is known (``has_cause``), and type, responsibility and severity of its decisive conflict; the
+    last four are in the header of the storyboard, too.
+
+    Args:
+        pipeline: evaluated the row.
+        x: ``(len(space.names),)``.
+        folder: an existing one.
+        name: of the files.
+        cause: of its harm, if it is known.
+        rollout: a simulation of the row; simulated here by default.
+        row: of the rollout.
+        noise: the key of its random numbers, which the storyboard then states.
+        conflict: its decisive conflict; of the rollout made here by default.
+
+    Raises:
+        OntologyError: its individuals break a constraint (SHACL).
+        OSError: the folder cannot be written.
+    """
+    owl, xodr, xosc = (folder / f"{name}.{kind}" for kind in ("owl", "xodr", "xosc"))
+    concrete = pipeline.concrete(x, xodr.name)
+    if rollout is None:
+        rollout = pipeline.rollout(x[np.newaxis])
+        conflict = summarise(analyse(rollout))
+    individuals = concrete.individuals
+    if individuals is not None:
+        individuals = with_outcomes(individuals, rollout, concrete.roads, row)
+        individuals = _with_findings(individuals, cause, conflict)
+        violations = check(individuals, pipeline.source.constraints)
+        if violations:
+            raise OntologyError(*(f"{name}.owl: {violation}" for violation in violations))
+    xodr.write_bytes(concrete.road_data)
+    storyboard = _with_header(concrete.storyboard, cause, conflict)
+    storyboard = with_vehicle(storyboard, pipeline.vehicle)
+    xosc.write_bytes(scenario_xml(keyed(storyboard, noise) if noise else storyboard))
+    if individuals is None:
+        return [xodr, xosc]
+    save(individuals, owl)
+    return [owl, xodr, xosc]
+
+
+def _with_header(
+    storyboard: osc.OpenScenario, cause: Cause, conflict: ConflictSummary | None
+) -> osc.OpenScenario:
+    """Return a scenario whose header states cause and decisive conflict, as far as they are known.
+
+    They replace those that a searched file states, which are another run's. From version 1.2 on:
+    earlier headers have no properties.
+    """
+    header = storyboard.file_header
+    stated = {CAUSE: cause.label} if cause else {}
+    if conflict is not None and conflict.happened:
+        stated |= {CONFLICT_TYPE: conflict.type, RESPONSIBLE: conflict.responsible}
+        stated[SEVERITY] = format_double(conflict.severity)
+    if header.rev_minor in (0, 1):
+        return storyboard
+    before = header.properties or osc.Properties()
+    others = tuple(one for one in before.properties if one.name not in (*FINDINGS, SEVERITY))
+    added = tuple(osc.Property(name, value) for name, value in stated.items())
+    if (*others, *added) == before.properties:
+        return storyboard
+    properties = replace(before, properties=(*others, *added))
+    return replace(storyboard, file_header=replace(header, properties=properties))
+
+
+def keyed(scenario: osc.OpenScenario, key: str) -> osc.OpenScenario:
+    """Return a scenario that states the key of its driver's random numbers, unless it does."""
+
+    def changed(before: osc.Properties) -> osc.Properties:
+        if before.get(NOISE_KEY) is not None:
+            return before
+        return replace(before, properties=(*before.properties, osc.Property(NOISE_KEY, key)))
+
+    return _with_properties(scenario, changed)
+
+
+def with_vehicle(scenario: osc.OpenScenario, vehicle: str) -> osc.OpenScenario:
+    """Return a scenario that states how its ego moves, in place of what it states, if need be."""
+    ego = ego_of(scenario)
+
+    def changed(before: osc.Properties) -> osc.Properties:
+        others = tuple(one for one in before.properties if one.name != VEHICLE)
+        added = () if vehicle == KINEMATIC else (osc.Property(VEHICLE, vehicle),)
+        return replace(before, properties=(*others, *added))
+
+    return _with_properties(scenario, changed, only=ego)
+
+
+def _with_properties(
+    scenario: osc.OpenScenario,
+    changed: Callable[[osc.Properties], osc.Properties],
+    only: str | None = None,
+) -> osc.OpenScenario:
+    """Return a scenario with other properties of the controllers that name a driver.
+
+    Args:
+        scenario: it.
+        changed: a controller's new properties, by the ones that it has.
+        only: the name of the one entity whose controllers are changed; all by default.
+    """
+
+    def with_changed(one: osc.ObjectController) -> osc.ObjectController:
+        before = one.controller.properties
+        if before is None or before.get(DRIVER) is None:
+            return one
+        return replace(one, controller=replace(one.controller, properties=changed(before)))
+
+    objects = tuple(
+        replace(one, object_controllers=tuple(with_changed(c) for c in one.object_controllers))
+        if only in (None, str(one.name))
+        else one
+        for one in scenario.entities.scenario_objects
+    )
+    return replace(scenario, entities=replace(scenario.entities, scenario_objects=objects))
+
+
+def _with_findings(
+    individuals: Individuals, cause: Cause, conflict: ConflictSummary | None
+) -> Individuals:
+    """Return individuals that state cause and decisive conflict, in place of a searched file's."""
+    scenario = individuals.one("Scenario")
+    values: dict[str, str | float] = {"has_cause": cause.label} if cause else {}
+    if conflict is not None and conflict.happened:
+        values |= {"has_conflict_type": conflict.type, "has_responsibility": conflict.responsible}
+        values["has_severity"] = conflict.severity
+    terms = {bg(name) for name in (*FINDINGS.values(), "has_severity")}
+    others = [
+        one for one in individuals.quads if one.subject != scenario or one.predicate not in terms
+    ]
+    quads = [ox.Quad(scenario, bg(name), ox.Literal(value)) for name, value in values.items()]
+    return Individuals([*others, *quads])

@@ -1,0 +1,147 @@
+"""What searches in a campaign: the run's algorithm, by itself or in a screen."""
+
+import shlex
+from collections.abc import Callable
+
+import numpy as np
+import numpy.typing as npt
+
+from bridgegen.base.errors import InputError
+from bridgegen.engine.options import SearchOptions
+from bridgegen.engine.pipeline import Pipeline
+from bridgegen.jobs.search.loop import Progress
+from bridgegen.jobs.search.run import Run
+from bridgegen.jobs.search.screening import Screen, screen_of
+from bridgegen.jobs.search.settings import Settings
+from bridgegen.results.store import Store
+from bridgegen.search import algorithms as toolkit
+from bridgegen.search.algorithms.algorithm import Arena, Problem, asynchronous, resolve
+from bridgegen.search.screened import Screened
+from bridgegen.simulation.rollout import FAILURES, STATUS_MESSAGES
+
+
+def searcher_of(
+    pipeline: Pipeline, settings: Settings, warn: Callable[[str], None]
+) -> toolkit.Algorithm:
+    """Return what searches: the run's algorithm, in the screen if there is one."""
+    if settings.screen is None:
+        return _algorithm(pipeline, settings)
+    there = screen_of(pipeline, settings.screen)
+    there.warm_up()
+    assert settings.screen_budget is not None
+    assert settings.screen_batch is not None
+    closed_loop = getattr(toolkit.get(settings.algorithm), "is_adversary", False)
+    return Screened(
+        _algorithm(there, settings),
+        None if closed_loop else lambda: _algorithm(pipeline, settings),
+        Screen(there, settings.screen.name, settings.screen_budget),
+        _problem(pipeline),
+        simulator=settings.simulator.name,
+        seed=settings.seed,
+        budget=settings.budget,
+        batch=settings.screen_batch,
+        say=warn,
+    )
+
+
+def require_asynchronous(given: SearchOptions, algorithm: type[toolkit.Algorithm]) -> None:
+    """Check that a search can run ahead of its results, if it is to.
+
+    Args:
+        given: the options of the search.
+        algorithm: of that name.
+
+    Raises:
+        InputError: it cannot.
+    """
+    if not given.ahead:
+        return
+    if given.screen is not None:
+        raise InputError(f"--ahead is for a search without a screen (--screen), got {given.ahead}")
+    if not asynchronous(algorithm):
+        able = ", ".join(name for name, one in toolkit.ALGORITHMS.items() if asynchronous(one))
+        raise InputError(
+            f"--ahead {given.ahead}: {given.algorithm} needs the results of all its rows before it "
+            f"asks for more; these algorithms do not: {able}"
+        )
+
+
+def _problem(pipeline: Pipeline, arena: Arena | None = None) -> Problem:
+    space, n_obj = pipeline.space, pipeline.objective.n_obj
+    return Problem(space.variables, pipeline.metrics, n_obj, arena, space.levels)
+
+
+def _algorithm(pipeline: Pipeline, settings: Settings) -> toolkit.Algorithm:
+    """Return the run's search algorithm, as it begins."""
+    method = toolkit.get(settings.algorithm)
+    arena = pipeline.arena() if getattr(method, "is_adversary", False) else None
+    if arena is not None:
+        arena.warm_up()
+    problem = _problem(pipeline, arena)
+    values = resolve(method, problem, settings.seed, settings.settings)
+    return method(problem, settings.seed, **values)
+
+
+# --- A search ends early if the user's driver fails in every scenario: there is nothing to find ---
+
+
+LEAST = 20
+"""Scenarios in which a driver must have failed before the search ends; the budget if smaller."""
+
+
+class FailingDriver:
+    """Ends the search of a driver that has failed in every evaluated scenario.
+
+    Scenarios that failed for another reason than the driver say nothing about it. The evaluations
+    that ended a search are in its store, so a resumed one ends in the same error.
+
+    Args:
+        store: of the run.
+        driver: the user's own, by name.
+        budget: of evaluations.
+
+    Raises:
+        InputError: it failed in all scenarios of a run that is resumed.
+    """
+
+    def __init__(self, store: Store, driver: str, budget: int) -> None:
+        self._store, self._driver, self._budget = store, driver, budget
+        self._failed, self._drives = 0, False
+        for rows in store.rows():
+            self._count(rows.status)
+            if self._drives:
+                return
+        self._refuse()
+
+    def after_batch(self, progress: Progress) -> None:
+        """Count the failures of a batch.
+
+        Raises:
+            InputError: the driver has failed in every scenario so far, and in enough of them.
+        """
+        if not (self._drives or progress.replayed):
+            self._count(progress.result.status)
+            self._refuse()
+
+    def _count(self, status: npt.NDArray[np.integer]) -> None:
+        self._drives = self._drives or bool((status == 0).any())
+        self._failed += int(np.isin(status, list(FAILURES.values())).sum())
+
+    @property
+    def fails(self) -> bool:
+        """Whether it has failed in every scenario so far, and in enough of them."""
+        return not self._drives and self._failed >= max(1, min(LEAST, self._budget))
+
+    def _refuse(self) -> None:
+        if not self.fails:
+            return
+        reasons = Run.of(self._store, self._store.read()).failures
+        of_drivers = tuple(STATUS_MESSAGES[status] for status in FAILURES.values())
+        reason, count = next(one for one in reasons.items() if one[0].startswith(of_drivers))
+        check = f"bridgegen check-driver {shlex.quote(self._driver)}"
+        raise InputError(
+            f"the driver '{self._driver}' failed in all {self._failed} scenarios that it was to "
+            f"drive, so the search ended after {len(self._store)} of {self._budget} evaluations; "
+            f"in {count}: {reason}. Run '{check}', then search again "
+            f"in a new folder: {self._store.folder} keeps these evaluations"
+        )

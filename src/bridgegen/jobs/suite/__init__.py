@@ -1,0 +1,1 @@
+"""Many scenario files with all their variations: found, run, judged, compared between drivers."""

@@ -1,0 +1,290 @@
+"""Two egos on the same rows: what is fixed, what is broken, and how sure that is."""
+
+import hashlib
+import json
+import re
+from collections import Counter
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Literal
+
+from bridgegen.base.errors import BridgeGenError, InputError, Interrupted
+from bridgegen.engine.options import SearchOptions
+from bridgegen.jobs.search import Run, resume, run_search
+from bridgegen.jobs.search.campaign import SearchCallbacks
+from bridgegen.jobs.suite.evaluate import Job, pipeline_of
+from bridgegen.jobs.suite.results import EntryResult, RowResult, Verdict
+from bridgegen.jobs.suite.rows import is_sample
+from bridgegen.jobs.suite.suite import SuiteRun
+from bridgegen.results.store.run_file import FILE
+from bridgegen.search.triage.bound import too_few
+from bridgegen.search.triage.record import NOT_JUDGED
+
+Change = Literal["fixed", "broken", "both fail", "both pass", "not comparable"]
+
+CHANGES: tuple[Change, ...] = ("broken", "fixed", "both fail", "both pass", "not comparable")
+
+
+@dataclass(frozen=True)
+class RowChange:
+    """What changes in one variation from the first ego to the second.
+
+    Attributes:
+        entry: of the suite, by name.
+        row: number of the variation.
+        change: the second passes what the first fails ("fixed"), the reverse ("broken"), …
+        severity: second less first, of the probability of MAIS3+.
+        harm: second less first.
+        run: whether both have a result.
+    """
+
+    entry: str
+    row: int
+    change: Change
+    severity: float
+    harm: float
+    run: bool = True
+
+
+@dataclass(frozen=True)
+class Difference:
+    """Two egos on the same variations.
+
+    Attributes:
+        first: the ego that is compared with, as named.
+        second: the ego that is compared.
+        rows: what changes in each variation; of an entry that one of them cannot run, one.
+        sampled: whether the variations are a sample, so that there are confidence intervals.
+    """
+
+    first: str
+    second: str
+    rows: tuple[RowChange, ...]
+    sampled: bool = True
+
+    @property
+    def counts(self) -> dict[Change, int]:
+        """The number of variations of each change."""
+        found = Counter(one.change for one in self.rows)
+        return {change: found[change] for change in CHANGES}
+
+    @cached_property
+    def unjudged(self) -> dict[str, str]:
+        """By entry why it says nothing, of those of which too few variations can be compared."""
+        of: dict[str, list[bool]] = {}
+        for one in self.rows:
+            of.setdefault(one.entry, []).append(one.change != "not comparable")
+        whys = {
+            entry: too_few(sum(known), len(known), "variations could be compared")
+            if len(known) > 1 or known[0]
+            else "it could not be compared"
+            for entry, known in of.items()
+        }
+        return {entry: why for entry, why in whys.items() if why}
+
+    def interval(self, change: Change) -> tuple[float, float]:
+        """Return the 95 % interval of the share of a change among comparable variations.
+
+        Source: Clopper and Pearson, Biometrika 26 (1934) 404. It holds where variations are a
+        sample, as those of a logical scenario are; not where they are all that there are.
+        """
+        from scipy.stats import binomtest
+
+        counts = self.counts
+        n = len(self.rows) - counts["not comparable"]
+        if not n:
+            return 0.0, 1.0
+        found = binomtest(counts[change], n).proportion_ci(0.95, "exact")
+        return float(found.low), float(found.high)
+
+    @property
+    def p_value(self) -> float:
+        """The probability of so uneven a number of fixed and broken variations by chance.
+
+        Source: McNemar's test, exact (Psychometrika 12 (1947) 153).
+        """
+        from scipy.stats import binomtest
+
+        counts = self.counts
+        n = counts["fixed"] + counts["broken"]
+        return float(binomtest(counts["broken"], n).pvalue) if n else 1.0
+
+
+def difference(
+    first: Sequence[EntryResult], second: Sequence[EntryResult], egos: tuple[str, str]
+) -> Difference:
+    """Compare the results of two egos on the same entries.
+
+    Args:
+        first: of the ego that is compared with, entry by entry.
+        second: of the other, in the same order.
+        egos: their names.
+    """
+    rows, sampled = list[RowChange](), True
+    for a, b in zip(first, second, strict=True):
+        if a.problem or b.problem or len(a.rows) != len(b.rows):
+            rows.append(RowChange(a.entry, 0, "not comparable", 0.0, 0.0, run=False))
+            continue
+        sampled = sampled and a.sampled
+        verdicts = zip(a.verdicts, b.verdicts, strict=True)
+        rows += [_change(a.entry, i, a.rows[i], b.rows[i], both) for i, both in enumerate(verdicts)]
+    return Difference(*egos, tuple(rows), sampled)
+
+
+def _change(
+    entry: str, row: int, a: RowResult, b: RowResult, verdicts: tuple[Verdict, Verdict]
+) -> RowChange:
+    change: Change = "not comparable"
+    if not {"not run", "not judged"} & {*verdicts}:
+        named: dict[tuple[bool, bool], Change] = {
+            (True, True): "both fail",
+            (True, False): "fixed",
+            (False, True): "broken",
+            (False, False): "both pass",
+        }
+        change = named[verdicts[0] == "failed", verdicts[1] == "failed"]
+    run = "not run" not in verdicts
+    return RowChange(entry, row, change, b.severity - a.severity, b.harm - a.harm, run)
+
+
+# --- Searches of a suite's scenarios for where one ego is worse than another ---
+
+
+FOLDER = "worse"
+"""In a suite's folder, that of the searches, a run each."""
+
+BUDGET = 300
+"""Evaluations of a search, each with both egos."""
+
+ALGORITHM = "es"
+"""It finds the most failure modes with few evaluations; see docs/decisions/search.md."""
+
+
+@dataclass(frozen=True)
+class WorseThan:
+    """What a search of one scenario found.
+
+    Attributes:
+        entry: of the suite, by name.
+        folder: of the run; its report has the playback of both egos.
+        evaluations: that were made.
+        worse: those that the second ego fails and the first passes.
+        modes: the titles of the failure modes that they make up, the worst first.
+        sentence: the finding in words, with the share of the space.
+        problem: why there is no result; else empty.
+    """
+
+    entry: str
+    folder: Path
+    evaluations: int = 0
+    worse: int = 0
+    modes: tuple[str, ...] = ()
+    sentence: str = ""
+    problem: str = ""
+
+
+@dataclass(frozen=True)
+class WorseCallbacks:
+    """Called as searches progress, all from the same thread.
+
+    Attributes:
+        begun: with the name of the entry that is searched next, its number from 0, and how many
+            there are.
+        batch: with the evaluations of that search so far.
+    """
+
+    begun: Callable[[str, int, int], None] = lambda entry, number, count: None
+    batch: Callable[[int], None] = lambda evaluations: None
+
+
+def search_worse(
+    suite: SuiteRun,
+    egos: tuple[str, str],
+    *,
+    budget: int = BUDGET,
+    seed: int = 0,
+    callbacks: WorseCallbacks | None = None,
+) -> tuple[WorseThan, ...]:
+    """Search each scenario of a suite for where the second ego fails and the first does not.
+
+    Only scenarios whose rows are a sample of a space are searched, logical ones say: of all others
+    the suite has run each variation. A search that was stopped is resumed.
+
+    Args:
+        suite: that both egos have run, with its jobs.
+        egos: the one that is compared with, then the other.
+        budget: evaluations of each search; 0: nothing is searched.
+        seed: of each search.
+        callbacks: called as they progress.
+
+    Returns:
+        Of each searched scenario what was found, in the order of the suite.
+
+    Raises:
+        Interrupted: Ctrl-C; what is done is kept.
+        StorageError: a folder cannot be written.
+    """
+    callbacks = callbacks or WorseCallbacks()
+    if not budget:
+        return ()
+    first, second = egos
+    runs = {(one.entry, one.ego): one for one in suite.results}
+    jobs = [
+        job
+        for job in suite.jobs
+        if job.ego == second
+        and not any(runs[job.entry.name, ego].problem for ego in egos)
+        and _is_searched(job)
+    ]
+    found = []
+    for number, job in enumerate(jobs):
+        callbacks.begun(job.entry.name, number, len(jobs))
+        found.append(_searched(job, first, suite.folder / FOLDER, budget, seed, callbacks))
+    return tuple(found)
+
+
+def _is_searched(job: Job) -> bool:
+    pipeline = pipeline_of(job)
+    return bool(pipeline.space.n_var) and is_sample(pipeline.scenario)
+
+
+def _searched(
+    job: Job, first: str, home: Path, budget: int, seed: int, callbacks: WorseCallbacks
+) -> WorseThan:
+    """Search one scenario, resume the search, or read what it found."""
+    options = SearchOptions.of(
+        job.options, ego=job.ego, worse_than=first, distribution=job.entry.distribution,
+        algorithm=ALGORITHM, budget=budget, seed=seed, simulator=job.simulator, causes=True,
+    )  # fmt: skip
+    how = SearchCallbacks(batch=lambda progress: callbacks.batch(progress.evaluations))
+    name = job.entry.name
+    folder = home / _folder_name(job, replace(job, ego=first), options)
+    try:
+        if not (folder / FILE).exists():
+            run = run_search(job.entry.scenario, **vars(options), out=folder, callbacks=how)
+        elif not (run := Run(folder)).report.exists():
+            run = resume(folder, ego=job.ego, worse_than=first, callbacks=how)
+    except Interrupted:
+        raise
+    except InputError as error:
+        return WorseThan(name, folder, problem="; ".join(error.problems))
+    except BridgeGenError as error:
+        return WorseThan(name, folder, problem=str(error))
+    triage, summary = run.triage, run.summary
+    if run.verdict == NOT_JUDGED and triage is not None and not summary.critical:
+        return WorseThan(name, folder, summary.evaluations, problem=triage.bound.sentence)
+    sentence = triage.bound.sentence if triage else ""
+    if triage is None or triage.bound.harmful != summary.critical:  # critical by another rule
+        words = f"{summary.critical} of {summary.evaluations} evaluations are critical"
+        sentence = "; ".join(filter(None, (f"{words} with {job.ego} alone", sentence)))
+    modes = tuple(one.title for one in triage.modes) if triage else ()
+    return WorseThan(name, folder, summary.evaluations, summary.critical, modes, sentence)
+
+
+def _folder_name(job: Job, first: Job, options: SearchOptions) -> str:
+    """Return a name that is another one for each scenario, driver and option."""
+    facts = [job.entry.digest, job.driver_digest, first.driver_digest, repr(options)]
+    short = hashlib.sha256(json.dumps(facts).encode()).hexdigest()[:8]
+    return f"{re.sub(r'[^A-Za-z0-9._-]+', '-', job.entry.name)}-{short}"

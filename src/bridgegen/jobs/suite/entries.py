@@ -1,0 +1,234 @@
+"""What a suite consists of: scenario files and their variations, found in folders."""
+
+import hashlib
+import json
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, Literal
+
+from bridgegen.base.errors import BridgeGenError, InputError
+from bridgegen.jobs.suite.index import Indexes
+from bridgegen.jobs.suite.rows import NO_MATRIX
+from bridgegen.openx.openscenario.kind import files_named_in, kind_of_file
+from bridgegen.scenario.language.plain_yaml import MAX_BYTES
+from bridgegen.scenario.language.reader import load, pack_names
+from bridgegen.scenario.language.reader import names as catalogue_names
+
+MOST_FILES = 100_000
+"""Files that are looked at in all folders together."""
+
+RESULTS = "results.jsonl"
+"""The file of a suite's results, in their folder."""
+
+VARIATIONS = "variations"
+"""The folder beside it of variations that were run again."""
+
+_YAML = (".yaml", ".yml")
+_STORYBOARD = ".xosc"
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A scenario of a suite, with the distribution of its parameters if there is one.
+
+    Attributes:
+        name: unique in the suite, short.
+        scenario: the path of a file, or a name of the catalogue.
+        distribution: the file with its variations, or None.
+        problem: why it cannot run; empty if nothing is known to be wrong.
+        criteria: pass criteria that the index of its folder states for it, besides its own; see
+            `bridgegen.jobs.suite.index`.
+        count: whose conflicts count as harm by that index; None leaves it to the scenario.
+        is_failure: whether that index keeps it as a failure.
+    """
+
+    name: str
+    scenario: str
+    distribution: str | None = None
+    problem: str = ""
+    criteria: tuple[Mapping[str, Any], ...] = ()
+    count: Literal["any"] | None = None
+    is_failure: bool = False
+
+    @property
+    def digest(self) -> str:
+        """A digest of its files, their map and catalogues; empty if they cannot be read."""
+        made = hashlib.sha256()
+        try:
+            if not self.scenario.lower().endswith(_STORYBOARD):
+                return load(self.scenario).fingerprint
+            if self.criteria or self.count:
+                made.update(json.dumps([self.criteria, self.count], sort_keys=True).encode())
+            for one in filter(None, (self.scenario, self.distribution)):
+                for path in (Path(one), *files_named_in(Path(one))):
+                    made.update(hashlib.sha256(path.read_bytes()).digest())
+        except (BridgeGenError, OSError):
+            return ""
+        return made.hexdigest()
+
+
+def find_entries(given: Sequence[str | Path]) -> tuple[Entry, ...]:
+    """Return the scenarios that files, folders and names stand for.
+
+    In a folder, and the folders in it: scenario files (``.xosc`` with a storyboard, ``.yaml`` with
+    a logical scenario), and distribution files, which stand for variations of the scenario that
+    they name. A scenario that a distribution of the suite names runs with its variations only. The
+    name of a pack stands for all of its scenarios.
+    Catalogues, fragments, maps and other files are passed over. A file that is named itself must be
+    one of them.
+
+    Args:
+        given: paths, or names of the catalogue, of a pack, or of a pack's scenario.
+
+    Returns:
+        The entries, in the order of their paths; one with a ``problem`` where a file is broken.
+
+    Raises:
+        InputError: a path does not exist, or a file that is named is no scenario; nothing is found.
+    """
+    problems, found = list[str](), dict[str, Entry]()
+    shipped = (*catalogue_names(), *pack_names())
+    for one in given:
+        path = Path(one)
+        if path.is_dir():
+            for file in _files(path):
+                if (entry := _entry(file)) is not None:
+                    found.setdefault(entry.distribution or entry.scenario, entry)
+        elif path.is_file():
+            entry = _entry(path)
+            if entry is None:
+                problems.append(f"{path}: is no scenario and no distribution of one")
+            else:
+                found.setdefault(entry.distribution or entry.scenario, entry)
+        elif some := [name for name in shipped if name == str(one) or name.startswith(f"{one}/")]:
+            for name in some:
+                found.setdefault(name, Entry(name, name))
+        else:
+            problems.append(f"{one}: no such file, folder, pack or scenario that ships")
+    if problems:
+        raise InputError(*problems)
+    if not found:
+        raise InputError(f"no scenario in {', '.join(map(str, given))}")
+    varied = {Path(one.scenario).resolve() for one in found.values() if one.distribution}
+    kept = [
+        one
+        for one in found.values()
+        if one.distribution or not Path(one.scenario).is_file()
+        or Path(one.scenario).resolve() not in varied
+    ]  # fmt: skip
+    indexes = Indexes()
+    return _named([indexed(one, indexes) for one in kept])
+
+
+def indexed(one: Entry, indexes: Indexes | None = None) -> Entry:
+    """Return an entry with what the index of its folder states for it.
+
+    Raises:
+        FileFormatError: the index is damaged.
+    """
+    indexes = indexes or Indexes()
+    found = indexes.failure_of(one.scenario, one.distribution)
+    if found is None:
+        return one
+    _, failure = found
+    count: Literal["any"] | None = "any" if failure.count == "any" else None
+    return replace(one, criteria=tuple(failure.criteria), count=count, is_failure=True)
+
+
+def of_edition(entries: Sequence[Entry], edition: str | None) -> tuple[Entry, ...]:
+    """Return the entries without those whose matrix lacks an edition.
+
+    Raises:
+        InputError: no scenario has that edition.
+    """
+    if edition in (None, NO_MATRIX):
+        return tuple(entries)
+    kept, known = list[Entry](), set[str]()
+    for one in entries:
+        editions = _editions(one)
+        known |= editions
+        if not editions or edition in editions:
+            kept.append(one)
+    if edition not in known:
+        some = f"; editions: {', '.join(sorted(known))}" if known else ""
+        raise InputError(f"no scenario has a matrix of the edition '{edition}'{some}")
+    return tuple(kept)
+
+
+def _editions(entry: Entry) -> set[str]:
+    """Return the editions of an entry's matrix; none if it has no matrix, or cannot be read."""
+    if entry.scenario.lower().endswith(_STORYBOARD):
+        return set()
+    try:
+        return {one.edition for one in load(entry.scenario).matrix}
+    except BridgeGenError:
+        return set()
+
+
+def _files(folder: Path) -> Iterable[Path]:
+    """Return the files of a folder that may be scenarios, in order.
+
+    Variations that were run again are none; see `bridgegen.jobs.suite.replay`.
+    """
+    found, again = [], set[Path]()
+    for count, path in enumerate(sorted(folder.rglob("*"))):
+        if count >= MOST_FILES:
+            raise InputError(f"{folder}: a suite has at most {MOST_FILES} files")
+        if path.name == RESULTS:  # sorted before the folder beside it
+            again.add(path.parent / VARIATIONS)
+        if again and not again.isdisjoint(path.parents):
+            continue
+        hidden = any(part.startswith(".") for part in path.relative_to(folder).parts)
+        if path.suffix.lower() in (*_YAML, _STORYBOARD) and not hidden and path.is_file():
+            found.append(path)
+    return found
+
+
+def _entry(path: Path) -> Entry | None:
+    """Return the entry of a file; None if it is none."""
+    if path.suffix.lower() in _YAML:
+        with path.open("rb") as file:
+            head = file.read(MAX_BYTES)
+        is_scenario = any(line.startswith(b"scenario:") for line in head.splitlines())
+        return Entry(path.stem, str(path)) if is_scenario else None
+    if path.suffix.lower() != _STORYBOARD:
+        return None
+    kind, named, problem = kind_of_file(path)
+    if problem:
+        return Entry(path.stem, str(path), problem=problem)
+    if kind == "distribution":
+        scenario = (path.parent / named).resolve()
+        if not scenario.is_file():
+            return Entry(path.stem, named, str(path), f"{path}: no such file: {scenario}")
+        return Entry(path.stem, str(_near(scenario, path)), str(path))
+    return Entry(path.stem, str(path)) if kind == "storyboard" else None
+
+
+def _near(path: Path, beside: Path) -> Path:
+    """Return a path relative to the working folder where another one is."""
+    if beside.is_absolute():
+        return path
+    try:
+        return path.relative_to(Path.cwd())
+    except ValueError:
+        return path
+
+
+def _named(entries: list[Entry]) -> tuple[Entry, ...]:
+    """Return entries with names of their own: the shortest ends of their paths that are unique."""
+    paths = [Path(one.distribution or one.scenario).with_suffix("") for one in entries]
+    depth = dict.fromkeys(range(len(paths)), 1)
+    names = [path.name for path in paths]
+    for _ in range(64):
+        seen: dict[str, list[int]] = {}
+        for i, name in enumerate(names):
+            seen.setdefault(name, []).append(i)
+        again = [i for some in seen.values() if len(some) > 1 for i in some]
+        if not again:
+            break
+        for i in again:
+            depth[i] += 1
+            names[i] = "/".join(paths[i].parts[-depth[i] :])
+    order = sorted(range(len(entries)), key=lambda i: names[i])
+    return tuple(replace(entries[i], name=names[i]) for i in order)

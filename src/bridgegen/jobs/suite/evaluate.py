@@ -1,0 +1,316 @@
+"""An entry of a suite → its pipeline → the results of its rows."""
+
+import hashlib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from bridgegen.assess.conflict.findings import is_unsafe_start
+from bridgegen.assess.conflict.happening import Happening
+from bridgegen.base.errors import BridgeGenError, InputError
+from bridgegen.drivers import is_remote
+from bridgegen.drivers.address import Command, address_of
+from bridgegen.engine.evaluation import Evaluation
+from bridgegen.engine.options import CommonOptions
+from bridgegen.engine.pipeline import Pipeline
+from bridgegen.engine.workers import CarriedDriver, Threads
+from bridgegen.jobs.search.scenarios import as_judged, chosen_objective, driven_by, load
+from bridgegen.jobs.suite.clauses import judged
+from bridgegen.jobs.suite.entries import Entry
+from bridgegen.jobs.suite.results import EntryResult, GridResult, RowResult, finite
+from bridgegen.jobs.suite.rows import Rows, is_sample, rows_of
+from bridgegen.openx.file_scenario import FileScenario
+from bridgegen.openx.openscenario.ranges import FileParameter
+from bridgegen.scenario.language.parameters import Parameter
+from bridgegen.scenario.language.scenario import SearchedScenario
+from bridgegen.scenario.language.space import SearchSpace
+from bridgegen.simulation.choice import SimulatorChoice
+from bridgegen.simulation.rollout import STATUS_MESSAGES
+
+# --- A digest of a user's driver: whether results are those of the driver as it is now ---
+
+
+def driver_digest(name: str) -> str:
+    """Return a digest of the files that a driver's name holds, not of what they import.
+
+    Empty where it holds none: a driver that ships, in a package, or of a server.
+    """
+    try:
+        if is_remote(name):
+            return _digest_of_command(name)
+        data = CarriedDriver.of(name).data
+    except (InputError, OSError, ValueError):
+        return ""
+    return "" if data is None else hashlib.sha256(data).hexdigest()
+
+
+def _digest_of_command(name: str) -> str:
+    """Return a digest of a program and of the files among its arguments."""
+    command = address_of(name)
+    if not isinstance(command, Command):
+        return ""
+    digest = hashlib.sha256()
+    for path in (Path(word) for word in (command.program or "", *command.words[1:])):
+        if path.is_file():
+            stat = path.stat()
+            digest.update(_digest_of_file(path, stat.st_mtime_ns, stat.st_size))
+    return digest.hexdigest()
+
+
+@lru_cache(maxsize=64)
+def _digest_of_file(path: Path, modified: int, size: int) -> bytes:
+    """Return the digest of a file that was modified then."""
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").digest()
+
+
+AT_ONCE = 512
+"""Rows that are evaluated together; no result depends on it."""
+
+IMPACT = ("impact_speed", "relative_impact_speed", "speed_reduction")
+
+QUANTITIES = ("harm", "severity", "n_collision", "d_min", *IMPACT)
+
+MATRIX = "matrix"
+"""The column that names a row's grid."""
+
+
+@dataclass(frozen=True)
+class Job:
+    """What a worker is given.
+
+    Attributes:
+        entry: what to run.
+        ego: the driver, None for the scenario's own.
+        options: those of all entries; without ego, distribution and map.
+        simulator: which runs them.
+        samples: rows of a logical scenario besides its defaults.
+        seed: of samples.
+        edition: of a logical scenario's matrix; None: all, "none": samples instead.
+        only: the number of the one row that is run, from 0 on; None: all.
+    """
+
+    entry: Entry
+    ego: str | None
+    options: CommonOptions
+    simulator: SimulatorChoice
+    samples: int
+    seed: int
+    edition: str | None = None
+    only: int | None = None
+
+    @property
+    def driver_digest(self) -> str:
+        """A digest of the files of a driver of the user's; else empty."""
+        return driver_digest(self.ego) if self.ego else ""
+
+    def is_of(self, result: EntryResult) -> bool:
+        """Whether a result is that of the files as they are now."""
+        if not result.digest or self.driver_digest != result.driver_digest:
+            return False
+        return self.entry.digest == result.digest
+
+    @property
+    def name(self) -> str:
+        """Of the entry, and of the ego if there is one."""
+        return self.entry.name if self.ego is None else f"{self.entry.name} ({self.ego})"
+
+
+def evaluate(job: Job) -> EntryResult:
+    """Run an entry; what is wrong with it is a result, too."""
+    entry = job.entry
+    found = EntryResult(
+        entry=entry.name,
+        ego=job.ego or "",
+        digest=entry.digest,
+        driver_digest=job.driver_digest,
+        scenario=entry.scenario,
+        distribution=entry.distribution or "",
+        problem=entry.problem,
+    )
+    if entry.problem:
+        return found
+    try:
+        return _evaluated(job, found)
+    except InputError as error:
+        return found.model_copy(update={"problem": "; ".join(error.problems)})
+    except BridgeGenError as error:
+        return found.model_copy(update={"problem": str(error)})
+
+
+def pipeline_of(job: Job) -> Pipeline:
+    """Return the pipeline of an entry, ready to evaluate.
+
+    Raises:
+        InputError: the files cannot be read or run.
+    """
+    entry = job.entry
+    is_file = entry.scenario.lower().endswith(".xosc")
+    trigger = job.options.empty_trigger if is_file else None
+    scenario = driven_by(load(entry.scenario, entry.distribution, trigger), job.options.others)
+    options = replace(
+        job.options,
+        ego=job.ego,
+        metrics=IMPACT,
+        criteria=[*job.options.criteria, *_further_criteria(job, scenario)],
+        count=job.options.count or entry.count,
+    )
+    spec = chosen_objective(scenario.objective, options, "one")
+    scenario = as_judged(replace(scenario, objective=spec), spec.gated)
+    pipeline = Pipeline(
+        scenario, scenario.space(), options, simulator=job.simulator, workers=Threads(1)
+    )
+    pipeline.choose_objective()
+    return pipeline
+
+
+def _further_criteria(job: Job, scenario: SearchedScenario) -> list[Mapping[str, Any]]:
+    """Return the criteria of the index whose ids neither the options nor the scenario have."""
+    known = {one.id for one in scenario.criteria} | {one["id"] for one in job.options.criteria}
+    return [one for one in job.entry.criteria if one["id"] not in known]
+
+
+def rows_of_job(job: Job, pipeline: Pipeline) -> np.ndarray:
+    """Return the rows of an entry, ``(N, len(pipeline.space.names))``.
+
+    Raises:
+        InputError: it has not the one that is asked for.
+    """
+    return _rows_of(job, pipeline).X
+
+
+def _rows_of(job: Job, pipeline: Pipeline) -> Rows:
+    """Return what is run of an entry."""
+    found = rows_of(pipeline.scenario, pipeline.space, job.samples, job.seed, job.edition)
+    if job.only is None:
+        return found
+    if not 0 <= job.only < len(found.X):
+        raise InputError(
+            f"{job.entry.name}: variations are numbered from 1 to {len(found.X)}, got "
+            f"{job.only + 1}"
+        )
+    at = slice(job.only, job.only + 1)
+    return replace(found, X=found.X[at], grid=found.grid[at], excluded=0)
+
+
+def _evaluated(job: Job, found: EntryResult) -> EntryResult:
+    pipeline = pipeline_of(job)
+    space = pipeline.space
+    given = _rows_of(job, pipeline)
+    X, names = given.X, given.names
+    notes = [*pipeline.scenario.notes, *pipeline.notes]
+    if given.excluded:
+        notes.append(
+            f"{given.excluded} combinations are excluded by the scenario's own constraints"
+        )
+    rows, texts = list[RowResult](), list[str]()
+    for start in range(0, len(X), AT_ONCE):
+        some = X[start : start + AT_ONCE]
+        evaluation = pipeline.evaluate(some)
+        texts += evaluation.findings.happened.tolist()
+        found_here = _rows(pipeline, some, evaluation, names)
+        rows += judged(pipeline, job.simulator, some, found_here)
+    happening = Happening.of(texts)
+    if job.entry.is_failure:  # it is about that conflict: one that stops for it has met it
+        happening = replace(happening, stuck=0)
+    units = dict(zip(space.names, space.units, strict=True))
+    labels = [one.label for one in given.grids]
+    if labels:
+        rows = [
+            one.model_copy(update={"x": [labels[number], *one.x]})
+            for one, number in zip(rows, given.grid, strict=True)
+        ]
+    return found.model_copy(
+        update={
+            "driver": pipeline.driver.label,
+            "title": pipeline.scenario.title,
+            "parameters": [*([MATRIX] if labels else []), *_shown(names, space)],
+            "units": [*(["1"] if labels else []), *(units[name] for name in names)],
+            "grids": [
+                GridResult(
+                    label=one.label,
+                    edition=one.edition,
+                    score=one.score,
+                    points=one.points,
+                    graded=one.graded,
+                )
+                for one in given.grids
+            ],
+            "sampled": bool(space.n_var) and not labels and is_sample(pipeline.scenario),
+            "criteria": [one.to_dict() for one in pipeline.monitor],
+            "clauses": [one.to_dict() for one in pipeline.scenario.clauses],
+            "rows": rows,
+            "notes": notes,
+            "not_happened": list(happening.reasons),
+        }
+    )
+
+
+def _shown(names: Sequence[str], space: SearchSpace) -> list[str]:
+    """Return what parameters are called: a set of values, whose name is ours, by what it is."""
+    made = list(names)
+    sets = [
+        i
+        for i, name in enumerate(names)
+        if isinstance(one := space.parameters.get(name), FileParameter) and one.is_set
+    ]
+    for k, i in enumerate(sets, start=1):
+        made[i] = f"value set {k}" if len(sets) > 1 else "value set"
+    return made
+
+
+def _rows(
+    pipeline: Pipeline, X: np.ndarray, evaluation: Evaluation, names: Sequence[str]
+) -> list[RowResult]:
+    space = pipeline.space
+    columns = [space.index(name) for name in names]
+    parameters: list[Parameter | None] = [space.parameters.get(name) for name in names]
+    scenario = pipeline.scenario
+    of_file = scenario.texts if isinstance(scenario, FileScenario) else {}
+    metrics = {name: evaluation.metrics[:, pipeline.metrics.index(name)] for name in QUANTITIES}
+    margins = [evaluation.metrics[:, pipeline.metrics.index(one)] for one in pipeline.monitor.names]
+    unsafe = is_unsafe_start(evaluation.findings, metrics["harm"])
+    rows = []
+    for i in range(len(X)):
+        x: list[float | str] = []
+        for name, column, one in zip(names, columns, parameters, strict=True):
+            value = float(X[i, column])
+            if name in of_file:  # of a set of values, too, which has no parameter of its own
+                x.append(of_file[name][round(value)])
+                continue
+            if isinstance(one, FileParameter) and one.is_set:
+                x.append(f"{round(value) + 1} of {round(one.high) + 1}")
+                continue
+            written = value if one is None else one.kind.written(value)
+            x.append(written if isinstance(written, str) else float(written))
+        if evaluation.status[i]:
+            text = STATUS_MESSAGES[int(evaluation.status[i])]
+            more = evaluation.messages.get(i, "")
+            rows.append(RowResult(x=x, problem=f"{text}: {more}" if more else text))
+            continue
+        texts = {key: value or "" for key, value in evaluation.findings.row(i).items()}
+        rows.append(
+            RowResult(
+                x=x,
+                critical=bool(evaluation.critical[i]),
+                harm=float(metrics["harm"][i]),
+                severity=float(metrics["severity"][i]),
+                collisions=float(metrics["n_collision"][i]),
+                d_min=finite(float(metrics["d_min"][i])),
+                impact_speed=float(metrics["impact_speed"][i]),
+                relative_impact_speed=float(metrics["relative_impact_speed"][i]),
+                speed_reduction=finite(float(metrics["speed_reduction"][i])) or 0.0,
+                conflict=texts["conflict"],
+                conflict_type=texts["conflict_type"],
+                responsible=texts["responsible"],
+                partner=texts["partner"],
+                implausible=texts["implausible"],
+                unsafe_start=bool(unsafe[i]),
+                margins=[float(one[i]) for one in margins],
+            )
+        )
+    return rows

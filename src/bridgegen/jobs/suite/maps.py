@@ -1,0 +1,116 @@
+"""Preventability maps of a suite's scenarios: the egos beside the regulation's models."""
+
+import hashlib
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from bridgegen.jobs.preventability.classes import CellClass
+from bridgegen.jobs.preventability.grid import coarse_axes
+from bridgegen.jobs.preventability.page import COLOURS, data_uri
+from bridgegen.jobs.preventability.preventability import MapCallbacks, digest_of, map_preventability
+from bridgegen.jobs.preventability.result import PreventabilityMap
+from bridgegen.jobs.search.scenarios import driven_by, load
+from bridgegen.jobs.suite.suite import SuiteRun
+from bridgegen.scenario.language.scenario import LogicalScenario
+
+MOST_CELLS = 20_000
+"""Cells of a map."""
+
+BESIDE = ("un-r157", "fsm", "computed:rss", "reference")
+"""The drivers that a map compares the egos with."""
+
+COLUMNS = 3
+"""Pictures of each driver in the suite's page."""
+
+FOLDER = "maps"
+
+
+def map_suite(
+    suite: SuiteRun, cells: Callable[[int, int], None] = lambda done, total: None
+) -> tuple[PreventabilityMap, ...]:
+    """Map each scenario of a suite that has a grid of its own, with all egos.
+
+    The maps lie in the suite's folder, and resume as it does.
+
+    Args:
+        suite: finished.
+        cells: called with the number of cells of a map that are done, and of all.
+
+    Raises:
+        StorageError: a map cannot be written.
+        Interrupted: Ctrl-C; what is done is kept.
+    """
+    found = []
+    for name in dict.fromkeys(job.entry.scenario for job in suite.jobs if not job.entry.problem):
+        if name.lower().endswith(".xosc"):
+            continue
+        others = suite.settings["others"]
+        scenario = driven_by(load(name), others)
+        assert isinstance(scenario, LogicalScenario)
+        axes = coarse_axes(scenario.name, scenario.space(), MOST_CELLS)
+        if axes is None:
+            continue
+        egos = dict.fromkeys([ego or scenario.driver for ego in suite.egos] + list(BESIDE))
+        found.append(
+            map_preventability(
+                name,
+                list(egos),
+                grid=axes,
+                others=others,
+                out=suite.folder / FOLDER / _folder(scenario, list(egos)),
+                callbacks=MapCallbacks(cells=cells),
+            )
+        )
+    return tuple(found)
+
+
+def _folder(scenario: LogicalScenario, egos: list[str]) -> str:
+    """Return a folder's name, another one where a map would be another."""
+    settings = [scenario.fingerprint, {ego: digest_of(ego) for ego in egos}]
+    digest = hashlib.sha256(json.dumps(settings).encode()).hexdigest()
+    return f"{scenario.name}-{digest[:8]}"
+
+
+def picture_payload(one: PreventabilityMap, folder: Path) -> dict[str, Any]:
+    """Return what the suite's page shows of a map, as plain data.
+
+    Args:
+        one: the map.
+        folder: of the page.
+    """
+    grid = one.grid
+    third = grid.values[2] if len(grid.shape) > 2 else np.zeros(1)
+    columns = sorted({round(i) for i in np.linspace(0, len(third) - 1, COLUMNS).tolist()})
+    labels = [f"{grid.names[2]} {third[k]:.3g} {grid.units[2]}" for k in columns]
+    further = (-1,) * max(0, len(grid.shape) - 3)  # the last values, the highest speeds say
+    return {
+        "title": one.scenario.title,
+        "page": one.page.relative_to(folder).as_posix(),
+        "axes": [
+            f"{name} {values[0]:.3g} to {values[-1]:.3g} {unit}"
+            for name, values, unit in zip(grid.names[:2], grid.values, grid.units, strict=False)
+        ],
+        "held": [
+            f"{name} {values[-1]:.3g} {unit}"
+            for name, values, unit in zip(
+                grid.names[3:], grid.values[3:], grid.units[3:], strict=True
+            )
+        ],
+        "columns": labels,
+        "classes": [[one.label, COLOURS[one]] for one in CellClass],
+        "drivers": [
+            {
+                "name": name,
+                "counts": list(one.counts(name).values()),
+                "pictures": [
+                    data_uri(one.classes[name][(slice(None), slice(None), k, *further)].T[::-1])
+                    for k in columns
+                ],
+            }
+            for name in one.drivers
+        ],
+    }

@@ -1,0 +1,159 @@
+"""The page of a suite: one self-contained file, with playbacks of what fails the worst."""
+
+import shlex
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from bridgegen.base.disk import write_whole
+from bridgegen.base.errors import BridgeGenError
+from bridgegen.engine.options import CommonOptions
+from bridgegen.engine.options.option import options_of
+from bridgegen.jobs.preventability.result import PreventabilityMap
+from bridgegen.jobs.suite.difference import WorseThan
+from bridgegen.jobs.suite.evaluate import Job, pipeline_of, rows_of_job
+from bridgegen.jobs.suite.maps import picture_payload
+from bridgegen.jobs.suite.page_payload import Key, key_of, payload
+from bridgegen.jobs.suite.replay import Replayed, replay_command
+from bridgegen.jobs.suite.results import EntryResult, rank
+from bridgegen.jobs.suite.suite import SuiteRun
+from bridgegen.pages.page import code_of, page_of
+from bridgegen.pages.payload import script_json
+from bridgegen.pages.playback import Playback
+from bridgegen.pages.playbacks import beside_others, measured_playbacks
+from bridgegen.simulation.choice import EMBEDDED
+
+FILE = "suite.html"
+
+MOST_PLAYBACKS = 50
+"""Maximum number of playbacks in a page."""
+
+_MODULE = "suite.js"
+
+_SIMULATE = ("ideal", "vehicle", "others", "time_limit", "criteria", "empty_trigger")
+"""Options that ``bridgegen simulate`` has, too."""
+
+
+def write_suite_page(
+    suite: SuiteRun,
+    jobs: Sequence[Job],
+    *,
+    searches: Sequence[WorseThan] = (),
+    maps: Sequence[PreventabilityMap] = (),
+) -> Path:
+    """Write the page of a suite, whole or not at all.
+
+    Args:
+        suite: its results.
+        jobs: of which they are; those that fail the worst are simulated again, to be played.
+        searches: for where the second of two egos is worse.
+        maps: of its scenarios, in its folder.
+
+    Returns:
+        The page, in the folder of the results.
+
+    Raises:
+        StorageError: it cannot be written.
+    """
+    by_key = {(job.entry.name, job.ego or ""): job for job in jobs}
+    commands = {
+        key_of(one): command_of(suite.folder, by_key[key_of(one)], one)
+        for one in suite.results
+        if one.verdict == "failed" and key_of(one) in by_key
+    }
+    return _write(suite, dict(_playbacks(suite, by_key)), commands, searches, maps)
+
+
+def write_replay_page(made: Replayed) -> Path:
+    """Write the page of a variation that was run again, with its playback, whether it fails or not.
+
+    Returns:
+        The page, in the folder of its files.
+
+    Raises:
+        StorageError: it cannot be written.
+    """
+    name = f"{made.result.entry}, variation {made.number}"
+    one = made.result.model_copy(update={"entry": name})
+    suite = SuiteRun(made.folder, (one.ego,), (one,), {})
+    job = replace(made.job, entry=replace(made.job.entry, name=name))
+    playback = _playback(job, one, 0)
+    played = {} if playback is None else {key_of(one): playback}
+    return _write(suite, played, {key_of(one): made.command})
+
+
+def _write(
+    suite: SuiteRun,
+    played: Mapping[Key, Playback],
+    commands: Mapping[Key, str],
+    searches: Sequence[WorseThan] = (),
+    maps: Sequence[PreventabilityMap] = (),
+) -> Path:
+    pictures = [picture_payload(one, suite.folder) for one in maps]
+    data = payload(suite, played, commands, searches=searches, maps=pictures, code=code_of(_MODULE))
+    path = suite.folder / FILE
+    title = f"{suite.folder.resolve().name}: suite – BridgeGen"
+    write_whole(path, page_of(_MODULE, title, script_json(data)))
+    return path
+
+
+def command_of(folder: Path, job: Job, result: EntryResult) -> str:
+    """Return the command that shows the worst failure of an entry again.
+
+    A file in which nothing varies is simulated; of anything else that one variation is run again.
+    """
+    entry = job.entry
+    is_alone = entry.distribution is None and entry.scenario.lower().endswith(".xosc")
+    if not is_alone or result.parameters or entry.criteria or entry.count:
+        return replay_command(folder, result, result.worst or 0)
+    words = ["bridgegen", "simulate", entry.scenario]
+    words += ["--ego", job.ego] if job.ego else []
+    for one in options_of(CommonOptions):
+        if one.name in _SIMULATE:
+            words += one.words(getattr(job.options, one.name))
+    if job.simulator.name != EMBEDDED.name:
+        words += ["--simulator", job.simulator.name]
+    return shlex.join(words)
+
+
+def _playbacks(suite: SuiteRun, jobs: Mapping[Key, Job]) -> Iterator[tuple[Key, Playback]]:
+    """Yield the playbacks of the worst failed rows, the most severe first."""
+    failed = [one for one in suite.results if one.worst is not None]
+    failed.sort(
+        key=lambda one: (-one.rows[one.worst or 0].severity, *rank(one.rows[one.worst or 0]))
+    )
+    for one in failed[:MOST_PLAYBACKS]:
+        job = jobs.get(key_of(one))
+        others = [jobs.get((one.entry, ego)) for ego in suite.egos if ego != one.ego]
+        shown = [other for other in others if other is not None]
+        playback = None if job is None else _playback(job, one, one.worst or 0, shown)
+        if playback is not None:
+            yield key_of(one), playback
+
+
+def _playback(
+    job: Job, result: EntryResult, row: int, others: Sequence[Job] = ()
+) -> Playback | None:
+    """Return the playback of an entry's row; None if that is no longer to be had.
+
+    Args:
+        job: the entry with the ego.
+        result: its.
+        row: its number.
+        others: the same with other egos, whose motion is shown beside.
+    """
+    if not job.is_of(result):  # the files have changed since
+        return None
+    try:
+        pipeline = pipeline_of(job)
+        X = rows_of_job(job, pipeline)[row : row + 1]
+        if not len(X):
+            return None
+        played = measured_playbacks(pipeline, [(job.name, row, ())], X)
+    except (BridgeGenError, OSError):
+        return None  # its results stand, and the page has the command
+    try:
+        beside = {one.ego or one.name: pipeline_of(one) for one in others}
+        return beside_others(played, X, beside)[0]
+    except (BridgeGenError, OSError):
+        return played[0]

@@ -1,0 +1,437 @@
+"""What the page of a suite holds, as plain data."""
+
+import json
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+from bridgegen.base.physics import HARD_BRAKING
+from bridgegen.jobs.suite.clauses import clause_results
+from bridgegen.jobs.suite.difference import WorseThan
+from bridgegen.jobs.suite.difference import difference as variations_compared
+from bridgegen.jobs.suite.known_failures import EXCUSED, words
+from bridgegen.jobs.suite.results import EntryResult, Outcome, Verdict, rank
+from bridgegen.jobs.suite.sentences import (
+    changes,
+    clause_in_words,
+    colours_of,
+    difference,
+    differences,
+    headline,
+    label_of,
+    outcomes,
+    points,
+)
+from bridgegen.jobs.suite.suite import SuiteRun
+from bridgegen.pages.packed import OF_ROW, deflated, road_key
+from bridgegen.pages.payload import script_json
+from bridgegen.pages.playback import Playback
+from bridgegen.pages.playback_payload import ROAD_SCALE, SCALE, playback_payload, road_payload
+
+SIZE, SIZE_OF_RESULT = 2_600_000, 600
+"""Maximum number of characters of a page with 1,000 results, and how many more it may have for each
+further one."""
+
+MOTIONS = 1_200_000
+"""Maximum number of characters of all playbacks."""
+
+MOST_MODES = 10
+"""Failure modes that the page names of each search."""
+
+MOST_ROWS = 1000
+"""Maximum number of variations that the page holds of an entry with an ego."""
+
+Key = tuple[str, str]
+"""Name of an entry, and the ego as the user names it."""
+
+_LETTER: dict[Verdict, str] = {"passed": "p", "failed": "f", "not run": "n", "not judged": "u"}
+_OUTCOME: dict[Outcome | None, str] = {
+    "avoided": "a", "mitigated": "m", "not avoided": "n", None: "-",
+}  # fmt: skip
+_HAPPENED = ("contact", "near miss", "violation")
+_SEVERITIES = ("critical", "major", "minor")
+
+
+def key_of(result: EntryResult) -> Key:
+    """Return what identifies a result."""
+    return result.entry, result.ego
+
+
+def payload(
+    suite: SuiteRun,
+    played: Mapping[Key, Playback],
+    commands: Mapping[Key, str],
+    *,
+    searches: Sequence[WorseThan] = (),
+    maps: Sequence[Mapping[str, Any]] = (),
+    code: int = 0,
+) -> dict[str, Any]:
+    """Return the page's data as plain dicts, lists, numbers and strings.
+
+    Variations take what the rest leaves: of each entry the failed ones first, then those that did
+    not run, then those that are not judged, then those that pass.
+
+    Args:
+        suite: the results.
+        played: playbacks of the worst failed rows.
+        commands: that show failures again.
+        searches: for where the second of two egos is worse.
+        maps: see `bridgegen.jobs.suite.maps.picture_payload`.
+        code: characters that the page has besides its data.
+    """
+    labels = [label_of(suite, ego) for ego in suite.egos]
+    by_entry: dict[str, dict[str, EntryResult]] = {}
+    for one in suite.results:
+        by_entry.setdefault(one.entry, {})[one.ego] = one
+    criteria = _criteria(suite)
+    motions, at = _motions(played)
+    entries = [_entry(suite, name, of_it, labels, criteria, at) for name, of_it in by_entry.items()]
+    complete = [_verdicts(suite, of_it) for of_it in by_entry.values()]
+    page: dict[str, Any] = {
+        "live": False,
+        "summary": {"critical_distance": None, "hard_braking": HARD_BRAKING},
+        "rows": {"columns": [], "evaluation": []},  # of a report; a suite has none
+        "confirmations": [],
+        "scale": {**SCALE, "road": ROAD_SCALE},
+        "roads": [],
+        "kept": [],
+        "suite": {
+            "name": suite.folder.resolve().name,
+            "egos": labels,
+            "headlines": [
+                headline(suite.of_ego(ego), label)
+                for ego, label in zip(suite.egos, labels, strict=True)
+            ],
+            "outcomes": [
+                [text for text in (outcomes(suite.of_ego(ego)), points(suite.of_ego(ego))) if text]
+                for ego in suite.egos
+            ],
+            "differences": differences([one for one in complete if len(one) > 1], labels),
+            "changes": _changes(suite, labels),
+            "facts": _facts(suite),
+            "entries": entries,
+            "criteria": _matrix(suite, criteria),
+            "searches": [_search(suite, one) for one in searches],
+            "clauses": _clauses(suite),
+            "maps": list(maps),
+            "motions": motions,
+        },
+    }
+    most = SIZE + SIZE_OF_RESULT * max(0, len(suite.results) - 1000)
+    room = most - code - len(script_json(page))
+    page["suite"]["details"] = _details(suite, by_entry, criteria, commands, room)
+    return page
+
+
+def _changes(suite: SuiteRun, labels: Sequence[str]) -> str:
+    """Return what the second of two egos breaks and fixes, in words; "" of any other number."""
+    if len(suite.egos) != 2:
+        return ""
+    first, second = (suite.of_ego(ego) for ego in suite.egos)
+    if [one.entry for one in first] != [one.entry for one in second]:  # it was stopped
+        return ""
+    return changes(variations_compared(first, second, (labels[0], labels[1])))
+
+
+def _verdicts(suite: SuiteRun, of_it: Mapping[str, EntryResult]) -> list[Verdict]:
+    return [of_it[ego].verdict for ego in suite.egos if ego in of_it]
+
+
+# ---- entries ----
+
+
+def _entry(
+    suite: SuiteRun,
+    name: str,
+    of_it: Mapping[str, EntryResult],
+    labels: Sequence[str],
+    criteria: Mapping[str, int],
+    at: Mapping[Key, int],
+) -> dict[str, Any]:
+    """Return a line of the table."""
+    verdicts = _verdicts(suite, of_it)
+    whole = len(verdicts) == len(labels)
+    return {
+        "name": name,
+        "title": next((one.title for one in of_it.values() if one.title), ""),
+        "differ": difference(verdicts, labels) if whole else "",
+        "results": [
+            _result(suite, of_it[ego], criteria, at.get((name, ego))) if ego in of_it else None
+            for ego in suite.egos
+        ],
+    }
+
+
+def _result(
+    suite: SuiteRun, one: EntryResult, criteria: Mapping[str, int], motion: int | None
+) -> dict[str, Any]:
+    """Return a cell of the table; what is absent is not said."""
+    found: dict[str, Any] = {
+        "v": _LETTER[one.verdict],
+        "n": [one.count(verdict) for verdict in _LETTER],
+    }
+    lost = one.problem or next((row.problem for row in one.rows if row.problem), "")
+    if lost or not one.rows:
+        found["problem"] = lost or "it has no variations"
+    if one.verdict == "not judged":
+        found["unjudged"] = one.unjudged
+    blameless = sum(row.verdict == "passed" and row.collisions > 0 for row in one.rows)
+    if blameless:
+        found["blameless"] = blameless
+    _, mitigated, unavoided = one.outcomes().values()
+    if mitigated or unavoided:
+        found["hits"] = [mitigated, unavoided]
+    if motion is not None:
+        found["motion"] = motion
+    if one.worst is None:
+        return found
+    stated = suite.known_failures
+    if said := words(stated.worst(one), stated.failures.get(one.entry)):
+        found["standing"] = said
+        found["excused"] = stated.worst(one) in EXCUSED
+        found["comment"] = stated.failures[one.entry][1].comment
+    row = one.rows[one.worst]
+    found["severity"] = _short(max(one.severity for one in one.rows if one.verdict == "failed"))
+    if row.critical or row.conflict in _HAPPENED:
+        found["conflict"] = [row.conflict, row.conflict_type, row.partner]
+    violated = {i for each in one.rows for i in each.violated if i < len(one.criteria)}
+    if violated:
+        found["violated"] = [criteria[_text(one.criteria[i])] for i in sorted(violated)]
+    return found
+
+
+# ---- criteria ----
+
+
+def _search(suite: SuiteRun, one: WorseThan) -> dict[str, Any]:
+    report = one.folder / "report.html"
+    return {
+        "entry": one.entry,
+        "worse": one.worse,
+        "evaluations": one.evaluations,
+        "sentence": one.problem or one.sentence,
+        "problem": bool(one.problem),
+        "modes": list(one.modes[:MOST_MODES]),
+        "report": report.relative_to(suite.folder).as_posix() if report.exists() else "",
+    }
+
+
+def _text(criterion: Mapping[str, Any]) -> str:
+    return json.dumps(criterion, sort_keys=True)
+
+
+def _criteria(suite: SuiteRun) -> dict[str, int]:
+    """Return all criteria with their numbers; the most severe, then the most violated first."""
+    seen: dict[str, int] = {}
+    for one in suite.results:
+        for i, criterion in enumerate(one.criteria):
+            text = _text(criterion)
+            seen[text] = seen.get(text, 0) + sum(i in row.violated for row in one.rows)
+
+    def order(text: str) -> tuple[bool, int, int, str]:
+        criterion = json.loads(text)
+        severe = _SEVERITIES.index(criterion.get("severity", "major"))
+        return not seen[text], severe, -seen[text], str(criterion["id"])
+
+    return {text: number for number, text in enumerate(sorted(seen, key=order))}
+
+
+def _matrix(suite: SuiteRun, criteria: Mapping[str, int]) -> list[dict[str, Any]]:
+    """Return each criterion with how many entries and variations violate it, by ego."""
+    found: list[dict[str, Any]] = [
+        {"severity": "major", "text": "", **json.loads(text), "of": []} for text in criteria
+    ]
+    for ego in suite.egos:
+        of = [{"entries": [0, 0, 0], "rows": [0, 0, 0]} for _ in criteria]
+        for one in suite.of_ego(ego):
+            for i, criterion in enumerate(one.criteria):
+                known = [
+                    row.margins[i]
+                    for row, verdict in zip(one.rows, one.verdicts, strict=True)
+                    if i < len(row.margins) and verdict != "not judged"
+                ]
+                violated = sum(margin < 0.0 for margin in known)
+                table = of[criteria[_text(criterion)]]
+                which = 0 if violated else 1 if known else 2
+                table["entries"][which] += 1
+                for k, n in enumerate(
+                    (violated, len(known) - violated, len(one.rows) - len(known))
+                ):
+                    table["rows"][k] += n
+        for criterion, table in zip(found, of, strict=True):
+            criterion["of"].append(table)
+    return found
+
+
+def _clauses(suite: SuiteRun) -> list[dict[str, Any]]:
+    """Return each clause of a regulation with what each ego makes of it."""
+    by_ego = [clause_results(suite.results, ego) for ego in suite.egos]
+    found: dict[str, dict[str, Any]] = {}
+    for e, clauses in enumerate(by_ego):
+        for one in clauses:
+            shown = {"id": one.id, "text": one.text, "entries": one.entries, "of": {}}
+            found.setdefault(one.id, shown)["of"][str(e)] = {
+                "v": _LETTER[one.verdict],
+                "words": clause_in_words(one),
+                "rows": [one.passed, one.failed, one.not_run, one.not_applicable],
+            }
+    return list(found.values())
+
+
+def _facts(suite: SuiteRun) -> list[str]:
+    """Return what the results depend on, where it is not the default; and how failures stand."""
+    s = suite.settings
+    facts = [f"simulator {s['simulator']}"] if s.get("simulator", "embedded") != "embedded" else []
+    for name in ("critical", "count", "others", "empty_trigger"):
+        facts += [f"{name.replace('_', ' ')}: {s[name]}"] if s.get(name) else []
+    facts += [f"ideal {', '.join(map(str, s['ideal']))}"] if s.get("ideal") else []
+    facts += [f"seed {s['seed']}"] if s.get("seed") else []
+    for ego in suite.egos:
+        if sentence := suite.known_failures.sentence(suite.of_ego(ego)):
+            facts.append(f"{label_of(suite, ego)}: {sentence}" if len(suite.egos) > 1 else sentence)
+    return facts
+
+
+# ---- details ----
+
+
+class _Words:
+    """The different texts of an entry, each once."""
+
+    def __init__(self) -> None:
+        self.number: dict[str, int] = {"": 0}
+
+    def at(self, texts: Iterable[str]) -> list[int]:
+        return [self.number.setdefault(text, len(self.number)) for text in texts]
+
+
+def _details(
+    suite: SuiteRun,
+    by_entry: Mapping[str, Mapping[str, EntryResult]],
+    criteria: Mapping[str, int],
+    commands: Mapping[Key, str],
+    room: int,
+) -> list[str]:
+    """Return each entry's variations, deflated; as many as there is room for."""
+    most = min(MOST_ROWS, max((len(one.rows) for one in suite.results), default=0))
+    while True:
+        texts = [
+            _packed(_of_entry([of_it.get(ego) for ego in suite.egos], criteria, commands, most))
+            for of_it in by_entry.values()
+        ]
+        size = sum(len(text) + 3 for text in texts)
+        if size <= room or most == 0:
+            return texts
+        most = min(most - 1, int(most * 0.9 * max(room, 0) / size))
+
+
+def _packed(value: Any) -> str:
+    return deflated(json.dumps(value, allow_nan=False, separators=(",", ":")).encode())
+
+
+def _of_entry(
+    results: Sequence[EntryResult | None],
+    criteria: Mapping[str, int],
+    commands: Mapping[Key, str],
+    most: int,
+) -> dict[str, Any]:
+    """Return what the page shows of an entry when it is opened."""
+    words = _Words()
+    same = len({len(one.rows) for one in results if one is not None and one.rows}) == 1
+    found: dict[str, Any] = {"results": []}
+    for one in results:
+        if one is None:
+            found["results"].append(None)
+            continue
+        verdicts = [_LETTER[verdict] for verdict in one.verdicts]
+        ranks = [("fnup".index(v), *rank(row)) for v, row in zip(verdicts, one.rows, strict=True)]
+        kept = sorted(range(len(one.rows)), key=lambda i: (*ranks[i], i))[:most]
+        rows = [one.rows[i] for i in kept]
+        colours = colours_of(one)
+        found["results"].append(
+            {
+                "driver": one.driver,
+                "files": [file for file in (one.scenario, one.distribution) if file],
+                "notes": one.notes,
+                "command": commands.get(key_of(one), ""),
+                "worst": one.worst,
+                "parameters": list(zip(one.parameters, one.units, strict=False)),
+                "criteria": [criteria[_text(criterion)] for criterion in one.criteria],
+                "total": len(one.rows),
+                "at": kept,
+                "verdict": "".join(verdicts[i] for i in kept),
+                "critical": "".join("01"[row.critical] for row in rows),
+                "x": _columns([row.x for row in rows], len(one.parameters)),
+                "margins": _columns([row.margins for row in rows], len(one.criteria)),
+                "severity": [_short(row.severity) for row in rows],
+                "d_min": [_short(row.d_min) for row in rows],
+                "outcome": "".join(_OUTCOME[row.outcome] for row in rows),
+                "impact": [_short(row.impact_speed) for row in rows],
+                "relative": [_short(row.relative_impact_speed) for row in rows],
+                "colour": words.at(colours[i] or "" for i in kept),
+                "conflict": words.at(row.conflict for row in rows),
+                "type": words.at(row.conflict_type for row in rows),
+                "partner": words.at(row.partner for row in rows),
+                "responsible": words.at(row.responsible for row in rows),
+                "note": words.at(row.problem or row.implausible or row.unjudged for row in rows),
+                "beside": _beside(results, one, kept) if same else [],
+            }
+        )
+    found["words"] = list(words.number)
+    return found
+
+
+def _columns(rows: Sequence[Sequence[float | str]], width: int) -> list[list[float | str | None]]:
+    """Return columns of rows; None where a row is shorter."""
+    return [[_short(row[k]) if k < len(row) else None for row in rows] for k in range(width)]
+
+
+def _beside(
+    results: Sequence[EntryResult | None], one: EntryResult, kept: Sequence[int]
+) -> list[str]:
+    """Return the verdicts of all egos on the same variations, a letter each."""
+    verdicts = [[] if other is None else other.verdicts for other in results]
+    return [
+        "".join(
+            _LETTER[theirs[i]]
+            if other is not None and i < len(other.rows) and other.rows[i].x == one.rows[i].x
+            else "-"
+            for other, theirs in zip(results, verdicts, strict=True)
+        )
+        for i in kept
+    ] if len(results) > 1 else []  # fmt: skip
+
+
+def _short(value: float | str | None) -> float | str | None:
+    """Return a number with six significant digits, which keep its sign; None if not finite."""
+    if value is None or isinstance(value, str):
+        return value
+    return float(f"{value:.6g}") if math.isfinite(value) else None
+
+
+# ---- playbacks ----
+
+
+def _motions(played: Mapping[Key, Playback]) -> tuple[dict[str, Any], dict[Key, int]]:
+    """Return the playbacks, deflated, with their roads, each road once; and which is whose."""
+    roads: list[str] = []
+    number: dict[Any, int] = {}
+    names, on, texts = list[str](), list[int](), list[str]()
+    at: dict[Key, int] = {}
+    room = MOTIONS
+    for key, one in played.items():
+        road = road_key(one)
+        new = "" if road in number else _packed(road_payload(one))
+        whole = playback_payload(one, 0, None)
+        text = _packed({name: value for name, value in whole.items() if name not in OF_ROW})
+        if len(new) + len(text) > room:
+            continue
+        room -= len(new) + len(text)
+        if road not in number:
+            number[road] = len(roads)
+            roads.append(new)
+        at[key] = len(texts)
+        names.append(one.name)
+        on.append(number[road])
+        texts.append(text)
+    return {"names": names, "roads": roads, "on": on, "texts": texts}, at

@@ -1,0 +1,182 @@
+"""A folder of runs as a site: a page that lists them, each run's report, two runs side by side."""
+
+import html
+from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+from bridgegen.assess.criteria import headline
+from bridgegen.base.errors import StorageError
+from bridgegen.jobs.view.overview import RunLine, find_runs, read_line
+from bridgegen.jobs.view.run_view import RunView
+from bridgegen.pages.page import page_of, still_page
+from bridgegen.pages.payload import script_json
+from bridgegen.pages.sentences import NARROW, share
+from bridgegen.search.triage.record import Mode
+
+MOST_OPEN = 4
+"""Maximum number of runs whose rows are in memory."""
+
+
+class FolderView:
+    """The runs below a folder, read only; other processes may be extending them.
+
+    Args:
+        folder: of the runs, at any depth.
+
+    Raises:
+        StorageError: it contains no run.
+    """
+
+    def __init__(self, folder: Path | str) -> None:
+        self.folder = Path(folder).resolve()
+        self._runs: list[Path] = []  # by number
+        self._views: dict[int, RunView] = {}
+        self._find()
+        if not self._runs:
+            raise StorageError(f"{folder}: contains no run, nor does any folder below it")
+
+    def _find(self) -> None:
+        known = set(self._runs)  # a run keeps its number
+        self._runs += [one for one in find_runs(self.folder) if one not in known]
+
+    def page(self) -> bytes:
+        """Return the list of all runs, as HTML."""
+        self._find()
+        lines = [_facts(k, read_line(self.folder, one)) for k, one in enumerate(self._runs)]
+        data = script_json({"folder": str(self.folder), "runs": lines})
+        return b"".join(page_of("runs.js", f"{self.folder.name}: runs – BridgeGen", data))
+
+    def run(self, number: int) -> RunView | None:
+        """Return the site of a run by its number; None if there is none.
+
+        Raises:
+            BridgeGenError: it cannot be shown.
+        """
+        if number >= len(self._runs):
+            return None
+        view = self._views.pop(number, None) or RunView(self._runs[number])
+        self._views[number] = view  # the latest is the last
+        while len(self._views) > MOST_OPEN:
+            del self._views[next(iter(self._views))]
+        return view
+
+    def pair(self, first: int, second: int) -> bytes | None:
+        """Return two runs side by side, as HTML; None if one does not exist."""
+        if max(first, second) >= len(self._runs):
+            return None
+        a, b = (read_line(self.folder, self._runs[k]) for k in (first, second))
+        body = "\n".join(_pair((first, a), (second, b))).encode("utf-8", "replace")
+        return b"".join(still_page("pair.html", f"{a.path} and {b.path} – BridgeGen", body))
+
+
+def _facts(number: int, line: RunLine) -> Mapping[str, Any]:
+    bound = line.triage.bound if line.triage else None
+    worst = max(line.modes, key=lambda one: (not one.knife_edge, one.harm), default=None)
+    return {
+        "number": number, "path": line.path, "problem": line.problem, "changed": line.changed,
+        "size": line.size, "scenario": line.scenario, "ego": line.ego,
+        "algorithm": line.algorithm, "seed": line.seed, "evaluations": line.evaluations,
+        "budget": line.budget, "finished": line.finished,
+        "modes": len(line.modes) + (line.triage.unrecorded_modes if line.triage else 0),
+        "worst": worst.title if worst else "",
+        "judged": headline(line.ego, line.criteria),
+        "violated": any(one.violated for one in line.criteria),
+        "failures": bound.harmful if bound else None,
+        "unjudged": bound is None or not bound.judged,
+        "share": bound.space.share if bound else None,
+        "low": bound.space.low if bound else None,
+        "high": bound.space.high if bound else None,
+    }  # fmt: skip
+
+
+def _pair(*runs: tuple[int, RunLine]) -> Iterator[str]:
+    (first, a), (second, b) = runs
+    yield '<p><a href="./">All runs</a></p>'
+    yield "<h1>Two runs side by side</h1>"
+    yield '<div class="card wide"><table class="pair"><thead><tr><th></th>'
+    yield "".join(f'<th scope="col">{_text(line.path)}</th>' for _, line in runs)
+    yield "</tr></thead><tbody>"
+    for name, of in _FIGURES.items():
+        cells = [of(line) for _, line in runs]
+        mark = ' class="differs"' if cells[0] != cells[1] else ""
+        yield f'<tr{mark}><th scope="row">{name}</th>'
+        yield "".join(f"<td>{_text(cell)}</td>" for cell in cells) + "</tr>"
+    yield "</tbody></table></div>"
+    for title, modes in _matched(a, b):
+        if modes:
+            items = "".join(f"<li>{_text(one)}</li>" for one in modes)
+            yield f'<section class="card"><h2>{title}</h2><ul>{items}</ul></section>'
+    yield '<div class="frames">'
+    for number, line in ((first, a), (second, b)):
+        if line.problem:
+            yield f'<p class="card">{_text(line.problem)}</p>'
+        else:
+            yield f'<iframe src="run/{number}/" title="{_text(line.path)}"></iframe>'
+    yield "</div>"
+
+
+def _failures(line: RunLine) -> str:
+    if line.triage is None:
+        return "–"
+    return f"{line.triage.bound.harmful:,}" if line.triage.bound.judged else "not judged"
+
+
+def _is_judged(line: RunLine) -> bool:
+    return line.triage is not None and line.triage.bound.judged
+
+
+def _share(line: RunLine) -> str:
+    space = line.triage.bound.space if line.triage else None
+    if space is None or space.share is None or not _is_judged(line):
+        return "–"
+    return f"{share(space.share)} (95{NARROW}%: {share(space.low)} to {share(space.high)})"
+
+
+_FIGURES: dict[str, Callable[[RunLine], str]] = {
+    "scenario": lambda one: one.scenario,
+    "driver": lambda one: one.ego,
+    "algorithm": lambda one: f"{one.algorithm}, seed {one.seed}",
+    "evaluations": lambda one: f"{one.evaluations:,}" + ("" if one.finished else ", not finished"),
+    "pass criteria": lambda one: headline(one.ego, one.criteria) or "–",
+    "failures": lambda one: _failures(one),
+    "failure modes": lambda one: f"{len(one.modes):,}" if _is_judged(one) else "–",
+    "harmful share of the space": _share,
+    "worst severity (MAIS3+)": lambda one: (
+        share(max((mode.severity for mode in one.modes), default=0.0)) if _is_judged(one) else "–"
+    ),
+}
+
+
+def _matched(a: RunLine, b: RunLine) -> Iterator[tuple[str, list[str]]]:
+    """Yield the failure modes of both runs, and of each alone, in words."""
+    ours, theirs = _by_key(a), _by_key(b)
+    both = [key for key in ours if key in theirs]
+    yield (
+        "Failure modes of both",
+        [
+            f"{ours[k][0].title}: {_count(ours[k])} and {_count(theirs[k])} evaluations"
+            for k in both
+        ],
+    )  # fmt: skip
+    for line, own, other in ((a, ours, theirs), (b, theirs, ours)):
+        alone = [one for key, one in own.items() if key not in other]
+        words = [f"{one[0].title}: {_count(one)} evaluations" for one in alone]
+        yield f"Only in {_text(line.path)}", words
+
+
+def _by_key(line: RunLine) -> dict[tuple[str, ...], list[Mode]]:
+    """Return the modes of a run by what makes two of different runs the same, in their order."""
+    found: dict[tuple[str, ...], list[Mode]] = {}
+    for one in line.modes:
+        key = (one.conflict, one.conflict_type, one.responsible, one.rule, one.partner)
+        found.setdefault(key, []).append(one)
+    return found
+
+
+def _count(modes: list[Mode]) -> str:
+    return f"{sum(one.count for one in modes):,}"
+
+
+def _text(text: str) -> str:
+    return html.escape(text)

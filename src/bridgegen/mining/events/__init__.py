@@ -1,1 +1,0 @@
-"""Events in recorded traffic: a detector per kind, and the parameters of scenarios in them."""

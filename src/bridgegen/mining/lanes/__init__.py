@@ -1,1 +1,0 @@
-"""Where recorded traffic is on lanes: `find.locate` is the way in."""

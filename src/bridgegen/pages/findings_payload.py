@@ -1,0 +1,127 @@
+"""Conflicts of the rows, and the failure modes of the run, as data of the page."""
+
+from collections import Counter
+from typing import Any
+
+from bridgegen.assess.conflict.findings import Findings
+from bridgegen.base.arrays import Bool
+from bridgegen.pages.playback import Conflict
+from bridgegen.search.triage.judgement import judgement
+from bridgegen.search.triage.record import Minimal, Mode, Neighbourhood, Treatment, Triage
+from bridgegen.search.triage.words import parameters_in_words
+
+FINDING_FIELDS = ("conflict", "conflict_type", "responsible", "rule", "partner")
+"""The fields of a row's finding, in the page's order."""
+
+MOST_REASONS = 5
+"""Maximum number of reasons of implausible rows that the page names."""
+
+MOST_MODES = 12
+"""Maximum number of failure modes that the page shows."""
+
+
+def findings_payload(findings: Findings, shown: Bool) -> dict[str, Any]:
+    """Return the findings of the rows that the page holds.
+
+    ``keys`` are the different findings, five texts each, see ``FINDING_FIELDS``; ``at`` is the
+    number of each row's.
+    """
+    columns = findings.columns()
+    texts = list(zip(*(columns[name][shown].tolist() for name in FINDING_FIELDS), strict=True))
+    keys = {key: number for number, key in enumerate(dict.fromkeys(texts))}
+    return {"keys": [list(key) for key in keys], "at": [keys[key] for key in texts]}
+
+
+def implausible_payload(findings: Findings | None) -> dict[str, Any]:
+    """Return the number of implausible rows, and the reasons, the most frequent first."""
+    if findings is None:
+        return {"count": 0, "reasons": []}
+    reasons = Counter(one for one in findings.implausible.tolist() if one)
+    return {
+        "count": sum(reasons.values()),
+        "reasons": [[text, n] for text, n in reasons.most_common(MOST_REASONS)],
+    }
+
+
+def conflict_payload(one: Conflict, cause: str = "") -> dict[str, Any]:
+    """Return a scenario's conflict; numbers are rounded to what a page can show.
+
+    Args:
+        one: the conflict.
+        cause: the quick label of its cause, with which its sentence is reconciled.
+    """
+    said = one.summary
+    if said.happened:
+        said = said.reconciled(
+            judgement(cause, None, preventable=said.preventable, responsible=said.responsible)
+        )
+    facts = said.to_dict()
+    numbers = {name: value for name, value in facts.items() if isinstance(value, dict)}
+    return {
+        **{name: value for name, value in facts.items() if name not in numbers},
+        "bare": one.summary.bare,
+        "numbers": {
+            name: [None if v["value"] is None else float(f"{v['value']:.4g}"), v["unit"]]
+            for name, v in numbers.items()
+        },
+        "partner_number": one.partner,
+        "instant": one.instant,
+        "decided": one.decided,
+        "zones": list(one.zones),
+    }
+
+
+def triage_payload(found: Triage) -> dict[str, Any]:
+    """Return the failure modes, or without any the bound and the nearest scenarios."""
+    return {
+        "ego": found.ego,
+        "baseline": found.baseline,
+        "modes": [_mode(one, found.neighbourhood(one.shown)) for one in found.modes[:MOST_MODES]],
+        "more": max(0, len(found.modes) - MOST_MODES) + found.unrecorded_modes,
+        "robust": found.robust,
+        "neighbours": found.neighbours,
+        "radius": found.radius,
+        "untested": found.untested,
+        "matters": parameters_in_words(found),
+        "judged": {one.evaluation: one.judgement for one in found.neighbourhoods if one.judgement},
+        "bound": {
+            "sentence": found.bound.in_full,
+            "judged": found.bound.judged,
+            "evaluations": found.bound.evaluations,
+            "failed": found.bound.failed,
+            "implausible": found.bound.implausible,
+            "least": [one.model_dump() for one in found.bound.least],
+        },
+    }
+
+
+def _mode(one: Mode, tested: Neighbourhood | None) -> dict[str, Any]:
+    facts = one.model_dump(
+        include={
+            "number", "title", "conflict", "conflict_type", "responsible", "rule", "partner",
+            "place", "cause", "judgement", "tested", "count", "harm", "severity", "shown", "worst",
+            "robustness", "space",
+        }
+    )  # fmt: skip
+    return facts | {
+        "knife_edge": one.knife_edge,
+        "exports": list(one.exports[:5]),
+        "rules": [rule for rule, _ in one.rules] or [one.rule],
+        "rows": tested.rows if tested else 0,
+        "harmful": tested.harmful if tested else 0,
+        "fix": _fix(tested.fix) if tested else None,
+        "placebo": _fix(tested.placebo) if tested else None,
+        "minimal": _minimal(one.minimal),
+    }
+
+
+def _fix(one: Treatment | None) -> dict[str, Any] | None:
+    return None if one is None else one.model_dump(include={"name", "drop", "low", "high", "rows"})
+
+
+def _minimal(one: Minimal | None) -> dict[str, Any] | None:
+    if one is None:
+        return None
+    return one.model_dump(
+        include={"name", "sentence", "rows", "harmful", "robustness", "harm", "severity"}
+    ) | {"knife_edge": one.knife_edge}

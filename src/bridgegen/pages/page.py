@@ -1,0 +1,271 @@
+"""Assembles the page: template, style, scripts and the data, in one file."""
+
+import html
+import re
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
+from functools import cache, cached_property
+from importlib.resources import files
+from pathlib import Path
+
+from bridgegen.base.disk import write_whole
+from bridgegen.pages.data import ReportData
+from bridgegen.pages.payload import to_json
+from bridgegen.pages.sections import SECTIONS
+
+# --- Joins the page's JavaScript modules, and the styles beside them, into one script and one style
+# A page is one file that is opened from disk, where a browser loads no module. So the modules are
+# joined here, each after those that it imports, into one scope: ``import`` statements and the word
+# ``export`` are removed, names keep their meaning. Two forms are supported, at the start of a line:
+# ``import { a, b } from "./x.js";`` (or ``import "./x.js";``), and ``export`` before a
+# ``function``, # ``class``, ``const`` or ``let`` that declares one name.
+
+
+IMPORT = re.compile(r'^import (?:\{([^{}]*)\} from )?"\./([\w.-]+\.js)";\n', re.MULTILINE)
+DECLARED = re.compile(
+    r"^(export )?(?:(?:async )?function\*?|class|const|let|var) ([\w$]+)", re.MULTILINE
+)
+STATEMENT = re.compile(r"^(?:import|export)\b.*", re.MULTILINE)
+NAME = re.compile(r"[\w$]+")
+
+
+class ModuleError(Exception):
+    """The modules cannot be joined; the message names the place."""
+
+
+@dataclass(frozen=True)
+class Module:
+    """One JavaScript module.
+
+    Attributes:
+        name: of its file ("table.js").
+        text: all of it.
+    """
+
+    name: str
+    text: str
+
+    @cached_property
+    def imports(self) -> dict[str, tuple[str, ...]]:
+        """The modules that it imports, in order, and which names of each.
+
+        Raises:
+            ModuleError: a name is imported under another name, or as a default.
+        """
+        found: dict[str, tuple[str, ...]] = {}
+        for names, module in IMPORT.findall(self.text):
+            listed = [one.strip() for one in names.split(",") if one.strip()]
+            for one in listed:
+                if not NAME.fullmatch(one):
+                    raise ModuleError(f"{self.name}: `{one}` is not a name that can be imported")
+            found[module] = (*found.get(module, ()), *listed)
+        return found
+
+    @cached_property
+    def declared(self) -> list[str]:
+        """All names that it declares."""
+        return [name for _, name in DECLARED.findall(self.text)]
+
+    @cached_property
+    def exported(self) -> list[str]:
+        """The names that other modules may import."""
+        return [name for export, name in DECLARED.findall(self.text) if export]
+
+    @cached_property
+    def body(self) -> str:
+        """The text without imports and exports.
+
+        Raises:
+            ModuleError: an import or export of another form, with its line.
+        """
+        text = DECLARED.sub(lambda m: m[0].removeprefix("export "), IMPORT.sub("", self.text))
+        if left := STATEMENT.search(text):
+            line = self.text[: self.text.index(left[0])].count("\n") + 1
+            raise ModuleError(f"{self.name}, line {line}: `{left[0]}` is not supported")
+        return text
+
+
+@dataclass
+class _Graph:
+    """The modules that were read, each after those that it imports."""
+
+    read: Callable[[str], str | None]
+    done: dict[str, Module] = field(default_factory=dict)
+    open: list[str] = field(default_factory=list)
+
+    def add(self, name: str, importer: str = "") -> Module:
+        if name in self.done:
+            return self.done[name]
+        if name in self.open:
+            circle = " → ".join([*self.open[self.open.index(name) :], name])
+            raise ModuleError(f"circular import: {circle}")
+        text = self.read(name)
+        if text is None:
+            raise ModuleError(f"{importer or 'the page'} imports {name}, which does not exist")
+        module = Module(name, text)
+        self.open.append(name)
+        for other, names in module.imports.items():
+            exported = self.add(other, name).exported
+            for one in names:
+                if one not in exported:
+                    raise ModuleError(f"{name} imports `{one}`, which {other} does not export")
+        self.open.pop()
+        self.done[name] = module
+        return module
+
+
+def in_order(entries: Iterable[str], read: Callable[[str], str | None]) -> list[Module]:
+    """Return modules and all that they import, each once and after those that it imports.
+
+    Args:
+        entries: names of modules, in the order in which they run.
+        read: returns the text of a file by its name; None where there is no such file.
+
+    Raises:
+        ModuleError: a module that does not exist, an import of what is not exported, a circular
+            import, or two modules that declare the same name.
+    """
+    graph = _Graph(read)
+    for name in entries:
+        graph.add(name)
+    owner: dict[str, str] = {}
+    for module in graph.done.values():
+        for name in module.declared:
+            if name in owner:
+                raise ModuleError(f"`{name}` is declared by {owner[name]} and by {module.name}")
+            owner[name] = module.name
+    return list(graph.done.values())
+
+
+def bundle(entries: Iterable[str], read: Callable[[str], str | None]) -> tuple[str, str]:
+    """Return the script and the style of a page.
+
+    The style is that of the ``x.css`` beside every ``x.js``, in the order of the modules.
+
+    Args:
+        entries: names of modules, in the order in which they run.
+        read: returns the text of a file by its name; None where there is no such file.
+
+    Raises:
+        ModuleError: as of `in_order`, or an import or export of an unknown form.
+    """
+    modules = in_order(entries, read)
+    styles = (read(module.name.removesuffix(".js") + ".css") for module in modules)
+    script = "\n".join(module.body for module in modules)
+    return script, "\n".join(style for style in styles if style is not None)
+
+
+WEB = files("bridgegen.pages").joinpath("web")
+
+REPORT = (*(section.module for section in SECTIONS), "page.js")
+"""Modules of the report, besides those that they import."""
+
+SERVED = ("motion.js", *REPORT, "live.js")
+"""Modules of a served report; a page on disk makes no requests."""
+
+
+def write_report(path: Path, data: ReportData) -> None:
+    """Write the report as one self-contained HTML file.
+
+    The write is atomic: to a temporary file beside it, which is then renamed.
+
+    Raises:
+        StorageError: the file cannot be written (no such folder, read-only, disk full).
+    """
+    write_whole(Path(path), report_page(data))
+
+
+def report_page(data: ReportData, *, live: bool = False) -> list[bytes]:
+    """Return the report as HTML, in parts.
+
+    Args:
+        data: of the report.
+        live: whether ``bridgegen view`` serves it, so that it can request updates.
+    """
+    title = f"{data.summary.scenario}: {data.summary.title} – BridgeGen"
+    connect = b"'self'" if live else b"'none'"
+    script, style = _bundled(SERVED if live else REPORT)
+    code = len(script) + len(style) + len(_own("page.html")) + len(_own("player.html"))
+    text = to_json(data, live=live, code=code)
+    return filled(
+        "page.html", title, style, data=text.encode("ascii"), script=script, connect=connect
+    )
+
+
+def write_page(path: Path, entry: str, title: str, data: str) -> None:
+    """Write a page, whole or not at all.
+
+    Args:
+        path: of the page.
+        entry: a module of ``web`` with a template beside it ("show.js", "show.html").
+        title: plain text.
+        data: JSON that is safe inside a ``<script>`` element, see `payload.script_json`.
+
+    Raises:
+        StorageError: the file cannot be written.
+    """
+    write_whole(path, page_of(entry, title, data))
+
+
+def page_of(entry: str, title: str, data: str) -> list[bytes]:
+    """Return a page in parts; see `write_page`."""
+    script, style = _bundled((entry,))
+    template = entry.replace(".js", ".html")
+    return filled(template, title, style, script=script, data=data.encode("ascii"))
+
+
+def code_of(entry: str) -> int:
+    """Return how many characters a page has besides its title and data; see `write_page`."""
+    parts = [*_bundled((entry,)), _own(entry.replace(".js", ".html")), _own("player.html")]
+    return sum(map(len, parts))
+
+
+def write_still_page(path: Path, template: str, title: str, body: bytes) -> None:
+    """Write a page without scripts, whole or not at all.
+
+    Args:
+        path: of the page.
+        template: a file of ``web``, with a style beside it.
+        title: plain text.
+        body: HTML.
+
+    Raises:
+        StorageError: the file cannot be written.
+    """
+    write_whole(path, still_page(template, title, body))
+
+
+def still_page(template: str, title: str, body: bytes) -> list[bytes]:
+    """Return a page without scripts, in parts; see `write_still_page`."""
+    style = _own("common.css") + b"\n" + _own(template.replace(".html", ".css"))
+    return filled(template, title, style, body=body)
+
+
+def filled(template: str, title: str, css: bytes, **more: bytes) -> list[bytes]:
+    """Return a page in parts; inserted parts are not searched for placeholders.
+
+    Args:
+        template: a file of ``web``.
+        title: plain text.
+        css: its style.
+        more: of the template's other placeholders; ``{{player}}`` is the player of playbacks.
+    """
+    heading = html.escape(title).encode("utf-8", "replace")
+    fill = {"title": heading, "css": css, "player": _own("player.html"), **more}
+    parts = re.split(rb"\{\{(\w+)\}\}", _own(template))
+    return [fill[part.decode()] if i % 2 else part for i, part in enumerate(parts)]
+
+
+@cache
+def _bundled(entries: tuple[str, ...]) -> tuple[bytes, bytes]:
+    script, style = bundle(entries, _text)
+    return script.encode(), style.encode()
+
+
+def _text(name: str) -> str | None:
+    file = WEB.joinpath(name)
+    return file.read_text("utf-8") if file.is_file() else None
+
+
+def _own(name: str) -> bytes:
+    return WEB.joinpath(name).read_bytes()

@@ -1,0 +1,351 @@
+"""Scenarios of a run with all that their playback shows."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from bridgegen.assess.cause import Cause
+from bridgegen.assess.conflict.analysis import Conflicts, analyse
+from bridgegen.assess.conflict.harm import Count
+from bridgegen.assess.conflict.outcomes import with_outcomes
+from bridgegen.assess.conflict.summary import summarise
+from bridgegen.assess.metrics.ttc import ttc_over_time
+from bridgegen.base.arrays import Float
+from bridgegen.base.errors import FileFormatError
+from bridgegen.drivers import _weather_columns as column
+from bridgegen.engine.evaluation import Replay, Replays
+from bridgegen.engine.pipeline import Pipeline
+from bridgegen.pages.painter import paint
+from bridgegen.pages.playback import Beside, Conflict, Course, Planned, Playback, Weather
+from bridgegen.pages.scenery import Scenery, bodies, lamps, vehicle_lamps
+from bridgegen.pages.sensing import sensed
+from bridgegen.results.store import Recorded, Rows
+from bridgegen.scenario.ontology.check import constraints_in_words
+from bridgegen.scenario.weather import COLUMNS
+from bridgegen.search.triage.record import Minimal
+from bridgegen.simulation.rollout import STATUS_MESSAGES, Rollout
+
+THIN = 0.01
+"""How far a way's line may be off where its points lie nearly straight [m]."""
+
+
+PLAN_POINTS, PLANS_EVERY = 20, 0.2
+"""Points of a trajectory that are shown at most, and seconds between two of them at least."""
+
+APART = 0.05
+"""How far apart an entity is with two drivers at least for the playback to show both [m]."""
+
+
+@dataclass(frozen=True)
+class Shown:
+    """A row that is played.
+
+    Attributes:
+        name: of its files, or for people.
+        evaluation: its row in the store, from 0; of a minimal scenario, what that was made from.
+        files: paths relative to the page.
+        x: ``(len(space.names),)``.
+        metrics: ``(M,)``.
+        critical: whether it counts as critical.
+        cause: the quick label; may be empty.
+    """
+
+    name: str
+    evaluation: int
+    files: tuple[str, ...]
+    x: Float
+    metrics: Float
+    critical: bool
+    cause: str
+
+
+def playbacks(
+    pipeline: Pipeline,
+    rows: Rows | Recorded,
+    kept: Sequence[tuple[str, int, tuple[str, ...]]],
+    *,
+    brief: bool = False,
+    replays: Replays | None = None,
+) -> tuple[Playback, ...]:
+    """Return the playbacks of some of a run's scenarios.
+
+    Args:
+        pipeline: what evaluated the rows.
+        rows: all of the run, in order.
+        kept: name, evaluation and files of each, most critical first.
+        brief: without the individuals' picture and the ego's planned course, which take most of the
+            time, and without the baseline.
+        replays: of these scenarios; simulated here by default.
+    """
+    if not kept:
+        return ()
+    some = rows.take(np.array([evaluation for _, evaluation, _ in kept]))
+    shown = [
+        Shown(
+            name, evaluation, files, some.X[k], some.metrics[k], bool(some.critical[k]),
+            Cause(some.cause[k]).label,
+        )
+        for k, (name, evaluation, files) in enumerate(kept)
+    ]  # fmt: skip
+    replays = pipeline.replays(some.X, plans=not brief) if replays is None else replays
+    played = _all_played(pipeline, shown, replays, brief=brief)
+    return played if brief else beside_others(played, some.X, others_of(pipeline))
+
+
+def minimal_playbacks(
+    pipeline: Pipeline, wanted: Sequence[tuple[str, int, tuple[str, ...], Minimal]]
+) -> tuple[Playback, ...]:
+    """Return the playbacks of minimal scenarios, which are no rows of the run.
+
+    Args:
+        pipeline: what evaluated the run.
+        wanted: name of each, the evaluation that it is the minimal form of, its files, and itself.
+    """
+    if not wanted:
+        return ()
+    X = np.array([one.x for *_, one in wanted])
+    noise = np.array([one.noise_key for *_, one in wanted], dtype=np.uint64)
+    names = [(name, evaluation, files) for name, evaluation, files, _ in wanted]
+    played = measured_playbacks(pipeline, names, X, noise)
+    return beside_others(played, X, others_of(pipeline), noise)
+
+
+def measured_playbacks(
+    pipeline: Pipeline,
+    wanted: Sequence[tuple[str, int, tuple[str, ...]]],
+    X: Float,
+    noise: npt.NDArray[np.uint64] | None = None,
+) -> tuple[Playback, ...]:
+    """Return the playbacks of rows, without picture and planned course; they are measured anew.
+
+    Args:
+        pipeline: what evaluates them.
+        wanted: name, evaluation and files of each.
+        X: the rows, ``(N, len(space.names))``.
+        noise: keys of the sensors' noise, ``(N,)``; by default each row's own.
+    """
+    replays = pipeline.replays(X, plans=False, noise=noise)
+    metrics = np.empty((len(X), len(pipeline.metrics)))
+    for at, replay in replays.parts:
+        metrics[at] = pipeline.measure(replay.rollout)
+    critical = pipeline.objective.critical(metrics, pipeline.metrics)
+    shown = [
+        Shown(name, evaluation, files, X[k], metrics[k], bool(critical[k]), "")
+        for k, (name, evaluation, files) in enumerate(wanted)
+    ]
+    return _all_played(pipeline, shown, replays, brief=True)
+
+
+def others_of(pipeline: Pipeline) -> Mapping[str, Pipeline]:
+    """Return the pipelines of the drivers that the ego's is compared with, by their labels."""
+    one = pipeline.baseline
+    return {} if one is None else {one.driver.label: one}
+
+
+def beside_others(
+    played: Sequence[Playback],
+    X: Float,
+    others: Mapping[str, Pipeline],
+    noise: npt.NDArray[np.uint64] | None = None,
+) -> tuple[Playback, ...]:
+    """Return playbacks with the motion of the same rows with other drivers of the ego.
+
+    Args:
+        played: the playbacks.
+        X: their rows, ``(N, len(space.names))``.
+        others: pipelines of the same scenario, by the labels of their drivers.
+        noise: keys of the sensors' noise, ``(N,)``; by default each row's own.
+    """
+    found: list[list[Beside]] = [[] for _ in played]
+    for label, pipeline in others.items() if played else ():
+        rollout = pipeline.rollout(X) if noise is None else pipeline.rollout_again(X, noise)
+        for k, one in enumerate(played):
+            if rollout.status[k] == 0:
+                found[k].append(_beside(label, one, rollout, k))
+    return tuple(
+        replace(one, beside=tuple(other)) for one, other in zip(played, found, strict=True)
+    )
+
+
+def _beside(label: str, playback: Playback, rollout: Rollout, row: int) -> Beside:
+    """Return the motion of a row, of the entities that move otherwise than in a playback."""
+    motion = {name: getattr(rollout, name)[row].copy() for name in "xyh"}
+    motion["x"][:, int(rollout.n_steps[row]) :] = np.nan
+    if rollout.present.size:
+        motion["x"][~rollout.present[row]] = np.nan
+    both = min(int(rollout.n_steps[row]), playback.n_steps)
+    x, y = (motion[name][:, :both] - getattr(playback, name)[:, :both] for name in "xy")
+    apart = np.nan_to_num(np.hypot(x, y), nan=0.0).max(axis=1, initial=0.0) > APART
+    return Beside(label, tuple(np.flatnonzero(apart).tolist()), *(motion[n][apart] for n in "xyh"))
+
+
+def nominal_playback(pipeline: Pipeline, name: str) -> Playback:
+    """Return the playback of a scenario with all parameters at their defaults.
+
+    No objective is asked whether it is critical.
+
+    Raises:
+        FileFormatError: it has no result.
+    """
+    X = pipeline.space.row({})[np.newaxis]
+    replay = pipeline.replay(X, plans=False)
+    rollout = replay.rollout
+    if rollout.status[0] != 0:
+        words = [STATUS_MESSAGES[int(rollout.status[0])], *rollout.messages.values()]
+        raise FileFormatError(f"{pipeline.scenario.place}: {': '.join(words)}")
+    metrics = pipeline.measure(rollout)
+    shown = Shown(name, 0, (), X[0], metrics[0], critical=False, cause="")
+    return _played(pipeline, [shown], replay, brief=True)[0]
+
+
+def _all_played(
+    pipeline: Pipeline, shown: Sequence[Shown], replays: Replays, *, brief: bool
+) -> tuple[Playback, ...]:
+    """Return the playbacks of rows that were rolled out, of one storyboard or of several."""
+    found: dict[int, Playback] = {}
+    for at, replay in replays.parts:
+        some = [shown[i] for i in at.tolist()]
+        played = _played(pipeline, some, replay, brief=brief)
+        found |= zip(at.tolist(), played, strict=True)
+    return tuple(replace(found[i], rank=i + 1) for i in sorted(found))
+
+
+def _played(
+    pipeline: Pipeline, shown: Sequence[Shown], replay: Replay, *, brief: bool
+) -> tuple[Playback, ...]:
+    """Return the playbacks of rows of one storyboard that were rolled out."""
+    rollout, objective = replay.rollout, getattr(pipeline, "objective", None)
+    count: Count = objective.count if objective else "ego"
+    conflicts = analyse(rollout)
+    entities, scenery = bodies(rollout, pipeline.bodies(shown[0].x)), Scenery(pipeline)
+    nearest = rollout.distance.min(axis=1)
+    ttc, detections = ttc_over_time(rollout), sensed(rollout)
+    shows = vehicle_lamps(rollout, pipeline.simulator.embedded.program.sirens)
+    checked = constraints_in_words(pipeline.source.constraints)
+    found = []
+    for k, one in enumerate(shown):
+        concrete = pipeline.concrete(one.x) if not brief else None
+        motion = {name: getattr(rollout, name)[k] for name in "xyhva"}
+        if rollout.present.size:  # who is not there has no place and no speed
+            motion |= {name: np.where(rollout.present[k], motion[name], np.nan) for name in "xyva"}
+        road = scenery.road(one.x)
+        picture = None
+        if concrete is not None and concrete.individuals is not None:
+            whole = with_outcomes(concrete.individuals, rollout, concrete.roads, k)
+            picture = paint(whole, (), checked)
+        found.append(
+            Playback(
+                name=one.name,
+                rank=k + 1,
+                evaluation=one.evaluation,
+                parameters=pipeline.facts(one.x),
+                metrics=dict(zip(pipeline.metrics, one.metrics.tolist(), strict=True)),
+                critical=one.critical,
+                time_step=rollout.time_step,
+                entities=entities,
+                **motion,
+                distance=nearest[k],
+                ttc=ttc[k],
+                lanes=road.outlines,
+                n_steps=int(rollout.n_steps[k]),
+                files=one.files,
+                picture=picture,
+                lamps=lamps(rollout, k, road.lights),
+                cause=one.cause,
+                sensed=detections[k] if detections else None,
+                course=_course(replay, k),
+                plans=_plans(replay, k),
+                weather=tuple(_weather(step, one) for step, one in replay.weathers[k]),
+                street_lights=road.street_lights,
+                conflict=_conflict(conflicts, k, count),
+                shows=shows[k],
+            )
+        )  # fmt: skip
+    return tuple(found)
+
+
+def _conflict(conflicts: Conflicts, row: int, count: Count) -> Conflict | None:
+    """Return the decisive conflict of a row."""
+    summary = summarise(conflicts, row, count)
+    if summary is None:
+        return None
+    other = conflicts.names.index(summary.partner or conflicts.names[0])
+    instant = int(conflicts.instant[row, other])
+    return Conflict(
+        summary=summary,
+        partner=other,
+        instant=instant,
+        decided=int(conflicts.decided[row, other]) if summary.happened else instant,
+        zones=(int(conflicts.zone_ego[row, other]), int(conflicts.zone_other[row, other])),
+    )
+
+
+def _course(replay: Replay, row: int) -> Course | None:
+    meant = replay.intentions
+    ways = replay.ways[row] if meant else None
+    if not meant or not ways:
+        return None
+    number = np.full(max(ways) + 2, -1)  # -1 stays -1
+    number[list(ways)] = range(len(ways))
+    return Course(
+        ways=tuple(_thin(way) for way in ways.values()),
+        steps=meant.steps,
+        way=number[meant.way[row]],
+        station=meant.station[row],
+        acceleration=meant.acceleration[row],
+        shift=meant.shift[row],
+    )
+
+
+def _plans(replay: Replay, row: int) -> tuple[Planned, ...]:
+    """Return the trajectories of a row's driver, with a few points of each."""
+    made = replay.intentions.plans if replay.intentions else ()
+    if not made:
+        return ()
+    every = max(1, round(PLANS_EVERY / replay.rollout.time_step))
+    found: list[Planned] = []
+    for step, states in sorted(made[row].items()):
+        if found and step - found[-1].step < every:
+            continue
+        time = states[:, 0]
+        at = np.linspace(0.0, time[-1], min(PLAN_POINTS, len(time)))
+        points = np.stack([np.interp(at, time, states[:, i]) for i in (1, 2)], axis=1)
+        found.append(Planned(step, float(time[-1]), points))
+    return tuple(found)
+
+
+def _thin(line: Float) -> Float:
+    """Return a line without the points that it does not need to stay within ``THIN`` of itself."""
+    kept = np.zeros(len(line), dtype=np.bool_)
+    kept[[0, -1]] = True
+    parts = [(0, len(line) - 1)]
+    while parts:
+        first, last = parts.pop()
+        if last - first < 2:
+            continue
+        along = line[last] - line[first]
+        off = line[first + 1 : last] - line[first]
+        length = float(np.hypot(*along))
+        gap = (
+            np.abs(along[0] * off[:, 1] - along[1] * off[:, 0]) / length
+            if length
+            else np.hypot(*off.T)
+        )
+        worst = int(gap.argmax())
+        if gap[worst] > THIN:
+            kept[first + 1 + worst] = True
+            parts += [(first, first + 1 + worst), (first + 1 + worst, last)]
+    return line[kept]
+
+
+def _weather(step: int, felt: Float) -> Weather:
+    from bridgegen.drivers._physics_kernels import KOSCHMIEDER  # numba is slow to import
+
+    return Weather(
+        step=step,
+        stated={one.name: float(felt[i]) for i, one in enumerate(COLUMNS)},
+        sight=float(KOSCHMIEDER / felt[column.EXTINCTION]),
+        background=float(felt[column.BACKGROUND]),
+    )

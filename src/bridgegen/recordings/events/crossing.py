@@ -1,0 +1,35 @@
+"""Crossings: the ego goes straight on, and another motor vehicle crosses its path."""
+
+from bridgegen.recordings.events.changes import LaneChanges
+from bridgegen.recordings.events.event import Events
+from bridgegen.recordings.events.meetings import (
+    CROSSING,
+    OPPOSITE,
+    STRAIGHT,
+    Meeting,
+    events_of_meetings,
+    meetings,
+    paces_of,
+)
+from bridgegen.recordings.events.red_light import ran_red
+from bridgegen.recordings.events.scene import Scene
+
+
+def find(scene: Scene, changes: LaneChanges) -> Events:
+    """Return the crossings of a recording; of two that go straight on, from both views."""
+    met = [
+        one for one in meetings(scene, scene.is_ego, scene.is_ego)
+        if CROSSING[0] <= one.angle <= CROSSING[1]
+        and one.approach_angle < OPPOSITE
+        and abs(one.ego_turn) <= STRAIGHT
+    ]  # fmt: skip
+    paces = paces_of(scene, met)
+    return events_of_meetings("crossing", scene, met, lambda one: _more(scene, one) | paces[one])
+
+
+def _more(scene: Scene, one: Meeting) -> dict[str, float]:
+    return {
+        "other_turn": one.other_turn,
+        "ego_ran_red": ran_red(scene, one.ego, one.ego_at),
+        "other_ran_red": ran_red(scene, one.other, one.other_at),
+    }

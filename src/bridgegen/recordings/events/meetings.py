@@ -1,0 +1,235 @@
+"""Two whose paths cross, from the view of the one or the other: what crossing events share."""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from types import MappingProxyType
+
+import numpy as np
+
+from bridgegen.assess.metrics.pet import pet
+from bridgegen.base.arrays import Bool
+from bridgegen.recordings.events.event import NOT_WHOLE, Events, events_of
+from bridgegen.recordings.events.pace import apart, pace_changes, set_off_instants
+from bridgegen.recordings.events.scene import Scene
+from bridgegen.recordings.excerpt import excerpt
+from bridgegen.recordings.readers.table import wrap
+from bridgegen.scenario.language.event_kinds import EVENT_KINDS
+
+AHEAD = 6.0
+"""A meeting begins so long before the first of both passes, or once both are recorded [s]."""
+LEAST_SEEN = 1.0
+"""Both are recorded for so long before the first passes [s]."""
+AFTER = 1.0
+"""The bodies are looked at until so long after the second passes [s]."""
+AVERAGED = 1.0
+"""Before and after the crossing point, over which a speed is averaged [s]."""
+LEAST_PACE = 0.5
+"""By which the other changes its pace, at least [m/s]."""
+STRAIGHT = 30.0
+"""Who turns less than this goes straight on [deg]."""
+CROSSING = (30.0, 150.0)
+"""Angles at which paths cross [deg]."""
+OPPOSITE = 145.0
+"""From this angle between their courses before, two come from opposite directions [deg]."""
+TOUCH = "bodies touch"
+
+
+@dataclass(frozen=True)
+class Meeting:
+    """An ego and another whose paths cross.
+
+    Attributes:
+        ego: participant.
+        other: participant.
+        ego_at: instant at which the ego's centre passes the point.
+        other_at: instant at which the other's does.
+        begin: instant.
+        angle: between the courses there [deg], 0 to 180.
+        approach_angle: between the courses before [deg], 0 to 180.
+        ego_turn: by how much the ego turns [deg], to the left positive.
+        other_turn: by how much the other turns [deg].
+        side: from which side of the ego the other comes: 1 right, -1 left.
+        course: of the ego there [rad].
+    """
+
+    ego: int
+    other: int
+    ego_at: float
+    other_at: float
+    begin: float
+    angle: float
+    approach_angle: float
+    ego_turn: float
+    other_turn: float
+    side: float
+    course: float
+
+    @property
+    def first_at(self) -> float:
+        """Instant at which the first of both passes."""
+        return min(self.ego_at, self.other_at)
+
+    @property
+    def last_at(self) -> float:
+        """Instant at which the second passes."""
+        return max(self.ego_at, self.other_at)
+
+
+def meetings(scene: Scene, egos: Bool, others: Bool) -> list[Meeting]:
+    """Return the meetings of some with others; of two that may be the ego, from both views.
+
+    Args:
+        scene: the recording.
+        egos: ``(P,)`` who can be the ego.
+        others: ``(P,)`` who can be the other.
+    """
+    met, found = scene.crossings, []
+    for one, other, one_at, other_at in zip(
+        met.one.tolist(), met.other.tolist(), met.one_at.tolist(), met.other_at.tolist(),
+        strict=True,
+    ):  # fmt: skip
+        if egos[one] and others[other]:
+            found.append(meeting(scene, one, other, one_at, other_at))
+        if egos[other] and others[one]:
+            found.append(meeting(scene, other, one, other_at, one_at))
+    return found
+
+
+def meeting(scene: Scene, ego: int, other: int, ego_at: float, other_at: float) -> Meeting:
+    """Return the meeting of an ego and another that pass a point at two instants."""
+    paths, clock = scene.paths, scene.clock
+    lengths = paths.length(ego, ego_at), paths.length(other, other_at)
+    own, its = paths.course(ego, lengths[0]), paths.course(other, lengths[1])
+    (before, turn), (its_before, its_turn) = (
+        paths.turn(who, length) for who, length in zip((ego, other), lengths, strict=True)
+    )
+    both = float(max(clock.begin[ego], clock.begin[other]))
+    begin = max(min(ego_at, other_at) - AHEAD / scene.step, both)
+    return Meeting(
+        ego, other, ego_at, other_at, begin,
+        float(np.degrees(abs(_wrapped(its - own)))),
+        float(np.degrees(abs(_wrapped(its_before - before)))),
+        float(np.degrees(turn)), float(np.degrees(its_turn)),
+        1.0 if np.sin(its - own) > 0.0 else -1.0, own,
+    )  # fmt: skip
+
+
+def _wrapped(angle: float) -> float:
+    return float(wrap(np.array([angle]))[0])
+
+
+def events_of_meetings(
+    kind: str,
+    scene: Scene,
+    met: Sequence[Meeting],
+    more: Callable[[Meeting], dict[str, float]],
+    roles: Mapping[str, Sequence[int]] = MappingProxyType({}),
+    refused: Mapping[str, Sequence[bool]] = MappingProxyType({}),
+) -> Events:
+    """Return meetings as events of a kind, with the quantities that all of them have.
+
+    Args:
+        kind: name.
+        scene: the recording.
+        met: in any order.
+        more: the quantities that this kind has besides.
+        roles: participants besides the other, by role.
+        refused: further reasons for which meetings are no events.
+    """
+    off = set_off_instants(scene, [one.other for one in met], [one.other_at for one in met])
+    rows = [
+        dict(_quantities(scene, one, at)) | more(one)
+        for one, at in zip(met, off.tolist(), strict=True)
+    ]
+    table = {
+        name: np.array([row[name] for row in rows], np.float64)
+        for name in EVENT_KINDS[kind].quantities
+    }
+    ego, other = (
+        np.array([getattr(one, key) for one in met], np.int64) for key in ("ego", "other")
+    )
+    begin, first, last = (
+        np.array([getattr(one, key) for one in met], np.float64)
+        for key in ("begin", "first_at", "last_at")
+    )
+    return events_of(
+        kind, ego,
+        {"other": other} | {name: np.array(who, np.int64) for name, who in roles.items()},
+        (scene.seconds(begin), scene.seconds(last)), table,
+        {
+            NOT_WHOLE: (first - begin) * scene.step < LEAST_SEEN,
+            TOUCH: table["pet"] <= 0.0,
+        }
+        | {reason: np.array(mask, np.bool_) for reason, mask in refused.items()},
+    )  # fmt: skip
+
+
+def paces_of(scene: Scene, met: Sequence[Meeting]) -> dict[Meeting, dict[str, float]]:
+    """Return of meetings how the other changes its pace before it passes the point."""
+    found = pace_changes(
+        scene, [one.other for one in met], [one.other_at for one in met], LEAST_PACE
+    )  # fmt: skip
+    paces = {}
+    for i, one in enumerate(met):
+        begin = float(found.begin[i])
+        ways, distance = _ways_left(scene, one, begin)
+        paces[one] = {
+            "pace_before": float(found.before[i]), "pace_after": float(found.after[i]),
+            "pace_distance": ways[0], "pace_ego_distance": ways[1], "pace_apart": distance,
+        }  # fmt: skip
+    return paces
+
+
+def _ways_left(scene: Scene, one: Meeting, at: float) -> tuple[list[float], float]:
+    """Return how far other and ego have to go at an instant, and how far apart they are [m]."""
+    paths, clock = scene.paths, scene.clock
+    if not clock.begin[one.ego] <= at <= clock.end[one.ego]:
+        return [np.nan, np.nan], np.nan
+    ways = [
+        paths.length(who, end) - paths.length(who, at)
+        for who, end in ((one.other, one.other_at), (one.ego, one.ego_at))
+    ]
+    return ways, apart(scene, one.ego, one.other, at)
+
+
+def _quantities(scene: Scene, one: Meeting, set_off: float) -> Iterator[tuple[str, float]]:
+    paths = scene.paths
+    for name, who, at in (("ego", one.ego, one.ego_at), ("other", one.other, one.other_at)):
+        yield f"{name}_speed", _speed(scene, who, one.begin)
+        yield f"{name}_crossing_speed", crossing_speed(scene, who, at)
+        yield f"{name}_distance", paths.length(who, at) - paths.length(who, one.begin)
+    yield "time_gap", (one.last_at - one.first_at) * scene.step
+    yield "pet", _pet(scene, one)
+    yield "angle", one.angle
+    yield "approach_angle", one.approach_angle
+    yield "side", one.side
+    yield "ego_first", float(one.ego_at < one.other_at)
+    yield "seen_time", (one.first_at - one.begin) * scene.step
+    ways, distance = _ways_left(scene, one, set_off)
+    yield "set_off_distance", ways[0]
+    yield "set_off_ego_distance", ways[1]
+    yield "set_off_apart", distance
+
+
+def _speed(scene: Scene, who: int, instant: float) -> float:
+    low, high = float(scene.clock.begin[who]), float(scene.clock.end[who])
+    at = np.array([min(max(instant, low), high)])
+    return float(scene.at(scene.speed, np.array([who]), at)[0])
+
+
+def crossing_speed(scene: Scene, who: int, at: float) -> float:
+    """Return a speed by the length of the path, which noise makes longer by little [m/s]."""
+    around, clock = AVERAGED / scene.step, scene.clock
+    low, high = max(at - around, float(clock.begin[who])), min(at + around, float(clock.end[who]))
+    way = scene.paths.length(who, high) - scene.paths.length(who, low)
+    return way / ((high - low) * scene.step)
+
+
+def _pet(scene: Scene, one: Meeting) -> float:
+    """Return the least time between the instants at which both bodies cover a point [s]."""
+    late, early = (one.ego, one.other) if one.ego_at > one.other_at else (one.other, one.ego)
+    begin = int(np.ceil(one.begin))
+    end = min(int(one.last_at + AFTER / scene.step) + 1, int(scene.clock.end[late]))
+    if end <= begin:
+        return np.nan
+    return float(pet(excerpt(scene.traffic, scene.clock, late, [early], begin, end))[0])

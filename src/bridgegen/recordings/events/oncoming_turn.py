@@ -1,0 +1,36 @@
+"""Oncoming left turns: two come from opposite directions, and one turns across the other's path."""
+
+from bridgegen.recordings.events.changes import LaneChanges
+from bridgegen.recordings.events.event import Events
+from bridgegen.recordings.events.meetings import (
+    CROSSING,
+    OPPOSITE,
+    STRAIGHT,
+    Meeting,
+    events_of_meetings,
+    meetings,
+)
+from bridgegen.recordings.events.scene import Scene
+
+TURNS = 20.0
+"""Who turns by more than this, and more than the other, turns [deg]: the rest may be cut off."""
+
+
+def find(scene: Scene, changes: LaneChanges) -> Events:
+    """Return the oncoming left turns of a recording, from both views."""
+    met = [
+        one for one in meetings(scene, scene.is_ego, scene.is_ego)
+        if CROSSING[0] <= one.angle <= CROSSING[1]
+        and one.approach_angle >= OPPOSITE
+        and max(abs(one.ego_turn), abs(one.other_turn)) > TURNS
+        and min(abs(one.ego_turn), abs(one.other_turn)) <= STRAIGHT
+    ]  # fmt: skip
+    return events_of_meetings("oncoming-left-turn", scene, met, _turn)
+
+
+def _turn(one: Meeting) -> dict[str, float]:
+    ego_turns = abs(one.ego_turn) > abs(one.other_turn)
+    return {
+        "ego_turns": float(ego_turns),
+        "turn": abs(one.ego_turn if ego_turns else one.other_turn),
+    }

@@ -1,0 +1,156 @@
+"""The closest events of each kind, with the motion around them, for the page."""
+
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from html import escape
+
+import numpy as np
+
+from bridgegen.base.arrays import Float
+from bridgegen.recordings.events.event import ABSENT, Events
+from bridgegen.recordings.events.find import FoundEvents
+from bridgegen.recordings.excerpt import Clock, excerpt
+from bridgegen.recordings.readers.table import RecordedTraffic
+from bridgegen.recordings.replays.scenario import others_near
+from bridgegen.recordings.replays.write import moving_picture
+from bridgegen.scenario.language.event_kinds import EVENT_KINDS
+from bridgegen.simulation.rollout import Rollout
+
+SHOWN = 3
+"""Of each kind."""
+AROUND = 2.0
+"""Before and after an event [s]."""
+LONGEST = 15.0
+"""Of a picture [s]."""
+MOST_OTHERS = 12
+"""Participants besides the ego."""
+GAPS = {"cut-in": "crossing_gap"}
+"""The gap that counts, by kind; of the others their gap at the beginning."""
+MEETING = "pet"
+"""Who meets on crossing paths has this time instead."""
+LEAST_SPEED = 1.0
+"""Slower egos count as so fast [m/s]."""
+
+
+@dataclass(frozen=True, eq=False)
+class PlayedEvent:
+    """An event with what happened around it.
+
+    Attributes:
+        kind: of it.
+        name: of it, as in the table of events.
+        recording: its name.
+        ego: the participant's name.
+        time_gap: gap by the ego's speed, or post-encroachment time [s]; inf if there is none.
+        motion: from `AROUND` before it on; entity 1 is the other of the event.
+        when: its begin, from the motion's [s].
+        seconds: of the motion's begin, by the recording's clock [s].
+    """
+
+    kind: str
+    name: str
+    recording: str
+    ego: str
+    time_gap: float
+    motion: Rollout
+    when: float
+    seconds: float
+
+
+def closest(
+    kept: Sequence[PlayedEvent],
+    traffic: RecordedTraffic,
+    clock: Clock,
+    found: FoundEvents,
+    before: "Counter[str]",
+) -> list[PlayedEvent]:
+    """Return the closest events of each kind, of earlier recordings and of one more.
+
+    Args:
+        kept: of earlier recordings.
+        traffic: the cleaned recording.
+        clock: its own.
+        found: its events.
+        before: how many events of each kind the earlier ones have.
+    """
+    made: list[PlayedEvent] = []
+    for events in found.kinds:
+        kind = events.kind.name
+        earlier = [one for one in kept if one.kind == kind]
+        gaps = _time_gaps(events)
+        worst = max((one.time_gap for one in earlier), default=np.inf)
+        limit = worst if len(earlier) >= SHOWN else np.inf
+        more = []
+        for i in np.argsort(gaps, kind="stable")[:SHOWN].tolist():
+            if not gaps[i] > limit:
+                name = f"{kind}-{before[kind] + i + 1}"
+                more += list(_played(traffic, clock, events, i, name, float(gaps[i])))
+        made += sorted([*earlier, *more], key=lambda one: one.time_gap)[:SHOWN]
+    return made
+
+
+def _time_gaps(events: Events) -> Float:
+    if MEETING in events.quantities:
+        return np.nan_to_num(events.quantities[MEETING], nan=np.inf)
+    gap = events.quantities.get(GAPS.get(events.kind.name, "gap"))
+    if gap is None:
+        return np.full(len(events), np.inf)
+    time_gap = gap / np.maximum(events.quantities["ego_speed"], LEAST_SPEED)
+    return np.where(np.isnan(time_gap), np.inf, time_gap)
+
+
+def _played(
+    traffic: RecordedTraffic, clock: Clock, events: Events, i: int, name: str, time_gap: float
+) -> Iterator[PlayedEvent]:
+    """Yield an event, if anyone else is there to be seen."""
+    step, ego = traffic.facts.time_step, int(events.ego[i])
+    around = round(AROUND / step)
+    at = round(float(events.begin[i]) / step)
+    begin = max(at - around, int(clock.begin[ego]))
+    end = min(round(float(events.end[i]) / step) + around, int(clock.end[ego]),
+              begin + round(LONGEST / step))  # fmt: skip
+    first = list(dict.fromkeys(int(who[i]) for who in events.others.values() if who[i] != ABSENT))
+    others = others_near(traffic, clock, ego, first, begin, end)[:MOST_OTHERS]
+    if others and end > begin:
+        motion = excerpt(traffic, clock, ego, others, begin, end)
+        yield PlayedEvent(
+            events.kind.name, name, traffic.facts.name, traffic.names[ego], time_gap, motion,
+            (at - begin) * step, begin * step,
+        )  # fmt: skip
+
+
+def playback_section(played: Sequence[PlayedEvent]) -> str:
+    """Return the cards of the closest events, each a moving picture."""
+    cards = []
+    for kind in EVENT_KINDS:
+        same = [one for one in played if one.kind == kind]
+        if same:
+            pictures = "".join(map(_picture, same))
+            cards.append(f"<div class='card event'><h3>{escape(kind)}</h3>{pictures}</div>")
+    if not cards:
+        return ""
+    return (
+        f"<p class='muted'>Of each kind up to {SHOWN} events, those with the least gap by the "
+        "ego's speed, or post-encroachment time. Blue is the ego, orange the other; pale outlines "
+        "show where both were when the event began.</p>"
+        f"{''.join(cards)}"
+    )
+
+
+def _picture(one: PlayedEvent) -> str:
+    if MEETING in EVENT_KINDS[one.kind].quantities:
+        gap = f"; {one.time_gap:.2f} s between them"
+    elif "gap" in EVENT_KINDS[one.kind].quantities:
+        gap = f"; {one.time_gap:.2f} s behind" if np.isfinite(one.time_gap) else "; no leader"
+    else:
+        gap = ""
+    about = (
+        f"{one.name}: ego {one.ego} of {one.recording}, from {one.seconds:.2f} s by the "
+        f"recording's clock{gap}"
+    )
+    picture = moving_picture(one.motion, 1, one.when, about)
+    return (
+        f"<figure id='{escape(one.name)}'>{picture}"
+        f"<figcaption>{escape(about)}</figcaption></figure>"
+    )

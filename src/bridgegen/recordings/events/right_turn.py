@@ -1,0 +1,48 @@
+"""Right turns with a bicycle: it goes straight on, on the right of an ego that turns right."""
+
+import numpy as np
+
+from bridgegen.drivers.kinds import BICYCLE
+from bridgegen.recordings.events.changes import LaneChanges
+from bridgegen.recordings.events.event import Events
+from bridgegen.recordings.events.meetings import (
+    STRAIGHT,
+    Meeting,
+    events_of_meetings,
+    meetings,
+    paces_of,
+)
+from bridgegen.recordings.events.scene import Scene
+
+TURNS = 45.0
+"""The ego turns to the right by more than this [deg]."""
+SAME_WAY = 45.0
+"""Between their courses before, at most [deg]."""
+ANGLES = (15.0, 160.0)
+"""Between their courses where they cross [deg]; flat where the turn has just begun."""
+
+
+def find(scene: Scene, changes: LaneChanges) -> Events:
+    """Return the right turns of a recording across the path of a bicycle."""
+    met = [
+        one for one in meetings(scene, scene.is_ego, scene.traffic.kind == BICYCLE)
+        if one.ego_turn < -TURNS and abs(one.other_turn) <= STRAIGHT
+        and one.approach_angle <= SAME_WAY and ANGLES[0] <= one.angle <= ANGLES[1]
+    ]  # fmt: skip
+    paces = paces_of(scene, met)
+    return events_of_meetings(
+        "right-turn-with-bicycle", scene, met, lambda one: _more(scene, one) | paces[one]
+    )
+
+
+def _more(scene: Scene, one: Meeting) -> dict[str, float]:
+    """Return the quantities that only these have; places hold at the beginning."""
+    who, at = np.array([one.ego, one.other]), np.full(2, one.begin)
+    x, y = (scene.at(values, who, at) for values in (scene.traffic.x, scene.traffic.y))
+    course = scene.paths.course(one.ego, scene.paths.length(one.ego, one.begin))
+    dx, dy = float(x[1] - x[0]), float(y[1] - y[0])
+    return {
+        "ego_turn": one.ego_turn,
+        "ahead": dx * np.cos(course) + dy * np.sin(course),
+        "aside": dx * np.sin(course) - dy * np.cos(course),
+    }

@@ -1,0 +1,168 @@
+"""Events as tables: all with all quantities, and per scenario a row of parameters per event."""
+
+import csv
+import io
+import math
+from collections import Counter
+from collections.abc import Iterable, Iterator, Sequence
+from html import escape
+from pathlib import Path
+
+from bridgegen.base.disk import write_whole
+from bridgegen.base.errors import StorageError
+from bridgegen.recordings.cells import cell, html_table
+from bridgegen.recordings.events.event import ABSENT
+from bridgegen.recordings.events.find import FoundEvents, named
+from bridgegen.recordings.events.of_scenarios import Broken, ScenarioEvents, encounters_of
+from bridgegen.scenario.exposure.exposure import Encounters
+from bridgegen.scenario.language.event_kinds import EVENT_KINDS
+
+TABLE, FOLDER = "events.csv", "events"
+NAMES_SHOWN = 3
+"""Of events that break a constraint."""
+QUANTITIES = tuple(dict.fromkeys(name for one in EVENT_KINDS.values() for name in one.quantities))
+ROLES = tuple(dict.fromkeys(role for one in EVENT_KINDS.values() for role in one.roles))
+HEAD = ("name", "recording", "file", "event", "ego", *ROLES, "begin", "end", *QUANTITIES)
+
+
+def write_events(
+    out: Path, found: Sequence[FoundEvents], scenarios: Sequence[ScenarioEvents]
+) -> None:
+    """Write the table of all events, and that of each scenario in a folder beside it.
+
+    Raises:
+        StorageError: they cannot be written.
+    """
+    write_whole(out / TABLE, _csv(HEAD, _rows(found)))
+    try:
+        (out / FOLDER).mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise StorageError(f"{out / FOLDER}: cannot be made: {error.strerror}") from None
+    for one in scenarios:
+        rows = zip(*(values.tolist() for values in one.rows.values()), strict=True)
+        path = out / FOLDER / f"{one.scenario}.csv"
+        write_whole(path, _csv(one.rows, ([f"{v:.7g}" for v in row] for row in rows)))
+
+
+def _rows(found: Sequence[FoundEvents]) -> Iterator[list[object]]:
+    for one, events, names in named(found):
+        for i, (name, ego) in enumerate(zip(names, events.ego.tolist(), strict=True)):
+            others = {role: int(who[i]) for role, who in events.others.items()}
+            yield [
+                name, one.recording, one.source, events.kind.name, one.names[ego],
+                *(_name(one.names, others.get(role, ABSENT)) for role in ROLES),
+                f"{events.begin[i]:.10g}", f"{events.end[i]:.10g}",
+                *(_number(events.quantities[name][i]) if name in events.quantities else ""
+                  for name in QUANTITIES),
+            ]  # fmt: skip
+
+
+def _name(names: Sequence[str], who: int) -> str:
+    return names[who] if who != ABSENT else ""
+
+
+def _number(value: float) -> str:
+    return "" if math.isnan(value) else f"{value:.7g}"
+
+
+def _csv(head: Iterable[str], rows: Iterable[Iterable[object]]) -> Iterator[bytes]:
+    text = io.StringIO()
+    writer = csv.writer(text)
+    writer.writerow(head)
+    writer.writerows([cell(value) for value in row] for row in rows)
+    yield text.getvalue().encode("utf-8", "replace")
+
+
+def kind_rows(found: Sequence[FoundEvents]) -> Iterator[tuple[str, int, str, str, str]]:
+    """Yield per kind: its name, how many, rates per hour and per 1000 km, what was refused."""
+    for kind in EVENT_KINDS:
+        same = [one for each in found for one in each.kinds if one.kind.name == kind]
+        count = sum(len(one) for one in same)
+        refused: Counter[str] = Counter()
+        for one in same:
+            refused.update(one.refused)
+        yield (
+            kind, count, *rates_in_words(encounters_of(count, found, kind)),
+            "; ".join(f"{number:,} {reason}" for reason, number in refused.items()),
+        )  # fmt: skip
+
+
+def rates_in_words(met: Encounters | None) -> tuple[str, str]:
+    """Return how often something was met, per hour and per 1000 km, with the 95 % interval."""
+    if met is None:
+        return "–", "–"
+    texts = []
+    for rate, scale in ((met.per_hour, 1.0), (met.per_km, 1000.0)):
+        if rate is None:
+            texts.append("–")
+        else:
+            estimate, low, high = (
+                _three_digits(scale * value) for value in (rate.estimate, rate.low, rate.high)
+            )
+            texts.append(f"{estimate} ({low} to {high})")
+    return texts[0], texts[1]
+
+
+def _three_digits(value: float) -> str:
+    return f"{value:,.0f}" if value >= 999.5 else f"{value:.3g}"
+
+
+def against_in_words(one: ScenarioEvents) -> tuple[str, ...]:
+    """Return what events say against the ranges and constraints of a scenario, a text each."""
+    texts = [
+        f"{each.parameter} [{each.unit}]: {each.below:,} below {each.low:g}, {each.above:,} above "
+        f"{each.high:g}; seen {each.least:.4g} to {each.most:.4g}"
+        for each in one.outside
+    ]
+    return (*texts, *(broken_in_words(each) for each in one.broken))
+
+
+def broken_in_words(one: Broken) -> str:
+    """Return how many events break a constraint, and the first of them."""
+    more = ", …" if len(one.events) > NAMES_SHOWN else ""
+    first = ", ".join(one.events[:NAMES_SHOWN])
+    return f"{len(one.events):,} break {one.rule} ({first}{more})"
+
+
+# --- The part of the page that counts events, and sets them against scenarios ---
+
+
+def events_section(found: Sequence[FoundEvents], scenarios: Sequence[ScenarioEvents]) -> str:
+    """Return the cards of events and of scenarios."""
+    of_scenarios = (
+        "scenario", "event", "rows", "incomplete", "per hour", "per 1000 km", "not given",
+    )  # fmt: skip
+    hours, km, all_hours, all_km = (
+        sum(getattr(one, name) for one in found)
+        for name in ("hours", "kilometres", "all_hours", "all_kilometres")
+    )
+    kinds = [
+        [kind, f"{count:,}", per_hour, per_km, refused]
+        for kind, count, per_hour, per_km, refused in kind_rows(found)
+    ]
+    met = [
+        [one.scenario, one.kind, f"{one.complete:,}", f"{one.incomplete:,}",
+         *rates_in_words(one.encounters), ", ".join(one.unmapped) or "–"]
+        for one in scenarios
+    ]  # fmt: skip
+    against = "".join(
+        f"<li>{escape(one.scenario)}: {escape(text)}</li>"
+        for one in scenarios
+        for text in against_in_words(one)
+    )
+    heard = f"<ul>{against}</ul>" if against else "<p>Nothing.</p>"
+    return (
+        f"<div class='card'><div class='wide'>"
+        f"{html_table(['event', 'count', 'per hour', 'per 1000 km', 'refused'], kinds)}</div>"
+        f"<p class='muted'>All are in {TABLE}. Rates are those of {hours:.4g} h and {km:.4g} km of "
+        f"motor vehicles on lanes (from crossing on in this table, {all_hours:.4g} h and "
+        f"{all_km:.4g} km, on lanes or not), each of which is the ego in turn, less the "
+        "share of events that the recording cuts off; in brackets the exact 95 % interval of a "
+        "Poisson process."
+        "</p></div>"
+        f"<div class='card'><h3>Scenarios</h3><div class='wide'>"
+        f"{html_table(of_scenarios, met)}"
+        f"</div><p class='muted'>A row of parameters per event is in {FOLDER}/SCENARIO.csv.</p>"
+        f"</div><div class='card'><h3>What the events say against ranges and constraints</h3>"
+        f"{heard}</div>"
+    )

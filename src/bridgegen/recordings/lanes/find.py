@@ -1,0 +1,139 @@
+"""Where a recording is on lanes: of a map, of its own lanelets or markings, or of its paths."""
+
+import math
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from bridgegen.base.arrays import Float
+from bridgegen.base.errors import InputError
+from bridgegen.openx.opendrive.model import Offset
+from bridgegen.openx.opendrive.read import read
+from bridgegen.recordings.lanes.fit import Fit, fit_of
+from bridgegen.recordings.lanes.inferred import infer_lanes
+from bridgegen.recordings.lanes.lanelets import lanes_of_lanelets
+from bridgegen.recordings.lanes.model import RecordedLanes
+from bridgegen.recordings.lanes.placing import Placed, place
+from bridgegen.recordings.lanes.road_map import lanes_of_map
+from bridgegen.recordings.readers.table import RecordedTraffic, wrap
+
+LEAST_SHARE = 0.5
+"""Of the states of vehicles that drive; less are not on the lanes of their map or lanelets."""
+USUAL_SHARE = 0.9
+"""With less there is a warning."""
+
+
+@dataclass(frozen=True, eq=False)
+class MapLanes:
+    """The lanes of an OpenDRIVE map.
+
+    Attributes:
+        path: of the file.
+        lanes: in its coordinates.
+        offset: from its header, of its coordinates in the geographical projection.
+        warnings: of reading.
+    """
+
+    path: Path
+    lanes: RecordedLanes
+    offset: Offset | None
+    warnings: tuple[str, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Located:
+    """Where a recording is: the lanes in its coordinates, its states on them, how well they fit."""
+
+    lanes: RecordedLanes
+    placed: Placed
+    fit: Fit
+
+
+def read_map(path: Path) -> MapLanes:
+    """Read the lanes of an OpenDRIVE map.
+
+    Raises:
+        FileFormatError: missing, unreadable, malformed or inconsistent.
+        InputError: it has no driving lane, or is too large.
+    """
+    warnings: list[str] = []
+    model = read(path, warnings=warnings)
+    lanes = lanes_of_map(model, str(path))
+    return MapLanes(path, lanes, model.header.offset, tuple(warnings))
+
+
+def locate(traffic: RecordedTraffic, road_map: MapLanes | None = None) -> Located:
+    """Say where a recording is: on a map if one is given, else its own lanes, else those inferred.
+
+    Args:
+        traffic: cleaned.
+        road_map: in the recording's coordinates, or in those that its header's offset leads to.
+
+    Raises:
+        InputError: less than half of the states of vehicles that drive are on the map's lanes.
+    """
+    if road_map is not None:
+        return _on_map(traffic, road_map)
+    if not traffic.facts.lanelets:
+        return _on(traffic, infer_lanes(traffic))
+    found = _on(traffic, lanes_of_lanelets(traffic.facts.lanelets))
+    if not found.fit.vehicle_share < LEAST_SHARE:
+        return found
+    note = (
+        f"the recording's own lanes hold {found.fit.vehicle_share:.0%} of the states of vehicles "
+        "that drive, and are not used"
+    )
+    lanes = infer_lanes(traffic)
+    return _on(traffic, replace(lanes, notes=(note, *lanes.notes)))
+
+
+def _on(traffic: RecordedTraffic, lanes: RecordedLanes) -> Located:
+    placed = place(traffic, lanes)
+    return Located(lanes, placed, fit_of(traffic, placed, lanes))
+
+
+def _on_map(traffic: RecordedTraffic, road_map: MapLanes) -> Located:
+    found = _on(traffic, road_map.lanes)
+    share = found.fit.vehicle_share
+    if share < LEAST_SHARE and road_map.offset is not None:
+        moved = _on(traffic, _projected(road_map.lanes, road_map.offset))
+        found = moved if moved.fit.vehicle_share > share else found
+    best = found.fit.vehicle_share
+    if LEAST_SHARE <= best < USUAL_SHARE:
+        note = (
+            f"{traffic.facts.source}: only {best:.0%} of the states of vehicles that drive are on "
+            "the map's lanes: is it the map of the place?"
+        )
+        lanes = replace(found.lanes, notes=(*found.lanes.notes, note))
+        return Located(lanes, found.placed, found.fit)
+    if not best < LEAST_SHARE:
+        return found
+    raise InputError(
+        f"{traffic.facts.source}: {best:.0%} of the states of vehicles that drive are on lanes of "
+        f"the map {road_map.path}, and {LEAST_SHARE:.0%} must be; the recording spans "
+        f"{_span(traffic.x, traffic.y)}, the map {_span(road_map.lanes.x, road_map.lanes.y)}: give "
+        "the map of the place, in the recording's coordinates"
+    )
+
+
+def _projected(lanes: RecordedLanes, offset: Offset) -> RecordedLanes:
+    """Return lanes in the coordinates of the map's projection.
+
+    Source: ASAM OpenDRIVE 1.8, georeferencing (see `bridgegen.openx.geo.projection`).
+    """
+    c, s = math.cos(offset.hdg), math.sin(offset.hdg)
+    x, y = lanes.x + offset.x, lanes.y + offset.y
+    note = (
+        "the recording's coordinates are those of the map's projection: the map's lanes are moved "
+        f"by its header's offset, ({offset.x:g}, {offset.y:g}) m, {offset.hdg:g} rad"
+    )
+    return replace(
+        lanes, x=c * x - s * y, y=s * x + c * y, heading=wrap(lanes.heading + offset.hdg),
+        notes=(*lanes.notes, note),
+    )  # fmt: skip
+
+
+def _span(x: Float, y: Float) -> str:
+    low, high = (np.array([f(x), f(y)]) for f in (np.min, np.max))
+    return f"x {low[0]:.0f} to {high[0]:.0f} m, y {low[1]:.0f} to {high[1]:.0f} m"

@@ -1,0 +1,192 @@
+"""The files of mined scenarios, in a folder of their own."""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import asdict
+from html import escape
+from pathlib import Path
+
+import numpy as np
+
+from bridgegen.base.disk import write_whole
+from bridgegen.base.errors import StorageError
+from bridgegen.openx.openscenario.exposure import distribution_xml
+from bridgegen.recordings.cells import html_table
+from bridgegen.recordings.events.find import FoundEvents
+from bridgegen.recordings.events.of_scenarios import ScenarioEvents, Sought
+from bridgegen.recordings.events.tables import FOLDER as EVENTS
+from bridgegen.recordings.scenarios.draft import MinedRange, mined_name
+from bridgegen.recordings.scenarios.mined import MinedScenario, Unmade, mined_scenario
+from bridgegen.scenario.exposure.page import facts, rate_text, write_page
+from bridgegen.scenario.ontology.builder import Builder
+from bridgegen.scenario.ontology.files import save
+from bridgegen.scenario.ontology.graph import Individuals
+
+# --- Mined scenarios and their statistics as individuals of the ontology ---
+
+
+FILE = "mined.owl"
+QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
+"""Of the values that were fitted."""
+
+
+def mined_individuals(mined: Sequence[MinedScenario]) -> Individuals:
+    """Return an individual for each scenario, and for each of its statistics."""
+    builder = Builder("mined", {})
+    for one in mined:
+        node = builder.node(one.name, "MinedScenario")
+        builder.put(node, "has_name", one.name)
+        for number, (name, unit, value) in enumerate(_statistics(one), 1):
+            statistic = builder.node(f"{one.name}_{number}", "Statistic")
+            builder.put(statistic, "has_name", name)
+            builder.put(statistic, "has_measured_unit", unit)
+            builder.put(statistic, "has_estimate", value)
+            builder.put(node, "has_statistic", statistic)
+    return Individuals(builder.quads)
+
+
+def _statistics(one: MinedScenario) -> Iterator[tuple[str, str, float]]:
+    """Yield name, unit and value of all that sums up a scenario's events."""
+    yield "events fitted", "count", float(one.fit.used)
+    met = one.fit.exposure.encounters
+    if met is not None:
+        yield "encounters", "count", float(met.count)
+        for name, unit, amount, rate in (
+            ("hours", "h", met.hours, met.per_hour), ("kilometres", "km", met.km, met.per_km),
+        ):  # fmt: skip
+            if amount is not None and rate is not None:
+                yield name, unit, amount
+                yield f"encounters per {unit}", f"1/{unit}", rate.estimate
+                yield f"encounters per {unit}, 2.5 %", f"1/{unit}", rate.low
+                yield f"encounters per {unit}, 97.5 %", f"1/{unit}", rate.high
+    for each in one.ranges:
+        values = one.fit.parameters[each.parameter].values
+        yield f"{each.parameter}, low", each.unit, each.mined.low
+        yield f"{each.parameter}, high", each.unit, each.mined.high
+        yield f"{each.parameter}, mean", each.unit, float(values.mean())
+        for share, value in zip(QUANTILES, np.quantile(values, QUANTILES).tolist(), strict=True):
+            yield f"{each.parameter}, {share:.0%} quantile", each.unit, value
+
+
+FOLDER = "scenarios"
+ENDINGS = (".yaml", ".html", "-distribution.xosc")
+"""Of a scenario's files: it, the page of its fit, and the distribution for OpenSCENARIO."""
+DATE = "2025-01-01T00:00:00"
+"""Of all distributions, so that the same recordings give the same bytes."""
+
+
+def write_mined(
+    out: Path,
+    sought: Sequence[Sought],
+    scenarios: Sequence[ScenarioEvents],
+    found: Sequence[FoundEvents],
+    time_step: float,
+    fitting: Callable[[int, int], None] = lambda done, total: None,
+) -> tuple[MinedScenario | Unmade, ...]:
+    """Make a scenario of the events of each, and write them in the place of earlier ones.
+
+    Their statistics are individuals in `ONTOLOGY`.
+
+    Args:
+        out: the folder of all, with the tables of events.
+        sought: the source scenarios.
+        scenarios: the events of each.
+        found: all events.
+        time_step: after cleaning [s].
+        fitting: is told how many of how many scenarios are done.
+
+    Raises:
+        StorageError: a file cannot be written.
+    """
+    folder = out / FOLDER
+    _emptied(folder, [mined_name(one.scenario) for one in sought])
+    made: list[MinedScenario | Unmade] = []
+    for number, (one, events) in enumerate(zip(sought, scenarios, strict=True)):
+        fitting(number, len(scenarios))
+        table = out / EVENTS / f"{events.scenario}.csv"
+        result = mined_scenario(one, events, found, table, time_step)
+        if isinstance(result, MinedScenario):
+            scenario, page, distribution = (folder / f"{result.name}{end}" for end in ENDINGS)
+            write_whole(scenario, [result.text.encode()])
+            write_page(page, result.fit)
+            write_whole(distribution, [distribution_xml(result.fit.exposure, date=DATE)])
+        made.append(result)
+    fitting(len(scenarios), len(scenarios))
+    if scenarios_made := [one for one in made if isinstance(one, MinedScenario)]:
+        save(mined_individuals(scenarios_made), folder / FILE)
+    return tuple(made)
+
+
+def _emptied(folder: Path, names: Sequence[str]) -> None:
+    """Make the folder, and remove what an earlier call wrote into it, by the scenarios' names."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        for end in ENDINGS:
+            for name in names:
+                (folder / f"{name}{end}").unlink(missing_ok=True)
+        (folder / FILE).unlink(missing_ok=True)
+    except OSError as error:
+        raise StorageError(f"{folder}: cannot be made: {error.strerror}") from None
+
+
+# --- Mined scenarios on the page of recordings, in the terminal, and as plain data ---
+
+
+_LINKS = ("scenario", "how well its distributions fit", "OpenSCENARIO distribution")
+
+
+def scenarios_section(mined: Sequence[MinedScenario | Unmade]) -> str:
+    """Return the cards of scenarios that were made, and why the others were not."""
+    made = "".join(_card(one) for one in mined if isinstance(one, MinedScenario))
+    lines = "".join(
+        f"<li>{escape(one.source)}: {escape(one.reason)}</li>"
+        for one in mined
+        if isinstance(one, Unmade)
+    )
+    rest = f"<div class='card'><h3>Not made</h3><ul>{lines}</ul></div>" if lines else ""
+    return made + rest
+
+
+def _card(one: MinedScenario) -> str:
+    head = ("parameter", "declared", "seen", "mined", "form", "")
+    rows = [
+        [f"{each.parameter} [{each.unit}]", *_ranges(each),
+         one.fit.parameters[each.parameter].form, each.remark]
+        for each in one.ranges
+    ]  # fmt: skip
+    known = "".join(f"<li>{escape(text)}</li>" for text in facts(one.fit))
+    rules = "".join(f"<li>{escape(rule)}</li>" for rule in one.tightened)
+    tightened = f"<p>Constraints added:</p><ul>{rules}</ul>" if rules else ""
+    links = ", ".join(
+        f"<a href='{FOLDER}/{escape(one.name)}{end}'>{text}</a>"
+        for end, text in zip(ENDINGS, _LINKS, strict=True)
+    )
+    return (
+        f"<div class='card' id='{escape(one.name)}'><h3>{escape(one.name)}</h3><ul>{known}</ul>"
+        f"<div class='wide'>{html_table(head, rows)}</div>{tightened}<p>{links}</p></div>"
+    )
+
+
+def _ranges(one: MinedRange) -> list[str]:
+    return [f"{each.low:g} to {each.high:g}" for each in (one.declared, one.seen, one.mined)]
+
+
+def made_row(one: MinedScenario) -> tuple[str, int, str, str]:
+    """Return what the terminal shows of a scenario."""
+    met = one.fit.exposure.encounters
+    rate = met.per_hour if met else None
+    beyond = [each.parameter for each in one.ranges if each.remark]
+    return (
+        one.name, one.fit.used, rate_text(rate, "h") if rate else "–", ", ".join(beyond) or "–",
+    )  # fmt: skip
+
+
+def made_as_json(one: MinedScenario | Unmade, out: Path) -> dict[str, object]:
+    """Return a scenario as plain data, or why there is none."""
+    if isinstance(one, Unmade):
+        return {"of": one.source, "scenario": None, "reason": one.reason}
+    met = one.fit.exposure.encounters
+    return {
+        "of": one.source, "scenario": str(out / FOLDER / f"{one.name}{ENDINGS[0]}"), "reason": None,
+        "events": one.fit.used, "encounters": asdict(met) if met else None,
+        "ranges": [asdict(each) for each in one.ranges], "tightened": one.tightened,
+    }  # fmt: skip

@@ -1,0 +1,263 @@
+"""The file of a run: its creation, and the checks of its content."""
+
+import json
+import os
+import sqlite3
+from collections.abc import Callable, Mapping
+from contextlib import closing
+from pathlib import Path
+from typing import Any
+
+from bridgegen.base.disk import write_whole
+from bridgegen.base.errors import InputError, StorageError
+from bridgegen.base.records import parse_json, read_bytes
+from bridgegen.results.store.rows import (
+    FIRST,
+    LAST_OF_SCHEMA,
+    NEEDED,
+    RUN,
+    Columns,
+    check_columns,
+    tables_of,
+)
+from bridgegen.results.store.sqlite import storage_errors, transaction
+
+SCHEMA = 4
+READABLE = tuple(LAST_OF_SCHEMA)
+"""The schemas that can be read and resumed."""
+
+FILE = "run.sqlite"
+LOCK = "run.lock"
+DRAFT = "run.sqlite.new"
+MAX_N_VAR = 10**5
+KEYS = ("schema", "version", "settings", "parameters", "metrics", "n_var", "n_obj")
+
+
+def refuse_other_names(folder: Path) -> None:
+    """Reject a folder whose path cannot be written in settings, pages or ontologies.
+
+    Raises:
+        StorageError: its path is not valid UTF-8.
+    """
+    path = str(folder.absolute())
+    try:
+        path.encode()
+    except UnicodeEncodeError:
+        shown = path.encode("utf-8", "backslashreplace").decode()
+        problem = "its path must be valid UTF-8; choose another folder"
+        raise StorageError(f"{shown}: {problem}") from None
+
+
+def require_there(folder: Path) -> None:
+    """Check that the file of a run is still in its folder.
+
+    Raises:
+        StorageError: it was deleted or moved.
+    """
+    if not (folder / FILE).is_file():
+        raise StorageError(
+            f"{folder}: {FILE} was deleted or moved during the run; if it was deleted, "
+            "its evaluations are lost"
+        )
+
+
+def refuse_used(folder: Path) -> None:
+    """Check that a new run in a folder would not overwrite anything.
+
+    Raises:
+        StorageError: the folder contains a run, or files that are not left over from one; or its
+            path is not valid UTF-8.
+    """
+    refuse_other_names(folder)
+    ours = {LOCK, DRAFT, f"{DRAFT}-journal"}
+    with storage_errors(folder, "read"):
+        if (folder / FILE).exists():
+            raise StorageError(
+                f"{folder}: contains a run already, which is never overwritten; "
+                f"resume it: bridgegen resume {folder}, or choose another --out"
+            )
+        if folder.is_dir() and any(path.name not in ours for path in folder.iterdir()):
+            raise StorageError(
+                f"{folder}: is not empty and contains no run, so it is not used; "
+                "choose another --out"
+            )
+
+
+def write_run(folder: Path, columns: Columns, run: Mapping[str, Any]) -> None:
+    """Create the run's file atomically."""
+    keys = [key for key in (*KEYS, "labels", "domain") if key in run]
+    values = [(key, json.dumps(run[key], allow_nan=False)) for key in keys]
+    draft = folder / DRAFT
+    draft.unlink(missing_ok=True)
+    try:
+        connect = sqlite3.connect(draft, isolation_level=None)
+        with closing(connect) as connection, transaction(connection):
+            connection.execute(f"CREATE TABLE {RUN}")
+            connection.execute(columns.create_sql())
+            connection.executemany("INSERT INTO run VALUES (?, ?)", values)
+        os.replace(draft, folder / FILE)
+    except BaseException:
+        draft.unlink(missing_ok=True)
+        raise
+
+
+def columns_of(run: Mapping[str, Any]) -> Columns:
+    """Return the columns of a run's table.
+
+    Raises:
+        InputError: a name that cannot be a column.
+        KeyError: a key is missing.
+    """
+    names = (run["n_var"], run["parameters"], run["metrics"], run["n_obj"])
+    return Columns.named(*names, schema=run["schema"])
+
+
+def read_run(connection: sqlite3.Connection, path: Path) -> dict[str, Any]:
+    """Return the values of :func:`write_run`, and ``finished`` if the run has ended.
+
+    Raises:
+        StorageError: not a run, damaged, or of another schema.
+    """
+    try:
+        with storage_errors(path, "read"):
+            if missing := {*NEEDED} - tables_of(connection):
+                names = ", ".join(sorted(missing))
+                raise StorageError(f"{path}: is not a run: its tables are missing ({names})")
+            stored = connection.execute("SELECT key, value FROM run").fetchall()
+            found = connection.execute("PRAGMA table_xinfo(evaluations)").fetchall()
+        run = {key: _value(key, text) for key, text in stored}
+        schema = run["schema"]
+        if type(schema) is not int or schema not in READABLE:
+            raise StorageError(
+                f"{path}: the store's schema must be at most {SCHEMA}, got {schema!r}: "
+                f"it was made by BridgeGen {run.get('version', '(unknown)')}"
+            )
+        if absent := [key for key in KEYS if key not in run]:
+            raise InputError(f"no {', '.join(absent)}")
+        _check_values(run, len(found))
+        with storage_errors(path, "read"):
+            check_columns(connection, "evaluations", columns_of(run).create_sql())
+            _check_rows(connection, run["n_var"], len(found))
+    except InputError as error:
+        raise StorageError(f"{path}: the file is damaged: {'; '.join(error.problems)}") from error
+    except (KeyError, TypeError, ValueError) as error:
+        raise StorageError(f"{path}: the file is damaged: bad or missing {error}") from error
+    return run
+
+
+def _value(key: str, text: str) -> Any:
+    """Return a value that is stored as JSON.
+
+    Raises:
+        InputError: it is not JSON of finite numbers.
+    """
+    try:
+        return parse_json(text)
+    except (TypeError, ValueError) as error:
+        raise InputError(f"bad or missing {key}: {error}") from error
+
+
+def _check_values(run: Mapping[str, Any], n_columns: int) -> None:
+    """Check the types of the values, and that the counts fit the table of evaluations.
+
+    Raises:
+        InputError: the first mistake.
+    """
+    kinds = {
+        "version": str,
+        "domain": str,
+        "settings": dict,
+        "notes": dict,
+        "labels": dict,
+        "n_var": int,
+        "n_obj": int,
+    }
+    for key, kind in kinds.items():
+        if key in run and type(run[key]) is not kind:
+            raise InputError(f"bad or missing {key}: it is a {type(run[key]).__name__}")
+    if not isinstance(run.get("finished", ""), str):
+        raise InputError("bad or missing finished: it must be a text")
+    for key in ("parameters", "metrics"):
+        if type(run[key]) is not list or not all(isinstance(name, str) for name in run[key]):
+            raise InputError(f"bad or missing {key}: it must be a list of names")
+    for name, one in run.get("labels", {}).items():
+        words = one.get("words", []) if isinstance(one, dict) else None
+        if (
+            name not in run["parameters"]
+            or type(words) is not list
+            or not all(isinstance(word, str) for word in words)
+        ):
+            raise InputError(f"bad or missing labels: {name} must be a parameter with its words")
+    if not 0 <= run["n_var"] <= MAX_N_VAR:
+        raise InputError(f"0 <= n_var <= {MAX_N_VAR} must hold, got {run['n_var']}")
+    named = len(FIRST) + len(run["parameters"]) + len(run["metrics"])
+    left = n_columns - named - len(LAST_OF_SCHEMA[run["schema"]])
+    if run["n_obj"] != left:
+        raise InputError(f"the columns are not the run's: n_obj is {run['n_obj']}, not {left}")
+
+
+def _check_rows(connection: sqlite3.Connection, n_var: int, n_columns: int) -> None:
+    """Check that the file has room for its evaluations: their number sizes arrays.
+
+    Raises:
+        InputError: a number is negative, or too large for the size of the file.
+    """
+    last, first = (
+        connection.execute(f"SELECT {end}(id) FROM evaluations").fetchone()[0]
+        for end in ("max", "min")
+    )
+    size = connection.execute("PRAGMA page_count").fetchone()[0]
+    size *= connection.execute("PRAGMA page_size").fetchone()[0]
+    if first is not None and (first < 0 or (last + 1) * (8 * n_var + n_columns) > size):
+        raise InputError(
+            f"evaluations {first} to {last} cannot be in a file of {size} bytes: they must be "
+            "numbered from 0"
+        )
+
+
+# --- A folder that belongs to one job: made for it, or of an earlier call with the same settings --
+
+
+def claim(
+    folder: Path,
+    settings: Mapping[str, Any],
+    *,
+    file: str,
+    pieces: str,
+    belongs: Callable[[str], bool] = lambda name: False,
+    what: str,
+) -> None:
+    """Make a job's folder, or find the one that an earlier call with the same settings has made.
+
+    Args:
+        folder: of the job.
+        settings: what its results depend on, as JSON's types.
+        file: name of the file that holds them.
+        pieces: name of the folder of its results, which is made.
+        belongs: whether another name is one of the job's files, too.
+        what: the job, for messages: "a map".
+
+    Raises:
+        StorageError: the folder holds another job or something else, or cannot be written.
+    """
+    made = json.loads(json.dumps(settings))
+    path = folder / file
+    try:
+        (folder / pieces).mkdir(parents=True, exist_ok=True)
+        before = parse_json(read_bytes(path)) if path.exists() else None
+        names = [one.name for one in folder.iterdir()]
+    except OSError as error:
+        raise StorageError(f"{folder}: cannot be written: {error.strerror}") from None
+    except ValueError as error:
+        raise StorageError(f"{path}: is damaged: {error}") from None
+    if before is None:
+        if any(name not in (file, pieces) and not belongs(name) for name in names):
+            raise StorageError(f"{folder}: holds something else than {what}, choose another")
+        write_whole(path, [json.dumps(made, indent=1).encode()])
+    elif before != made:
+        known = before if isinstance(before, dict) else {}
+        differs = [name for name in {**made, **known} if known.get(name) != made.get(name)]
+        raise StorageError(
+            f"{folder}: holds another {what.removeprefix('a ')} (it differs in "
+            f"{', '.join(differs)}); choose another folder (--out), or remove it"
+        )

@@ -1,0 +1,199 @@
+"""A participant that an adversary drives: what it decides is searched like any other parameter.
+
+Its events are taken from the scenario; instead, it changes its speed and moves within its lane as
+parameters of the extension axis say, one of each per decision. Whatever they are, they keep to the
+scenario's limits: the speeds that the scenario gives the participant (which road and weather
+bound), the rate at which it takes them up, what its body and the road's friction let it brake, and
+its lane.
+"""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
+from math import ceil
+
+from bridgegen.base.errors import InputError, UnknownNameError
+from bridgegen.base.physics import GRIP
+from bridgegen.scenario.language.parameters import Axis, Parameter
+from bridgegen.scenario.language.roads import Quantity
+from bridgegen.scenario.language.rules import speeds_of
+from bridgegen.scenario.language.scenario import LogicalScenario, SearchedScenario
+from bridgegen.scenario.language.story import Adversary, EventSpec, Participant, SpeedChange, Story
+from bridgegen.scenario.participants import PARTICIPANTS
+
+PERIOD = 0.5
+"""Seconds between two decisions: less than an alert driver's reaction, more than a controller's."""
+
+MARGIN = 0.1
+"""Metres that its body keeps to the edges of its lane: it overshoots by a centimetre at times."""
+
+
+def first_speed(adversary: Adversary, values: Mapping[str, float]) -> float:
+    """Return the participant's speed at the start [m/s]."""
+    return _value(adversary.speeds[0], values)
+
+
+def top_speed(adversary: Adversary, values: Mapping[str, float]) -> float:
+    """Return the participant's highest speed [m/s]."""
+    return max(_value(one, values) for one in adversary.speeds)
+
+
+def limits(adversary: Adversary, values: Mapping[str, float]) -> tuple[float, float]:
+    """Return by how much the participant accelerates and brakes at most [m/s²]."""
+    grip = GRIP * values.get("friction", 1.0)
+    rate = min(_value(adversary.rate, values), adversary.acceleration, grip)
+    return rate, min(adversary.braking, grip)
+
+
+def room(adversary: Adversary, values: Mapping[str, float]) -> float:
+    """Return how far the participant may be aside of its lane's centre [m]."""
+    return max(0.0, 0.5 * (_value(adversary.lane_width, values) - adversary.width) - MARGIN)
+
+
+def adversarial(scenario: SearchedScenario, participant: str | None = None) -> LogicalScenario:
+    """Return a scenario in which an adversary drives one of the participants.
+
+    Args:
+        scenario: of five layers.
+        participant: a vehicle or bicycle that keeps to lanes, not to rails, and not the ego; the
+            first that the scenario lets move by default.
+
+    Raises:
+        UnknownNameError: no such participant.
+        InputError: a scenario file; or a participant that is no such vehicle, or whose events
+            others wait for.
+    """
+    if not isinstance(scenario, LogicalScenario):
+        raise InputError(
+            f"{scenario.name}: an adversary drives participants of a scenario of five layers (a "
+            "YAML file), and this is an OpenSCENARIO file"
+        )
+    able = [one.name for one in scenario.participants if _can_be_driven(one, scenario.story)]
+    if participant is None:
+        if not able:
+            raise InputError(
+                f"{scenario.place}: an adversary needs a vehicle other than the ego that keeps to "
+                "lanes and may move"
+            )
+        participant = able[0]
+    names = [one.name for one in scenario.participants]
+    if participant not in names:
+        raise UnknownNameError("participant", participant, names)
+    if participant not in able:
+        raise InputError(
+            f"{scenario.place}: an adversary drives a vehicle other than the ego that keeps to "
+            f"lanes and may move, got '{participant}'; it can drive: {', '.join(able) or 'none'}"
+        )
+    driven = scenario.participant(participant)
+    own = [event for event in scenario.events if event.participant == participant]
+    rest = tuple(event for event in scenario.events if event.participant != participant)
+    _refuse_awaited(scenario, own, rest)
+    adversary = _adversary(scenario, driven, own)
+    # The adversary is its driver.
+    story = replace(
+        scenario.story,
+        participants=tuple(
+            replace(one, driver="scripted") if one is driven else one
+            for one in scenario.participants
+        ),
+        events=rest,
+    )
+    left = replace(scenario, story=story)
+    own_limits = (*adversary.speeds, adversary.lane_width, adversary.rate)
+    needed = {quantity for quantity in own_limits if isinstance(quantity, str)}
+    idle = _quantities(own) - _quantities(rest) - needed - _elsewhere(left)
+    kept = {name: one for name, one in left.parameters.items() if name not in idle}
+    return replace(
+        left,
+        parameters=kept | {one.name: one for one in _controls(adversary)},
+        bounds=tuple(bound for bound in left.bounds if bound.target not in idle),
+        axes=tuple(axis for axis in Axis if axis in {*left.axes, Axis.EXTENSION}),
+        adversary=adversary,
+    )
+
+
+def _can_be_driven(one: Participant, story: Story) -> bool:
+    on_lanes = one.conduct in ("vehicle", "bicycle") and not one.path and not one.ways
+    on_lanes = on_lanes and not PARTICIPANTS[one.type].on_rails
+    return on_lanes and one.name != "ego" and any(speed != 0.0 for speed in speeds_of(one, story))
+
+
+def _adversary(
+    scenario: LogicalScenario, driven: Participant, own: Iterable[EventSpec]
+) -> Adversary:
+    body = driven.body
+    changes = [a.change for event in own for a in event.actions if isinstance(a, SpeedChange)]
+    rates = [one.rate for one in changes if one.rate is not None]
+    numbers = [f"{k:02d}" for k in range(1, ceil(scenario.duration / PERIOD) + 1)]
+    return Adversary(
+        participant=driven.name,
+        speeds=tuple(speeds_of(driven, scenario.story)),
+        lane_width=scenario.roads.knobs["lane_width"],
+        width=body.width,
+        rate=rates[0] if rates else body.max_acceleration,
+        acceleration=body.max_acceleration,
+        braking=body.max_deceleration,
+        paces=tuple(f"{driven.name}_pace_{number}" for number in numbers),
+        offsets=tuple(f"{driven.name}_offset_{number}" for number in numbers),
+    )
+
+
+def _controls(adversary: Adversary) -> Iterable[Parameter]:
+    name = adversary.participant
+    for k, (pace, offset) in enumerate(zip(adversary.paces, adversary.offsets, strict=True)):
+        when = f"from {k * PERIOD:g} s to {(k + 1) * PERIOD:g} s"
+        yield Parameter(
+            pace, Axis.EXTENSION, "1", 0.0, 1.0, 1.0,
+            description=f"Speed that the adversary has {name} make for {when}; 1: its highest.",
+            source="The speeds that the scenario gives it.",
+        )  # fmt: skip
+        yield Parameter(
+            offset, Axis.EXTENSION, "1", -1.0, 1.0, 0.0,
+            description=f"Where in its lane the adversary steers {name} {when}; 1: leftmost.",
+            source="The lane's width, less its body's.",
+        )  # fmt: skip
+
+
+def _refuse_awaited(
+    scenario: LogicalScenario, own: Iterable[EventSpec], rest: Iterable[EventSpec]
+) -> None:
+    names = {event.name for event in own}
+    problems = [
+        f"{scenario.place}: event '{event.name}' waits for '{condition.event}', which an adversary "
+        f"that drives '{next(iter(own)).participant}' takes away"
+        for event in rest
+        for group in event.when
+        for condition in group
+        if condition.event in names
+    ]
+    if problems:
+        raise InputError(*problems)
+
+
+def _quantities(events: Iterable[EventSpec]) -> set[str]:
+    """Return the parameters that events read."""
+    found: set[Quantity | None] = set()
+    for event in events:
+        found |= {condition.value for group in event.when for condition in group}
+        for action in event.actions:
+            found |= {getattr(action, "speed", None)}
+            if (change := getattr(action, "change", None)) is not None:
+                found |= {change.rate, change.time, change.distance}
+    return {one for one in found if isinstance(one, str)}
+
+
+def _elsewhere(scenario: LogicalScenario) -> set[str]:
+    """Return the parameters that anything but events reads."""
+    found: set[Quantity] = set(scenario.roads.knobs.values())
+    for one in scenario.participants:
+        found.add(one.speed)
+        for point in (one.start, one.end, *one.path):
+            if point is not None:
+                found |= {point.distance, point.offset}
+    names = {one for one in found if isinstance(one, str)}
+    return names.union(
+        *(bound.names for bound in scenario.bounds), *(one.names for one in scenario.derived)
+    )
+
+
+def _value(quantity: Quantity, values: Mapping[str, float]) -> float:
+    return float(values[quantity]) if isinstance(quantity, str) else float(quantity)

@@ -1,0 +1,274 @@
+"""What a logical scenario must have as a whole: what it needs, nothing idle, all of it feasible."""
+
+import math
+from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
+from contextlib import suppress
+from dataclasses import replace
+from itertools import combinations
+
+import numpy as np
+
+from bridgegen.base.arrays import Float
+from bridgegen.base.errors import ScenarioError
+from bridgegen.base.units import has_unit, in_unit
+from bridgegen.scenario.language.expression import parse
+from bridgegen.scenario.language.kinds import slack
+from bridgegen.scenario.language.parameters import Axis, Bound, Derived, Parameter, at, nearest
+from bridgegen.scenario.language.plain_yaml import Document
+from bridgegen.scenario.language.roads import Quantity
+from bridgegen.scenario.language.rules import cap, speeds_of
+from bridgegen.scenario.language.scenario import LogicalScenario
+from bridgegen.scenario.language.space import probes
+from bridgegen.scenario.language.story import Participant
+from bridgegen.scenario.participants import Body
+from bridgegen.scenario.weather import PARAMETERS
+
+MAX_STEPS = 100_000
+
+NEEDED = {one.name: one.unit for one in PARAMETERS.values() if one.is_declared} | {
+    "speed_factor": "1"
+}
+"""What the weather is made of, and its effect on speeds: every scenario has these, in these units.
+"""
+
+_CLEARANCE = 0.4
+"""Between the boxes of two that start in one lane [m]."""
+
+_ASIDE = 0.25
+"""Between the sides of two that start beside each other in one lane [m]."""
+
+
+def use_problems(
+    declared: Mapping[str, Parameter | Derived],
+    bounds: Iterable[Bound],
+    names: Set[str],
+    used: Set[str],
+    place: str,
+) -> list[str]:
+    """Return which parameters are needed and not declared, or declared and of no effect.
+
+    Args:
+        declared: parameters and derived quantities, by name.
+        bounds: what limits them.
+        names: of all that is declared, also wrongly.
+        used: names that participants and events refer to.
+        place: the scenario's file.
+    """
+    problems = []
+    missing = [f"{name} [{unit}]" for name, unit in NEEDED.items() if name not in names]
+    if missing:
+        problems.append(
+            f"a scenario needs {', '.join(missing)} on the axis weather; "
+            f"include 'weather' declares all that it needs there ({place})"
+        )
+    for name, unit in NEEDED.items():
+        found = declared.get(name)
+        if found is not None and (found.axis, found.unit) != (Axis.WEATHER, unit):
+            problems.append(
+                f"{name} belongs to the axis weather in {unit}, "
+                f"got {found.axis} in {found.unit}{at(found.place)}"
+            )
+        elif isinstance(found, Parameter) and found.kind.apart:
+            problems.append(f"{name} [{unit}] must be of kind float{at(found.place)}")
+    needed = set(NEEDED)
+    rules: list[Bound | Derived] = [*bounds]
+    rules += (one for one in declared.values() if isinstance(one, Derived))
+    read = set(used).union(*(rule.names for rule in rules))
+    for name, one in declared.items():
+        if name not in needed | read and one.axis is not Axis.EXTENSION:
+            problems.append(
+                f"nothing in {place} uses {name} [{one.unit}] of the axis {one.axis}"
+                f"{nearest(name, needed - declared.keys())}{at(one.place)}"
+            )
+    return problems
+
+
+def time_problems(document: Document) -> list[str]:
+    """Return what is wrong with a file's duration and time step."""
+    data = document.data if isinstance(document.data, dict) else {}
+    duration, step = (_in_seconds(data.get(key)) for key in ("duration", "time_step"))
+    if not isinstance(duration, int | float) or not isinstance(step, int | float):
+        return []  # reported with the shape already
+    for key, value in (("duration", duration), ("time_step", step)):
+        if not 0.0 < value < math.inf:
+            where = document.at((key,))
+            return [f"{key} [s] must be greater than 0 and finite, got {value} ({where})"]
+    steps = duration / step
+    if 1 <= steps <= MAX_STEPS and abs(steps - round(steps)) <= 1e-6 * steps:
+        return []
+    return [
+        f"duration must be a whole number of time steps, 1 to {MAX_STEPS}, got {duration} s / "
+        f"{step} s = {steps:.6g} ({document.at(('duration',))})"
+    ]
+
+
+def _in_seconds(value: object) -> object:
+    """Return a time that is written with a unit in seconds; others as they are."""
+    if isinstance(value, str) and has_unit(value):
+        with suppress(ValueError):
+            return in_unit(value, "s")
+    return value
+
+
+def try_out(scenario: LogicalScenario) -> None:
+    """Refuse what only shows in values: at the defaults, and all over the space.
+
+    Raises:
+        ScenarioError: constraints that leave no value, defaults that break them, positions past
+            the end of a leg or inside each other, nothing to search.
+    """
+    whole = scenario.space(Axis)
+    if scenario.space().n_var == 0:
+        raise ScenarioError(
+            f"the axes {', '.join(scenario.axes)} hold nothing to search ({scenario.place})"
+        )
+    defaults = {one.name: one.default for one in scenario.parameters.values()}
+    try:
+        whole.row(defaults)
+    except ScenarioError as error:
+        where = f"at the defaults ({scenario.place})"
+        raise ScenarioError(*(f"{problem}, {where}" for problem in error.problems)) from None
+    X = whole.decode(probes(whole.n_var))
+    columns = {name: X[:, whole.index(name)] for name in whole.names}
+    problems = [
+        problem
+        for participants, rows in _placed(scenario, columns)
+        for problem in _places(scenario, participants, rows)
+    ]
+    problems += _fast(scenario, columns)
+    if problems:
+        raise ScenarioError(*dict.fromkeys(problems))
+
+
+def _placed(
+    scenario: LogicalScenario, columns: Mapping[str, Float]
+) -> Iterator[tuple[tuple[Participant, ...], Mapping[str, Float]]]:
+    """Yield the participants at the places that categories choose, and the rows of that choice."""
+    names = list(dict.fromkeys(one.place_by for one in scenario.participants if one.place_by))
+    if not names:
+        yield scenario.participants, columns
+        return
+    chosen = np.stack([columns[name] for name in names], axis=1)
+    for key in np.unique(chosen, axis=0):
+        at = dict(zip(names, key.astype(int).tolist(), strict=True))
+        rows = np.flatnonzero((chosen == key).all(axis=1))
+        yield (
+            tuple(
+                one.at_each_place[at[one.place_by]] if one.place_by else one
+                for one in scenario.participants
+            ),
+            {name: column[rows] for name, column in columns.items()},
+        )
+
+
+def _places(
+    scenario: LogicalScenario,
+    participants: Sequence[Participant],
+    columns: Mapping[str, Float],
+) -> Iterator[str]:
+    """Yield participants that may leave a leg's end, or start inside another."""
+    for one in participants:
+        ends = [(one.start, 0.0), *((point, 0.0) for point in one.path[1:])]
+        for end, least in [*ends, *([(one.end, 0.0)] if one.end else [])]:
+            length = scenario.roads.length(end.leg)
+            at_ = _metres(end.distance, columns)
+            if at_.min() < least - slack(0.0):
+                yield (
+                    f"{one.name} must stay on leg {end.leg}: distance >= 0 [m], "
+                    f"'{end.distance}' can be {at_.min():.3g} m ({scenario.place})"
+                )
+            if length is None:
+                beyond = at_ - _segments_length(scenario, columns)
+            else:
+                beyond = at_ - _metres(length, columns)
+            if beyond.max() > slack(0.0):
+                limit = length if isinstance(length, str) else "its length"
+                yield (
+                    f"{one.name} must stay on leg {end.leg}: distance <= {limit} [m], "
+                    f"'{end.distance}' can lie {beyond.max():.3g} m beyond ({scenario.place})"
+                )
+    for one in participants:
+        if one.end is None or (one.start.leg, one.start.way) != (one.end.leg, one.end.way):
+            continue
+        behind = _metres(one.start.distance, columns) - _metres(one.end.distance, columns)
+        behind = behind if one.start.way == "out" else -behind
+        if behind.max() >= 0.0:
+            yield (
+                f"the route of {one.name} must lead on along its lane: its end can lie "
+                f"{behind.max():.3g} m behind its start, and vehicles follow their lane's "
+                f"direction (one that drives against it has heading 180 and no end) "
+                f"({scenario.place})"
+            )
+    on_lanes = [one for one in participants if not one.path]
+    for one, other in combinations(on_lanes, 2):
+        a, b = one.start, other.start
+        if (a.leg, a.way, a.lane) != (b.leg, b.way, b.lane):
+            continue
+        body, others = (_room(each, columns) for each in (one, other))
+        ahead = _metres(a.distance, columns) - _metres(b.distance, columns)
+        ahead = ahead if a.way == "out" else -ahead
+        aside = np.abs(_metres(a.offset, columns) - _metres(b.offset, columns))
+        needed = _CLEARANCE + np.where(
+            ahead >= 0.0, body.rear + others.front, body.front + others.rear
+        )
+        in_the_way = aside < 0.5 * (body.width + others.width) + _ASIDE
+        gap, needed, in_the_way = np.broadcast_arrays(np.abs(ahead), needed, in_the_way)
+        lacking = np.where(in_the_way, needed - gap, -math.inf)
+        worst = int(lacking.argmax())
+        if lacking[worst] > slack(0.0):
+            yield (
+                f"{one.name} and {other.name} start {gap[worst]:.3g} m apart on {a}, "
+                f"at least {needed[worst]:g} m is needed ({scenario.place})"
+            )
+
+
+def _hull(bodies: tuple[Body, ...]) -> Body:
+    """Return a body that takes as much room as each of some about the reference point."""
+    front, rear = (max(getattr(one, end) for one in bodies) for end in ("front", "rear"))
+    width = max(one.width for one in bodies)
+    ahead = 0.5 * (front - rear)
+    return replace(bodies[0], length=front + rear, width=width, center_ahead=ahead)
+
+
+def _room(one: Participant, columns: Mapping[str, Float]) -> Body:
+    """Return the body of a participant; of one that is turned, what holds it however it is."""
+    body = _hull(one.bodies)
+    heading = _metres(one.heading, columns)
+    if not heading.any():
+        return body
+    if (np.abs(heading) == 180.0).all():
+        return replace(body, center_ahead=-body.center_ahead)
+    far = math.hypot(max(body.front, body.rear), 0.5 * body.width)
+    return replace(body, length=2.0 * far, width=2.0 * far, center_ahead=0.0)
+
+
+def _fast(scenario: LogicalScenario, columns: Mapping[str, Float]) -> Iterator[str]:
+    """Yield who may be faster than road, weather or legs allow; parameters have their bounds."""
+    prefixes = sorted(
+        name.removesuffix("speed_factor") for name in columns if name.endswith("speed_factor")
+    )
+    limit = parse(cap(scenario.roads.knobs["speed_limit"], prefixes)).evaluate(columns)
+    for one in scenario.participants:
+        for value in speeds_of(one, scenario.story):
+            speed = _metres(value, columns)
+            allowed = np.asarray(min(body.max_speed for body in one.bodies))
+            why = f"a {' or '.join(one.types) or one.type} can do"
+            if one.conduct == "vehicle" and value != 0.0 and not one.exceeds_limit:
+                if np.min(limit) <= allowed:
+                    why = "road and weather allow"
+                allowed = np.minimum(limit, allowed)
+            over = speed - allowed
+            if over.max() > slack(float(np.max(allowed))):
+                yield (
+                    f"{one.name} must be no faster than {why}, the speed {value} [m/s] exceeds "
+                    f"that by up to {over.max():.3g} m/s ({scenario.place})"
+                )
+
+
+def _segments_length(scenario: LogicalScenario, columns: Mapping[str, Float]) -> Float:
+    parts = [_metres(one.length, columns) for one in scenario.roads.segments]
+    return np.asarray(sum(parts[1:], parts[0]))
+
+
+def _metres(value: Quantity, columns: Mapping[str, Float]) -> Float:
+    return columns[value] if isinstance(value, str) else np.array([value])

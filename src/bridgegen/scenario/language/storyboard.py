@@ -1,0 +1,546 @@
+"""Participants and events of a scenario file: built, with the rules they must keep."""
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+from bridgegen.scenario.language.choices import Choices
+from bridgegen.scenario.language.others import DRIVERS, LOOKING
+from bridgegen.scenario.language.parameters import nearest
+from bridgegen.scenario.language.places import Places, Quantities
+from bridgegen.scenario.language.plain_yaml import Path, entries
+from bridgegen.scenario.language.roads import LETTERS, Quantity, RoadsSpec
+from bridgegen.scenario.language.shape import section
+from bridgegen.scenario.language.story import (
+    CONDITIONS,
+    Action,
+    Arrival,
+    Change,
+    ConditionSpec,
+    EventSpec,
+    Indication,
+    KeepDistance,
+    LaneChange,
+    LaneOffset,
+    Participant,
+    SpeedChange,
+    Waypoint,
+    WeatherChange,
+)
+from bridgegen.scenario.language.story_schema import (
+    ACTIONS,
+    ConditionSection,
+    EventSection,
+    ParticipantSection,
+    WaypointSection,
+)
+from bridgegen.scenario.named_models import MODELS, body_of
+from bridgegen.scenario.participants import PARTICIPANTS, TYPES, Body
+
+EGO = "ego"
+
+MOST_ASIDE = 4.0
+"""From the lane's centre [m]: a lane and a shoulder are seldom wider."""
+
+FASTEST_REVERSE = -5.0
+"""[m/s]; 18 km/h is about what a reverse gear does."""
+
+_OF_EVENTS = ("after", "began")
+
+_OFF_LANES = tuple(
+    name
+    for name in TYPES
+    if PARTICIPANTS[name].seen_as.conduct != "obstacle" and not PARTICIPANTS[name].on_rails
+)
+"""Types that may have a path of their own."""
+
+
+class Storyboard:
+    """A file's sections on participants and events, as far as they have the right shape.
+
+    Attributes:
+        participants: as ``LogicalScenario`` holds them.
+        events: likewise.
+        known: the participants' names, also of those that are described wrongly.
+
+    Args:
+        quantities: of the file; collects problems.
+        roads: what waypoints may lie on.
+        prefixes: of the weathers that an event may change to.
+        more: names of participants that other parts of the file bring.
+    """
+
+    def __init__(
+        self,
+        quantities: Quantities,
+        roads: RoadsSpec,
+        prefixes: tuple[str, ...] = (),
+        more: tuple[str, ...] = (),
+    ) -> None:
+        self._quantities, self._roads, self._prefixes = quantities, roads, prefixes
+        self._places, self._choices = Places(quantities, roads), Choices(quantities)
+        self._report, self._check = quantities.report, quantities.check
+        document = quantities.document
+        self.known = [str(name) for name, _ in entries(document, "participants")] + list(more)
+        self._events_read = list(entries(document, "events"))
+        self._event_names = [str(name) for name, _ in self._events_read]
+        self.participants = tuple(self._participants())
+        self._acting = {one.name: one for one in self.participants}
+        self.events = tuple(self._events())
+
+    # -- participants --------------------------------------------------------------------------
+
+    def _participants(self) -> Iterator[Participant]:
+        if EGO not in self.known:
+            self._report("participants must hold 'ego', the system under test", ("participants",))
+        elif len(self.known) < 2:
+            self._report("participants must hold another one besides the ego", ("participants",))
+        for key, data in entries(self._quantities.document, "participants"):
+            name, path = str(key), ("participants", key)
+            given = section(ParticipantSection, data)
+            if given is None:
+                continue
+            if not name.isidentifier() or not name.isascii():
+                self._report(f"a participant's name is a word, got '{name}'", path)
+            slowest = _slowest(name, given.type)
+            self._check(given.speed, "m/s", (*path, "speed"), low=slowest)
+            self._check_heading(name, given, path)
+            self._check_body(name, given, path)
+            self._choices.check_types(name, given, path)
+            self._choices.check_places(name, given, path)
+            if given.siren and (given.type != "emergency" or name == EGO):
+                self._report(
+                    f"a siren is for emergency vehicles other than the ego, {name} is a "
+                    f"{given.type}",
+                    (*path, "siren"),
+                )
+            if given.exceeds_limit and PARTICIPANTS[given.type].seen_as.conduct != "vehicle":
+                self._report(
+                    f"a speed limit is for vehicles, {name} has none to exceed",
+                    (*path, "exceeds_limit"),
+                )
+            self._check_driver(name, given, path)
+            if given.places:
+                yield self._at_places(name, given, path)
+            elif given.path:
+                yield self._off_lanes(name, given, path)
+            elif given.start is None:
+                self._report(f"{name} must have a start or a path", path)
+            else:
+                yield self._driver(name, given, given.start, path)
+
+    def _at_places(self, name: str, given: ParticipantSection, path: Path) -> Participant:
+        """Return a participant whose start and end a category chooses."""
+        usual, found = self._choices.default_place(given), {}
+        for key, one in given.places.items():
+            at = given.model_copy(update={"start": one.start, "end": one.end})
+            place = (*path, "places", key)
+            found[key] = self._driver(name, at, one.start, place)
+            self._check_heading(name, at, place)
+        chosen = found[usual or next(iter(found))]
+        ways = tuple((found[key].start, found[key].end) for key in self._choices.places(given))
+        return replace(chosen, place_by=given.place_by or "", ways=ways)
+
+    def _off_lanes(self, name: str, given: ParticipantSection, path: Path) -> Participant:
+        """Return a participant with a path of its own."""
+        points = tuple(
+            self._places.waypoint(one, (*path, "path", number))
+            for number, one in enumerate(given.path)
+        )
+        if given.start is not None or given.end is not None:
+            self._report(f"{name} must have a path, or a start and an end, not both", path)
+        if len(points) < 2:
+            self._report(f"a path leads through two points at least, {name} has one", path)
+        if name == EGO:
+            self._report("the ego has a route, no path: its driver is under test", path)
+        elif given.type not in _OFF_LANES:
+            kinds = ", ".join(_OFF_LANES)
+            self._report(f"a path is for {kinds}; {name} is of type {given.type}", path)
+        elif given.driver in LOOKING and PARTICIPANTS[given.type].seen_as.conduct == "vehicle":
+            self._report(
+                f"an {given.driver} driver keeps to lanes, {name} has a path: it is scripted", path
+            )
+        if given.type == "pedestrian":
+            self._places.check_crossing(name, points, path)
+        driver = given.driver or ""
+        return Participant(
+            name, given.type, points[0], None, given.speed, points, driver=driver,
+            exceeds_limit=given.exceeds_limit or "", siren=given.siren, own_body=_body(given),
+            type_by=given.type_by or "", types=self._choices.types(given), model=given.model or "",
+        )  # fmt: skip
+
+    def _driver(
+        self, name: str, given: ParticipantSection, place: WaypointSection, path: Path
+    ) -> Participant:
+        """Return a participant that keeps to lanes."""
+        start = self._places.waypoint(place, (*path, "start"))
+        end = None
+        if given.end is not None:
+            end = self._places.waypoint(given.end, (*path, "end"), above=True)
+            self._check_route(name, start, end, given, path)
+        elif name == EGO:
+            self._report("the ego's route must have an end", path)
+        if name == EGO and isinstance(start.offset, str):
+            self._report(
+                f"the ego's offset is a constant, its driver keeps to one path; got "
+                f"'{start.offset}'",
+                path,
+            )
+        conduct = PARTICIPANTS[given.type].seen_as.conduct
+        if name == EGO and PARTICIPANTS[given.type].on_rails:
+            self._report(
+                f"the ego must be a vehicle that its driver can steer, a {given.type} runs on "
+                f"rails; got type '{given.type}'",
+                (*path, "type"),
+            )
+        stands = conduct in ("obstacle", "pedestrian", "animal")
+        if stands and (given.speed != 0.0 or end is not None):
+            self._report(f"{name} without a path stands: no speed, no end", path)
+        if given.type == "pedestrian" and start.lane != "sidewalk":
+            self._report(
+                f"{name} must stand on a sidewalk: pedestrians are on roads to cross", path
+            )
+        if conduct == "vehicle" and start.lane == "sidewalk":
+            self._report(f"{name} must stand on a lane: vehicles are on roads only", path)
+        return Participant(
+            name, given.type, start, end, given.speed, driver=given.driver or "",
+            heading=given.heading, exceeds_limit=given.exceeds_limit or "", siren=given.siren,
+            own_body=_body(given), type_by=given.type_by or "", types=self._choices.types(given),
+            model=given.model or "",
+        )  # fmt: skip
+
+    def _check_body(self, name: str, given: ParticipantSection, path: Path) -> None:
+        """Check model and own body, if there are: what the type's has none of, it has not."""
+        if given.model and MODELS[given.model].type != given.type:
+            self._report(
+                f"model of {name} must be a {given.type}, {given.model} is a "
+                f"{MODELS[given.model].type}",
+                (*path, "model"),
+            )
+        usual = PARTICIPANTS[given.type].body
+        for key, value in given.body.model_dump().items() if given.body else ():
+            if value is not None and getattr(usual, key) == 0.0 and key != "mass":
+                self._report(f"{name}, of type {given.type}, has no {key}", (*path, "body", key))
+
+    def _check_heading(self, name: str, given: ParticipantSection, path: Path) -> None:
+        """Check how a participant is turned from its lane's direction, if it is."""
+        heading, place = given.heading, (*path, "heading")
+        if heading == 0.0:
+            return
+        self._check(heading, "deg", place, low=-180.0)
+        one = self._quantities.parameters.get(heading) if isinstance(heading, str) else None
+        most = one.high if one else heading
+        if not isinstance(most, str) and most > 180.0:
+            self._report(f"heading of {name} [deg] must be -180 to 180, got {most:g}", place)
+        if name == EGO:
+            self._report("the ego drives along its route, it has no heading", place)
+        elif given.path:
+            self._report(f"{name} goes along its path, it has no heading of its own", place)
+        elif given.end is not None:
+            self._report(
+                f"a route leads along lanes in their direction: {name} has an end, so no heading",
+                place,
+            )
+        elif self._moves(name, given) and heading not in (180.0, -180.0):
+            self._report(
+                f"{name} moves, so it drives along its lane or against the traffic: heading 0 or "
+                f"180 deg, got {heading}",
+                place,
+            )
+
+    def _moves(self, name: str, given: ParticipantSection) -> bool:
+        """Return whether a participant is given a speed, at the start or by an event."""
+        events = (section(EventSection, one) for _, one in self._events_read)
+        return given.speed != 0.0 or any(
+            one is not None
+            and one.participant == name
+            and (one.speed not in (None, 0.0) or one.keep_distance or one.arrive)
+            for one in events
+        )
+
+    def _check_driver(self, name: str, given: ParticipantSection, path: Path) -> None:
+        """Check a participant's driver, if it has one."""
+        driver, place = given.driver, (*path, "driver")
+        if driver is None:
+            return
+        if name == EGO:
+            self._report(
+                f"the ego's driver is named once, by the scenario's own key 'driver'; got "
+                f"'{driver}' here",
+                place,
+            )
+        elif driver not in DRIVERS:
+            hint = nearest(driver, DRIVERS)
+            self._report(
+                f"the driver of {name} must be one of {', '.join(DRIVERS)} (others are for the "
+                f"ego), got '{driver}'{hint}",
+                place,
+            )
+        elif driver in LOOKING and PARTICIPANTS[given.type].seen_as.conduct == "obstacle":
+            self._report(f"{name} is an obstacle, which has no driver; got '{driver}'", place)
+
+    def _check_route(
+        self,
+        name: str,
+        start: Waypoint,
+        end: Waypoint,
+        given: ParticipantSection,
+        path: Path,
+    ) -> None:
+        by_points = given.start is not None and given.start.point is not None
+        if self._roads.template == "road":
+            if (start.leg, start.way, start.lane) != (end.leg, end.way, end.lane):
+                self._report(f"a route changes no lane: {name} goes from {start} to {end}", path)
+            return
+        if start.way != "in":
+            got = f"P{_point(start)}" if by_points else str(start)
+            which = ", ".join(f"P{2 * LETTERS.index(leg) + 1}" for leg in self._roads.legs)
+            self._report(
+                f"a route starts where an inbound lane does: {which}, got {got}", (*path, "start")
+            )
+        if end.way != "out":
+            got = f"P{_point(end)}" if by_points else str(end)
+            which = ", ".join(f"P{2 * LETTERS.index(leg) + 2}" for leg in self._roads.legs)
+            self._report(
+                f"a route ends where an outbound lane does: {which}, got {got}", (*path, "end")
+            )
+        back = start.leg == end.leg and start.way == "in" and end.way == "out"
+        if back and self._roads.template != "roundabout":
+            self._report(
+                f"a route must not turn back: P{_point(start)} to P{_point(end)} is one leg", path
+            )
+
+    # -- what and when -------------------------------------------------------------------------
+
+    def _events(self) -> Iterator[EventSpec]:
+        for key, data in self._events_read:
+            name, path = str(key), ("events", key)
+            given = section(EventSection, data)
+            if given is None:
+                continue
+            if not name.isidentifier() or not name.isascii():
+                self._report(f"an event's name is a word, got '{name}'", path)
+            actions = tuple(self._actions(name, given, path))
+            if not actions:
+                self._report(f"{name} must have an action: {', '.join(ACTIONS)}", path)
+            if given.participant is not None:
+                self._check_participant(given.participant, (*path, "participant"))
+                if given.participant == EGO:
+                    self._report("events move the others; the ego's driver is under test", path)
+            when = tuple(
+                tuple(self._conditions(given, one, (*path, "when", number)))
+                for number, one in enumerate(given.when)
+            )
+            yield EventSpec(name, given.participant, actions, when)
+
+    def _actions(self, name: str, given: EventSection, path: Path) -> Iterator[Action]:
+        if given.weather is not None:
+            if given.weather not in self._prefixes:
+                known = ", ".join(self._prefixes) or "none"
+                self._report(
+                    f"{name} changes the weather to one that is included with a prefix "
+                    f"('weather as {given.weather}'); there are: {known}",
+                    path,
+                )
+            if given.participant is not None:
+                self._report(f"{name}: the weather has no participant", path)
+            yield WeatherChange(given.weather)
+        elif given.participant is None:
+            self._report(f"{name} must have a participant", path)
+        if given.speed is not None:
+            actor = self._acting.get(str(given.participant))
+            slowest = _slowest(actor.name, actor.type) if actor else 0.0
+            self._check(given.speed, "m/s", (*path, "speed"), low=slowest)
+            if given.jerk is not None:
+                self._check(given.jerk, "m/s³", (*path, "jerk"), above=True)
+                if given.rate is None or given.shape != "linear":
+                    self._report("a jerk is for a rate, without a shape", (*path, "jerk"))
+            change = self._change(given.rate, given.time, given.distance, given.shape, path)
+            yield SpeedChange(given.speed, replace(change, jerk=given.jerk))
+        elif any(one is not None for one in (given.rate, given.jerk, given.time, given.distance)):
+            self._report(f"{name} has a change of speed without its target (speed)", path)
+        if given.lane_change is not None:
+            one = given.lane_change
+            if one.lanes == 0.0:
+                self._report("lane_change must not be 0 lanes", (*path, "lane_change"))
+            if one.time is None and one.distance is None:
+                self._report("a lane change takes a time or a distance", (*path, "lane_change"))
+            change = self._change(None, one.time, one.distance, one.shape, (*path, "lane_change"))
+            actor = self._acting.get(str(given.participant))
+            if actor is not None and (actor.end is not None or actor.path):
+                self._report(f"{actor.name} changes lane, so it has no end and no path", path)
+            if actor is not None and PARTICIPANTS[actor.type].on_rails:
+                self._report(
+                    f"{actor.name}, a {actor.type}, runs on rails and changes no lane", path
+                )
+            yield LaneChange(int(one.lanes), change)
+        yield from self._moves_aside(name, given, path)
+        yield from self._beside_others(name, given, path)
+        if given.indicate is not None:
+            actor = self._acting.get(str(given.participant))
+            if actor is not None and PARTICIPANTS[actor.type].seen_as.conduct != "vehicle":
+                self._report(
+                    f"{actor.name}, a {actor.type}, has no indicators", (*path, "indicate")
+                )
+            yield Indication(given.indicate)
+
+    def _moves_aside(self, name: str, given: EventSection, path: Path) -> Iterator[Action]:
+        aside, place = given.lane_offset, (*path, "lane_offset")
+        if aside is None:
+            return
+        self._check(aside.offset, "m", (*place, "offset"), low=-MOST_ASIDE)
+        one = self._quantities.parameters.get(str(aside.offset))
+        most = one.high if one else aside.offset
+        if not isinstance(most, str) and most > MOST_ASIDE:
+            self._report(
+                f"offset of {name} [m] must be {-MOST_ASIDE:g} to {MOST_ASIDE:g}, beyond that it "
+                f"changes lane, got {most:g}",
+                (*place, "offset"),
+            )
+        self._check(aside.acceleration, "m/s²", (*place, "acceleration"), above=True)
+        actor = self._acting.get(str(given.participant))
+        if actor is not None and (actor.path or PARTICIPANTS[actor.type].on_rails):
+            self._report(f"{actor.name} keeps to its path and cannot move aside", place)
+        yield LaneOffset(aside.offset, aside.acceleration, aside.shape)
+
+    def _beside_others(self, name: str, given: EventSection, path: Path) -> Iterator[Action]:
+        """Yield the actions whose speed depends on another participant."""
+        keeps, arrives = given.keep_distance, given.arrive
+        if sum(one is not None for one in (given.speed, keeps, arrives)) > 1:
+            self._report(
+                f"{name} must have one of speed, keep_distance and arrive: each sets the speed",
+                path,
+            )
+        actor = self._acting.get(str(given.participant))
+        for other, key in (
+            (keeps.to if keeps else None, "keep_distance"),
+            (arrives.other if arrives else None, "arrive"),
+        ):
+            if other is None:
+                continue
+            self._check_participant(other, (*path, key))
+            if other == given.participant:
+                self._report(f"{key} is to another participant, got '{other}' twice", (*path, key))
+            if actor is not None and actor.driver in LOOKING:
+                self._report(
+                    f"{actor.name} is {actor.driver}, its driver keeps the distance; {key} is for "
+                    "one that is scripted",
+                    (*path, key),
+                )
+        if keeps is not None:
+            place = (*path, "keep_distance")
+            if (keeps.distance is None) == (keeps.time is None):
+                self._report(f"{name} keeps a distance or a time, one of them", place)
+            for value, unit, part in (
+                (keeps.distance, "m", "distance"),
+                (keeps.time, "s", "time"),
+                (keeps.acceleration, "m/s²", "acceleration"),
+                (keeps.braking, "m/s²", "braking"),
+                (keeps.max_speed, "m/s", "max_speed"),
+            ):
+                if value is not None:
+                    self._check(value, unit, (*place, part), above=True)
+            yield KeepDistance(
+                keeps.to, keeps.distance, keeps.time, keeps.acceleration, keeps.braking,
+                keeps.max_speed,
+            )  # fmt: skip
+        if arrives is not None:
+            places = [
+                self._places.waypoint(one, (*path, "arrive", key))
+                for one, key in ((arrives.at, "at"), (arrives.place, "place"))
+            ]
+            yield Arrival(places[0], arrives.other, places[1])
+
+    def _change(
+        self,
+        rate: Quantity | None,
+        time: Quantity | None,
+        distance: Quantity | None,
+        shape: str,
+        path: Path,
+    ) -> Change:
+        given = {"rate": (rate, "m/s²"), "time": (time, "s"), "distance": (distance, "m")}
+        for key, (value, unit) in given.items():
+            if value is not None:
+                self._check(value, unit, (*path, key), above=True)
+        if sum(value is not None for value, _ in given.values()) > 1:
+            self._report("a change takes a rate, a time or a distance, one of them", path)
+        return Change(rate, time, distance, shape)  # type: ignore[arg-type]
+
+    def _conditions(
+        self, event: EventSection, one: ConditionSection, path: Path
+    ) -> Iterator[ConditionSpec]:
+        """Yield the conditions of one alternative."""
+        if one.all:
+            if one.kind is not None:
+                self._report("an alternative is a condition, or 'all' of several, not both", path)
+            for number, each in enumerate(one.all):
+                if each.kind == "began":
+                    self._report(
+                        "a 'began' condition holds for an instant, so it stands alone, not in "
+                        "'all'",
+                        (*path, "all", number),
+                    )
+                yield from self._conditions(event, each, (*path, "all", number))
+            return
+        if one.kind is None:
+            self._report(f"a condition must have a kind: {', '.join(CONDITIONS)}", path)
+            return
+        kind, subject = CONDITIONS[one.kind], one.of or event.participant
+        self._check(one.value, kind.unit, (*path, "value"))
+        if one.kind == "contact" and one.value != 0.0:
+            self._report(f"a contact condition has no value, got {one.value}", (*path, "value"))
+        if one.kind in _OF_EVENTS and isinstance(one.value, str):
+            self._report(
+                f"value of an '{one.kind}' condition [s] must be a constant, got '{one.value}': "
+                "delays are part of the storyboard, which is the same for all rows",
+                (*path, "value"),
+            )
+        if not kind.pair and one.to is not None:
+            self._report(f"a {one.kind} condition has no 'to', got '{one.to}'", path)
+        if kind.pair and one.to is None:
+            self._report(f"a {one.kind} condition needs 'to', the other participant", path)
+        elif kind.pair:
+            self._check_participant(str(one.to), (*path, "to"))
+            if one.to == subject:
+                self._report(f"a {one.kind} is to another participant, got '{one.to}' twice", path)
+        if one.of is not None:
+            self._check_participant(one.of, (*path, "of"))
+        elif subject is None and one.kind not in ("time", *_OF_EVENTS):
+            self._report(f"a {one.kind} condition needs 'of', whose it is", path)
+        if (one.kind in _OF_EVENTS) != (one.event is not None):
+            self._report("an 'after' or 'began' condition, and no other, names an event", path)
+        elif one.event is not None and one.event not in self._event_names:
+            hint = nearest(one.event, self._event_names)
+            self._report(f"unknown event '{one.event}'{hint}", path)
+        yield ConditionSpec(one.kind, one.value, one.to, one.of, one.event)
+
+    def _check_participant(self, name: str, path: Path) -> None:
+        if name not in self.known:
+            self._report(f"unknown participant '{name}'{nearest(name, self.known)}", path)
+
+
+def _slowest(name: str, kind: str) -> float:
+    """Return the least speed that a participant may be given [m/s]; below 0 it reverses."""
+    one = PARTICIPANTS[kind]
+    reverses = name != EGO and one.seen_as.conduct == "vehicle" and not one.on_rails
+    return FASTEST_REVERSE if reverses else 0.0
+
+
+def _body(given: ParticipantSection) -> Body | None:
+    """Return a body of one's own; the reference point and the axles move with the length."""
+    if given.body is None:
+        return None
+    usual = body_of(given.model or given.type)
+    said = {key: value for key, value in given.body.model_dump().items() if value is not None}
+    longer = said.get("length", usual.length) / usual.length
+    return replace(
+        usual,
+        center_ahead=usual.center_ahead * longer,
+        wheelbase=usual.wheelbase * longer,
+        **said,
+    )
+
+
+def _point(place: Waypoint) -> int:
+    """Return the number of a place's point in the paper's counting."""
+    return 2 * LETTERS.index(place.leg) + (1 if place.way == "in" else 2)

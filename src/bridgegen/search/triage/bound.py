@@ -1,0 +1,251 @@
+"""Bounds of a run for the whole space: its least margins, and the harmful share."""
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from decimal import ROUND_CEILING, Context, Decimal
+from typing import Self
+
+import numpy as np
+
+from bridgegen.assess.conflict import analysis
+from bridgegen.assess.conflict.findings import KINDS, Findings, is_excused
+from bridgegen.assess.conflict.happening import Happening
+from bridgegen.assess.conflict.harm import COURSE, NEAR_MISS
+from bridgegen.assess.conflict.quantities import QUANTITIES
+from bridgegen.assess.conflict.types import Rule
+from bridgegen.base.arrays import Bool, Float, Int, Numbers
+from bridgegen.base.statistics import clopper_pearson
+from bridgegen.search.regions.box import percent
+from bridgegen.search.triage.record import NOT_JUDGED, Bound, Drawn, Estimate, Least, Verdict
+
+UNBIASED = ("random", "sobol")
+"""The algorithms whose rows do not depend on results."""
+
+MARGINS = ("harm", "course_ttc", "course_braking")
+
+_DRAWN = {
+    "random": "random draws",
+    "sobol": "Sobol points, taken as independent draws",
+    "fresh": "{} fresh random draws",
+}
+
+
+_MARGIN = {
+    "harm": f"harm {{:.2f}}, failures start at {NEAR_MISS:g}",
+    "course_ttc": "{:.2f} s to collision",
+    "course_braking": "{:.2f} m/s² needed",
+}
+
+
+def estimate(drawn: Drawn, harmful: int, rows: int) -> Estimate:
+    """Estimate a share of the space from independent rows, with its exact interval.
+
+    Args:
+        drawn: the source of the rows; "" if there are none.
+        harmful: number of harmful rows.
+        rows: number of rows with a result.
+
+    Source: C. Clopper and E. Pearson, Biometrika 26 (1934); 95 %, two-sided.
+    """
+    if not drawn:
+        return Estimate(drawn="", rows=0, harmful=0, share=None, low=0.0, high=1.0)
+    low, high = clopper_pearson(harmful, rows)
+    share = harmful / rows if rows else None
+    return Estimate(drawn=drawn, rows=rows, harmful=harmful, share=share, low=low, high=high)
+
+
+def least_margins(
+    metrics: Numbers, names: Sequence[str], harm: Float, ids: Int, fit: Bool
+) -> tuple[Least, ...]:
+    """Return the rows with the least margin to harm, one for each recorded one of ``MARGINS``.
+
+    Time to collision and deceleration count only in rows with a collision course that counts as
+    harm: conflicts without the ego's fault are not its margins.
+
+    Args:
+        metrics: ``(N, M)``.
+        names: of the M columns.
+        harm: ``(N,)``.
+        ids: ``(N,)`` evaluations.
+        fit: ``(N,)`` bool, which have a result.
+    """
+    found = [_least("harm", harm, fit, ids)]
+    for name in MARGINS[1:]:
+        if name in names:
+            column = metrics[:, list(names).index(name)]
+            found.append(_least(name, column, fit & (harm >= COURSE), ids))
+    return tuple(found)
+
+
+def _least(name: str, column: Float, counts: Bool, ids: Int) -> Least:
+    quantity = QUANTITIES[name]
+    worth = np.where(counts & np.isfinite(column), quantity.sign * column, -np.inf)
+    k = int(np.lexsort((ids, -worth))[0]) if len(worth) else 0  # the earliest of equal ones
+    known = len(worth) > 0 and bool(np.isfinite(worth[k]))
+    return Least(
+        quantity=name, unit=quantity.unit, value=float(column[k]) if known else None,
+        evaluation=int(ids[k]) if known else None,
+    )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class NotCounted:
+    """What a run has seen and does not count as a failure.
+
+    Attributes:
+        conflicts: by ("contact" or "near miss", rule that excuses the ego) the number of rows.
+        implausible: by reason the number of rows whose traffic could not happen.
+        collisions: rows of implausible traffic in which the ego collides.
+        failed: rows without a result.
+    """
+
+    conflicts: Mapping[tuple[str, str], int]
+    implausible: Mapping[str, int]
+    collisions: int
+    failed: int
+
+    @classmethod
+    def of(cls, findings: Findings, harm: Float, ok: Bool) -> Self:
+        """Return what N rows hold, by their findings, harm and whether they have a result."""
+        contact, odd = findings.conflict == CONTACT, ok & (findings.implausible != "")
+        excused = ok & is_excused(findings, harm)
+        pairs = zip(findings.conflict[excused], findings.rule[excused], strict=True)
+        return cls(
+            Counter(pairs), Counter(findings.implausible[odd].tolist()),
+            int((odd & contact).sum()), int((~ok).sum()),
+        )  # fmt: skip
+
+    @property
+    def unsafe(self) -> int:
+        """Rows in which there was no time to act from the start on: nothing can be said of them."""
+        return sum(n for (_, rule), n in self.conflicts.items() if rule == Rule.UNSAFE_START.label)
+
+    @property
+    def sentence(self) -> str:
+        """In words; "" if all counts."""
+        parts = []
+        for kind, (one, many) in _KIND.items():
+            rules = {rule: n for (what, rule), n in self.conflicts.items() if what == kind}
+            if rules:
+                total = sum(rules.values())
+                parts.append(f"{total} {one if total == 1 else many} ({_listed(rules)})")
+        if self.implausible:
+            total = sum(self.implausible.values())
+            also = f"; {self.collisions} of them collisions" if self.collisions else ""
+            traffic = f"{total} with implausible traffic ({_listed(self.implausible)}{also})"
+            parts.append(traffic)
+        if self.failed:
+            parts.append(f"{self.failed} without a result")
+        return "not counted: " + ", ".join(parts) if parts else ""
+
+
+CONTACT, NEAR = KINDS[analysis.CONTACT], KINDS[analysis.NEAR_MISS]
+_KIND = {CONTACT: ("collision", "collisions"), NEAR: ("near miss", "near misses")}
+
+JUDGED = 0.5
+"""Share of a run's evaluations that must be judged, so that no failure among them says anything."""
+
+
+def _listed(counts: Mapping[str, int]) -> str:
+    """Return numbers by name, the largest first."""
+    ordered = sorted(counts.items(), key=lambda one: (-one[1], one[0]))
+    return ", ".join(f"{name or 'no rule'} {n}" for name, n in ordered)
+
+
+def too_few(judged: int, n: int, what: str) -> str:
+    """Return that too few of N could be judged for a verdict, in words; "" if enough could.
+
+    Args:
+        judged: how many could.
+        n: all of them.
+        what: they are, in the plural, and what could be done with them.
+    """
+    if judged and judged >= JUDGED * n:
+        return ""
+    return f"{f'only {judged}' if judged else 'none'} of {n} {what}"
+
+
+def _unjudged(evaluations: int, besides: NotCounted, happening: Happening) -> str:
+    """Return why a run without failures says nothing of its driver; "" if it does."""
+    left_out = besides.failed + sum(besides.implausible.values()) + besides.unsafe
+    if few := too_few(evaluations - left_out, evaluations, "evaluations could be judged"):
+        return few
+    if not happening.happened:
+        return "the scenario did not happen: " + "; ".join(happening.reasons)
+    return happening.domain
+
+
+def bound(
+    *,
+    evaluations: int,
+    besides: NotCounted,
+    happening: Happening,
+    harmful: int,
+    space: Estimate,
+    least: tuple[Least, ...],
+    modes: int,
+    ego: str,
+    baseline: str = "",
+) -> Bound:
+    """Return the bound of the space, in figures and in words."""
+    fails = f"{ego} fails, and {baseline} does not," if baseline else f"{ego} fails"
+    such = "harmful with it alone" if baseline else "harmful"
+    none = f"No scenario in which {fails} was found" if baseline else "No failure found"
+    failed, implausible = besides.failed, sum(besides.implausible.values())
+    verdict: Verdict = "no failure found"
+    if harmful:
+        verdict = "fails"
+        text = (
+            f"{fails} in {modes} way{'s' * (modes != 1)}: {harmful} of {evaluations} "
+            f"evaluations; {_of_the_space(space, such)}."
+        )
+    elif evaluations == failed:
+        verdict, text = NOT_JUDGED, f"Not judged: no evaluation of {ego} has a result."
+    elif why := _unjudged(evaluations, besides, happening):
+        verdict, text = NOT_JUDGED, f"Not judged: {why}."
+    else:
+        fresh = ""
+        if space.drawn == "fresh" and space.harmful:
+            fresh = f", but in {space.harmful} of {space.rows} fresh random draws"
+        text = (
+            f"{none} in {evaluations} evaluations{fresh}: {_margin(least)}; "
+            f"{_of_the_space(space, such)}."
+        )
+    return Bound(
+        evaluations=evaluations, failed=failed, implausible=implausible, harmful=harmful,
+        space=space, least=least, verdict=verdict, not_counted=besides.sentence, sentence=text,
+    )  # fmt: skip
+
+
+def _of_the_space(space: Estimate, such: str) -> str:
+    """Return the share of the space that is such, with its interval."""
+    if not space.drawn or not space.rows:
+        return f"how much of the space is {such} is unknown: the search chose its rows on purpose"
+    by = _DRAWN[space.drawn].format(space.rows)
+    if not space.harmful:
+        return f"with 95 % confidence at most {_at_most(space.high)} of the space is {such} ({by})"
+    return (
+        f"{percent(space.share or 0.0)} of the space is {such} ({_percent(space.low)} to "
+        f"{_percent(space.high)} with 95 % confidence, {by})"
+    )
+
+
+def _margin(least: Sequence[Least]) -> str:
+    of = {one.quantity: one for one in least}
+    parts = []
+    for name, words in _MARGIN.items():
+        one = of.get(name)
+        if one is not None and one.value is not None and one.evaluation is not None:
+            parts.append(f"{words.format(one.value)} (evaluation {one.evaluation + 1})")
+    return "closest: " + ", ".join(parts) if parts else "no margin is known"
+
+
+def _at_most(share: float) -> str:
+    """Return an upper bound in per cent, rounded up to two digits, so that it remains one."""
+    rounded = Context(prec=2, rounding=ROUND_CEILING).create_decimal(Decimal(share) * 100)
+    return f"{rounded.normalize():f} %"
+
+
+def _percent(share: float) -> str:
+    return f"{100.0 * share:.2g} %" if share < 0.0995 else percent(share)

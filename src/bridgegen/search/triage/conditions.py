@@ -1,0 +1,312 @@
+"""What a minimal scenario needs: bounds of its parameters, stated only where probes confirm them.
+
+Each parameter that is not nominal is moved alone, towards its nominal value and away from it, in
+steps until the harm ends; bisection finds the bound more precisely, and the bound is rounded
+inwards before it is verified. A condition is confirmed where harm of any mode is absent outside
+(one step beyond each bound, with the nominal value, and with 95 % of random values farther out, the
+other conditions met) and where 95 % of random points inside all confirmed conditions are harmful.
+A parameter whose condition is not confirmed stays at its value: it is an example.
+"""
+
+import math
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from bridgegen.base.arrays import Bool, Float
+from bridgegen.engine.pipeline import Pipeline
+from bridgegen.scenario.language.space import SearchSpace
+from bridgegen.search.triage.moves import nearest, searched
+from bridgegen.search.triage.record import Condition, Probes
+
+INSIDE, OUTSIDE = 40, 20
+"""Random probes inside all conditions, and outside each one."""
+
+SURE = 0.95
+"""Least share of probes inside that are harmful, and of random probes outside that are not."""
+
+_AHEAD, _HALVINGS = 6, 5  # steps tried at a time to find a bound; bisections of the last one
+_STREAM = 20  # a random stream of its own under the seed
+_UNITLESS = ("1", "count", "?")
+
+
+class _SpentError(Exception):
+    """No simulations are left."""
+
+
+@dataclass(frozen=True)
+class _Span:
+    """The values of one parameter for which the harm persists, all else as in the scenario.
+
+    Attributes:
+        low: smallest value.
+        high: largest value.
+        below: whether the harm ends below ``low``, within the range.
+        above: whether it ends above ``high``.
+    """
+
+    low: float
+    high: float
+    below: bool
+    above: bool
+
+
+class Conditions:
+    """Finds the conditions of one minimal scenario.
+
+    Args:
+        pipeline: the run's, one that ``tries``.
+        x: ``(len(space.names),)``, the minimal scenario.
+        base: the row whose random numbers it uses.
+        steps: ``(n_var,)`` > 0, of each searched parameter.
+        noise_key: of those numbers; the probes follow from it and the seed.
+        seed: of the run.
+        most: simulations at most.
+    """
+
+    def __init__(
+        self,
+        pipeline: Pipeline,
+        x: Float,
+        base: Float,
+        steps: Float,
+        noise_key: int,
+        seed: int,
+        most: int,
+    ) -> None:
+        self._pipeline, self._space, self._base, self._left = pipeline, pipeline.space, base, most
+        self._v = searched(self._space, x[np.newaxis])[0]
+        self._nominal = searched(self._space, self._space.row({})[np.newaxis])[0]
+        self._steps = steps
+        self._kinds = [self._space.parameters[name].kind for name in self._space.variables]
+        self._random = np.random.Generator(np.random.PCG64([seed, _STREAM, noise_key]))
+
+    def find(self, needed: Sequence[int]) -> tuple[list[Condition], Probes]:
+        """Return the condition of each parameter, and the probes inside the confirmed ones.
+
+        Args:
+            needed: columns of the searched parameters that are not nominal.
+        """
+        confirmed: dict[int, tuple[_Span, Probes]] = {}
+        inside = Probes(rows=0, harmful=0)
+        with suppress(_SpentError):
+            confirmed, inside = self._confirmed(self._spans(needed))
+        return [self._condition(i, confirmed.get(i)) for i in needed], inside
+
+    def _harmful(self, V: Float) -> tuple[Bool, Float]:
+        """Return which rows are harmful, in any mode, and their feasible values ``(n, n_var)``."""
+        if len(V) > self._left:
+            raise _SpentError
+        self._left -= len(V)
+        X = nearest(self._space, V)
+        noise = np.broadcast_to(self._base, X.shape)
+        return self._pipeline.try_all(X, noise=noise).harmful, searched(self._space, X)
+
+    def _moved(self, moves: Sequence[tuple[int, float]]) -> Float:
+        """Return the scenario's values ``(n, n_var)``, each row with one parameter moved."""
+        V = np.tile(self._v, (len(moves), 1))
+        for row, (i, value) in enumerate(moves):
+            V[row, i] = value
+        return V
+
+    def _spans(self, needed: Sequence[int]) -> dict[int, _Span]:
+        """Return where each parameter's harm ends, if it has ended with the nominal value."""
+        harmless = ~self._harmful(self._moved([(i, self._nominal[i]) for i in needed]))[0]
+        asked = [i for i, one in zip(needed, harmless.tolist(), strict=True) if one]
+        single = [i for i in asked if self._kinds[i].names]
+        spans = {i: _Span(self._v[i], self._v[i], below=True, above=True) for i in single}
+        ways = [(i, way) for i in asked if i not in spans for way in (-1.0, 1.0)]
+        ends = self._bisected(self._scanned(ways))
+        for i in (one for one in asked if one not in single):
+            (low, below), (high, above) = ends[i, -1.0], ends[i, 1.0]
+            if not (below if self._v[i] > self._nominal[i] else above):
+                continue  # the nominal value cannot be had without moving other parameters
+            low = self._rounded(i, low, 1.0) if below else low
+            high = self._rounded(i, high, -1.0) if above else high
+            spans[i] = _Span(low, high, below, above)
+        return {i: spans[i] for i in asked if i in spans}
+
+    def _scanned(
+        self, ways: Sequence[tuple[int, float]]
+    ) -> dict[tuple[int, float], tuple[float, float | None]]:
+        """Return per parameter and direction the last harmful value, and the harmless one beyond.
+
+        The latter is None where the harm persists to the end of what the parameter can be.
+        """
+        found: dict[tuple[int, float], tuple[float, float | None]] = {}
+        last = {one: float(self._v[one[0]]) for one in ways}
+        while len(found) < len(ways):
+            open_ = [one for one in ways if one not in found]
+            moves = [
+                (i, last[i, way] + way * k * self._steps[i])
+                for i, way in open_
+                for k in range(1, _AHEAD + 1)
+            ]
+            harmful, values = self._harmful(self._moved(moves))
+            for n, (i, way) in enumerate(open_):
+                for k in range(n * _AHEAD, (n + 1) * _AHEAD):
+                    value = float(values[k, i])
+                    moves_on = way * (value - last[i, way]) > 1e-9 * self._steps[i]
+                    if not moves_on:
+                        found[i, way] = last[i, way], None
+                    elif not harmful[k]:
+                        found[i, way] = last[i, way], value
+                    if (i, way) in found:
+                        break
+                    last[i, way] = value
+        return found
+
+    def _bisected(
+        self, ends: Mapping[tuple[int, float], tuple[float, float | None]]
+    ) -> dict[tuple[int, float], tuple[float, bool]]:
+        """Return the last harmful value of each, and whether the harm ends beyond it."""
+        inner = {one: inside for one, (inside, _) in ends.items()}
+        outer = {one: outside for one, (_, outside) in ends.items() if outside is not None}
+        fine = [one for one in outer if not self._kinds[one[0]].apart]
+        for _ in range(_HALVINGS if fine else 0):
+            halves = [(i, 0.5 * (inner[i, way] + outer[i, way])) for i, way in fine]
+            harmful, values = self._harmful(self._moved(halves))
+            for k, (i, way) in enumerate(fine):
+                (inner if harmful[k] else outer)[i, way] = float(values[k, i])
+        return {one: (value, one in outer) for one, value in inner.items()}
+
+    def _rounded(self, i: int, value: float, inwards: float) -> float:
+        """Return a bound of few digits, moved inwards by less than half a step, not past ``v``."""
+        if self._kinds[i].apart or self._kinds[i].turn is not None:
+            return value
+        digits = -math.floor(math.log10(0.5 * self._steps[i]))
+        for more in range(6):
+            grid = 10.0 ** (digits + more)
+            found = (math.ceil(value * grid) if inwards > 0.0 else math.floor(value * grid)) / grid
+            if inwards * (self._v[i] - found) >= 0.0:
+                return found
+        return value
+
+    def _confirmed(
+        self, spans: Mapping[int, _Span]
+    ) -> tuple[dict[int, tuple[_Span, Probes]], Probes]:
+        """Return the spans that probes confirm together, each with its probes outside."""
+        left = dict(spans)
+        while left:
+            outside = {i: self._outside(i, left) for i in left}
+            worst = max(left, key=lambda i: outside[i][1])
+            if outside[worst][1] > 1.0 - SURE:
+                del left[worst]
+                continue
+            V = self._inside(left, INSIDE)
+            harmful, _ = self._harmful(V)
+            inside = Probes(rows=len(V), harmful=int(harmful.sum()))
+            if inside.harmful >= SURE * inside.rows:
+                return {i: (left[i], outside[i][0]) for i in left}, inside
+            del left[self._telling(V, harmful, left)]
+        return {}, Probes(rows=0, harmful=0)
+
+    def _telling(self, V: Float, harmful: Bool, spans: Mapping[int, _Span]) -> int:
+        """Return the parameter that differs most between the harmful rows and the others."""
+        if not harmful.any():
+            return max(spans)
+
+        def apart(i: int) -> float:
+            width = max(spans[i].high - spans[i].low, 1e-300)
+            return abs(float(V[harmful, i].mean() - V[~harmful, i].mean())) / width
+
+        return max(spans, key=apart)
+
+    def _inside(self, spans: Mapping[int, _Span], n: int) -> Float:
+        """Return random values that meet all conditions, ``(n, n_var)``."""
+        V = np.tile(self._v, (n, 1))
+        for i, one in spans.items():
+            share = self._random.random(n)
+            V[:, i] = one.low + share * (one.high - one.low)
+        return V
+
+    def _outside(self, i: int, spans: Mapping[int, _Span]) -> tuple[Probes, float]:
+        """Probe outside one condition.
+
+        Returns:
+            The probes, and the harmful share of the random ones; 1 if another one is harmful.
+        """
+        one, step = spans[i], self._steps[i]
+        parameter = self._space.parameters[self._space.variables[i]]
+        V = self._inside(spans, OUTSIDE)
+        fixed = [(i, self._nominal[i])]
+        if parameter.kind.names:
+            others = [k for k in range(len(parameter.kind.names)) if k != one.low]
+            V[:, i] = self._random.choice(others, OUTSIDE)
+        else:
+            beyond = []
+            if one.below:
+                fixed.append((i, one.low - step))
+                beyond.append((parameter.low, max(parameter.low, one.low - step)))
+            if one.above:
+                fixed.append((i, one.high + step))
+                beyond.append((min(parameter.high, one.high + step), parameter.high))
+            V[:, i] = self._within(beyond)
+        harmful, values = self._harmful(np.concatenate([self._moved(fixed), V]))
+        # What other parameters leave no room for is no probe.
+        is_outside = (values[:, i] < one.low) | (values[:, i] > one.high)
+        harmful &= is_outside
+        probes = Probes(rows=int(is_outside.sum()), harmful=int(harmful.sum()))
+        if harmful[: len(fixed)].any():
+            return probes, 1.0
+        return probes, float(harmful.sum()) / max(int(is_outside[len(fixed) :].sum()), 1)
+
+    def _within(self, intervals: Sequence[tuple[float, float]]) -> Float:
+        """Return random values of some intervals, as many of each as it is wide."""
+        widths = np.array([high - low for low, high in intervals])
+        at = self._random.random(OUTSIDE) * widths.sum()
+        which = np.minimum(np.searchsorted(np.cumsum(widths), at, "right"), len(widths) - 1)
+        start = np.concatenate([[0.0], np.cumsum(widths)])[which]
+        values: Float = np.array([low for low, _ in intervals])[which] + at - start
+        return values
+
+    def _condition(self, i: int, confirmed: tuple[_Span, Probes] | None) -> Condition:
+        name, v, nominal = self._space.variables[i], float(self._v[i]), float(self._nominal[i])
+        span, outside = confirmed or (_Span(v, v, below=True, above=True), None)
+        sign: Literal[">=", "<="] = ">=" if v > nominal else "<="
+        near, far, ends = (
+            (span.low, span.high, span.above) if sign == ">=" else (span.high, span.low, span.below)
+        )
+        return Condition(
+            name=name, unit=self._space.parameters[name].unit, sign=sign, limit=near,
+            until=far if ends and confirmed else None, step=float(self._steps[i]), value=v,
+            nominal=nominal, needs=_words(self._space, name, span), outside=outside,
+        )  # fmt: skip
+
+
+def _words(space: SearchSpace, name: str, span: _Span) -> str:
+    """Return the values of a span as people read them: "≥ 3.4 m/s", "from 3.4 to 7 m/s"."""
+    one = space.parameters[name]
+    unit = "" if one.unit in _UNITLESS or one.kind.names else f" {one.unit}"
+    text = one.kind.text(span.low, _number), one.kind.text(span.high, _number)
+    if text[0] == text[1]:
+        return f"= {text[0]}{unit}"
+    if (span.below and span.above) or one.kind.turn is not None:  # neither end of a turn is lower
+        return f"from {text[0]} to {text[1]}{unit}"
+    return f"≥ {text[0]}{unit}" if span.below else f"≤ {text[1]}{unit}"
+
+
+def _number(value: float) -> str:
+    """Return a number of four digits; 0 for next to nothing."""
+    return f"{value:.4g}" if abs(value) >= 1e-4 else "0"
+
+
+def sentence(conditions: Sequence[Condition]) -> str:
+    """Return when the driver fails, in words: conditions that are confirmed, then examples."""
+    if not conditions:
+        return "fails already with all parameters at their defaults"
+    needs = [f"{one.name} {one.needs}" for one in conditions if one.confirmed]
+    examples = [f"{one.name} {one.needs}" for one in conditions if not one.confirmed]
+    rest = ", other parameters at default"
+    if not needs:
+        return f"fails, for example, with {_listed(examples)}{rest}"
+    if not examples:
+        return f"fails if {_listed(needs)}{rest}"
+    return f"with {_listed(examples)}, for example, fails if {_listed(needs)}{rest}"
+
+
+def _listed(texts: Sequence[str]) -> str:
+    return texts[0] if len(texts) == 1 else f"{', '.join(texts[:-1])} and {texts[-1]}"

@@ -1,0 +1,73 @@
+"""How much of a run's findings is simulated again: less for slow drivers."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from bridgegen.base.errors import UnknownNameError
+
+
+@dataclass(frozen=True)
+class Effort:
+    """What a triage tests, at most. Each test has 32 neighbours, whatever the effort.
+
+    Attributes:
+        per_mode: distinct worst rows of a mode among which a robust one is sought.
+        spare: further rows among which robust ones to export are sought, for each exported one.
+        placed: worst harmful rows that are simulated again to find their place on the route. Other
+            rows get the place of the nearest of these with an otherwise equal key.
+        tested: modes with a tested cause, besides those of the exported scenarios.
+        minimal: modes with a minimal scenario.
+        probes: of each minimal scenario, simulations that confirm its conditions.
+        descends_robustly: whether a minimal scenario that is not robust is sought anew, by steps
+            that each leave it robust.
+        sampled: random harmful rows, besides the exported ones, whose neighbours are tested.
+        fresh: random rows that estimate shares of the space if an algorithm chose the run's.
+    """
+
+    per_mode: int
+    spare: int
+    placed: int
+    tested: int
+    minimal: int
+    probes: int
+    descends_robustly: bool
+    sampled: int
+    fresh: int
+
+    @property
+    def tests(self) -> bool:
+        """Whether anything is simulated again."""
+        return self.per_mode > 0
+
+
+FULL = Effort(
+    per_mode=3, spare=2, placed=4096, tested=20, minimal=10, probes=500, descends_robustly=True,
+    sampled=8, fresh=256,
+)  # fmt: skip
+SHORT = Effort(
+    per_mode=1, spare=0, placed=64, tested=0, minimal=3, probes=250, descends_robustly=False,
+    sampled=0, fresh=0,
+)  # fmt: skip
+NONE = Effort(
+    per_mode=0,
+    spare=0,
+    placed=0,
+    tested=0,
+    minimal=0,
+    probes=0,
+    descends_robustly=False,
+    sampled=0,
+    fresh=0,
+)
+EFFORTS: Mapping[str, Effort] = {"full": FULL, "short": SHORT, "none": NONE}
+
+
+def effort(name: str) -> Effort:
+    """Return an effort.
+
+    Raises:
+        UnknownNameError: no such effort.
+    """
+    if name not in EFFORTS:
+        raise UnknownNameError("triage", name, EFFORTS)
+    return EFFORTS[name]

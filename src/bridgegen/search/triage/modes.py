@@ -1,0 +1,248 @@
+"""Failure modes: harmful rows that fail in the same way, by interpretable keys, then by distance.
+
+Rows of one mode agree in conflict (contact, near miss or violation), conflict type, responsibility,
+cause, the other participant's kind, and place on the route. The rule that decides on the
+responsibility may differ: it names a breach, and does not change what happens. Such a group is
+divided further only where its rows form clusters in the space of parameters that are clearly apart.
+"""
+
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from bridgegen.assess.conflict.findings import Findings
+from bridgegen.assess.conflict.types import RULES, ConflictType, Rule
+from bridgegen.base.arrays import Float, Int
+
+APART = 0.25
+"""Clusters are apart by at least this: root mean square over the searched parameters, 0 to 1 …"""
+
+GAPS = 3.0
+"""… and by at least so many times the median distance of a row to the nearest one …"""
+
+LEAST_ROWS, LEAST_SHARE = 5, 0.05
+"""… and hold at least so many rows, and this share of the group's; fewer join the nearest."""
+
+MOST_CLUSTERED = 500
+"""Rows of a group whose distances are compared; the others join the nearest of these."""
+
+
+class Key(NamedTuple):
+    """What the rows of a mode have in common; all are labels.
+
+    Attributes:
+        conflict: "contact", "near miss" or "violation".
+        conflict_type: see `ConflictType`.
+        responsible: see `Responsible`.
+        partner: kind of the other participant.
+        place: on the ego's route.
+        cause: quick, or tested by neighbours.
+    """
+
+    conflict: str
+    conflict_type: str
+    responsible: str
+    partner: str
+    place: str
+    cause: str = ""
+
+    @property
+    def way(self) -> "Key":
+        """The same without its cause."""
+        return self._replace(cause="")
+
+
+@dataclass(frozen=True, eq=False)
+class Group:
+    """A failure mode before it is recorded.
+
+    Attributes:
+        key: what its rows have in common.
+        rows: ``(n,)`` positions, the worst first.
+        part: 0, or the number of the cluster where a key's rows are divided.
+    """
+
+    key: Key
+    rows: Int
+    part: int = 0
+
+
+def keys_of(
+    findings: Findings, kinds: Mapping[str, str], place: Sequence[str], cause: Sequence[str]
+) -> list[Key]:
+    """Return the key of each of N rows.
+
+    Args:
+        findings: of the rows.
+        kinds: of the participants, by name.
+        place: ``(N,)``.
+        cause: ``(N,)``.
+    """
+    partner = [kinds.get(name, "") for name in findings.partner.tolist()]
+    texts = (findings.conflict, findings.conflict_type, findings.responsible)
+    columns = zip(*(one.tolist() for one in texts), partner, place, cause, strict=True)
+    known: dict[tuple[str, ...], Key] = {}
+    return [known.setdefault(one, Key(*one)) for one in columns]
+
+
+def by_harm(harm: Float, U: Float) -> Int:
+    """Return the rows, the worst first; equal ones in the order of their parameters."""
+    order: Int = np.lexsort((*U.T[::-1], -harm))
+    return order
+
+
+def group(keys: Sequence[Key], harm: Float, U: Float) -> list[Group]:
+    """Return the failure modes of N harmful rows; the one with the worst row first.
+
+    The order of the rows does not matter.
+
+    Args:
+        keys: ``(N,)``.
+        harm: ``(N,)``.
+        U: ``(N, n_var)`` in [0, 1], the searched parameters.
+    """
+    held: dict[Key, list[int]] = {}
+    for i in by_harm(harm, U).tolist():
+        held.setdefault(keys[i], []).append(i)
+    found = []
+    for key, members in held.items():
+        rows = np.array(members, dtype=np.int64)
+        labels = clusters(U[rows])
+        parts = [rows[labels == k] for k in range(int(labels.max(initial=0)) + 1)]
+        found += [Group(key, part, k if len(parts) > 1 else 0) for k, part in enumerate(parts, 1)]
+    rank = by_harm(harm[[one.rows[0] for one in found]], U[[one.rows[0] for one in found]])
+    return [found[k] for k in rank.tolist()]
+
+
+def rekeyed(groups: Sequence[Group], keys: Sequence[Key], harm: Float, U: Float) -> list[Group]:
+    """Return groups under other keys; groups with equal keys and parts are merged.
+
+    Args:
+        groups: disjoint.
+        keys: one for each group.
+        harm: of all rows.
+        U: likewise.
+    """
+    held: dict[tuple[Key, int], list[Int]] = {}
+    for one, key in zip(groups, keys, strict=True):
+        held.setdefault((key, one.part), []).append(one.rows)
+    found = []
+    for (key, part), rows in held.items():
+        joined = np.concatenate(rows)
+        found.append(Group(key, joined[by_harm(harm[joined], U[joined])], part))
+    return found
+
+
+def clusters(U: Float) -> Int:
+    """Return the cluster of each row, ``(n,)`` from 0 on, that of the first row first.
+
+    Rows are in one cluster if a chain of short distances joins them (single linkage).
+
+    Args:
+        U: ``(n, n_var)``, the worst first.
+    """
+    one = np.zeros(len(U), dtype=np.int64)
+    if len(U) < 2 * LEAST_ROWS or not U.shape[1]:
+        return one
+    from scipy.cluster.hierarchy import fcluster, linkage
+    from scipy.spatial import cKDTree
+
+    scaled = U / np.sqrt(U.shape[1])
+    some = scaled[:MOST_CLUSTERED]
+    distance = np.asarray(cKDTree(some).query(some, k=2)[0])
+    cut = max(APART, GAPS * float(np.median(distance[:, 1])))
+    labels = fcluster(linkage(some, "single"), cut, "distance").astype(np.int64)
+    numbers, counts = np.unique(labels, return_counts=True)
+    large = numbers[counts >= max(LEAST_ROWS, LEAST_SHARE * len(some))]
+    if len(large) < 2:
+        return one
+    core = np.flatnonzero(np.isin(labels, large))
+    nearest = np.asarray(cKDTree(some[core]).query(scaled)[1])
+    found = labels[core][nearest]
+    _, first, inverse = np.unique(found, return_index=True, return_inverse=True)
+    rank = np.empty(len(first), dtype=np.int64)
+    rank[np.argsort(first)] = np.arange(len(first))
+    return rank[inverse.reshape(-1)]
+
+
+_TITLES: Mapping[ConflictType, tuple[str, str]] = {
+    ConflictType.NONE: ("collides with {}", "nearly collides with {}"),
+    ConflictType.REAR_END_STRIKING: ("runs into the rear of {}", "nearly runs into the rear of {}"),
+    ConflictType.REAR_END_STRUCK: ("is hit in the rear by {}", "is nearly hit in the rear by {}"),
+    ConflictType.CROSSING: ("hits {} that crosses", "nearly hits {} that crosses"),
+    ConflictType.TURNING: ("collides with {} at a turn", "nearly collides with {} at a turn"),
+    ConflictType.SIDE_SWIPE: ("side-swipes {}", "nearly side-swipes {}"),
+    ConflictType.HEAD_ON: ("collides head-on with {}", "nearly collides head-on with {}"),
+    ConflictType.EGO_STANDING: ("is struck standing by {}", "is nearly struck standing by {}"),
+    ConflictType.VRU_BY_FRONT: ("hits {} with its front", "nearly hits {} with its front"),
+    ConflictType.VRU_INTO_SIDE: ("is hit at its side by {}", "is nearly hit at its side by {}"),
+    ConflictType.OBJECT: ("hits an obstacle ({})", "nearly hits an obstacle ({})"),
+    ConflictType.LANE_DEPARTURE: ("", "leaves its lane"),
+    ConflictType.ROAD_DEPARTURE: ("", "leaves the road"),
+    ConflictType.CLOSE_PASS: ("", "passes {} too closely"),
+}  # fmt: skip
+_ARTICLES = {"": "another participant", "other": "an object", "animal": "an animal"}
+_RESPONSIBLE = {
+    "ego": "ego responsible",
+    "shared": "both responsible",
+    "other": "other responsible, preventable by the ego",
+    "none": "no participant responsible, preventable by the ego",
+    "": "responsibility unknown",
+}
+
+
+def by_frequency(rules: Iterable[str]) -> tuple[tuple[str, int], ...]:
+    """Return rules with their numbers, the most frequent first; equal ones by name."""
+    counts = Counter(rules)
+    return tuple(sorted(counts.items(), key=lambda one: (-one[1], one[0])))
+
+
+def title(key: Key, rules: Sequence[str] = (), count: str = "ego") -> str:
+    """Return a mode's key in words, without its cause.
+
+    Args:
+        key: of the mode.
+        rules: labels of the rules that occur, the most frequent first; see `Rule`.
+        count: whose conflicts count, "ego" or "any": with the latter the ego need not be able to
+            prevent them.
+    """
+    kinds = {one.label: one for one in ConflictType}
+    contact, near = _TITLES[kinds.get(key.conflict_type, ConflictType.NONE)]
+    partner = _ARTICLES.get(key.partner, f"a {key.partner}")
+    if (*rules[:1], key.responsible) == (Rule.EMERGENCY_VEHICLE.label, "ego"):  # a car by its kind
+        partner = "an emergency vehicle"
+    text = (contact if key.conflict == "contact" else near).format(partner)
+    if key.place:
+        text += f" {key.place}"
+    known = {rule.label: words for rule, (words, _) in RULES.items()}
+    reason = "; or ".join(known.get(one, one) for one in rules if one)
+    responsible = _RESPONSIBLE.get(key.responsible, key.responsible)
+    if count == "any":
+        responsible = responsible.removesuffix(", preventable by the ego")
+    return f"{text} ({responsible}: {reason})" if reason else f"{text} ({responsible})"
+
+
+def where(U: Float, others: Float, names: Sequence[str]) -> tuple[int, float, float] | None:
+    """Return the parameter that best separates a cluster from the others, and its range.
+
+    Args:
+        U: ``(n, n_var)`` of the cluster, in any units.
+        others: ``(m, n_var)`` of the other clusters of the key.
+        names: of the columns.
+
+    Returns:
+        Its column, least and largest value; None if there is nothing to compare.
+    """
+    if not len(others) or not len(names):
+        return None
+    spread = np.concatenate([U, others]).std(axis=0)
+    gap = np.abs(np.median(U, axis=0) - np.median(others, axis=0))
+    k = int(np.argmax(np.divide(gap, spread, out=np.zeros_like(gap), where=spread > 0.0)))
+    return k, float(U[:, k].min()), float(U[:, k].max())
+
+
+__all__ = ["Group", "Key", "by_frequency", "by_harm", "clusters", "group", "keys_of", "rekeyed",
+           "title", "where"]  # fmt: skip

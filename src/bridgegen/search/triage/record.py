@@ -1,0 +1,494 @@
+"""The triage of a run as ``triage.json`` in its folder: written from these models, checked by them.
+
+Every list has a limit, so that the size of the record does not depend on the length of the run.
+"""
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+from bridgegen.assess.conflict.harm import NEAR_MISS
+from bridgegen.base.disk import write_whole
+from bridgegen.base.errors import FileFormatError
+from bridgegen.base.records import read_model
+
+JSON_FILE = "triage.json"
+"""Its name in a run's folder."""
+
+MOST_MODES = 50
+"""Failure modes that are recorded; those that hold the most harmful rows."""
+
+MOST_EXAMPLES = 20
+"""Evaluations that are named of a mode, worst first."""
+
+MOST_NEIGHBOURHOODS = 2000
+
+Number = Annotated[float, Field(allow_inf_nan=False)]
+Share = Annotated[float, Field(ge=0.0, le=1.0)]
+Change = Annotated[float, Field(ge=-1.0, le=1.0)]
+Count = Annotated[int, Field(ge=0, le=10**8)]
+Text = Annotated[str, Field(max_length=2000)]
+Drawn = Literal["random", "sobol", "fresh", ""]
+"""Where rows come from whose share is an estimate: the run's own, drawn at random or from a Sobol
+sequence; fresh random ones; "" where there are none and nothing is estimated."""
+
+Verdict = Literal["fails", "no failure found", "not judged"]
+"""What a run says of its driver."""
+NOT_JUDGED: Verdict = "not judged"
+
+CauseLabel = Literal[
+    "perception", "planning", "vehicle dynamics", "control", "unavoidable", "sensitive",
+    "not known", "",
+]  # fmt: skip
+"""Labels of `bridgegen.assess.cause.Cause`; "sensitive": a small change of the parameters alone
+makes most of the harm vanish, so that no fix can be credited; "not known": too few neighbours have
+a result with some fix; "" where none was tried."""
+
+
+class _Model(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+
+class Estimate(_Model):
+    """A share of the search space, estimated from rows that no algorithm chose.
+
+    Attributes:
+        drawn: the source of the rows.
+        rows: that have a result.
+        harmful: of them.
+        share: harmful / rows; None where there are no rows.
+        low: lower end of the two-sided 95 % Clopper-Pearson interval.
+        high: its upper end, also where no row is harmful: a one-sided 97.5 % upper bound.
+    """
+
+    drawn: Drawn
+    rows: Count
+    harmful: Count
+    share: Share | None
+    low: Share
+    high: Share
+
+
+class FreshRows(_Model):
+    """The fresh random rows that shares of the space are estimated from, in their order.
+
+    Attributes:
+        harm: of each; None of one without a result, or with implausible traffic.
+        mode: the number of the failure mode that each is of; 0 of no recorded one.
+    """
+
+    harm: Annotated[tuple[Share | None, ...], Field(max_length=10_000)]
+    mode: Annotated[tuple[Count, ...], Field(max_length=10_000)]
+
+
+class Treatment(_Model):
+    """What one change made of the neighbours of a row; each neighbour is its own comparison.
+
+    Attributes:
+        name: "perception is ideal", "un-r157 drives", "the road is dry", …; "random move" is the
+            placebo.
+        cause: that the change stands for; "" for the placebo.
+        rows: neighbours that have a result with and without the change. Where the change removes
+            the conflict, harmless up to its time is enough: what would follow is gone.
+        before: of them, those that are harmful unchanged; None in records of earlier versions.
+        gone: neighbours that are harmful unchanged and harmless with the change.
+        new: neighbours that are harmless unchanged and harmful with the change.
+        drop: (gone - new) / rows.
+        low: lower end of its 95 % interval (Newcombe 1998, paired proportions, method 10).
+        high: its upper end.
+    """
+
+    name: Text
+    cause: CauseLabel
+    rows: Count
+    gone: Count
+    new: Count
+    drop: Change
+    low: Change
+    high: Change
+    before: Count | None = None
+
+    @property
+    def works(self) -> bool:
+        """Whether the drop is significantly above zero."""
+        return self.low > 0.0
+
+    def exceeds(self, placebo: "Treatment") -> bool:
+        """Whether it helps more neighbours than a placebo, and lowers the share by more."""
+        return self.gone > placebo.gone and self.drop > placebo.drop
+
+
+class Neighbourhood(_Model):
+    """The results of the neighbours of one row.
+
+    Attributes:
+        evaluation: the row's id in the store.
+        rows: neighbours that have a result.
+        harmful: of them, unchanged.
+        robustness: harmful / rows; None where no neighbour has a result.
+        low: lower end of its 95 % interval (Wilson).
+        high: its upper end.
+        cause: the first fix whose drop is significantly above zero and exceeds the placebo's;
+            "unavoidable" where no fix has one; "not known" where fewer than half of the neighbours
+            have a result with some fix; "sensitive" of a knife-edge row; "" where no fix was tried.
+        fixes: in the order in which causes are sought; empty where they were not tried.
+        placebo: one more random move of the same size for each neighbour.
+        sampled: whether the row was drawn at random from those that are not exported.
+        judgement: what caused it, and what would have avoided it, in one clause; "" where no fix
+            was tried, and in records of earlier versions.
+    """
+
+    evaluation: Count
+    rows: Count
+    harmful: Count
+    robustness: Share | None
+    low: Share
+    high: Share
+    cause: CauseLabel = ""
+    fixes: Annotated[tuple[Treatment, ...], Field(max_length=20)] = ()
+    placebo: Treatment | None = None
+    sampled: bool = False
+    judgement: Text = ""
+
+    @property
+    def knife_edge(self) -> bool:
+        """Whether fewer than half of the neighbours are harmful."""
+        return self.robustness is not None and self.robustness < 0.5
+
+    @property
+    def fix(self) -> Treatment | None:
+        """The fix that the cause was found by, if one was."""
+        if self.placebo is None or self.cause in ("sensitive", "unavoidable", "not known", ""):
+            return None
+        works = (one for one in self.fixes if one.works and one.exceeds(self.placebo))
+        return next(works, None)
+
+
+class Probes(_Model):
+    """Scenarios that were simulated to check a statement.
+
+    Attributes:
+        rows: how many.
+        harmful: of them.
+    """
+
+    rows: Count
+    harmful: Count
+
+
+class Condition(_Model):
+    """What a minimal scenario needs of one parameter.
+
+    Where probes did not confirm that it needs it, its value is an example: limit and value agree.
+
+    Attributes:
+        name: of the parameter.
+        unit: of it.
+        sign: ">=" where the parameter lies above its nominal value, "<=" below it.
+        limit: the harm persists as far as here when this parameter alone is moved on towards its
+            nominal value, and not one step further.
+        until: likewise away from its nominal value; None where the harm persists to the end of its
+            range.
+        step: of that parameter.
+        value: in the minimal scenario.
+        nominal: value of the parameter in the nominal scenario.
+        needs: the values as people read them: "≥ 3.4 m/s", "from 3.4 to 7 m/s", "= rain".
+        outside: the probes that confirm it: with values outside, the other conditions met; None
+            where it is not confirmed, and in records of earlier versions.
+    """
+
+    name: Text
+    unit: Text
+    sign: Literal[">=", "<="]
+    limit: Number
+    step: Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
+    value: Number
+    nominal: Number
+    needs: Text = ""
+    until: Number | None = None
+    outside: Probes | None = None
+
+    @property
+    def confirmed(self) -> bool:
+        """Whether the scenario needs it: probes outside are harmless."""
+        return self.outside is not None
+
+
+class Minimal(_Model):
+    """The scenario of a mode that differs least from the nominal one.
+
+    Attributes:
+        name: of its files in ``critical``, "minimal-01"; "" where none are written.
+        x: the row of X, all parameters and derived quantities in the run's order.
+        noise_key: of its random numbers: those of the row that it was made from.
+        values: the parameters that its scenario depends on, by name.
+        conditions: the parameters that must differ from nominal, those furthest from it first.
+        sentence: they in words.
+        inside: random probes that meet all confirmed conditions, all else as in the scenario.
+        rows: neighbours that have a result.
+        harmful: of them.
+        robustness: harmful / rows.
+        harm: of the scenario.
+        severity: probability of MAIS3+.
+    """
+
+    name: Text
+    x: Annotated[tuple[Number, ...], Field(max_length=10_000)]
+    noise_key: Annotated[str, Field(pattern=r"^[0-9]{1,20}$")]
+    values: Annotated[dict[Text, Number], Field(max_length=10_000)]
+    conditions: Annotated[tuple[Condition, ...], Field(max_length=1000)]
+    sentence: Annotated[str, Field(max_length=100_000)]
+    rows: Count
+    harmful: Count
+    robustness: Share | None
+    harm: Share
+    severity: Share
+    inside: Probes = Probes(rows=0, harmful=0)
+
+    @property
+    def knife_edge(self) -> bool:
+        """Whether fewer than half of its neighbours are harmful."""
+        return self.robustness is not None and self.robustness < 0.5
+
+
+class Mode(_Model):
+    """A way in which the driver fails.
+
+    Attributes:
+        number: 1, 2, … in the order of the record: robust ones first, then by worst harm.
+        title: in words.
+        conflict: "contact", "near miss" or "violation".
+        conflict_type: label of `ConflictType`.
+        responsible: label of `Responsible`.
+        rule: label of the `Rule` that decides on it most often.
+        rules: all that occur with their numbers, the most frequent first; empty in records of
+            earlier versions.
+        judgement: of ``shown``, see `Neighbourhood`; by the quick cause where it was not tested.
+        cause: tested by the neighbours of ``shown``; else the quick one of the rows.
+        tested: whether the neighbours gave the cause.
+        partner: kind of the other participant: "car", "pedestrian", …; "" if there is none.
+        place: "before the junction", "in the junction", "between junctions", "after the
+            junction"; "" where the ego's route crosses none, or it is not known.
+        count: harmful evaluations of the run.
+        space: share of the search space.
+        harm: the worst.
+        severity: the worst, probability of MAIS3+.
+        worst: the evaluation of the worst harm.
+        shown: the evaluation that stands for it: the worst robust one of those that were tested.
+        robustness: of ``shown``; None where it was not tested.
+        examples: evaluations, the worst first; not all of them.
+        exports: names of the exported scenarios, the one that stands for it first.
+        minimal: its minimal scenario, if one was sought and found.
+    """
+
+    number: Annotated[int, Field(ge=1, le=10**6)]
+    title: Text
+    conflict: Text
+    conflict_type: Text
+    responsible: Text
+    rule: Text
+    cause: CauseLabel
+    tested: bool
+    partner: Text
+    place: Text
+    count: Annotated[int, Field(ge=1, le=10**8)]
+    space: Estimate
+    harm: Share
+    severity: Share
+    worst: Count
+    shown: Count
+    robustness: Share | None
+    examples: Annotated[tuple[Count, ...], Field(max_length=MOST_EXAMPLES)]
+    exports: Annotated[tuple[Text, ...], Field(max_length=1000)] = ()
+    minimal: Minimal | None = None
+    rules: Annotated[tuple[tuple[Text, Count], ...], Field(max_length=100)] = ()
+    judgement: Text = ""
+
+    @property
+    def knife_edge(self) -> bool:
+        """Whether fewer than half of the neighbours of ``shown`` are harmful."""
+        return self.robustness is not None and self.robustness < 0.5
+
+
+class Influence(_Model):
+    """How differently a parameter is distributed in the failures of a run and in its other rows.
+
+    Attributes:
+        name: of the parameter.
+        distance: the Kolmogorov-Smirnov distance of the two.
+        p: the probability of such a distance by chance, with Bonferroni's correction.
+        failures: harmful rows that are compared.
+        at_low: of them, those in the lowest 2.5 % of the parameter's range.
+        at_high: likewise in the highest.
+    """
+
+    name: Text
+    distance: Share
+    p: Share
+    failures: Count
+    at_low: Count
+    at_high: Count
+
+
+class Least(_Model):
+    """The row with the least margin to harm in one quantity.
+
+    Attributes:
+        quantity: "harm", "course_ttc" or "course_braking".
+        value: its most critical value; None where no row has one (no collision course).
+        unit: of it.
+        evaluation: where; None where no row has one.
+    """
+
+    quantity: Text
+    value: Number | None
+    unit: Text
+    evaluation: Count | None
+
+
+class Bound(_Model):
+    """The bounds of a run for the whole space, with or without failures.
+
+    Attributes:
+        evaluations: of the run.
+        failed: of them, simulations without a result.
+        implausible: of them, traffic that could not happen.
+        harmful: of them.
+        space: the harmful share of the search space.
+        least: the smallest margins reached.
+        verdict: "fails"; "no failure found"; or "not judged", where too few evaluations could be
+            judged, or the scenario did not happen. "" in records of earlier versions.
+        not_counted: the collisions, near misses and evaluations that do not count as failures,
+            with their reasons; "" where there are none.
+        sentence: in words.
+    """
+
+    evaluations: Count
+    failed: Count
+    implausible: Count
+    harmful: Count
+    space: Estimate
+    least: Annotated[tuple[Least, ...], Field(max_length=20)]
+    verdict: Verdict | Literal[""] = ""
+    not_counted: Text = ""
+    sentence: Text
+
+    @property
+    def in_full(self) -> str:
+        """The sentence, and what does not count."""
+        return f"{self.sentence} N{self.not_counted[1:]}." if self.not_counted else self.sentence
+
+    @property
+    def judged(self) -> bool:
+        """Whether the run supports a statement on its driver."""
+        known = self.evaluations - self.failed - self.implausible
+        return self.verdict != NOT_JUDGED if self.verdict else known > 0
+
+
+class Triage(_Model):
+    """The triage of a run.
+
+    Attributes:
+        schema_version: 1.
+        scenario: its name.
+        ego: label of its driver.
+        baseline: label of the driver that the ego's is compared with: what that one fails in, too,
+            is not harmful; "" without one.
+        count: whose conflicts count as harm, "ego" or "any".
+        results: digest of the evaluations that it was made from, `Rows.digest`.
+        seed: of the run, from which all random numbers follow.
+        neighbours: of each row that was tested; 0 where none were (see ``untested``).
+        radius: by which each searched parameter moves at most, a share of its range.
+        sampled: rows that were drawn from those not exported.
+        bound: of the space.
+        modes: the failure modes, at most ``MOST_MODES``.
+        unrecorded_modes: further modes.
+        neighbourhoods: of the exported rows, in their order, then of the others.
+        untested: why no neighbours were tested; "" where they were.
+        influences: the parameters that matter for failure significantly, the most important first.
+        fresh: the fresh random rows; None where none were drawn, and in records of earlier
+            versions.
+    """
+
+    schema_version: Literal[1] = 1
+    scenario: Text
+    ego: Text
+    baseline: Text = ""
+    count: Literal["ego", "any"]
+    results: Text
+    seed: Annotated[int, Field(ge=0)]
+    neighbours: Count
+    radius: Share
+    sampled: Count
+    bound: Bound
+    modes: Annotated[tuple[Mode, ...], Field(max_length=MOST_MODES)]
+    unrecorded_modes: Count = 0
+    neighbourhoods: Annotated[tuple[Neighbourhood, ...], Field(max_length=MOST_NEIGHBOURHOODS)]
+    untested: Text = ""
+    influences: Annotated[tuple[Influence, ...], Field(max_length=1000)] = ()
+    fresh: FreshRows | None = None
+
+    @model_validator(mode="after")
+    def _consistent(self) -> "Triage":
+        if self.fresh is not None:
+            known = [one for one in self.fresh.harm if one is not None]
+            harmful = sum(one >= NEAR_MISS for one in known)
+            if (self.bound.space.rows, self.bound.space.harmful) != (len(known), harmful):
+                raise ValueError("the fresh rows must be those that the share is estimated from")
+            if len(self.fresh.mode) != len(self.fresh.harm):
+                raise ValueError("each fresh row must have its mode")
+        if [one.number for one in self.modes] != list(range(1, len(self.modes) + 1)):
+            raise ValueError("modes must be numbered 1, 2, …")
+        if sum(one.count for one in self.modes) > self.bound.harmful:
+            raise ValueError("modes must not hold more rows than are harmful")
+        named = [i for one in self.modes for i in (one.worst, one.shown, *one.examples)]
+        named += [one.evaluation for one in self.neighbourhoods]
+        if max(named, default=-1) >= self.bound.evaluations:
+            raise ValueError(f"evaluation {max(named)} must be one of the run's")
+        return self
+
+    def neighbourhood(self, evaluation: int) -> Neighbourhood | None:
+        """Return the results of an evaluation's neighbours, if they were tested."""
+        found = (one for one in self.neighbourhoods if one.evaluation == evaluation)
+        return next(found, None)
+
+    @property
+    def robust(self) -> int:
+        """How many modes are not knife-edge; those that were not tested count."""
+        return sum(not one.knife_edge for one in self.modes)
+
+
+def write_record(folder: Path, triage: Triage) -> Path:
+    """Write the record into a run's folder atomically; return its path.
+
+    Raises:
+        StorageError: it cannot be written.
+    """
+    path = folder / JSON_FILE
+    write_whole(path, [triage.model_dump_json(indent=1).encode(), b"\n"])
+    return path
+
+
+def read_record(path: Path, results: str | None = None) -> Triage | None:
+    """Return a record of `write_record`; None if the file does not exist.
+
+    Args:
+        path: of the record.
+        results: digest of the run's evaluations, `Rows.digest`, if it is known.
+
+    Raises:
+        FileFormatError: it is not such a record, or belongs to another run.
+        StorageError: it cannot be read.
+    """
+    record = read_model(path, Triage, _not_ours)
+    if record is not None and results is not None and record.results != results:
+        raise _not_ours(path, "it was made from other evaluations than the run's")
+    return record
+
+
+def _not_ours(path: Path, why: str) -> FileFormatError:
+    return FileFormatError(
+        f"{path}: must be the triage of this run, as 'bridgegen resume {path.parent}' writes it: "
+        f"{why}"
+    )

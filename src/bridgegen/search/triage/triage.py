@@ -1,0 +1,461 @@
+"""From a run's rows to findings: modes, their neighbours, minimal scenarios, and a bound."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from bridgegen.assess.cause import Cause
+from bridgegen.assess.conflict.findings import Findings
+from bridgegen.assess.conflict.happening import Happening
+from bridgegen.assess.conflict.harm import NEAR_MISS
+from bridgegen.assess.conflict.quantities import HARM
+from bridgegen.assess.criteria import OF_BASELINE
+from bridgegen.base.arrays import Bool, Float, Numbers
+from bridgegen.engine.evaluation import EVENT
+from bridgegen.engine.pipeline import Pipeline
+from bridgegen.results.store import Recorded, Rows
+from bridgegen.search.triage.bound import UNBIASED, NotCounted, bound, estimate, least_margins
+from bridgegen.search.triage.effort import FULL, Effort
+from bridgegen.search.triage.influence import influences
+from bridgegen.search.triage.judgement import judgement
+from bridgegen.search.triage.minimal import Minimiser
+from bridgegen.search.triage.modes import (
+    Group,
+    Key,
+    by_frequency,
+    by_harm,
+    group,
+    keys_of,
+    rekeyed,
+    title,
+    where,
+)
+from bridgegen.search.triage.moves import searched
+from bridgegen.search.triage.neighbours import NEIGHBOURS, RADIUS, AsIs, neighbourhoods
+from bridgegen.search.triage.record import (
+    MOST_EXAMPLES,
+    MOST_MODES,
+    Drawn,
+    Estimate,
+    FreshRows,
+    Minimal,
+    Mode,
+    Neighbourhood,
+    Triage,
+)
+from bridgegen.search.triage.what_happened import COPY, apart, distinct, of_events, of_results
+
+_SAMPLE, _FRESH = 18, 19  # streams of random numbers, apart from others of the same seed
+
+
+@dataclass(frozen=True, eq=False)
+class Triaged:
+    """The result of the triage of a run.
+
+    Attributes:
+        record: the findings, without names of files.
+        exports: positions of the rows to export, best first.
+    """
+
+    record: Triage
+    exports: tuple[int, ...]
+
+
+def triage(
+    pipeline: Pipeline,
+    rows: Rows | Recorded,
+    *,
+    algorithm: str,
+    seed: int,
+    keep: int,
+    chosen: Sequence[int] | None = None,
+    effort: Effort = FULL,
+    domain: str = "",
+) -> Triaged:
+    """Group a run's harmful rows into failure modes, and test the robustness of each finding.
+
+    The result depends on the seed and the effort only, to the last bit.
+
+    Args:
+        pipeline: of the run.
+        rows: all evaluations.
+        algorithm: of the run; only rows of "random" and "sobol" estimate shares of the space.
+        seed: of the run.
+        keep: how many scenarios to export.
+        chosen: positions of the rows to export, best first, where something else than harm chooses
+            them; the harmful ones among them are tested.
+        effort: how much is tested.
+        domain: a sentence if the driver is not made for the scenario.
+    """
+    return _Triage(pipeline, rows, algorithm, seed, keep, chosen, effort, domain).run()
+
+
+def harmful_rows(
+    metrics: Numbers, names: Sequence[str], harm: str, status: npt.NDArray[Any], findings: Findings
+) -> tuple[Bool, Float]:
+    """Return which rows are a failure of the ego, ``(N,)``, and the harm of each, ``(N,)``.
+
+    Independently of the objective, a row is harmful if it has a result, plausible traffic and a
+    harm of at least 0.3. Without recorded harm no row is harmful.
+
+    Args:
+        metrics: ``(N, M)``.
+        names: of the M columns.
+        harm: the quantity, "harm" or "harm_any".
+        status: ``(N,)``, 0 is success.
+        findings: of N rows.
+    """
+    if harm not in names:
+        return np.zeros(len(metrics), np.bool_), np.zeros(len(metrics))
+    values = np.nan_to_num(metrics[:, list(names).index(harm)], nan=0.0)
+    plausible: Bool = np.array(findings.implausible == "", dtype=np.bool_).reshape(len(values))
+    return (status == 0) & plausible & (values >= NEAR_MISS), values
+
+
+class _Triage:
+    """One call of `triage`; positions are those among all rows unless stated otherwise."""
+
+    def __init__(
+        self,
+        pipeline: Pipeline,
+        rows: Rows | Recorded,
+        algorithm: str,
+        seed: int,
+        keep: int,
+        chosen: Sequence[int] | None,
+        effort: Effort,
+        domain: str,
+    ) -> None:
+        self._effort, self._tests = effort, pipeline.tries and effort.tests
+        self._pipeline, self._rows, self._space = pipeline, rows, pipeline.space
+        self._algorithm, self._seed, self._keep = algorithm, seed, keep
+        self._chosen, self._domain = chosen, domain
+        name = pipeline.objective.harm
+        harmful, self._harm = harmful_rows(
+            rows.metrics, pipeline.metrics, name, rows.status, rows.findings
+        )
+        if pipeline.cause is not None:  # harm of another cause does not count
+            harmful &= rows.critical
+        if pipeline.baseline is not None:  # nor does what the baseline's driver fails in, too
+            harmful &= ~_baseline_fails(pipeline, rows)
+        self._at = np.flatnonzero(harmful)
+        self._U: Float = rows.U[self._at]
+        self._found: dict[int, Neighbourhood] = {}
+        self._as_is: AsIs = {}
+        self._unrecorded = 0
+        self._preventable: dict[int, bool | None] = {}
+        self._event: Float = np.zeros((0, len(EVENT)))
+
+    def run(self) -> Triaged:
+        """Run the stages."""
+        rows, tests = self._rows, self._tests
+        U, harm = self._U, self._harm[self._at]
+        place = self._places(U) if tests else [""] * len(self._at)
+        quick = [Cause(one).label for one in rows.cause[self._at].tolist()]
+        kinds = self._pipeline.kinds
+        keys = keys_of(rows.findings.take(self._at), kinds, place, quick)
+        every = group(keys, harm, U)
+        self._unrecorded = len(every[MOST_MODES:])
+        groups = every[:MOST_MODES]
+        shown = [int(one.rows[0]) for one in groups]
+        if tests:
+            shown = self._test_robustness(groups, U, harm)
+        exports = self._choose(shown, U, harm)
+        tested = list(dict.fromkeys([*exports, *shown[: self._effort.tested]]))
+        sample = self._sample(tested) if tests else []
+        if tests:
+            self._test(tested, sampled=False)
+            self._test(sample, sampled=True)
+        groups, shown = self._by_tested_cause(groups, shown, U, harm)
+        order = sorted(range(len(groups)), key=lambda k: self._rank(shown[k], harm))
+        groups, shown = [groups[k] for k in order], [shown[k] for k in order]
+        minimal = self._minimal(groups, shown) if tests else [None] * len(groups)
+        record = self._record(groups, shown, exports, tested, sample, minimal)
+        return Triaged(record, tuple(self._at[exports].tolist()))
+
+    # Stages; positions are those among the harmful rows.
+
+    def _places(self, U: Float) -> list[str]:
+        """Return where on its route each harmful row fails; keep what happened in it."""
+        order = by_harm(self._harm[self._at], U)
+        first, rest = np.split(order, [self._effort.placed])
+        place = np.full(len(order), "", dtype=object)
+        trials = self._pipeline.try_all(self._rows.X[self._at[first]])
+        place[first] = trials.place
+        self._preventable = dict(zip(first.tolist(), trials.avoidable, strict=True))
+        if not len(rest):
+            self._event = trials.event[np.argsort(first)]
+        else:
+            from scipy.spatial import cKDTree
+
+            findings = self._rows.findings.take(self._at)
+            kinds, blank = self._pipeline.kinds, [""] * len(order)
+            keys = keys_of(findings, kinds, blank, blank)
+            known: dict[Key, list[int]] = {}
+            for i in first.tolist():
+                known.setdefault(keys[i], []).append(i)
+            trees = {key: cKDTree(U[members]) for key, members in known.items()}
+            for i in rest.tolist():
+                if keys[i] in trees:
+                    place[i] = place[known[keys[i]][int(trees[keys[i]].query(U[i])[1])]]
+        return place.tolist()
+
+    def _happened(self) -> Float:
+        """Return coordinates in which rows are near if the same happened in them."""
+        if len(self._event) == len(self._at):
+            return of_events(self._event)
+        at = self._at
+        return of_results(self._rows.metrics[at], self._rows.findings.take(at))
+
+    def _test_robustness(self, groups: Sequence[Group], U: Float, harm: Float) -> list[int]:
+        """Simulate neighbours of the worst rows; return the row that represents each mode."""
+        events = self._happened()
+        worst = [distinct(events, one.rows, self._effort.per_mode) for one in groups]
+        every = by_harm(harm, U)
+        several = distinct(events, every, self._effort.spare * max(self._keep, 1))
+        self._simulate(dict.fromkeys(i for some in (*worst, several) for i in some), fixes=False)
+        return [min(some, key=lambda i: (self._is_knife_edge(i), some.index(i))) for some in worst]
+
+    def _choose(self, shown: Sequence[int], U: Float, harm: Float) -> list[int]:
+        """Return the rows to export, one of each mode and others: robust ones first, then harm."""
+        if self._chosen is not None:
+            known = {at: i for i, at in enumerate(self._at.tolist())}
+            return [known[at] for at in self._chosen if at in known]
+        critical = self._rows.critical[self._at]
+        first = sorted((i for i in shown if critical[i]), key=lambda i: self._rank(i, harm))
+        events = self._happened()
+        first = [i for k, i in enumerate(first) if not _is_copy(events, i, first[:k])]
+        first = first[: self._keep]
+        every = by_harm(harm, U)
+        tried = [i for i in every.tolist() if i in self._found and critical[i]]
+        tried.sort(key=lambda i: self._rank(i, harm))
+        more = distinct(events, np.array(tried, dtype=np.int64), self._keep, first)
+        if len(first) + len(more) < self._keep:  # rows of unknown robustness
+            kept = [*first, *more]
+            more += distinct(events, every[critical[every]], self._keep, kept)
+            self._simulate([i for i in more if self._tests and i not in self._found], fixes=False)
+        return sorted([*first, *more], key=lambda i: self._rank(i, harm))
+
+    def _sample(self, tested: Sequence[int]) -> list[int]:
+        """Return some of the harmful rows that are not tested yet, drawn at random."""
+        rest = np.setdiff1d(np.arange(len(self._at)), tested)
+        rest = rest[np.argsort(self._rows.id[self._at[rest]])]
+        random = np.random.Generator(np.random.PCG64([self._seed, _SAMPLE]))
+        drawn = random.permutation(len(rest))[: self._effort.sampled]
+        return rest[np.sort(drawn)].tolist()  # type: ignore[no-any-return]
+
+    def _test(self, at: Sequence[int], *, sampled: bool) -> None:
+        """Simulate neighbours with every fix, if causes are determined."""
+        if self._pipeline.seeks_causes:
+            self._simulate(at, fixes=True, sampled=sampled)
+        else:
+            self._simulate([i for i in at if i not in self._found], fixes=False, sampled=sampled)
+
+    def _simulate(self, at: Any, *, fixes: bool, sampled: bool = False) -> None:
+        rows = self._at[np.array(list(at), dtype=np.int64)]
+        results = neighbourhoods(
+            self._pipeline, self._rows.X[rows], self._rows.id[rows], self._seed,
+            fixes=fixes, sampled=sampled, as_is=self._as_is,
+        )  # fmt: skip
+        self._found |= dict(zip(at, results, strict=True))
+
+    def _is_knife_edge(self, i: int) -> bool:
+        return i in self._found and self._found[i].knife_edge
+
+    def _rank(self, i: int, harm: Float) -> tuple[Any, ...]:
+        """Return the sort key of findings: robust ones first, then the worst."""
+        return self._is_knife_edge(i), -float(harm[i]), *self._U[i].tolist()
+
+    def _by_tested_cause(
+        self, groups: Sequence[Group], shown: Sequence[int], U: Float, harm: Float
+    ) -> tuple[list[Group], list[int]]:
+        """Give modes the tested cause; modes that are then equal are merged."""
+        keys = []
+        for one, i in zip(groups, shown, strict=True):
+            cause = self._found[i].cause if i in self._found else ""
+            keys.append(one.key._replace(cause=cause) if cause else one.key)
+        joined = rekeyed(groups, keys, harm, U)
+        held = np.zeros(len(harm), dtype=np.int64)
+        for k, one in enumerate(joined):
+            held[one.rows] = k
+        of_each: list[list[int]] = [[] for _ in joined]
+        for i in shown:
+            of_each[int(held[i])].append(i)
+        return joined, [min(some, key=lambda i: self._rank(i, harm)) for some in of_each]
+
+    def _minimal(self, groups: Sequence[Group], shown: Sequence[int]) -> list[Minimal | None]:
+        """Return the minimal scenarios of the first modes; one for modes that differ only in cause.
+
+        With an adversary there are none: its decisions have no useful nominal values.
+        """
+        found: list[Minimal | None] = [None] * len(groups)
+        first: dict[Any, int] = {}
+        for k, one in enumerate(groups if not self._space.decisions else ()):
+            first.setdefault((one.key.way, one.part), k)
+        at = list(first.values())[: self._effort.minimal]
+        if at:
+            X = self._rows.X[self._at[np.array([shown[k] for k in at], dtype=np.int64)]]
+            ways, names = [groups[k].key.way for k in at], [f"minimal-{k + 1:02d}" for k in at]
+            results = Minimiser(self._pipeline, self._seed, self._effort).find(X, ways, names)
+            for k, minimal in zip(at, results, strict=True):
+                found[k] = minimal
+        return found
+
+    def _shares(self, groups: Sequence[Group]) -> tuple[Estimate, list[Estimate], FreshRows | None]:
+        """Return the harmful share of the space, that of each mode, and the fresh rows drawn."""
+        rows = self._rows
+        fit = int(((rows.status == 0) & ~_implausible(rows)).sum())
+        if self._algorithm in UNBIASED:
+            drawn: Drawn = "sobol" if self._algorithm == "sobol" else "random"
+            each = [estimate(drawn, len(one.rows), fit) for one in groups]
+            return estimate(drawn, len(self._at), fit), each, None
+        n = self._effort.fresh
+        is_possible = self._tests and self._pipeline.cause is None
+        if not (n and is_possible and self._space.n_var):
+            return estimate("", 0, 0), [estimate("", 0, 0) for _ in groups], None
+        random = np.random.Generator(np.random.PCG64([self._seed, _FRESH]))
+        U = random.random((n, self._space.n_var))
+        results = self._pipeline.try_all(self._space.decode(U) + 0.0)
+        keys = keys_of(results.findings, self._pipeline.kinds, results.place.tolist(), [""] * n)
+        mode = [0] * n
+        own = self._U
+        for i in np.flatnonzero(results.harmful).tolist():
+            same = [k for k, one in enumerate(groups) if one.key.way == keys[i]]
+            if same:  # of several that differ in cause, the one with the nearest row
+                gaps = [float(((own[groups[k].rows] - U[i]) ** 2).sum(axis=1).min()) for k in same]
+                mode[i] = same[int(np.argmin(gaps))] + 1
+        ok = int(results.ok.sum())
+        harm = zip(results.harm.tolist(), results.ok.tolist(), strict=True)
+        fresh = FreshRows(harm=tuple(one if has else None for one, has in harm), mode=tuple(mode))
+        each = [estimate("fresh", mode.count(k), ok) for k in range(1, len(groups) + 1)]
+        return estimate("fresh", int(results.harmful.sum()), ok), each, fresh
+
+    def _record(
+        self,
+        groups: Sequence[Group],
+        shown: Sequence[int],
+        exports: Sequence[int],
+        tested: Sequence[int],
+        sample: Sequence[int],
+        minimal: Sequence[Minimal | None],
+    ) -> Triage:
+        rows, pipeline = self._rows, self._pipeline
+        space, shares, fresh = self._shares(groups)
+        ids = rows.id[self._at]
+        order = self._at[exports].tolist() if self._chosen is None else list(self._chosen)
+        self._judge([*tested, *sample, *shown])
+        names = {i: f"{order.index(self._at[i]) + 1:04d}" for i in exports}
+        modes = []
+        for k, (one, i) in enumerate(zip(groups, shown, strict=True), start=1):
+            members = np.isin(exports, one.rows).tolist()
+            kept = [names[j] for j, has in zip(exports, members, strict=True) if has and j != i]
+            near = self._found.get(i)
+            rules = by_frequency(rows.findings.rule[self._at[one.rows]].tolist())
+            modes.append(
+                Mode(
+                    number=k, title=self._title(one, groups, [rule for rule, _ in rules]),
+                    **one.key._asdict(), rule=rules[0][0], rules=rules,
+                    judgement=self._judgement(i, one.key.cause),
+                    tested=near is not None and near.cause != "",
+                    count=len(one.rows), space=shares[k - 1],
+                    harm=float(self._harm[self._at[one.rows]].max()),
+                    severity=self._severity(one), worst=int(ids[one.rows[0]]), shown=int(ids[i]),
+                    robustness=None if near is None else near.robustness,
+                    examples=tuple(ids[one.rows[:MOST_EXAMPLES]].tolist()),
+                    exports=(*([names[i]] if i in names else []), *kept),
+                    minimal=minimal[k - 1],
+                )
+            )  # fmt: skip
+        ok = rows.status == 0
+        implausible = _implausible(rows)
+        known = [self._found[i] for i in dict.fromkeys([*tested, *sample]) if i in self._found]
+        untested, baseline = "", pipeline.baseline.driver.label if pipeline.baseline else ""
+        if not pipeline.tries:
+            untested = "neighbours are simulated in the embedded simulator only"
+        elif not self._tests:
+            untested = "neighbours were not simulated (--triage none)"
+        return Triage(
+            scenario=pipeline.scenario.name, ego=pipeline.driver.label,
+            baseline=baseline, count=pipeline.objective.count,
+            results=rows.digest(), seed=self._seed,
+            neighbours=NEIGHBOURS if self._tests else 0, radius=RADIUS, sampled=len(sample),
+            bound=bound(
+                evaluations=len(ok),
+                besides=NotCounted.of(rows.findings.take(slice(None)), self._harm, ok),
+                happening=Happening.of(rows.findings.happened, self._domain),
+                harmful=len(self._at), space=space,
+                least=least_margins(
+                    rows.metrics, pipeline.metrics, self._harm, rows.id, ok & ~implausible,
+                ),
+                modes=len(modes), ego=pipeline.driver.label, baseline=baseline,
+            ),
+            modes=tuple(modes), unrecorded_modes=self._unrecorded,
+            neighbourhoods=tuple(known),
+            influences=influences(
+                self._space, rows.X, np.isin(np.arange(len(ok)), self._at), ok & ~implausible
+            ),
+            untested=untested, fresh=fresh,
+        )  # fmt: skip
+
+    def _judge(self, at: Sequence[int]) -> None:
+        """Put the judgement of some rows on record, for which each is simulated once more."""
+        rest = [i for i in dict.fromkeys(at) if i not in self._preventable] if self._tests else []
+        if rest:
+            trials = self._pipeline.try_all(self._rows.X[self._at[rest]])
+            self._preventable |= dict(zip(rest, trials.avoidable, strict=True))
+        for i, near in self._found.items():
+            if near.cause:
+                text = self._judgement(i, near.cause)
+                self._found[i] = near.model_copy(update={"judgement": text})
+
+    def _judgement(self, i: int, cause: str) -> str:
+        return judgement(
+            cause, self._found.get(i), preventable=self._preventable.get(i),
+            responsible=str(self._rows.findings.responsible[self._at[i]]),
+        )  # fmt: skip
+
+    def _severity(self, one: Group) -> float:
+        names = self._pipeline.metrics
+        if "severity" not in names:
+            return 0.0
+        column = self._rows.metrics[self._at[one.rows], names.index("severity")]
+        return float(np.nan_to_num(column, nan=0.0).max())
+
+    def _title(self, one: Group, groups: Sequence[Group], rules: Sequence[str]) -> str:
+        """Return a mode in words; a cluster also with the parameter that separates it."""
+        text = title(one.key, rules, self._pipeline.objective.count)
+        others = [g.rows for g in groups if g is not one and g.key == one.key]
+        if not one.part or not others:
+            return text
+        names, at = self._space.variables, self._at
+        X, rest = (
+            searched(self._space, self._rows.X[at[rows]])
+            for rows in (one.rows, np.concatenate(others))
+        )
+        found = where(X, rest, names)
+        if found is None:
+            return text
+        k, low, high = found
+        parameter = self._space.parameters[names[k]]
+        unit = "" if parameter.unit in ("1", "count", "?") else f" {parameter.unit}"
+        return f"{text}, {names[k]} {parameter.kind.span_text(low, high, '{:.3g}'.format, unit)}"
+
+
+def _baseline_fails(pipeline: Pipeline, rows: Rows | Recorded) -> Bool:
+    """Return which rows the baseline's driver fails in, ``(N,)``, or has no usable result of."""
+    column = rows.metrics[:, pipeline.metrics.index(f"{OF_BASELINE}{HARM}")]
+    fails: Bool = ~(np.nan_to_num(column, nan=1.0) < NEAR_MISS)
+    return fails | ~rows.critical if pipeline.objective.rule == "harm" else fails
+
+
+def _is_copy(events: Float, i: int, others: Sequence[int]) -> bool:
+    """Return whether the same happened in a row as in one of some others."""
+    return bool((apart(events[list(others)], events[i]) < COPY).any())
+
+
+def _implausible(rows: Rows | Recorded) -> Bool:
+    marked: Bool = np.array(rows.findings.implausible != "", dtype=np.bool_).reshape(len(rows.id))
+    return marked

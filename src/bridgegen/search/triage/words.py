@@ -1,0 +1,58 @@
+"""A run's triage in lines of text, for the terminal."""
+
+from bridgegen.search.regions.box import percent
+from bridgegen.search.triage.influence import ends_in_words, in_words
+from bridgegen.search.triage.record import Mode, Triage
+
+
+def headline(found: Triage) -> str:
+    """Return the number of failure modes, or the least margin, and the share of the space."""
+    return found.bound.sentence
+
+
+def mode_in_words(mode: Mode, found: Triage) -> str:
+    """Return a failure mode in one line: count, title, worst severity, robustness, cause, share.
+
+    The cause is one judgement, see `bridgegen.search.triage.judgement`.
+    """
+    parts = [f"{mode.count:>5} × {mode.title}"]
+    if mode.conflict == "contact":
+        parts.append(f"MAIS3+ {percent(mode.severity)}")
+    else:
+        parts.append(f"harm {mode.harm:.2f}")
+    parts.append(robustness_in_words(mode, found))
+    parts.append(mode.judgement or mode.cause)
+    if mode.space.drawn and mode.space.share is not None:
+        low, high = percent(mode.space.low), percent(mode.space.high)
+        seen = f"{percent(mode.space.share)} of the space ({low} to {high})"
+        parts.append(seen if mode.space.harmful else f"at most {high} of the space")
+    return "; ".join(part for part in parts if part)
+
+
+def parameters_in_words(found: Triage) -> str:
+    """Return which parameters matter most, and at the end of whose range failures lie, if any."""
+    text, ends = in_words(found.influences), ends_in_words(found.influences)
+    if text:
+        text = f"{text}: distance of failures from other rows, 0 to 1"
+    return "; ".join([*([text] if text else []), *(f"{one}: widen the range?" for one in ends[:1])])
+
+
+def shortly(mode: Mode) -> str:
+    """Return a failure mode in few words: what happens, how often, how severe, its cause."""
+    often = f"{mode.count} evaluation" + "s" * (mode.count != 1)
+    severe = f"MAIS3+ {percent(mode.severity)}" if mode.conflict == "contact" else ""
+    cause = mode.judgement.partition(":")[0] or mode.cause
+    return f"{mode.title}: {', '.join(one for one in (often, severe, cause) if one)}"
+
+
+def robustness_in_words(mode: Mode, found: Triage) -> str:
+    """Return how many neighbours of the evaluation that stands for a mode fail, too."""
+    near = found.neighbourhood(mode.shown)
+    if mode.robustness is None:
+        return ""
+    if near is None or not near.rows:
+        return f"also fails in {percent(mode.robustness)} of its nearby scenarios"
+    if mode.knife_edge:
+        return f"knife-edge: fails in only {near.harmful} of {near.rows} nearby scenarios"
+    share = "all " if near.harmful == near.rows else f"{near.harmful} of "
+    return f"also fails in {share}{near.rows} nearby scenarios"

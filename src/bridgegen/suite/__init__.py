@@ -1,1 +1,0 @@
-"""Many scenario files, with all their variations, run and judged together."""
