@@ -184,7 +184,7 @@ def test_a_run_in_which_nobody_who_acts_is_met_did_not_happen():
         return json.dumps({"began": {}, "near": {"bv": True}, "met": {"a": first, "b": second}})
 
     (reason,) = Happening.of([texts(False, False)] * 99 + [texts(True, False)]).reasons
-    assert reason == "the ego was near whoever acts, when it did, in 1 of 100 evaluations at most"
+    assert reason == "a participant that acts came near the ego in at most 1 of 100 evaluations"
     assert Happening.of([texts(True, False)] * 2 + [texts(False, False)] * 98).happened
 
 

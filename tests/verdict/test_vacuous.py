@@ -51,11 +51,11 @@ VACUOUS: Mapping[str, tuple[dict[str, Any], str]] = {
     "the ego stands behind a jam, and the walker is 180 m ahead": (
         walker(8.0)
         | {"jams": {"jam": {"tail": {"distance": 120.0}, "vehicles": ["car", "van"], "gap": 3.0}}},
-        "the ego was near whoever acts, when it did, in 0 of 30",
+        "a participant that acts came near the ego in at most 0 of 30",
     ),
     "the oncoming car acts when it has long passed": (
         {"participants": {"bv": car(120.0, 15.0, way="in")}, "events": brakes("bv", 12.0, 5.0)},
-        "the ego was near whoever acts, when it did, in 0 of 30",
+        "a participant that acts came near the ego in at most 0 of 30",
     ),
     "the ego is struck from behind before anything happens": (
         {

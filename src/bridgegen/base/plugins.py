@@ -1,4 +1,4 @@
-"""What installed packages add to BridgeGen, by entry points: algorithms, metrics, simulators."""
+"""Code that is named: by entry points of installed packages, or by an option of the user."""
 
 import importlib
 import importlib.util
@@ -145,7 +145,7 @@ class Registry(MutableMapping[str, Kind]):
         return len(self._added.names(self._ours))
 
 
-# --- Code of the user's own that an option names: ``module:Class``, or a file's, ``file.py:Class``
+# --- Code of the user that an option names: ``module:Class`` or ``file.py:Class`` ---
 # Only what a person has typed is imported, never what a folder or a file names.
 
 

@@ -1,6 +1,7 @@
-"""The command line: parse, call, print; no logic. Commands are in the order of these imports.
+"""The command line: it parses, calls, prints; no logic.
 
-`terminal` prints, `verdict` judges (`--fail-if`, JUnit). Imports `jobs` and below.
+Commands are listed in the order of these imports. `terminal` prints, `verdict` judges
+(`--fail-if`, JUnit). Imports `jobs` and below.
 """
 
 # ruff: noqa: I001

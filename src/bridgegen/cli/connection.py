@@ -1,4 +1,4 @@
-"""The options of the connection to a simulator, which several commands share."""
+"""Options that several commands share: the connection to a simulator, and the folder of maps."""
 
 import inspect
 import os

@@ -1,4 +1,4 @@
-"""The drivers that ship, and how a scenario file names them."""
+"""The drivers that ship, how a scenario file names them, and all drivers as a table."""
 
 import math
 from collections.abc import Iterable, Iterator

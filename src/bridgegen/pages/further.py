@@ -1,4 +1,4 @@
-"""The scenarios besides the exported ones whose motion the page holds."""
+"""Scenarios besides the exported ones: whose motion the page holds, or has simulated on request."""
 
 from collections.abc import Iterator, Sequence
 from itertools import zip_longest

@@ -13,7 +13,7 @@ from bridgegen.pages.data import ReportData
 from bridgegen.pages.payload import to_json
 from bridgegen.pages.sections import SECTIONS
 
-# --- Joins the page's JavaScript modules, and the styles beside them, into one script and one style
+# --- Joins the page's modules and styles into one script and one style ---
 # A page is one file that is opened from disk, where a browser loads no module. So the modules are
 # joined here, each after those that it imports, into one scope: ``import`` statements and the word
 # ``export`` are removed, names keep their meaning. Two forms are supported, at the start of a line:

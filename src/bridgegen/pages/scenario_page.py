@@ -1,4 +1,4 @@
-"""A logical scenario as a page: its picture, what happens, its parameters and their reasons."""
+"""Pages of a logical scenario and of an ontology file, with what happens in sentences."""
 
 import html
 from collections.abc import Iterator

@@ -1,4 +1,4 @@
-"""A playback as a film (GIF, WebP, MP4, WebM), or as one picture (PNG, SVG)."""
+"""A playback as a film (GIF, WebP; MP4 and WebM by ffmpeg), or as one picture (PNG, SVG)."""
 
 import io
 import shutil

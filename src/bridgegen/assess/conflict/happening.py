@@ -381,7 +381,7 @@ class Happening:
         elif self.met and all(one.value < SELDOM for one in self.met) and not found:
             most = max(self.met, key=lambda one: one.rows)
             rows = f"{most.rows} of {most.of} evaluations"
-            found.append(f"the ego was near whoever acts, when it did, in {rows} at most")
+            found.append(f"a participant that acts came near the ego in at most {rows}")
         if self.stuck is not None and self.stuck - self.may_stop > MOSTLY * self.rows:
             found.append(self.stuck_in_words)
         return tuple(found)

@@ -1,4 +1,4 @@
-"""The folder of the compiled code.
+"""The folder of compiled code, the sources that it depends on, and code that a wheel carries.
 
 It holds pickles and machine code, so only a folder that this user owns is read.
 """

@@ -243,7 +243,7 @@ class _WithoutEnvironments:
         return getattr(self._codegen, name)
 
 
-# --- Numba's compiler as kernels use it: their code in libraries of ours, wrappers for Python only
+# --- Numba's compiler as kernels use it ---
 
 
 _FOR_KERNEL: ContextVar[bool] = ContextVar("for_kernel", default=False)

@@ -1,4 +1,4 @@
-"""What a field of an options class declares of its option, and what follows from it."""
+"""What a field of an options class declares, and functions that take these fields as keywords."""
 
 import inspect
 from collections.abc import Callable
@@ -124,7 +124,7 @@ def range_problems(options: object) -> list[str]:
     return problems
 
 
-# --- Functions whose arguments are checked: those that take the fields of a dataclass as keywords -
+# --- Functions that take the fields of a dataclass as keywords, and check them ---
 
 
 P = ParamSpec("P")

@@ -1,4 +1,4 @@
-"""Processes of this machine, each one thread; one that crashes or is killed costs time only."""
+"""Processes of this machine, each one thread, that call functions; a crash costs time only."""
 
 import os
 import queue

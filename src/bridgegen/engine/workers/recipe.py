@@ -1,4 +1,4 @@
-"""Plain data from which a worker builds its pipeline; no file has to exist on its machine."""
+"""Plain data from which a worker builds its pipeline, with the files of a user's driver."""
 
 import hashlib
 import io

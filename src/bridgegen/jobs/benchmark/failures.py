@@ -1,4 +1,4 @@
-"""The rows of a run that are failures of its ego, and whether a careful driver avoids them."""
+"""The failures of a benchmark: whether a careful driver avoids them, and how to reproduce them."""
 
 import importlib
 import io

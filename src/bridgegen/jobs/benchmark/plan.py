@@ -1,4 +1,4 @@
-"""The grid of a benchmark: scenarios × drivers × perception × seeds, and what is applicable."""
+"""The grid of a benchmark: scenarios × drivers × perception × seeds, and how long it will take."""
 
 import re
 import shlex

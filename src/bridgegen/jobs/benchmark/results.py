@@ -1,4 +1,4 @@
-"""What the runs of a benchmark found: by driver and scenario, and by driver."""
+"""What the runs of a benchmark found, by driver and scenario; and as CSV."""
 
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
@@ -296,7 +296,7 @@ def read_gaps(plan: Plan, failures: Mapping[Cell, str]) -> dict[Cell, str]:
     return gaps
 
 
-# --- A benchmark's results as CSV: the drivers, their outcomes by scenario, and every failure mode
+# --- Results as CSV: drivers, outcomes by scenario, failure modes ---
 
 
 DRIVERS_FILE, OUTCOMES_FILE, MODES_FILE = "drivers.csv", "outcomes.csv", "modes.csv"

@@ -1,4 +1,4 @@
-"""One run of a comparison: started or resumed, and its result."""
+"""The runs of a comparison, on several cores: each started or resumed, and its result."""
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass

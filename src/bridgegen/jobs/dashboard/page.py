@@ -1,4 +1,4 @@
-"""The dashboard's page: one file without scripts, which needs no network."""
+"""The dashboard's page: failure modes, requirements, trends; one file without scripts."""
 
 from importlib.metadata import version
 from urllib.parse import quote

@@ -1,4 +1,4 @@
-"""The page's part that lists all results: runs, suites, maps, comparisons; and what is damaged."""
+"""The dashboard's lists of results, and its part on the operational design domain."""
 
 from collections.abc import Sequence
 from itertools import groupby

@@ -1,4 +1,4 @@
-"""What a run and an entry of a suite have in common: a scenario, driven by one driver."""
+"""Results of a project: a scenario driven by one driver; what both are called."""
 
 import re
 from collections.abc import Iterable, Mapping

@@ -148,7 +148,7 @@ def _seen(store: Store, settings: Settings, sceneries: Sceneries) -> Seen | None
     return found
 
 
-# --- A suite's folder → a result for each of its entries and egos, and the difference of two egos -
+# --- A suite's folder → a result for each of its entries and egos ---
 
 
 _NO_CONFLICT = ("", "none")
@@ -227,7 +227,7 @@ def _result(
 ) -> Result:
     scenario = scenario_name(one.scenario, project, one.distribution)
     driver = driver_of(one.ego or one.driver or "the scenario's own", project, made)
-    judged = tuple(_judged_of_suites(one))
+    judged = tuple(_judged_entry(one))
     return Result(
         "suite",
         source,
@@ -240,17 +240,17 @@ def _result(
         one.count("not run"),
         finished=not one.problem,
         failures=(
-            *_failures_of_suites(one, scenario, driver.name),
+            *_failures_of_entry(one, scenario, driver.name),
             *violations(judged, scenario, driver.name),
         ),
         judged=judged,
         unjudged=one.verdict == "not judged",
-        seen=_seen_of_suites(one, _scenery(project, one, sceneries)),
+        seen=_seen_in_entry(one, _scenery(project, one, sceneries)),
         entry=one.entry,
     )
 
 
-def _judged_of_suites(one: EntryResult) -> Iterator[Judged]:
+def _judged_entry(one: EntryResult) -> Iterator[Judged]:
     for i, given in enumerate(one.criteria):
         criterion = read_criterion(given)
         margins = [
@@ -269,7 +269,7 @@ def _judged_of_suites(one: EntryResult) -> Iterator[Judged]:
         )
 
 
-def _failures_of_suites(one: EntryResult, scenario: str, driver: str) -> Iterator[Failure]:
+def _failures_of_entry(one: EntryResult, scenario: str, driver: str) -> Iterator[Failure]:
     """Yield the critical variations, grouped by what happens."""
     held: dict[ModeKey, list[RowResult]] = {}
     for row in one.rows:
@@ -303,7 +303,7 @@ def _scenery(project: Path, one: EntryResult, sceneries: Sceneries) -> Scenery |
     return sceneries.of((paths[0], paths[1], "", False))
 
 
-def _seen_of_suites(one: EntryResult, scenery: Scenery | None) -> Seen | None:
+def _seen_in_entry(one: EntryResult, scenery: Scenery | None) -> Seen | None:
     """Count an entry's variations."""
     if scenery is None or one.problem:
         return None
@@ -318,7 +318,7 @@ def _seen_of_suites(one: EntryResult, scenery: Scenery | None) -> Seen | None:
     return scenery.seen(columns, len(rows))
 
 
-# --- The folders of a project that test no driver for failures: preventability maps, comparisons --
+# --- Folders that test no driver: preventability maps, comparisons ---
 
 
 Count = Annotated[int, Field(ge=0, le=10**12)]

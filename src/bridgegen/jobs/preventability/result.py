@@ -1,4 +1,4 @@
-"""A finished map, its figures, and the files that hold it."""
+"""A map, finished or not: its figures, and the files and folder that hold it."""
 
 import io
 import json

@@ -1,4 +1,4 @@
-"""The random experiment that an estimator asks: rows of an exposure, driven by the ego's driver."""
+"""The random experiment that an estimator asks, and the estimators by name."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""What becomes of rows: how close each comes to harm, in numbers that an estimator sums up."""
+"""Outcomes of rows for estimators: how close to harm, which event, how few data weigh them."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -160,7 +160,7 @@ def require(name: str) -> Event:
     return EVENTS[name]
 
 
-# --- How much few data leave open: the same outcomes, weighted for exposures of resampled events --
+# --- The uncertainty that few data leave: outcomes weighted for resampled events ---
 
 
 FEWEST = 10.0

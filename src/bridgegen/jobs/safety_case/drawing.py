@@ -1,4 +1,4 @@
-"""A layout as SVG, in the shapes of the notation; colours are the page's."""
+"""An argument drawn: where its elements are, and as SVG in the shapes of the notation."""
 
 import textwrap
 from collections.abc import Sequence

@@ -1,4 +1,4 @@
-"""``bridgegen safety-case``: writes the case, its page, and the script that recomputes it."""
+"""The safety case of runs: made, and written with its page and the script that recomputes it."""
 
 import os
 from collections.abc import Mapping, Sequence

@@ -1,4 +1,4 @@
-"""What a finished run holds, as a safety case needs it; one clear error where it does not."""
+"""What a finished run holds, as a safety case needs it; and the files that prove it."""
 
 import hashlib
 import os

@@ -1,4 +1,4 @@
-"""The rows that a search has asked for: 24 to 32 bytes of memory for each."""
+"""The rows that a search has asked for, and the results of all evaluated ones."""
 
 from array import array
 from hashlib import blake2b

@@ -1,4 +1,4 @@
-"""What can be searched: a scenario of the catalogue, of a YAML file, or of an OpenSCENARIO file."""
+"""What can be searched, and the objective as options change it."""
 
 from dataclasses import replace
 from pathlib import Path

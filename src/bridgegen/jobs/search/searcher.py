@@ -1,4 +1,4 @@
-"""What searches in a campaign: the run's algorithm, by itself or in a screen."""
+"""What searches in a campaign: the algorithm, alone or in a screen; and what ends it early."""
 
 import shlex
 from collections.abc import Callable

@@ -1,4 +1,4 @@
-"""Two egos on the same rows: what is fixed, what is broken, and how sure that is."""
+"""Two egos on the same rows: what is fixed or broken; and searches for where one is worse."""
 
 import hashlib
 import json

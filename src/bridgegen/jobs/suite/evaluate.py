@@ -1,4 +1,4 @@
-"""An entry of a suite → its pipeline → the results of its rows."""
+"""An entry of a suite → its pipeline → the results of its rows, with a digest of its driver."""
 
 import hashlib
 from collections.abc import Mapping, Sequence

@@ -1,4 +1,4 @@
-"""Failures for a suite that grows: in runs, in results of suites, and in scenario files."""
+"""Failures for a suite that grows: where they are found, and in which way each fails."""
 
 import shlex
 from collections.abc import Callable, Iterator, Mapping, Sequence

@@ -1,4 +1,4 @@
-"""A suite's results in words: what each ego passes, and where they differ."""
+"""A suite's results in words, and in points of Euro NCAP's protocol."""
 
 from collections import Counter
 from collections.abc import Iterable, Sequence

@@ -1,4 +1,4 @@
-"""A map that was made elsewhere: its bytes as they came, its model, and the chosen place."""
+"""A map that was made elsewhere: its bytes, model and place; and CARLA's maps by name."""
 
 import hashlib
 import os

@@ -21,7 +21,7 @@ from bridgegen.openx.opendrive.model import (
 )
 from bridgegen.openx.opendrive.plan_view import Spiral
 
-# --- Ids that occur twice or out of turn, and links to what is not there: what no reader gets over
+# --- Ids that occur twice or out of turn, and links to what does not exist ---
 
 
 Owner = Road | Junction | Connection
@@ -320,7 +320,7 @@ def _junction(model: OpenDrive, junction: Junction) -> Iterator[str]:
     served: set[tuple[str, int]] = set()
     entered: set[str] = set()
     for connection in junction.connections:
-        yield from _connection_validate(model, junction, connection)
+        yield from _connection_problems(model, junction, connection)
         entered.add(connection.entered_road)
         for each in connection.lane_links:
             served.add((connection.incoming_road, each.from_lane))
@@ -340,7 +340,7 @@ def _junction(model: OpenDrive, junction: Junction) -> Iterator[str]:
                     yield f"junction {junction.id}: no way on for lane {lane.id} of road {road.id}"
 
 
-def _connection_validate(
+def _connection_problems(
     model: OpenDrive, junction: Junction, connection: Connection
 ) -> Iterator[str]:
     name = f"junction {junction.id}, connection {connection.id}"

@@ -1,4 +1,4 @@
-"""A participant's body as OpenSCENARIO says it."""
+"""A participant's body as OpenSCENARIO says it, and which kind of participant a body is."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 
@@ -137,7 +137,7 @@ def kind_of(body: Element, resolve: Resolve = _literal) -> ParticipantKind | Non
     The property `KIND` decides; then a vehicle's role; then its category, of what stands at road
     works its name.
     """
-    stated = _stated_participant_kinds(body, resolve)
+    stated = _stated_kind(body, resolve)
     if stated is not None:
         return stated
     if isinstance(body, osc.Vehicle):
@@ -156,7 +156,7 @@ def kind_of(body: Element, resolve: Resolve = _literal) -> ParticipantKind | Non
 
 def object_class_of(body: Element) -> ObjectClass:
     """Return what sensors and drivers take a body for."""
-    if isinstance(body, osc.Vehicle) and _stated_participant_kinds(body, _literal) is None:
+    if isinstance(body, osc.Vehicle) and _stated_kind(body, _literal) is None:
         category = _literal(body.vehicle_category)
         alike = (
             one.seen_as
@@ -173,7 +173,7 @@ def _written_as(body: Element) -> Iterator[ParticipantKind]:
     return (one for one in PARTICIPANTS.values() if one.written.element == tag)
 
 
-def _stated_participant_kinds(body: Element, resolve: Resolve) -> ParticipantKind | None:
+def _stated_kind(body: Element, resolve: Resolve) -> ParticipantKind | None:
     properties = getattr(body, "properties", None)
     said = None if properties is None else properties.get(KIND)
     name = None if said is None else resolve(said)

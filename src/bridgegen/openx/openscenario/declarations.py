@@ -1,4 +1,4 @@
-"""What a file declares: its header, parameters, variables, monitors and properties."""
+"""What a file declares: header, parameters, variables, monitors, properties, catalogues."""
 
 from dataclasses import dataclass
 from typing import Annotated

@@ -1,4 +1,4 @@
-"""Entities: vehicles with their boxes and limits, and their drivers."""
+"""Entities: vehicles with their boxes and limits, their drivers and controllers."""
 
 from dataclasses import dataclass, field
 from typing import Annotated
@@ -247,7 +247,6 @@ class TriggeringEntities(Element):
 
 
 _SHARE = Range(0.0, 1.0)
-_NOT_NEGATIVE_CONTROLLERS = Range(0.0)
 
 
 @dataclass(frozen=True)
@@ -282,7 +281,7 @@ class OverrideThrottleAction(Element):
 
     active: Boolean
     value: Annotated[Double, _SHARE]
-    max_rate: Annotated[Double | None, _NOT_NEGATIVE_CONTROLLERS] = None
+    max_rate: Annotated[Double | None, _NOT_NEGATIVE] = None
 
 
 @dataclass(frozen=True)
@@ -290,15 +289,15 @@ class BrakePercent(Element):
     """A brake's position, 0 to 1, and how fast it gets there [1/s]."""
 
     value: Annotated[Double, _SHARE]
-    max_rate: Annotated[Double | None, _NOT_NEGATIVE_CONTROLLERS] = None
+    max_rate: Annotated[Double | None, _NOT_NEGATIVE] = None
 
 
 @dataclass(frozen=True)
 class BrakeForce(Element):
     """A brake's force [N], and how fast it gets there [N/s]."""
 
-    value: Annotated[Double, _NOT_NEGATIVE_CONTROLLERS]
-    max_rate: Annotated[Double | None, _NOT_NEGATIVE_CONTROLLERS] = None
+    value: Annotated[Double, _NOT_NEGATIVE]
+    max_rate: Annotated[Double | None, _NOT_NEGATIVE] = None
 
 
 @dataclass(frozen=True)
@@ -316,7 +315,7 @@ class OverrideClutchAction(Element):
 
     active: Boolean
     value: Annotated[Double, _SHARE]
-    max_rate: Annotated[Double | None, _NOT_NEGATIVE_CONTROLLERS] = None
+    max_rate: Annotated[Double | None, _NOT_NEGATIVE] = None
 
 
 @dataclass(frozen=True)
@@ -325,8 +324,8 @@ class OverrideSteeringWheelAction(Element):
 
     active: Boolean
     value: Double
-    max_rate: Annotated[Double | None, _NOT_NEGATIVE_CONTROLLERS] = None
-    max_torque: Annotated[Double | None, _NOT_NEGATIVE_CONTROLLERS] = None
+    max_rate: Annotated[Double | None, _NOT_NEGATIVE] = None
+    max_torque: Annotated[Double | None, _NOT_NEGATIVE] = None
 
 
 @dataclass(frozen=True)

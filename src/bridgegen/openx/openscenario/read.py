@@ -123,7 +123,7 @@ def verbatim(
     return scenario
 
 
-# --- Single elements of OpenSCENARIO as text: what the ontology keeps in OpenSCENARIO's own words -
+# --- Single elements of OpenSCENARIO as text, as the ontology keeps them ---
 
 
 def fragment_of(element: Element) -> str:

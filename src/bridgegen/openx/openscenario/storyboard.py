@@ -1,4 +1,4 @@
-"""The storyboard and the whole file."""
+"""The storyboard, the road network, and the whole file."""
 
 from dataclasses import dataclass, field
 from typing import Annotated
@@ -28,7 +28,7 @@ from bridgegen.openx.openscenario.global_actions import GlobalAction
 from bridgegen.openx.openscenario.positions import Position
 from bridgegen.openx.openscenario.values import Double, ParameterRef, String, UnsignedInt
 
-# --- The road network: the map, what to draw it with, the part in use, and how its lights change --
+# --- The road network: the map, the part in use, and how its lights change ---
 
 
 @dataclass(frozen=True)

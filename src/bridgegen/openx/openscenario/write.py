@@ -1,4 +1,4 @@
-"""From the model to an OpenSCENARIO file, driven by the model's declaration."""
+"""From the model to an OpenSCENARIO file, in this version of the standard or another."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -83,7 +83,7 @@ def fill(node: etree._Element, tag: str, element: Element, *, bare: bool) -> Non
             fill(etree.SubElement(node, each), each, one, bare=bare)
 
 
-# --- A scenario in another version of the standard: what was renamed, and what was required when --
+# --- Other versions of the standard: what was renamed, and what was required when ---
 # Source: the XSDs of ASAM OpenSCENARIO XML 1.0 to 1.3. Of all that differs between 1.2 and 1.3,
 # this # touches what our model can hold: an orientation without a type is absolute up to 1.2 and
 # relative # from 1.3 on; 1.3 does without an act's start trigger, the storyboard's stop trigger,

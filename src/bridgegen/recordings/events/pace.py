@@ -1,4 +1,4 @@
-"""When somebody changes pace: a ramp of the speed."""
+"""When somebody changes pace or sets off: ramps of the speed."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""Events as tables: all with all quantities, and per scenario a row of parameters per event."""
+"""Events as tables, and in the part of the page that counts them."""
 
 import csv
 import io

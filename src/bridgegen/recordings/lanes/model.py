@@ -1,4 +1,4 @@
-"""The lanes of a recording, whatever they were made of."""
+"""The lanes of a recording, whatever they were made of, and the chains that they form."""
 
 import math
 from collections import Counter, defaultdict, deque

@@ -1,4 +1,4 @@
-"""Directions and velocities from positions, and headings from velocities."""
+"""Directions, velocities and headings from positions; and the usual body of each kind."""
 
 import itertools
 from typing import Literal

@@ -1,4 +1,4 @@
-"""What cleaning found and did: one finding per rule, so that nothing is dropped silently."""
+"""What cleaning found and did, and whether a recording is in the units of its format."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field

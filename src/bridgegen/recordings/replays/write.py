@@ -1,4 +1,4 @@
-"""Recorded events as files, each proven to replay what was recorded."""
+"""Recorded events as files, each proven to replay what was recorded; and as moving pictures."""
 
 import math
 from collections.abc import Iterator

@@ -1,4 +1,4 @@
-"""The files of mined scenarios, in a folder of their own."""
+"""Mined scenarios as files, as individuals of the ontology, and on the page."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict

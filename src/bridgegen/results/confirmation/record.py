@@ -1,4 +1,4 @@
-"""The record of a confirmation in a run's folder: JSON, from which it can be resumed."""
+"""The record of a confirmation: its schema, and JSON from which it can be resumed."""
 
 import math
 from collections.abc import Iterable

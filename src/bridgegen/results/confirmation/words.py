@@ -1,4 +1,4 @@
-"""Where and why two rollouts diverge, in sentences."""
+"""A confirmation in sentences: its result; where and why two rollouts diverge."""
 
 import math
 from collections.abc import Sequence

@@ -1,4 +1,4 @@
-"""The table of evaluations: its columns, and its rows as arrays."""
+"""The table of evaluations: its columns, its rows as arrays, and checks before any is read."""
 
 import re
 import sqlite3

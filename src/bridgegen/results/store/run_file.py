@@ -1,4 +1,4 @@
-"""The file of a run: its creation, and the checks of its content."""
+"""The file of a run and its folder: made, claimed, checked."""
 
 import json
 import os
@@ -215,7 +215,7 @@ def _check_rows(connection: sqlite3.Connection, n_var: int, n_columns: int) -> N
         )
 
 
-# --- A folder that belongs to one job: made for it, or of an earlier call with the same settings --
+# --- A folder that belongs to one job: new, or of an earlier call with the same settings ---
 
 
 def claim(

@@ -1,4 +1,4 @@
-"""SQLite for the store: connections, a lock that ends with its process, clear errors."""
+"""SQLite for the store: connections, a lock, clear errors; and the latest state of a search."""
 
 import os
 import sqlite3

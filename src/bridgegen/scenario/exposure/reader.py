@@ -1,4 +1,4 @@
-"""From an exposure's block, in a scenario file or a file of its own, to the exposure."""
+"""Exposures as files: which one a command takes, read, and written."""
 
 import json
 from collections.abc import Mapping
@@ -231,7 +231,7 @@ UNIFORM = "uniform"
 ROWS = 200_000
 """Of an exposure, always the same ones, that show how likely parts of a search space are."""
 
-_EVENLY_CHOSEN = b"source: Uniform over the ranges, which no road is like.\nothers: uniform\n"
+_UNIFORM_BLOCK = b"source: Uniform over the ranges, which no road is like.\nothers: uniform\n"
 
 
 def chosen_exposure(
@@ -257,7 +257,7 @@ def chosen_exposure(
             )
         return given
     if given == UNIFORM:
-        return build_exposure(read_plain_yaml(_EVENLY_CHOSEN, UNIFORM), scenario, None)
+        return build_exposure(read_plain_yaml(_UNIFORM_BLOCK, UNIFORM), scenario, None)
     if given is not None:
         return read_exposure(given, scenario)
     return exposure_of(scenario) if isinstance(scenario, LogicalScenario) else None

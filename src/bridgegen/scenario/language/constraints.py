@@ -1,4 +1,4 @@
-"""What may vary and what limits it: the graph of constraints, in an order that can be computed."""
+"""What limits parameters: the graph of constraints, and whether a row keeps all of them."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass

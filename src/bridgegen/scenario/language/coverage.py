@@ -21,7 +21,7 @@ from bridgegen.base.arrays import Bool, Float, Int, Numbers, as_float
 from bridgegen.base.errors import InputError
 from bridgegen.scenario.language.space import SearchSpace
 
-# --- The bins that rows, and a random sample of the search space, are in; and how many are where --
+# --- Bins of rows, and of a random sample of the search space ---
 
 
 # Rows decoded at a time, and cells of a table that marks combinations: both bound the memory.

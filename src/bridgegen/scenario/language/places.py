@@ -1,4 +1,4 @@
-"""Places of a scenario file: on which leg and lane, and whether there is such a lane."""
+"""Numbers and places of a scenario file: checked, with the parameters that they name."""
 
 import math
 from collections.abc import Mapping, Set

@@ -16,7 +16,7 @@ from bridgegen.scenario.language.parameters import Derived, Parameter, at, neare
 from bridgegen.scenario.language.plain_yaml import Document, Path, entries
 from bridgegen.scenario.language.shape import ID, Number, NumberOrName, ShapedSection, Text, section
 
-# --- Test matrices of a scenario file: values of its parameters, of which all combinations are test
+# --- Test matrices: values of parameters, of which all combinations are tested ---
 # A protocol tests certain speeds and overlaps, a search what lies between them too. So a matrix is
 # no # range: it names values within the ranges, by editions of the protocol.
 
@@ -197,7 +197,7 @@ def _value(
     return value
 
 
-# --- Clauses: what a regulation or protocol requires of the ego in a scenario, and what decides it
+# --- Clauses: what a regulation requires of the ego, and what decides it ---
 
 
 Collisions = Literal["any", "preventable"]

@@ -1,4 +1,4 @@
-"""Rules of layers 3 and 4 in every scenario: where participants may be, and how fast.
+"""Rules of layers 1 to 4 in every scenario: where things and participants may be, how fast.
 
 Each is one query per scenario, however many participants it has.
 """
@@ -352,8 +352,6 @@ FARTHEST_BESIDE = 5.0
 """How far from the road's edge what stands beside it may be [m], to be still seen as this road's;
 ours (signs stand 0.5 to 1.5 m from it, RSA 21)."""
 
-_PAPER_PLACEMENT = "BridgeGen paper, Section III-B"
-_SLACK_PLACEMENT = literal(TOLERANCE)
 _OURS = "FILTER NOT EXISTS { ?value bg:has_s ?s }"
 """Places on an imported map are left to it."""
 

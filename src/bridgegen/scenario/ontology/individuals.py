@@ -31,7 +31,7 @@ from bridgegen.scenario.ontology.templates import crossroads, site_of
 if TYPE_CHECKING:
     from bridgegen.scenario.language.scenario import LogicalScenario
 
-# --- A user's own additions to a scenario: functions that a scenario file names under ``effects`` -
+# --- Functions of a user's own that a scenario file names under ``effects`` ---
 # Such a function is called with the `Builder` of each concrete scenario and the values of all its
 # parameters, after the scenario's own individuals are there, and adds its own: with
 # ``builder.quantity(node, property, "my_parameter")`` they carry a parameter's value, and so do the

@@ -1,4 +1,4 @@
-"""The protocol of search algorithms: ask for rows of the unit cube, tell their objectives."""
+"""The protocol of search algorithms: rows of the unit cube out, their objectives in."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass

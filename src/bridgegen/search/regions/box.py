@@ -1,4 +1,4 @@
-"""Boxes of the search space with rounded edges."""
+"""Boxes of the search space: with rounded edges, in words, and the evidence of their share."""
 
 import math
 from collections.abc import Sequence

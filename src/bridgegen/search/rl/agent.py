@@ -1,4 +1,4 @@
-"""Base of PPO, DDPG and DQN: batches of episodes, each a step of every environment."""
+"""Base of PPO, DDPG and DQN: batches of episodes; and the state of a learner as arrays."""
 
 import json
 from abc import ABC, abstractmethod

@@ -1,4 +1,4 @@
-"""How far two simulators agree on the rows that both have evaluated."""
+"""What the screen and the simulator say of the same rows: agreement, and what to evaluate next."""
 
 import json
 from collections.abc import Mapping, Sequence
@@ -225,7 +225,7 @@ class Compared:
         return self.by_screen.sum(axis=1), self.F.sum(axis=1)
 
 
-# --- What a search in the screen has found, and the choice of what the run's simulator evaluates --
+# --- What the screen has found, and the choice of what the run's simulator evaluates ---
 
 
 ROOM = 8192

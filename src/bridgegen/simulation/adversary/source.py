@@ -1,4 +1,4 @@
-"""Where the concrete scenarios of an adversary come from."""
+"""Where an adversary's participant is, and the concrete scenarios that follow."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace

@@ -1,4 +1,4 @@
-"""The event found without a score that leads to it, by points spread over all of the space."""
+"""Exploration: events that no score leads to, their design point, events at single points."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -129,7 +129,7 @@ AGAIN = 16
 """Maximum number of points that are tested again."""
 ROUGH = 0.02
 """The share of single points beyond which an estimate is in doubt."""
-_STREAM_SINGLE_POINTS = 3  # of random numbers
+_STREAM_OF_COPIES = 3  # of random numbers
 
 
 @dataclass(frozen=True)
@@ -161,7 +161,7 @@ class SinglePoints:
         tried = _tried(aim) if len(Z) else 0
         if tried < 1:
             return cls()
-        random = block_of(seed, 0, _STREAM_SINGLE_POINTS)
+        random = block_of(seed, 0, _STREAM_OF_COPIES)
         points = Z[random.choice(len(Z), tried, p=weights / weights.sum())]
 
         def alone(points: Float, distance: float) -> tuple[Bool, int, int]:

@@ -1,4 +1,4 @@
-"""The legs of a road network that is to be built: lanes, strips, what stands on them."""
+"""The legs of a road network that is to be built, and smooth curves between them."""
 
 import math
 from collections.abc import Iterator

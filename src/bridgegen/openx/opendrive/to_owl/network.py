@@ -254,7 +254,7 @@ def _speed_limit(road: Road) -> float | None:
     return speeds[0] if speeds and speeds[0] else None
 
 
-# --- Contents of a map that its individuals lack: they stay in the map's own file, which they name
+# --- Contents of a map that its individuals lack: they stay in the map's own file ---
 
 
 def losses(model: OpenDrive) -> Iterator[str]:

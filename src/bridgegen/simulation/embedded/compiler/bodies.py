@@ -1,4 +1,4 @@
-"""The bodies of entities: how large they are, what they can do, and what they are."""
+"""The bodies of entities: how large they are, what they can do, who tows whom."""
 
 import math
 

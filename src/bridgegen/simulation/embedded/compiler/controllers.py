@@ -187,7 +187,7 @@ def _names_driver(one: osc.Controller) -> bool:
     return one.properties is not None and one.properties.get(DRIVER) is not None
 
 
-# --- Pedals, wheel and gear that a storyboard holds, as rows of integers; see ``_pedal_kernels`` --
+# --- Pedals, wheel and gear that a storyboard holds; see ``_pedal_kernels`` ---
 
 
 AT_ONCE = 1e9

@@ -13,7 +13,7 @@ from bridgegen.openx.openscenario import model as osc
 from bridgegen.simulation.embedded.compiler.tables import Tables
 from bridgegen.simulation.embedded.program import Bend
 
-# --- Clothoids as lines to follow: curvature that changes evenly from one end of an arc to the othe
+# --- Clothoids: curvature that changes evenly along an arc ---
 # Source: ASAM OpenSCENARIO XML 1.3, Clothoid and ClothoidSpline.
 
 
