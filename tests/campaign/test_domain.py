@@ -4,10 +4,11 @@ import numpy as np
 import pytest
 
 from bridgegen.drivers.planners import DOMAINS
+from bridgegen.engine.domain import in_words, needed, outside
 from bridgegen.engine.options import PipelineOptions
 from bridgegen.engine.pipeline import Pipeline
 from bridgegen.engine.workers import Threads
-from bridgegen.jobs.search.domain import domain_of, in_words, needed, outside
+from bridgegen.jobs.benchmark.benchmark import domain_of
 from bridgegen.openx.opendrive.from_owl.network import opendrive_from_owl
 from bridgegen.openx.source import build_static
 from bridgegen.scenario.language.reader import load

@@ -68,7 +68,9 @@ def test_an_empty_field_is_not_known(tmp_path):
     assert all(math.isnan(value) for value in read_columns(path, ("a", "b")).numbers["b"])
 
 
-@pytest.mark.parametrize("bad", ["1,x", "1,1e", "1,--2", "1,0x1F", "1,1_0", "1,inf", "1,1 2"])
+@pytest.mark.parametrize(
+    "bad", ["1,x", "1,1e", "1,--2", "1,0x1F", "1,1_0", "1,inf", "1,1 2", "1,7e999"]
+)
 def test_what_is_no_number_is_named_with_its_line(tmp_path, bad):
     path = tmp_path / "table.csv"
     path.write_text(f"a,b\n1,2\n{bad}\n")

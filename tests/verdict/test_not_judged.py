@@ -13,6 +13,7 @@ from bridgegen.assess.conflict.happening import Happening, Share
 from bridgegen.cli.verdict.of_difference import DifferenceCriteria
 from bridgegen.cli.verdict.of_run import PassFailCriteria
 from bridgegen.cli.verdict.of_suite import SuiteCriteria, figures_of
+from bridgegen.engine.simulate import simulate_file
 from bridgegen.jobs.suite.difference import difference
 from bridgegen.jobs.suite.entries import RESULTS
 from bridgegen.jobs.suite.index import Index, write_index
@@ -108,7 +109,7 @@ def test_results_of_earlier_versions_are_not_taken_for_passes(tmp_path):
     file = out / RESULTS
     header, line = file.read_text().splitlines()
     before = json.loads(line)
-    del before["not_happened"]
+    del before["not_happened"], before["outside"]
     file.write_text(f"{header}\n{json.dumps(before)}\n")
     assert read_suite(out).results[0].verdict == "passed"  # it is read as it was
     assert run_suite(DOUBLE_PARKED, samples=3, out=out, workers=1).results[0].unjudged
@@ -192,9 +193,24 @@ def test_a_kept_failure_passes_where_the_ego_stops_for_what_it_hit(tmp_path):
     assert [one.unjudged[:48] for one in alone.results] == [
         "the scenario did not happen: stuck in 1 of 1: st"
     ]
+    assert "stuck in 1 of 1: stands behind" in simulate_file(file).unjudged
     write_index(file.parent, Index({}), {"b": failure("b", files=[file.name], status="fixed")})
     kept = run_suite(file, out=tmp_path / "kept", workers=1)
     assert [one.verdict for one in kept.results] == ["passed"]
+
+
+def test_a_driver_outside_its_domain_passes_nowhere(tmp_path, cli):
+    """In a search, a suite and a simulation alike."""
+    words = ("lead-brakes", "--samples", 2, "--workers", 1, "--ego")
+    assert cli("suite", *words, "un-r157", "--out", tmp_path / "motorway")[0] == 0
+    town = ("crossroads-s1", *words[1:], "un-r157", "--out", tmp_path / "town")
+    code, out, _ = cli("suite", *town)
+    assert code == 3
+    assert "outside the domain of un-r157 (motorway): crossroads-s1 has junctions" in out
+    (file,) = [one for one in replay(tmp_path / "town", "crossroads-s1", 1).files
+               if one.suffix == ".xosc"]  # fmt: skip
+    assert "outside the domain of un-r157 (motorway)" in simulate_file(file).unjudged
+    assert simulate_file(file, ego="careful").unjudged == ""
 
 
 # ---- differences ----

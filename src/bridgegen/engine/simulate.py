@@ -14,11 +14,16 @@ from bridgegen.assess import metrics as measures
 from bridgegen.assess.conflict import quantities
 from bridgegen.assess.conflict.analysis import Conflicts, analyse
 from bridgegen.assess.conflict.findings import Findings, is_unsafe_start, why_unjudged
-from bridgegen.assess.conflict.harm import decisive
+from bridgegen.assess.conflict.happening import Happening, happened
+from bridgegen.assess.conflict.harm import NEAR_MISS, decisive
 from bridgegen.assess.conflict.plausibility import plausibility
 from bridgegen.assess.criteria import CriterionResult, Monitor
 from bridgegen.base.errors import FileFormatError, UnknownNameError
+from bridgegen.drivers import STORYBOARD
+from bridgegen.drivers.kinds import NAMES
+from bridgegen.engine.domain import against_ego, needed, why_outside
 from bridgegen.engine.options import checked
+from bridgegen.openx.opendrive.model import OpenDrive
 from bridgegen.openx.openscenario import validate as openscenario_validate
 from bridgegen.openx.openscenario.declarations import CAUSE
 from bridgegen.openx.openscenario.empty_triggers import NEVER, read_empty_triggers
@@ -28,6 +33,7 @@ from bridgegen.openx.openscenario.stated_criteria import stated_criteria
 from bridgegen.openx.prepared import prepared, roads_of
 from bridgegen.scenario.language.criteria import Criterion, joined
 from bridgegen.simulation.choice import EMBEDDED, SimulatorChoice
+from bridgegen.simulation.embedded.places.network import Network
 from bridgegen.simulation.embedded.simulator import EmbeddedSimulator
 from bridgegen.simulation.rollout import STATUS_MESSAGES, Incident, Rollout
 
@@ -50,7 +56,8 @@ class FileResult:
             it states none, or another driver than the file's drives.
         notes: what runs otherwise than a reader of the file may expect, a sentence each.
         unjudged: why the scenario says nothing of the ego: its traffic could not happen, or left no
-            time to act from the start on; "" if it does.
+            time to act from the start on; or the ego does not fail, and nothing happened, or its
+            driver is not made for the scenario. "" if it does.
     """
 
     driver: str
@@ -154,7 +161,9 @@ def simulate_file(
         joined(stated, criteria), embedded.program.names, held, embedded.duration,
         f"the driver '{embedded.driver}'",
     )  # fmt: skip
-    rollout = runs.run(runs.roads([roads]), np.zeros(1, dtype=np.int64), {})
+    network = embedded.roads([roads])
+    made = network if runs is embedded else runs.roads([roads])
+    rollout = runs.run(made, np.zeros(1, dtype=np.int64), {})
     values = quantities.evaluate(rollout, names)[0]
     conflicts = analyse(rollout)
     return FileResult(
@@ -168,15 +177,34 @@ def simulate_file(
         criteria=monitor.results(rollout, 0),
         cause=None if changes else _stated_cause(scenario),
         notes=(*warnings, *(f"{path}: {one}" for one in unknown), *embedded.program.notes),
-        unjudged=_unjudged(rollout, conflicts),
+        unjudged=_unjudged(rollout, conflicts, may_stop=bool(stated))
+        or _outside(embedded, roads, network, rollout, path.stem),
     )
 
 
-def _unjudged(rollout: Rollout, conflicts: Conflicts) -> str:
+def _unjudged(rollout: Rollout, conflicts: Conflicts, *, may_stop: bool) -> str:
+    """Return why a run says nothing of its ego, by the rules of a suite's entry; "" if it does."""
     findings = Findings.of(conflicts, plausibility(rollout).labels)
     _, harm = decisive(conflicts)
     unsafe = bool(is_unsafe_start(findings, harm)[0])
-    return why_unjudged(str(findings.implausible[0]), unsafe)
+    if why := why_unjudged(str(findings.implausible[0]), unsafe):
+        return why
+    happening = Happening.of(happened(rollout, may_stop=may_stop))
+    if harm[0] >= NEAR_MISS or happening.happened:
+        return ""
+    return "the scenario did not happen: " + "; ".join(happening.reasons)
+
+
+def _outside(
+    embedded: EmbeddedSimulator, roads: OpenDrive, network: Network, rollout: Rollout, name: str
+) -> str:
+    """Return a sentence if the ego's driver is not made for the scenario; "" if it is."""
+    if embedded.program.driver == STORYBOARD or rollout.status[0]:
+        return ""
+    headings = rollout.h[0, :, 0]
+    kinds = [NAMES[kind] for kind in rollout.kinds[1:].tolist()]
+    needs = needed(roads, network.roads_ahead(0), headings, kinds)
+    return why_outside(embedded.program.driver, name, needs, bool(against_ego(headings).any()))
 
 
 def _stated_cause(scenario: OpenScenario) -> str | None:

@@ -5,6 +5,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from bridgegen.base.errors import InputError, Interrupted
+from bridgegen.engine.domain import needed_by
+from bridgegen.engine.options import PipelineOptions
+from bridgegen.engine.pipeline import Pipeline
+from bridgegen.engine.workers import Threads
 from bridgegen.engine.workers.processes import cores
 from bridgegen.jobs.benchmark.page import write_page
 from bridgegen.jobs.benchmark.plan import (
@@ -46,7 +50,7 @@ from bridgegen.jobs.benchmark.work import (
 )
 from bridgegen.jobs.compare.plan import claim
 from bridgegen.jobs.compare.runs import RunCallbacks, run_all
-from bridgegen.jobs.search.domain import domain_of
+from bridgegen.jobs.search.scenarios import load
 from bridgegen.results.store.sqlite import Lock
 from bridgegen.search import algorithms as toolkit
 from bridgegen.search.algorithms.algorithm import Problem, resolve
@@ -247,3 +251,17 @@ class _Counting:
         """Count one more."""
         self._done += 1
         self._callbacks.tasks(self._number, self._done)
+
+
+def domain_of(scenario: str) -> frozenset[str]:
+    """Return what a logical scenario needs, see `bridgegen.engine.domain.needed_by`.
+
+    Args:
+        scenario: name of the catalogue, or path of a file.
+
+    Raises:
+        InputError: no such scenario, or an invalid one.
+    """
+    logical = load(scenario)
+    options = PipelineOptions(ego="route-follower")
+    return needed_by(Pipeline(logical, logical.space(), options, workers=Threads(1)))[0]

@@ -10,11 +10,11 @@ from pathlib import Path
 from bridgegen.base.disk import write_whole
 from bridgegen.drivers.drivers import available
 from bridgegen.drivers.planners import DOMAINS
+from bridgegen.engine.domain import in_words
 from bridgegen.jobs.benchmark.failures import CAREFUL
 from bridgegen.jobs.benchmark.plan import COLUMNS, PERFECT, SENSED, Entrant, Plan
 from bridgegen.jobs.benchmark.results import Outcome, Standing, Way
 from bridgegen.jobs.compare.words import number
-from bridgegen.jobs.search.domain import in_words
 
 
 def write_page(

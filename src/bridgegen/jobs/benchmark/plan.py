@@ -15,11 +15,11 @@ from bridgegen import drivers as egos
 from bridgegen.base.errors import BridgeGenError, InputError
 from bridgegen.drivers.drivers import DRIVERS, Driver
 from bridgegen.drivers.planners import DOMAINS, Planner, installed, missing, planners
+from bridgegen.engine.domain import in_words
 from bridgegen.engine.options import PipelineOptions, SearchOptions
 from bridgegen.engine.pipeline import Pipeline
 from bridgegen.engine.workers import Threads
 from bridgegen.jobs.compare.plan import MAX_SEEDS, RUNS
-from bridgegen.jobs.search.domain import in_words
 from bridgegen.jobs.search.scenarios import is_file, load
 from bridgegen.scenario.language.reader import names
 

@@ -14,11 +14,11 @@ import numpy as np
 from bridgegen.base.arrays import Int
 from bridgegen.base.errors import InputError, Interrupted, StorageError, WorkersError
 from bridgegen.drivers import STORYBOARD
+from bridgegen.engine.domain import outside
 from bridgegen.engine.options import SearchOptions, called_with, checked, range_problems
 from bridgegen.engine.pipeline import Pipeline
 from bridgegen.engine.workers import Choice, Workers, open_workers
 from bridgegen.jobs.search.critical import export_critical, most_critical
-from bridgegen.jobs.search.domain import outside
 from bridgegen.jobs.search.exportable import require_exportable
 from bridgegen.jobs.search.loop import Progress, Reason, run_loop
 from bridgegen.jobs.search.report import write_run_report

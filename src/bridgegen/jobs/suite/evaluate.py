@@ -14,6 +14,7 @@ from bridgegen.assess.conflict.happening import Happening
 from bridgegen.base.errors import BridgeGenError, InputError
 from bridgegen.drivers import is_remote
 from bridgegen.drivers.address import Command, address_of
+from bridgegen.engine.domain import outside
 from bridgegen.engine.evaluation import Evaluation
 from bridgegen.engine.options import CommonOptions
 from bridgegen.engine.pipeline import Pipeline
@@ -215,6 +216,7 @@ def _evaluated(job: Job, found: EntryResult) -> EntryResult:
         found_here = _rows(pipeline, some, evaluation, names)
         rows += judged(pipeline, job.simulator, some, found_here)
     happening = Happening.of(texts)
+    beyond = "" if job.entry.is_failure else outside(pipeline)
     if job.entry.is_failure:  # it is about that conflict: one that stops for it has met it
         happening = replace(happening, stuck=0)
     units = dict(zip(space.names, space.units, strict=True))
@@ -246,6 +248,7 @@ def _evaluated(job: Job, found: EntryResult) -> EntryResult:
             "rows": rows,
             "notes": notes,
             "not_happened": list(happening.reasons),
+            "outside": beyond,
         }
     )
 

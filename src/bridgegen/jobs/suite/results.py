@@ -158,6 +158,8 @@ class EntryResult(Strict):
         notes: what runs otherwise than one may expect.
         not_happened: why what the scenario is about does not happen in its rows, a clause each; see
             `bridgegen.assess.conflict.happening.Happening.reasons`. Empty if it does.
+        outside: a sentence if the ego's driver is not made for the scenario; see
+            `bridgegen.engine.domain.outside`.
     """
 
     entry: str
@@ -178,6 +180,7 @@ class EntryResult(Strict):
     problem: str = ""
     notes: list[str] = []
     not_happened: list[str] = []
+    outside: str = ""
 
     @property
     def verdict(self) -> Verdict:
@@ -191,9 +194,13 @@ class EntryResult(Strict):
 
     @property
     def verdicts(self) -> list[Verdict]:
-        """The verdict of each row; none passes where what the scenario is about did not happen."""
+        """The verdict of each row; none passes where nothing says anything of the ego."""
         found = [one.verdict for one in self.rows]
-        return ["not judged" if one == "passed" and self.not_happened else one for one in found]
+        return ["not judged" if one == "passed" and self._says_nothing else one for one in found]
+
+    @property
+    def _says_nothing(self) -> bool:
+        return bool(self.not_happened or self.outside)
 
     @property
     def unjudged(self) -> str:
@@ -206,7 +213,7 @@ class EntryResult(Strict):
             why = ", ".join(f"{rows} × {why}" for why, rows in reasons.most_common())
             return f"{few}: {why}" if n > 1 else next(iter(reasons))
         happened = "; ".join(self.not_happened)
-        return f"the scenario did not happen: {happened}" if happened else ""
+        return f"the scenario did not happen: {happened}" if happened else self.outside
 
     def count(self, verdict: Verdict) -> int:
         """Return the number of rows with a verdict; an entry that cannot run counts as one."""
@@ -229,12 +236,12 @@ class EntryResult(Strict):
         """Return what each variation means for a clause, by its number.
 
         An entry that cannot run counts as one. None passes where what the scenario is about did not
-        happen.
+        happen, or the ego's driver is not made for it.
         """
         if not self.rows:
             return NOT_RUN
         found = "".join(row.clauses[clause : clause + 1] or NOT_RUN for row in self.rows)
-        if not self.not_happened:
+        if not self._says_nothing:
             return found
         return found.replace(PASSED, NOT_APPLICABLE).replace(EXCUSED, NOT_APPLICABLE)
 

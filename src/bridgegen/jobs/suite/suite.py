@@ -333,7 +333,8 @@ def _done(
     for one in results:
         job = wanted.get((one.entry, one.ego))
         # Earlier versions did not record what happened: such an entry is run again.
-        if job is not None and job.is_of(one) and "not_happened" in one.model_fields_set:
+        is_whole = {"not_happened", "outside"} <= one.model_fields_set
+        if job is not None and job.is_of(one) and is_whole:
             found[one.entry, one.ego] = one
     if torn or len(found) < len(results):  # what has changed is run again, and said once
         lines = [header.model_dump_json(), *(one.model_dump_json() for one in found.values())]

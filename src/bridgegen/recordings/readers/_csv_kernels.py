@@ -1,5 +1,7 @@
 """Compiled reading of comma-separated numbers; public wrapper: ``columns.read_columns``."""
 
+import math
+
 from bridgegen.base.arrays import Float, Int
 from bridgegen.base.compiled import inlined_kernel, kernel
 
@@ -9,7 +11,7 @@ FEW_FIELDS, MANY_FIELDS, NOT_A_NUMBER, BAD_QUOTE = 1, 2, 3, 4
 
 @inlined_kernel
 def number(data: Int, begin: int, end: int) -> tuple[float, bool]:
-    """Return the number in a field, and whether it is one; NaN for an empty field.
+    """Return the number in a field, and whether it is a finite one; NaN for an empty field.
 
     Correctly rounded up to 15 digits and 10 to the ±22, within 2 units in the last place beyond.
     """
@@ -77,7 +79,7 @@ def number(data: Int, begin: int, end: int) -> tuple[float, bool]:
     for _ in range(abs(shift)):
         power *= 10.0
     value = value * power if shift >= 0 else value / power
-    return (-value if negative else value), True
+    return (-value if negative else value), not math.isinf(value)
 
 
 @kernel

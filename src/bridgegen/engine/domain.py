@@ -2,18 +2,19 @@
 
 import math
 from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from bridgegen.base.arrays import Bool, Float
+from bridgegen.drivers import Driver
 from bridgegen.drivers.planners import DOMAINS
-from bridgegen.engine.options import PipelineOptions
-from bridgegen.engine.pipeline import Pipeline
-from bridgegen.engine.workers import Threads
-from bridgegen.jobs.search.scenarios import load
 from bridgegen.openx.opendrive.geometry import reference_pose
 from bridgegen.openx.opendrive.model import OpenDrive, Road
 from bridgegen.scenario.participants import PARTICIPANTS
+
+if TYPE_CHECKING:
+    from bridgegen.engine.pipeline import Pipeline
 
 CROSSES = math.radians(45.0)
 """Ways through a junction whose directions differ by more cross or turn; those of a merge do
@@ -26,48 +27,43 @@ VULNERABLE = frozenset({"pedestrian", "bicycle"})
 """Conduct of vulnerable participants."""
 
 
-def domain_of(scenario: str) -> frozenset[str]:
-    """Return which of `DOMAINS` a logical scenario needs, at its nominal values.
-
-    One of "junction" (the ego's route leads through one in which ways cross or turn), "road" (there
-    are opposite lanes) and "motorway"; "oncoming" if on the latter somebody drives against the
-    ego's direction; and "vulnerable" if a pedestrian or a cyclist takes part.
-
-    Args:
-        scenario: name of the catalogue, or path of a file.
-
-    Raises:
-        InputError: no such scenario, or an invalid one.
-    """
-    logical = load(scenario)
-    options = PipelineOptions(ego="route-follower")
-    return _needed_by(Pipeline(logical, logical.space(), options, workers=Threads(1)))[0]
-
-
-def outside(pipeline: Pipeline) -> str:
+def outside(pipeline: "Pipeline") -> str:
     """Return a sentence if the ego's driver says that it is not made for the scenario; else "".
 
     A driver for motorways may also follow a road on which there are lanes, but at first nobody,
     the other way.
     """
-    domain = pipeline.driver.domain
-    if not domain:
+    if not pipeline.driver.domain:
         return ""
-    needs, is_met = _needed_by(pipeline)
-    odd = needs - domain
-    if "motorway" in domain and not is_met:
+    return why_outside(pipeline.driver, pipeline.scenario.name, *needed_by(pipeline))
+
+
+def why_outside(driver: Driver, name: str, needs: frozenset[str], is_met: bool) -> str:
+    """Return a sentence if a driver says that it is not made for a scenario; else "".
+
+    Args:
+        driver: of the ego.
+        name: of the scenario.
+        needs: what it needs, see `needed`.
+        is_met: whether another starts against the ego's direction.
+    """
+    odd = needs - driver.domain
+    if "motorway" in driver.domain and not is_met:
         odd -= {"road"}
-    if not odd:
+    if not (driver.domain and odd):
         return ""
     there = " and ".join(what for word, what in DOMAINS.items() if word in odd)
-    return (
-        f"outside the domain of {pipeline.driver.name} ({in_words(domain)}): "
-        f"{pipeline.scenario.name} has {there}"
-    )
+    return f"outside the domain of {driver.name} ({in_words(driver.domain)}): {name} has {there}"
 
 
-def _needed_by(pipeline: Pipeline) -> tuple[frozenset[str], bool]:
-    """Return what the nominal scenario needs, and whether another starts against the ego."""
+def needed_by(pipeline: "Pipeline") -> tuple[frozenset[str], bool]:
+    """Return what the nominal scenario needs, and whether another starts against the ego.
+
+    What it needs is of `DOMAINS`: one of "junction" (the ego's route leads through one in which
+    ways cross or turn), "road" (there are opposite lanes) and "motorway"; "oncoming" if on the
+    latter somebody drives against the ego's direction; and "vulnerable" if a pedestrian or a
+    cyclist takes part.
+    """
     nominal = pipeline.space.row({})[np.newaxis]
     _, one = next(pipeline.by_variant(nominal))
     model = one.source.roads(one.space.values(nominal[0]))
@@ -79,7 +75,7 @@ def _needed_by(pipeline: Pipeline) -> tuple[frozenset[str], bool]:
     batch.start()
     headings = batch.record.h[0, :, 0]
     kinds = [kind for text in pipeline.kinds.values() for kind in text.split(" or ")]
-    against = _against(headings)
+    against = against_ego(headings)
     return needed(model, roads.roads_ahead(0), headings, kinds), bool(against.any())
 
 
@@ -105,7 +101,7 @@ def needed(
         return frozenset(needs | {"junction"})
     if any(_has_opposite_lanes(one) for one in own):
         return frozenset(needs | {"road"})
-    if _against(headings).any():
+    if against_ego(headings).any():
         needs.add("oncoming")
     return frozenset(needs | {"motorway"})
 
@@ -127,7 +123,7 @@ def _crosses(model: OpenDrive, junction: str) -> bool:
     return bool((np.abs(_wrapped(angles[:, np.newaxis] - angles)) > CROSSES).any())
 
 
-def _against(headings: Float) -> Bool:
+def against_ego(headings: Float) -> Bool:
     """Return which of the others start against the ego's direction, ``(E - 1,)``."""
     against: Bool = np.abs(_wrapped(headings[1:] - headings[0])) > AGAINST
     return against
