@@ -342,9 +342,9 @@ def town() -> list[Row]:
         pipeline = Pipeline(
             placed, placed.space(), PipelineOptions(ego="reference"), road_map=town05
         )
-        model = pipeline.concrete(placed.space().row({})).roads
-        ready = best(lambda: seconds(lambda: pipeline.simulator.roads([model])))
-        tables = pipeline.simulator.roads([model]).tables
+        model = pipeline.runner.concrete(placed.space().row({})).roads
+        ready = best(lambda: seconds(lambda: pipeline.runner.simulator.roads([model])))
+        tables = pipeline.runner.simulator.roads([model]).tables
         carried = sum(np.asarray(table).nbytes for table in tables)
         return [
             ("Town05 compiled for a scenario, s", f"{ready:.2f}", "≤ 2"),

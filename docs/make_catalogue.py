@@ -61,7 +61,7 @@ def catalogue() -> str:
 def picture(name: str) -> str:
     """Return the picture of a scenario at its defaults, as SVG."""
     scenario = load(name)
-    return sketch(Pipeline(scenario, scenario.space()))
+    return sketch(Pipeline(scenario, scenario.space()).runner)
 
 
 if __name__ == "__main__":

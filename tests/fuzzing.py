@@ -204,7 +204,7 @@ def write_ours(folder: Path) -> None:
         scenario = load(name)
         space = scenario.space()
         pipeline = Pipeline(scenario, space)
-        concrete = pipeline.concrete(space.row({}), f"{name}.xodr")
+        concrete = pipeline.runner.concrete(space.row({}), f"{name}.xodr")
         assert concrete.individuals is not None
         save(concrete.individuals, folder / f"{name}.owl")
         (folder / f"{name}.xodr").write_bytes(road_xml(concrete.roads))

@@ -226,9 +226,9 @@ def test_a_collision_with_it_is_analysed(kind, rollout, entity):
 
 
 def test_it_is_drawn(kind, pipeline, rollout, entity):
-    assert pipeline.source.bodies({})[rollout.names[entity]] == kind.name
+    assert pipeline.runner.source.bodies({})[rollout.names[entity]] == kind.name
     label = f">{rollout.names[entity]}</text>"
-    assert (label if kind.takes_part else 'fill="#d9480f"') in sketch(pipeline)
+    assert (label if kind.takes_part else 'fill="#d9480f"') in sketch(pipeline.runner)
 
 
 @pytest.mark.parametrize("name", [one.name for one in ALL if one.on_rails])

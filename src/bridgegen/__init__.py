@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from bridgegen.jobs.safety_case import SafetyCase, export_safety_case
     from bridgegen.jobs.search import Run, resume, run_search
     from bridgegen.jobs.search.confirm import confirm
+    from bridgegen.jobs.search.model import Model, model
     from bridgegen.scenario.exposure import Exposure, exposure_of, read_exposure
     from bridgegen.scenario.exposure.fit import Fit, fit_exposure
     from bridgegen.scenario.language.reader import load
@@ -27,6 +28,7 @@ __all__ = [
     "Dashboard",
     "Exposure",
     "Fit",
+    "Model",
     "PreventabilityMap",
     "Risk",
     "Run",
@@ -42,6 +44,7 @@ __all__ = [
     "fit_exposure",
     "load",
     "map_preventability",
+    "model",
     "read_exposure",
     "resume",
     "run_search",
@@ -55,6 +58,8 @@ _HOMES = {
     "build_dashboard": "bridgegen.jobs.dashboard",
     "confirm": "bridgegen.jobs.search.confirm",
     "errors": "bridgegen.base.errors",
+    "Model": "bridgegen.jobs.search.model",
+    "model": "bridgegen.jobs.search.model",
     "Run": "bridgegen.jobs.search",
     "Exposure": "bridgegen.scenario.exposure",
     "Fit": "bridgegen.scenario.exposure.fit",

@@ -64,7 +64,7 @@ def test_words_are_in_the_order_of_their_definition():
 def test_a_driver_outside_its_domain_is_named(scenario, ego, said):
     logical = load(scenario)
     pipeline = Pipeline(logical, logical.space(), PipelineOptions(ego=ego), workers=Threads(1))
-    found = outside(pipeline)
+    found = outside(pipeline.runner)
     assert bool(found) == bool(said)
     assert said in found
     assert not found or found.startswith(f"outside the domain of {ego} (motorway): {scenario} has")

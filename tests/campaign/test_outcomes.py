@@ -83,7 +83,7 @@ def jam():
 
 def test_a_declared_jam_is_no_outcome_unless_somebody_joins(jam):
     x = jam.space.row({})
-    individuals, roads = jam.concrete(x).individuals, jam.concrete(x).roads
+    individuals, roads = jam.runner.concrete(x).individuals, jam.runner.concrete(x).roads
     rollout = jam.rollout(x[np.newaxis])
     names = rollout.names
     members = [k for k, name in enumerate(names) if name.startswith("jam_")]
@@ -114,10 +114,13 @@ def test_a_declared_jam_is_no_outcome_unless_somebody_joins(jam):
 
 
 def test_a_failed_rollout_brings_about_nothing(jam):
-    individuals = jam.concrete(jam.space.row({})).individuals
+    individuals = jam.runner.concrete(jam.space.row({})).individuals
     rollout = jam.rollout(jam.space.row({})[np.newaxis])
     rollout.status[0] = 1
-    assert with_outcomes(individuals, rollout, jam.concrete(jam.space.row({})).roads) is individuals
+    assert (
+        with_outcomes(individuals, rollout, jam.runner.concrete(jam.space.row({})).roads)
+        is individuals
+    )
 
 
 def test_outcomes_use_terms_as_declared(crashed):
@@ -151,7 +154,7 @@ def crashed():
     scenario = load("road-works")
     pipeline = Pipeline(scenario, scenario.space())
     x = pipeline.space.row({})
-    concrete = pipeline.concrete(x)
+    concrete = pipeline.runner.concrete(x)
     rollout = pipeline.rollout(x[np.newaxis])
     ego, cone, truck = (rollout.names.index(one) for one in ("ego", "works_cone_5", "truck"))
     for states in (rollout.x, rollout.y, rollout.h):
@@ -327,14 +330,14 @@ def test_outcomes_of_another_rollout_are_replaced(crashed):
     scenario = load("road-works")
     pipeline = Pipeline(scenario, scenario.space())
     x = pipeline.space.row({})
-    roads, rollout = pipeline.concrete(x).roads, pipeline.rollout(x[np.newaxis])
-    plain = with_outcomes(pipeline.concrete(x).individuals, rollout, roads)
+    roads, rollout = pipeline.runner.concrete(x).roads, pipeline.rollout(x[np.newaxis])
+    plain = with_outcomes(pipeline.runner.concrete(x).individuals, rollout, roads)
     assert records(crashed) != records(plain)
     again = with_outcomes(crashed, rollout, roads)
     assert set(again.quads) == set(plain.quads)
     rollout.status[0] = 1
     failed = with_outcomes(crashed, rollout, roads)
-    assert set(failed.quads) == set(pipeline.concrete(x).individuals.quads)
+    assert set(failed.quads) == set(pipeline.runner.concrete(x).individuals.quads)
 
 
 @pytest.mark.parametrize(

@@ -216,7 +216,7 @@ def test_on_a_map_of_its_own_a_scenario_is_what_it_is_at_home(name: str, tmp_pat
     home = Pipeline(scenario, scenario.space())
     row = home.space.row({})
     path = tmp_path / "road.xodr"
-    path.write_bytes(to_xml(home.concrete(row).roads))
+    path.write_bytes(to_xml(home.runner.concrete(row).roads))
     place = "1" if name in ROADS else None
     roads = searchable(scenario, load_map(path, place, scenario))
     there = on_map(scenario, roads)
@@ -283,7 +283,7 @@ def test_a_roundabout_is_found_by_its_ring(tmp_path: Path) -> None:
     scenario = load("roundabout-entry")
     home = Pipeline(scenario, scenario.space())
     path = tmp_path / "ring.xodr"
-    path.write_bytes(to_xml(home.concrete(home.space.row({})).roads))
+    path.write_bytes(to_xml(home.runner.concrete(home.space.row({})).roads))
     found, model, _ = places_of(path)
     (ring,) = [one for one in found if one.kind == "roundabout"]
     assert (ring.id, ring.size) == ("100+101+102+103", "4 legs, 8 roads around")
@@ -301,7 +301,7 @@ def test_a_merge_is_found_by_its_ramp(tmp_path: Path) -> None:
     scenario = load("motorway-merge")
     home = Pipeline(scenario, scenario.space())
     path = tmp_path / "merge.xodr"
-    path.write_bytes(to_xml(home.concrete(home.space.row({})).roads))
+    path.write_bytes(to_xml(home.runner.concrete(home.space.row({})).roads))
     (fit,), _, _ = places_of(path, scenario)
     assert (fit.id, fit.kind, fit.lacks) == ("100", "merge", "")
     assert fit.size == "2 lanes and a ramp, 3 for 260 m"
@@ -309,7 +309,7 @@ def test_a_merge_is_found_by_its_ramp(tmp_path: Path) -> None:
     short = replace(scenario, roads=replace(scenario.roads, knobs=knobs))
     made = Pipeline(short, short.space())
     other = tmp_path / "short.xodr"
-    other.write_bytes(to_xml(made.concrete(made.space.row({})).roads))
+    other.write_bytes(to_xml(made.runner.concrete(made.space.row({})).roads))
     (late,), _, _ = places_of(other, scenario)
     assert "changes lane up to 150 m after its ramp; the acceleration lane ends 130" in late.lacks
     for name, text in (("crossroads-s4", "fits no junction"), ("cut-in", "must be named, or best")):

@@ -103,7 +103,7 @@ def test_each_row_is_what_its_own_storyboard_gives(both, tmp_path):
             ),
         )  # fmt: skip
         row = alone.space.row({"Gap": values["Gap"]})[np.newaxis]
-        assert not next(iter(alone.by_variant(row)))[1].source.variants
+        assert not next(iter(alone.runner.by_variant(row)))[1].source.variants
         assert found.metrics[i].tobytes() == alone.evaluate(row).metrics[0].tobytes()
 
 
@@ -115,12 +115,12 @@ def test_a_longer_lead_is_hit_earlier(both):
     """
     X = np.array([both.space.row({"Gap": 20.0, "Model": float(k)}) for k in (0, 1)])
     parts = {
-        both.scenario.texts["Model"][int(X[at[0], both.space.index("Model")])]: one.rollout(X[at])
-        for at, one in both.by_variant(X)
+        both.scenario.texts["Model"][int(X[at[0], both.space.index("Model")])]: one.run(X[at])
+        for at, one in both.runner.by_variant(X)
     }
     small, long = parts["small"], parts["long"]
     assert small.distance[0, 1, 0] - long.distance[0, 1, 0] == pytest.approx(1.2, abs=1e-9)
-    assert both.kinds == {"Ego": "car", "Lead": "car or truck"}
+    assert both.runner.kinds == {"Ego": "car", "Lead": "car or truck"}
     with pytest.raises(ValueError, match="bodies of different sizes"):
         both.rollout(X)
 
@@ -179,7 +179,7 @@ def test_texts_of_value_sets_come_together(tmp_path):
     lengths = {(20.0, 12.0), (10.0, 4.0), (30.0, 12.0)}
     found = set()
     for x in X:
-        body = made.concrete(x).storyboard.entities.scenario_objects[0].entity_object
+        body = made.runner.concrete(x).storyboard.entities.scenario_objects[0].entity_object
         found.add((made.space.values(x)["Gap"], body.bounding_box.dimensions.length))
     assert found == lengths
 

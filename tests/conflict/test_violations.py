@@ -328,7 +328,7 @@ def test_the_room_beside_routes_of_the_catalogue(name, expected):
     fixed = {"lane_width": 3.75 if name == "cut-in" else 3.5}
     middle = pipeline.space.decode(np.full((1, pipeline.space.n_var), 0.5))[0]
     x = [fixed.get(one, value) for one, value in zip(pipeline.space.names, middle, strict=True)]
-    roads, _ = pipeline._roads_of(np.array([x]))
+    roads, _ = pipeline.runner.roads_of(np.array([x]))
     table = roads.corridors([0])[0]
     assert {tuple(row) for row in table[:, 3:].round(6).tolist()} == expected
 

@@ -19,7 +19,7 @@ def network_of(scenario: str) -> tuple[OpenDrive, Route]:
     logical = load(scenario)
     pipeline = Pipeline(logical, logical.space(), PipelineOptions(ego="route-follower"))
     middle = pipeline.space.decode(np.full((1, pipeline.space.n_var), 0.5))
-    networks, _ = pipeline._roads_of(middle)
+    networks, _ = pipeline.runner.roads_of(middle)
     return networks._models[0], networks._ways[0].routes[0]
 
 

@@ -61,8 +61,8 @@ def crossing(folder: Path, leg: str, to: str, **signs: str) -> Pipeline:
 
 def routes(pipeline: Pipeline) -> tuple[OpenDrive, list[Route]]:
     """Return the nominal road network, and the routes of ego and other."""
-    model = pipeline.concrete(pipeline.space.row({})).roads
-    found = Ways(pipeline.simulator.program, model).routes
+    model = pipeline.runner.concrete(pipeline.space.row({})).roads
+    found = Ways(pipeline.runner.simulator.program, model).routes
     return model, [one for one in found if one is not None]
 
 

@@ -56,15 +56,15 @@ def watched(scenario: str, wants: Iterable[str], n: int = 4, seed: int = 4) -> R
     pipeline = pipeline_of(scenario, ego=f"{DRIVERS}:Cruises")
     X = pipeline.space.decode(np.random.default_rng(seed).random((n, pipeline.space.n_var)))
     driver.pipeline, driver.X = pipeline, X
-    networks, rows = pipeline._roads_of(X)
+    networks, rows = pipeline.runner.roads_of(X)
     values = {name: X[:, i] for i, name in enumerate(pipeline.space.names)}
     networks.provide(driver.traits.wants)
-    program = pipeline.simulator.program
+    program = pipeline.runner.simulator.program
     driver.networks, driver.network_of = networks, rows
 
     def setup(at):
         some = {name: np.broadcast_to(one, len(rows))[at] for name, one in values.items()}
-        return pipeline.simulator.batch(networks, rows[at], some, own=driver.traits)
+        return pipeline.runner.simulator.batch(networks, rows[at], some, own=driver.traits)
 
     driver.rollout = drive_in_lock_step(program, setup, n, driver)
     return driver

@@ -233,6 +233,7 @@ in_front = st.tuples(
 
 @given(anywhere | in_front, st.floats(1, 15))
 @example((5.0, 2.0, 0.0, 0.0, 0.0), 1.0)  # it would slide along the other's side
+@example((6.5, 0.0, 2.25, 10.0, 0.0), 6.0)  # a corner grazes for less than 2 ms
 def test_btn_is_what_braking_takes(rollout_of, other, ego):
     x, y, h, v, a = other
     rollout = two(rollout_of, x=x, y=y, h=h, v=v, a=a, ego=ego)
@@ -248,5 +249,6 @@ def test_btn_is_what_braking_takes(rollout_of, other, ego):
     assume(0.05 < found < MOST)
     _, speed = clear_until(found * 1.02 + 0.01, *other, ego)
     assert speed <= 0.2  # never touched, or standing when it is
-    time, speed = clear_until(found * 0.98 - 0.01, *other, ego, depth=-1e-6)
+    step = 2e-3 * (ego + abs(v) + 60.0 * abs(a))  # a corner may graze between two instants
+    time, speed = clear_until(found * 0.98 - 0.01, *other, ego, depth=-step - 1e-6)
     assert time < np.inf  # less does not do

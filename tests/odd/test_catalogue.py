@@ -289,7 +289,7 @@ def test_the_traffic_of_random_rows_drives_as_drivers_do(name, ego):
     space = scenario.space()
     X = space.decode(np.random.default_rng(11).random((64, space.n_var)))
     pipeline = Pipeline(scenario, space, PipelineOptions(ego=ego))
-    for rollout in (one.rollout(X[at]) for at, one in pipeline.by_variant(X)):
+    for rollout in (one.run(X[at]) for at, one in pipeline.runner.by_variant(X)):
         assert (rollout.status == 0).all()
         assert set(plausibility(rollout).labels) == {""}
         dt = rollout.time_step

@@ -74,8 +74,8 @@ def contacts(name):
     assert rows.excluded == 0
     pipeline = Pipeline(scenario, space, PipelineOptions(ego="route-follower"))
     found = []
-    for at, one in pipeline.by_variant(rows.X):
-        rollout = one.rollout(rows.X[at])
+    for at, one in pipeline.runner.by_variant(rows.X):
+        rollout = one.run(rows.X[at])
         touching, instant = first_contact(rollout)
         assert (rollout.status == 0).all()
         for i, (who, k) in enumerate(zip(touching, instant, strict=True)):
@@ -182,8 +182,8 @@ def test_the_car_that_pulls_out_keeps_the_protocol_s_times():
     space = scenario.space()
     rows = rows_of(scenario, space, 0, 0)
     pipeline = Pipeline(scenario, space, PipelineOptions(ego="route-follower"))
-    ((_, one),) = pipeline.by_variant(rows.X)
-    rollout = one.rollout(rows.X)
+    ((_, one),) = pipeline.runner.by_variant(rows.X)
+    rollout = one.run(rows.X)
     target, overtaken = (rollout.names.index(who) for who in ("target", "overtaken"))
     speed, length = (rows.X[:, space.index(n)] for n in ("target_speed", "change_length"))
     y = rollout.y[:, target]
@@ -201,8 +201,8 @@ def test_a_child_is_hidden_until_it_is_near():
     space = scenario.space()
     X = space.row({})[np.newaxis]
     pipeline = Pipeline(scenario, space, PipelineOptions(ego="reference"))
-    ((_, one),) = pipeline.by_variant(X)
-    rollout = one.rollout(X)
+    ((_, one),) = pipeline.runner.by_variant(X)
+    rollout = one.run(X)
     child = rollout.names.index("pedestrian")
     seen = rollout.detections[0, child, :, 0] > 0.0
     start = scenario.space().values(X[0])["start_time"]

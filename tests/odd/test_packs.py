@@ -22,7 +22,7 @@ def rollouts(name: str, ego: str, rows: int = 64):
     space = scenario.space()
     X = space.decode(np.random.default_rng(2).random((rows, space.n_var)))
     pipeline = Pipeline(scenario, space, PipelineOptions(ego=ego))
-    return space, [(X[at], one.rollout(X[at])) for at, one in pipeline.by_variant(X)]
+    return space, [(X[at], one.run(X[at])) for at, one in pipeline.runner.by_variant(X)]
 
 
 def test_the_pack_has_each_kind_of_test_of_the_regulation():
@@ -107,7 +107,7 @@ def test_a_scenario_of_a_pack_can_be_copied(tmp_path):
 def test_individuals_of_a_pack_s_scenario_find_it_again():
     scenario = load("r157/deceleration")
     pipeline = Pipeline(scenario, scenario.space())
-    individuals = pipeline.concrete(scenario.space().row({})).individuals
+    individuals = pipeline.runner.concrete(scenario.space().row({})).individuals
     found = scenario_of(individuals)
     assert found is not None
     assert found.place == "r157/deceleration.yaml"

@@ -255,7 +255,7 @@ def test_each_kind_of_detection_is_drawn_and_told(show, fog):
 def test_the_weather_is_the_simulator_s(show, fog):
     page = show(fog)
     columns = {name: fog.X[:, i] for i, name in enumerate(fog.pipeline.space.names)}
-    ((_, felt), *_) = weathers(fog.pipeline.simulator.program, columns, fog.rollout, 0)
+    ((_, felt), *_) = weathers(fog.pipeline.runner.simulator.program, columns, fog.rollout, 0)
     shown = state(page)["weather"]
     assert shown["visual_range"] == pytest.approx(felt[column.VISUAL_RANGE], rel=1e-3)
     assert shown["sun_elevation"] == pytest.approx(math.radians(-30.0), rel=1e-3)
@@ -269,7 +269,8 @@ def test_the_weather_is_the_simulator_s(show, fog):
 
 def test_the_planned_path_is_what_the_driver_planned(opened):
     case, page = opened
-    meant = case.pipeline.replay(case.X).intentions
+    ((_, replay),) = case.pipeline.replays(case.X).parts
+    meant = replay.intentions
     body = case.rollout.box[0]
     numbers = range(2, int(np.searchsorted(meant.steps, case.rollout.n_steps[0])), 9)
     steps = meant.steps[list(numbers)].tolist()

@@ -23,7 +23,7 @@ SVG = "{http://www.w3.org/2000/svg}"
 @pytest.mark.parametrize("name", names())
 def test_the_picture_shows_everybody_who_matters(name):
     scenario = load(name)
-    text = sketch(Pipeline(scenario, scenario.space()))
+    text = sketch(Pipeline(scenario, scenario.space()).runner)
     root = ElementTree.fromstring(text)
     assert root.get("viewBox") == f"0 0 {WIDTH} {HEIGHT}"
     labels = {one.text for one in root.iter(f"{SVG}text")}
@@ -53,7 +53,7 @@ def test_bodies_are_drawn_where_they_are():
     gap += 1.4 * np.array(
         [np.cos(heading[1]) - np.cos(heading[0]), np.sin(heading[1]) - np.sin(heading[0])]
     )
-    root = ElementTree.fromstring(sketch(pipeline, x))
+    root = ElementTree.fromstring(sketch(pipeline.runner, x))
     bodies = [
         one.get("transform")
         for one in root.iter(f"{SVG}g")
@@ -75,13 +75,13 @@ def test_nobody_is_drawn_who_is_not_there(monkeypatch):
     present[0, 1, 20:] = False
     gone = replace(rollout, present=present)
     monkeypatch.setattr(pipeline, "rollout", lambda _: gone)
-    root = ElementTree.fromstring(sketch(pipeline))
+    root = ElementTree.fromstring(sketch(pipeline.runner))
     closest = int(gone.distance[0, 1, : gone.n_steps[0]].argmin())
     assert closest < 20  # it counts only while it is there
     assert len(list(root.iter(f"{SVG}polyline"))) > 4
     present[0, 1] = False
     gone = replace(rollout, present=present)
-    root = ElementTree.fromstring(sketch(pipeline))
+    root = ElementTree.fromstring(sketch(pipeline.runner))
     assert "ego" in {one.text for one in root.iter(f"{SVG}text")}
     assert "bv" not in {one.text for one in root.iter(f"{SVG}text")}
 
@@ -233,7 +233,7 @@ def test_a_report_has_no_place_for_who_is_not_there(monkeypatch):
     scenario = load("crossroads-s4")
     pipeline = Pipeline(scenario, scenario.space())
     X = pipeline.space.row({})[np.newaxis]
-    replay = pipeline.replay(X)
+    ((_, replay),) = pipeline.replays(X).parts
     present = np.ones(replay.rollout.x.shape, dtype=np.bool_)
     present[0, 1, 20:] = False
     gone = replace(replay, rollout=replace(replay.rollout, present=present))

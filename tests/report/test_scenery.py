@@ -13,7 +13,7 @@ from bridgegen.scenario.language.reader import load
 def roads():
     scenario = load("crossroads-s1")
     pipeline = Pipeline(scenario, scenario.space())
-    return pipeline.concrete(pipeline.space.row({})).roads
+    return pipeline.runner.concrete(pipeline.space.row({})).roads
 
 
 def test_street_lights_stand_beside_their_road(roads):

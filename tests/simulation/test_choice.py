@@ -12,7 +12,7 @@ def test_the_embedded_one_is_the_default():
     logical = load("crossroads-s1")
     pipeline = Pipeline(logical, logical.space())
     assert EMBEDDED.name == "embedded"
-    assert pipeline.simulator is pipeline.simulator.embedded
+    assert pipeline.runner.simulator is pipeline.runner.embedded
 
 
 @pytest.mark.parametrize("name", SIMULATORS)

@@ -103,7 +103,7 @@ def test_minimal_scenarios_come_to_the_harm_of_their_mode(run, pipeline):
         with Store.open(run.folder) as store:
             base = store.read(mode.shown, mode.shown + 1).X
         came = pipeline.try_all(X, noise=base)
-        (key,) = keys_of(came.findings, pipeline.kinds, came.place.tolist(), [""])
+        (key,) = keys_of(came.findings, pipeline.runner.kinds, came.place.tolist(), [""])
         names = ("conflict", "conflict_type", "responsible", "partner", "place")
         assert key[:5] == tuple(getattr(mode, name) for name in names)
         for kind in ("owl", "xodr", "json"):
@@ -247,7 +247,7 @@ def test_neighbours_of_a_noisy_driver_have_its_random_numbers():
     pipeline = Pipeline(scenario, space, PipelineOptions(ego="reference"))
     X = space.decode(np.random.default_rng(0).random((2, space.n_var)))
     one, other = ({n: X[[k], i] for i, n in enumerate(space.names)} for k in (0, 1))
-    simulator, roads = pipeline.simulator.embedded, pipeline._roads
+    simulator, roads = pipeline.runner.embedded, pipeline.runner._roads
     rows = np.zeros(1, np.int64)
 
     def keys(values, noise=None):

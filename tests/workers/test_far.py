@@ -67,7 +67,8 @@ def test_only_workers_have_it(there):
     plain = Pipeline(scenario, space)
     plain.choose_objective()
     assert pipeline.evaluate(X).metrics.tobytes() == plain.evaluate(X).metrics.tobytes()
-    assert pipeline.replay(X, plans=True).intentions is None
+    ((_, replay),) = pipeline.replays(X, plans=True).parts
+    assert replay.intentions is None
     motion, expected = pipeline.rollout(X), plain.rollout(X)
     assert motion.x.tobytes() == expected.x.tobytes()
     pool.lost, pool.count = 1, 3

@@ -1,4 +1,4 @@
-"""How a row becomes a result: options, pipeline, counterfactual trials, replays, and the workers.
+"""How a row becomes a result: options, runner, pipeline, counterfactual trials, replays, workers.
 
-Start with `pipeline.py`. Imports `assess` and below.
+`runner.py` makes rollouts of rows, `pipeline.py` evaluations. Imports `assess` and below.
 """

@@ -12,7 +12,8 @@ import numpy as np
 
 from bridgegen.assess.criteria.measured import OF_BASELINE
 from bridgegen.base.arrays import Bool
-from bridgegen.engine.evaluation import Evaluation, Trials
+from bridgegen.engine.evaluation import Evaluation
+from bridgegen.engine.trials import Trials
 
 RECORDED = tuple(f"{OF_BASELINE}{name}" for name in ("harm", "severity", "d_min"))
 """The baseline's quantities that a search records, after the ego's."""

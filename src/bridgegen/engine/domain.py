@@ -14,7 +14,7 @@ from bridgegen.openx.opendrive.model import OpenDrive, Road
 from bridgegen.scenario.participants import PARTICIPANTS
 
 if TYPE_CHECKING:
-    from bridgegen.engine.pipeline import Pipeline
+    from bridgegen.engine.runner import Runner
 
 CROSSES = math.radians(45.0)
 """Ways through a junction whose directions differ by more cross or turn; those of a merge do
@@ -27,15 +27,15 @@ VULNERABLE = frozenset({"pedestrian", "bicycle"})
 """Conduct of vulnerable participants."""
 
 
-def outside(pipeline: "Pipeline") -> str:
+def outside(runner: "Runner") -> str:
     """Return a sentence if the ego's driver says that it is not made for the scenario; else "".
 
     A driver for motorways may also follow a road on which there are lanes, but at first nobody,
     the other way.
     """
-    if not pipeline.driver.domain:
+    if not runner.driver.domain:
         return ""
-    return why_outside(pipeline.driver, pipeline.scenario.name, *needed_by(pipeline))
+    return why_outside(runner.driver, runner.scenario.name, *needed_by(runner))
 
 
 def why_outside(driver: Driver, name: str, needs: frozenset[str], is_met: bool) -> str:
@@ -56,7 +56,7 @@ def why_outside(driver: Driver, name: str, needs: frozenset[str], is_met: bool) 
     return f"outside the domain of {driver.name} ({in_words(driver.domain)}): {name} has {there}"
 
 
-def needed_by(pipeline: "Pipeline") -> tuple[frozenset[str], bool]:
+def needed_by(runner: "Runner") -> tuple[frozenset[str], bool]:
     """Return what the nominal scenario needs, and whether another starts against the ego.
 
     What it needs is of `DOMAINS`: one of "junction" (the ego's route leads through one in which
@@ -64,17 +64,16 @@ def needed_by(pipeline: "Pipeline") -> tuple[frozenset[str], bool]:
     latter somebody drives against the ego's direction; and "vulnerable" if a pedestrian or a
     cyclist takes part.
     """
-    nominal = pipeline.space.row({})[np.newaxis]
-    _, one = next(pipeline.by_variant(nominal))
+    nominal = runner.space.row({})[np.newaxis]
+    _, one = next(runner.by_variant(nominal))
     model = one.source.roads(one.space.values(nominal[0]))
-    embedded = one.simulator.embedded
+    embedded = one.embedded
     roads = embedded.roads([model])
-    names = [(i, name) for i, name in enumerate(one.space.names) if name not in one.simulator.fixed]
-    columns = {name: nominal[:, i] for i, name in names}
+    columns = {name: x for name, x in one.columns(nominal).items() if name not in embedded.fixed}
     batch = embedded.batch(roads, np.zeros(1, np.int64), columns)
     batch.start()
     headings = batch.record.h[0, :, 0]
-    kinds = [kind for text in pipeline.kinds.values() for kind in text.split(" or ")]
+    kinds = [kind for text in runner.kinds.values() for kind in text.split(" or ")]
     against = against_ego(headings)
     return needed(model, roads.roads_ahead(0), headings, kinds), bool(against.any())
 

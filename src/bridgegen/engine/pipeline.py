@@ -1,21 +1,20 @@
-"""The evaluation in one file: rows of X → scenarios → rollouts → metrics → objectives → causes.
+"""The evaluation in one file: rows of X → rollouts → metrics → objectives → causes.
 
 Read this first. `Pipeline.evaluate_rows` is the whole path of a batch, one line per stage;
-everything else here prepares it.
+everything else here prepares it, or shares the rows among workers.
 """
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from copy import copy
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from functools import cached_property, lru_cache
-from typing import TYPE_CHECKING, Any, Self, TypeVar, TypeVarTuple
+from functools import cached_property
+from typing import Any, Self, TypeVar, TypeVarTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from bridgegen import drivers as egos
 from bridgegen.assess import metrics as measures
-from bridgegen.assess.cause import Cause, Counterfactual, causes, counterfactuals, require
+from bridgegen.assess.cause import Cause, Counterfactual, causes, require
 from bridgegen.assess.conflict import quantities
 from bridgegen.assess.conflict.analysis import analyse
 from bridgegen.assess.conflict.findings import Findings
@@ -28,31 +27,25 @@ from bridgegen.assess.objective import CLASSIFYING, Objective, Objectives, needs
 from bridgegen.base.arrays import Bool, Float, Int
 from bridgegen.base.errors import InputError, UnknownNameError
 from bridgegen.engine.baseline import RECORDED, difference, difference_of_trials
-from bridgegen.engine.evaluation import Evaluation, Replay, Replays, Trials
+from bridgegen.engine.evaluation import Evaluation
 from bridgegen.engine.options import PipelineOptions
-from bridgegen.engine.variants import Variants, nominal_of
+from bridgegen.engine.replays import Replays, replay_of
+from bridgegen.engine.runner import Runner
+from bridgegen.engine.trials import Trials, try_rows
 from bridgegen.engine.workers import CarriedDriver, Lost, Part, Recipe, Stream, Threads, Workers
 from bridgegen.engine.workers.compile_ahead import compiled_ahead
 from bridgegen.openx.opendrive.road_map import RoadMap
-from bridgegen.openx.source import ConcreteScenario, OntologySource, Source, source_of
-from bridgegen.scenario.language.criteria import PREFIX, joined, read_criterion
+from bridgegen.scenario.language.criteria import PREFIX, read_criterion
+from bridgegen.scenario.language.criteria import joined as joined_criteria
 from bridgegen.scenario.language.scenario import SearchedScenario
 from bridgegen.scenario.language.space import SearchSpace
 from bridgegen.simulation.adversary import AdversarySource, Arena
 from bridgegen.simulation.choice import EMBEDDED, SimulatorChoice
-from bridgegen.simulation.rollout import NO_SCENARIO, WORKER_ENDED, Rollout
-from bridgegen.simulation.rollout import joined as joined_rollouts
-from bridgegen.simulation.simulator import Simulator
+from bridgegen.simulation.rollout import WORKER_ENDED, Rollout, joined
 from bridgegen.simulation.vehicles import KINEMATIC
-
-if TYPE_CHECKING:
-    from bridgegen.simulation.embedded.batch import Batch
 
 FAR_ROWS = 8
 """Rows per chunk if only the workers' machines have the simulator."""
-
-KEPT_VARIANTS = 64
-"""Storyboards that stay compiled."""
 
 SAMPLE = 400
 """Random scenarios that set an objective's weights and scales where it needs a sample."""
@@ -65,16 +58,15 @@ class Pipeline:
     """Everything between a row and its objectives, for one scenario, ego and road network.
 
     Attributes:
+        runner: rolls rows out, with the embedded simulator if only the workers' machines have the
+            chosen one.
         scenario: the logical scenario.
         space: its search space; names the columns of X.
         driver: the ego's driver.
-        source: makes its concrete scenarios.
         objective: set by ``choose_objective``.
         metrics: the names of all metrics that are recorded: those requested, and those that the
             objective and the thresholds need; then the margins of criteria, and the baseline's.
         monitor: the pass criteria, of the scenario and of the options.
-        simulator: runs the scenario's storyboard; the embedded one if only the workers' machines
-            have the chosen one.
         cause: the only one that makes a scenario count as critical, if one was requested.
         seeks_causes: whether ``evaluate`` finds causes.
         baseline: the same with the driver that the ego's is compared with; None without one.
@@ -118,34 +110,27 @@ class Pipeline:
             "scenario": scenario, "space": space, "road_map": road_map, "simulator": simulator,
         }  # fmt: skip
         self._simulated_by = simulator
-        name = options.ego or scenario.driver
-        if name is None and options.ideal:
-            raise InputError(f"{scenario.place}: to make stages of its driver ideal, name it (ego)")
-        driver = egos.get(name, options.ideal, options.time_limit) if name else None
-        self.source = _source(scenario, driver, road_map, space)
         self.cause = None if options.cause is None else Cause.named(options.cause)
         self.seeks_causes = options.causes or self.cause is not None
-        nominal = self.concrete(space.row({}), road_map.path.name if road_map else "")
         self._workers = workers or Threads()
         self._is_far = simulator != EMBEDDED and not self._workers.are_here
-        self._simulates = EMBEDDED if self._is_far else simulator
-        self._given_driver, self._refused = driver, ""
-        self.simulator: Simulator[Any] = self._simulator_of(nominal)
-        self.driver = self.simulator.embedded.program.driver
-        if driver is None and self.driver != egos.STORYBOARD:  # write the file's choice, too
-            self.source = _source(scenario, self.driver, road_map, space)
-        if self._is_far and self.vehicle != KINEMATIC:
+        self.runner = Runner(
+            scenario, space, options, road_map=road_map,
+            simulator=EMBEDDED if self._is_far else simulator,
+        )  # fmt: skip
+        self.driver = self.runner.driver
+        if self._is_far and self.runner.vehicle != KINEMATIC:
             raise InputError(
-                f"{scenario.place}: the vehicle '{self.vehicle}' is of the embedded simulator "
-                f"(--vehicle {KINEMATIC})"
+                f"{scenario.place}: the vehicle '{self.runner.vehicle}' is of the embedded "
+                f"simulator (--vehicle {KINEMATIC})"
             )
         if self.cause is not None:
-            require(self.cause, self.driver, self.vehicle)
-        sees, embedded = simulator.detects, self.simulator.embedded
+            require(self.cause, self.driver, self.runner.vehicle)
+        sees, embedded = simulator.detects, self.runner.embedded
         held = measures.held_by(self.driver, detects=sees)
         named = f"the driver '{self.driver.name}'"
         self.monitor = Monitor(
-            joined(scenario.criteria, [read_criterion(one) for one in options.criteria]),
+            joined_criteria(scenario.criteria, [read_criterion(one) for one in options.criteria]),
             embedded.program.names, held, embedded.duration, named,
         )  # fmt: skip
         if recorded is None:
@@ -159,9 +144,6 @@ class Pipeline:
         if not beside and self.baseline is not None:
             beside = list(RECORDED)
         self.metrics = (*known, *(margins or self.monitor.names), *beside)
-        self._roads: Any = self._static_roads(nominal)
-        self._variants = Variants.of(scenario, space, self.source, embedded, driver)
-        self._variant = lru_cache(maxsize=KEPT_VARIANTS)(self._make_variant)
 
     def _baseline_of(self, options: PipelineOptions) -> "Pipeline | None":
         """Return the pipeline of the driver that the ego's is compared with, if there is one.
@@ -200,81 +182,6 @@ class Pipeline:
         one.choose_objective(self.objective)
         return one
 
-    @property
-    def vehicle(self) -> str:
-        """How the ego moves, one of `bridgegen.simulation.vehicles.VEHICLES`."""
-        return self.simulator.embedded.program.vehicle
-
-    def _simulator_of(self, nominal: ConcreteScenario) -> Simulator[Any]:
-        place = self.scenario.name
-        return self._simulates.simulator(
-            nominal.storyboard, place, self._given_driver, self._options.vehicle
-        )
-
-    def _static_roads(self, nominal: ConcreteScenario) -> Any:
-        """Return the compiled road network, None if rows have several."""
-        if {*self._road_names} & {*self.space.variables}:
-            return None
-        return self.simulator.roads([nominal.roads])
-
-    def _make_variant(self, key: tuple[float, ...]) -> "Pipeline":
-        """Return the pipeline of the rows that have these values of what storyboards differ in."""
-        one = copy(self)
-        one._variants = replace(self._variants, names=())
-        try:
-            values = dict(zip(self._variants.names, key, strict=True))
-            nominal = nominal_of(self.source, self.space, values)
-            one.simulator = self._simulator_of(nominal)
-            one._roads = one._static_roads(nominal)
-        except InputError as error:  # it is a result of these rows; the others go on
-            one.simulator, one._refused = self.simulator, "; ".join(error.problems)
-        return one
-
-    @property
-    def notes(self) -> tuple[str, ...]:
-        """What is run otherwise than one may expect, a sentence each."""
-        return self._variants.notes
-
-    def by_variant(self, X: Float) -> "Iterator[tuple[Int, Pipeline]]":
-        """Yield the rows of each storyboard, and the pipeline that has it.
-
-        Args:
-            X: ``(N, len(space.names))``.
-
-        Yields:
-            Their numbers in X, ascending; and the pipeline, this one where one serves every row.
-        """
-        if self.scenario.checks and not self._refused:
-            table = {name: X[:, i] for i, name in enumerate(self.space.names)}
-            wrong = np.zeros(len(X), np.bool_)
-            for rule, rows in self.scenario.broken(table).items():
-                if (fresh := rows & ~wrong).any():
-                    yield np.flatnonzero(fresh), self._refusing(rule)
-                wrong |= rows
-            if wrong.any():
-                right = np.flatnonzero(~wrong)
-                if right.size:
-                    yield from ((right[at], one) for at, one in self._by_key(X[right]))
-                return
-        yield from self._by_key(X)
-
-    def _refusing(self, rule: str) -> "Pipeline":
-        """Return a pipeline in which every row fails, for it breaks a rule."""
-        one = copy(self)
-        one._variants, one._refused = replace(self._variants, names=()), rule
-        return one
-
-    def _by_key(self, X: Float) -> "Iterator[tuple[Int, Pipeline]]":
-        """Yield rows that keep all checks, see ``by_variant``."""
-        names = self._variants.names
-        if not (names and len(X)):
-            yield np.arange(len(X)), self
-            return
-        columns = [self.space.index(name) for name in names]
-        keys, which = np.unique(X[:, columns], axis=0, return_inverse=True)
-        for k, key in enumerate(keys.tolist()):
-            yield np.flatnonzero(which.reshape(-1) == k), self._variant(tuple(key))
-
     @cached_property
     def recipe(self) -> Recipe:
         """Builds this pipeline in a worker, without the objective, which is sent with the rows."""
@@ -297,13 +204,13 @@ class Pipeline:
         """The number of rows of a chunk that is fastest; see `Simulator`."""
         if self._is_far:
             return FAR_ROWS
-        own = self.simulator.rows_at_once
+        own = self.runner.simulator.rows_at_once
         return own if self.baseline is None else max(own, self.baseline.rows_at_once)
 
     @property
     def runs_at_once(self) -> int:
         """The number of threads that is fastest; see `Simulator`."""
-        own = self.simulator.runs_at_once
+        own = self.runner.simulator.runs_at_once
         return own if self.baseline is None else min(own, self.baseline.runs_at_once)
 
     @property
@@ -318,14 +225,15 @@ class Pipeline:
             InputError: there is no adversary, the ego's driver cannot be called step by step, or
                 the simulator is not the embedded one.
         """
-        if not isinstance(self.source, AdversarySource):
+        source, embedded = self.runner.source, self.runner.embedded
+        if not isinstance(source, AdversarySource):
             raise InputError(f"{self.scenario.place}: no participant is driven by an adversary")
-        if self._is_far or self.simulator is not self.simulator.embedded:
+        if self._is_far or self.runner.simulator is not embedded:
             raise InputError(
                 f"{self.scenario.place}: an agent drives in closed loop in the embedded simulator "
                 "only; search there, and confirm its results in another simulator"
             )
-        return Arena(self.source, self.simulator.embedded, self.space)
+        return Arena(source, embedded, self.space)
 
     def choose_objective(
         self,
@@ -350,7 +258,7 @@ class Pipeline:
             if needs_sample(spec.weights, spec.scale, objectives):
                 rng = np.random.Generator(np.random.PCG64([seed, 1]))
                 U = rng.random((SAMPLE, self.space.n_var))
-                parts = self._map(type(self).measure_rows, self.space.decode(U))
+                parts = self._map(type(self)._measure_rows, self.space.decode(U))
                 lost = np.full((1, len(self.metrics)), np.nan)
                 rows = [lost if isinstance(one.result, Lost) else one.result for one in parts]
                 sample = (np.concatenate(rows), self.metrics)
@@ -394,36 +302,30 @@ class Pipeline:
         """
         nominal = self.space.row({})[np.newaxis]
         if not self._workers.are_here:
-            self._map(type(self).measure_rows, nominal)
+            self._map(type(self)._measure_rows, nominal)
             return
         with compiled_ahead(self._recipe_of(_compile_ahead)) as is_shared:
             if is_shared and self.tries:
                 self._compile_first()
-            self.measure_rows(nominal)
+            self._measure_rows(nominal)
         if self.baseline is not None:
             self.baseline.warm_up()
 
     def _compile_first(self) -> None:
-        batch = self._nominal_batch()
+        batch = self.runner.nominal_batch()
         batch.compile_start()
         standing = batch.standing()
         apart = (*quantities.MEASURED, *self.monitor.names)
         quantities.evaluate(standing, [one for one in self.metrics if one not in apart])
         plausibility(standing)
-        for fix in self.fixes:
-            self._nominal_batch(fix).take_addresses()
+        for fix in self.runner.fixes:
+            self.runner.nominal_batch(fix).take_addresses()
 
     def compile_ahead(self) -> None:
         """Compile what ``_compile_first`` leaves: instants and the conflict analysis."""
-        batch = self._nominal_batch()
+        batch = self.runner.nominal_batch()
         batch.compile_instants()
         analyse(batch.standing())
-
-    def _nominal_batch(self, fix: Counterfactual | None = None) -> "Batch":
-        nominal = self.space.row({})[np.newaxis]
-        columns = {name: nominal[:, i] for i, name in enumerate(self.space.names)}
-        roads, rows = self._roads_of(nominal)
-        return self.simulator.embedded.batch(roads, rows, columns, **_changed(fix))
 
     def evaluate(self, X: Float) -> Evaluation:
         """Evaluate N rows; a row's result depends on that row alone.
@@ -431,14 +333,14 @@ class Pipeline:
         Args:
             X: ``(N, len(space.names))`` float64, feasible rows.
         """
-        return self.joined(self._map(type(self).evaluate_rows, X, self.objective))
+        return self._joined(self._map(type(self).evaluate_rows, X, self.objective))
 
     def stream(self) -> "EvaluationStream":
         """Return what evaluates rows while its caller does something else."""
         rows = self._workers.stream(self, type(self).evaluate_rows, self.objective)
         return EvaluationStream(self, rows)
 
-    def joined(self, parts: Sequence[Part[Evaluation]]) -> Evaluation:
+    def _joined(self, parts: Sequence[Part[Evaluation]]) -> Evaluation:
         """Return the evaluation of consecutive rows from the workers' results."""
         return Evaluation.join(
             [
@@ -450,13 +352,13 @@ class Pipeline:
     def evaluate_rows(self, X: Float, objective: Objective) -> Evaluation:
         """Evaluate N rows at once, in this thread; ``evaluate`` shares them among workers."""
         return Evaluation.gathered(
-            [(at, one._evaluate(X[at], objective)) for at, one in self.by_variant(X)]
+            [(at, self._evaluate(one, X[at], objective)) for at, one in self.runner.by_variant(X)]
         )
 
-    def _evaluate(self, X: Float, objective: Objective) -> Evaluation:
+    def _evaluate(self, runner: Runner, X: Float, objective: Objective) -> Evaluation:
         """Evaluate N rows of one storyboard."""
-        roads, rows = self._roads_of(X)
-        rollout = self._run(roads, rows, X)
+        roads, rows = runner.roads_of(X)
+        rollout = runner.run(X, roads=(roads, rows))
         metrics = self.measure(rollout)
         gate = plausibility(rollout)
         texts = happened(rollout, may_stop=self._is_protocol)
@@ -473,10 +375,11 @@ class Pipeline:
         if not self.seeks_causes:
             return found
 
-        def harmless(at: Int, replay: Counterfactual) -> Bool:
-            return self._harmless(self._run(roads, rows[at], X[at], replay), objective)
+        def harmless(at: Int, fix: Counterfactual) -> Bool:
+            changed = runner.run(X[at], fix=fix, roads=(roads, rows[at]))
+            return self._harmless(changed, objective)
 
-        cause = causes(self.fixes, found.critical, harmless)
+        cause = causes(runner.fixes, found.critical, harmless)
         counts = found.critical if self.cause is None else cause == self.cause
         return replace(found, critical=counts, cause=cause)
 
@@ -501,22 +404,12 @@ class Pipeline:
         """Whether ``try_all`` is available: rows are simulated by the embedded simulator."""
         return self._simulated_by == EMBEDDED
 
-    @cached_property
-    def fixes(self) -> tuple[Counterfactual, ...]:
-        """The changes that ``try_all`` takes by number: the counterfactuals of causes."""
-        return counterfactuals(self.driver, self.vehicle)
-
-    @property
-    def kinds(self) -> Mapping[str, str]:
-        """What each participant is, "car", "pedestrian" or "car or truck" say, by its name."""
-        return self._variants.kinds
-
     def try_all(self, X: Float, fix: Int | None = None, noise: Float | None = None) -> Trials:
         """Simulate N rows again, each unchanged or with one stage idealised; see `Trials`.
 
         Args:
             X: ``(N, len(space.names))`` feasible rows.
-            fix: ``(N,)`` number of each row's change in ``fixes``; −1, the default, for unchanged.
+            fix: ``(N,)`` number of each row's change in ``runner.fixes``; −1, the default: none.
             noise: ``(N, len(space.names))`` rows whose random numbers these rows use, so that a
                 row and its neighbours differ only in X; their own by default.
         """
@@ -526,112 +419,42 @@ class Pipeline:
         if not len(rows):
             return Trials.none(0)
         order = np.arange(len(rows))
-        if self._roads is not None:  # chunks with one driver are faster
+        if self.runner.has_one_network:  # chunks with one driver are faster
             order = np.argsort(numbers, kind="stable")
         parts = self._map(
-            type(self).try_rows, rows[order], self.objective.harm, self.objective.count
+            type(self)._try_rows, rows[order], self.objective.harm, self.objective.count
         )
         trials = [
             Trials.none(one.rows) if isinstance(one.result, Lost) else one.result for one in parts
-        ]
+        ]  # fmt: skip
         return Trials.join(trials).take(np.argsort(order))
 
-    def try_rows(self, rows: Float, harm: str, count: Count) -> Trials:
-        """Simulate N rows at once, in this thread; ``try_all`` shares them among workers.
-
-        Args:
-            rows: ``(N, 2 n + 1)``: X, the rows whose random numbers they use, number of the fix.
-            harm: the quantity that is measured.
-            count: the conflicts that count.
-        """
-        parts = [(at, one._try(rows[at], harm, count)) for at, one in self.by_variant(rows)]
-        return Trials.join([one for _, one in parts]).take(
-            np.argsort(np.concatenate([at for at, _ in parts]))
-        )
-
-    def _try(self, rows: Float, harm: str, count: Count) -> Trials:
-        """Simulate N rows of one storyboard; see ``try_rows``."""
-        n = len(self.space.names)
-        X, keys, numbers = rows[:, :n], rows[:, n : 2 * n], rows[:, -1].astype(np.int64)
-        if self._refused:
-            return Trials.none(len(rows))
-        roads, which = self._roads_of(X)
-        parts, order = [], []
-        for number in np.unique(numbers).tolist():
-            at = np.flatnonzero(numbers == number)
-            replay = self.fixes[number] if number >= 0 else None
-            rollout = self.simulator.embedded.run(
-                roads, which[at], self._columns(X[at]), noise=self.noise_keys(keys[at]),
-                **_changed(replay),
-            )  # fmt: skip
-            order.append(at)
-            parts.append(Trials.of(rollout, roads, which[at], harm, count))
-        found = Trials.join(parts).take(np.argsort(np.concatenate(order)))
+    def _try_rows(self, rows: Float, harm: str, count: Count) -> Trials:
+        """Simulate N rows at once, in this thread; see `try_rows`."""
+        found = try_rows(self.runner, rows, harm, count)
         if self.baseline is None:
             return found
-        unchanged = np.concatenate([X, keys, np.full((len(X), 1), -1.0)], axis=1)
-        return difference_of_trials(found, self.baseline.try_rows(unchanged, harm, count))
+        unchanged = rows.copy()
+        unchanged[:, -1] = -1.0
+        return difference_of_trials(found, try_rows(self.baseline.runner, unchanged, harm, count))
 
-    def noise_keys(self, X: Float) -> npt.NDArray[np.uint64]:
-        """Return the keys of N rows' random numbers, ``(N,)``."""
-        return self.simulator.embedded.noise_keys(self._columns(X), len(X))
-
-    def rollout_again(self, X: Float, noise: npt.NDArray[np.uint64]) -> Rollout:
-        """Roll out N rows in the embedded simulator with the random numbers of some keys."""
-        return joined_rollouts(
-            [(at, one._again(X[at], noise[at])) for at, one in self.by_variant(X)]
-        )
-
-    def _again(self, X: Float, noise: npt.NDArray[np.uint64]) -> Rollout:
-        """Roll out N rows of one storyboard; see ``rollout_again``."""
-        if self._refused:
-            return self._failed(X)
-        roads, rows = self._roads_of(X)
-        return self.simulator.embedded.run(roads, rows, self._columns(X), noise=noise)
-
-    def _columns(self, X: Float) -> dict[str, Float]:
-        return {name: X[:, i] for i, name in enumerate(self.space.names)}
-
-    def facts(self, x: Float) -> dict[str, float]:
-        """Return the parameters of one row that its scenario depends on, by name.
-
-        Without an adversary's decisions, which the scenario contains as a course.
-        """
-        unused = {*self.source.unused_names, *self.space.decisions}
-        return {name: one for name, one in self.space.values(x).items() if name not in unused}
-
-    def concrete(self, x: Float, road_file: str = "") -> ConcreteScenario:
-        """Return the concrete scenario of one row.
-
-        Args:
-            x: ``(len(space.names),)``.
-            road_file: the name of its OpenDRIVE file; the map's own name by default.
-        """
-        return self.source.concrete(self.space.values(x), road_file)
-
-    def rollout(self, X: Float, *, until_collision: bool = False) -> Rollout:
-        """Roll out N rows as ``evaluate`` does, and keep the motion.
+    def rollout(self, X: Float) -> Rollout:
+        """Roll out N rows as ``evaluate`` does, wherever the simulator is, and keep the motion.
 
         Args:
             X: ``(N, len(space.names))`` float64.
-            until_collision: whether rows may end where the ego collides, to save time.
         """
         if not self._is_far:
-            return joined_rollouts(
-                [
-                    (at, one._run(*one._roads_of(X[at]), X[at], until_collision=until_collision))
-                    for at, one in self.by_variant(X)
-                ]
-            )
+            return self.runner.run(X)
         parts, start = [], 0
         for part in self._map(type(self).rollout, X):
             rows, rollout = np.arange(start, start := start + part.rows), part.result
             if isinstance(rollout, Lost):
-                lost = self._run(*self._roads_of(X[rows]), X[rows])
+                lost = self.runner.run(X[rows])
                 status = np.full(part.rows, WORKER_ENDED, np.int8)
                 rollout = replace(lost, status=status, messages={0: rollout.reason})
             parts.append((rows, rollout))
-        return joined_rollouts(parts)
+        return joined(parts)
 
     def rollouts(self, X: Float) -> list[Rollout | Lost]:
         """Roll out N rows in the workers; return the rollouts of consecutive parts of them."""
@@ -640,18 +463,7 @@ class Pipeline:
     def replays(
         self, X: Float, *, plans: bool = True, noise: npt.NDArray[np.uint64] | None = None
     ) -> Replays:
-        """Roll out N rows, of one storyboard or of several, as ``replay`` does."""
-        return Replays(
-            tuple(
-                (at, one.replay(X[at], plans=plans, noise=None if noise is None else noise[at]))
-                for at, one in self.by_variant(X)
-            )
-        )
-
-    def replay(
-        self, X: Float, *, plans: bool = True, noise: npt.NDArray[np.uint64] | None = None
-    ) -> Replay:
-        """Roll out N rows of one storyboard as ``evaluate`` does, with the egos' plans and weather.
+        """Roll out N rows as ``evaluate`` does, with the egos' plans and the weather.
 
         Args:
             X: ``(N, len(space.names))`` float64.
@@ -660,60 +472,18 @@ class Pipeline:
             noise: ``(N,)`` keys of the rows' random numbers, in the embedded simulator; their own
                 by default.
         """
-        embedded = self.simulator.embedded
-        roads, rows = self._roads_of(X)
-        rollout = self.rollout(X) if noise is None else self.rollout_again(X, noise)
-        columns = {name: X[:, i] for i, name in enumerate(self.space.names)}
-        intentions, ways = None, []
-        if plans and self.simulator is embedded and not self._is_far:
-            intentions = embedded.intentions(roads, rows, columns, rollout)
-            ways = [
-                {way: roads.way(p, way) for way in np.unique(named[named >= 0]).tolist()}
-                for p, named in zip(rows.tolist(), intentions.way, strict=True)
-            ]
-        weathers = [embedded.weathers(columns, rollout, i) for i in range(len(X))]
-        return Replay(rollout, intentions, ways, weathers)
+        parts = []
+        for at, one in self.runner.by_variant(X):
+            if noise is None:
+                rollout = self.rollout(X[at]) if self._is_far else one.run(X[at])
+            else:
+                rollout = one.run(X[at], noise=noise[at])
+            parts.append((at, replay_of(one, X[at], rollout, plans=plans and not self._is_far)))
+        return Replays(tuple(parts))
 
-    def bodies(self, x: Float) -> Mapping[str, str]:
-        """Return what the entities of a row are, by name: a car, a pedestrian, a cone."""
-        return self.source.bodies(self.space.values(x))
-
-    def _failed(self, X: Float) -> Rollout:
-        """Return the rollout of N rows whose values make no scenario."""
-        columns = {
-            name: X[:, i]
-            for i, name in enumerate(self.space.names)
-            if name not in self.simulator.fixed
-        }
-        batch = self.simulator.embedded.batch(*self._roads_of(X), columns)
-        batch.start()
-        batch.fail(NO_SCENARIO, self._refused)
-        return batch.rollout()
-
-    def _run(
-        self,
-        roads: Any,
-        rows: Int,
-        X: Float,
-        replay: Counterfactual | None = None,
-        *,
-        until_collision: bool = False,
-    ) -> Rollout:
-        """Roll out N rows of one storyboard."""
-        if self._refused:
-            return self._failed(X)
-        columns = {name: X[:, i] for i, name in enumerate(self.space.names)}
-        if until_collision and self.simulator is self.simulator.embedded:
-            return self.simulator.run(roads, rows, columns, until_collision=True)
-        if replay is not None and replay.kinematic:  # another vehicle has the embedded one alone
-            return self.simulator.embedded.run(roads, rows, columns, **_changed(replay))
-        if replay is None:
-            return self.simulator.run(roads, rows, columns)
-        return self.simulator.run(roads, rows, columns, driver=replay.driver, dry=replay.dry)
-
-    def measure_rows(self, X: Float) -> Float:
+    def _measure_rows(self, X: Float) -> Float:
         """Return the metrics of N rows, ``(N, M)``, in this thread."""
-        return self.measure(self.rollout(X))
+        return self.measure(self.runner.run(X))
 
     def measure(self, rollout: Rollout) -> Float:
         """Return all recorded quantities of a rollout, ``(N, len(metrics))``.
@@ -732,7 +502,7 @@ class Pipeline:
         try:
             return self._workers.map(self, work, X, *args)
         except KeyboardInterrupt:
-            self.simulator.stop()
+            self.runner.simulator.stop()
             raise
 
     def _lost(self, rows: int, lost: Lost) -> Evaluation:
@@ -743,24 +513,6 @@ class Pipeline:
         cause = np.full(rows, Cause.NONE, np.int8) if self.seeks_causes else None
         findings = Findings.none(rows)
         return Evaluation(metrics, F, critical, status, findings, {0: lost.reason}, cause)
-
-    def _roads_of(self, X: Float) -> tuple[Any, Int]:
-        """Return the compiled road networks of rows, and each row's network, ``(N,)``."""
-        if self._roads is not None:
-            return self._roads, np.zeros(len(X), dtype=np.int64)
-        source, names = self.source, self._road_names
-        columns = [self.space.index(name) for name in names]
-        distinct, rows = np.unique(X[:, columns], axis=0, return_inverse=True)
-        values = [dict(zip(names, row, strict=True)) for row in distinct.tolist()]
-        roads = self.simulator.roads(
-            [source.roads(one) for one in values], [source.courses(one) for one in values]
-        )
-        return roads, rows.reshape(-1).astype(np.int64)
-
-    @property
-    def _road_names(self) -> tuple[str, ...]:
-        """The parameters that a row's road network, and the courses on it, depend on."""
-        return tuple(dict.fromkeys((*self.source.static_names, *self.source.course_names)))
 
 
 class EvaluationStream:
@@ -782,22 +534,15 @@ class EvaluationStream:
         """Wait for the evaluation of the next n rows; as many must have been added."""
         parts = self._rows.take(n)
         self._pending -= n
-        return self._pipeline.joined(parts)
+        return self._pipeline._joined(parts)
 
     def __enter__(self) -> Self:
         return self
 
     def __exit__(self, *_: object) -> None:
         if self._pending:
-            self._pipeline.simulator.stop()
+            self._pipeline.runner.simulator.stop()
         self._rows.close()
-
-
-def _changed(fix: Counterfactual | None) -> dict[str, Any]:
-    """Return what a replay changes, as arguments of the embedded simulator."""
-    if fix is None:
-        return {}
-    return {"driver": fix.driver, "dry": fix.dry, "kinematic": fix.kinematic}
 
 
 Carried = tuple[CarriedDriver | None, CarriedDriver | None]
@@ -823,25 +568,6 @@ def _compile_ahead(carried: Carried, options: PipelineOptions, **made_with: Any)
     else:
         options = replace(options, ego=ego.name if ego else None)
     Pipeline(options=options, **made_with, workers=Threads(1)).compile_ahead()
-
-
-def _source(
-    scenario: SearchedScenario,
-    driver: egos.Driver | None,
-    road_map: RoadMap | None,
-    space: SearchSpace,
-) -> Source:
-    if driver is None:
-        return source_of(scenario, None, road_map)
-    source = source_of(scenario, driver.name, road_map, egos.join(driver.ideal))
-    if isinstance(source, OntologySource) and source.constraints.adversary:
-        if source.variant_names:
-            raise InputError(
-                f"{scenario.place}: an adversary drives in one storyboard, so no type may vary "
-                f"({', '.join(source.variant_names)})"
-            )
-        return AdversarySource(source, space.values(space.row({})))
-    return source
 
 
 def metrics_of(

@@ -14,8 +14,8 @@ from bridgegen.assess.criteria import by_gravity, quantity, summarise_criteria
 from bridgegen.assess.objective import Objective, Rule
 from bridgegen.base.arrays import Taken
 from bridgegen.base.errors import ScenarioError
-from bridgegen.engine.evaluation import Replays
 from bridgegen.engine.pipeline import Pipeline
+from bridgegen.engine.replays import Replays
 from bridgegen.pages.data import (
     WHOLE,
     Column,
@@ -103,6 +103,7 @@ def build_report(
         happening: which events began, and who came near the ego, if it is known.
     """
     scenario, limits = pipeline.scenario, pipeline.objective.thresholds
+    embedded = pipeline.runner.embedded
     terms, rule = pipeline.objective.names, pipeline.objective.rule
     if pipeline.objective.objectives == "one":
         weighted = zip(terms, pipeline.objective.weights, strict=True)
@@ -113,7 +114,7 @@ def build_report(
         scenario=scenario.name,
         title=scenario.title,
         description=scenario.description.strip(),
-        road=pipeline.source.road,
+        road=pipeline.runner.source.road,
         ego=pipeline.driver.label,
         baseline=pipeline.baseline.driver.label if pipeline.baseline else "",
         algorithm=algorithm,
@@ -142,7 +143,7 @@ def build_report(
         settings={
             "axes searched": ", ".join(str(axis) for axis in pipeline.space.axes),
             **wanted,
-            "simulated": f"{pipeline.simulator.duration:g} s at {pipeline.simulator.time_step:g} s",
+            "simulated": f"{embedded.duration:g} s at {embedded.time_step:g} s",
         },
     )
     modes = triage.modes[:MOST_MODES] if triage else ()
@@ -236,7 +237,7 @@ def _evaluations(pipeline: Pipeline, rows: Rows | Recorded) -> Evaluations:
             declared[name].kind.labels() if name in declared else {},
         )
         for i, (name, unit) in enumerate(zip(space.names, space.units, strict=True))
-        if name not in {*pipeline.source.unused_names, *space.decisions}
+        if name not in {*pipeline.runner.source.unused_names, *space.decisions}
     )
     metrics = tuple(
         Column(

@@ -36,7 +36,7 @@ def further_playbacks(
     best = critical[by_merit(rows.F[critical])]
     best = best[~np.isin(best, list(kept))]
     space = pipeline.space
-    own = space.decisions or {*pipeline.source.static_names} & {*space.variables}
+    own = space.decisions or {*pipeline.runner.source.static_names} & {*space.variables}
     most = MOTIONS_OF_THEIR_OWN if own else max(MOTIONS, len(rows) // 10)
     first = [evaluation for evaluation in wanted if evaluation not in kept]
     best = best[:most]

@@ -15,8 +15,8 @@ from bridgegen.assess.metrics.ttc import ttc_over_time
 from bridgegen.base.arrays import Float
 from bridgegen.base.errors import FileFormatError
 from bridgegen.drivers import _weather_columns as column
-from bridgegen.engine.evaluation import Replay, Replays
 from bridgegen.engine.pipeline import Pipeline
+from bridgegen.engine.replays import Replay, Replays
 from bridgegen.pages.painter import paint
 from bridgegen.pages.playback import Beside, Conflict, Course, Planned, Playback, Weather
 from bridgegen.pages.scenery import Scenery, bodies, lamps, vehicle_lamps
@@ -160,7 +160,7 @@ def beside_others(
     """
     found: list[list[Beside]] = [[] for _ in played]
     for label, pipeline in others.items() if played else ():
-        rollout = pipeline.rollout(X) if noise is None else pipeline.rollout_again(X, noise)
+        rollout = pipeline.rollout(X) if noise is None else pipeline.runner.run(X, noise=noise)
         for k, one in enumerate(played):
             if rollout.status[k] == 0:
                 found[k].append(_beside(label, one, rollout, k))
@@ -190,7 +190,7 @@ def nominal_playback(pipeline: Pipeline, name: str) -> Playback:
         FileFormatError: it has no result.
     """
     X = pipeline.space.row({})[np.newaxis]
-    replay = pipeline.replay(X, plans=False)
+    ((_, replay),) = pipeline.replays(X, plans=False).parts
     rollout = replay.rollout
     if rollout.status[0] != 0:
         words = [STATUS_MESSAGES[int(rollout.status[0])], *rollout.messages.values()]
@@ -219,14 +219,15 @@ def _played(
     rollout, objective = replay.rollout, getattr(pipeline, "objective", None)
     count: Count = objective.count if objective else "ego"
     conflicts = analyse(rollout)
-    entities, scenery = bodies(rollout, pipeline.bodies(shown[0].x)), Scenery(pipeline)
+    entities = bodies(rollout, pipeline.runner.bodies(shown[0].x))
+    scenery = Scenery(pipeline.runner)
     nearest = rollout.distance.min(axis=1)
     ttc, detections = ttc_over_time(rollout), sensed(rollout)
-    shows = vehicle_lamps(rollout, pipeline.simulator.embedded.program.sirens)
-    checked = constraints_in_words(pipeline.source.constraints)
+    shows = vehicle_lamps(rollout, pipeline.runner.embedded.program.sirens)
+    checked = constraints_in_words(pipeline.runner.source.constraints)
     found = []
     for k, one in enumerate(shown):
-        concrete = pipeline.concrete(one.x) if not brief else None
+        concrete = pipeline.runner.concrete(one.x) if not brief else None
         motion = {name: getattr(rollout, name)[k] for name in "xyhva"}
         if rollout.present.size:  # who is not there has no place and no speed
             motion |= {name: np.where(rollout.present[k], motion[name], np.nan) for name in "xyva"}
@@ -240,7 +241,7 @@ def _played(
                 name=one.name,
                 rank=k + 1,
                 evaluation=one.evaluation,
-                parameters=pipeline.facts(one.x),
+                parameters=pipeline.runner.facts(one.x),
                 metrics=dict(zip(pipeline.metrics, one.metrics.tolist(), strict=True)),
                 critical=one.critical,
                 time_step=rollout.time_step,

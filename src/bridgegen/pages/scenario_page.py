@@ -155,7 +155,7 @@ def _body(scenario: LogicalScenario) -> Iterator[str]:
     yield f'<p class="lead">{_text(scenario.description)}</p>'
     yield f'<p class="muted">Source: {_text(scenario.source)}</p>'
     yield (
-        f'<figure class="card sketch">{sketch(pipeline)}<figcaption class="muted">At the '
+        f'<figure class="card sketch">{sketch(pipeline.runner)}<figcaption class="muted">At the '
         "defaults, when they are closest; dashed: where each starts.</figcaption></figure>"
     )
     lines = "".join(f"<li>{_text(line)}</li>" for line in story_lines(scenario))

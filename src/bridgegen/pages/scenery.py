@@ -9,7 +9,7 @@ import numpy.typing as npt
 from bridgegen.base.arrays import Float, Int
 from bridgegen.drivers._kind_tables import IS_VEHICLE
 from bridgegen.drivers.lamps import BLUE, BRAKE, BRAKE_LIGHTS_FROM
-from bridgegen.engine.pipeline import Pipeline
+from bridgegen.engine.runner import Runner
 from bridgegen.openx.opendrive.lanes import points
 from bridgegen.openx.opendrive.model import OpenDrive
 from bridgegen.openx.opendrive.outline import Light, Shape, lights, outline
@@ -35,23 +35,23 @@ class RoadPicture:
 
 
 class Scenery:
-    """The drawings of a pipeline's road networks, each drawn once.
+    """The drawings of a runner's road networks, each drawn once.
 
     Args:
-        pipeline: of the scenarios.
+        runner: of the scenarios.
     """
 
-    def __init__(self, pipeline: Pipeline) -> None:
-        self._pipeline = pipeline
+    def __init__(self, runner: Runner) -> None:
+        self._runner = runner
         self._known: dict[bytes, RoadPicture] = {}
 
     def road(self, x: Float) -> RoadPicture:
         """Return the drawing of a row's road network, the same objects for the same network."""
-        space, source = self._pipeline.space, self._pipeline.source
+        space, source = self._runner.space, self._runner.source
         names = (*source.variant_names, *source.static_names)
         key = x[[space.index(name) for name in names]].tobytes()
         if key not in self._known:
-            model = self._pipeline.concrete(x).roads
+            model = self._runner.concrete(x).roads
             found = tuple(Outline(*one) for one in _outline(model, source.place(space.values(x))))
             self._known[key] = RoadPicture(found, lights(model), street_lights(model))
         return self._known[key]

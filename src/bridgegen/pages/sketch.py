@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from bridgegen.base.arrays import Bool, Float
-from bridgegen.engine.pipeline import Pipeline
+from bridgegen.engine.runner import Runner
 from bridgegen.pages.playback import AREA_KINDS, Entity, Lamp, Outline
 from bridgegen.pages.scenery import Scenery, bodies, lamps
 from bridgegen.scenario.participants import drawing_of
@@ -56,25 +56,25 @@ class _View(NamedTuple):
         return bool((low <= middle + half).all() and (high >= middle - half).all())
 
 
-def sketch(pipeline: Pipeline, x: Float | None = None) -> str:
+def sketch(runner: Runner, x: Float | None = None) -> str:
     """Return the picture of one row of a scenario.
 
     Args:
-        pipeline: of the scenario and its ego.
+        runner: of the scenario and its ego.
         x: ``(len(space.names),)``; by default the row of the defaults.
 
     Returns:
         SVG of `WIDTH` by `HEIGHT` pixels: every body at the closest approach, its path until
         shortly afterwards, and as a dashed outline its start.
     """
-    x = pipeline.space.row({}) if x is None else x
-    rollout = pipeline.rollout(x[np.newaxis])
-    road = Scenery(pipeline).road(x)
+    x = runner.space.row({}) if x is None else x
+    rollout = runner.run(x[np.newaxis])
+    road = Scenery(runner).road(x)
     n = int(rollout.n_steps[0])
     distance = rollout.distance[0].min(axis=0)[:n]
     closest = int(distance.argmin()) if np.isfinite(distance).any() else n - 1
     last = min(n - 1, closest + round(_AFTER / rollout.time_step))
-    entities = bodies(rollout, pipeline.bodies(x))
+    entities = bodies(rollout, runner.bodies(x))
     where = np.stack([rollout.x[0], rollout.y[0], rollout.h[0]], axis=-1)  # (E, T, 3)
     there = rollout.present[0] if rollout.present.size else np.ones(where.shape[:2], np.bool_)
     moving = [e == 0 or bool((rollout.v[0, e, :n] > _MOVES).any()) for e in range(len(entities))]
@@ -94,7 +94,7 @@ def sketch(pipeline: Pipeline, x: Float | None = None) -> str:
         if not at_works:
             labels.append((body.name, colour, view.point(*_centre(body, where[e, closest]))))
     parts += _labels(labels)
-    title = html.escape(f"{pipeline.scenario.title}, seen from above")
+    title = html.escape(f"{runner.scenario.title}, seen from above")
     return (
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH} {HEIGHT}" role="img" '
         f'font-family="system-ui, sans-serif"><title>{title}</title>'

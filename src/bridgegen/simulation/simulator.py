@@ -1,32 +1,24 @@
 """What every simulator does: take a storyboard and roads once, then rows by the thousand."""
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Protocol, TypeVar
+from typing import Protocol, TypeVar
 
 import numpy.typing as npt
 
 from bridgegen.base.arrays import Float, Int
 from bridgegen.drivers import Driver
 from bridgegen.openx.opendrive.model import OpenDrive
-from bridgegen.simulation.embedded.simulator import EmbeddedSimulator
 from bridgegen.simulation.rollout import Rollout
-
-if TYPE_CHECKING:
-    from bridgegen.simulation.embedded.simulator import EmbeddedSimulator
 
 Roads = TypeVar("Roads")
 
 
 class Simulator(Protocol[Roads]):
-    """A simulator that holds one storyboard; its rollouts depend on nothing else."""
+    """A simulator that holds one storyboard; its rollouts depend on nothing else.
 
-    @property
-    def embedded(self) -> "EmbeddedSimulator":
-        """The embedded one of the same storyboard and driver; itself, if it is that."""
-
-    @property
-    def driver(self) -> str:
-        """Who drives the ego, and which of its stages are ideal."""
+    What the storyboard says (its driver, parameters, duration and time step) is known from the
+    embedded simulator, which compiles each storyboard whoever runs it.
+    """
 
     @property
     def rows_at_once(self) -> int:
@@ -35,22 +27,6 @@ class Simulator(Protocol[Roads]):
     @property
     def runs_at_once(self) -> int:
         """How many calls of ``run`` had best go on at a time, each in a thread."""
-
-    @property
-    def time_step(self) -> float:
-        """Between two recorded instants [s]."""
-
-    @property
-    def duration(self) -> float:
-        """The longest that a scenario takes [s]."""
-
-    @property
-    def fixed(self) -> Mapping[str, str]:
-        """The parameters that rows may not vary, and what they are used for."""
-
-    @property
-    def parameters(self) -> Mapping[str, float]:
-        """The storyboard's numeric parameters with their declared values."""
 
     def roads(
         self, models: Sequence[OpenDrive], courses: Sequence[Mapping[str, Float]] = ()
@@ -91,45 +67,3 @@ class Simulator(Protocol[Roads]):
 
     def stop(self) -> None:
         """Let what is being rolled out in other threads end soon; it is of no use afterwards."""
-
-
-# --- What a simulator beside the embedded one says of a storyboard just as that one does ---
-
-
-class AroundEmbedded:
-    """The part of `Simulator` that the embedded one answers for any other.
-
-    Args:
-        embedded: the embedded one of the same storyboard and driver.
-
-    Attributes:
-        embedded: see `Simulator`.
-    """
-
-    def __init__(self, embedded: EmbeddedSimulator) -> None:
-        self.embedded = embedded
-
-    @property
-    def driver(self) -> str:
-        """See `Simulator`."""
-        return self.embedded.driver
-
-    @property
-    def time_step(self) -> float:
-        """See `Simulator`."""
-        return self.embedded.time_step
-
-    @property
-    def duration(self) -> float:
-        """See `Simulator`."""
-        return self.embedded.duration
-
-    @property
-    def fixed(self) -> Mapping[str, str]:
-        """See `Simulator`."""
-        return self.embedded.fixed
-
-    @property
-    def parameters(self) -> Mapping[str, float]:
-        """See `Simulator`."""
-        return self.embedded.parameters

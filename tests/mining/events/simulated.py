@@ -39,7 +39,7 @@ def simulated(name, count, ego, seed=1):
     X = rows_of(scenario, space, count - 1, seed).X
     rollout = pipeline.rollout(X)
     assert (rollout.status == 0).all()
-    lanes = lanes_of_map(pipeline.concrete(X[0]).roads, name)
+    lanes = lanes_of_map(pipeline.runner.concrete(X[0]).roads, name)
     return scenario, dict(zip(space.names, X.T, strict=True)), rollout, lanes
 
 

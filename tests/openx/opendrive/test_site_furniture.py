@@ -25,7 +25,7 @@ def lit() -> OpenDrive:
     """Return the map of red-light-runner, as if it came from elsewhere."""
     scenario = load("red-light-runner")
     pipeline = Pipeline(scenario, scenario.space())
-    return pipeline.concrete(pipeline.space.row({})).roads
+    return pipeline.runner.concrete(pipeline.space.row({})).roads
 
 
 def lights(site: Site) -> set[tuple[str, str | None]]:
@@ -116,7 +116,7 @@ def test_a_scenario_with_lights_needs_them() -> None:
     scenario = load("red-light-runner")
     dark = replace(scenario, roads=replace(scenario.roads, signals="none"))
     pipeline = Pipeline(dark, dark.space())
-    model = pipeline.concrete(pipeline.space.row({})).roads
+    model = pipeline.runner.concrete(pipeline.space.row({})).roads
     site = site_for(dark, model)
     assert missing(scenario, model, site) == [
         "a traffic light on leg A", "a traffic light on leg D"
@@ -126,7 +126,7 @@ def test_a_scenario_with_lights_needs_them() -> None:
 def test_pedestrians_need_a_crosswalk() -> None:
     scenario = load("pedestrian-at-night")
     pipeline = Pipeline(scenario, scenario.space())
-    model = pipeline.concrete(pipeline.space.row({})).roads
+    model = pipeline.runner.concrete(pipeline.space.row({})).roads
     site = site_for(scenario, model)
     assert ("D", 3.0) in {(one.leg, one.distance) for one in site.facilities}
     bare = replace(model, roads=tuple(replace(road, objects=()) for road in model.roads))
@@ -142,7 +142,7 @@ def test_more_lanes_count_from_the_outermost() -> None:
         roads=replace(scenario.roads, knobs=dict(scenario.roads.knobs) | {"lanes": 3.0}),
     )
     pipeline = Pipeline(wide, wide.space())
-    model = pipeline.concrete(pipeline.space.row({})).roads
+    model = pipeline.runner.concrete(pipeline.space.row({})).roads
     site = site_for(scenario, model, "1")
     there, notes = adapted(scenario, model, site)
     assert [one.start.lane for one in there.participants] == [3, "shoulder"]
@@ -158,7 +158,7 @@ def test_a_lane_that_is_not_there_is_the_outermost_one() -> None:
         ),
     )
     pipeline = Pipeline(narrow, narrow.space())
-    model = pipeline.concrete(pipeline.space.row({})).roads
+    model = pipeline.runner.concrete(pipeline.space.row({})).roads
     first, *others = scenario.story.participants
     outside = replace(first, start=replace(first.start, lane=2))
     story = replace(scenario.story, participants=(outside, *others))

@@ -29,7 +29,7 @@ def crossroads() -> str:
     """The roads of a crossroads, as OpenDRIVE."""
     logical = load("crossroads-s1")
     pipeline = Pipeline(logical, logical.space(), PipelineOptions(ego="route-follower"))
-    return to_xml(pipeline.concrete(pipeline.space.row({})).roads).decode()
+    return to_xml(pipeline.runner.concrete(pipeline.space.row({})).roads).decode()
 
 
 @pytest.fixture

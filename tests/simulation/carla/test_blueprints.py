@@ -41,8 +41,8 @@ def test_everybody_of_the_catalogue_has_a_model(scenario):
     """The nearest in size of its kind: on foot if it is, with wheels if it has."""
     logical = load(scenario)
     pipeline = Pipeline(logical, logical.space())
-    program = pipeline.simulator.program
-    storyboard = pipeline.concrete(pipeline.space.row({})).storyboard
+    program = pipeline.runner.simulator.program
+    storyboard = pipeline.runner.concrete(pipeline.space.row({})).storyboard
     objects = {one.name: one.entity_object for one in storyboard.entities.scenario_objects}
     for e, name in enumerate(program.names):
         size = tuple(program.bodies[e, [0, 1, 7]].tolist())

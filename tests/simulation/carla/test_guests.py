@@ -26,7 +26,7 @@ def test_the_autopilot_goes_our_way(made, machine):
     pipeline = made("crossroads-s4", "carla-autopilot", seed=7)
     X = rows(pipeline, 2)
     rollout = pipeline.rollout(X)
-    assert pipeline.simulator.driver == "carla-autopilot"
+    assert pipeline.runner.embedded.driver == "carla-autopilot"
     assert (rollout.status == 0).all()
     (manager,) = machine.managers.values()
     assert manager.seed == 7

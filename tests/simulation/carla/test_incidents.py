@@ -15,8 +15,8 @@ from ..embedded.storyboards import after, crossroads, events, lane, lateral, sce
 def hit(pipeline):
     """Return a row in which the ego hits somebody."""
     X = pipeline.space.decode(np.random.default_rng(0).random((200, pipeline.space.n_var)))
-    rollout = pipeline.simulator.embedded.run(
-        pipeline._roads_of(X)[0].network, pipeline._roads_of(X)[1],
+    rollout = pipeline.runner.embedded.run(
+        pipeline.runner.roads_of(X)[0].network, pipeline.runner.roads_of(X)[1],
         {name: X[:, i] for i, name in enumerate(pipeline.space.names)},
     )  # fmt: skip
     contacts = metrics.evaluate(rollout, ("n_collision",))[:, 0]

@@ -129,7 +129,7 @@ def test_a_wet_road_has_less_grip(made, machine, monkeypatch):
     assert friction < 0.7
     pipeline.rollout(np.array([wet]))
     assert grips == [pytest.approx(DRY * friction)]
-    pipeline.simulator.run(*pipeline._roads_of(np.array([wet])), {}, dry=True)
+    pipeline.runner.simulator.run(*pipeline.runner.roads_of(np.array([wet])), {}, dry=True)
     assert len(grips) == 1
 
 
@@ -169,8 +169,8 @@ def test_who_is_not_there_is_not_seen(made, machine, monkeypatch):
 
     monkeypatch.setattr(machine, "tick", looking)
     pipeline = made("crossroads-s1", "route-follower", ego="kinematic")
-    joint = pipeline.simulator.embedded.co_simulation(
-        pipeline._roads_of(rows(pipeline, 1))[0].network, 0, {}
+    joint = pipeline.runner.embedded.co_simulation(
+        pipeline.runner.roads_of(rows(pipeline, 1))[0].network, 0, {}
     )
     kind = type(joint)
     monkeypatch.setattr(kind, "present", lambda self, k: np.array([True, k > 10]))
@@ -306,7 +306,7 @@ def test_it_is_started_by_the_command(machine, monkeypatch, tmp_path):
     machine.faults[machine.ticks + 100] = die
     assert (pipeline.rollout(rows(pipeline, 2)).status == 0).all()
     assert [one[0] for one in started] == [started[0][0], "e", started[0][0]]
-    pipeline.simulator._server.close()
+    pipeline.runner.simulator._server.close()
     assert started[-1] == "ended"
 
 
@@ -367,7 +367,7 @@ def test_settings_and_weather_are_put_back(made, machine):
 def test_ctrl_c_puts_them_back_too(made, machine):
     """It comes to the main thread, which stops the simulator; the row ends at the next tick."""
     pipeline = made("crossroads-s1", "route-follower", ego="kinematic")
-    machine.faults[machine.ticks + 20] = lambda _: pipeline.simulator.stop()
+    machine.faults[machine.ticks + 20] = lambda _: pipeline.runner.simulator.stop()
     ticks = machine.ticks
     rollout = pipeline.rollout(rows(pipeline, 3))
     assert (rollout.status == 40).all()
@@ -452,7 +452,7 @@ def test_another_time_step_is_refused(machine):
     from bridgegen.openx.openscenario.declarations import TIME_STEP
 
     pipeline = embedded("crossroads-s1", "route-follower")
-    storyboard = pipeline.concrete(pipeline.space.row({})).storyboard
+    storyboard = pipeline.runner.concrete(pipeline.space.row({})).storyboard
     old = storyboard.file_header.properties
     said = tuple(one for one in (old.properties if old else ()) if one.name != TIME_STEP)
     properties = osc.Properties((*said, osc.Property(TIME_STEP, "0.02")))

@@ -34,10 +34,12 @@ def pipeline():
 
 
 def sky_of(pipeline, values, storyboard=None):
-    joint = pipeline.simulator.co_simulation(pipeline._roads_of(row(pipeline))[0], 0, values)
+    joint = pipeline.runner.simulator.co_simulation(
+        pipeline.runner.roads_of(row(pipeline))[0], 0, values
+    )
     joint.decide(0)
-    storyboard = storyboard or pipeline.concrete(row(pipeline)[0]).storyboard
-    weather = Weather(storyboard, pipeline.simulator.program, values)
+    storyboard = storyboard or pipeline.runner.concrete(row(pipeline)[0]).storyboard
+    weather = Weather(storyboard, pipeline.runner.simulator.program, values)
     return weather.at(0, joint.weather, joint.events)
 
 
@@ -75,7 +77,7 @@ def test_without_our_properties_the_physical_quantities_tell_the_same(pipeline, 
     values = space.values(space.decode(np.full((1, space.n_var), 0.5))[0])
     said = {"fog_density": fog, "precipitation": rain, "cloudiness": 90, "wind_intensity": 5}
     values = space.values(space.row(said))
-    storyboard = pipeline.concrete(space.row(said)).storyboard
+    storyboard = pipeline.runner.concrete(space.row(said)).storyboard
     bare = without_properties(storyboard)
     assert not [one for one in walk(bare) if isinstance(one, osc.RoadCondition) and one.properties]
     with_them, without = sky_of(pipeline, values), sky_of(pipeline, values, bare)

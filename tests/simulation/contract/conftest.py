@@ -83,19 +83,23 @@ class Contender:
 
     def made(self, text, driver="route-follower"):
         """Return the simulator of a storyboard's text."""
+        return self._both(text, driver)[0]
+
+    def _both(self, text, driver):
+        """Return the simulator of a storyboard's text, and the embedded one."""
         storyboard = read(text.encode(), "test.xosc")
         limit = 5.0 if driver and is_spec(driver) else None
         ego = egos.get(driver, time_limit=limit) if driver else None
         embedded = EmbeddedSimulator(storyboard, "test.xosc", driver=ego)
-        return self.choose().around(embedded, storyboard)
+        return self.choose().around(embedded, storyboard), embedded
 
     def run(self, text, driver="route-follower", roads=None, replay=None, **values):
         """Return the rollout of a storyboard's text on the crossroads, of sound form."""
-        simulator = self.made(text, driver)
+        simulator, embedded = self._both(text, driver)
         n = len(next(iter(values.values()))) if values else 1
         ready = simulator.roads([roads or crossroads()])
         rollout = simulator.run(ready, np.zeros(n, dtype=np.int64), values, **(replay or {}))
-        is_sound(rollout, simulator, n)
+        is_sound(rollout, embedded, n)
         return rollout
 
 
@@ -122,12 +126,12 @@ def contender(request, monkeypatch):
         yield request.param
 
 
-def is_sound(rollout, simulator, n):
+def is_sound(rollout, embedded, n):
     """Assert that a rollout is as `Rollout` says, whatever happened in it."""
-    names = simulator.embedded.program.names
-    e, t = len(names), round(simulator.duration / simulator.time_step) + 1
+    names = embedded.program.names
+    e, t = len(names), round(embedded.duration / embedded.time_step) + 1
     assert rollout.names == names
-    assert rollout.time_step == simulator.time_step
+    assert rollout.time_step == embedded.time_step
     for name in ("x", "y", "h", "v", "a", "offset"):
         array = getattr(rollout, name)
         assert array.shape == (n, e, t), name

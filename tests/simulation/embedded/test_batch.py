@@ -34,8 +34,8 @@ def test_lock_step_gives_the_bits_of_the_rollout(name, ego):
     pipeline = Pipeline(logical, space, PipelineOptions(ego=ego))
     X = space.decode(np.random.default_rng(0).random((20, space.n_var)))
     columns = {parameter: X[:, i] for i, parameter in enumerate(space.names)}
-    made = pipeline.simulator
-    roads = made.roads([pipeline.concrete(space.row({})).roads])
+    made = pipeline.runner.simulator
+    roads = made.roads([pipeline.runner.concrete(space.row({})).roads])
     batch = made.batch(roads, np.zeros(len(X), dtype=np.int64), columns)
     whole, stepped = pipeline.rollout(X), in_lock_step(batch)
     assert (len(set(whole.n_steps.tolist())) > 1) == (name != "cut-in")

@@ -121,7 +121,7 @@ def test_what_cannot_be_chosen_is_refused(made, old, new, problem):
 
 def test_a_map_has_no_such_choice(made):
     pipeline = made()
-    model = pipeline.source.roads({})
+    model = pipeline.runner.source.roads({})
     with pytest.raises(
         UnsupportedError, match=r"roads of the scenario's own \(side chooses where ego"
     ):

@@ -21,9 +21,9 @@ def made(scenario, ego):
 
 def begun(pipeline, seed=4):
     X = pipeline.space.decode(np.random.default_rng(seed).random((1, pipeline.space.n_var)))
-    roads, rows = pipeline._roads_of(X)
+    roads, rows = pipeline.runner.roads_of(X)
     values = pipeline.space.values(X[0])
-    return X, pipeline.simulator.embedded.co_simulation(roads, int(rows[0]), values)
+    return X, pipeline.runner.embedded.co_simulation(roads, int(rows[0]), values)
 
 
 def driven(joint, between=lambda joint, k: None):
@@ -149,9 +149,9 @@ def test_the_stop_trigger_can_be_overruled():
 def test_a_driver_that_fails_says_so(file, name, kind):
     pipeline = made("crossroads-s1", f"{EGO / file}:{name}")
     x = pipeline.space.row({"ego_speed": 8.5})
-    roads, rows = pipeline._roads_of(x[np.newaxis])
+    roads, rows = pipeline.runner.roads_of(x[np.newaxis])
     values = pipeline.space.values(x)
     with pytest.raises(DriverError) as caught:
-        driven(pipeline.simulator.embedded.co_simulation(roads, int(rows[0]), values))
+        driven(pipeline.runner.embedded.co_simulation(roads, int(rows[0]), values))
     assert caught.value.kind == kind
     assert "Error" in str(caught.value)

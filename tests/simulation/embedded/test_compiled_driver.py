@@ -128,8 +128,8 @@ def test_a_replay_with_ideal_perception_is_just_that(file, name):
     X = rows(pipeline, 6)
     replay = counterfactuals(pipeline.driver)[0]
     assert replay.cause == Cause.PERCEPTION
-    simulator, columns = pipeline.simulator, dict(zip(pipeline.space.names, X.T, strict=True))
-    roads = simulator.roads([pipeline.concrete(X[0]).roads])
+    simulator, columns = pipeline.runner.simulator, pipeline.runner.columns(X)
+    roads = simulator.roads([pipeline.runner.concrete(X[0]).roads])
     replayed = simulator.run(roads, np.zeros(6, np.int64), columns, driver=replay.driver)
     other = made(name, "jam-tail-in-fog", file=file, ideal=["perception"]).rollout(X)
     foggy = pipeline.rollout(X)
@@ -158,7 +158,7 @@ def test_a_driver_that_hangs_can_be_stopped(file, name):
         hangs = threads.submit(pipeline.rollout, X)
         with pytest.raises(TimeoutError):
             hangs.result(timeout=1.0)
-        pipeline.simulator.stop()
+        pipeline.runner.simulator.stop()
         with pytest.raises(DriverError, match="ended with status"):
             hangs.result(timeout=20.0)
 

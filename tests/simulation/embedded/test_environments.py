@@ -159,8 +159,8 @@ def test_a_catalogue_scenario_s_own_numbers_arrive():
     given = {name: value for name, value in given.items() if name in space.variables}
     assert given
     x = space.row(given)
-    made = pipeline.simulator
-    roads = made.roads([pipeline.concrete(x).roads])
+    made = pipeline.runner.simulator
+    roads = made.roads([pipeline.runner.concrete(x).roads])
     columns = {name: x[i : i + 1] for i, name in enumerate(space.names)}
     batch = made.batch(roads, np.zeros(1, dtype=np.int64), columns)
     batch.start()

@@ -22,7 +22,8 @@ def replayed(name: str, ego: str, ideal=()):
     space = logical.space()
     pipeline = Pipeline(logical, space, PipelineOptions(ego=ego, ideal=ideal))
     X = space.decode(np.random.default_rng(3).random((N, space.n_var)))
-    return pipeline, X, pipeline.replay(X)
+    ((_, replay),) = pipeline.replays(X).parts
+    return pipeline, X, replay
 
 
 def real(replay, row):
@@ -34,8 +35,8 @@ def real(replay, row):
 
 def test_what_is_asked_up_to_an_instant_is_the_rollout_up_to_there():
     pipeline, X, replay = replayed("cut-in", "reference")
-    made = pipeline.simulator
-    roads = made.roads([pipeline.concrete(X[0]).roads])
+    made = pipeline.runner.simulator
+    roads = made.roads([pipeline.runner.concrete(X[0]).roads])
     columns = {name: X[:, i] for i, name in enumerate(pipeline.space.names)}
     for k in (0, 37, 200):
         batch = Batch(replace(made.program, n_steps=k + 1), roads, np.zeros(N, np.int64), columns)
@@ -49,7 +50,7 @@ def test_what_is_asked_up_to_an_instant_is_the_rollout_up_to_there():
 def test_with_ideal_control_it_does_what_it_planned(name):
     """Only tyres, its own limits and standing come between."""
     pipeline, _, replay = replayed(name, "reference", ("control",))
-    most_speed_up, most_braking = pipeline.simulator.program.bodies[0, 4:6]
+    most_speed_up, most_braking = pipeline.runner.simulator.program.bodies[0, 4:6]
     compared = changed = 0
     for row in range(N):
         at, k = real(replay, row)

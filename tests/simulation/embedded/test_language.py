@@ -81,8 +81,8 @@ def motion(pipeline: Pipeline, **values):
 
 def there_and_back(pipeline: Pipeline) -> None:
     """The files say it, the constraints hold, and what is read is what was written."""
-    concrete = pipeline.concrete(pipeline.space.row({}), "roads.xodr")
-    assert not list(check(concrete.individuals, pipeline.source.constraints))
+    concrete = pipeline.runner.concrete(pipeline.space.row({}), "roads.xodr")
+    assert not list(check(concrete.individuals, pipeline.runner.source.constraints))
     found, lost = individuals_from_openscenario(
         concrete.storyboard, concrete.roads, "roads.xodr", ""
     )[:2]
@@ -264,7 +264,7 @@ def test_a_gap_a_contact_and_a_beginning(made):
 def test_a_siren_is_in_the_files(made):
     text = PARTICIPANTS.replace("other:\n    type: car", "other:\n    type: emergency")
     pipeline = made(text.replace("other_at, lane: 1}", "other_at, lane: 1}\n    siren: true"))
-    assert pipeline.simulator.embedded.program.sirens.tolist() == [0, 1]
+    assert pipeline.runner.embedded.program.sirens.tolist() == [0, 1]
     there_and_back(pipeline)
     with pytest.raises(ScenarioError, match="a siren is for emergency vehicles"):
         made(PARTICIPANTS + "    siren: true\n")
@@ -301,8 +301,8 @@ BUILDING = """
 def test_bodies_of_ones_own(made):
     """A motorcycle 2.6 m long: reference point and axles as far from its middle, in proportion."""
     pipeline = made(PARTICIPANTS + BUILDING)
-    names = pipeline.simulator.embedded.program.names
-    box = dict(zip(names, pipeline.simulator.embedded.program.box.tolist(), strict=True))
+    names = pipeline.runner.embedded.program.names
+    box = dict(zip(names, pipeline.runner.embedded.program.box.tolist(), strict=True))
     assert box["building"] == [20.0, 8.0, 0.0]
     assert box["parked"] == pytest.approx([2.6, 0.8, 0.7 * 2.6 / 2.2])
     there_and_back(pipeline)
@@ -363,14 +363,14 @@ def test_types_vary(made, tmp_path, monkeypatch):
     X = np.array([space.row({"lead_type": float(k)}) for k in (2, 0, 1, 1)])
     pipeline.choose_objective()
     found = pipeline.evaluate(X)
-    assert pipeline.kinds["lead"] == "car or truck or motorcycle"
+    assert pipeline.runner.kinds["lead"] == "car or truck or motorcycle"
     lengths = {"car": 4.6, "truck": 10.0, "motorcycle": 2.2}
     for k, kind in enumerate(("motorcycle", "car", "truck")):
-        ((_, one),) = pipeline.by_variant(X[k : k + 1])
-        rollout = one.rollout(X[k : k + 1])
+        ((_, one),) = pipeline.runner.by_variant(X[k : k + 1])
+        rollout = one.run(X[k : k + 1])
         lead = rollout.names.index("lead")
         assert rollout.box[lead, 0] == pytest.approx(lengths[kind], abs=0.5)
-        assert pipeline.bodies(X[k])["lead"] == kind
+        assert pipeline.runner.bodies(X[k])["lead"] == kind
         alone = made(
             PARTICIPANTS + LEAD.replace("    type_by: lead_type\n", "").replace("car", kind)
         )
@@ -399,7 +399,7 @@ def test_models_by_name(made):
     row = pipeline.space.row({})
     rollout = pipeline.rollout(row[np.newaxis])
     assert rollout.box[rollout.names.index("lead")] == pytest.approx([4.023, 1.712, 1.328])
-    written = to_xml(pipeline.concrete(row, "roads.xodr").storyboard)
+    written = to_xml(pipeline.runner.concrete(row, "roads.xodr").storyboard)
     assert b'name="ncap_global_vehicle_target"' in written
     there_and_back(pipeline)
     said = " ".join(story_lines(pipeline.scenario))
@@ -416,8 +416,8 @@ def test_models_vary(made):
     pipeline.choose_objective()
     for k, length in enumerate((2.08, 9.2, 4.6)):
         row = pipeline.space.row({"lead_type": float(k)})[np.newaxis]
-        ((_, one),) = pipeline.by_variant(row)
-        rollout = one.rollout(row)
+        ((_, one),) = pipeline.runner.by_variant(row)
+        rollout = one.run(row)
         assert rollout.box[rollout.names.index("lead"), 0] == pytest.approx(length, abs=0.2)
     there_and_back(pipeline)
 
@@ -509,7 +509,7 @@ def test_downhill_the_ego_brakes_less(made, monkeypatch):
         rollout = pipeline.rollout(pipeline.space.row({"other_at": 90.0})[np.newaxis])
         hardest[grade] = -rollout.a[0, 0].min()
         there_and_back(pipeline)
-        concrete = pipeline.concrete(pipeline.space.row({}), "roads.xodr")
+        concrete = pipeline.runner.concrete(pipeline.space.row({}), "roads.xodr")
         assert concrete.roads.roads[0].elevations[0].b == rise
     angle = np.arctan(0.06)
     assert hardest["0 %"] == pytest.approx(GRIP)
@@ -542,7 +542,7 @@ def test_indicating(made):
     assert np.array_equal(ego[:20], free[:20])
     assert ego[100] < free[100] - 1.0
     there_and_back(pipeline)
-    assert str(pipeline.concrete(x[0], "roads.xodr").storyboard.file_header.rev_minor) == "3"
+    assert str(pipeline.runner.concrete(x[0], "roads.xodr").storyboard.file_header.rev_minor) == "3"
     said = " ".join(story_lines(pipeline.scenario))
     assert "other indicates to the right" in said
     assert "other stops indicating" in said

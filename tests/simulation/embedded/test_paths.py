@@ -84,8 +84,8 @@ def test_a_car_leaves_a_driveway_on_a_cubic_curve(made):
 
 def test_it_is_a_spline_in_the_files_and_back(made):
     pipeline = made()
-    concrete = pipeline.concrete(pipeline.space.row({}), "roads.xodr")
-    assert not list(check(concrete.individuals, pipeline.source.constraints))
+    concrete = pipeline.runner.concrete(pipeline.space.row({}), "roads.xodr")
+    assert not list(check(concrete.individuals, pipeline.runner.source.constraints))
     text = to_xml(concrete.storyboard)
     assert b'<Nurbs order="4">' in text
     found, lost = individuals_from_openscenario(

@@ -59,7 +59,7 @@ def test_the_default_is_kinematic_to_the_bit_and_others_are_not():
     pipeline = made(vehicle=None)
     X = rows(pipeline)
     default = pipeline.rollout(X)
-    assert pipeline.vehicle == "kinematic"
+    assert pipeline.runner.vehicle == "kinematic"
     assert same(made(vehicle="kinematic").rollout(X), default)
     single, multi = (made(vehicle=vehicle).rollout(X) for vehicle in DYNAMIC)
     assert not same(single, default)
@@ -93,10 +93,9 @@ def test_a_car_steers_fast_enough_for_its_driver_through_a_roundabout(vehicle):
 @pytest.mark.parametrize("vehicle", DYNAMIC)
 def test_a_replay_with_a_kinematic_vehicle_is_the_kinematic_rollout(vehicle):
     pipeline = made(vehicle=vehicle, causes=True)
-    (fix,) = (one for one in pipeline.fixes if one.cause is Cause.VEHICLE_DYNAMICS)
+    (fix,) = (one for one in pipeline.runner.fixes if one.cause is Cause.VEHICLE_DYNAMICS)
     X = rows(pipeline)
-    roads, at = pipeline._roads_of(X)
-    assert same(pipeline._run(roads, at, X, fix), made(vehicle="kinematic").rollout(X))
+    assert same(pipeline.runner.run(X, fix=fix), made(vehicle="kinematic").rollout(X))
 
 
 @pytest.mark.parametrize("vehicle", DYNAMIC)

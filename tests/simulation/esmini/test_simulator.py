@@ -72,17 +72,17 @@ def test_causes_are_found_by_replays_there(esmini):
 
 def test_what_it_does_not_take_is_told_in_its_words(esmini):
     _, there, X = both(load("crossroads-s1"), esmini, n=2, ego="route-follower")
-    roads, rows = there._roads_of(X)
+    roads, rows = there.runner.roads_of(X)
     columns = {name: X[:, i] for i, name in enumerate(there.space.names)}
     whole = roads.files.paths[0].read_bytes()
     roads.files.paths[0].write_text("<OpenDRIVE><road")
-    out = there.simulator.run(roads, rows, columns)
+    out = there.runner.simulator.run(roads, rows, columns)
     assert out.status.tolist() == [40, 40]
     assert "esmini did not take the scenario" in out.messages[0]
     assert "OpenDRIVE" in out.messages[0]
     assert np.isfinite(out.x).all()
     roads.files.paths[0].write_bytes(whole)
-    assert there.simulator.run(roads, rows, columns).status.tolist() == [0, 0]
+    assert there.runner.simulator.run(roads, rows, columns).status.tolist() == [0, 0]
 
 
 def test_a_file_runs_in_it(esmini, tmp_path, cli):

@@ -88,7 +88,7 @@ def crossing_of(folder: Path, runs: Sequence[Run]) -> Crossing:
         np.column_stack([one[e, e, : nominal.n_steps[e]] for one in (nominal.x, nominal.y)])
         for e in (0, 1)
     )
-    road = Scenery(pipeline).road(x).outlines
+    road = Scenery(pipeline.runner).road(x).outlines
     junction = [one.points for one in road if one.kind == "junction"]
     middle = np.concatenate(junction).mean(axis=0) if junction else ways[0].mean(axis=0)
     ends = tuple(_points(scenario, name) for name in nominal.names[:2])

@@ -34,7 +34,6 @@ from bridgegen.simulation.embedded.places.network import Network
 from bridgegen.simulation.embedded.program import Program
 from bridgegen.simulation.embedded.simulator import EmbeddedSimulator
 from bridgegen.simulation.rollout import FAILURES, Rollout, joined
-from bridgegen.simulation.simulator import AroundEmbedded
 from bridgegen.simulation.trace import write_trace
 
 if TYPE_CHECKING:
@@ -105,7 +104,7 @@ class CarlaRoads:
     worlds: tuple[Town | Generated, ...]
 
 
-class CarlaSimulator(AroundEmbedded):
+class CarlaSimulator:
     """A `Simulator` that a CARLA server runs, one row at a time.
 
     The storyboard moves the participants as in the embedded simulator; the driver controls the ego,
@@ -130,7 +129,7 @@ class CarlaSimulator(AroundEmbedded):
         settings: CarlaSettings | None = None,
         access: Access | None = None,
     ) -> None:
-        super().__init__(embedded)
+        self.embedded = embedded
         if self.embedded.time_step != TIME_STEP:
             raise InputError(
                 f"{embedded.program.place}: time_step = {TIME_STEP:g} s must hold in carla, whose "

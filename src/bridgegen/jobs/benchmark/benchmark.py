@@ -7,8 +7,7 @@ from pathlib import Path
 from bridgegen.base.errors import InputError, Interrupted
 from bridgegen.engine.domain import needed_by
 from bridgegen.engine.options import PipelineOptions
-from bridgegen.engine.pipeline import Pipeline
-from bridgegen.engine.workers import Threads
+from bridgegen.engine.runner import Runner
 from bridgegen.engine.workers.processes import cores
 from bridgegen.jobs.benchmark.page import write_page
 from bridgegen.jobs.benchmark.plan import (
@@ -263,5 +262,4 @@ def domain_of(scenario: str) -> frozenset[str]:
         InputError: no such scenario, or an invalid one.
     """
     logical = load(scenario)
-    options = PipelineOptions(ego="route-follower")
-    return needed_by(Pipeline(logical, logical.space(), options, workers=Threads(1)))[0]
+    return needed_by(Runner(logical, logical.space(), PipelineOptions(ego="route-follower")))[0]

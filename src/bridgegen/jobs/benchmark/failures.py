@@ -200,7 +200,7 @@ def _seen(
         options = PipelineOptions(ego=ego, ideal=settings.ideal, time_limit=settings.time_limit)
         pipeline = Pipeline(scenario, space, options, road_map=roads, workers=Threads(1))
         pipeline.rollout(rows.X[[evaluation]])
-        pipeline.simulator.stop()
+        pipeline.runner.simulator.stop()
         scene, observations = recorded(Path(name))
     return {key: np.asarray(one) for key, one in export(observations, scene).items()}
 

@@ -378,5 +378,5 @@ def _seconds(entrant: Entrant, scenario: str) -> float:
         took[n] = time.perf_counter() - start
         if took[n] > SLOW:
             break
-    pipeline.simulator.stop()
+    pipeline.runner.simulator.stop()
     return took[max(took)] / max(took)

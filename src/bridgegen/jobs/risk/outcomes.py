@@ -15,6 +15,7 @@ from bridgegen.assess.conflict.plausibility import Implausible, plausibility
 from bridgegen.base.arrays import Float
 from bridgegen.base.errors import UnknownNameError
 from bridgegen.engine.pipeline import Pipeline
+from bridgegen.engine.runner import Runner
 from bridgegen.jobs.risk.estimators.weighted import Weighted
 from bridgegen.scenario.exposure import Exposure
 from bridgegen.scenario.exposure.fit import Fit
@@ -83,7 +84,7 @@ def outcomes(pipeline: Pipeline, X: Float, count: Count) -> Outcomes:
     """
     values = np.zeros((len(X), len(Column)))
     words = np.full(len(X), "", dtype=object)
-    for at, one in pipeline.by_variant(X):
+    for at, one in pipeline.runner.by_variant(X):
         values[at], words[at] = _outcomes(one, X[at], count)
     harmful = values[:, Column.SCORE] >= NEAR_MISS
     modes = dict.fromkeys(words[harmful])
@@ -93,8 +94,8 @@ def outcomes(pipeline: Pipeline, X: Float, count: Count) -> Outcomes:
     return Outcomes(values, tuple(modes))
 
 
-def _outcomes(pipeline: Pipeline, X: Float, count: Count) -> tuple[Float, npt.NDArray[np.object_]]:
-    rollout = pipeline.rollout(X)
+def _outcomes(runner: Runner, X: Float, count: Count) -> tuple[Float, npt.NDArray[np.object_]]:
+    rollout = runner.run(X)
     conflicts = encounters(rollout)
     gate = plausibility(rollout)
     other, _ = decisive(conflicts, count)

@@ -158,7 +158,7 @@ def estimate_risk(
             "exposure": _digest(met),
             "driver": name,
             "file of the driver": CarriedDriver.of(name).digest,
-            "vehicle": pipeline.vehicle,
+            "vehicle": pipeline.runner.vehicle,
             "event": event,
             "count": count,
             "method": method,

@@ -171,9 +171,9 @@ def run_search(given: SearchArguments) -> Run:
         pipeline = Pipeline(
             logical, space, given, road_map=roads, simulator=given.simulator, workers=pool
         )
-        for note in (*logical.notes, *pipeline.notes):
+        for note in (*logical.notes, *pipeline.runner.notes):
             callbacks.warning(note)
-        if domain := outside(pipeline):
+        if domain := outside(pipeline.runner):
             callbacks.warning(domain)
         callbacks.stage("compile")
         pipeline.warm_up()
@@ -192,7 +192,7 @@ def run_search(given: SearchArguments) -> Run:
             seed=seed,
             ego=pipeline.driver.name,
             ideal=sorted(pipeline.driver.ideal),
-            vehicle=pipeline.vehicle,
+            vehicle=pipeline.runner.vehicle,
             axes=[str(axis) for axis in space.axes],
             road_map=_absolute(roads.path) if roads else None,
             map_digest=hashlib.sha256(roads.data).hexdigest() if roads else None,

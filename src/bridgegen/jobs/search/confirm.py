@@ -155,7 +155,7 @@ def _empty(
 ) -> Record:
     """Return the record of a run before its first confirmation."""
     objective = here.objective
-    version = getattr(there.simulator, "version", "")
+    version = getattr(there.runner.simulator, "version", "")
     known = any(letter.isdigit() for letter in version)  # esmini may not know its own
     return Record(
         simulator=simulator.name,

@@ -14,8 +14,8 @@ from bridgegen.assess.conflict.harm import NEAR_MISS, Count
 from bridgegen.assess.conflict.summary import ConflictSummary, summarise
 from bridgegen.base.arrays import Bool, Float, Int
 from bridgegen.base.errors import OntologyError, StorageError
-from bridgegen.engine.evaluation import Replays
 from bridgegen.engine.pipeline import Pipeline
+from bridgegen.engine.replays import Replays
 from bridgegen.jobs.search.exported import FOLDER, NOT_EXPORTED, Exported, Refused
 from bridgegen.jobs.search.scenario_files import write_scenario
 from bridgegen.results.store import Rows
@@ -179,7 +179,7 @@ def _write_minimal(
         OntologyError: its individuals break a rule.
     """
     X = np.array([minimal.x])
-    rollout = pipeline.rollout_again(X, np.array([minimal.noise_key], dtype=np.uint64))
+    rollout = pipeline.runner.run(X, noise=np.array([minimal.noise_key], dtype=np.uint64))
     conflict = summarise(analyse(rollout), 0, pipeline.objective.count)
     metrics = pipeline.measure(rollout)
     harm = float(metrics[0, pipeline.metrics.index(pipeline.objective.harm)])
@@ -240,7 +240,7 @@ def _facts(pipeline: Pipeline, rows: Rows, i: int, name: str) -> dict[str, objec
 def _parameters(pipeline: Pipeline, x: Float) -> dict[str, dict[str, float | str | None]]:
     """Return the parameters of a row as people read them."""
     units = dict(zip(pipeline.space.names, pipeline.space.units, strict=True))
-    values = _named(pipeline.facts(x), units)
+    values = _named(pipeline.runner.facts(x), units)
     for name in values.keys() & pipeline.space.parameters.keys():
         kind = pipeline.space.parameters[name].kind
         values[name]["value"] = kind.written(float(x[pipeline.space.index(name)]))

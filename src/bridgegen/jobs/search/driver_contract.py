@@ -118,7 +118,7 @@ def described(spec: str, pipeline: Pipeline) -> str:
         spec: its name.
         pipeline: that it has driven in.
     """
-    own = pipeline.simulator.embedded.own_driver
+    own = pipeline.runner.embedded.own_driver
     traits = own.process.traits
     if traits.memory is not None:
         kept = f"{traits.memory} number{'' if traits.memory == 1 else 's'}"
@@ -130,7 +130,7 @@ def described(spec: str, pipeline: Pipeline) -> str:
         kind = "a co-simulation unit"
     asked = "asked at every instant"
     if traits.period is not None:
-        step = pipeline.simulator.time_step
+        step = pipeline.runner.embedded.time_step
         every = traits.steps(step)
         asked = f"asked every {every * step:.4g} s ({every} time steps of {step:g} s)"
     wants = f"wants {', '.join(traits.wants)}" if traits.wants else "wants nothing beyond the usual"
@@ -162,7 +162,7 @@ def _in_one(name: str, pipeline: Pipeline, X: Float, rng: np.random.Generator) -
     X, whole = X[rows], whole.take(rows)
     problem = _difference(whole, pipeline.rollout(X), rows)
     yield Check(name, AGAIN, problem)
-    own = pipeline.simulator.embedded.own_driver
+    own = pipeline.runner.embedded.own_driver
     own.restart()
     anew = pipeline.rollout(X)
     yield Check(name, ANEW, _difference(whole, anew, rows))
@@ -209,7 +209,7 @@ def _failures(pipeline: Pipeline, X: Float, rollout: Rollout) -> str:
         return ""
     row = int(failed[0])
     words = [STATUS_MESSAGES[int(rollout.status[row])], *filter(None, [rollout.messages.get(row)])]
-    process, when = pipeline.simulator.embedded.own_driver.process, ""
+    process, when = pipeline.runner.embedded.own_driver.process, ""
     if process.traits.memory is None and rollout.status[row] in FAILURES.values():
         pipeline.rollout(X[row : row + 1])
         when = f" at {process.asked_at:g} s"

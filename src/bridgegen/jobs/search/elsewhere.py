@@ -13,6 +13,7 @@ from bridgegen.assess.objective import CLASSIFYING
 from bridgegen.base.arrays import Float
 from bridgegen.base.errors import InputError
 from bridgegen.engine.pipeline import Pipeline
+from bridgegen.engine.runner import Runner
 from bridgegen.engine.workers import Lost
 from bridgegen.results.confirmation.compare import compare, first_contact, tracks
 from bridgegen.results.confirmation.record import (
@@ -68,21 +69,21 @@ def run_elsewhere(
         every: all rows of the run.
         evaluations: some of these, which succeeded.
     """
-    for at, one in here.by_variant(every.X[list(evaluations)]):
-        yield from _run_some(one, there, every, [evaluations[row] for row in at.tolist()])
+    for at, one in here.runner.by_variant(every.X[list(evaluations)]):
+        yield from _run_some(here, one, there, every, [evaluations[row] for row in at.tolist()])
 
 
 def _run_some(
-    here: Pipeline, there: Pipeline, every: Rows, evaluations: Sequence[int]
+    here: Pipeline, runner: Runner, there: Pipeline, every: Rows, evaluations: Sequence[int]
 ) -> Iterator[Scenario]:
-    """Compare evaluations of one storyboard."""
+    """Compare evaluations of one storyboard, which a runner has."""
     most = max(1, min(AT_A_TIME, there.rows_at_once * there.runs_at_once))
     size, done = min(most, there.runs_at_once), 0
     while done < len(evaluations):
         began = time.monotonic()
         some = list(evaluations[done : done + size])
         X = every.X[some]
-        motion = here.rollout(X)
+        motion = runner.run(X)
         found = _elsewhere(there, X, here.objective.count)
         for row, (k, ran) in enumerate(zip(some, found, strict=True)):
             yield _scenario(here, every, k, motion, row, ran)

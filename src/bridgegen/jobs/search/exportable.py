@@ -67,11 +67,11 @@ def require_exportable(pipeline: Pipeline, checked: int = CHECKED) -> None:
     X, words = corners(pipeline)
     if problems := list(dict.fromkeys(_export_problems(pipeline, X, words, checked))):
         raise OntologyError(*problems)
-    if pipeline.simulator is not pipeline.simulator.embedded or pipeline.driver.is_own:
+    if pipeline.runner.simulator is not pipeline.runner.embedded or pipeline.driver.is_own:
         return  # other simulators and drivers take seconds a row
     status = np.empty(len(X), np.int8)
-    for at, one in pipeline.by_variant(X):
-        status[at] = one.rollout(X[at]).status
+    for at, one in pipeline.runner.by_variant(X):
+        status[at] = one.run(X[at]).status
     if status[0] in FAULTS_OF_THE_SCENARIO:
         raise InputError(f"{pipeline.scenario.place}: {words[0]}: {STATUS_MESSAGES[status[0]]}")
 
@@ -84,11 +84,11 @@ def _export_problems(
     first = min(3, len(X))
     more = np.linspace(first, len(X) - 1, checked - first).astype(int) if len(X) > first else ()
     for i in dict.fromkeys([*range(first), *map(int, more)]):
-        concrete = pipeline.concrete(X[i], "roads.xodr")
+        concrete = pipeline.runner.concrete(X[i], "roads.xodr")
         scenario_xml(concrete.storyboard)
         if concrete.individuals is None:
             return
-        for violation in check(concrete.individuals, pipeline.source.constraints):
+        for violation in check(concrete.individuals, pipeline.runner.source.constraints):
             if str(violation) not in seen:
                 seen.add(str(violation))
                 yield f"{place}: {words[i]}: {violation}"

@@ -170,7 +170,7 @@ def _state(pipeline: Pipeline, found: Found, path: Path, origin: str) -> list[Re
     space = pipeline.space
     # Any row would do; in this one no two parameters have the same value.
     x = space.decode(np.random.default_rng(0).random((1, space.n_var)))[0]
-    individuals = pipeline.concrete(x).individuals if found.confirmed else None
+    individuals = pipeline.runner.concrete(x).individuals if found.confirmed else None
     carried = (
         {} if individuals is None else carriers(individuals, space.values(x), space.parameters)
     )

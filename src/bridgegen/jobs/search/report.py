@@ -5,8 +5,8 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 from bridgegen.base.disk import read_inside
-from bridgegen.engine.evaluation import Replays
 from bridgegen.engine.pipeline import Pipeline
+from bridgegen.engine.replays import Replays
 from bridgegen.jobs.search.exported import FOLDER, MINIMAL, Exported
 from bridgegen.jobs.search.run import Run
 from bridgegen.jobs.search.settings import Settings

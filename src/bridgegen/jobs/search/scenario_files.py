@@ -70,7 +70,7 @@ def write_scenario(
         OSError: the folder cannot be written.
     """
     owl, xodr, xosc = (folder / f"{name}.{kind}" for kind in ("owl", "xodr", "xosc"))
-    concrete = pipeline.concrete(x, xodr.name)
+    concrete = pipeline.runner.concrete(x, xodr.name)
     if rollout is None:
         rollout = pipeline.rollout(x[np.newaxis])
         conflict = summarise(analyse(rollout))
@@ -78,12 +78,12 @@ def write_scenario(
     if individuals is not None:
         individuals = with_outcomes(individuals, rollout, concrete.roads, row)
         individuals = _with_findings(individuals, cause, conflict)
-        violations = check(individuals, pipeline.source.constraints)
+        violations = check(individuals, pipeline.runner.source.constraints)
         if violations:
             raise OntologyError(*(f"{name}.owl: {violation}" for violation in violations))
     xodr.write_bytes(concrete.road_data)
     storyboard = _with_header(concrete.storyboard, cause, conflict)
-    storyboard = with_vehicle(storyboard, pipeline.vehicle)
+    storyboard = with_vehicle(storyboard, pipeline.runner.vehicle)
     xosc.write_bytes(scenario_xml(keyed(storyboard, noise) if noise else storyboard))
     if individuals is None:
         return [xodr, xosc]

@@ -175,7 +175,7 @@ def _classes(
         if not open_.any():
             break
         model = Pipeline(
-            scenario, pipeline.space, PipelineOptions(ego=name, vehicle=pipeline.vehicle),
+            scenario, pipeline.space, PipelineOptions(ego=name, vehicle=pipeline.runner.vehicle),
             simulator=simulator, workers=Threads(1),
         )  # fmt: skip
         codes[open_] = outcomes(model, X[open_])

@@ -203,7 +203,7 @@ def _evaluated(job: Job, found: EntryResult) -> EntryResult:
     space = pipeline.space
     given = _rows_of(job, pipeline)
     X, names = given.X, given.names
-    notes = [*pipeline.scenario.notes, *pipeline.notes]
+    notes = [*pipeline.scenario.notes, *pipeline.runner.notes]
     if given.excluded:
         notes.append(
             f"{given.excluded} combinations are excluded by the scenario's own constraints"
@@ -216,7 +216,7 @@ def _evaluated(job: Job, found: EntryResult) -> EntryResult:
         found_here = _rows(pipeline, some, evaluation, names)
         rows += judged(pipeline, job.simulator, some, found_here)
     happening = Happening.of(texts)
-    beyond = "" if job.entry.is_failure else outside(pipeline)
+    beyond = "" if job.entry.is_failure else outside(pipeline.runner)
     if job.entry.is_failure:  # it is about that conflict: one that stops for it has met it
         happening = replace(happening, stuck=0)
     units = dict(zip(space.names, space.units, strict=True))

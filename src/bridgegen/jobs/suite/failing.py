@@ -73,7 +73,7 @@ def ways(pipeline: Pipeline, X: Float) -> list[Way]:
     found = pipeline.evaluate(X)
     places = pipeline.try_all(X).place.tolist()
     causes = [""] * len(X) if found.cause is None else [Cause(k).label for k in found.cause]
-    keys = keys_of(found.findings, pipeline.kinds, places, causes)
+    keys = keys_of(found.findings, pipeline.runner.kinds, places, causes)
     margins = found.metrics[:, [pipeline.metrics.index(one) for one in pipeline.monitor.names]]
     made = []
     for i, key in enumerate(keys):

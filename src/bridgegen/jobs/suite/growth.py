@@ -224,7 +224,7 @@ def _put(job: Job, way: Way, folder: Path, name: str) -> Way:
     ego = job.ego if job.ego is not None and is_spec(job.ego) else None  # else the file names it
     options = CommonOptions(
         ideal=job.options.ideal if ego else (),
-        vehicle=pipeline.vehicle if ego else None,
+        vehicle=pipeline.runner.vehicle if ego else None,
         time_limit=job.options.time_limit,
     )
     count: Literal["any"] | None = "any" if pipeline.objective.count == "any" else None

@@ -18,8 +18,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from bridgegen.base.arrays import Bool, Float, Int
-from bridgegen.engine.evaluation import Trials
 from bridgegen.engine.pipeline import Pipeline
+from bridgegen.engine.trials import Trials
 from bridgegen.scenario.language.space import SearchSpace
 from bridgegen.search.triage.conditions import Conditions, sentence
 from bridgegen.search.triage.effort import FULL, Effort
@@ -221,7 +221,7 @@ class Minimiser:
         X = np.concatenate([self._rows(ladders[m], here[m][np.newaxis]) for m in modes])
         shares = self._robustness([(m, here[m]) for m in modes], ladders)
         tried = self._pipeline.try_all(X, noise=self._bases[list(modes)])
-        noise = self._pipeline.noise_keys(self._bases[list(modes)])
+        noise = self._pipeline.runner.noise_keys(self._bases[list(modes)])
         for k, m in enumerate(modes):
             if not tried.harmful[k]:
                 continue
@@ -236,7 +236,7 @@ class Minimiser:
             share, hits, rows = shares[k]
             found[m] = Minimal(
                 name=names[m], x=tuple(X[k].tolist()), noise_key=str(noise[k]),
-                values=self._pipeline.facts(X[k]),
+                values=self._pipeline.runner.facts(X[k]),
                 conditions=tuple(conditions), sentence=sentence(conditions),
                 rows=rows, harmful=hits, robustness=share if rows else None,
                 harm=float(tried.harm[k]), severity=float(tried.severity[k]), inside=inside,
@@ -254,7 +254,7 @@ class Minimiser:
         noise = np.repeat(self._bases, [len(part) for part in parts], axis=0)
         trials = self._pipeline.try_all(np.concatenate(parts), noise=noise)
         keys = keys_of(
-            trials.findings, self._pipeline.kinds, trials.place.tolist(), [""] * len(trials)
+            trials.findings, self._pipeline.runner.kinds, trials.place.tolist(), [""] * len(trials)
         )
         fine, start = [], 0
         for part, way in zip(parts, ways, strict=True):

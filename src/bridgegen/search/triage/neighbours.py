@@ -67,7 +67,7 @@ def neighbourhoods(
     known |= {
         ids[k]: (harmful[j, :, 0], ok[j, :, 0], until[j, :, 0]) for j, k in enumerate(new.tolist())
     }
-    tried = pipeline.fixes if fixes else ()
+    tried = pipeline.runner.fixes if fixes else ()
     variants = [_MOVED, *range(len(tried))] if tried else []
     harmful, ok, until = _simulate(pipeline, X, evaluations, seed, variants)
     made = []

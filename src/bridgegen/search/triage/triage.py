@@ -14,8 +14,8 @@ from bridgegen.assess.conflict.harm import NEAR_MISS
 from bridgegen.assess.conflict.quantities import HARM
 from bridgegen.assess.criteria import OF_BASELINE
 from bridgegen.base.arrays import Bool, Float, Numbers
-from bridgegen.engine.evaluation import EVENT
 from bridgegen.engine.pipeline import Pipeline
+from bridgegen.engine.trials import EVENT
 from bridgegen.results.store import Recorded, Rows
 from bridgegen.search.triage.bound import UNBIASED, NotCounted, bound, estimate, least_margins
 from bridgegen.search.triage.effort import FULL, Effort
@@ -155,7 +155,7 @@ class _Triage:
         U, harm = self._U, self._harm[self._at]
         place = self._places(U) if tests else [""] * len(self._at)
         quick = [Cause(one).label for one in rows.cause[self._at].tolist()]
-        kinds = self._pipeline.kinds
+        kinds = self._pipeline.runner.kinds
         keys = keys_of(rows.findings.take(self._at), kinds, place, quick)
         every = group(keys, harm, U)
         self._unrecorded = len(every[MOST_MODES:])
@@ -192,7 +192,7 @@ class _Triage:
             from scipy.spatial import cKDTree
 
             findings = self._rows.findings.take(self._at)
-            kinds, blank = self._pipeline.kinds, [""] * len(order)
+            kinds, blank = self._pipeline.runner.kinds, [""] * len(order)
             keys = keys_of(findings, kinds, blank, blank)
             known: dict[Key, list[int]] = {}
             for i in first.tolist():
@@ -319,7 +319,8 @@ class _Triage:
         random = np.random.Generator(np.random.PCG64([self._seed, _FRESH]))
         U = random.random((n, self._space.n_var))
         results = self._pipeline.try_all(self._space.decode(U) + 0.0)
-        keys = keys_of(results.findings, self._pipeline.kinds, results.place.tolist(), [""] * n)
+        kinds = self._pipeline.runner.kinds
+        keys = keys_of(results.findings, kinds, results.place.tolist(), [""] * n)
         mode = [0] * n
         own = self._U
         for i in np.flatnonzero(results.harmful).tolist():

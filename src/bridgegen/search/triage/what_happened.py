@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from bridgegen.assess.conflict.findings import Findings
 from bridgegen.base.arrays import Float, Int
-from bridgegen.engine.evaluation import CODES, EVENT, MEASURES
+from bridgegen.engine.trials import CODES, EVENT, MEASURES
 
 LEAST = {
     "time": 1.0, "x": 5.0, "y": 5.0, "v_ego": 2.0, "v_other": 2.0, "closing_normal": 2.0,

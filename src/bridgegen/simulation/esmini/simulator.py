@@ -21,7 +21,6 @@ from bridgegen.simulation.embedded.simulator import EmbeddedSimulator
 from bridgegen.simulation.esmini.files import RoadFiles, ScenarioFile
 from bridgegen.simulation.esmini.process import EsminiProcess, EsminiRow, Job
 from bridgegen.simulation.rollout import SIMULATOR_FAILURES, Rollout, joined
-from bridgegen.simulation.simulator import AroundEmbedded
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -84,7 +83,7 @@ class EsminiRoads(NamedTuple):
     files: RoadFiles
 
 
-class EsminiSimulator(AroundEmbedded):
+class EsminiSimulator:
     """A `Simulator`: esmini runs the storyboard, BridgeGen's drivers drive their vehicles.
 
     If the storyboard moves the ego, esmini's default controller does.
@@ -97,7 +96,7 @@ class EsminiSimulator(AroundEmbedded):
         seconds: time limit for a step, and for loading a scenario [s].
 
     Attributes:
-        embedded: see `Simulator`.
+        embedded: the embedded one.
         version: of esmini.
 
     Raises:
@@ -114,7 +113,7 @@ class EsminiSimulator(AroundEmbedded):
         steps: int,
         seconds: float = SECONDS,
     ) -> None:
-        super().__init__(embedded)
+        self.embedded = embedded
         driver = embedded.program.driver
         self._drives = driver != STORYBOARD
         program = embedded.program
