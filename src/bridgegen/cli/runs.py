@@ -23,7 +23,6 @@ from bridgegen.cli.declared import with_declared_options
 from bridgegen.cli.groups import FILES, RESULTS, SEARCH
 from bridgegen.cli.run_files import keys_of, schema, with_run_files
 from bridgegen.cli.several_runs import search_all
-from bridgegen.drivers import split
 from bridgegen.engine.options import SearchOptions
 from bridgegen.engine.options.forms import read_names
 from bridgegen.engine.options.option import DRIVER, OUTPUT, WHAT
@@ -279,6 +278,7 @@ def simulate(
     """
     from bridgegen.cli.terminal.files import conflict_facts, criteria_facts, print_file_result
     from bridgegen.cli.verdict.of_file import FileCriteria
+    from bridgegen.drivers import split
     from bridgegen.engine.simulate import simulate_file
     from bridgegen.simulation.trace import write_trace
 
