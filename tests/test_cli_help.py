@@ -1,6 +1,8 @@
 """``bridgegen --help`` shows every command, in a panel, with a summary that is not cut."""
 
 import re
+import subprocess
+import sys
 from importlib.metadata import version
 
 import pytest
