@@ -43,9 +43,10 @@ class Conflicts:
     predictions agree that they touch within 4 s: constant velocity, and constant speed along the
     paths that both drive in the rollout (straight on beyond their ends). Where paths do not meet,
     passing is no conflict, however near. A near miss is a collision course with at most 1.5 s left
-    and a needed deceleration of at least 3.35 m/s². Of all instants of a collision course the most
-    urgent one counts, near misses first; see ``harm``. Types, zones and responsibility exist for
-    near misses and contacts only.
+    and a needed deceleration of at least 3.35 m/s², which is more than a comfort function has (ISO
+    15622), or after which they come nearer than 0.5 m. Of all instants of a collision course the
+    most urgent one counts, near misses first; see ``harm``. Types, zones and responsibility exist
+    for near misses and contacts only.
 
     Attributes:
         names: E participants.
