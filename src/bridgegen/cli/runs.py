@@ -175,7 +175,7 @@ def coverage(
     Also shows which combinations of bins, and which of them are critical; with an
     exposure, how much of what is met on the road these are.
     """
-    from bridgegen.cli.terminal.coverage import print_coverage
+    from bridgegen.cli.terminal.search import print_coverage
     from bridgegen.jobs.search.coverage import coverage_of
 
     settings, found = coverage_of(run, bins=bins, strength=strength, exposure=exposure)
@@ -362,7 +362,7 @@ def check_driver(
 
 def _end(outcomes: "Sequence[Outcome]") -> None:
     """Print the outcomes of the criteria; exit with their status if one failed."""
-    from bridgegen.cli.terminal.verdict import print_outcomes
+    from bridgegen.cli.terminal.tables import print_outcomes
 
     if not print_outcomes(outcomes):
         raise typer.Exit(FAILED)

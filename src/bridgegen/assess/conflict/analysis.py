@@ -14,7 +14,7 @@ from bridgegen.assess.conflict.types import ConflictType, Responsible, Rule, Zon
 from bridgegen.assess.metrics.metric import recorded, shared
 from bridgegen.assess.metrics.motion import motion
 from bridgegen.base.arrays import Bool, Float, Int
-from bridgegen.drivers._kind_tables import IS_OBSTACLE
+from bridgegen.drivers.kinds import IS_OBSTACLE
 from bridgegen.simulation.rollout import Rollout
 
 _DIRECTION = np.array(
