@@ -35,6 +35,7 @@ from bridgegen.simulation.embedded._codes import (
     DOES,
     PRESS,
 )
+from bridgegen.simulation.embedded.addresses import addressed
 from bridgegen.simulation.embedded.chassis.multi_body import MOTIONS
 from bridgegen.simulation.embedded.drivers import (
     ANSWER,
@@ -49,7 +50,7 @@ from bridgegen.simulation.embedded.drivers import (
     see_map_of_rows,
 )
 from bridgegen.simulation.embedded.places.network import Network
-from bridgegen.simulation.embedded.program import Program, addressed
+from bridgegen.simulation.embedded.program import Program
 from bridgegen.simulation.embedded.storyboard import start
 from bridgegen.simulation.rollout import Rollout
 

@@ -31,6 +31,7 @@ from bridgegen.simulation.embedded._memory_kernels import (
     State,
 )
 from bridgegen.simulation.embedded._rollout_kernels import simulate_rows
+from bridgegen.simulation.embedded.addresses import addressed
 from bridgegen.simulation.embedded.batch import Batch
 from bridgegen.simulation.embedded.drivers import (
     ACCELERATION,
@@ -43,7 +44,7 @@ from bridgegen.simulation.embedded.drivers import (
 )
 from bridgegen.simulation.embedded.own_drivers.lock_step import Note, Wheel, drive_in_lock_step
 from bridgegen.simulation.embedded.own_drivers.shared_arrays import Layout, SharedArrays, seen
-from bridgegen.simulation.embedded.program import Program, addressed
+from bridgegen.simulation.embedded.program import Program
 from bridgegen.simulation.rollout import FAILURES, Rollout, joined
 
 
