@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
     from bridgegen.jobs.preventability import CellClass, PreventabilityMap
     from bridgegen.jobs.preventability.preventability import MapCallbacks
-    from bridgegen.jobs.risk import Risk
+    from bridgegen.jobs.risk.result import Risk
     from bridgegen.jobs.risk.risk import RiskCallbacks
     from bridgegen.scenario.exposure.exposure import Rate
     from bridgegen.scenario.exposure.fit import Fit
