@@ -148,10 +148,10 @@ def test_a_stopped_map_is_resumed_and_ends_the_same(whole, tmp_path, monkeypatch
 
 
 def test_a_folder_with_another_map_or_something_else_is_refused(whole, tmp_path):
-    with pytest.raises(StorageError, match=r"holds another map \(it differs in grid"):
+    with pytest.raises(StorageError, match=r"holds a map with other settings, .*: grid was"):
         map_preventability("r157/cut-in", whole.drivers, grid=GRID[:2], out=whole.folder)
     (tmp_path / "notes.txt").write_text("mine")
-    with pytest.raises(StorageError, match="something else than a map"):
+    with pytest.raises(StorageError, match="holds no map, so it is left alone"):
         map_preventability("r157/cut-in", "un-r157", grid=GRID, out=tmp_path)
 
 
@@ -168,7 +168,7 @@ def test_a_driver_of_one_s_own_and_one_that_fails(tmp_path):
     assert (halts == CellClass.AVOIDED).all()
     assert fails.tolist() == [[CellClass.AVOIDED] * 2, [CellClass.NO_RESULT] * 2]
     file.write_text(HALT + "\n# changed\n")
-    with pytest.raises(StorageError, match="differs in files of drivers"):
+    with pytest.raises(StorageError, match="files of drivers has changed"):
         map_preventability(
             "r157/cut-in", found.drivers,
             grid={"ego_speed": GridAxis("60 km/h", "90 km/h", 2), "gap": GridAxis(60.0, 90.0, 2)},

@@ -238,9 +238,9 @@ def test_what_is_wrong_is_said_and_nothing_written(tmp_path, given, message):
 
 def test_folders_of_others_are_left_alone(risk, tmp_path):
     (tmp_path / "thesis.txt").write_text("mine")
-    with pytest.raises(StorageError, match="holds something else than a risk"):
+    with pytest.raises(StorageError, match="holds no risk, so it is left alone"):
         estimate_risk(SCENARIO, out=tmp_path, **GIVEN)
-    with pytest.raises(StorageError, match=r"holds another risk \(it differs in seed"):
+    with pytest.raises(StorageError, match=r"holds a risk with other settings, .*: seed was"):
         estimate_risk(SCENARIO, out=risk.folder, **GIVEN, seed=9)
 
 

@@ -321,7 +321,7 @@ class Pipeline:
         for fix in self.runner.fixes:
             self.runner.nominal_batch(fix).take_addresses()
 
-    def compile_ahead(self) -> None:
+    def _compile_rest(self) -> None:
         """Compile what ``_compile_first`` leaves: instants and the conflict analysis."""
         batch = self.runner.nominal_batch()
         batch.compile_instants()
@@ -567,7 +567,7 @@ def _compile_ahead(carried: Carried, options: PipelineOptions, **made_with: Any)
         made_with["recorded"] = None
     else:
         options = replace(options, ego=ego.name if ego else None)
-    Pipeline(options=options, **made_with, workers=Threads(1)).compile_ahead()
+    Pipeline(options=options, **made_with, workers=Threads(1))._compile_rest()
 
 
 def metrics_of(

@@ -47,9 +47,10 @@ from bridgegen.jobs.benchmark.work import (
     searches,
     task_of,
 )
-from bridgegen.jobs.compare.plan import claim
+from bridgegen.jobs.compare.plan import RUN_PATTERN, RUNS
 from bridgegen.jobs.compare.runs import RunCallbacks, run_all
 from bridgegen.jobs.search.scenarios import load
+from bridgegen.results.folder import claim
 from bridgegen.results.store.sqlite import Lock
 from bridgegen.search import algorithms as toolkit
 from bridgegen.search.algorithms.algorithm import Problem, resolve
@@ -161,7 +162,10 @@ def benchmark_planners(
         searched, taking_part, needs, seeds=seeds, budget=budget, algorithm=algorithm, keep=keep,
         triage=triage, out=folder,
     )  # fmt: skip
-    claim(plan.out, FILE, plan.identity(), "benchmark", {})
+    claim(
+        plan.out, plan.identity(), file=FILE, what="benchmark", pieces=RUNS, kept=RUN_PATTERN,
+        grows=True,
+    )  # fmt: skip
     lock = Lock(plan.out / LOCK)
     done: list[str] = []
     try:

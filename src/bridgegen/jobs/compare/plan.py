@@ -9,13 +9,12 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from bridgegen.base.disk import write_whole
-from bridgegen.base.errors import InputError, StorageError, UnknownNameError
+from bridgegen.base.errors import InputError, UnknownNameError
 from bridgegen.base.plugins import file_of, label_of
-from bridgegen.base.records import parse_json, read_bytes
 from bridgegen.engine.options import CommonOptions, SearchOptions, options_of
 from bridgegen.jobs.compare.distinct import APART
 from bridgegen.jobs.search.scenarios import is_file, load
+from bridgegen.results.folder import claim
 from bridgegen.results.store.run_file import FILE as RUN_FILE
 from bridgegen.search import algorithms as toolkit
 from bridgegen.search.algorithms.algorithm import Problem, Value, resolve
@@ -25,6 +24,9 @@ FILE = "compare.json"
 
 RUNS = "runs"
 """In a comparison's folder: the folders of its runs."""
+
+RUN_PATTERN = f"*/{RUN_FILE}"
+"""Path of a run's file in that folder, as a pattern."""
 
 MAX_SEEDS = 1000
 
@@ -223,75 +225,16 @@ def begin(plan: Plan) -> None:
     Raises:
         StorageError: the folder holds something else, or runs with other settings.
     """
-    claim(plan.out, FILE, plan.identity(), "comparison", asdict(CommonOptions()))
-
-
-def claim(
-    out: Path, name: str, mine: Mapping[str, Any], what: str, defaults: Mapping[str, Any]
-) -> None:
-    """Create the folder of a grid of runs, or check that it holds this grid.
-
-    Args:
-        out: the folder; its runs are in ``RUNS``.
-        name: of the file in it that says what is equal in all runs.
-        mine: what that is, as JSON's types; it may say more than before.
-        what: a comparison, say, for messages.
-        defaults: of what did not exist when the folder was made.
-
-    Raises:
-        StorageError: the folder holds something else, or runs with other settings.
-    """
-    file = out / name
-    try:
-        before = parse_json(read_bytes(file)) if file.exists() else None
-        if before is not None and not isinstance(before, dict):
-            raise ValueError("it must hold an object")
-        if before is None and out.exists() and any(out.iterdir()):
-            raise StorageError(
-                f"{out}: is not empty and holds no {what}, so it is left alone; "
-                "choose another --out"
-            )
-        out.joinpath(RUNS).mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise StorageError(f"{out}: cannot be used: {error.strerror}") from None
-    except ValueError as error:
-        raise StorageError(f"{file}: the file is damaged: {error}") from None
-    if not any(out.glob(f"{RUNS}/*/{RUN_FILE}")):
-        before = None  # there is no run yet that must match
-    before = before or {}
-    # An option that did not exist then had its default.
-    made_with = {**_plain(defaults), **before} if before else {}
-    differ = [name for name in mine if name in made_with and made_with[name] != mine[name]]
-    if differ:
-        differences = ", ".join(_difference(name, made_with[name], mine[name]) for name in differ)
-        raise StorageError(
-            f"{out}: holds a {what} with other settings, and runs of both cannot be "
-            f"compared: {differences}; choose another --out"
-        )
-    text = json.dumps({**before, **mine}, indent=1)
-    write_whole(file, [text.encode()])
+    claim(
+        plan.out, plan.identity(), file=FILE, what="comparison", pieces=RUNS, kept=RUN_PATTERN,
+        grows=True, defaults=asdict(CommonOptions()),
+    )  # fmt: skip
 
 
 def _plain(value: Any) -> dict[str, Any]:
     """Return an object as JSON's types."""
     plain: dict[str, Any] = json.loads(json.dumps(value))
     return plain
-
-
-def _difference(name: str, before: Any, now: Any) -> str:
-    if name.startswith(("algorithm ", "scenario ")):
-        return f"{name} has changed"
-    if name == "map":
-        return "the map has changed"
-    if isinstance(before, dict) and isinstance(now, dict):
-        keys = [key for key in {**before, **now} if before.get(key) != now.get(key)]
-        before, now = ({key: one.get(key) for key in keys} for one in (before, now))
-    return f"{name} was {_shown(before)}, is {_shown(now)}"
-
-
-def _shown(value: Any) -> str:
-    text = json.dumps(value)
-    return text if len(text) <= 1000 else f"{text[:1000]} …"
 
 
 def _twice(what: str, names: Iterable[str]) -> list[str]:

@@ -15,7 +15,7 @@ from bridgegen.base.extras import is_installed
 from bridgegen.base.records import read_bytes
 from bridgegen.jobs.preventability.classes import CellClass, Codes, Outcome, classes
 from bridgegen.jobs.preventability.grid import Grid
-from bridgegen.results.store.run_file import claim
+from bridgegen.results.folder import claim
 
 if TYPE_CHECKING:
     from bridgegen.scenario.language.scenario import SearchedScenario
@@ -172,7 +172,7 @@ class ChunkStore:
 
     def __init__(self, folder: Path, settings: Mapping[str, Any], drivers: int, cells: int) -> None:
         self.folder, self._drivers, self._cells = folder, drivers, cells
-        claim(folder, settings, file=SETTINGS, pieces=CHUNKS, what="a map")
+        claim(folder, settings, file=SETTINGS, pieces=CHUNKS, what="map")
 
     @property
     def count(self) -> int:

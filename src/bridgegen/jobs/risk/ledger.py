@@ -17,7 +17,7 @@ from bridgegen.base.arrays import Float
 from bridgegen.base.disk import write_whole
 from bridgegen.base.records import read_bytes
 from bridgegen.jobs.risk.outcomes import Column, Outcomes
-from bridgegen.results.store.run_file import claim
+from bridgegen.results.folder import claim
 
 SETTINGS = "settings.json"
 BATCHES = "batches"
@@ -46,7 +46,7 @@ class Ledger:
 
     def __init__(self, folder: Path, settings: Mapping[str, Any]) -> None:
         self.folder = folder
-        claim(folder, settings, file=SETTINGS, pieces=BATCHES, belongs=_is_result, what="a risk")
+        claim(folder, settings, file=SETTINGS, pieces=BATCHES, belongs=_is_result, what="risk")
         self._number = 0
 
     def next(self, Z: Float, least: float) -> Outcomes | None:
