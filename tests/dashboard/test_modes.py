@@ -1,17 +1,17 @@
 """Failure modes over all results, with the status that a person sets."""
 
-from bridgegen.jobs.dashboard.modes import decisions_of, failure_modes, unseen
+from bridgegen.jobs.dashboard.modes import Decisions, failure_modes, undecided, unseen
 from bridgegen.jobs.dashboard.results import ModeKey
-from bridgegen.jobs.dashboard.status_file import Decision, StatusFile
+from bridgegen.results.failures import Failure
 
 
 def file_of(**statuses):
-    """Return a status file, by conflict type of cut-in, stack."""
+    """Return decisions, by conflict type of cut-in, stack."""
     found = {}
     for kind, status in statuses.items():
         name = ModeKey("cut-in", "stack", "contact", kind).id
-        found[name] = Decision(name, status, note=f"about {kind}")
-    return StatusFile("", {}, found)
+        found[name] = Failure(status=status, comment=f"about {kind}")
+    return Decisions(found)
 
 
 def test_a_mode_of_two_versions_is_one_mode(result):
@@ -38,7 +38,7 @@ def test_fixed_and_failing_again_is_a_regression(result):
     assert not failure_modes(some[:2], file)[0].is_regression
     (mode,) = failure_modes(some, file)
     assert mode.is_regression
-    assert mode.note == "about turn"
+    assert mode.comment == "about turn"
 
 
 def test_regressions_come_first_then_new_ones(result):
@@ -48,13 +48,16 @@ def test_regressions_come_first_then_new_ones(result):
     assert [one.key.conflict_type for one in found] == ["fixed", "fresh", "known", "accepted"]
 
 
-def test_blocks_for_the_file_keep_the_status(result):
-    found = failure_modes([result(modes=("turn",))], file_of(turn="known"))
-    (block,) = decisions_of(found)
-    assert (block.id, block.status, block.scenario) == (found[0].key.id, "known", "cut-in")
+def test_what_no_block_is_about_gets_a_new_one(result):
+    file = file_of(turn="known")
+    found = failure_modes([result(modes=("turn", "rear\ud800"))], file)
+    ((id, block),) = undecided(found, file.own).items()
+    assert (block.status, block.scenario, block.driver) == ("new", "cut-in", "stack")
+    assert block.title == "collides (rear\ufffd)"
+    assert id == ModeKey("cut-in", "stack", "contact", "rear\ud800").id
 
 
 def test_what_no_result_has_is_said(result):
     file = file_of(turn="accepted", gone="known")
-    (left,) = unseen(failure_modes([result(modes=("turn",))], file), file)
-    assert left.note == "about gone"
+    (left,) = unseen(failure_modes([result(modes=("turn",))], file), file.own).values()
+    assert left.comment == "about gone"

@@ -5,8 +5,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal, Self
 
-from bridgegen.jobs.suite.index import Failure, Indexes, Status
 from bridgegen.jobs.suite.results import EntryResult, RowResult
+from bridgegen.results.failures import Failure, FailureFiles, Status
 
 Standing = Literal["passed", "not run", "not judged", "new", "known", "accepted", "regression"]
 """Of a variation: known and accepted failures do not fail a suite; new ones do, and regressions:
@@ -32,7 +32,7 @@ class KnownFailures:
         Raises:
             FileFormatError: an index is damaged.
         """
-        indexes = Indexes()
+        indexes = FailureFiles()
         found = {
             one.entry: failure
             for one in results
