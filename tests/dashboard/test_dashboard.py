@@ -386,6 +386,21 @@ def test_a_suite_that_grows_decides_on_its_failures_wherever_they_are_found(grow
     for one in (*kinds["run"], *kinds["suite"]):
         assert (one.status, one.comment) == ("accepted", "JIRA-3")
         assert one.key.driver == "route-follower"
+    shutil.rmtree(growing / "suites" / "mine-results")  # its blocks are there
+    assert of_suite(bg.build_dashboard(growing)).keys() == {"run"}
+
+
+def test_a_suite_beside_the_project_decides_too(growing):
+    suite = growing / "suites" / "mine"
+    decide(suite, *read_failures(suite).failures, status="known")
+    other = growing.parent / "other"
+    shutil.copytree(growing / "suites" / "mine-results", other / "nightly")
+    found = bg.build_dashboard(other)
+    place = "../project/suites/mine/failures.yaml: cut-in-"
+    decided = [one for one in found.modes if one.decided.startswith(place)]
+    assert decided
+    assert {one.status for one in decided} == {"known"}
+    assert place in found.page.read_text("utf-8")
 
 
 def test_update_adds_only_modes_that_no_block_names(growing):

@@ -72,6 +72,30 @@ def test_a_changed_block_keeps_status_and_comment_as_they_are_written(tmp_path):
     assert read_failures(tmp_path).failures["b"].harm == 1.0
 
 
+def test_of_a_changed_block_only_values_that_differ_are_written_anew(tmp_path):
+    rule = {"id": "R-1", "formula": "ttc >= 1.5 s"}
+    kept = {"b": failure("b", minimal="needs x", seed=3), "c": failure("c", violates=[rule])}
+    write_failures(read_failures(tmp_path), kept)
+    path = tmp_path / FILE
+    text = path.read_text("utf-8")
+    text = text.replace("    cause: planning\n", "\n    # why?\n    cause: planning  # sure\n")
+    path.write_text(text.replace("    seed: 3", "    # mine\n    seed: 3"), "utf-8")
+    before = path.read_text("utf-8").splitlines()
+    more = {"minimal": "", "violates": [rule], "seed": 4, "status": "fixed"}
+    changed = {"b": failure("b", **more), "c": failure("c", harm=1.0)}
+    write_failures(read_failures(tmp_path), changed)
+    assert dict(read_failures(tmp_path).failures) == changed
+    after = path.read_text("utf-8").splitlines()
+    assert [one for one in before if one not in after] == ["    minimal: needs x", "    seed: 3"]
+    assert [one for one in after if one not in before] == [
+        "    status: fixed", "    seed: 4", "    harm: 1.0",
+    ]  # fmt: skip
+    assert after.index("    # mine") == after.index("    seed: 4") - 1
+    assert after.count("    violates:") == 1
+    first = after.index("    violates:")  # of b, before the keys that stand behind it in a block
+    assert first < after.index("    driver: route-follower")
+
+
 def test_a_comment_of_several_lines_costs_no_other_block_its_own(tmp_path):
     write_failures(read_failures(tmp_path), {"b": failure("b"), "c": failure("c")})
     path = tmp_path / FILE
@@ -228,6 +252,15 @@ def test_adding_keeps_every_line_and_the_order_of_the_person(path):
         assert one + rest in text
         text = text.replace(one + rest, "")
     assert text == TEXT
+
+
+def test_a_text_that_ends_like_a_comment_is_none(path):
+    text = TEXT.replace("# of a note.\n\n  # waits for 1.3\n", "# of a note.\n")
+    path.write_text(text.replace("fm-d", "fm-0"), "utf-8")
+    write_failures(read_failures(path.parent), {"fm-a": Failure()})
+    found = read_failures(path.parent).failures
+    assert [*found] == ["fm-0", "fm-a", "fm-b"]
+    assert found["fm-0"].comment == "Two lines\n# of a note.\n"
 
 
 def test_both_kinds_of_blocks_stand_in_one_file(path):

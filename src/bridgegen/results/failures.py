@@ -9,6 +9,7 @@ import json
 import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
+from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Any, Literal, TypeVar, get_args
 
@@ -179,10 +180,10 @@ def read_old_file(folder: Path) -> dict[str, Failure]:
 
 
 def write_failures(file: FailureFile, changed: Mapping[str, Failure]) -> None:
-    """Add blocks to a file, or replace them; all else stays as it is.
+    """Add blocks to a file, or change them; all else stays as it is.
 
-    A new block stands before the first one with a greater id. A block that is replaced keeps what
-    people wrote, where that is the same.
+    A new block stands before the first one with a greater id. Of a block that is there, only the
+    values that differ are written anew.
 
     Args:
         file: as it was read.
@@ -211,25 +212,26 @@ def write_failures(file: FailureFile, changed: Mapping[str, Failure]) -> None:
     write_whole(file.path, [data])
 
 
-class FailureFiles:
-    """Reads the files of folders, each once."""
+def failure_of(
+    scenario: str, distribution: str | None, read: dict[Path, FailureFile]
+) -> tuple[str, Failure] | None:
+    """Return the failure, with its id, that a scenario's folder states for it.
 
-    def __init__(self) -> None:
-        self._read: dict[Path, FailureFile] = {}
+    Args:
+        scenario: a path, or a name of the catalogue.
+        distribution: the file with its variations, if there is one.
+        read: files by folder; those that are read are added.
 
-    def failure_of(self, scenario: str, distribution: str | None) -> tuple[str, Failure] | None:
-        """Return the failure, with its id, that a scenario's folder states for it.
-
-        Raises:
-            FileFormatError: the file is damaged.
-            StorageError: it cannot be read.
-        """
-        path = Path(scenario)
-        if distribution or path.suffix.lower() != ".xosc":
-            return None
-        if path.parent not in self._read:
-            self._read[path.parent] = read_failures(path.parent)
-        return self._read[path.parent].of_file(path.name)
+    Raises:
+        FileFormatError: the file is damaged.
+        StorageError: it cannot be read.
+    """
+    path = Path(scenario)
+    if distribution or path.suffix.lower() != ".xosc":
+        return None
+    if path.parent not in read:
+        read[path.parent] = read_failures(path.parent)
+    return read[path.parent].of_file(path.name)
 
 
 # --- Bytes → failures ---
@@ -288,85 +290,69 @@ def _parsed(data: bytes, path: Path) -> FailureFile:
 
 
 def _edited(file: FailureFile, changed: Mapping[str, Failure]) -> str:
-    """Return the text with blocks added or replaced."""
+    """Return the text with blocks added, and with other values in those that are there."""
     lines = file.text.splitlines(keepends=True)  # the lines of YAML, which has no \v, \f or \x1c
     if lines and not lines[-1].endswith("\n"):
         lines[-1] += "\n"
-    keys = {id: file.lines["failures", id] - 1 for id in file.failures}
-    starts = {id: _start(lines, key) for id, key in keys.items()}
-    ends = dict(zip(starts, [*[*starts.values()][1:], len(lines)], strict=False))
-    indent = _indent(lines[min(keys.values())]) if keys else 2
+    blocks, indent = _spans(file, lines, ("failures",), len(lines))
     edits = []
     for id, failure in changed.items():
-        if id in keys:
-            text = _replaced(file, lines[: ends[id]], starts[id], id, failure)
-            edits.append((starts[id], ends[id], id, text))
-        else:
-            at = next((start for one, start in starts.items() if one > id), len(lines))
-            edits.append((at, at, id, _emitted(id, failure, indent, indent + 2)))
+        values = _values(failure)
+        if id not in blocks:
+            at = next((start for one, (start, _) in blocks.items() if one > id), len(lines))
+            text = "".join(_entry(name, value, indent + 2) for name, value in values.items())
+            edits.append((at, at, id, f"{' ' * indent}{_flow(id)}:\n{text}"))
+            continue
+        old = _values(file.failures[id])
+        keys, inner = _spans(file, lines, ("failures", id), blocks[id][1])
+        for number, name in enumerate(names := [*Failure.model_fields]):
+            if old.get(name) == values.get(name):
+                continue
+            later = (keys[one][0] for one in names[number:] if one in keys)
+            start, end = keys.get(name) or (next(later, blocks[id][1]),) * 2
+            text = "".join(one for one in lines[start:end] if one.lstrip().startswith("#"))
+            text += _entry(name, values[name], inner) if name in values else ""
+            edits.append((start, end, f"{number:02}", text))
     for start, end, _, text in sorted(edits, reverse=True):
         lines[start:end] = [text]
     return "".join(lines)
+
+
+def _spans(
+    file: FailureFile, lines: list[str], path: tuple[str, ...], end: int
+) -> tuple[dict[str, tuple[int, int]], int]:
+    """Return the lines of each entry of a mapping, with the comments above it, and the indent."""
+    keys = {str(one[-1]): line - 1 for one, line in file.lines.items() if one[:-1] == path}
+    starts = []
+    for key in keys.values():
+        start = key
+        while start and lines[start - 1].lstrip().startswith("#") and (
+            _indent(lines[start - 1]) <= _indent(lines[key])  # else of the entry before
+        ):  # fmt: skip
+            start -= 1
+        starts.append(start)
+    indents = [_indent(lines[key]) for key in keys.values()]
+    return dict(zip(keys, pairwise([*starts, end]), strict=True)), min(indents, default=2)
 
 
 def _indent(line: str) -> int:
     return len(line) - len(line.lstrip())
 
 
-def _start(lines: list[str], key: int) -> int:
-    """Return the first line of a block: that of the comments directly above its key."""
-    start = key
-    while start and lines[start - 1].lstrip().startswith("#"):
-        if _indent(lines[start - 1]) > _indent(lines[key]):  # of the block before
-            break
-        start -= 1
-    return start
-
-
-def _replaced(file: FailureFile, lines: list[str], start: int, id: str, failure: Failure) -> str:
-    """Return the block of another failure, with what people wrote in the one that is there.
-
-    Args:
-        file: as it was read.
-        lines: of its text, up to the end of the block.
-        start: the first line of the block.
-        id: of the failure.
-        failure: the other one.
-    """
-    key = file.lines["failures", id] - 1
-    at = sorted(
-        (line - 1, str(path[2])) for path, line in file.lines.items()
-        if path[:2] == ("failures", id) and len(path) == 3 and line - 1 > key
-    )  # fmt: skip
-    ends = [*[line for line, _ in at[1:]], len(lines)]
-    own, comments = dict[str, str](), lines[start:key]
-    for (line, name), end in zip(at, ends, strict=True):
-        if name in _OWN and getattr(file.failures[id], name) == getattr(failure, name):
-            own[name] = "".join(lines[line:end])
-        else:
-            comments += [one for one in lines[line:end] if one.lstrip().startswith("#")]
-    indent = _indent(lines[key])
-    inner = _indent(lines[at[0][0]]) if at else indent + 2
-    return "".join(comments) + _emitted(id, failure, indent, inner, own)
-
-
-def _emitted(
-    id: str, failure: Failure, indent: int, inner: int, own: Mapping[str, str] | None = None
-) -> str:
-    """Return a failure as a block of YAML; its own keys as they are written, where they are."""
-    lines = [f"{' ' * indent}{_flow(id)}:\n"]
-    before = " " * inner
+def _values(failure: Failure) -> dict[str, Any]:
+    """Return what a block states."""
     defaults = Failure().model_dump()
     required = {*_OWN, *(defaults.keys() - {*_OPTIONAL} if failure.files else ())}
-    for name, value in failure.model_dump(exclude_none=True).items():
-        if own and name in own:
-            lines.append(own[name])
-        elif name == "violates":
-            lines += [f"{before}violates:\n"] if value else []
-            lines += [f"{before}  - {_flow(one)}\n" for one in failure.criteria]
-        elif name in required or value != defaults[name]:
-            lines.append(f"{before}{name}: {_flow(value)}\n")
-    return "".join(lines)
+    found = {**failure.model_dump(), "violates": failure.criteria}
+    return {name: one for name, one in found.items() if name in required or one != defaults[name]}
+
+
+def _entry(name: str, value: Any, indent: int) -> str:
+    """Return a key with its value as YAML; pass criteria on lines of their own."""
+    before = " " * indent
+    if name == "violates":
+        return f"{before}violates:\n" + "".join(f"{before}  - {_flow(one)}\n" for one in value)
+    return f"{before}{name}: {_flow(value)}\n"
 
 
 _PLAIN = re.compile(r"[A-Za-z]([A-Za-z0-9_./;()%=<>+ -]*[A-Za-z0-9_.)%])?", re.ASCII)

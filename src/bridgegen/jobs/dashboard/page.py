@@ -61,10 +61,12 @@ def modes_part(found: Dashboard, base: str) -> str:
 
 
 def _table(name: str, modes: list[OpenMode], base: str) -> str:
-    rows = [_row(one, base) for one in modes[:MOST_MODES]]
-    more = len(modes) - len(rows)
-    after = f'<p class="muted">and {more:,} more</p>' if more else ""
-    return table(name, _HEADS, rows) + after
+    return _some(name, _HEADS, [_row(one, base) for one in modes[:MOST_MODES]], len(modes))
+
+
+def _some(name: str, heads: tuple[str, ...], rows: list[list[str]], total: int) -> str:
+    more = total - len(rows)
+    return table(name, heads, rows) + (f'<p class="muted">and {more:,} more</p>' if more else "")
 
 
 def _row(one: OpenMode, base: str) -> list[str]:
@@ -98,16 +100,8 @@ def _decisions(some: dict[str, Failure]) -> str:
          text(one.comment)]
         for id, one in [*some.items()][:MOST_MODES]
     ]  # fmt: skip
-    more = len(some) - len(rows)
-    after = f'<p class="muted">and {more:,} more</p>' if more else ""
-    return (
-        table(
-            "Failure modes in no result",
-            ("failure mode", "status", "scenario", "driver", "comment"),
-            rows,
-        )
-        + after
-    )
+    heads = ("failure mode", "status", "scenario", "driver", "comment")
+    return _some("Failure modes in no result", heads, rows, len(some))
 
 
 # --- The page's part on requirements: a matrix for each driver ---
