@@ -13,8 +13,7 @@ import numpy as np
 from bridgegen.base.compiled import bundled, kernel
 from bridgegen.drivers._perception_kernels import MEMORY, perceive
 from bridgegen.drivers._tracking_kernels import TRACK
-from bridgegen.drivers.detections import DETECTION
-from bridgegen.drivers.kinds import CAR
+from bridgegen.drivers.kinds import CAR, DETECTION
 from bridgegen.drivers.sight import Sky
 
 STEPS, DT = 401, 0.05

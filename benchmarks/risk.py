@@ -22,10 +22,11 @@ from types import ModuleType
 import numpy as np
 
 from bridgegen.assess.conflict.harm import NEAR_MISS
-from bridgegen.jobs.risk import Risk, estimate_risk
 from bridgegen.jobs.risk.estimators.problem import Aim
 from bridgegen.jobs.risk.estimators.weighted import Probability, of_weights
 from bridgegen.jobs.risk.experiment import estimate
+from bridgegen.jobs.risk.result import Risk
+from bridgegen.jobs.risk.risk import estimate_risk
 from bridgegen.jobs.search.scenarios import load
 from bridgegen.scenario.exposure import Exposure
 from bridgegen.scenario.exposure.reader import UNIFORM, build_exposure

@@ -16,7 +16,7 @@ from rates import Rate, rate_of
 from bridgegen.assess import metrics
 from bridgegen.engine.options import PipelineOptions
 from bridgegen.engine.pipeline import Pipeline
-from bridgegen.scenario.language.others import with_others
+from bridgegen.scenario.language.adversary import with_others
 from bridgegen.scenario.language.reader import load
 from bridgegen.scenario.language.scenario import LogicalScenario
 

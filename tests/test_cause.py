@@ -14,8 +14,8 @@ from bridgegen.base.errors import InputError, UnknownNameError
 from bridgegen.drivers import DRIVERS, STORYBOARD
 from bridgegen.engine.options import PipelineOptions
 from bridgegen.engine.pipeline import Pipeline
+from bridgegen.scenario.language.adversary import with_others
 from bridgegen.scenario.language.objectives import PAPERS
-from bridgegen.scenario.language.others import with_others
 from bridgegen.scenario.language.reader import load
 from bridgegen.scenario.language.thresholds import Thresholds
 from bridgegen.simulation.embedded import simulator

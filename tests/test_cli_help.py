@@ -1,6 +1,8 @@
 """``bridgegen --help`` shows every command, in a panel, with a summary that is not cut."""
 
 import re
+import subprocess
+import sys
 from importlib.metadata import version
 
 import pytest
@@ -91,3 +93,13 @@ def test_the_options_of_a_search_are_in_groups(cli, monkeypatch):
 def test_a_group_is_one_of_those_declared(name, command):
     groups = {getattr(one, "rich_help_panel", None) for one in command.params}
     assert groups <= {None, *GROUPS}
+
+
+def test_the_command_line_starts_without_what_only_runs_need():
+    """NumPy and Pydantic alone would take longer than all else that help needs."""
+    code = (
+        "import sys, bridgegen.cli; "
+        "print(*sorted({'numpy', 'pydantic', 'numba', 'yaml', 'lxml'} & {*sys.modules}))"
+    )
+    found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert found.stdout.strip() == ""

@@ -194,7 +194,7 @@ def test_the_main_job_goes_through_the_files_of_the_architecture_page_in_that_or
     text = (DOCS / "architecture.md").read_text("utf-8")
     _, _, table = text.partition(MAIN_JOB)
     path = re.findall(r"^\| `([\w/]+\.py)` \| `([\w.]+)` \|", table, re.M)
-    assert len({file for file, _ in path}) == len(path) <= 30
+    assert len({file for file, _ in path}) == len(path) <= 20
     calls: dict[tuple[str, str], None] = {}
 
     def note(frame, event, _):

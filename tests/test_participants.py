@@ -10,8 +10,7 @@ from bridgegen.assess.conflict.analysis import analyse
 from bridgegen.assess.conflict.plausibility import plausibility
 from bridgegen.assess.metrics.perceived import CLASSES
 from bridgegen.base.errors import ScenarioError
-from bridgegen.drivers.detections import MISSED, SEEN_BY
-from bridgegen.drivers.kinds import NAMES
+from bridgegen.drivers.kinds import MISSED, NAMES, SEEN_BY
 from bridgegen.engine.pipeline import Pipeline
 from bridgegen.openx.opendrive.from_owl import opendrive_from_owl
 from bridgegen.openx.openscenario import model as osc

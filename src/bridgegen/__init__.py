@@ -13,7 +13,8 @@ if TYPE_CHECKING:
     from bridgegen.jobs.compare import Comparison, compare
     from bridgegen.jobs.dashboard import Dashboard, build_dashboard
     from bridgegen.jobs.preventability import PreventabilityMap, map_preventability
-    from bridgegen.jobs.risk import Risk, estimate_risk
+    from bridgegen.jobs.risk.result import Risk
+    from bridgegen.jobs.risk.risk import estimate_risk
     from bridgegen.jobs.safety_case import SafetyCase, export_safety_case
     from bridgegen.jobs.search import Run, resume, run_search
     from bridgegen.jobs.search.confirm import confirm
@@ -69,8 +70,8 @@ _HOMES = {
     "load": "bridgegen.scenario.language.reader",
     "map_preventability": "bridgegen.jobs.preventability",
     "PreventabilityMap": "bridgegen.jobs.preventability",
-    "Risk": "bridgegen.jobs.risk",
-    "estimate_risk": "bridgegen.jobs.risk",
+    "Risk": "bridgegen.jobs.risk.result",
+    "estimate_risk": "bridgegen.jobs.risk.risk",
     "resume": "bridgegen.jobs.search",
     "run_search": "bridgegen.jobs.search",
     "export_safety_case": "bridgegen.jobs.safety_case",

@@ -3,21 +3,21 @@
 from collections import Counter
 
 import bridgegen as bg
-from bridgegen.engine.pipeline import Pipeline
+from bridgegen.engine.runner import Runner
 from bridgegen.jobs.search import SearchCallbacks
 from bridgegen.results.store import Store
 
 
 def test_an_exported_scenario_is_simulated_once(tmp_path, monkeypatch):
     """For its outcomes, its files, its playback and its picture together."""
-    simulated, stages, rollout = Counter(), [], Pipeline.rollout
+    simulated, stages, run_rows = Counter(), [], Runner.run
 
-    def counted(self, X):
+    def counted(self, X, **more):
         if stages[-1] in ("export", "report"):
             simulated.update(x.tobytes() for x in X)
-        return rollout(self, X)
+        return run_rows(self, X, **more)
 
-    monkeypatch.setattr(Pipeline, "rollout", counted)
+    monkeypatch.setattr(Runner, "run", counted)
     run = bg.run_search(
         "crossroads-s3", budget=60, keep=3, ego="route-follower", triage="short",
         out=tmp_path / "run",

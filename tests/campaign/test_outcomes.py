@@ -211,7 +211,7 @@ def test_the_cause_is_in_every_file_and_comes_back(tmp_path):
 def test_a_cause_that_is_none_breaks_a_rule():
     scenario = load("crossroads-s4")
     individuals = (
-        Pipeline(scenario, scenario.space()).concrete(scenario.space().row({})).individuals
+        Pipeline(scenario, scenario.space()).runner.concrete(scenario.space().row({})).individuals
     )
     node = individuals.one("Scenario")
     quad = ox.Quad(node, tbox_property("has_cause"), ox.Literal("luck"))
@@ -351,7 +351,7 @@ def test_outcomes_of_another_rollout_are_replaced(crashed):
 def test_wrong_findings_break_a_rule(name, value, word):
     scenario = load("crossroads-s4")
     individuals = (
-        Pipeline(scenario, scenario.space()).concrete(scenario.space().row({})).individuals
+        Pipeline(scenario, scenario.space()).runner.concrete(scenario.space().row({})).individuals
     )
     quad = ox.Quad(individuals.one("Scenario"), tbox_property(name), value)
     broken = check(Individuals([*individuals.quads, quad]), scenario)

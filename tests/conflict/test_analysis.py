@@ -225,6 +225,24 @@ def test_no_near_miss_of_an_ego_that_brakes_enough(track, meeting, course):
     assert found.ttc < 1.5
 
 
+@pytest.mark.parametrize(
+    ("gap", "stops", "kind"),
+    [
+        pytest.param(12.5, 2.5, COURSE, id="4 m/s², which suffices"),
+        pytest.param(10.5, 2.5, NEAR_MISS, id="4.76 m/s²: ISO 15622 allows 4.5 at 10 m/s"),
+        pytest.param(12.5, 0.3, NEAR_MISS, id="4 m/s², and it comes as near as 0.3 m"),
+    ],
+)
+def test_comfortable_braking_is_no_near_miss_unless_they_all_but_touch(
+    track, meeting, course, gap, stops, kind
+):
+    # at 10 m/s it brakes from 1 s on, and stops some metres before a standing car
+    taken = (gap - stops) / 5.0
+    v = course((0.0, 10.0), (1.0, 10.0), (1.0 + taken, 0.0), (6.0, 0.0))
+    found = one(meeting(track(v=v), track(x=14.0 + gap)))
+    assert found.kind == kind
+
+
 def test_far_away_is_a_course_and_no_near_miss(track, meeting, course):
     v = course((0.0, 20.0), (0.5, 20.0), (5.5, 0.0), (6.0, 0.0))
     found = one(meeting(track(v=v), track(x=74.0)))

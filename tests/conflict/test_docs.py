@@ -31,6 +31,9 @@ def test_every_type_and_rule_is_on_the_page(one):
     [
         f"TTC ≤ {limits.SERIOUS_TTC:g} s",
         f"≥ {limits.SERIOUS_DECELERATION:g} m/s²",
+        f"more than {limits.BRISK_SLOW[1]:g} m/s² at {limits.BRISK_SLOW[0]:g} m/s",
+        f"{limits.BRISK_FAST[1]:g} m/s² at {limits.BRISK_FAST[0]:g} m/s",
+        f"nearer than {limits.CLOSE_CALL:g} m",
         f"within {limits.HORIZON:g} s",
         f"for {limits.REACTION:g} s",
         f"{limits.BRAKING / 9.81:.3f} g",

@@ -8,8 +8,7 @@ from bridgegen.drivers import _weather_columns as column
 from bridgegen.drivers import _weather_kernels
 from bridgegen.drivers._perception_kernels import MEMORY, perceive
 from bridgegen.drivers._tracking_kernels import TRACK
-from bridgegen.drivers.detections import DETECTION
-from bridgegen.drivers.kinds import CAR, PEDESTRIAN
+from bridgegen.drivers.kinds import CAR, DETECTION, PEDESTRIAN
 
 BOX = {
     CAR: (4.5, 1.8, 1.4, 50.0, 3.0, 9.0, 0.2, 1.5),

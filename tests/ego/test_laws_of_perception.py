@@ -10,19 +10,20 @@ from hypothesis import strategies as st
 from bridgegen.drivers import _camera_kernels as camera
 from bridgegen.drivers import _lidar_kernels as lidar
 from bridgegen.drivers import _weather_columns as column
-from bridgegen.drivers.detections import (
+from bridgegen.drivers.kinds import (
     BOTH,
     CAMERA,
+    CAR,
     HEADING,
     KIND,
     LIDAR,
     MISSED,
     NO_FRAME,
+    PEDESTRIAN,
     SEEN_BY,
     X,
     Y,
 )
-from bridgegen.drivers.kinds import CAR, PEDESTRIAN
 
 from .scenes import Scene, ahead, weather
 

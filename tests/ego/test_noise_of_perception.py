@@ -8,10 +8,22 @@ import pytest
 from bridgegen.drivers import _camera_kernels as camera
 from bridgegen.drivers import _lidar_kernels as lidar
 from bridgegen.drivers import _weather_columns as column
-from bridgegen.drivers._kind_tables import LAMPS, REFLECTANCE
 from bridgegen.drivers._physics_kernels import DROPOUT_TIME, ERROR_TIME, HEADING_ERROR, MOUNT, veil
-from bridgegen.drivers.detections import BOTH, CAMERA, HEADING, KIND, LENGTH, LIDAR, SEEN_BY, X, Y
-from bridgegen.drivers.kinds import CAR, PEDESTRIAN
+from bridgegen.drivers.kinds import (
+    BOTH,
+    CAMERA,
+    CAR,
+    HEADING,
+    KIND,
+    LAMPS,
+    LENGTH,
+    LIDAR,
+    PEDESTRIAN,
+    REFLECTANCE,
+    SEEN_BY,
+    X,
+    Y,
+)
 
 from .scenes import BOX, Scene, weather
 

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from bridgegen.drivers import _tracking_kernels as track
-from bridgegen.drivers.detections import BOTH, HEADING, NO_FRAME, SEEN_BY, X, Y
-from bridgegen.drivers.kinds import CAR, PEDESTRIAN
+from bridgegen.drivers.kinds import BOTH, CAR, HEADING, NO_FRAME, PEDESTRIAN, SEEN_BY, X, Y
 
 from .scenes import Scene, ahead, weather
 

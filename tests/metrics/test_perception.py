@@ -16,7 +16,7 @@ from bridgegen.assess.metrics.iou import iou
 from bridgegen.assess.metrics.mean_average_precision import mean_average_precision
 from bridgegen.assess.metrics.r_red import r_red
 from bridgegen.drivers import kinds
-from bridgegen.drivers.detections import BOTH, MISSED, NO_FRAME
+from bridgegen.drivers.kinds import BOTH, MISSED, NO_FRAME
 
 # r_red. The ego drives along +x; its front bumper is 2 m ahead of its reference point.
 

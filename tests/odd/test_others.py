@@ -5,7 +5,7 @@ from importlib.resources import files
 import pytest
 
 from bridgegen.base.errors import ScenarioError
-from bridgegen.scenario.language.others import with_others
+from bridgegen.scenario.language.adversary import with_others
 from bridgegen.scenario.language.reader import load, names
 
 PAPERS = ("crossroads-s1", "crossroads-s2", "crossroads-s3", "crossroads-s4")

@@ -5,7 +5,7 @@ import pytest
 
 from bridgegen.base.errors import ScenarioError
 from bridgegen.scenario.language.reader import load, shipped_text
-from bridgegen.scenario.language.recorded import unmapped
+from bridgegen.scenario.language.storyboard import unmapped
 
 
 @pytest.fixture

@@ -4,7 +4,7 @@ import pytest
 
 from bridgegen.openx.openscenario.declarations import DRIVER
 from bridgegen.openx.openscenario.from_owl import openscenario_from_owl
-from bridgegen.scenario.language.others import with_others
+from bridgegen.scenario.language.adversary import with_others
 from bridgegen.scenario.language.reader import load
 from bridgegen.scenario.ontology.check import check
 from bridgegen.scenario.ontology.individuals import build

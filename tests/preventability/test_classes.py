@@ -78,7 +78,7 @@ def test_rows_that_end_where_the_ego_collides_have_the_same_outcomes():
     space = scenario.space()
     X = space.decode(np.random.default_rng(5).random((96, space.n_var)))
     pipeline = Pipeline(scenario, space, PipelineOptions(ego="route-follower"))
-    whole, short = pipeline.rollout(X), pipeline.rollout(X, until_collision=True)
+    whole, short = pipeline.runner.run(X), pipeline.runner.run(X, until_collision=True)
     hit = collides(whole)
     assert 10 < hit.sum() < 86
     np.testing.assert_array_equal(collides(short), hit)

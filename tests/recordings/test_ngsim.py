@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from bridgegen.recordings.readers.formats import read
-from bridgegen.recordings.readers.motion import centre_ahead
+from bridgegen.recordings.readers.states import centre_ahead
 
 from . import writers as w
 

@@ -16,7 +16,7 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 
 from bridgegen.drivers.kinds import TRUCK
-from bridgegen.recordings.readers.motion import centre_ahead
+from bridgegen.recordings.readers.states import centre_ahead
 
 STEP = 0.1
 N = 41

@@ -10,6 +10,7 @@ import pytest
 
 from bridgegen.base.errors import InputError, StorageError, UnknownNameError
 from bridgegen.engine.pipeline import Pipeline
+from bridgegen.engine.replays import Replays
 from bridgegen.pages import page
 from bridgegen.pages.playbacks import playbacks
 from bridgegen.pages.scenario_page import show_scenario, story_lines
@@ -74,7 +75,7 @@ def test_nobody_is_drawn_who_is_not_there(monkeypatch):
     present = np.ones(rollout.x.shape, dtype=np.bool_)
     present[0, 1, 20:] = False
     gone = replace(rollout, present=present)
-    monkeypatch.setattr(pipeline, "rollout", lambda _: gone)
+    monkeypatch.setattr(pipeline.runner, "run", lambda _: gone)
     root = ElementTree.fromstring(sketch(pipeline.runner))
     closest = int(gone.distance[0, 1, : gone.n_steps[0]].argmin())
     assert closest < 20  # it counts only while it is there
@@ -237,7 +238,8 @@ def test_a_report_has_no_place_for_who_is_not_there(monkeypatch):
     present = np.ones(replay.rollout.x.shape, dtype=np.bool_)
     present[0, 1, 20:] = False
     gone = replace(replay, rollout=replace(replay.rollout, present=present))
-    monkeypatch.setattr(pipeline, "replay", lambda *_, **__: gone)
+    whole = Replays(((np.zeros(1, np.int64), gone),))
+    monkeypatch.setattr(pipeline, "replays", lambda *_, **__: whole)
     rows = SimpleNamespace(
         X=X, metrics=np.zeros((1, len(pipeline.metrics))), critical=[True], cause=np.zeros(1, int),
         take=lambda at: rows,

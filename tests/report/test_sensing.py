@@ -5,7 +5,7 @@ import pytest
 
 from bridgegen.assess.metrics.e_position import e_position
 from bridgegen.assess.metrics.perceived import perceived
-from bridgegen.drivers.detections import DETECTION
+from bridgegen.drivers.kinds import DETECTION
 from bridgegen.engine.options import PipelineOptions
 from bridgegen.engine.pipeline import Pipeline
 from bridgegen.pages.sensing import TOLERANCE, sensed

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from bridgegen.drivers.lamps import BLUE, BRAKE, HAZARD, LEFT, RIGHT
+from bridgegen.drivers.kinds import BLUE, BRAKE, HAZARD, LEFT, RIGHT
 from bridgegen.engine.options import PipelineOptions
 from bridgegen.engine.pipeline import Pipeline
 from bridgegen.pages.frames import FINE, Film

@@ -8,7 +8,7 @@ import pytest
 
 from bridgegen.assess.cause import Cause
 from bridgegen.assess.conflict.findings import Findings
-from bridgegen.engine.evaluation import EVENT, Trials
+from bridgegen.engine.trials import EVENT, Trials
 from bridgegen.scenario.language.parameters import Axis
 from bridgegen.scenario.language.reader import load
 from bridgegen.scenario.language.space import SearchSpace
@@ -55,6 +55,11 @@ class World:
         self.driver = SimpleNamespace(label="driver")
         self.objective = SimpleNamespace(harm="harm", count="ego", rule="harm")
         self.asked = []
+
+    @property
+    def runner(self):
+        """The stand-in of the runner is the same."""
+        return self
 
     def values(self, X):
         return {name: X[:, k] for k, name in enumerate(self.space.names)}

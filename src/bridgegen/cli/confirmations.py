@@ -52,7 +52,7 @@ def confirm(
     Are its critical scenarios critical there, too?
     """
     from bridgegen.cli.terminal.confirmation import ConfirmationScreen, print_confirmation
-    from bridgegen.cli.terminal.verdict import print_outcomes
+    from bridgegen.cli.terminal.tables import print_outcomes
     from bridgegen.cli.verdict.of_confirmation import ConfirmationCriteria
     from bridgegen.jobs.search.confirm import confirm as confirm_run
 

@@ -50,7 +50,7 @@ def dashboard(
     folder and in suites that grow, which are yours.
     """
     from bridgegen.cli.terminal.dashboard import DashboardScreen, print_dashboard
-    from bridgegen.cli.terminal.verdict import print_outcomes
+    from bridgegen.cli.terminal.tables import print_outcomes
     from bridgegen.cli.verdict.of_dashboard import DashboardCriteria
     from bridgegen.jobs.dashboard import build_dashboard
 

@@ -83,8 +83,8 @@ def preventability(
 
     And which of its collisions the driver models of UN R157 avoid. Writes arrays and a page.
     """
-    from bridgegen.cli.terminal.preventability import MapScreen, print_map
-    from bridgegen.cli.terminal.verdict import print_outcomes
+    from bridgegen.cli.terminal.risk import MapScreen, print_map
+    from bridgegen.cli.terminal.tables import print_outcomes
     from bridgegen.cli.verdict.of_map import MapCriteria
     from bridgegen.jobs.preventability import map_preventability
 

@@ -135,9 +135,9 @@ def risk(
     record, a page, the harmful rows, and the most likely one of each failure mode as a scenario.
     """
     from bridgegen.cli.terminal.risk import RiskScreen, print_risk
-    from bridgegen.cli.terminal.verdict import print_outcomes
+    from bridgegen.cli.terminal.tables import print_outcomes
     from bridgegen.cli.verdict.of_risk import RiskCriteria
-    from bridgegen.jobs.risk import estimate_risk
+    from bridgegen.jobs.risk.risk import estimate_risk
 
     judges = RiskCriteria.read(fail_if or (), junit)
     elsewhere = common.read_simulator(simulator, simulator_set, connection)

@@ -16,7 +16,6 @@ import typer
 
 from bridgegen.base.disk import write_whole
 from bridgegen.base.errors import BridgeGenError, FileFormatError, InputError, StorageError
-from bridgegen.drivers import is_remote
 from bridgegen.engine.options import SearchOptions, file_forms, options_of
 from bridgegen.engine.options.file_forms import FileForm
 
@@ -208,6 +207,8 @@ def _moved(key: Key, value: Any, move: Callable[[str], object]) -> Any:
         return [str(move(one)) if one.lower().endswith(_YAML) else one for one in value]
     if not isinstance(value, str):
         return value
+    from bridgegen.drivers import is_remote
+
     if is_remote(value):
         return value
     if key.name in _CODE:

@@ -23,7 +23,6 @@ from bridgegen.cli.declared import with_declared_options
 from bridgegen.cli.groups import FILES, RESULTS, SEARCH
 from bridgegen.cli.run_files import keys_of, schema, with_run_files
 from bridgegen.cli.several_runs import search_all
-from bridgegen.drivers import split
 from bridgegen.engine.options import SearchOptions
 from bridgegen.engine.options.forms import read_names
 from bridgegen.engine.options.option import DRIVER, OUTPUT, WHAT
@@ -176,7 +175,7 @@ def coverage(
     Also shows which combinations of bins, and which of them are critical; with an
     exposure, how much of what is met on the road these are.
     """
-    from bridgegen.cli.terminal.coverage import print_coverage
+    from bridgegen.cli.terminal.search import print_coverage
     from bridgegen.jobs.search.coverage import coverage_of
 
     settings, found = coverage_of(run, bins=bins, strength=strength, exposure=exposure)
@@ -279,6 +278,7 @@ def simulate(
     """
     from bridgegen.cli.terminal.files import conflict_facts, criteria_facts, print_file_result
     from bridgegen.cli.verdict.of_file import FileCriteria
+    from bridgegen.drivers import split
     from bridgegen.engine.simulate import simulate_file
     from bridgegen.simulation.trace import write_trace
 
@@ -362,7 +362,7 @@ def check_driver(
 
 def _end(outcomes: "Sequence[Outcome]") -> None:
     """Print the outcomes of the criteria; exit with their status if one failed."""
-    from bridgegen.cli.terminal.verdict import print_outcomes
+    from bridgegen.cli.terminal.tables import print_outcomes
 
     if not print_outcomes(outcomes):
         raise typer.Exit(FAILED)

@@ -120,7 +120,7 @@ def suite(
     the ego fails if it is critical, or if a pass criterion is violated.
     """
     from bridgegen.cli.terminal.suite import SuiteScreen, print_suite
-    from bridgegen.cli.terminal.verdict import print_outcomes
+    from bridgegen.cli.terminal.tables import print_outcomes
     from bridgegen.cli.verdict.of_suite import SuiteCriteria
     from bridgegen.jobs.suite.maps import map_suite
     from bridgegen.jobs.suite.page import write_suite_page
@@ -198,7 +198,7 @@ def diff(
     logical scenarios for where the second is worse.
     """
     from bridgegen.cli.terminal.suite import SuiteScreen, print_difference
-    from bridgegen.cli.terminal.verdict import print_outcomes
+    from bridgegen.cli.terminal.tables import print_outcomes
     from bridgegen.cli.verdict.of_difference import DifferenceCriteria
     from bridgegen.jobs.suite.difference import difference, search_worse
     from bridgegen.jobs.suite.page import write_suite_page

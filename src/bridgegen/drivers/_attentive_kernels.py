@@ -51,11 +51,10 @@ from bridgegen.drivers._following_kernels import (
     let_in,
     stop_for,
 )
-from bridgegen.drivers._kind_tables import IS_ON_FOOT, IS_PEDESTRIAN, IS_VEHICLE, NEEDS_ROOM
 from bridgegen.drivers._lights_kernels import stop_at_lights, stop_at_signs
 from bridgegen.drivers._path_kernels import COS, SIN, H, X, Y, locate, project
 from bridgegen.drivers._yielding_kernels import COMMITTED, HORIZON, give_way
-from bridgegen.drivers.lamps import HAZARD
+from bridgegen.drivers.kinds import HAZARD, IS_ON_FOOT, IS_PEDESTRIAN, IS_VEHICLE, NEEDS_ROOM
 
 MIND = 8
 RISK, GIVEN, BRAKES, STOPS_FOR, HALTED, ASKED, STRAIGHT_TO, STRAIGHT_ON = range(MIND)
@@ -68,7 +67,7 @@ SEEN = 9
 CX, CY, C, S, W, GAIN, LENGTH, WIDTH, LAMPS = range(SEEN)
 """Rows of ``seen``, the bodies as all drivers see them: the centre [m], cosine and sine of the
 heading, the speed [m/s], its rate of change [m/s²], length and width [m], and the indicators that
-it shows, see `bridgegen.drivers.lamps`."""
+it shows, see `bridgegen.drivers.kinds`."""
 
 LOOK = 0.2  # s, between two looks around; the acceleration of one holds until the next
 CONCERNS = 0.75 * COMFORT_ACCELERATION  # m/s²; a leader that allows more (its gap is twice the

@@ -12,7 +12,6 @@ import math
 
 from bridgegen.base.compiled import kernel
 from bridgegen.drivers._following_kernels import COMFORT_DECELERATION
-from bridgegen.drivers._kind_tables import HIDES_PEOPLE, IS_ON_FOOT
 from bridgegen.drivers._shift_kernels import aside_at
 from bridgegen.drivers._surroundings_kernels import (
     ACROSS,
@@ -24,6 +23,7 @@ from bridgegen.drivers._surroundings_kernels import (
     NEAR,
 )
 from bridgegen.drivers._tracking_kernels import KIND
+from bridgegen.drivers.kinds import HIDES_PEOPLE, IS_ON_FOOT
 
 ENTER, LEAVE, RIGHT_END, LEFT_END = 0, 1, 2, 3
 """Columns of a crosswalk: where the ego's route enters and leaves it, and how far it reaches to

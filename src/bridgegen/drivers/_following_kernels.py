@@ -11,7 +11,6 @@ heuristic: a short gap to a leader that is not slower needs no hard braking).
 import math
 
 from bridgegen.base.compiled import kernel
-from bridgegen.drivers._kind_tables import NEEDS_ROOM
 from bridgegen.drivers._shift_kernels import aside_at
 from bridgegen.drivers._surroundings_kernels import (
     ACROSS,
@@ -25,7 +24,7 @@ from bridgegen.drivers._surroundings_kernels import (
     NEAR,
 )
 from bridgegen.drivers._tracking_kernels import KIND, LAMPS
-from bridgegen.drivers.lamps import HAZARD, LEFT, RIGHT
+from bridgegen.drivers.kinds import HAZARD, LEFT, NEEDS_ROOM, RIGHT
 
 COMFORT_ACCELERATION = 1.5  # m/s²
 COMFORT_DECELERATION = 2.0  # m/s²
@@ -81,7 +80,7 @@ def follow(gap, v, leader_speed, leader_acceleration):
 def let_in(lamps, beside, space, gap, v, speed, acceleration):
     """Return the acceleration [m/s²] by which an actor beside is let in; +inf if it is not.
 
-    The actor shows ``lamps`` (`bridgegen.drivers.lamps`) ``beside`` the strip, left positive, at so
+    The actor shows ``lamps`` (`bridgegen.drivers.kinds`) ``beside`` the strip, left positive, at so
     much ``space``, and its rear end is ahead by a ``gap`` [m]. Whoever indicates has no right of
     way, so braking stays comfortable.
     """

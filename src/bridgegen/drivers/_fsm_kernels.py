@@ -48,8 +48,8 @@ from bridgegen.drivers._conflict_kernels import (
 )
 from bridgegen.drivers._cruise_kernels import cruise
 from bridgegen.drivers._following_kernels import COMFORT_ACCELERATION, COMFORT_DECELERATION
-from bridgegen.drivers._kind_tables import USES_LANES
 from bridgegen.drivers._route_follower_kernels import hold_speed, keep_to_route
+from bridgegen.drivers.kinds import USES_LANES
 
 REACTION = 0.75  # s
 COMFORT_BRAKING = 4.0  # m/s²

@@ -27,7 +27,6 @@ from bridgegen.drivers._following_kernels import (
     keep_distance,
     stop_for,
 )
-from bridgegen.drivers._kind_tables import IS_ON_FOOT
 from bridgegen.drivers._shift_kernels import aside_at, shift_length
 from bridgegen.drivers._speed_kernels import FAST_ROAD, LEFT, LIMIT, RIGHT, sight_speed
 from bridgegen.drivers._surroundings_kernels import (
@@ -43,6 +42,7 @@ from bridgegen.drivers._surroundings_kernels import (
 )
 from bridgegen.drivers._tracking_kernels import KIND
 from bridgegen.drivers._yielding_kernels import ACROSS as CROSSES
+from bridgegen.drivers.kinds import IS_ON_FOOT
 
 BEFORE, AFTER, BEGINS, LENGTH, HELD_UP = range(control.SIZE + 3, control.SIZE + 8)
 LAST = control.SIZE + 8

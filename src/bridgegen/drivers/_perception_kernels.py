@@ -32,7 +32,7 @@ from bridgegen.drivers._physics_kernels import (
     MOUNT,
 )
 from bridgegen.drivers._sensor_kernels import DRAWN, MEMORY, draw, observe
-from bridgegen.drivers.detections import (
+from bridgegen.drivers.kinds import (
     BOTH,
     CONFIDENCE,
     DETECTION,
@@ -183,7 +183,7 @@ def perceive(
         v: ``(E, T)`` [m/s].
         bodies: ``(E, 8)``, see `bridgegen.simulation.embedded.program.Program`.
         kinds: ``(E,)``, see `bridgegen.drivers.kinds`.
-        lamps: ``(E,)`` int64, what shows, see `bridgegen.drivers.lamps`.
+        lamps: ``(E,)`` int64, what shows, see `bridgegen.drivers.kinds`.
         weather: ``(W,)``, see ``_weather_kernels``.
         memory: ``(E, MEMORY)``, zeros before the first instant.
         tracks: ``(E, TRACK)``, zeros before the first instant; see ``_tracking_kernels``.

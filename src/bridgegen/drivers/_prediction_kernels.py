@@ -17,7 +17,6 @@ gives way (``right_of_way``). The planner reads the passages of either predictio
 import math
 
 from bridgegen.base.compiled import kernel
-from bridgegen.drivers._kind_tables import IS_VULNERABLE
 from bridgegen.drivers._path_kernels import COS, SIN, X, Y, project
 from bridgegen.drivers._surroundings_kernels import BEHIND, QUICKENING
 from bridgegen.drivers._tracking_kernels import CONFIRMED, KIND, LENGTH, STATE, VX, VY, WIDTH, H
@@ -36,6 +35,7 @@ from bridgegen.drivers._yielding_kernels import (
     STATION,
     ZONE,
 )
+from bridgegen.drivers.kinds import IS_VULNERABLE
 
 PASSAGE = ZONE + 7
 

@@ -14,7 +14,6 @@ import math
 from bridgegen.base.compiled import kernel
 from bridgegen.drivers import _camera_kernels as camera
 from bridgegen.drivers import _lidar_kernels as lidar
-from bridgegen.drivers._kind_tables import LAMPS, MISTAKEN_FOR, REFLECTANCE
 from bridgegen.drivers._occlusion_kernels import COS, DX, DY, LAST, SIN, D
 from bridgegen.drivers._physics_kernels import (
     BOX_ERROR,
@@ -28,14 +27,17 @@ from bridgegen.drivers._physics_kernels import (
 )
 from bridgegen.drivers._random_kernels import block, normal_pair, unit
 from bridgegen.drivers._weather_columns import ATTENUATION, GLARE, SUN_X, SUN_Y
-from bridgegen.drivers.detections import (
+from bridgegen.drivers.kinds import (
     BOTH,
     CAMERA,
     CONFIDENCE,
     HEADING,
     KIND,
+    LAMPS,
     LENGTH,
     LIDAR,
+    MISTAKEN_FOR,
+    REFLECTANCE,
     SEEN_BY,
     WIDTH,
     X,

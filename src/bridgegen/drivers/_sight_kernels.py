@@ -12,7 +12,6 @@ import math
 from bridgegen.base.compiled import kernel
 from bridgegen.drivers import _camera_kernels as camera
 from bridgegen.drivers import _lidar_kernels as lidar
-from bridgegen.drivers._kind_tables import LAMPS, REFLECTANCE
 from bridgegen.drivers._physics_kernels import (
     CULL,
     ENOUGH_RETURNS,
@@ -23,7 +22,7 @@ from bridgegen.drivers._physics_kernels import (
     veil,
 )
 from bridgegen.drivers._weather_columns import ATTENUATION, GLARE, N_GLARES, SIGHT, SUN_X, SUN_Y
-from bridgegen.drivers.kinds import CAR, PEDESTRIAN
+from bridgegen.drivers.kinds import CAR, LAMPS, PEDESTRIAN, REFLECTANCE
 
 LIGHT, REAR, WALKER = 0, 1, 2
 """What is looked for: a traffic light, a car from behind, a pedestrian."""

@@ -40,8 +40,8 @@ from bridgegen.base.physics import CAREFUL_BRAKING, CAREFUL_JERK, CAREFUL_REACTI
 from bridgegen.drivers._ahead_kernels import place_on_way
 from bridgegen.drivers._cruise_kernels import cruise
 from bridgegen.drivers._following_kernels import COMFORT_ACCELERATION, COMFORT_DECELERATION, idm
-from bridgegen.drivers._kind_tables import USES_LANES
 from bridgegen.drivers._route_follower_kernels import hold_speed, keep_to_route
+from bridgegen.drivers.kinds import USES_LANES
 
 CRITICAL_TTC = 2.0  # s, up to which a cut-in is dangerous
 CRITICAL_HEADWAY = 2.0 + 1e-6  # s, up to which a cut-out or a deceleration is; and rounding

@@ -107,7 +107,7 @@ class Observation:
             none or absent, 1 tentative, 2 confirmed, 3 coasting), x, y of the box's
             centre [m], heading [rad], velocity in x and y [m/s], length, width [m], class (see
             ``bridgegen.drivers.kinds``), confidence, seconds since last seen, seconds tracked,
-            indicators and brake lights (see ``bridgegen.drivers.lamps``). With
+            indicators and brake lights (see ``bridgegen.drivers.kinds``). With
             ``--ideal perception`` they are the truth.
         stop_distance: ``(N,)`` float64 [m], from the front of the ego to the next stop line of a
             light on its route; +inf where there is none.

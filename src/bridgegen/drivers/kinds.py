@@ -10,3 +10,87 @@ CAR, TRUCK, BUS, MOTORCYCLE, BICYCLE, PEDESTRIAN, ANIMAL, OTHER = (
     for name in ("car", "truck", "bus", "motorcycle", "bicycle", "pedestrian", "animal", "other")
 )
 """The kinds that code refers to by name."""
+
+
+# --- What a vehicle's lamps tell others: indicators and brake lights, as bits of a number ---
+# Indicators are as the storyboard says. Brake lights light by themselves, unless it has switched
+# them.
+
+
+LEFT, RIGHT, BRAKE = 1, 2, 4
+"""What shows; both indicators are hazard lights, which tell of no change of lane."""
+
+SWITCHED = 8
+"""Besides ``BRAKE``: brake lights are as the storyboard has switched them."""
+
+BLUE = 16
+"""The blue lights of an emergency vehicle on a call; drivers know of them by its siren."""
+
+HAZARD = LEFT | RIGHT
+
+BRAKE_LIGHTS_FROM = 1.3
+"""[m/s²] The deceleration from which brake lights must be lit.
+
+Source: UN R13-H, 5.2.22: not below 0.7 m/s², always above 1.3 m/s²."""
+
+
+# --- The columns of ``Rollout.detections``: how the ego's sensors detect an entity at an instant --
+# Association is perfect: a detection is in the row of the entity that caused it.
+
+
+SEEN_BY = 0
+"""`NO_FRAME`, `MISSED`, `CAMERA`, `LIDAR` or `BOTH`; other columns are valid from `CAMERA` on."""
+X, Y = 1, 2
+"""The detected box's centre in the world [m]."""
+HEADING = 3
+"""[rad], counter-clockwise from +x."""
+LENGTH, WIDTH = 4, 5
+"""[m], > 0."""
+CONFIDENCE = 6
+"""0 to 1."""
+KIND = 7
+"""The class assigned to it, a code of `bridgegen.drivers.kinds`."""
+
+DETECTION = 8
+"""Number of columns."""
+
+NO_FRAME, MISSED, CAMERA, LIDAR, BOTH = -1, 0, 1, 2, 3
+"""No sensor took a frame at this instant; a frame missed the entity; the sensors that saw it."""
+
+
+# --- Properties of each kind for compiled code, by its code in `bridgegen.drivers.kinds` ---
+
+
+_CONDUCT = tuple(one.conduct for one in OBJECT_CLASSES)
+
+IS_VEHICLE = tuple(one == "vehicle" for one in _CONDUCT)
+"""Whether it is a motor vehicle."""
+
+IS_CYCLE = tuple(one == "bicycle" for one in _CONDUCT)
+IS_PEDESTRIAN = tuple(one == "pedestrian" for one in _CONDUCT)
+IS_ANIMAL = tuple(one == "animal" for one in _CONDUCT)
+IS_OBSTACLE = tuple(one == "obstacle" for one in _CONDUCT)
+
+USES_LANES = tuple(one in ("vehicle", "bicycle") for one in _CONDUCT)
+"""Whether it drives or rides."""
+
+IS_ON_FOOT = tuple(one in ("pedestrian", "animal") for one in _CONDUCT)
+"""Whether it walks."""
+
+NEEDS_ROOM = tuple(one in ("bicycle", "pedestrian") for one in _CONDUCT)
+"""Whether it is passed with more room than a vehicle."""
+
+IS_VULNERABLE = tuple(one in ("bicycle", "pedestrian", "animal") for one in _CONDUCT)
+"""Whether it is a vulnerable road user, or an animal."""
+
+HIDES_PEOPLE = tuple(one.hides_people for one in OBJECT_CLASSES)
+"""Whether a person may step out from behind it."""
+
+LAMPS = tuple(one.lamps for one in OBJECT_CLASSES)
+"""cd, of the lamps that each kind shows; UN R7 asks 4 of each of two rear lamps."""
+
+REFLECTANCE = tuple(one.reflectance for one in OBJECT_CLASSES)
+"""Of each kind at 905 nm: dark clothes 0.1; with plates and reflectors, vehicles more."""
+
+MISTAKEN_FOR = tuple(NAMES.index(one.mistaken_for) for one in OBJECT_CLASSES)
+"""The class that each kind is mistaken for where its own is not recognised."""

@@ -86,8 +86,8 @@ def detection_range(sky: Sky, kind: int) -> DetectionRange:
     """
     from bridgegen.drivers import _camera_kernels as camera
     from bridgegen.drivers import _lidar_kernels as lidar
-    from bridgegen.drivers._kind_tables import LAMPS, REFLECTANCE
     from bridgegen.drivers._physics_kernels import veil
+    from bridgegen.drivers.kinds import LAMPS, REFLECTANCE
 
     weather = sky.numbers()
     width, height = _SIZES[kind]

@@ -26,8 +26,8 @@ from bridgegen.engine.options import checked
 from bridgegen.openx.opendrive.model import OpenDrive
 from bridgegen.openx.openscenario import validate as openscenario_validate
 from bridgegen.openx.openscenario.declarations import CAUSE
-from bridgegen.openx.openscenario.empty_triggers import NEVER, read_empty_triggers
 from bridgegen.openx.openscenario.model import OpenScenario
+from bridgegen.openx.openscenario.pruning import NEVER, read_empty_triggers
 from bridgegen.openx.openscenario.read import read as read_scenario
 from bridgegen.openx.openscenario.stated_criteria import stated_criteria
 from bridgegen.openx.prepared import prepared, roads_of

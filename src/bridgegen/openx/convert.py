@@ -12,9 +12,9 @@ from bridgegen.openx.opendrive.to_owl import individuals_from_opendrive
 from bridgegen.openx.opendrive.to_owl.network import losses
 from bridgegen.openx.openscenario import read as openscenario_read
 from bridgegen.openx.openscenario import write as openscenario_write
-from bridgegen.openx.openscenario.empty_triggers import NEVER, read_empty_triggers
 from bridgegen.openx.openscenario.from_owl.scenario import openscenario_from_owl
-from bridgegen.openx.openscenario.renaming import EGO, ego_of, rename_entity
+from bridgegen.openx.openscenario.parameters import EGO, ego_of, rename_entity
+from bridgegen.openx.openscenario.pruning import NEVER, read_empty_triggers
 from bridgegen.openx.openscenario.to_owl import individuals_from_openscenario
 from bridgegen.openx.prepared import logic_path, prepared, roads_of
 from bridgegen.openx.xml import read_bytes

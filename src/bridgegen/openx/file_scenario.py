@@ -22,11 +22,11 @@ from bridgegen.openx.openscenario import parameters, validate
 from bridgegen.openx.openscenario.bodies import kind_of
 from bridgegen.openx.openscenario.declarations import DRIVER, IDEAL
 from bridgegen.openx.openscenario.element import Element
-from bridgegen.openx.openscenario.empty_triggers import read_empty_triggers
 from bridgegen.openx.openscenario.fixed_texts import fixed_texts
+from bridgegen.openx.openscenario.parameters import EGO, ego_of, rename_entity
+from bridgegen.openx.openscenario.pruning import read_empty_triggers
 from bridgegen.openx.openscenario.ranges import FileParameter, Ranges, ranges_of
 from bridgegen.openx.openscenario.read import read
-from bridgegen.openx.openscenario.renaming import EGO, ego_of, rename_entity
 from bridgegen.openx.openscenario.stated_criteria import stated_criteria
 from bridgegen.openx.openscenario.to_owl import individuals_from_openscenario
 from bridgegen.openx.openscenario.values import Kind, format_double

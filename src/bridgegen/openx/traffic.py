@@ -22,7 +22,7 @@ from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.declarations import DRIVER
 from bridgegen.openx.openscenario.element import Element, references
 from bridgegen.openx.openscenario.to_owl.starts import Starts
-from bridgegen.scenario.language.others import ATTENTIVE
+from bridgegen.scenario.language.adversary import ATTENTIVE
 from bridgegen.scenario.participants import PARTICIPANTS, Body
 
 MOST = 100

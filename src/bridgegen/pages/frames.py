@@ -12,7 +12,7 @@ from PIL import Image, ImageDraw, ImageFont
 
 from bridgegen.assess.metrics.d_min import first_closest
 from bridgegen.base.arrays import Float
-from bridgegen.drivers.lamps import BLUE, BRAKE, LEFT, RIGHT
+from bridgegen.drivers.kinds import BLUE, BRAKE, LEFT, RIGHT
 from bridgegen.pages.playback import AREA_KINDS, Playback
 from bridgegen.pages.svg import SvgDraw
 from bridgegen.scenario.participants import drawing_of

@@ -112,7 +112,7 @@ class Sensed:
     Attributes:
         steps: ``(F,)`` int64, these instants, ascending.
         seen_by: ``(E, F)`` int64: -1 not applicable (the ego, an absent entity), 0 missed, then
-            the sensor, as `bridgegen.drivers.detections` numbers it.
+            the sensor, as `bridgegen.drivers.kinds` numbers it.
         counts: ``(E, F)`` bool, whether the metrics of perception count it: it is within the range
             of its class.
         x: ``(E, F)`` float64 [m], of the detected box's centre, NaN where nothing was detected.
@@ -251,7 +251,7 @@ class Playback:
         weather: from the start on, and whenever it changes; empty: not known.
         street_lights: ``(n, 2)`` float64 [m].
         conflict: the decisive one; None if there is none, or it was not analysed.
-        shows: ``(E, T)`` int8, indicators and brake lights, see `bridgegen.drivers.lamps`; None:
+        shows: ``(E, T)`` int8, indicators and brake lights, see `bridgegen.drivers.kinds`; None:
             not known.
         beside: the same scenario with other drivers, drawn in outline.
     """

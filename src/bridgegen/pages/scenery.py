@@ -7,8 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from bridgegen.base.arrays import Float, Int
-from bridgegen.drivers._kind_tables import IS_VEHICLE
-from bridgegen.drivers.lamps import BLUE, BRAKE, BRAKE_LIGHTS_FROM
+from bridgegen.drivers.kinds import BLUE, BRAKE, BRAKE_LIGHTS_FROM, IS_VEHICLE
 from bridgegen.engine.runner import Runner
 from bridgegen.openx.opendrive.lanes import points
 from bridgegen.openx.opendrive.model import OpenDrive

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bridgegen.base.arrays import Bool, Float, Int
-from bridgegen.recordings.readers.motion import centre_ahead
+from bridgegen.recordings.readers.states import centre_ahead
 from bridgegen.recordings.readers.table import RecordedTraffic
 from bridgegen.simulation.rollout import Rollout
 

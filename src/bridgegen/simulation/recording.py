@@ -230,7 +230,7 @@ def kinds_of(path: Path) -> dict[str, int]:
     Raises:
         FileFormatError: not a valid OpenSCENARIO file.
     """
-    from bridgegen.simulation.embedded.compiler.bodies import kind
+    from bridgegen.simulation.embedded.compiler.layouts import kind
 
     scenario = resolved(read_scenario(path), str(path))
     return {

@@ -90,11 +90,11 @@ class Rollout:
         present: ``(N, E, T)`` bool, which entity is present at which instant; where one is
             absent, its states are finite but meaningless. ``(0, 0, 0)`` where all always are.
         lamps: ``(N, E, T)`` int8, indicators and brake lights that show, see
-            `bridgegen.drivers.lamps`; ``(0, 0, 0)`` where no scenario switches any.
+            `bridgegen.drivers.kinds`; ``(0, 0, 0)`` where no scenario switches any.
         kinds: ``(E,)`` int64, what each entity is, as `bridgegen.drivers.kinds` numbers it; empty
             where unknown.
         detections: ``(N, E, T, 8)`` float64, what the ego's sensors made of each entity at each
-            instant, in the columns of `bridgegen.drivers.detections`; rows of the ego itself
+            instant, in the columns of `bridgegen.drivers.kinds`; rows of the ego itself
             are zeros. ``(0, 0, 0, 8)`` where its driver perceives nothing.
         stop_lines: ``(N, L, 3)`` float64: x, y [m] and heading [rad] of each point where a route
             crosses the stop line of a traffic light, the heading in travel direction.

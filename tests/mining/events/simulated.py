@@ -17,7 +17,7 @@ from bridgegen.recordings.lanes.placing import place
 from bridgegen.recordings.lanes.road_map import lanes_of_map
 from bridgegen.recordings.readers.clean import clean
 from bridgegen.recordings.readers.table import Facts, RecordedLight, build, changes_of
-from bridgegen.scenario.language.others import with_others
+from bridgegen.scenario.language.adversary import with_others
 from bridgegen.scenario.language.reader import load
 
 STEP = 0.01

@@ -13,7 +13,7 @@ from bridgegen.recordings.lanes.fit import fit_of
 from bridgegen.recordings.lanes.model import Strip, assemble
 from bridgegen.recordings.lanes.placing import place
 from bridgegen.recordings.readers.clean import clean
-from bridgegen.recordings.readers.motion import centre_ahead
+from bridgegen.recordings.readers.states import centre_ahead
 from bridgegen.scenario.language.event_kinds import EVENT_KINDS
 from bridgegen.scenario.language.reader import load
 

@@ -11,7 +11,7 @@ from tests.openx.openscenario.strangers import FILE, changed
 from bridgegen.openx.opendrive.from_owl import opendrive_from_owl
 from bridgegen.openx.opendrive.write import to_xml as roads_to_xml
 from bridgegen.openx.openscenario.from_owl import openscenario_from_owl
-from bridgegen.openx.openscenario.from_owl.weather import time_of_day
+from bridgegen.openx.openscenario.from_owl.signals import time_of_day
 from bridgegen.openx.openscenario.write import to_xml
 from bridgegen.scenario.language.reader import load
 from bridgegen.scenario.ontology.graph import Individuals

@@ -10,7 +10,8 @@ from bridgegen.base.errors import OntologyError, UnsupportedError
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario import parameters
 from bridgegen.openx.openscenario.element import references, walk
-from bridgegen.openx.openscenario.from_owl import openscenario_from_owl, weather
+from bridgegen.openx.openscenario.from_owl import openscenario_from_owl
+from bridgegen.openx.openscenario.from_owl import signals as weather
 from bridgegen.openx.openscenario.read import read
 from bridgegen.openx.openscenario.values import Expr, resolve
 from bridgegen.openx.openscenario.write import to_xml

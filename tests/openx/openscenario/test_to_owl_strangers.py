@@ -7,8 +7,8 @@ from tests.openx.openscenario.strangers import KNOWN, line_of, moves_as, over_ti
 
 from bridgegen.base.errors import InputError, UnsupportedError
 from bridgegen.openx.convert import convert_file, import_file
+from bridgegen.openx.openscenario.parameters import rename_entity
 from bridgegen.openx.openscenario.read import read
-from bridgegen.openx.openscenario.renaming import rename_entity
 from bridgegen.scenario.ontology.check import check
 from bridgegen.scenario.ontology.files import load as load_owl
 

@@ -1,5 +1,8 @@
 """Intervals of weighted outcomes, against other people's formulas."""
 
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 import scipy.stats
@@ -79,3 +82,13 @@ def test_hits_are_what_equal_weights_would_be():
     assert weighted([1.0] * 7, [0.1] * 7, 10).hits(np.ones(7)) == pytest.approx(7.0)
     one = weighted([1.0, 1.0], [1.0, 1e-9], 10)
     assert one.hits(np.ones(2)) == pytest.approx(1.0)
+
+
+def test_estimators_load_without_a_simulator():
+    """They know points of normal space and scores alone: 12 modules of the package."""
+    code = (
+        "import sys, bridgegen.jobs.risk.estimators.subset as one; "
+        "print(sum(name.startswith('bridgegen') for name in sys.modules))"
+    )
+    found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert int(found.stdout) < 20

@@ -415,7 +415,7 @@ def test_a_route_must_be_on_the_servers_map(machine, made):
     )
     from bridgegen.openx.opendrive.write import to_xml
 
-    text = to_xml(other.concrete(other.space.row({})).roads).decode()
+    text = to_xml(other.runner.concrete(other.space.row({})).roads).decode()
     machine.maps["Carla/Maps/Elsewhere"] = text
     pipeline = made("crossroads-s1", "route-follower", map="Elsewhere")
     with pytest.raises(InputError, match=r"route must be on a lane of Elsewhere .* the same map"):

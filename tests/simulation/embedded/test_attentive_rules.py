@@ -5,7 +5,7 @@ import pytest
 
 from bridgegen.engine.options import PipelineOptions
 from bridgegen.engine.pipeline import Pipeline
-from bridgegen.scenario.language.others import with_others
+from bridgegen.scenario.language.adversary import with_others
 from bridgegen.scenario.language.reader import load
 from bridgegen.simulation.boxes import box_distance
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from bridgegen.drivers.detections import BOTH, CAMERA, LIDAR, MISSED, NO_FRAME, SEEN_BY, X, Y
+from bridgegen.drivers.kinds import BOTH, CAMERA, LIDAR, MISSED, NO_FRAME, SEEN_BY, X, Y
 from bridgegen.engine.options import PipelineOptions
 from bridgegen.engine.pipeline import Pipeline
 from bridgegen.scenario.language.reader import load

@@ -8,7 +8,7 @@ import pytest
 from bridgegen.base.errors import UnsupportedError
 from bridgegen.drivers import _weather_columns as column
 from bridgegen.engine.pipeline import Pipeline
-from bridgegen.openx.openscenario.from_owl.weather import time_of_day
+from bridgegen.openx.openscenario.from_owl.signals import time_of_day
 from bridgegen.scenario.language.reader import load
 from bridgegen.simulation.embedded.compiler.global_actions import sun_at
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from bridgegen.drivers._tracking_kernels import LAMPS
-from bridgegen.drivers.lamps import BRAKE, BRAKE_LIGHTS_FROM, HAZARD, LEFT, RIGHT
+from bridgegen.drivers.kinds import BRAKE, BRAKE_LIGHTS_FROM, HAZARD, LEFT, RIGHT
 from bridgegen.pages.scenery import vehicle_lamps
 
 from .storyboards import after, crossroads, events, lane, run, scenario, simulator, speeding, start

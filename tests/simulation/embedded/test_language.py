@@ -9,7 +9,7 @@ import pytest
 from bridgegen.assess.conflict.plausibility import plausibility
 from bridgegen.base.errors import ScenarioError
 from bridgegen.base.physics import GRAVITY, GRIP
-from bridgegen.drivers import lamps
+from bridgegen.drivers import kinds as lamps
 from bridgegen.engine.pipeline import Pipeline
 from bridgegen.openx.openscenario.from_owl import openscenario_from_owl
 from bridgegen.openx.openscenario.to_owl import individuals_from_openscenario

@@ -9,7 +9,7 @@ import pytest
 from bridgegen.base.errors import UnsupportedError
 from bridgegen.openx.openscenario.read import read
 from bridgegen.simulation.embedded._codes import COMPLETE, OFF, RUNNING, STANDBY
-from bridgegen.simulation.embedded.compiler.nodes import nodes
+from bridgegen.simulation.embedded.compiler.declared import nodes
 
 from .storyboards import (
     after,

@@ -101,9 +101,9 @@ def test_a_replay_with_a_kinematic_vehicle_is_the_kinematic_rollout(vehicle):
 @pytest.mark.parametrize("vehicle", DYNAMIC)
 def test_the_cause_is_vehicle_dynamics_where_the_kinematic_vehicle_copes(vehicle):
     dynamic, kinematic = (
-        made("lead-brakes", "careful-fsm", one, causes=True) for one in (vehicle, None)
+        made("jam-tail-in-fog", "careful-fsm", one, causes=True) for one in (vehicle, None)
     )
-    X = rows(dynamic, 80)
+    X = rows(dynamic, 100)
     found, other = dynamic.evaluate(X), kinematic.evaluate(X)
     late = found.critical & ~other.critical
     assert late.any()  # its brakes build up late
@@ -150,7 +150,7 @@ def test_where_it_cannot_be():
         UnknownNameError, match="'tank'; known: kinematic, multi-body, single-track"
     ):
         made(vehicle="tank")
-    file = made().concrete(rows(made())[0]).storyboard
+    file = made().runner.concrete(rows(made())[0]).storyboard
     simulator = SimulatorChoice("esmini")
     with pytest.raises(InputError, match="'single-track' is of the embedded simulator; esmini"):
         simulator.around(EmbeddedSimulator(file, "here", vehicle="single-track"), file)

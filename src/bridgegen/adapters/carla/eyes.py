@@ -14,7 +14,7 @@ from bridgegen.adapters.carla.settings import TIME_STEP
 from bridgegen.adapters.carla.stage import Stage
 from bridgegen.adapters.carla.view import View
 from bridgegen.base.arrays import Float
-from bridgegen.drivers import detections as column
+from bridgegen.drivers import kinds as column
 from bridgegen.drivers.detector import Detector, Frame, checked
 from bridgegen.drivers.driver_process import DriverError
 from bridgegen.drivers.kinds import NAMES

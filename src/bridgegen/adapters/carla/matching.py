@@ -7,7 +7,7 @@ import numpy as np
 
 from bridgegen.adapters.carla.view import View, overlap
 from bridgegen.base.arrays import Bool, Float
-from bridgegen.drivers import detections as column
+from bridgegen.drivers import kinds as column
 from bridgegen.drivers.detector import Checked
 
 NEAR = 4.0
@@ -59,7 +59,7 @@ class Truth:
 
 
 def matched(answer: Checked, truth: Truth, view: View) -> Float:
-    """Return the rows of an instant's detections ``(E, 8)``, see `bridgegen.drivers.detections`.
+    """Return the rows of an instant's detections ``(E, 8)``, see `bridgegen.drivers.kinds`.
 
     In order of confidence, each detection is assigned to an entity that is still free. Detections
     without an entity have no row: they are not counted.

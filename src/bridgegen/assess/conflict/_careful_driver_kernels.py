@@ -15,6 +15,9 @@ from bridgegen.assess.conflict._limits import (
     AHEAD_BY,
     BEND_SHARE,
     BRAKES_FOR,
+    BRISK_FAST,
+    BRISK_SLOW,
+    CLOSE_CALL,
     HEADWAY,
     HEADWAY_RISE,
     JERK,
@@ -43,6 +46,15 @@ def gains(speed, other, ca, sa, cb, sb):
     braking ends at standstill.
     """
     return max(speed - max(other * (cb * ca + sb * sa), 0.0), 0.0)
+
+
+@kernel
+def is_emergency(needed, speed):
+    """Return whether a body of this speed needs more deceleration than a comfort function has."""
+    slow, most = BRISK_SLOW
+    fast, least = BRISK_FAST
+    share = min(max((speed - slow) / (fast - slow), 0.0), 1.0)
+    return needed > most + share * (least - most)
 
 
 @kernel
@@ -122,7 +134,7 @@ def braked_and_stood(scene, a, b, k, start, braking, stands):
     k_meet = scene.at
     crosses = c[a, k_meet] * c[b, k_meet] + s[a, k_meet] * s[b, k_meet] < SAME_WAY
     at, speed, slowed, i, j = gone[a, k], v[a, k], 0.0, k, min(k, until)
-    apart = math.inf
+    apart, urgent = math.inf, False
     for m in range(k, start + int(BRAKES_FOR / dt)):
         if m > k:
             harder = slowed
@@ -146,6 +158,8 @@ def braked_and_stood(scene, a, b, k, start, braking, stands):
         its = v[b, min(m, until)]
         if apart <= 0.0:
             return worst if speed <= 0.0 and its > 0.0 and not stands else COLLIDES
+        if urgent and apart < CLOSE_CALL:
+            worst = COMES_NEAR
         meets = crosses and (speed <= 0.0 or m == k_meet)
         if meets and at > gone[a, k_meet] + AHEAD_BY:
             return COLLIDES
@@ -162,5 +176,7 @@ def braked_and_stood(scene, a, b, k, start, braking, stands):
             faster = gains(speed, its, c[a, i], s[a, i], c[b, j], s[b, j])
             needed = faster / (2.0 * max(time, dt))
             if time <= SERIOUS_TTC and needed >= SERIOUS_DECELERATION and needed > slowed:
-                worst = COMES_NEAR
+                urgent = True
+                if is_emergency(needed, speed) or apart < CLOSE_CALL:
+                    worst = COMES_NEAR
     return worst

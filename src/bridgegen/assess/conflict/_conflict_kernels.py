@@ -9,7 +9,7 @@ up to the ego's first contact with any body count.
 
 import math
 
-from bridgegen.assess.conflict._careful_driver_kernels import gains
+from bridgegen.assess.conflict._careful_driver_kernels import gains, is_emergency
 from bridgegen.assess.conflict._circumstances_kernels import stops_at_red
 from bridgegen.assess.conflict._codes import (
     ACROSS,
@@ -52,6 +52,7 @@ from bridgegen.assess.conflict._geometry_kernels import (
     zones,
 )
 from bridgegen.assess.conflict._limits import (
+    CLOSE_CALL,
     COMFORT,
     CREEPS,
     FRONT_PART,
@@ -164,7 +165,7 @@ def most_urgent(half, x, y, c, s, v, gone, distance, e, n, end, dt):
                 break
             needed = faster / (2.0 * max(time, dt))
             worth = urgency(time, needed)
-            if is_serious(time, needed, v[0], k, dt):
+            if is_serious(time, needed, v[0], distance, k, end, dt):
                 worth += 1.0
             if worth < best or (worth == best and time >= best_time):
                 break
@@ -180,14 +181,17 @@ def most_urgent(half, x, y, c, s, v, gone, distance, e, n, end, dt):
 
 
 @kernel
-def is_serious(time, needed, v, k, dt):
+def is_serious(time, needed, v, distance, k, end, dt):
     """Return whether a collision course at instant k is a near miss of an ego with speeds v.
 
-    It is not if the ego already brakes as hard as needed.
+    It is not if the ego already brakes as hard as needed; nor if comfortable braking suffices, and
+    the two do not come as near as `CLOSE_CALL` before instant ``end``.
     """
     if time > SERIOUS_TTC or needed < SERIOUS_DECELERATION or v[k] < MOVES:
         return False
-    return k == 0 or needed > (v[k - 1] - v[k]) / dt
+    if k > 0 and needed <= (v[k - 1] - v[k]) / dt:
+        return False
+    return is_emergency(needed, v[k]) or distance[k:end].min() < CLOSE_CALL
 
 
 @kernel
@@ -228,7 +232,7 @@ def analyse_pair(
     own_part = max(ux * nx + uy * ny, 0.0)
     if contact:
         needed = gains(v[0, k], v[e, k], ca, sa, cb, sb) / (2.0 * dt)
-    near = not contact and is_serious(time, needed, v[0], k, dt)
+    near = not contact and is_serious(time, needed, v[0], distance[e], k, end, dt)
     whole[KIND] = CONTACT if contact else NEAR_MISS if near else COURSE
     whole[INSTANT], whole[ZONE_EGO], whole[ZONE_OTHER] = at, own, its
     leads = (1.0 - 2.0 * FRONT_PART) * la

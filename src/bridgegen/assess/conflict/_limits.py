@@ -23,6 +23,13 @@ SERIOUS_DECELERATION = 3.35
 """[m/s²] Least deceleration that a near miss needs. Source: Archer (2005), Indicators for traffic
 safety assessment and prediction, KTH: deceleration rate to avoid a crash (DRAC) above the
 3.35 m/s² (11 ft/s²) of AASHTO."""
+BRISK_SLOW, BRISK_FAST = (5.0, 5.0), (20.0, 3.5)
+"""[m/s], [m/s²] Up to this deceleration at this speed of the ego, linear between the two, braking
+is no emergency. Source: ISO 15622:2018, the average over 2 s by which adaptive cruise control, a
+comfort function, may brake."""
+CLOSE_CALL = 0.5
+"""[m] Two bodies that come nearer after such braking was needed have a near miss all the same.
+Ours."""
 MOVES = 0.5
 """[m/s] A slower ego has no near miss: others pass it. Ours."""
 GUIDANCE = 6.0

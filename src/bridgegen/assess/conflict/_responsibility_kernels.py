@@ -111,9 +111,16 @@ from bridgegen.assess.conflict._limits import (
 from bridgegen.assess.conflict._type_kernels import strikes_with_front, turns
 from bridgegen.base.compiled import kernel
 from bridgegen.drivers._claims import SIREN
-from bridgegen.drivers._kind_tables import IS_ANIMAL, IS_CYCLE, IS_PEDESTRIAN, IS_VULNERABLE
-from bridgegen.drivers.kinds import BUS
-from bridgegen.drivers.lamps import HAZARD, LEFT, RIGHT
+from bridgegen.drivers.kinds import (
+    BUS,
+    HAZARD,
+    IS_ANIMAL,
+    IS_CYCLE,
+    IS_PEDESTRIAN,
+    IS_VULNERABLE,
+    LEFT,
+    RIGHT,
+)
 
 
 @kernel
@@ -192,7 +199,7 @@ def evident_since(scene, e, k, entry, signal):
     Both drive on at their speeds, each on its own track, and touch within `HORIZON`; without a
     break of more than `UNSURE` up to ``entry``, when e comes into the ego's way (``entry`` if they
     do not before). A bus that leaves its stop must show a ``signal``, see
-    `bridgegen.drivers.lamps`;
+    `bridgegen.drivers.kinds`;
     0: none is asked for. From one that must give way, or that runs a red light, the ego may expect
     that it stops, before the ego's way or at its line: it is a danger once that would take more
     than `COMFORT`, or if they would touch within `DOUBTS`.

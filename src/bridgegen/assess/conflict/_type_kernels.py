@@ -22,7 +22,7 @@ from bridgegen.assess.conflict._codes import (
 from bridgegen.assess.conflict._geometry_kernels import turned
 from bridgegen.assess.conflict._limits import PUSHES, SAME_WAY, TURN_BEGINS, TURN_TIME, TURNS
 from bridgegen.base.compiled import kernel
-from bridgegen.drivers._kind_tables import IS_OBSTACLE, IS_VULNERABLE
+from bridgegen.drivers.kinds import IS_OBSTACLE, IS_VULNERABLE
 
 
 @kernel

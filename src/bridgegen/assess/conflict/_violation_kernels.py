@@ -16,7 +16,7 @@ from bridgegen.assess.conflict._limits import (
     WALKING_PACE,
 )
 from bridgegen.base.compiled import kernel
-from bridgegen.drivers._kind_tables import IS_PEDESTRIAN, NEEDS_ROOM
+from bridgegen.drivers.kinds import IS_PEDESTRIAN, NEEDS_ROOM
 from bridgegen.drivers.lane_tables import EDGES, HEADING, LANES, STRAYS, TOWN
 
 AT, WORST, ROAD, SIDE, SAMPLE, END = range(6)

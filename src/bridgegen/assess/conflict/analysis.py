@@ -14,7 +14,7 @@ from bridgegen.assess.conflict.types import ConflictType, Responsible, Rule, Zon
 from bridgegen.assess.metrics.metric import recorded, shared
 from bridgegen.assess.metrics.motion import motion
 from bridgegen.base.arrays import Bool, Float, Int
-from bridgegen.drivers._kind_tables import IS_OBSTACLE
+from bridgegen.drivers.kinds import IS_OBSTACLE
 from bridgegen.simulation.rollout import Rollout
 
 _DIRECTION = np.array(
@@ -43,9 +43,10 @@ class Conflicts:
     predictions agree that they touch within 4 s: constant velocity, and constant speed along the
     paths that both drive in the rollout (straight on beyond their ends). Where paths do not meet,
     passing is no conflict, however near. A near miss is a collision course with at most 1.5 s left
-    and a needed deceleration of at least 3.35 m/s². Of all instants of a collision course the most
-    urgent one counts, near misses first; see ``harm``. Types, zones and responsibility exist for
-    near misses and contacts only.
+    and a needed deceleration of at least 3.35 m/s², which is more than a comfort function has (ISO
+    15622), or after which they come nearer than 0.5 m. Of all instants of a collision course the
+    most urgent one counts, near misses first; see ``harm``. Types, zones and responsibility exist
+    for near misses and contacts only.
 
     Attributes:
         names: E participants.

@@ -17,7 +17,7 @@ import numpy.typing as npt
 from pydantic import BaseModel
 
 from bridgegen.base.arrays import Bool, Float, Int
-from bridgegen.drivers._kind_tables import IS_OBSTACLE, IS_ON_FOOT
+from bridgegen.drivers.kinds import IS_OBSTACLE, IS_ON_FOOT
 from bridgegen.simulation.rollout import Rollout
 
 NEAR, NEAR_TIME = 5.0, 2.0

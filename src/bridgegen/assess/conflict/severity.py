@@ -23,8 +23,7 @@ import numpy as np
 import numpy.typing as npt
 
 from bridgegen.base.arrays import Bool, Float, Int
-from bridgegen.drivers._kind_tables import IS_OBSTACLE
-from bridgegen.drivers.kinds import CAR, NAMES
+from bridgegen.drivers.kinds import CAR, IS_OBSTACLE, NAMES
 from bridgegen.scenario.participants import OBJECT_CLASSES
 
 FRONT, REAR, SIDE = range(3)

@@ -6,7 +6,7 @@ import numpy as np
 
 from bridgegen.base.arrays import Bool, Float, Int
 from bridgegen.base.compiled import kernel
-from bridgegen.drivers.detections import HEADING, LENGTH, MISSED, SEEN_BY, WIDTH, X, Y
+from bridgegen.drivers.kinds import HEADING, LENGTH, MISSED, SEEN_BY, WIDTH, X, Y
 
 
 @kernel

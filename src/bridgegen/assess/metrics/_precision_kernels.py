@@ -4,7 +4,7 @@ import numpy as np
 
 from bridgegen.base.arrays import Bool, Float, Int
 from bridgegen.base.compiled import kernel
-from bridgegen.drivers.detections import CONFIDENCE, KIND, MISSED, SEEN_BY, X, Y
+from bridgegen.drivers.kinds import CONFIDENCE, KIND, MISSED, SEEN_BY, X, Y
 
 FIRST_RECALL, LAST_RECALL = 11, 100  # per cent; recalls up to 10 % are left out
 LEAST_PRECISION = 0.1

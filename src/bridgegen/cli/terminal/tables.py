@@ -1,6 +1,7 @@
 """Tables, and lists of parameters."""
 
 import json
+import sys
 from collections.abc import Sequence
 from dataclasses import asdict
 from typing import TYPE_CHECKING
@@ -11,6 +12,7 @@ from rich.padding import Padding
 from rich.table import Table
 
 if TYPE_CHECKING:
+    from bridgegen.cli.verdict.fail_if import Outcome
     from bridgegen.scenario.language.scenario import ParameterLine
 
 WHOLE = 10_000
@@ -103,3 +105,17 @@ def print_parameters(lines: "Sequence[ParameterLine]", *, as_json: bool) -> None
         for text in (line.description, *line.bounds.split("; ")):
             if text:
                 print(f"{'':<{width}}    {text}")
+
+
+# --- Outcomes of criteria on standard error: standard output may be JSON ---
+
+
+_WORDS = {"passed": "passed", "failed": "FAILED", "unknown": "NOT JUDGED"}
+
+
+def print_outcomes(outcomes: "Sequence[Outcome]") -> bool:
+    """Print each outcome; return whether all passed."""
+    for one in outcomes:
+        word = _WORDS[one.verdict]
+        print(f"bridgegen: {word}: {one.test} ({one.details})", file=sys.stderr)
+    return all(one.verdict == "passed" for one in outcomes)

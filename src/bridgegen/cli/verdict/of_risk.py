@@ -3,8 +3,8 @@
 from bridgegen.cli.verdict.conditions import Conditions
 from bridgegen.cli.verdict.fail_if import Outcome, Verdict
 from bridgegen.cli.verdict.junit import Suite, case_of, write_junit
-from bridgegen.jobs.risk import Risk
 from bridgegen.jobs.risk.outcomes import WORDS
+from bridgegen.jobs.risk.result import Risk
 
 _OF = {"": "probability of {} per encounter", "_upper": "it is below this, with 95 % confidence"}
 FIGURES = {

@@ -5,8 +5,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from bridgegen.scenario.language.plain_yaml import read_plain_yaml
-
 
 @dataclass(frozen=True)
 class FileForm:
@@ -88,6 +86,8 @@ def _criteria(value: Any) -> list[str]:
 
 
 def _plain_criteria(texts: list[str]) -> list[Any]:
+    from bridgegen.scenario.language.plain_yaml import read_plain_yaml
+
     return [
         read_plain_yaml(one.encode(), "--criterion").data if one.startswith("{") else one
         for one in texts

@@ -6,19 +6,15 @@ from dataclasses import dataclass
 from numbers import Integral, Real
 from os import PathLike
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from bridgegen.base.errors import InputError
 from bridgegen.engine.options import file_forms
 from bridgegen.engine.options.file_forms import FileForm
-from bridgegen.scenario.language.criteria import (
-    Criterion,
-    in_words,
-    joined,
-    read_criteria,
-    read_criterion,
-)
 from bridgegen.simulation.choice import EMBEDDED, SimulatorChoice, Value
+
+if TYPE_CHECKING:  # criteria take a third of a second to import: only a run that has some waits
+    from bridgegen.scenario.language.criteria import Criterion
 
 Words = Callable[[str, Any], list[str]]
 """Of an option's spelling and its value: the words of a command line."""
@@ -173,9 +169,18 @@ def _term_texts(terms: Mapping[str, float | None]) -> list[str]:
 
 
 def _kept_criteria(
-    given: Iterable[str | Criterion | Mapping[str, Any]],
+    given: "Iterable[str | Criterion | Mapping[str, Any]]",
 ) -> tuple[dict[str, Any], ...]:
     """Return criteria as plain data, of texts, plain data or themselves."""
+    if not given:
+        return ()
+    from bridgegen.scenario.language.criteria import (
+        Criterion,
+        joined,
+        read_criteria,
+        read_criterion,
+    )
+
     found: list[Criterion] = []
     for one in given:
         if isinstance(one, str):
@@ -183,6 +188,12 @@ def _kept_criteria(
         else:
             found.append(one if isinstance(one, Criterion) else read_criterion(one))
     return tuple(one.to_dict() for one in joined(found))
+
+
+def _criteria_texts(given: Iterable[Mapping[str, Any]]) -> list[str]:
+    from bridgegen.scenario.language.criteria import in_words, read_criterion
+
+    return [in_words(read_criterion(one)) for one in given]
 
 
 def _kept_terms(terms: Mapping[str, float | None] | Iterable[str] | None) -> Any:
@@ -291,7 +302,7 @@ TERMS = Form(
 CRITERIA = Form(
     list[str],
     lambda texts, _: _kept_criteria(texts),
-    _repeated(lambda given: [in_words(read_criterion(one)) for one in given]),
+    _repeated(_criteria_texts),
     lambda given: _kept_criteria(given or ()),
     file_forms.CRITERIA,
     lambda given: isinstance(given, tuple),

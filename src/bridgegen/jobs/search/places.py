@@ -11,9 +11,8 @@ from bridgegen.openx.opendrive.model import Junction, OpenDrive
 from bridgegen.openx.opendrive.read import read
 from bridgegen.openx.opendrive.rings import Ring, rings
 from bridgegen.openx.opendrive.road_map import RoadMap, map_of, map_path
-from bridgegen.openx.opendrive.site import road_ends
+from bridgegen.openx.opendrive.site import road_ends, stretches
 from bridgegen.openx.opendrive.site_fit import candidates, kind_of_place, missing, sites_at
-from bridgegen.openx.opendrive.stretches import stretches
 from bridgegen.openx.xml import read_bytes
 from bridgegen.scenario.language.scenario import LogicalScenario
 from bridgegen.scenario.ontology.site import Site

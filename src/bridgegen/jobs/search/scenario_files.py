@@ -25,7 +25,7 @@ from bridgegen.openx.openscenario.declarations import (
     VEHICLE,
 )
 from bridgegen.openx.openscenario.from_owl.notes import FINDINGS
-from bridgegen.openx.openscenario.renaming import ego_of
+from bridgegen.openx.openscenario.parameters import ego_of
 from bridgegen.openx.openscenario.values import format_double
 from bridgegen.openx.openscenario.write import to_xml as scenario_xml
 from bridgegen.scenario.ontology.check import check

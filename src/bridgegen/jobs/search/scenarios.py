@@ -14,9 +14,9 @@ from bridgegen.openx.file_scenario import FileScenario, load_file_scenario, with
 from bridgegen.openx.file_scenario import with_others as drive_file_by
 from bridgegen.openx.openscenario.parameters import values
 from bridgegen.scenario.language import reader
+from bridgegen.scenario.language.adversary import require, with_others
 from bridgegen.scenario.language.criteria import PREFIX, joined, read_criterion
 from bridgegen.scenario.language.objectives import PAPERS
-from bridgegen.scenario.language.others import require, with_others
 from bridgegen.scenario.language.scenario import (
     LogicalScenario,
     ObjectiveSpec,
@@ -83,7 +83,7 @@ def driven_by(scenario: SearchedScenario, others: str | None) -> SearchedScenari
 
     Args:
         scenario: of any kind.
-        others: of `bridgegen.scenario.language.others.DRIVERS`; None leaves it to the scenario.
+        others: of `bridgegen.scenario.language.adversary.DRIVERS`; None leaves it to the scenario.
 
     Raises:
         UnknownNameError: no such driver.

@@ -7,9 +7,8 @@ from bridgegen.base.errors import InputError, UnsupportedError
 from bridgegen.openx.opendrive.merges import merges
 from bridgegen.openx.opendrive.model import OpenDrive
 from bridgegen.openx.opendrive.rings import rings
-from bridgegen.openx.opendrive.site import ring_sites, turned_sites, unlikeness
+from bridgegen.openx.opendrive.site import ring_sites, stretches, turned_sites, unlikeness
 from bridgegen.openx.opendrive.site_adapted import adapted, furnished, has_way
-from bridgegen.openx.opendrive.stretches import stretches
 from bridgegen.scenario.language.scenario import LogicalScenario
 from bridgegen.scenario.language.story import Arrival, Waypoint
 from bridgegen.scenario.ontology.site import Site

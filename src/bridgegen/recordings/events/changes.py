@@ -16,7 +16,7 @@ from bridgegen.base.arrays import Bool, Float, Int
 from bridgegen.recordings.events.scene import Scene
 from bridgegen.recordings.events.steps import fit_steps
 from bridgegen.recordings.lanes.model import RecordedLanes
-from bridgegen.recordings.readers.motion import centre_ahead
+from bridgegen.recordings.readers.states import centre_ahead
 
 SHORTEST, LONGEST = 1.0, 13.3
 """Of a lane change [s]."""

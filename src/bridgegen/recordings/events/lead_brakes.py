@@ -8,7 +8,7 @@ from bridgegen.recordings.events.event import ABSENT, NOT_WHOLE, OVERLAP, Events
 from bridgegen.recordings.events.scene import Scene
 from bridgegen.recordings.events.steps import MARGIN, fit_steps
 from bridgegen.recordings.lanes.model import NONE
-from bridgegen.recordings.readers.motion import usual
+from bridgegen.recordings.readers.states import usual
 
 ONSET = 1.0
 """Deceleration over 2 s from which it may brake [m/s²]."""

@@ -15,8 +15,8 @@ from bridgegen.scenario.exposure.exposure import Encounters
 from bridgegen.scenario.language.kinds import slack
 from bridgegen.scenario.language.plain_yaml import Document
 from bridgegen.scenario.language.reader import build, document_of, names, pack_names, shipped_text
-from bridgegen.scenario.language.recorded import RecordedSpec, unmapped
 from bridgegen.scenario.language.scenario import LogicalScenario
+from bridgegen.scenario.language.storyboard import RecordedSpec, unmapped
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ import numpy as np
 from bridgegen.base.arrays import Bool, Float, Int
 from bridgegen.recordings.events.scene import SLOPE, Scene
 from bridgegen.recordings.events.steps import fit_steps
-from bridgegen.recordings.readers.motion import centre_ahead
+from bridgegen.recordings.readers.states import centre_ahead
 
 LEAST_RATE = 0.3
 """Of a change of pace [m/s²]."""

@@ -15,7 +15,7 @@ from bridgegen.recordings.events.obstacle import obstacle_ahead
 from bridgegen.recordings.events.paths import WINDOW
 from bridgegen.recordings.events.scene import Scene
 from bridgegen.recordings.events.steps import fit_steps
-from bridgegen.recordings.readers.motion import centre_ahead
+from bridgegen.recordings.readers.states import centre_ahead
 from bridgegen.recordings.readers.table import wrap
 
 FARTHEST = 90.0

@@ -13,8 +13,8 @@ from bridgegen.drivers.kinds import BICYCLE, CAR, MOTORCYCLE, PEDESTRIAN, TRUCK
 from bridgegen.recordings.readers import quality as plausibility
 from bridgegen.recordings.readers import smoothing
 from bridgegen.recordings.readers import smoothing as cuts
-from bridgegen.recordings.readers.motion import headings, usual_box, velocities
 from bridgegen.recordings.readers.quality import Quality, Rule
+from bridgegen.recordings.readers.states import headings, usual_box, velocities
 from bridgegen.recordings.readers.table import UNKNOWN_KIND, RecordedTraffic, kind_in_words, wrap
 
 TIME_STEP = 0.05

@@ -15,7 +15,7 @@ from bridgegen.base.arrays import Float, Int
 from bridgegen.drivers.kinds import BICYCLE, BUS, CAR, MOTORCYCLE, PEDESTRIAN, TRUCK
 from bridgegen.recordings.readers.columns import Columns, header, read_columns
 from bridgegen.recordings.readers.format import Format, Head
-from bridgegen.recordings.readers.motion import STANDING
+from bridgegen.recordings.readers.states import STANDING
 from bridgegen.recordings.readers.table import (
     UNKNOWN_KIND,
     Facts,

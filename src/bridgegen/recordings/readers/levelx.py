@@ -20,7 +20,7 @@ from bridgegen.base.errors import FileFormatError
 from bridgegen.drivers.kinds import BICYCLE, BUS, CAR, MOTORCYCLE, PEDESTRIAN, TRUCK
 from bridgegen.recordings.readers.columns import Columns, read_columns, whole_numbers
 from bridgegen.recordings.readers.format import Format, Head, read_head
-from bridgegen.recordings.readers.motion import (
+from bridgegen.recordings.readers.states import (
     SHORTEST_ARM,
     STANDING,
     centre_ahead,

@@ -19,8 +19,8 @@ from bridgegen.base.arrays import Float, Int
 from bridgegen.drivers.kinds import CAR, MOTORCYCLE, TRUCK
 from bridgegen.recordings.readers.columns import read_columns, whole_numbers
 from bridgegen.recordings.readers.format import Format, Head
-from bridgegen.recordings.readers.motion import SHORTEST_ARM, centre_ahead, headings_behind
 from bridgegen.recordings.readers.smoothing import NOISE, scatter, smooth
+from bridgegen.recordings.readers.states import SHORTEST_ARM, centre_ahead, headings_behind
 from bridgegen.recordings.readers.table import (
     NO_LANE,
     UNKNOWN_KIND,

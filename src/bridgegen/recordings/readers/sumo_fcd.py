@@ -18,7 +18,7 @@ from lxml import etree
 from bridgegen.base.errors import FileFormatError
 from bridgegen.drivers.kinds import BICYCLE, BUS, CAR, MOTORCYCLE, PEDESTRIAN, TRUCK
 from bridgegen.recordings.readers.format import Format, Head
-from bridgegen.recordings.readers.motion import usual_box
+from bridgegen.recordings.readers.states import usual_box
 from bridgegen.recordings.readers.table import (
     MOST_STATES,
     NO_LANE,

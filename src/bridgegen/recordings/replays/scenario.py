@@ -16,7 +16,7 @@ from bridgegen.openx.openscenario.declarations import DRIVER
 from bridgegen.openx.openscenario.recorded import Recording, recorded
 from bridgegen.openx.openscenario.write import at, at_once
 from bridgegen.recordings.excerpt import Clock, excerpt, path_speeds
-from bridgegen.recordings.readers.motion import usual
+from bridgegen.recordings.readers.states import usual
 from bridgegen.recordings.readers.table import RecordedTraffic
 from bridgegen.simulation.rollout import Rollout
 

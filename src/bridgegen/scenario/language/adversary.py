@@ -1,13 +1,6 @@
-"""A participant that an adversary drives: what it decides is searched like any other parameter.
+"""Other participants that decide: drivers that look ahead, and one that an adversary drives."""
 
-Its events are taken from the scenario; instead, it changes its speed and moves within its lane as
-parameters of the extension axis say, one of each per decision. Whatever they are, they keep to the
-scenario's limits: the speeds that the scenario gives the participant (which road and weather
-bound), the rate at which it takes them up, what its body and the road's friction let it brake, and
-its lane.
-"""
-
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from math import ceil
 
@@ -19,6 +12,14 @@ from bridgegen.scenario.language.rules import speeds_of
 from bridgegen.scenario.language.scenario import LogicalScenario, SearchedScenario
 from bridgegen.scenario.language.story import Adversary, EventSpec, Participant, SpeedChange, Story
 from bridgegen.scenario.participants import PARTICIPANTS
+
+# --- A participant that an adversary drives: what it decides is searched like any other parameter -
+# Its events are taken from the scenario; instead, it changes its speed and moves within its lane as
+# parameters of the extension axis say, one of each per decision. Whatever they are, they keep to
+# the # scenario's limits: the speeds that the scenario gives the participant (which road and
+# weather # bound), the rate at which it takes them up, what its body and the road's friction let it
+# brake, # and # its lane.
+
 
 PERIOD = 0.5
 """Seconds between two decisions: less than an alert driver's reaction, more than a controller's."""
@@ -197,3 +198,71 @@ def _elsewhere(scenario: LogicalScenario) -> set[str]:
 
 def _value(quantity: Quantity, values: Mapping[str, float]) -> float:
     return float(values[quantity]) if isinstance(quantity, str) else float(quantity)
+
+
+# --- Drivers of participants other than the ego: their script alone, or one that looks ahead ---
+
+
+ATTENTIVE, INSISTENT, SCRIPTED = "attentive", "insistent", "scripted"
+
+LOOKING = (ATTENTIVE, INSISTENT)
+"""Those that limit the script by what is in the way."""
+
+DRIVERS = (*LOOKING, SCRIPTED)
+"""What a participant other than the ego may have as its driver."""
+
+EGO = "ego"
+ABLE = ("vehicle", "bicycle", "pedestrian")
+"""How participants move that get the driver which a scenario states for all."""
+
+
+def require(name: str) -> str:
+    """Return the name of a driver of other participants.
+
+    Raises:
+        UnknownNameError: no such driver.
+    """
+    if name not in DRIVERS:
+        raise UnknownNameError("driver of other participants", name, DRIVERS)
+    return name
+
+
+def driven(
+    participants: Iterable[Participant], events: Sequence[EventSpec], others: str
+) -> tuple[Participant, ...]:
+    """Return participants with one driver for all that have none of their own.
+
+    The ego, animals, objects and participants that never move stay as they are.
+    """
+    acting = {event.participant for event in events}
+    return tuple(
+        replace(one, driver=others)
+        if not one.driver
+        and one.name != EGO
+        and one.conduct in ABLE
+        and (one.speed != 0.0 or one.name in acting)
+        else one
+        for one in participants
+    )
+
+
+def with_others(scenario: LogicalScenario, others: str) -> LogicalScenario:
+    """Return a scenario in which one driver drives all participants but the ego.
+
+    Args:
+        scenario: of five layers.
+        others: of `DRIVERS`, instead of the scenario's. A participant that an
+            adversary drives keeps it.
+
+    Raises:
+        UnknownNameError: no such driver.
+    """
+    require(others)
+    adversary = scenario.adversary.participant if scenario.adversary else None
+    story = scenario.story
+    bare = [
+        one if one.name in (EGO, adversary) else replace(one, driver="")
+        for one in story.participants
+    ]
+    changed = driven(bare, story.events, others)
+    return replace(scenario, story=replace(story, participants=changed))

@@ -1,14 +1,17 @@
 """Numbers and places of a scenario file: checked, with the parameters that they name."""
 
 import math
-from collections.abc import Mapping, Set
+from collections.abc import Iterator, Mapping, Set
 from itertools import pairwise
 
+from bridgegen.scenario.language.expression import parse
 from bridgegen.scenario.language.parameters import Axis, Derived, Parameter, nearest
-from bridgegen.scenario.language.plain_yaml import Document, Path
+from bridgegen.scenario.language.plain_yaml import Document, Path, entries
 from bridgegen.scenario.language.roads import LETTERS, Quantity, RoadsSpec
-from bridgegen.scenario.language.story import Waypoint
-from bridgegen.scenario.language.story_schema import WaypointSection
+from bridgegen.scenario.language.shape import section
+from bridgegen.scenario.language.story import Jam, Participant, RoadWorks, Waypoint
+from bridgegen.scenario.language.story_schema import JamSection, WaypointSection, WorksSection
+from bridgegen.scenario.participants import PARTICIPANTS
 
 # --- Numbers of a scenario file: constants, or names of parameters in the right unit ---
 
@@ -175,3 +178,161 @@ class Places:
                         f"on leg {point.leg}, got {got}",
                         path,
                     )
+
+
+# --- Temporary changes of a scenario file (layer 3): queues and road works, down to each body ---
+# Where a place depends on a parameter, so do the places of all that stands in a row with it: each
+# gets a derived quantity of its own.
+
+
+_BESIDE = 0.75
+"""How far from the carriageway's edge a sign stands [m]; source: RSA 21, 0.5 to 1.5 m."""
+_MOST_CONES = 60
+
+
+def jam_members(quantities: Quantities) -> tuple[str, ...]:
+    """Return the names of all vehicles of a file's jams."""
+    names: list[str] = []
+    for key, data in entries(quantities.document, "jams"):
+        given = section(JamSection, data)
+        if given is not None:
+            names += (f"{key}_{k}" for k in range(1, len(given.vehicles) + 1))
+    return tuple(names)
+
+
+class TemporaryChanges:
+    """A file's sections on layer 3.
+
+    Attributes:
+        participants: the vehicles of the jams.
+        jams: as ``Story`` holds them.
+        works: as ``Story`` holds them.
+        derived: the places of what stands in a row.
+
+    Args:
+        quantities: of the file; collects problems.
+        roads: where it is.
+    """
+
+    def __init__(self, quantities: Quantities, roads: RoadsSpec) -> None:
+        self._quantities, self._roads = quantities, roads
+        self._places = Places(quantities, roads)
+        self.participants: list[Participant] = []
+        self.derived: list[Derived] = []
+        self.jams = tuple(self._jams())
+        self.works = tuple(self._works())
+
+    def _jams(self) -> Iterator[Jam]:
+        for key, data in entries(self._quantities.document, "jams"):
+            name, path = str(key), ("jams", key)
+            given = section(JamSection, data)
+            if given is None:
+                continue
+            self._quantities.check(given.gap, "m", (*path, "gap"), above=True)
+            tail = self._places.waypoint(given.tail, (*path, "tail"))
+            ahead, names = 0.0, []
+            for k, kind in enumerate(given.vehicles):
+                body = PARTICIPANTS[kind].body
+                ahead += body.rear if k else 0.0
+                place = self._row(f"{name}_{k + 1}_at", tail, ahead, k, given.gap, path)
+                names.append(f"{name}_{k + 1}")
+                self.participants.append(Participant(names[-1], kind, place, None, 0.0))
+                ahead += body.front
+            yield Jam(name, tail, tuple(names))
+
+    def _works(self) -> Iterator[RoadWorks]:
+        for key, data in entries(self._quantities.document, "road_works"):
+            name, path = str(key), ("road_works", key)
+            given = section(WorksSection, data)
+            if given is None:
+                continue
+            start = self._places.waypoint(given.start, (*path, "start"))
+            problem = self._works_problem(given, start)
+            if problem:
+                self._quantities.report(problem, path)
+                continue
+            count = int(given.length / given.spacing) + 1
+            cones = tuple(
+                self._moved(f"{name}_cone_{k + 1}_at", start, k * given.spacing,
+                            self._offset(given, start, k * given.spacing), path)
+                for k in range(count)
+            )  # fmt: skip
+            sign = self._moved(
+                f"{name}_sign_at", start, -given.sign_before, self._beside(start), path
+            )
+            yield RoadWorks(name, start, given.length, cones, sign)
+
+    def _works_problem(self, given: WorksSection, start: Waypoint) -> str:
+        """Return why a lane cannot be closed so, or nothing."""
+        lanes = self._roads.lanes(start.leg, start.way)
+        if not isinstance(start.lane, int):
+            return "road works close a driving lane, given by its number"
+        if isinstance(lanes, str) or isinstance(self._roads.knobs["lane_width"], str):
+            return "road works need a fixed number of lanes of a fixed width"
+        if lanes < 2:
+            return f"road works leave a lane to drive on; leg {start.leg} {start.way} has only one"
+        if not 0.0 < given.taper <= given.length or not 1.0 <= given.spacing <= 50.0:
+            return (
+                "road works need 0 < taper <= length and 1 <= spacing <= 50 [m], got "
+                f"taper={given.taper:g}, length={given.length:g}, spacing={given.spacing:g}"
+            )
+        if given.length / given.spacing > _MOST_CONES:
+            return f"road works have {_MOST_CONES} cones at most, got {given.length} m of them"
+        if given.sign_before <= 0.0:
+            return f"sign_before [m] must be greater than 0, got {given.sign_before:g}"
+        return ""
+
+    def _offset(self, given: WorksSection, start: Waypoint, along: float) -> float:
+        """Return a cone's offset from the closed lane's centre: across it, then along its side."""
+        half = 0.5 * float(self._roads.knobs["lane_width"])
+        share = min(along / given.taper, 1.0)
+        lanes = float(self._roads.lanes(start.leg, start.way))
+        # Traffic passes on the inner side, unless the inner lane is the closed one.
+        side = -1.0 if start.lane == 1 and lanes > 1 else 1.0
+        return side * half * (2.0 * share - 1.0)
+
+    def _beside(self, start: Waypoint) -> float:
+        """Return the offset from a lane that lies beside the road, on its right."""
+        knobs = self._roads.knobs
+        width, lanes = float(knobs["lane_width"]), float(self._roads.lanes(start.leg, start.way))
+        outer = (lanes - int(start.lane) + 0.5) * width
+        strips = sum(
+            float(value)
+            for value in (knobs["shoulder_width"], knobs["sidewalk_width"])
+            if not isinstance(value, str)
+        )
+        return -(outer + strips + _BESIDE)
+
+    def _moved(
+        self, name: str, start: Waypoint, along: float, offset: float, path: Path
+    ) -> Waypoint:
+        """Return a place ``along`` metres of travel beyond another."""
+        moved = self._row(name, start, along, 0, 0.0, path)
+        return Waypoint(moved.leg, moved.way, moved.distance, start.lane, offset)
+
+    def _row(
+        self, name: str, start: Waypoint, along: float, gaps: int, gap: Quantity, path: Path
+    ) -> Waypoint:
+        """Return the place ``along`` metres and some gaps beyond another, in travel direction."""
+        sign = 1.0 if start.way == "out" else -1.0
+        distance: Quantity
+        known = self._quantities.parameters.keys() | self._quantities.derived.keys()
+        if any(isinstance(one, str) and one not in known for one in (start.distance, gap)):
+            return start  # reported as unknown already
+        if isinstance(start.distance, str) or (isinstance(gap, str) and gaps):
+            between = f"{gaps}*{gap}" if isinstance(gap, str) else repr(gaps * gap)
+            text = f"{start.distance} {'+' if sign > 0 else '-'} ({along!r} + {between})"
+            if along == 0.0 and gaps == 0:
+                return start
+            self.derived.append(
+                Derived(
+                    name, Axis.TEMPORARY, "m", parse(text),
+                    "It stands in a row with the first.", "BridgeGen", f"Where {name[:-3]} stands.",
+                    self._quantities.document.at(path),
+                )
+            )  # fmt: skip
+            distance = name
+        else:
+            between_them = gaps * float(gap) if gaps else 0.0
+            distance = start.distance + sign * (along + between_them)
+        return Waypoint(start.leg, start.way, distance, start.lane, start.offset)

@@ -9,14 +9,13 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from bridgegen.base.errors import FileFormatError, InputError, ScenarioError, UnknownNameError
-from bridgegen.scenario.language.changes import TemporaryChanges, jam_members
+from bridgegen.scenario.language.adversary import DRIVERS, SCRIPTED, driven
 from bridgegen.scenario.language.checks import NEEDED, time_problems, try_out, use_problems
 from bridgegen.scenario.language.constraints import problems_of
 from bridgegen.scenario.language.criteria import read_criteria_in, unknown_entities
 from bridgegen.scenario.language.expression import Expression, parse
 from bridgegen.scenario.language.kinds import KEYS, KINDS
 from bridgegen.scenario.language.objectives import HARM, PAPERS, read_objective
-from bridgegen.scenario.language.others import DRIVERS, SCRIPTED, driven
 from bridgegen.scenario.language.parameters import (
     Axis,
     Bound,
@@ -26,10 +25,9 @@ from bridgegen.scenario.language.parameters import (
     nearest,
     read_axes,
 )
-from bridgegen.scenario.language.places import Quantities
+from bridgegen.scenario.language.places import Quantities, TemporaryChanges, jam_members
 from bridgegen.scenario.language.plain_yaml import MAX_BYTES, Document, entries, read_plain_yaml
 from bridgegen.scenario.language.protocols import read_clauses_in, read_matrix
-from bridgegen.scenario.language.recorded import read_recorded
 from bridgegen.scenario.language.roads import KNOBS, RoadsSpec
 from bridgegen.scenario.language.roads_reader import read_roads
 from bridgegen.scenario.language.rules import bounds_between_layers
@@ -45,7 +43,7 @@ from bridgegen.scenario.language.schema import (
 )
 from bridgegen.scenario.language.shape import Section, section, shape_problems
 from bridgegen.scenario.language.story import Story
-from bridgegen.scenario.language.storyboard import Storyboard
+from bridgegen.scenario.language.storyboard import Storyboard, read_recorded
 
 _PREFIX = re.compile(r"[a-z][a-z0-9_]{0,30}_")
 

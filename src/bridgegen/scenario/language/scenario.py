@@ -20,7 +20,7 @@ if TYPE_CHECKING:  # the checks of individuals start without pydantic
     from bridgegen.scenario.language.criteria import Criterion
     from bridgegen.scenario.language.plain_yaml import Document
     from bridgegen.scenario.language.protocols import Clause, Grid
-    from bridgegen.scenario.language.recorded import RecordedSpec
+    from bridgegen.scenario.language.storyboard import RecordedSpec
 
 
 @dataclass(frozen=True)

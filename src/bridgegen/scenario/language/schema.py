@@ -12,7 +12,6 @@ from pydantic import Field, ValidationInfo, field_validator
 from bridgegen.scenario.language.criteria import CriterionSection
 from bridgegen.scenario.language.exposure_schema import ExposureSection
 from bridgegen.scenario.language.protocols import ClauseSection, GridSection
-from bridgegen.scenario.language.recorded import RecordedSection
 from bridgegen.scenario.language.shape import (
     AxisName,
     Curvature,
@@ -44,6 +43,7 @@ from bridgegen.scenario.language.story_schema import (
     ParticipantSection,
     WorksSection,
 )
+from bridgegen.scenario.language.storyboard import RecordedSection
 
 # --- The shape of a scenario file's ``roads``: its keys, what each takes and means ---
 

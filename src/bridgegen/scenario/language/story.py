@@ -69,7 +69,7 @@ class Participant:
         speed: [m/s] at time 0; of the ego also its target.
         path: the points of its own way, ``start`` first; empty: it keeps to lanes.
         driver: of a participant other than the ego one of
-            `bridgegen.scenario.language.others.DRIVERS`; empty: as scripted.
+            `bridgegen.scenario.language.adversary.DRIVERS`; empty: as scripted.
         heading: turned from its lane's direction of travel [deg], left positive; who moves at 180
             drives against the traffic.
         type_by: the category that gives its type or model in each evaluation; empty: it is always

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import pyoxigraph as ox
 
 from bridgegen.base.errors import OntologyError
-from bridgegen.scenario.language.others import LOOKING
+from bridgegen.scenario.language.adversary import LOOKING
 from bridgegen.scenario.language.story import (
     Action,
     Arrival,

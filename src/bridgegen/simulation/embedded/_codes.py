@@ -24,7 +24,7 @@ TO_SENSORS, TO_TRAFFIC = 3, 6  # of showing: whether these see it
 IS_HELD, COLUMN = 2, 3  # of pressing: whether it is held, not let go of; which of the pedals
 THROTTLE, BRAKE, PARKING_BRAKE, STEERING, IDLE = range(5)
 PEDALS = 5
-LAMP, IS_LIT = 3, 6  # of switching: what, as bits of `bridgegen.drivers.lamps`; whether it is on
+LAMP, IS_LIT = 3, 6  # of switching: what, as bits of `bridgegen.drivers.kinds`; whether it is on
 DETAIL = 3  # of a route, its position; of a trajectory, whether its times are relative
 PASSES = 2  # of a date: whether time passes
 # What they do, by groups: of one entity from FIRST_MOTION on, of these along its path by

@@ -186,7 +186,7 @@ class State(NamedTuple):
         visible: ``(E,)`` bool, whether the ego's sensors may see it,
         minded: ``(E,)`` bool, and attentive drivers may,
         switched: ``(E,)`` int64, its lamps as the storyboard has them; see
-            `bridgegen.drivers.lamps`,
+            `bridgegen.drivers.kinds`,
         lamps: ``(E,)`` int64, and what shows,
         holds: ``(E,)`` int64, which pedals are held, as bits; see ``_pedal_kernels``,
         pedals: ``(E, 5, 4)`` where they are,

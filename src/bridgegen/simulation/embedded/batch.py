@@ -11,7 +11,6 @@ from bridgegen.base.compiled import compile_for_kernels, row_type
 from bridgegen.base.errors import InputError
 from bridgegen.drivers._attentive_kernels import MIND as HEED
 from bridgegen.drivers._attentive_kernels import SEEN
-from bridgegen.drivers._kind_tables import NEEDS_ROOM
 from bridgegen.drivers._perception_kernels import MEMORY
 from bridgegen.drivers._prediction_kernels import LOST, PASSAGE
 from bridgegen.drivers._reference_kernels import MIND
@@ -19,9 +18,9 @@ from bridgegen.drivers._surroundings_kernels import AROUND
 from bridgegen.drivers._tracking_kernels import TRACK
 from bridgegen.drivers._weather_columns import FRICTION, WEATHER
 from bridgegen.drivers.compiled import CONFLICT
-from bridgegen.drivers.detections import DETECTION
 from bridgegen.drivers.drivers import STAGES, STORYBOARD
 from bridgegen.drivers.interface import CONFLICT_WAYS, HISTORY, NEAR_PIECES, ROUTE_POINTS, RoadMap
+from bridgegen.drivers.kinds import DETECTION, NEEDS_ROOM
 from bridgegen.drivers.lane_tables import STRAYS
 from bridgegen.drivers.noise import noise_key
 from bridgegen.drivers.user_drivers import Traits

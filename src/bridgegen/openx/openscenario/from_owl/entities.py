@@ -1,14 +1,16 @@
 """OWL2OpenSCENARIO, its entities: bodies and drivers."""
 
+import math
 from collections.abc import Iterator, Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 
 from bridgegen.base.errors import OntologyError, UnsupportedError
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.bodies import EntityBody, entity_body
 from bridgegen.openx.openscenario.declarations import DRIVER, IDEAL, SIREN
-from bridgegen.openx.openscenario.values import format_double
+from bridgegen.openx.openscenario.from_owl.quantities import Quantities, Quantity, quoted_element
+from bridgegen.openx.openscenario.values import Double, format_double
 from bridgegen.scenario.ontology.graph import Individuals
 from bridgegen.scenario.ontology.vocabulary import Subject
 from bridgegen.scenario.participants import PARTICIPANTS, Body, ParticipantKind
@@ -139,3 +141,205 @@ def plain_text(individuals: Individuals, node: Subject, name: str) -> str:
             f"{name} of {individuals.describe(node)} must not begin with $, got '{text}'"
         )
     return text
+
+
+# --- OWL2OpenSCENARIO, its places: from a distance to the junction to a lane position ---
+# An individual says on which lane of a leg, and how far from the junction. A leg may be a chain of
+# roads, and a road's reference line may run towards the junction or away from it.
+
+
+RADIANS = repr(math.pi / 180.0)
+"""In a degree, as a part of a formula."""
+
+_ALONG_LANE = osc.Orientation(osc.ReferenceContext.RELATIVE, h=0.0)
+
+
+@dataclass(frozen=True)
+class _Road:
+    """A road of a leg; ``near`` is its end that is nearer to the junction.
+
+    Distances count from there, or from the start of a road that meets no junction, or two; or
+    from ``station`` along its reference line.
+    """
+
+    node: Subject
+    road_id: str
+    length: float
+    near: str
+    station: float
+
+
+class Places:
+    """The lane positions of a scenario's individuals.
+
+    Raises:
+        OntologyError: the roads lack a property, or lead back into themselves.
+    """
+
+    def __init__(self, individuals: Individuals, quantities: Quantities) -> None:
+        self._individuals = individuals
+        self._quantities = quantities
+        self._of_lane: dict[Subject, tuple[tuple[_Road, ...], int]] = {}
+        self._road_ids: dict[Subject, str] = {}
+        legs = [
+            leg
+            for junction in individuals.of_class("Intersection")
+            for leg in individuals.links(junction, "has_leg")
+        ]
+        everywhere = individuals.of_class("Road")
+        onward = {individuals.optional_link(road, "has_continuation") for road in everywhere}
+        covered: set[Subject] = set()
+        for leg in legs:  # on a whole map, a leg of one junction may continue another's
+            if leg not in onward:
+                covered |= self._add(self._chain(leg))
+        for road in everywhere:  # of no junction, within one, or between two
+            if road not in covered:
+                covered |= self._add(self._chain(road))
+
+    def _add(self, roads: tuple[_Road, ...]) -> set[Subject]:
+        """Take up the lanes of a leg; return its roads."""
+        for index, road in enumerate(roads):
+            for name in ("has_lane", "has_strip"):
+                for lane in self._individuals.links(road.node, name):
+                    self._of_lane[lane] = roads, index
+                    self._road_ids[lane] = road.road_id
+        return {road.node for road in roads}
+
+    def road_id(self, lane: Subject) -> str | None:
+        """Return the id of the road that a lane or strip is of, or None."""
+        return self._road_ids.get(lane)
+
+    def position(self, node: Subject, *, oriented: bool) -> osc.Position:
+        """Return where an individual of class LanePosition or WorldPosition is.
+
+        A distance that is bound to a parameter becomes an expression on the road that holds its
+        present value.
+
+        Args:
+            node: the individual.
+            oriented: whether to state the driving direction (esmini compares an orientation that
+                a ReachPositionCondition states, so a destination has none).
+
+        Raises:
+            OntologyError: a property is missing, the lane belongs to no leg, or the distance lies
+                beyond the leg's end.
+        """
+        individuals = self._individuals
+        if individuals.is_a(node, "OpenScenarioPosition"):
+            made = quoted_element(individuals, node, {"Position": osc.Position})
+            assert isinstance(made, osc.Position)
+            return made
+        if individuals.is_a(node, "WorldPosition"):
+            x, y = (self._quantities.get(node, f"has_world_{one}") for one in ("x", "y"))
+            turned = [
+                None
+                if (angle := individuals.optional_number(node, name)) is None
+                else math.radians(angle)
+                for name in ("has_world_yaw", "has_world_pitch", "has_world_roll")
+            ]
+            z = individuals.optional_number(node, "has_world_z")
+            return osc.Position(osc.WorldPosition(x, y, z, *turned))
+        lane = individuals.link(node, "on_lane")
+        try:
+            roads, index = self._of_lane[lane]
+        except KeyError:
+            raise OntologyError(
+                f"on_lane of {individuals.describe(node)} must be a lane of one of the "
+                f"intersection's legs, got {individuals.describe(lane)}"
+            ) from None
+        distance = self._quantities.get(node, "has_distance")
+        at = self._holds(node, roads, self._quantities.value(distance))
+        lane = self._same_lane(lane, roads[index], roads[at])
+        lane_id = individuals.integer(lane, "has_lane_id")
+        position = osc.LanePosition(
+            road_id=roads[at].road_id,
+            lane_id=str(lane_id),
+            s=self._station(roads[at], sum(road.length for road in roads[:at]), distance),
+            offset=self._offset(node, lane_id),
+            orientation=self._orientation(node) if oriented else None,
+        )
+        return osc.Position(position)
+
+    def _orientation(self, node: Subject) -> osc.Orientation:
+        if self._individuals.optional_number(node, "has_relative_heading") is None:
+            return _ALONG_LANE
+        heading = self._quantities.get(node, "has_relative_heading")
+        h = self._quantities.apply(f"x*{RADIANS}", heading)
+        return osc.Orientation(osc.ReferenceContext.RELATIVE, h=h)
+
+    def _offset(self, node: Subject, lane_id: int) -> Double | None:
+        """Return how far a place is from its lane's centre, left of the road's direction."""
+        if self._individuals.optional_number(node, "has_lateral_offset") is None:
+            return None
+        offset = self._quantities.get(node, "has_lateral_offset")
+        return offset if lane_id < 0 else self._quantities.apply("-x", offset)
+
+    def _chain(self, leg: Subject) -> tuple[_Road, ...]:
+        individuals = self._individuals
+        roads: list[_Road] = []
+        node: Subject | None = leg
+        while node is not None:
+            if any(road.node == node for road in roads):
+                raise OntologyError(f"{individuals.describe(node)} must not continue itself")
+            near = individuals.text(node, "has_junction_end")
+            if near not in ("start", "end", "none", "both"):
+                raise OntologyError(
+                    f"has_junction_end of {individuals.describe(node)} must be 'start' or 'end', "
+                    f"or 'none' of a road that meets no junction, got '{near}'"
+                )
+            road_id = individuals.text(node, "has_road_id")
+            length = individuals.number(node, "has_length")
+            station = individuals.optional_number(node, "has_station")
+            if station is None:
+                station = length if near == "end" else 0.0
+            roads.append(_Road(node, road_id, length, near, station))
+            node = individuals.optional_link(node, "has_continuation")
+        return tuple(roads)
+
+    def _holds(self, node: Subject, roads: tuple[_Road, ...], distance: float) -> int:
+        """Return which road of a leg holds a distance from the junction [m]."""
+        end = 0.0
+        for index, road in enumerate(roads):
+            end += road.length
+            if 0.0 <= distance <= end:
+                return index
+        raise OntologyError(
+            f"has_distance [m] of {self._individuals.describe(node)} must lie on its "
+            f"leg, 0 to {end!r}, got {distance!r}"
+        )
+
+    def _same_lane(self, lane: Subject, on: _Road, other: _Road) -> Subject:
+        """Return the lane of another road of the leg that continues a lane: as many further in."""
+        individuals = self._individuals
+        if on == other:
+            return lane
+        direction = individuals.text(lane, "has_direction")
+        own, others = (
+            sorted(
+                (abs(individuals.integer(one, "has_lane_id")), one.value, one)
+                for one in individuals.links(road.node, "has_lane")
+                if individuals.text(one, "has_direction") == direction
+            )
+            for road in (on, other)
+        )
+        rank = next(k for k, item in enumerate(own) if item[2] == lane)
+        if len(own) != len(others):
+            raise OntologyError(
+                f"{individuals.describe(lane)} must continue on road {other.road_id}, which has "
+                f"{len(others)} lanes of that direction, not {len(own)}"
+            )
+        return others[rank][2]
+
+    def _station(self, road: _Road, before: float, distance: Quantity) -> Double:
+        """Return s on a road that begins ``before`` metres from the junction."""
+        near = road.station
+        if road.near == "end":
+            low, formula = near - road.length, f"{format_double(before + near)}-x"
+        elif before == near:
+            return distance
+        elif before > near:
+            low, formula = near, f"x-{format_double(before - near)}"
+        else:
+            low, formula = near, f"x+{format_double(near - before)}"
+        s = self._quantities.apply(formula, distance)
+        return min(max(s, low), low + road.length) if isinstance(s, float) else s  # rounding

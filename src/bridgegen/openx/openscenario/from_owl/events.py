@@ -7,10 +7,8 @@ here, or refused by name.
 from bridgegen.base.errors import OntologyError, UnsupportedError
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.from_owl.actions import Actions
-from bridgegen.openx.openscenario.from_owl.entities import Cast, plain_text
-from bridgegen.openx.openscenario.from_owl.places import Places
-from bridgegen.openx.openscenario.from_owl.quantities import Quantities
-from bridgegen.openx.openscenario.from_owl.quoted import quoted_element
+from bridgegen.openx.openscenario.from_owl.entities import Cast, Places, plain_text
+from bridgegen.openx.openscenario.from_owl.quantities import Quantities, quoted_element
 from bridgegen.openx.openscenario.from_owl.signals import lamp_states
 from bridgegen.scenario.ontology.graph import Individuals
 from bridgegen.scenario.ontology.vocabulary import Subject

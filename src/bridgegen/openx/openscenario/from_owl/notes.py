@@ -40,8 +40,7 @@ from bridgegen.openx.openscenario.declarations import (
     SEVERITY,
     TIME_STEP,
 )
-from bridgegen.openx.openscenario.from_owl.entities import plain_text
-from bridgegen.openx.openscenario.from_owl.places import Places
+from bridgegen.openx.openscenario.from_owl.entities import Places, plain_text
 from bridgegen.openx.openscenario.from_owl.quantities import Quantities
 from bridgegen.openx.openscenario.from_owl.signals import Signals
 from bridgegen.openx.openscenario.values import format_double

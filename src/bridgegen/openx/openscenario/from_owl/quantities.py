@@ -6,13 +6,16 @@ dynamic parameter with that value and refers to it by ``$name``, so it is concre
 
 import math
 import re
+from collections.abc import Mapping
 from functools import lru_cache
 from keyword import iskeyword
 
 import pyoxigraph as ox
 
-from bridgegen.base.errors import OntologyError
+from bridgegen.base.errors import FileFormatError, OntologyError
 from bridgegen.openx.openscenario import model as osc
+from bridgegen.openx.openscenario.element import Element
+from bridgegen.openx.openscenario.read import element_from
 from bridgegen.openx.openscenario.values import format_double
 from bridgegen.scenario.language.expression import RESERVED, Expression, parse
 from bridgegen.scenario.language.kinds import slack
@@ -181,3 +184,28 @@ class Quantities:
 @lru_cache(maxsize=256)
 def _parse(formula: str) -> Expression:
     return parse(formula)
+
+
+# --- OWL2OpenSCENARIO, what the ontology keeps in OpenSCENARIO's own words ---
+
+
+def quoted_element(
+    individuals: Individuals, node: Subject, options: Mapping[str, type[Element]]
+) -> Element:
+    """Return the element that an individual's has_openscenario is.
+
+    Args:
+        individuals: one scenario.
+        node: of a class of what is quoted.
+        options: tag → class, all that it may be.
+
+    Raises:
+        OntologyError: there is none, or it is malformed.
+        UnsupportedError: it holds what cannot be run.
+    """
+    text = individuals.text(node, "has_openscenario")
+    place = f"has_openscenario of {individuals.describe(node)}"
+    try:
+        return element_from(text, options, place)
+    except FileFormatError as error:
+        raise OntologyError(*error.problems) from None

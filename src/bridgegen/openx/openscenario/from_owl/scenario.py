@@ -13,15 +13,12 @@ from itertools import count
 from bridgegen.base.errors import OntologyError
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.from_owl.actions import Actions
-from bridgegen.openx.openscenario.from_owl.entities import Cast, plain_text, scenario_object
+from bridgegen.openx.openscenario.from_owl.entities import Cast, Places, plain_text, scenario_object
 from bridgegen.openx.openscenario.from_owl.events import Conditions, Events
 from bridgegen.openx.openscenario.from_owl.notes import Notes
-from bridgegen.openx.openscenario.from_owl.places import Places
-from bridgegen.openx.openscenario.from_owl.quantities import Quantities
-from bridgegen.openx.openscenario.from_owl.quoted import quoted_element
-from bridgegen.openx.openscenario.from_owl.signals import Signals
-from bridgegen.openx.openscenario.from_owl.weather import environment
-from bridgegen.openx.openscenario.renaming import EGO
+from bridgegen.openx.openscenario.from_owl.quantities import Quantities, quoted_element
+from bridgegen.openx.openscenario.from_owl.signals import Signals, environment
+from bridgegen.openx.openscenario.parameters import EGO
 from bridgegen.openx.openscenario.write import least_version, to_version
 from bridgegen.scenario.ontology.graph import Individuals
 from bridgegen.scenario.ontology.vocabulary import Subject

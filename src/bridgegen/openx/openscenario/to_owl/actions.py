@@ -7,7 +7,7 @@ import pyoxigraph as ox
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.element import Element
 from bridgegen.openx.openscenario.from_owl.signals import LAMPS
-from bridgegen.openx.openscenario.splines import is_uniform
+from bridgegen.openx.openscenario.movement import is_uniform
 from bridgegen.openx.openscenario.to_owl.build import (
     ACTION,
     StoryBuilder,

@@ -1,6 +1,6 @@
 """OpenSCENARIO2OWL, its places: from a lane position to a distance along a leg of the map.
 
-The other way round than `bridgegen.openx.openscenario.from_owl.places`. Roads that lead to the
+The other way round than `bridgegen.openx.openscenario.from_owl.entities`. Roads that lead to the
 scenario's intersection count from there (`bridgegen.openx.openscenario.to_owl.legs`); any other
 counts by itself, from its end at a junction, or from its start where none or both ends are at one.
 """
@@ -17,7 +17,7 @@ from bridgegen.openx.opendrive.legs import junction_end
 from bridgegen.openx.opendrive.map_names import lane_name
 from bridgegen.openx.opendrive.model import Road
 from bridgegen.openx.openscenario import model as osc
-from bridgegen.openx.openscenario.from_owl.places import RADIANS
+from bridgegen.openx.openscenario.from_owl.entities import RADIANS
 from bridgegen.openx.openscenario.to_owl.build import (
     POSITION,
     StoryBuilder,

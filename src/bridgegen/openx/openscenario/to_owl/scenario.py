@@ -32,8 +32,8 @@ from bridgegen.openx.openscenario.declarations import DEFAULT_TIME_STEP
 from bridgegen.openx.openscenario.from_owl.notes import EVENT, FINDINGS, SIGNALS
 from bridgegen.openx.openscenario.from_owl.scenario import ARRIVAL, openscenario_from_owl
 from bridgegen.openx.openscenario.from_owl.signals import Signals
+from bridgegen.openx.openscenario.parameters import EGO
 from bridgegen.openx.openscenario.read import fragment_of
-from bridgegen.openx.openscenario.renaming import EGO
 from bridgegen.openx.openscenario.resolve import part_resolved
 from bridgegen.openx.openscenario.to_owl.build import ACTION, Lost, StoryBuilder, numbered, quoted
 from bridgegen.openx.openscenario.to_owl.conditions import add_trigger
@@ -49,12 +49,11 @@ from bridgegen.openx.openscenario.to_owl.events import (
     add_events,
     happenings,
 )
-from bridgegen.openx.openscenario.to_owl.foregone import without_foregone
 from bridgegen.openx.openscenario.to_owl.legs import stretches, with_legs
 from bridgegen.openx.openscenario.to_owl.losses import losses
 from bridgegen.openx.openscenario.to_owl.parameters import Notes, add_parameters
 from bridgegen.openx.openscenario.to_owl.signals import add_controllers
-from bridgegen.openx.openscenario.to_owl.simplified import simplified
+from bridgegen.openx.openscenario.to_owl.simplified import simplified, without_foregone
 from bridgegen.openx.openscenario.to_owl.weather import add_weather
 from bridgegen.scenario.ontology.graph import Individuals
 from bridgegen.scenario.ontology.vocabulary import bg

@@ -4,7 +4,7 @@ import math
 from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 
-from bridgegen.drivers import lamps
+from bridgegen.drivers import kinds as lamps
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.element import Element
 from bridgegen.simulation.embedded._codes import (
@@ -23,11 +23,10 @@ from bridgegen.simulation.embedded._codes import (
     SWITCH,
     TELEPORT,
 )
-from bridgegen.simulation.embedded.compiler.bodies import Towing
 from bridgegen.simulation.embedded.compiler.controllers import Controllers, Pedals, parts
 from bridgegen.simulation.embedded.compiler.courses import SHAPES, Courses
 from bridgegen.simulation.embedded.compiler.global_actions import GlobalActions
-from bridgegen.simulation.embedded.compiler.layouts import Layouts, is_laid
+from bridgegen.simulation.embedded.compiler.layouts import Layouts, Towing, is_laid
 from bridgegen.simulation.embedded.compiler.positions import Positions
 from bridgegen.simulation.embedded.compiler.tables import Tables
 from bridgegen.simulation.embedded.compiler.trajectories import compile_trajectory

@@ -1,6 +1,10 @@
 """Declarations in a file's properties: time step, drivers, the ego's vehicle and its noise."""
 
+import math
 import shlex
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime
 
 from bridgegen.base.errors import InputError, UnknownNameError, UnsupportedError
 from bridgegen.drivers import DRIVERS, GUESTS, STORYBOARD, Driver, get, is_planner, is_spec, split
@@ -16,7 +20,12 @@ from bridgegen.openx.openscenario.declarations import (
     TIME_STEP,
     VEHICLE,
 )
+from bridgegen.openx.openscenario.element import Element
+from bridgegen.openx.openscenario.parameters import kind_of
+from bridgegen.openx.openscenario.values import Kind, Value
+from bridgegen.simulation.embedded import _codes as codes
 from bridgegen.simulation.embedded.compiler.controllers import Controllers
+from bridgegen.simulation.embedded.compiler.tables import Tables
 from bridgegen.simulation.vehicles import KINEMATIC, require
 
 LEAST_STEP, MOST_STEP = 1e-4, 1.0  # s
@@ -174,3 +183,154 @@ def noise_key(controllers: Controllers, place: str) -> int | None:
                 )
             return int(str(text))
     return None
+
+
+# --- The elements of a storyboard in the order of the file ---
+
+
+Part = osc.Story | osc.Act | osc.ManeuverGroup | osc.Maneuver | osc.Event | osc.Action
+
+_KINDS = {
+    osc.Story: codes.STORY, osc.Act: codes.ACT, osc.ManeuverGroup: codes.GROUP,
+    osc.Maneuver: codes.MANEUVER, osc.Event: codes.EVENT, osc.Action: codes.ACTION,
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Node:
+    """An element of the storyboard: its place in the order of the file, its name and parents.
+
+    Attributes:
+        part: the element.
+        kind: see ``_codes``.
+        path: names from the story's to its own.
+        parent: number of its parent; -1 of a story.
+        end: number of the first element after it that is not in it.
+    """
+
+    part: Part
+    kind: int
+    path: tuple[str, ...]
+    parent: int
+    end: int
+
+
+def nodes(storyboard: osc.Storyboard) -> list[Node]:
+    """Return all elements in the order of the file, each before its children."""
+    found: list[Node] = []
+    for story in storyboard.stories:
+        _append(found, story, (), -1)
+    return found
+
+
+def _append(found: list[Node], part: Part, path: tuple[str, ...], parent: int) -> None:
+    number, path = len(found), (*path, str(part.name))
+    kind = _KINDS[type(part)]
+    found.append(Node(part, kind, path, parent, 0))
+    for child in _children(part):
+        _append(found, child, path, number)
+    found[number] = Node(part, kind, path, parent, len(found))
+
+
+def _children(part: Part) -> Sequence[Part]:
+    match part:
+        case osc.Story():
+            return part.acts
+        case osc.Act():
+            return part.maneuver_groups
+        case osc.ManeuverGroup():
+            return part.maneuvers
+        case osc.Maneuver():
+            return part.events
+        case osc.Event():
+            return part.actions
+    return ()
+
+
+# --- Parameters and variables that change as the scenario runs, and dates, as numbers ---
+
+
+EQUALITY = (codes.EQUAL, codes.NOT_EQUAL)
+
+
+class Values:
+    """The parameters and variables that conditions compare or actions set, numbered as they come.
+
+    A text is a number of its own, a date the seconds since 1970, true is 1.
+
+    Attributes:
+        slots: of their first values.
+    """
+
+    def __init__(self, tables: Tables, scenario: osc.OpenScenario) -> None:
+        self._tables = tables
+        self._texts: dict[str, float] = {}
+        self._numbers: dict[tuple[str, str], int] = {}
+        self.slots: list[int] = []
+        parameters, variables = scenario.parameter_declarations, scenario.variable_declarations
+        self._declared: dict[tuple[str, str], tuple[Kind, Value]] = {}
+        for one in parameters.parameters if parameters else ():
+            kind = kind_of(one.parameter_type)
+            first: Value = osc.ParameterRef(f"${one.name}") if kind.is_number else one.value
+            self._declared["parameter", one.name] = kind, first
+        for other in variables.variables if variables else ():
+            kind = kind_of(other.variable_type)
+            self._declared["variable", other.name] = kind, other.value
+
+    def number(self, element: Element, what: str, name: str) -> int:
+        """Return the number of a parameter or variable; one that is not declared is taken down."""
+        key = (what, name)
+        if key not in self._declared:
+            self._tables.unsupported(element, f"{what} '{name}', which is not declared,")
+            return 0
+        if key not in self._numbers:
+            kind, first = self._declared[key]
+            value = first if isinstance(first, osc.ParameterRef) else self._read(kind, first)
+            self._numbers[key] = len(self.slots)
+            self.slots.append(self._tables.slot(value if value is not None else math.nan))
+        return self._numbers[key]
+
+    def value(self, element: Element, what: str, name: str, text: Value) -> Value:
+        """Return what a text is as a value of a parameter or variable: a number, or its source."""
+        kind, _ = self._declared.get((what, name), (Kind.STRING, ""))
+        if self._is_number(text) and kind not in (Kind.STRING, Kind.DATE_TIME):
+            return text
+        value = self._read(kind, text)
+        if value is None:
+            what = f"value=\"{text}\" for {what} '{name}' ({kind.value})"
+            self._tables.unsupported(element, what)
+            return 0.0
+        return value
+
+    def is_ordered(self, what: str, name: str) -> bool:
+        """Return whether values of a parameter or variable can be greater or less."""
+        return self._declared.get((what, name), (Kind.STRING, ""))[0] is not Kind.STRING
+
+    def _is_number(self, value: Value) -> bool:
+        """Return whether a value is computed, or a number of the file's parameters."""
+        if isinstance(value, osc.ParameterRef):
+            return value.name in self._tables.parameters
+        return isinstance(value, osc.Expr)
+
+    def _read(self, kind: Kind, value: Value) -> float | None:
+        text = self._tables.text(value) if isinstance(value, osc.ParameterRef) else str(value)
+        if kind is Kind.STRING:
+            return self._texts.setdefault(text, float(len(self._texts)))
+        if kind is Kind.DATE_TIME:
+            return seconds(text)
+        if text in ("true", "false"):
+            return float(text == "true")
+        try:
+            number = float(text)
+        except ValueError:
+            return None
+        return number if math.isfinite(number) else None
+
+
+def seconds(date: str) -> float | None:
+    """Return a date's seconds since 1970, in UTC where it names no zone; None if it is none."""
+    try:
+        moment = datetime.fromisoformat(date)
+    except ValueError:
+        return None
+    return (moment if moment.tzinfo else moment.replace(tzinfo=UTC)).timestamp()

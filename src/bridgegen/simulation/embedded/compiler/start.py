@@ -7,10 +7,9 @@ from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.element import Element, walk
 from bridgegen.simulation.embedded._codes import WHOSE
 from bridgegen.simulation.embedded.compiler.actions import CONTROLLING, Actions
-from bridgegen.simulation.embedded.compiler.bodies import Towing
 from bridgegen.simulation.embedded.compiler.controllers import Controllers
 from bridgegen.simulation.embedded.compiler.courses import LONGITUDINAL, first_speed
-from bridgegen.simulation.embedded.compiler.layouts import gives_path, is_laid
+from bridgegen.simulation.embedded.compiler.layouts import Towing, gives_path, is_laid
 from bridgegen.simulation.embedded.compiler.positions import Positions
 from bridgegen.simulation.embedded.compiler.tables import Tables
 from bridgegen.simulation.embedded.compiler.trajectories import compile_trajectory

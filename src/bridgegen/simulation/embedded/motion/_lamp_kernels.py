@@ -4,8 +4,7 @@
 # Numba infers what kernels take; their wrappers are typed.
 
 from bridgegen.base.compiled import kernel
-from bridgegen.drivers._kind_tables import IS_VEHICLE
-from bridgegen.drivers.lamps import BRAKE, BRAKE_LIGHTS_FROM, HAZARD, SWITCHED
+from bridgegen.drivers.kinds import BRAKE, BRAKE_LIGHTS_FROM, HAZARD, IS_VEHICLE, SWITCHED
 from bridgegen.simulation.embedded._codes import IS_LIT, LAMP, WHOM
 
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from bridgegen.base.arrays import Float, Int
 from bridgegen.base.errors import InputError
-from bridgegen.drivers._kind_tables import IS_CYCLE, IS_VEHICLE
+from bridgegen.drivers.kinds import IS_CYCLE, IS_VEHICLE
 from bridgegen.drivers.right_of_way import is_off_road
 from bridgegen.openx.opendrive.lane_changes import plan_with_changes
 from bridgegen.openx.opendrive.lane_graph import LaneGraph, Node
