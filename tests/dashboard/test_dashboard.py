@@ -16,16 +16,17 @@ from bridgegen.base.errors import FileFormatError, StorageError
 from bridgegen.cli.verdict.of_dashboard import FIGURES
 from bridgegen.jobs.dashboard.dashboard import Dashboard
 from bridgegen.jobs.dashboard.markup import within
-from bridgegen.jobs.dashboard.modes import failure_modes
+from bridgegen.jobs.dashboard.modes import Decisions, failure_modes
 from bridgegen.jobs.dashboard.odd import coverage
 from bridgegen.jobs.dashboard.page import MOST_MODES, write_page
 from bridgegen.jobs.dashboard.project import Problem, Project
 from bridgegen.jobs.dashboard.requirements import matrices
 from bridgegen.jobs.dashboard.scenery import scenery_of
 from bridgegen.jobs.dashboard.sentences import failing_sentence, requirements_sentence
-from bridgegen.jobs.dashboard.status_file import FILE, StatusFile, read_status_file
 from bridgegen.jobs.dashboard.trends import trends
-from bridgegen.jobs.suite.suite import read_suite
+from bridgegen.jobs.suite.growth import add_failures
+from bridgegen.jobs.suite.suite import read_suite, run_suite
+from bridgegen.results.failures import FILE, OLD_FILE, Failure, read_failures, write_failures
 from bridgegen.scenario.language.reader import load
 from bridgegen.search.triage.record import Estimate, read_record
 
@@ -174,7 +175,7 @@ def test_links_hold_from_another_folder(copy, tmp_path):
 
 
 def test_damaged_statuses_are_an_error_before_anything_is_written(cli, copy):
-    (copy / FILE).write_text("modes:\n- id: fm-1\n  status: maybe\n", "utf-8")
+    (copy / FILE).write_text("failures:\n  fm-1:\n    status: maybe\n", "utf-8")
     with pytest.raises(FileFormatError):
         bg.build_dashboard(copy)
     status, _, err = cli("dashboard", copy)
@@ -234,10 +235,9 @@ def made(results, folder, problems=()):
     """Return a dashboard of results that are not on disk."""
     sceneries = {"cut-in": scenery_of(load("cut-in"))}
     project = Project(folder, tuple(results), (), (), (), sceneries, tuple(problems))
-    file = StatusFile("", {}, {})
     page = folder / "dashboard.html"
     return Dashboard(
-        project, page, file, folder / FILE, tuple(failure_modes(results, file)),
+        project, page, {}, folder / FILE, tuple(failure_modes(results, Decisions())),
         tuple(matrices(results)), (), tuple(trends(results, ())), coverage(results, sceneries),
     )  # fmt: skip
 
@@ -299,7 +299,7 @@ def test_the_sentences_of_a_clean_project(result, tmp_path):
 
 def test_statuses_are_read_back(copy):
     found = bg.build_dashboard(copy, update=True)
-    assert set(read_status_file(copy / FILE).decisions) == {one.key.id for one in found.modes}
+    assert set(read_failures(copy).failures) == {one.key.id for one in found.modes}
 
 
 def test_a_suite_of_a_stranger_is_read_or_named(copy):
@@ -309,6 +309,7 @@ def test_a_suite_of_a_stranger_is_read_or_named(copy):
     hostile = [
         {**first, "scenario": "a\0b.yaml", "entry": "<script>"},
         {**first, "scenario": "../" * 400 + "x.yaml", "entry": "far"},
+        {**first, "scenario": "a\0b/c.xosc", "entry": "nul"},
         {**first, "rows": [{**first["rows"][0], "x": ["text"] * len(first["parameters"])}]},
         {**first, "entry": "short", "rows": [{**first["rows"][0], "x": []}]},
     ]
@@ -328,3 +329,147 @@ def test_a_damaged_map_is_named(copy, damage):
 def test_parts_that_do_not_fit_are_counted():
     assert within(["aaa", "bb", "cc"], 5, "x") == 'aaabb<p class="muted">and 1 x more</p>'
     assert within(["aaaaaaaa"], 5, "x") == "aaaaaaaa"
+
+
+# ---- one decision in one place ----
+
+
+def decide(folder, *ids, **more):
+    """Set the status of blocks, as a person does."""
+    file = read_failures(folder)
+    write_failures(file, {id: file.failures[id].model_copy(update=more) for id in ids})
+
+
+@pytest.fixture(scope="module")
+def grown(project, tmp_path_factory) -> Path:
+    """A copy of the project with a suite of the failures of its first run, and its results."""
+    folder = shutil.copytree(project, tmp_path_factory.mktemp("grown") / "project")
+    with pytest.MonkeyPatch.context() as patched:
+        patched.chdir(folder.parent)  # so that the results name the scenarios by relative paths
+        _grow(Path("project"))
+    return folder
+
+
+def _grow(folder):
+    add_failures([folder / "runs" / "route-follower"], folder / "suites" / "mine")
+    run_suite(
+        folder / "suites" / "mine", egos=["route-follower"], workers=1,
+        out=folder / "suites" / "mine-results",
+    )  # fmt: skip
+
+
+@pytest.fixture
+def growing(grown, tmp_path) -> Path:
+    return shutil.copytree(grown, tmp_path / "project")
+
+
+def of_suite(found):
+    """Return the failure modes on which blocks of the suite decide, by what results they are in."""
+    kinds = {}
+    for one in found.modes:
+        if one.decided:
+            assert one.decided.startswith("suites/mine/failures.yaml: cut-in-")
+            kinds.setdefault(one.results[0].kind, []).append(one)
+    return kinds
+
+
+def test_a_suite_that_grows_decides_on_its_failures_wherever_they_are_found(growing):
+    suite = growing / "suites" / "mine"
+    ids = [*read_failures(suite).failures]
+    decide(suite, *ids, status="accepted", comment="JIRA-3")
+    kinds = of_suite(bg.build_dashboard(growing))
+    run = growing / "runs" / "route-follower"
+    ways = {(one.conflict, one.conflict_type, one.responsible, one.partner, one.place)
+            for one in bg.Run(run).modes}  # fmt: skip
+    assert len(kinds["run"]) >= len(ways)  # and violations, where they alone are kept
+    assert kinds["suite"]
+    for one in (*kinds["run"], *kinds["suite"]):
+        assert (one.status, one.comment) == ("accepted", "JIRA-3")
+        assert one.key.driver == "route-follower"
+    shutil.rmtree(growing / "suites" / "mine-results")  # its blocks are there
+    assert of_suite(bg.build_dashboard(growing)).keys() == {"run"}
+
+
+def test_a_suite_beside_the_project_decides_too(growing):
+    suite = growing / "suites" / "mine"
+    decide(suite, *read_failures(suite).failures, status="known")
+    other = growing.parent / "other"
+    shutil.copytree(growing / "suites" / "mine-results", other / "nightly")
+    found = bg.build_dashboard(other)
+    place = "../project/suites/mine/failures.yaml: cut-in-"
+    decided = [one for one in found.modes if one.decided.startswith(place)]
+    assert decided
+    assert {one.status for one in decided} == {"known"}
+    assert place in found.page.read_text("utf-8")
+
+
+def test_update_adds_only_modes_that_no_block_names(growing):
+    found = bg.build_dashboard(growing, update=True)
+    decided = {one.key.id for one in found.modes if one.decided}
+    assert decided
+    assert set(read_failures(growing).failures) == {one.key.id for one in found.modes} - decided
+    assert found.added == len(found.modes) - len(decided)
+
+
+def test_a_decision_that_contradicts_the_suites_is_named(growing):
+    (mode, *_) = of_suite(bg.build_dashboard(growing))["run"]
+    write_failures(read_failures(growing), {mode.key.id: Failure(status="accepted")})
+    found = bg.build_dashboard(growing)
+    assert next(one for one in found.modes if one.key == mode.key).status == "new"
+    assert found.notes == (
+        f"{mode.key.id} is accepted in failures.yaml and new in {mode.decided}, which counts: "
+        "remove the former",
+    )
+
+
+def test_one_folder_may_be_suite_and_project(growing):
+    suite = growing / "suites" / "mine"
+    for path in suite.iterdir():
+        path.rename(growing / path.name)
+    found = bg.build_dashboard(growing, update=True)
+    blocks = read_failures(growing).failures
+    assert {bool(one.files) for one in blocks.values()} == {True, False}
+    in_runs = [one for one in found.modes if one.decided]
+    assert in_runs
+    assert all(one.decided.startswith("failures.yaml: cut-in-") for one in in_runs)
+
+
+def test_a_damaged_file_of_a_suite_is_a_problem_and_its_failures_are_new(growing):
+    path = growing / "suites" / "mine" / FILE
+    path.write_text(path.read_text("utf-8").replace("status: new", "status: wontfix", 1), "utf-8")
+    found = bg.build_dashboard(growing)
+    (problem,) = [one for one in found.project.problems if one.place == "suites/mine/failures.yaml"]
+    assert "wontfix" in problem.why
+    assert "suites/mine/failures.yaml, line" in problem.why
+    assert {one.status for one in found.modes} == {"new"}
+    with pytest.raises(FileFormatError, match="wontfix"):
+        bg.build_dashboard(growing, update=True)
+    assert not (growing / FILE).exists()
+
+
+def test_the_file_of_earlier_versions_is_read_and_copied(cli, copy):
+    mode, other = (one.key.id for one in bg.build_dashboard(copy).modes[:2])
+    old = copy / OLD_FILE
+    gone = "- id: fm-gone\n  status: known\n  title: 'no more'\n"
+    text = f"modes:\n# in May\n- id: {mode}\n  status: accepted\n  note: by Ada\n{gone}"
+    old.write_text(text, "utf-8")
+    write_failures(read_failures(copy), {other: Failure(status="known")})
+    status, out, _ = cli("dashboard", copy)
+    assert status == 0
+    assert out.count("failure-modes.yaml") == 1
+    assert "is read, too: --update copies its statuses and notes to failures.yaml" in out
+    cli("dashboard", copy, "--update")
+    assert old.read_text("utf-8") == text
+    blocks = read_failures(copy).failures
+    assert (blocks[mode].status, blocks[mode].comment) == ("accepted", "by Ada")
+    assert (blocks[other].status, blocks["fm-gone"].status) == ("known", "known")
+    _, out, _ = cli("dashboard", copy)
+    assert "are in failures.yaml, which counts; move its comments there, and remove it" in out
+    decide(copy, mode, status="fixed")
+    found = bg.build_dashboard(copy)
+    assert {one.key.id for one in found.modes if one.status == "fixed"} == {mode}
+    assert found.unseen["fm-gone"].title == "no more"
+    old.write_text("modes:\n- id: fm-1\n  status: maybe\n", "utf-8")
+    status, _, err = cli("dashboard", copy)
+    assert status == 2
+    assert "failure-modes.yaml, line 3" in err

@@ -13,9 +13,9 @@ from bridgegen.engine.options import CommonOptions
 from bridgegen.engine.simulate import simulate_file
 from bridgegen.jobs.suite import growth
 from bridgegen.jobs.suite.growth import add_failures
-from bridgegen.jobs.suite.index import FILE, read_index
 from bridgegen.jobs.suite.results import counts
 from bridgegen.jobs.suite.suite import run_suite
+from bridgegen.results.failures import FILE, read_failures
 
 FAST = "R-1: always(ego.v < 13 m/s)"
 """A rule that faster scenarios violate."""
@@ -59,7 +59,7 @@ def outcomes(made):
 def test_each_mode_is_kept_once_and_fails_there_to_the_bit(run, tmp_path):
     to = tmp_path / "mine"
     made = add_failures([run.folder], to)
-    failures = read_index(to).failures
+    failures = read_failures(to).failures
     assert outcomes(made) == ["added"] * len(run.modes)
     assert all(one.is_same and not one.reason for one in made)
     assert {one.id for one in made} == failures.keys()
@@ -109,7 +109,7 @@ def test_a_worse_one_replaces_only_when_asked(run, tmp_path):
     add_failures([run.folder / "critical" / "0001.xosc"], to)
     path = to / FILE
     text = path.read_text("utf-8")
-    (old,) = read_index(to).failures.values()
+    (old,) = read_failures(to).failures.values()
     milder = text.replace(f"harm: {old.harm}", "harm: 0.31").replace("status: new", "status: known")
     path.write_text(milder.replace('comment: ""', "comment: mine"), "utf-8")
     before = bytes_of(to)
@@ -117,7 +117,7 @@ def test_a_worse_one_replaces_only_when_asked(run, tmp_path):
     assert bytes_of(to) == before
     made = add_failures([run.folder / "critical" / "0001.xosc"], to, replace_worse=True)
     assert outcomes(made) == ["replaced"]
-    (new,) = read_index(to).failures.values()
+    (new,) = read_failures(to).failures.values()
     assert (new.harm, new.status, new.comment) == (old.harm, "known", "mine")
 
 
@@ -135,7 +135,7 @@ def test_what_does_not_fail_there_is_refused_and_named(copied, tmp_path):
     assert outcomes(made) == ["refused"]
     assert "0001" in made[0].source
     assert made[0].reason.startswith("it is no failure of the ego: harm 0")
-    assert read_index(tmp_path / "mine") is None
+    assert not (tmp_path / "mine" / FILE).exists()
 
 
 def test_what_fails_otherwise_than_it_was_found_is_refused(copied, tmp_path):
@@ -195,7 +195,7 @@ def test_the_worst_variation_of_a_suite_is_kept_and_its_criterion_judges_there(t
     assert [row.verdict for row in reference.rows] == ["passed", "passed", "failed"]
     to = tmp_path / "mine"
     add_failures([suite.folder], to)
-    by_conflict = {one.conflict: one for one in read_index(to).failures.values()}
+    by_conflict = {one.conflict: one for one in read_failures(to).failures.values()}
     assert {*by_conflict} == {"contact", ""}
     assert by_conflict[""].title == "violates R-1"
     assert by_conflict[""].driver == "reference"
@@ -267,7 +267,7 @@ def test_a_driver_is_that_of_the_run_and_code_is_named(run, tmp_path):
         add_failures([suite.folder], tmp_path / "mine", egos=["reference"])
     (made,) = add_failures([suite.folder], tmp_path / "mine", egos=[ego])
     assert (made.outcome, made.is_same) == ("added", True)
-    (kept,) = read_index(tmp_path / "mine").failures.values()
+    (kept,) = read_failures(tmp_path / "mine").failures.values()
     assert kept.driver.startswith(str(driver))
     again = run_suite(tmp_path / "mine", egos=[ego], out=tmp_path / "again", workers=1)
     assert again.results[0].rows[0].harm == suite.results[0].rows[0].harm

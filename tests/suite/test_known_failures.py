@@ -1,7 +1,7 @@
 """What is known of a suite's failures, by hand: which failures are excused, and which are not."""
 
 import pytest
-from tests.suite.test_index import failure
+from tests.results.test_failures import failure
 
 from bridgegen.jobs.suite.known_failures import KnownFailures, words
 from bridgegen.jobs.suite.results import EntryResult, RowResult

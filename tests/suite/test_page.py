@@ -12,16 +12,16 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tests.suite.test_index import failure
+from tests.results.test_failures import failure
 
 from bridgegen.engine.options import CommonOptions
 from bridgegen.jobs.suite import page
-from bridgegen.jobs.suite.index import Index, write_index
 from bridgegen.jobs.suite.page import FILE, write_suite_page
 from bridgegen.jobs.suite.page_payload import payload
 from bridgegen.jobs.suite.results import EntryResult, RowResult
 from bridgegen.jobs.suite.sentences import difference, differences, headline
 from bridgegen.jobs.suite.suite import SuiteRun, run_suite
+from bridgegen.results.failures import read_failures, write_failures
 
 CRITERIA = CommonOptions(criteria=["C-1: always(ego.v < 12 m/s)"])
 HIT = RowResult(critical=True, harm=0.5, severity=0.1, collisions=1.0, d_min=0.0)
@@ -171,7 +171,7 @@ def test_a_known_failure_is_told_from_a_new_one(tmp_path):
     named = {id: failure(id, type="turning") for id in ("a", "b", "c")}
     named["a"] = named["a"].model_copy(update={"status": "known", "comment": "<b> JIRA-3"})
     named["c"] = named["c"].model_copy(update={"status": "fixed"})
-    write_index(tmp_path, Index({}), named)
+    write_failures(read_failures(tmp_path), named)
     made = [
         one.model_copy(update={"scenario": str(tmp_path / one.scenario)})
         for one in (result(id, rows=(hit,)) for id in "abcd")

@@ -6,7 +6,7 @@ from xml.etree import ElementTree
 
 import pytest
 from tests.campaign.braking import deterministic, scenario_text, write_pair
-from tests.suite.test_index import failure
+from tests.results.test_failures import failure
 
 import bridgegen as bg
 from bridgegen.assess.conflict.happening import Happening, Share
@@ -16,12 +16,12 @@ from bridgegen.cli.verdict.of_suite import SuiteCriteria, figures_of
 from bridgegen.engine.simulate import simulate_file
 from bridgegen.jobs.suite.difference import difference
 from bridgegen.jobs.suite.entries import RESULTS
-from bridgegen.jobs.suite.index import Index, write_index
 from bridgegen.jobs.suite.known_failures import KnownFailures
 from bridgegen.jobs.suite.replay import replay
 from bridgegen.jobs.suite.results import EntryResult, RowResult
 from bridgegen.jobs.suite.suite import SuiteRun, read_suite, run_suite
 from bridgegen.jobs.view.folder_view import FolderView
+from bridgegen.results.failures import read_failures, write_failures
 
 DOUBLE_PARKED = Path(__file__).parents[1] / "campaign" / "double-parked.yaml"
 
@@ -194,7 +194,8 @@ def test_a_kept_failure_passes_where_the_ego_stops_for_what_it_hit(tmp_path):
         "the scenario did not happen: stuck in 1 of 1: st"
     ]
     assert "stuck in 1 of 1: stands behind" in simulate_file(file).unjudged
-    write_index(file.parent, Index({}), {"b": failure("b", files=[file.name], status="fixed")})
+    fixed = failure("b", files=[file.name], status="fixed")
+    write_failures(read_failures(file.parent), {"b": fixed})
     kept = run_suite(file, out=tmp_path / "kept", workers=1)
     assert [one.verdict for one in kept.results] == ["passed"]
 

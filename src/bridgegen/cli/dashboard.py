@@ -31,7 +31,7 @@ def dashboard(
         bool,
         typer.Option(
             "--update",
-            help="Add failure modes that failure-modes.yaml does not name to it, as new.",
+            help="Add failure modes that no failures.yaml names to that in the folder, as new.",
         ),
     ] = False,
     fail_if: Annotated[
@@ -46,8 +46,8 @@ def dashboard(
     """Show all results of a project on one page.
 
     What fails now, trends over driver versions, requirements by scenario, coverage of the
-    operational design domain. The statuses of failure modes are those of failure-modes.yaml in
-    the folder, which is yours.
+    operational design domain. The statuses of failure modes are those of failures.yaml, in the
+    folder and in suites that grow, which are yours.
     """
     from bridgegen.cli.terminal.dashboard import DashboardScreen, print_dashboard
     from bridgegen.cli.terminal.tables import print_outcomes

@@ -1,4 +1,4 @@
-"""Where results are kept: evaluations of a run in SQLite, and records of confirmations.
+"""Where results are kept: evaluations in SQLite, records of confirmations, known failures.
 
 Imports `engine` and below.
 """

@@ -39,6 +39,8 @@ def print_dashboard(found: "Dashboard", *, as_json: bool = False) -> None:
         print(f"  not read    {problem.place}: {problem.why}")
     if len(found.project.problems) > MOST_MODES:
         print(f"  and {len(found.project.problems) - MOST_MODES:,} more are not read")
+    for note in found.notes[:MOST_MODES]:
+        print(f"{'note':<12}{note}")
     if found.added:
         print(f"{'statuses':<12}{found.status_path}: {found.added:,} added as new")
     print(f"{'page':<12}{found.page}")
@@ -53,6 +55,8 @@ def _facts(found: "Dashboard") -> dict[str, object]:
             {
                 "id": one.key.id,
                 "status": one.status,
+                "comment": one.comment,
+                "decided": one.decided,
                 "fails_now": one.fails_now,
                 "regression": one.is_regression,
                 "scenario": one.key.scenario,
@@ -64,5 +68,6 @@ def _facts(found: "Dashboard") -> dict[str, object]:
             }
             for one in found.modes
         ],
+        "notes": list(found.notes),
         "problems": [{"place": one.place, "why": one.why} for one in found.project.problems],
     }

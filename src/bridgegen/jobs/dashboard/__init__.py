@@ -1,7 +1,7 @@
 """All results of a project as one page: runs, suites, comparisons and preventability maps.
 
 ``project.py`` finds and reads them; ``modes.py``, ``requirements.py``, ``trends.py`` and ``odd.py``
-say what follows; ``page.py`` writes it; ``status_file.py`` keeps what a person decides.
+say what follows; ``page.py`` writes it. What a person decides is in `bridgegen.results.failures`.
 """
 
 from bridgegen.jobs.dashboard.dashboard import Dashboard, build_dashboard

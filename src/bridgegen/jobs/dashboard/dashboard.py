@@ -1,23 +1,32 @@
 """A dashboard: what a project's results say together, and the page that shows it."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
 from bridgegen.base.disk import refuse_other
-from bridgegen.jobs.dashboard.modes import OpenMode, decisions_of, failure_modes, unseen
+from bridgegen.base.errors import FileFormatError
+from bridgegen.jobs.dashboard.modes import (
+    OpenMode,
+    contradictions,
+    decisions_of,
+    failure_modes,
+    undecided,
+    unseen,
+)
 from bridgegen.jobs.dashboard.odd import Coverage, coverage
 from bridgegen.jobs.dashboard.project import Project, read_project
 from bridgegen.jobs.dashboard.requirements import Matrix, matrices
-from bridgegen.jobs.dashboard.status_file import (
-    FILE,
-    Decision,
-    StatusFile,
-    add_decisions,
-    read_status_file,
-)
 from bridgegen.jobs.dashboard.trends import Series, trends
+from bridgegen.results.failures import (
+    FILE,
+    OLD_FILE,
+    Failure,
+    read_failures,
+    read_old_file,
+    write_failures,
+)
 from bridgegen.scenario.language.criteria import Criterion, read_criteria
 
 PAGE = "dashboard.html"
@@ -31,19 +40,20 @@ class Dashboard:
     Attributes:
         project: all that was found.
         page: path of the page.
-        file: what the person decides about failure modes.
-        status_path: path of that file.
+        own: the blocks of ``failures.yaml`` in the folder, by id.
+        status_path: path of ``failures.yaml`` in the folder.
         modes: all failure modes, those that fail now first.
         requirements: a matrix for each driver.
         declared: the requirements that are named for the project.
         trends: a series for each scenario or suite, and driver.
         coverage: of the taxonomy, and by parameter.
         added: number of failure modes that were added to the file.
+        notes: what the person should know of the files of decisions.
     """
 
     project: Project
     page: Path
-    file: StatusFile
+    own: Mapping[str, Failure]
     status_path: Path
     modes: tuple[OpenMode, ...]
     requirements: tuple[Matrix, ...]
@@ -51,6 +61,7 @@ class Dashboard:
     trends: tuple[Series, ...]
     coverage: Coverage
     added: int = 0
+    notes: tuple[str, ...] = ()
 
     @cached_property
     def failing(self) -> tuple[OpenMode, ...]:
@@ -63,9 +74,9 @@ class Dashboard:
         return tuple(one for one in self.failing if one.is_regression)
 
     @cached_property
-    def unseen(self) -> list[Decision]:
-        """What the file decides about modes that no result has."""
-        return unseen(self.modes, self.file)
+    def unseen(self) -> dict[str, Failure]:
+        """The blocks of the folder about modes that no result has, by id."""
+        return unseen(self.modes, self.own)
 
     @cached_property
     def criteria(self) -> tuple[Criterion, ...]:
@@ -148,37 +159,58 @@ def build_dashboard(
         folder: of the project.
         out: the page; ``dashboard.html`` in the folder by default.
         criteria: requirements that the project has, tested or not: as of ``--criterion``.
-        update: whether to add failure modes to ``failure-modes.yaml`` that it does not name, with
-            the status "new".
+        update: whether to add failure modes that no ``failures.yaml`` names to that in the folder,
+            with the status "new".
         begun: called with the number of folders that are read, and of all.
 
     Raises:
         StorageError: there are no results; or the page or the file cannot be written, or another
             file is where the page is to be.
-        InputError: ``failure-modes.yaml`` or a requirement breaks a rule.
+        InputError: ``failures.yaml`` in the folder or a requirement breaks a rule; with ``update``,
+            any ``failures.yaml``.
     """
     from bridgegen.jobs.dashboard.page import write_page
 
     folder = Path(folder)
     page = folder / PAGE if out is None else Path(out)
     status_path = folder / FILE
-    file = read_status_file(status_path)
+    file, old = read_failures(folder), read_old_file(folder)
+    own = {**old, **file.failures}
     declared = read_criteria(criteria)
     refuse_other(page, GENERATOR, "dashboard")
     project = read_project(folder, begun)
-    modes = failure_modes(project.results, file)
-    added = add_decisions(status_path, file, decisions_of(modes)) if update else 0
+    if update and (damaged := [one.why for one in project.problems if one.place.endswith(FILE)]):
+        raise FileFormatError(*damaged)  # it may name modes that seem to be new
+    modes = failure_modes(project.results, decisions_of(own, project))
+    new = {} if not update else undecided(modes, own)
+    moved = {id: one for id, one in old.items() if id not in file.failures}
+    if update and (new or moved):
+        write_failures(file, {**moved, **new})
+    notes = contradictions(modes, own)
+    if old:
+        notes.append(_note(folder / OLD_FILE, moved=bool(moved), update=update))
     found = Dashboard(
         project,
         page,
-        file,
+        own,
         status_path,
         tuple(modes),
         tuple(matrices(project.results, declared)),
         declared,
         tuple(trends(project.runs, project.suites)),
         coverage(project.results, project.sceneries),
-        added,
+        len(new),
+        tuple(notes),
     )
     write_page(found)
     return found
+
+
+def _note(old: Path, *, moved: bool, update: bool) -> str:
+    """Return what to do with a file of an earlier version."""
+    if moved and not update:
+        return f"{old} is read, too: --update copies its statuses and notes to {FILE}"
+    return (
+        f"{old}: its statuses and notes are in {FILE}, which counts; move its comments there, and "
+        "remove it"
+    )

@@ -1,11 +1,24 @@
-"""The failure modes of a project: those of all results, each once, with the person's status."""
+"""The failure modes of a project: those of all results, each once, with the person's status.
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+The status is that of a block of ``failures.yaml``: of a suite that keeps the same failure, else of
+the project's folder.
+"""
 
-from bridgegen.jobs.dashboard.results import Failure, ModeKey, Result, current, in_order
-from bridgegen.jobs.dashboard.status_file import Decision, StatusFile
-from bridgegen.jobs.suite.index import Status
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+from bridgegen.jobs.dashboard.project import Project
+from bridgegen.jobs.dashboard.results import (
+    Failure,
+    ModeKey,
+    Result,
+    current,
+    driver_of,
+    in_order,
+    place_of,
+)
+from bridgegen.results.failures import FILE, MOST_TEXT, STATUSES, FailureFile, Status
+from bridgegen.results.failures import Failure as Block
 
 
 @dataclass(frozen=True)
@@ -16,7 +29,8 @@ class OpenMode:
         key: of it.
         title: in words, of the latest result that has it.
         status: as the person sets it; "new" where nothing is set.
-        note: of the person, or "".
+        comment: of the person, or "".
+        decided: the suite's file and block that state both; "" if the project's own do, or none.
         fails_now: whether a current result has it, see `bridgegen.jobs.dashboard.results.current`.
         count: of evaluations in the current results that have it, else in the latest.
         severity: the worst probability of MAIS3+ in these.
@@ -29,7 +43,8 @@ class OpenMode:
     key: ModeKey
     title: str
     status: Status
-    note: str
+    comment: str
+    decided: str
     fails_now: bool
     count: int
     severity: float
@@ -43,15 +58,91 @@ class OpenMode:
         return self.status == "fixed" and self.fails_now
 
 
+# --- The blocks that decide ---
+
+
+@dataclass
+class Decisions:
+    """What a person decides about failure modes.
+
+    Attributes:
+        own: the blocks of the project's folder, by id.
+        others: place and block of other folders, by the id or the key of the mode.
+    """
+
+    own: Mapping[str, Block] = field(default_factory=dict)
+    others: dict[str | ModeKey, list[tuple[str, Block]]] = field(default_factory=dict)
+
+    def of(self, failure: Failure) -> tuple[str, Block]:
+        """Return the block of a failure mode, and where it is if it is not the project's own.
+
+        Of several, the one that calls for most: new before known, accepted and fixed.
+        """
+        key = failure.key
+        in_file = ModeKey(
+            key.scenario, "", key.conflict, key.conflict_type, key.responsible,
+            requirement=key.requirement,
+        )  # fmt: skip
+        for one in (replace(key, scenario=failure.searched or key.scenario), in_file, key.id):
+            if some := self.others.get(one, []):
+                return min(some, key=lambda pair: STATUSES.index(pair[1].status))
+        return "", self.own.get(key.id) or Block()
+
+
+def decisions_of(own: Mapping[str, Block], project: Project) -> Decisions:
+    """Return all decisions that concern a project.
+
+    Args:
+        own: the blocks of its folder, by id.
+        project: with the other files.
+    """
+    found = Decisions(own)
+    files = {**project.decisions, project.folder: FailureFile(project.folder / FILE, own)}
+    for folder, file in files.items():
+        place = place_of(str(folder / FILE), project.folder)
+        for id, block in file.failures.items():
+            keys: list[str | ModeKey] = [id] if folder != project.folder else []
+            for key in _keys(block, project) if block.files else keys:
+                found.others.setdefault(key, []).append((f"{place}: {id}", block))
+    for suite in project.suites:
+        for scenario, path in suite.files.items():
+            kept = files[path.parent].of_file(path.name) if path.parent in files else None
+            if kept is None:
+                continue
+            id, block = kept
+            place = place_of(str(path.parent / FILE), project.folder)
+            happens = ModeKey(scenario, "", block.conflict, block.type, block.responsible)
+            violated = [ModeKey(scenario, "", requirement=one.id) for one in block.violates]
+            for key in (happens, *violated):
+                found.others[key] = [(f"{place}: {id}", block)]
+    return found
+
+
+def _keys(block: Block, project: Project) -> Iterator[ModeKey]:
+    """Yield the keys of the failure modes of runs that a suite's block is about."""
+    scenario, driver = block.scenario, driver_of(block.driver, project.folder, "").name
+    if block.conflict:
+        yield ModeKey(
+            scenario, driver, block.conflict, block.type, block.responsible, block.partner,
+            block.place,
+        )  # fmt: skip
+    else:
+        for one in block.violates:
+            yield ModeKey(scenario, driver, requirement=one.id)
+
+
+# --- The modes, each with its block ---
+
+
 _RANK = {"regression": 0, "new": 1, "known": 2, "accepted": 3, "fixed": 4}
 
 
-def failure_modes(results: Sequence[Result], file: StatusFile) -> list[OpenMode]:
+def failure_modes(results: Sequence[Result], decisions: Decisions) -> list[OpenMode]:
     """Return all failure modes: those that fail now first, regressions and new ones ahead.
 
     Args:
         results: of the project.
-        file: with the status of each.
+        decisions: with the status of each.
     """
     now = {id(one) for one in current(results)}
     held: dict[ModeKey, list[tuple[Result, Failure]]] = {}
@@ -62,12 +153,14 @@ def failure_modes(results: Sequence[Result], file: StatusFile) -> list[OpenMode]
     for key, some in held.items():
         of_now = [pair for pair in some if id(pair[0]) in now]
         shown = of_now or some[-1:]
+        decided, block = decisions.of(some[-1][1])
         found.append(
             OpenMode(
                 key,
                 some[-1][1].title,
-                file.status(key.id),
-                file.note(key.id),
+                block.status,
+                block.comment,
+                decided,
                 bool(of_now),
                 sum(failure.count for _, failure in shown),
                 max(failure.severity for _, failure in shown),
@@ -84,15 +177,35 @@ def _order(one: OpenMode) -> tuple[bool, int, bool, float, int, ModeKey]:
     return not one.fails_now, rank, one.knife_edge, -one.severity, -one.count, one.key
 
 
-def decisions_of(modes: Sequence[OpenMode]) -> list[Decision]:
-    """Return the blocks of the status file for failure modes, each with its status."""
-    return [
-        Decision(one.key.id, one.status, one.key.scenario, one.key.driver, one.title)
+def undecided(modes: Sequence[OpenMode], own: Mapping[str, Block]) -> dict[str, Block]:
+    """Return blocks for the failure modes that no block is about, by id."""
+    return {
+        one.key.id: Block(
+            title=_clean(one.title),
+            scenario=_clean(one.key.scenario),
+            driver=_clean(one.key.driver),
+        )
         for one in modes
+        if not one.decided and one.key.id not in own
+    }
+
+
+def contradictions(modes: Sequence[OpenMode], own: Mapping[str, Block]) -> list[str]:
+    """Return a sentence on each decision of the project's folder that a suite's overrules."""
+    return [
+        f"{id} is {own[id].status} in {FILE} and {one.status} in {one.decided}, which counts: "
+        "remove the former"
+        for one in modes
+        if one.decided and (id := one.key.id) in own and own[id].status not in ("new", one.status)
     ]
 
 
-def unseen(modes: Sequence[OpenMode], file: StatusFile) -> list[Decision]:
-    """Return what the file decides about modes that no result of the project has."""
+def _clean(text: str) -> str:
+    """Return a text, which may come from a stranger's file, as a block takes it."""
+    return "".join(c if c.isprintable() else "\ufffd" for c in text[:MOST_TEXT])
+
+
+def unseen(modes: Sequence[OpenMode], own: Mapping[str, Block]) -> dict[str, Block]:
+    """Return the blocks of the project's folder about modes that none of its results has."""
     known = {one.key.id for one in modes}
-    return [one for name, one in file.decisions.items() if name not in known]
+    return {id: one for id, one in own.items() if id not in known and not one.files}

@@ -24,10 +24,10 @@ from bridgegen.jobs.dashboard.page_results import odd_part, problems_part, resul
 from bridgegen.jobs.dashboard.requirements import Cell, Matrix, statements
 from bridgegen.jobs.dashboard.results import versions
 from bridgegen.jobs.dashboard.sentences import failing_sentence, requirements_sentence
-from bridgegen.jobs.dashboard.status_file import Decision
 from bridgegen.jobs.dashboard.trends import Point, Series
 from bridgegen.pages.page import write_still_page
 from bridgegen.pages.sentences import NARROW, share
+from bridgegen.results.failures import FILE, Failure
 
 # --- The page's part on failure modes ---
 
@@ -46,12 +46,11 @@ def modes_part(found: Dashboard, base: str) -> str:
     now = list(found.failing)
     before = [one for one in found.modes if not one.fails_now]
     lead = (
-        "Each is counted once, whatever number of results has it. The status is that of "
-        f"{found.status_path.name}; what is not named there is new."
+        "Each is counted once, whatever number of results has it. The status is that of its block "
+        f"in {FILE}, of a suite that keeps it or of this folder; without a block it is new."
     )
-    parts = [_table("Failure modes of current results", now, base)]
-    if not now:
-        parts = ["<p>None.</p>"]
+    parts = [f"<p>{text(one)}</p>" for one in found.notes[:MOST_RESULTS]]
+    parts.append(_table("Failure modes of current results", now, base) if now else "<p>None.</p>")
     if before:
         summary = f"{counted(len(before), 'failure mode')} that no current result has"
         parts.append(folded(summary, _table(summary, before, base)))
@@ -62,16 +61,19 @@ def modes_part(found: Dashboard, base: str) -> str:
 
 
 def _table(name: str, modes: list[OpenMode], base: str) -> str:
-    rows = [_row(one, base) for one in modes[:MOST_MODES]]
-    more = len(modes) - len(rows)
-    after = f'<p class="muted">and {more:,} more</p>' if more else ""
-    return table(name, _HEADS, rows) + after
+    return _some(name, _HEADS, [_row(one, base) for one in modes[:MOST_MODES]], len(modes))
+
+
+def _some(name: str, heads: tuple[str, ...], rows: list[list[str]], total: int) -> str:
+    more = total - len(rows)
+    return table(name, heads, rows) + (f'<p class="muted">and {more:,} more</p>' if more else "")
 
 
 def _row(one: OpenMode, base: str) -> list[str]:
     word = "regression" if one.is_regression else one.status
     said = "fixed, but fails again" if one.is_regression else one.status
-    note = f"<small>{text(one.note)}</small>" if one.note else ""
+    note = f"<small>{text(one.comment)}</small>" if one.comment else ""
+    decided = f" ({text(one.decided)})" if one.decided else ""
     edge = "<small>knife-edge: small changes make it vanish</small>" if one.knife_edge else ""
     latest = one.results[0]
     links = ", ".join(
@@ -82,7 +84,7 @@ def _row(one: OpenMode, base: str) -> list[str]:
     links += f" and {more:,} more" if more > 0 else ""
     labels = f"<small>{text(joined(one.versions, 6))}</small>" if one.versions else ""
     return [
-        f'{text(one.title)}{edge}{note}<small class="id">{one.key.id}</small>',
+        f'{text(one.title)}{edge}{note}<small class="id">{one.key.id}{decided}</small>',
         f'<span class="status {word}">{text(said)}</span>',
         text(one.key.scenario),
         f"{text(one.key.driver)}{labels}",
@@ -92,22 +94,14 @@ def _row(one: OpenMode, base: str) -> list[str]:
     ]
 
 
-def _decisions(some: list[Decision]) -> str:
+def _decisions(some: dict[str, Failure]) -> str:
     rows = [
-        [text(one.title or one.id), text(one.status), text(one.scenario), text(one.driver),
-         text(one.note)]
-        for one in some[:MOST_MODES]
+        [text(one.title or id), text(one.status), text(one.scenario), text(one.driver),
+         text(one.comment)]
+        for id, one in [*some.items()][:MOST_MODES]
     ]  # fmt: skip
-    more = len(some) - len(rows)
-    after = f'<p class="muted">and {more:,} more</p>' if more else ""
-    return (
-        table(
-            "Failure modes in no result",
-            ("failure mode", "status", "scenario", "driver", "note"),
-            rows,
-        )
-        + after
-    )
+    heads = ("failure mode", "status", "scenario", "driver", "comment")
+    return _some("Failure modes in no result", heads, rows, len(some))
 
 
 # --- The page's part on requirements: a matrix for each driver ---

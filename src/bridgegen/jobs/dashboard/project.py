@@ -1,12 +1,12 @@
 """A project's folder → all that is found in it: runs, suites, maps, comparisons, and problems."""
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from bridgegen.base.errors import BridgeGenError, StorageError
 from bridgegen.jobs.compare.plan import FILE as COMPARISON_FILE
-from bridgegen.jobs.dashboard.results import Result
+from bridgegen.jobs.dashboard.results import Result, place_of
 from bridgegen.jobs.dashboard.results_of import (
     ComparisonLine,
     MapLine,
@@ -20,6 +20,8 @@ from bridgegen.jobs.dashboard.scenery import Sceneries, Scenery
 from bridgegen.jobs.preventability.result import SETTINGS as MAP_FILE
 from bridgegen.jobs.suite.entries import RESULTS as SUITE_FILE
 from bridgegen.jobs.view.overview import MOST_RUNS, find_folders
+from bridgegen.results.failures import FILE as FAILURES
+from bridgegen.results.failures import FailureFile, read_failures
 from bridgegen.results.store.run_file import FILE as RUN_FILE
 
 _FILES = (RUN_FILE, SUITE_FILE, MAP_FILE, COMPARISON_FILE)
@@ -50,6 +52,8 @@ class Project:
         comparisons: of algorithms; their runs are not among ``runs``.
         sceneries: what each scenario states, by the name that results have it under.
         problems: what cannot be read.
+        decisions: the files ``failures.yaml`` below the folder and beside the scenarios of suites,
+            by folder; not that of the folder itself.
     """
 
     folder: Path
@@ -59,6 +63,7 @@ class Project:
     comparisons: tuple[ComparisonLine, ...]
     sceneries: dict[str, Scenery]
     problems: tuple[Problem, ...]
+    decisions: Mapping[Path, FailureFile] = field(default_factory=dict)
 
     @property
     def results(self) -> tuple[Result, ...]:
@@ -79,13 +84,13 @@ def read_project(folder: Path, begun: Callable[[int, int], None] | None = None) 
     root = folder.resolve()
     if not root.is_dir():
         raise StorageError(f"{folder}: there is no such folder")
-    found = find_folders(root, lambda one: _kind(one) is not None)
+    reader = _Reader(root)
+    found = find_folders(root, reader.is_result)
     if not found:
         raise StorageError(
             f"{folder}: contains no run, suite, preventability map or comparison, nor does any "
             "folder below it"
         )
-    reader = _Reader(root)
     for number, one in enumerate(found):
         if begun is not None:
             begun(number, len(found))
@@ -114,6 +119,14 @@ class _Reader:
         self.maps: list[MapLine] = []
         self.comparisons: list[ComparisonLine] = []
         self.problems: list[Problem] = []
+        self.deciding: list[Path] = []
+
+    def is_result(self, folder: Path) -> bool:
+        """Return whether a folder holds results; note it if it holds decisions."""
+        file = folder / FAILURES
+        if file.is_file() and not file.is_symlink():
+            self.deciding.append(folder)
+        return _kind(folder) is not None
 
     def read(self, folder: Path) -> None:
         """Read a folder; what is wrong with it is a problem of the project."""
@@ -137,6 +150,7 @@ class _Reader:
 
     def project(self) -> Project:
         """Return all that was read."""
+        decisions = self._decisions()
         results = (*self.runs, *(one for suite in self.suites for one in suite.results))
         unread = sorted({one.scenario for one in results if one.seen is None and one.finished})
         problems = [*self.problems]
@@ -151,7 +165,19 @@ class _Reader:
             tuple(self.comparisons),
             self.sceneries.by_name(self.root),
             tuple(problems),
+            decisions,
         )
+
+    def _decisions(self) -> dict[Path, FailureFile]:
+        beside = [path.parent for one in self.suites for path in one.files.values()]
+        found = {}
+        for folder in sorted({*self.deciding, *beside} - {self.root}):
+            try:
+                found[folder] = read_failures(folder)
+            except BridgeGenError as error:
+                place = place_of(str(folder / FAILURES), self.root)
+                self.problems.append(Problem(place, self._short("; ".join(error.problems))))
+        return found
 
     def _short(self, text: str) -> str:
         """Return a message without the path of the project, cut where it is long."""

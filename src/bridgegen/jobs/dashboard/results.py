@@ -150,6 +150,7 @@ class Failure:
         count: of evaluations or variations.
         severity: the worst probability of MAIS3+.
         knife_edge: whether small changes of the parameters make it vanish.
+        searched: the scenario of a run as suites that grow call it; else "".
     """
 
     key: ModeKey
@@ -157,6 +158,7 @@ class Failure:
     count: int
     severity: float = 0.0
     knife_edge: bool = False
+    searched: str = ""
 
 
 @dataclass(frozen=True)

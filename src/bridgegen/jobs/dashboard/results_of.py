@@ -1,7 +1,7 @@
 """Folders of a project become results: runs, suites, and those that test no driver for failures."""
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, replace
 from math import isfinite
 from pathlib import Path
 from typing import Annotated, Any
@@ -34,6 +34,7 @@ from bridgegen.jobs.search.run import REPORT
 from bridgegen.jobs.search.settings import Settings
 from bridgegen.jobs.suite.difference import Difference, difference
 from bridgegen.jobs.suite.entries import RESULTS
+from bridgegen.jobs.suite.failing import searched_scenario
 from bridgegen.jobs.suite.page import FILE as PAGE
 from bridgegen.jobs.suite.results import EntryResult, RowResult
 from bridgegen.jobs.suite.suite import SuiteRun, read_suite
@@ -68,6 +69,10 @@ def read_run(project: Path, folder: Path, sceneries: Sceneries) -> Result:
     bound = line.triage.bound if line.triage else None
     judged = tuple(map(_judged, line.criteria))
     other = settings.worse_than
+    failures = (*_failures(line, scenario, driver), *violations(judged, scenario, driver.name))
+    searched = ""
+    if line.triage is not None:
+        searched = searched_scenario(line.triage.scenario, settings.road_map)
     return Result(
         "run" if other is None else "difference",
         line.path,
@@ -80,7 +85,7 @@ def read_run(project: Path, folder: Path, sceneries: Sceneries) -> Result:
         bound.failed if bound else 0,
         line.finished,
         bound.space if bound and other is None else None,
-        (*_failures(line, scenario, driver), *violations(judged, scenario, driver.name)),
+        tuple(replace(one, searched=searched) for one in failures),
         judged,
         seen[0],
         worse_than="" if other is None else driver_of(other, project, line.version).label,
@@ -166,6 +171,7 @@ class SuiteLine:
         results: of each entry and ego.
         difference: of its two drivers; None where it has another number of them.
         lost: entries that did not run, with the reason.
+        files: the scenario files that it runs without distributions, by what results call them.
     """
 
     source: str
@@ -175,6 +181,7 @@ class SuiteLine:
     results: tuple[Result, ...]
     difference: Difference | None
     lost: tuple[tuple[str, str], ...]
+    files: Mapping[str, Path] = field(default_factory=dict)
 
 
 def read_suite_line(project: Path, folder: Path, sceneries: Sceneries) -> SuiteLine:
@@ -197,7 +204,15 @@ def read_suite_line(project: Path, folder: Path, sceneries: Sceneries) -> SuiteL
         for one in suite.results
         if one.problem
     )
-    return SuiteLine(source, page, time, egos, results, _difference(project, suite, made), lost)
+    files = {
+        scenario_name(one.scenario, project): path.resolve()
+        for one in suite.results
+        if one.scenario.lower().endswith(".xosc") and not one.distribution
+        and (path := _path(project, one.scenario)).is_file()
+    }  # fmt: skip
+    return SuiteLine(
+        source, page, time, egos, results, _difference(project, suite, made), lost, files
+    )
 
 
 def _difference(project: Path, suite: SuiteRun, made: str) -> Difference | None:
@@ -292,15 +307,16 @@ def _title(row: RowResult) -> str:
 
 
 def _scenery(project: Path, one: EntryResult, sceneries: Sceneries) -> Scenery | None:
-    """Return the scenery of an entry; its file may be relative to the project's folder."""
-    paths = []
-    for text in (one.scenario, one.distribution):
-        path = next(
-            (base / text for base in (project, project.parent) if text and (base / text).is_file()),
-            None,
-        )
-        paths.append(str(path) if path else text)
-    return sceneries.of((paths[0], paths[1], "", False))
+    """Return the scenery of an entry."""
+    scenario = str(_path(project, one.scenario))
+    distribution = str(_path(project, one.distribution)) if one.distribution else ""
+    return sceneries.of((scenario, distribution, "", False))
+
+
+def _path(project: Path, text: str) -> Path:
+    """Return the path of a file, which may be relative to the project's folder or its parent."""
+    tried = (base / text for base in (project, project.parent))
+    return next((path for path in tried if path.is_file()), Path(text))
 
 
 def _seen_in_entry(one: EntryResult, scenery: Scenery | None) -> Seen | None:

@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import Any, Literal
 
 from bridgegen.base.errors import BridgeGenError, InputError
-from bridgegen.jobs.suite.index import Indexes
 from bridgegen.jobs.suite.rows import NO_MATRIX
 from bridgegen.openx.openscenario.kind import files_named_in, kind_of_file
+from bridgegen.results.failures import FailureFile, failure_of
 from bridgegen.scenario.language.plain_yaml import MAX_BYTES
 from bridgegen.scenario.language.reader import load, pack_names
 from bridgegen.scenario.language.reader import names as catalogue_names
@@ -38,7 +38,7 @@ class Entry:
         distribution: the file with its variations, or None.
         problem: why it cannot run; empty if nothing is known to be wrong.
         criteria: pass criteria that the index of its folder states for it, besides its own; see
-            `bridgegen.jobs.suite.index`.
+            `bridgegen.results.failures`.
         count: whose conflicts count as harm by that index; None leaves it to the scenario.
         is_failure: whether that index keeps it as a failure.
     """
@@ -117,18 +117,17 @@ def find_entries(given: Sequence[str | Path]) -> tuple[Entry, ...]:
         if one.distribution or not Path(one.scenario).is_file()
         or Path(one.scenario).resolve() not in varied
     ]  # fmt: skip
-    indexes = Indexes()
-    return _named([indexed(one, indexes) for one in kept])
+    read = dict[Path, FailureFile]()
+    return _named([indexed(one, read) for one in kept])
 
 
-def indexed(one: Entry, indexes: Indexes | None = None) -> Entry:
+def indexed(one: Entry, read: dict[Path, FailureFile] | None = None) -> Entry:
     """Return an entry with what the index of its folder states for it.
 
     Raises:
         FileFormatError: the index is damaged.
     """
-    indexes = indexes or Indexes()
-    found = indexes.failure_of(one.scenario, one.distribution)
+    found = failure_of(one.scenario, one.distribution, {} if read is None else read)
     if found is None:
         return one
     _, failure = found

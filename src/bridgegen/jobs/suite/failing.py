@@ -224,8 +224,7 @@ def _of_run(
             seed=settings.seed,
         )
 
-    on = f" on {Path(settings.road_map).stem}" if settings.road_map else ""
-    scenario = f"{run.triage.scenario}{on}"
+    scenario = searched_scenario(run.triage.scenario, settings.road_map)
     for mode in run.modes:
         found = _of_mode(folder, mode, failing, exported, only)
         if found is not None:
@@ -238,6 +237,11 @@ def _of_run(
         if violates or name == only:
             made = failing(name, f"evaluation {evaluation + 1}")
             yield replace(made, metrics=metrics)
+
+
+def searched_scenario(name: str, road_map: Path | str | None) -> str:
+    """Return what failures call the scenario of a run: its name, and the map if it is on one."""
+    return f"{name} on {Path(road_map).stem}" if road_map else name
 
 
 def _of_mode(

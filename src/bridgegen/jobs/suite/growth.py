@@ -27,8 +27,8 @@ from bridgegen.jobs.suite.failing import (
     seeking_causes,
     ways,
 )
-from bridgegen.jobs.suite.index import MOST_TEXT, Failure, Index, read_index, write_index
 from bridgegen.jobs.suite.replay import slug
+from bridgegen.results.failures import MOST_TEXT, Failure, read_failures, write_failures
 from bridgegen.results.store.run_file import FILE as RUN_FILE
 from bridgegen.scenario.language.criteria import CriterionSection
 from bridgegen.search.triage.modes import Key
@@ -98,7 +98,7 @@ def add_failures(
     """
     if held := [name for name in (RESULTS, RUN_FILE) if (to / name).exists()]:
         raise StorageError(f"{to}: holds results ({held[0]}); choose another folder with --to")
-    read_index(to)  # refuses a damaged one before anything is run
+    read_failures(to)  # refuses a damaged one before anything is run
     made = []
     for one in given:
         inside = Path(one).resolve()
@@ -120,7 +120,7 @@ def _add(found: Failing | NotFailing, to: Path, replace_worse: bool) -> Addition
         way = _way(job)
         key = _agreed(found, way)
         id = identity(found.scenario, key, way)
-        index = read_index(to) or Index({})
+        index = read_failures(to)
         before = index.failures.get(id)
         is_worse = before is not None and way.harm > before.harm
         if before is not None and not (is_worse and replace_worse):
@@ -134,7 +134,7 @@ def _add(found: Failing | NotFailing, to: Path, replace_worse: bool) -> Addition
             for name in {*before.files} - {*failure.files}:
                 _remove(to / name)
         try:
-            write_index(to, index, {**index.failures, id: failure})
+            write_failures(index, {id: failure})
         except BridgeGenError:
             for name in failure.files if before is None else ():
                 _remove(to / name)

@@ -3,10 +3,11 @@
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Literal, Self
 
-from bridgegen.jobs.suite.index import Failure, Indexes, Status
 from bridgegen.jobs.suite.results import EntryResult, RowResult
+from bridgegen.results.failures import Failure, FailureFile, Status, failure_of
 
 Standing = Literal["passed", "not run", "not judged", "new", "known", "accepted", "regression"]
 """Of a variation: known and accepted failures do not fail a suite; new ones do, and regressions:
@@ -32,11 +33,11 @@ class KnownFailures:
         Raises:
             FileFormatError: an index is damaged.
         """
-        indexes = Indexes()
+        read = dict[Path, FailureFile]()
         found = {
             one.entry: failure
             for one in results
-            if (failure := indexes.failure_of(one.scenario, one.distribution or None)) is not None
+            if (failure := failure_of(one.scenario, one.distribution or None, read)) is not None
         }
         return cls(found)
 

@@ -21,7 +21,7 @@ from bridgegen.recordings.events.of_scenarios import ScenarioEvents, Sought, bro
 from bridgegen.recordings.events.tables import broken_in_words
 from bridgegen.recordings.scenarios.ranges import Range, around
 from bridgegen.scenario.language.parameters import Parameter
-from bridgegen.scenario.language.plain_yaml import read_plain_yaml, replaced, scalars
+from bridgegen.scenario.language.plain_yaml import read_plain_yaml, replaced
 from bridgegen.scenario.language.reader import build
 
 ENDING = ".diff"
@@ -107,7 +107,7 @@ def _ends(
     sought: Sought, text: str, kept: Mapping[str, Float]
 ) -> tuple[dict[tuple[str | int, ...], str], dict[str, str], dict[tuple[str, str], float]]:
     """Return the new texts of ends of ranges, why there are not more, and the new values."""
-    found = scalars(text, str(sought.path))
+    found = read_plain_yaml(text.encode(), str(sought.path)).scalars
     wanted: dict[tuple[str, str], float] = {}
     refused: dict[str, str] = {}
     texts: dict[tuple[str | int, ...], str] = {}

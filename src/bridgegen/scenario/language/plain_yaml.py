@@ -8,7 +8,8 @@ are texts, ``1e-3`` is a number.
 import math
 import re
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import yaml
 
@@ -34,6 +35,20 @@ _SPECIAL: dict[str, float | bool | None] = {
 _LOADER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 
 
+class Scalar(NamedTuple):
+    """A value in a text.
+
+    Attributes:
+        start: its first character, quotes included; without a byte order mark before the text.
+        end: the one after its last.
+        text: it, without quotes.
+    """
+
+    start: int
+    end: int
+    text: str
+
+
 @dataclass(frozen=True)
 class Document:
     """A file's contents, with their lines.
@@ -42,11 +57,13 @@ class Document:
         data: mappings, lists, texts, numbers, truth values and ``None``.
         lines: the line of each entry, by its path from the root: ``("parameters", "ego_speed")``.
         place: the file, for messages.
+        scalars: where the values stand, by path.
     """
 
     data: object
     lines: dict[Path, int]
     place: str
+    scalars: Mapping[Path, Scalar] = field(default_factory=dict, repr=False)
 
     def at(self, path: Path) -> str:
         """Return file and line of an entry, or of the nearest one around it."""
@@ -87,7 +104,7 @@ def read_plain_yaml(data: bytes, place: str) -> Document:
         raise FileFormatError(*reader.problems, f"not YAML: {reason} ({where})") from None
     if reader.problems:
         raise FileFormatError(*reader.problems)
-    return Document(value, reader.lines, place)
+    return Document(value, reader.lines, place, reader.scalars)
 
 
 def entries(document: Document, key: str) -> list[tuple[str | int, object]]:
@@ -102,6 +119,7 @@ class _Reader:
     def __init__(self, place: str) -> None:
         self.place = place
         self.lines: dict[Path, int] = {}
+        self.scalars: dict[Path, Scalar] = {}
         self.problems: list[str] = []
 
     def document(self, events: Iterator[yaml.Event]) -> object:
@@ -133,6 +151,8 @@ class _Reader:
         if isinstance(event, yaml.MappingStartEvent):
             return self.mapping(events, path)
         assert isinstance(event, yaml.ScalarEvent)
+        if event.start_mark and event.end_mark:
+            self.scalars[path] = Scalar(event.start_mark.index, event.end_mark.index, event.value)
         return _scalar(event.value, quoted=bool(event.style))
 
     def check_plain(self, event: yaml.Event) -> None:
@@ -147,6 +167,7 @@ class _Reader:
         while not isinstance(event := next(events), yaml.MappingEndEvent):
             key = self.value(event, events, (*path, ""))
             del self.lines[(*path, "")]
+            self.scalars.pop((*path, ""), None)
             if not isinstance(key, str):
                 self.refuse(event, f"a key must be a text, got {key!r}")
                 key = str(key)
@@ -178,45 +199,8 @@ def _scalar(text: str, *, quoted: bool) -> object:
     return text
 
 
-# --- Values of a YAML text, replaced where they stand: comments and layout stay as they are ---
-
-
-@dataclass(frozen=True)
-class Scalar:
-    """A value in a text.
-
-    Attributes:
-        start: its first character, quotes included.
-        end: the one after its last.
-        text: it, without quotes.
-    """
-
-    start: int
-    end: int
-    text: str
-
-
-def scalars(text: str, place: str) -> dict[Path, Scalar]:
-    """Return the values of a YAML text, by their path from the root.
-
-    Args:
-        text: of a whole file.
-        place: the file, for messages.
-
-    Raises:
-        FileFormatError: no YAML, or more than plain YAML.
-    """
-    read_plain_yaml(text.encode(), place)
-    found: dict[Path, Scalar] = {}
-    events = yaml.parse(text, Loader=yaml.SafeLoader)
-    for event in events:
-        if isinstance(event, yaml.DocumentStartEvent):
-            _take(next(events), events, (), found)
-    return found
-
-
 def replaced(text: str, values: Mapping[Path, str], place: str) -> str:
-    """Return a text in which some values are others.
+    """Return a text in which some values are others; comments and layout stay as they are.
 
     Args:
         text: of a whole file.
@@ -225,29 +209,11 @@ def replaced(text: str, values: Mapping[Path, str], place: str) -> str:
 
     Raises:
         KeyError: no value stands there.
-        FileFormatError: see `scalars`.
+        FileFormatError: see `read_plain_yaml`.
     """
-    found = scalars(text, place)
+    found = read_plain_yaml(text.encode(), place).scalars
+    mark = len(text) - len(text.removeprefix("\ufeff"))
     for path in sorted(values, key=lambda one: -found[one].start):
         at = found[path]
-        text = text[: at.start] + values[path] + text[at.end :]
+        text = text[: mark + at.start] + values[path] + text[mark + at.end :]
     return text
-
-
-def _take(
-    event: yaml.Event, events: Iterator[yaml.Event], path: Path, found: dict[Path, Scalar]
-) -> None:
-    if isinstance(event, yaml.SequenceStartEvent):
-        number = 0
-        while not isinstance(event := next(events), yaml.SequenceEndEvent):
-            _take(event, events, (*path, number), found)
-            number += 1
-    elif isinstance(event, yaml.MappingStartEvent):
-        while not isinstance(event := next(events), yaml.MappingEndEvent):
-            assert isinstance(event, yaml.ScalarEvent)  # of plain YAML, keys are texts
-            _take(next(events), events, (*path, event.value), found)
-    elif isinstance(event, yaml.ScalarEvent):
-        start, end = event.start_mark, event.end_mark
-        assert start is not None
-        assert end is not None
-        found[path] = Scalar(start.index, end.index, event.value)
