@@ -32,7 +32,7 @@ def braking(reaction, n=80):
 def test_they_are_what_the_analysis_of_a_simulated_row_says(tmp_path):
     scenario = load("cut-in")
     pipeline = Pipeline(scenario, scenario.space(), PipelineOptions(ego="route-follower"))
-    X = pipeline.space.decode(np.random.default_rng(3).random((400, pipeline.space.n_var)))
+    X = pipeline.space.decode(np.random.default_rng(3).random((500, pipeline.space.n_var)))
     rollout = pipeline.rollout(X)
     known = analyse(rollout)
     row = int(np.flatnonzero(known.kind.max(axis=1) == NEAR_MISS)[0])
