@@ -51,6 +51,7 @@ class Runner:
         driver: the ego's driver.
         embedded: the embedded simulator with the storyboard.
         simulator: runs the storyboard; may be ``embedded``.
+        refused: why no row of this storyboard makes a scenario; "" if they do.
     """
 
     def __init__(
@@ -81,7 +82,7 @@ class Runner:
             raise InputError(f"{scenario.place}: to make stages of its driver ideal, name it (ego)")
         driver = egos.get(name, options.ideal, options.time_limit) if name else None
         self._given_driver, self._vehicle, self._choice = driver, options.vehicle, simulator
-        self._refused = ""
+        self.refused = ""
         self.source = _source(scenario, driver, road_map, space)
         nominal = self.concrete(space.row({}), road_map.path.name if road_map else "")
         self._take_storyboard(nominal)
@@ -165,7 +166,7 @@ class Runner:
         until_collision: bool,
     ) -> Rollout:
         """Roll out N rows of one storyboard."""
-        if self._refused:
+        if self.refused:
             return self._failed(X)
         networks, rows = roads or self.roads_of(X)
         columns, embedded = self.columns(X), self.embedded
@@ -185,7 +186,7 @@ class Runner:
         columns = {name: one for name, one in self.columns(X).items() if name not in fixed}
         batch = self.embedded.batch(*self.roads_of(X), columns)
         batch.start()
-        batch.fail(NO_SCENARIO, self._refused)
+        batch.fail(NO_SCENARIO, self.refused)
         return batch.rollout()
 
     def nominal_batch(self, fix: Counterfactual | None = None) -> "Batch":
@@ -202,7 +203,7 @@ class Runner:
         Yields:
             Their numbers in X, ascending; and the runner, this one where one serves every row.
         """
-        if self.scenario.checks and not self._refused:
+        if self.scenario.checks and not self.refused:
             wrong = np.zeros(len(X), np.bool_)
             for rule, rows in self.scenario.broken(self.columns(X)).items():
                 if (fresh := rows & ~wrong).any():
@@ -218,7 +219,7 @@ class Runner:
     def _refusing(self, rule: str) -> "Runner":
         """Return a runner in which every row fails, for it breaks a rule."""
         one = copy(self)
-        one._variants, one._refused = replace(self._variants, names=()), rule
+        one._variants, one.refused = replace(self._variants, names=()), rule
         return one
 
     def _by_key(self, X: Float) -> "Iterator[tuple[Int, Runner]]":
@@ -243,13 +244,8 @@ class Runner:
             one._roads = one._static_roads(nominal)
         except InputError as error:  # it is a result of these rows; the others go on
             one.embedded, one.simulator = self.embedded, self.simulator
-            one._refused = "; ".join(error.problems)
+            one.refused = "; ".join(error.problems)
         return one
-
-    @property
-    def refused(self) -> str:
-        """Why none of the rows of this storyboard makes a scenario; "" if they do."""
-        return self._refused
 
     @property
     def has_one_network(self) -> bool:

@@ -36,7 +36,7 @@ def claim(
         file: name of the file that holds them.
         what: the job, for messages: "map".
         pieces: name of the folder of its results, which is made.
-        kept: pattern of a result there; as long as there is none, settings may change.
+        kept: pattern of a result there; until there is one, settings may change.
         belongs: whether another name in the folder is one of the job's files, too.
         grows: whether a call may name more settings than before, or fewer: a grid's axes.
         defaults: of settings that did not exist when the folder may have been made.
