@@ -78,6 +78,15 @@ def test_what_does_not_count_is_named_with_its_reasons():
         "2 with implausible traffic (jump 2; 1 of them collisions), 1 without a result"
     )
     assert ALL_COUNT.sentence == ""
+    # Of the two excused collisions, a careful driver avoids the second.
+    found = NotCounted.of(findings, harm, ok, lambda rows: rows == 2)
+    assert (found.avoided, found.driven_again) == (1, 2)
+    collisions = "2 collisions (cut in 1, unsafe start 1; a careful driver avoids 1 of 2), 1 near"
+    assert collisions in found.sentence
+    assert text(besides=found).startswith(
+        "No failure found in 1000 evaluations, but a careful driver avoids 1 of 2 collisions not "
+        "counted: "
+    )
 
 
 def test_nothing_in_a_thousand_draws_bounds_the_share_by_0_37_per_cent():
@@ -96,11 +105,13 @@ def test_an_upper_bound_is_rounded_up():
     assert "at most 1.5 % of the space" in text(space=estimate("fresh", 0, 256))
 
 
-def test_failures_of_fresh_draws_are_said_where_the_search_found_none():
-    assert text(space=estimate("fresh", 6, 256), evaluations=30).startswith(
-        "No failure found in 30 evaluations, but in 6 of 256 fresh random draws: "
+def test_a_driver_that_fails_in_fresh_draws_alone_fails():
+    found = bounded(space=estimate("fresh", 6, 256), evaluations=30)
+    assert (found.verdict, found.failures, found.judged) == ("fails", 6, True)
+    assert found.sentence.startswith(
+        "reference fails in 6 of 256 fresh random draws, though in none of 30 evaluations: "
     )
-    assert "but in" not in text(space=estimate("fresh", 0, 256))
+    assert bounded(space=estimate("fresh", 0, 256)).verdict == "no failure found"
 
 
 @pytest.mark.parametrize(("harmful", "rows"), [(0, 40), (3, 256), (17, 17)])

@@ -1,6 +1,7 @@
 """The triage of real runs: what is recorded, exported, shown and judged."""
 
 import json
+import re
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -198,6 +199,46 @@ def test_a_driver_without_failures_leaves_an_empty_export_and_a_bound(tmp_path, 
     assert run.verdict == "no failure found"
     assert str(run.report) in out
     assert figures_of(run)["modes"] == 0
+
+
+def test_a_failure_among_fresh_draws_alone_is_one_and_is_exported(tmp_path, capsys):
+    from bridgegen.cli.terminal.search import print_summary
+
+    run = bg.run_search(
+        "bus-pulls-out", ego="reference", budget=300, seed=4, out=tmp_path / "run", causes=False
+    )
+    assert run.triage.bound.harmful == 0
+    assert run.verdict == "fails"
+    assert run.scenarios == run.modes == ()
+    assert len(run.fresh_scenarios) == run.triage.bound.space.harmful == run.triage.bound.failures
+    for path in run.fresh_scenarios:
+        facts = json.loads(path.with_suffix(".json").read_text("utf-8"))
+        assert facts["metrics"]["harm"]["value"] >= NEAR_MISS
+        found = bg.simulate_file(path)
+        assert found.metrics["harm"] == facts["metrics"]["harm"]["value"]
+    print_summary(run, 1.0)
+    out = capsys.readouterr().out
+    assert out.startswith("FAILS  reference in bus-pulls-out: in 1 of 256 fresh random draws")
+    assert str(run.fresh_scenarios[0]) in out
+    assert figures_of(run)["modes"] == 1
+
+
+def test_a_run_says_how_many_excused_collisions_a_careful_driver_avoids(tmp_path):
+    run = bg.run_search(
+        "cut-in", ego="un-r157", budget=100, seed=4, algorithm="random", out=tmp_path / "run"
+    )
+    said = re.search(r"careful driver avoids (\d+) of (\d+) coll", run.triage.bound.sentence)
+    avoided, again = map(int, said.groups())
+    frame = run.frame()
+    excused = frame[(frame["conflict"] == "contact") & frame["implausible"].isna()]
+    excused = excused[excused["harm"] < NEAR_MISS]
+    assert again == len(excused)
+    X = excused[list(bg.model("cut-in").columns)].to_numpy()
+    clean = np.zeros(len(X), bool)
+    for driver in ("careful", "careful-fsm"):
+        others = bg.model("cut-in", ego=driver).evaluate(X)
+        clean |= (others["conflict"] != "contact") & (others["harm"] < NEAR_MISS)
+    assert avoided == clean.sum() > 0
 
 
 def test_only_failures_are_exported_also_with_the_paper_s_rule(tmp_path, capsys):

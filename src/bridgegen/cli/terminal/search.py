@@ -175,9 +175,10 @@ def verdict_lines(run: "Run", seconds: float) -> list[str]:
     ]
     folder = run.folder
     lines.append(f"Report: {run.report} (-v prints all figures)")
-    if run.scenarios:
+    if run.scenarios or run.fresh_scenarios:
+        kept = folder if run.scenarios else run.fresh_scenarios[0]
         lines.append(
-            f"Keep: bridgegen suite add {folder} --to SUITE · compare drivers: bridgegen diff "
+            f"Keep: bridgegen suite add {kept} --to SUITE · compare drivers: bridgegen diff "
             f"SUITE --ego {settings.ego} --ego OTHER"
         )
     return lines
@@ -197,13 +198,18 @@ def conclusion(run: "Run") -> str:
         modes = len(found.modes) + found.unrecorded_modes
         ways = f"{modes} failure mode" + "s" * (modes != 1)
         return f"{word}  {name}: {ways} in {bound.harmful:,} of {bound.evaluations:,} evaluations"
-    if run.verdict == "fails":
-        violated = [one.criterion.id for one in run.criteria if one.violated]
+    if violated := [one.criterion.id for one in run.criteria if one.violated]:
         return f"{word}  {name}: violates {', '.join(violated)}"
+    if run.verdict == "fails":
+        drawn = f"{bound.space.harmful} of {bound.space.rows} fresh random draws"
+        none = f"in none of {bound.evaluations:,} evaluations"
+        return f"{word}  {name}: in {drawn}, though {none}"
     _, _, why = bound.sentence.rstrip(".").partition(": ")
     if run.verdict == NOT_JUDGED:
         return f"{word}  {name}: {why}"
-    return f"{word}  {name}: in {bound.evaluations:,} evaluations; {why.partition(';')[0]}"
+    _, _, but = bound.sentence.partition(": ")[0].partition(" evaluations")
+    nearest = why.partition(";")[0]
+    return f"{word}  {name}: in {bound.evaluations:,} evaluations{but}; {nearest}"
 
 
 def _mode_lines(found: "Triage") -> list[str]:
@@ -272,6 +278,8 @@ def _print_modes(found: "Triage") -> None:
 
 def _exported(run: "Run") -> str:
     n, minimal = len(run.scenarios), len(run.minimal_scenarios)
+    if run.fresh_scenarios:
+        return f"{len(run.fresh_scenarios)} in {run.folder / 'critical'}, of fresh random draws"
     if not (n or minimal or run.not_exported) and run.settings.keep:
         return f"none exported: {run.verdict}" if run.verdict != "fails" else "none exported"
     return f"{n} in {run.folder / 'critical'}" + (f", and {minimal} minimal" if minimal else "")

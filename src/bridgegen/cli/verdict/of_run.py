@@ -177,7 +177,7 @@ def _of_triage(run: Run) -> dict[str, float]:
         return dict.fromkeys(_TRIAGE, nan)
     space = found.bound.space
     return {
-        "modes": len(found.modes) + found.unrecorded_modes,
+        "modes": len(found.modes) + found.unrecorded_modes or min(found.bound.failures, 1),
         "robust": found.robust + found.unrecorded_modes if found.neighbours else nan,
         "worst_severity": max((one.severity for one in found.modes), default=0.0),
         "harmful.upper": space.high if space.drawn and space.rows else nan,

@@ -81,7 +81,7 @@ def read_run(project: Path, folder: Path, sceneries: Sceneries) -> Result:
         scenario,
         driver,
         line.evaluations,
-        bound.harmful if bound else 0,
+        bound.failures if bound else 0,
         bound.failed if bound else 0,
         line.finished,
         bound.space if bound and other is None else None,

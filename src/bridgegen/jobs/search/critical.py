@@ -3,6 +3,7 @@
 import json
 import shutil
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import asdict
 from pathlib import Path
 
@@ -16,7 +17,7 @@ from bridgegen.base.arrays import Bool, Float, Int
 from bridgegen.base.errors import OntologyError, StorageError
 from bridgegen.engine.pipeline import Pipeline
 from bridgegen.engine.replays import Replays
-from bridgegen.jobs.search.exported import FOLDER, NOT_EXPORTED, Exported, Refused
+from bridgegen.jobs.search.exported import FOLDER, FRESH, NOT_EXPORTED, Exported, Refused
 from bridgegen.jobs.search.scenario_files import write_scenario
 from bridgegen.results.store import Rows
 from bridgegen.search.algorithms.dominance import by_merit
@@ -48,12 +49,14 @@ def export_critical(
     folder: Path,
     progress: Callable[[int], None] | None = None,
     triage: Triage | None = None,
+    drawn: Float | None = None,
 ) -> tuple[Exported, ...]:
     """Write each row's ``.owl``, ``.xodr``, ``.xosc`` and ``.json`` into ``folder/critical``.
 
     The folder is replaced as a whole, once all of it is written. A scenario whose individuals break
     a rule is left out, and named in ``NOT_EXPORTED``; see `not_exported`. Minimal scenarios of the
-    failure modes are written beside them, as ``minimal-01.*`` and so on.
+    failure modes are written beside them, as ``minimal-01.*`` and so on, those of fresh random
+    draws as ``fresh-01.*``.
 
     Args:
         pipeline: evaluated the rows.
@@ -62,6 +65,7 @@ def export_critical(
         folder: the run's.
         progress: called with the number of rows written, after each.
         triage: the run's, if there is one.
+        drawn: ``(K, len(space.names))`` fresh random draws to export, too.
 
     Raises:
         StorageError: the folder cannot be written.
@@ -113,6 +117,10 @@ def export_critical(
                     problems = error.problems
                 if problems:
                     refused.append(Refused(mode.minimal.name, mode.worst, problems))
+        for k, x in enumerate(() if drawn is None else drawn):
+            with suppress(OntologyError):  # the verdict counts it all the same
+                name = f"{FRESH}{k + 1:02d}"
+                _write_alone(pipeline, x, None, fresh, name, {"drawn": "fresh"})
         shutil.rmtree(target, ignore_errors=True)
         fresh.rename(target)
         _write_refused(refused, folder / NOT_EXPORTED)
@@ -178,39 +186,54 @@ def _write_minimal(
     Raises:
         OntologyError: its individuals break a rule.
     """
-    X = np.array([minimal.x])
-    rollout = pipeline.runner.run(X, noise=np.array([minimal.noise_key], dtype=np.uint64))
+    facts = {
+        "mode": mode.number,
+        "title": mode.title,
+        "sentence": minimal.sentence,
+        "conditions": [one.model_dump() for one in minimal.conditions],
+        "inside": minimal.inside.model_dump(),
+        "noise_key": minimal.noise_key,
+        "robustness": minimal.robustness,
+    }
+    key = minimal.noise_key
+    return _write_alone(pipeline, np.array(minimal.x), key, folder, minimal.name, facts)
+
+
+def _write_alone(
+    pipeline: Pipeline,
+    x: Float,
+    noise_key: str | None,
+    folder: Path,
+    name: str,
+    facts: Mapping[str, object],
+) -> tuple[str, ...]:
+    """Write a row that is no evaluation, with facts of its own; see `_write_minimal`."""
+    X = x[np.newaxis]
+    noise = None if noise_key is None else np.array([noise_key], dtype=np.uint64)
+    rollout = pipeline.runner.run(X, noise=noise)
     conflict = summarise(analyse(rollout), 0, pipeline.objective.count)
     metrics = pipeline.measure(rollout)
     harm = float(metrics[0, pipeline.metrics.index(pipeline.objective.harm)])
     if not harm >= NEAR_MISS:
         return (f"it is not harmful as it is exported: harm {harm:.2g} of {NEAR_MISS:g}",)
     critical = pipeline.objective.critical(metrics, pipeline.metrics)
-    noise = minimal.noise_key if pipeline.driver.stages else None  # others have no noise
-    write_scenario(
-        pipeline, X[0], folder, minimal.name, rollout=rollout, noise=noise, conflict=conflict
-    )
-    facts = {
-        "name": minimal.name,
+    written = noise_key if pipeline.driver.stages else None  # others have no noise
+    write_scenario(pipeline, x, folder, name, rollout=rollout, noise=written, conflict=conflict)
+    every = {
+        "name": name,
         "scenario": pipeline.scenario.name,
         "ego": pipeline.driver.label,
-        "mode": mode.number,
-        "title": mode.title,
-        "sentence": minimal.sentence,
-        "conditions": [one.model_dump() for one in minimal.conditions],
-        "inside": minimal.inside.model_dump(),
+        **facts,
         "critical": bool(critical[0]),
-        "noise_key": minimal.noise_key,
-        "robustness": minimal.robustness,
         "conflict": None if conflict is None else conflict.to_dict(),
-        "parameters": _parameters(pipeline, X[0]),
+        "parameters": _parameters(pipeline, x),
         "metrics": _named(
             dict(zip(pipeline.metrics, metrics[0].tolist(), strict=True)),
             pipeline.units,
         ),
         "F": pipeline.objective.F(metrics, pipeline.metrics)[0][0].tolist(),
     }
-    (folder / f"{minimal.name}.json").write_text(_json(facts), encoding="utf-8")
+    (folder / f"{name}.json").write_text(_json(every), encoding="utf-8")
     return ()
 
 

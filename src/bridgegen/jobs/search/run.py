@@ -13,6 +13,7 @@ from bridgegen.assess.criteria import CriterionSummary, summarise_criteria
 from bridgegen.base.errors import StorageError
 from bridgegen.jobs.search.exported import (
     FOLDER,
+    FRESH,
     MINIMAL,
     Exported,
     Refused,
@@ -135,6 +136,11 @@ class Run:
         """The OpenSCENARIO files of minimal scenarios, in the order of the failure modes."""
         return tuple(sorted((self.folder / FOLDER).glob(f"{MINIMAL}*.xosc")))
 
+    @property
+    def fresh_scenarios(self) -> tuple[Path, ...]:
+        """Those of failures that only the fresh random draws have, the worst first."""
+        return tuple(sorted((self.folder / FOLDER).glob(f"{FRESH}*.xosc")))
+
     @cached_property
     def triage(self) -> Triage | None:
         """Its failure modes and the bound on the space; None before the run has finished.
@@ -164,7 +170,7 @@ class Run:
             return "fails"
         if self.triage is None or not self.triage.bound.judged:
             return NOT_JUDGED
-        return "fails" if self.triage.bound.harmful else "no failure found"
+        return "fails" if self.triage.bound.failures else "no failure found"
 
     @property
     def modes(self) -> tuple[Mode, ...]:

@@ -82,7 +82,7 @@ def _facts(number: int, line: RunLine) -> Mapping[str, Any]:
         "worst": worst.title if worst else "",
         "judged": headline(line.ego, line.criteria),
         "violated": any(one.violated for one in line.criteria),
-        "failures": bound.harmful if bound else None,
+        "failures": bound.failures if bound else None,
         "unjudged": bound is None or not bound.judged,
         "share": bound.space.share if bound else None,
         "low": bound.space.low if bound else None,
@@ -119,7 +119,7 @@ def _pair(*runs: tuple[int, RunLine]) -> Iterator[str]:
 def _failures(line: RunLine) -> str:
     if line.triage is None:
         return "–"
-    return f"{line.triage.bound.harmful:,}" if line.triage.bound.judged else "not judged"
+    return f"{line.triage.bound.failures:,}" if line.triage.bound.judged else "not judged"
 
 
 def _is_judged(line: RunLine) -> bool:

@@ -1,7 +1,7 @@
 """Bounds of a run for the whole space: its least margins, and the harmful share."""
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from decimal import ROUND_CEILING, Context, Decimal
 from typing import Self
@@ -18,6 +18,9 @@ from bridgegen.base.arrays import Bool, Float, Int, Numbers
 from bridgegen.base.statistics import clopper_pearson
 from bridgegen.search.regions.box import percent
 from bridgegen.search.triage.record import NOT_JUDGED, Bound, Drawn, Estimate, Least, Verdict
+
+Avoids = Callable[[Int], Bool]
+"""Says of rows ``(K,)`` whether a careful driver has no collision in them, ``(J,)``, J <= K."""
 
 UNBIASED = ("random", "sobol")
 """The algorithms whose rows do not depend on results."""
@@ -98,28 +101,50 @@ class NotCounted:
         implausible: by reason the number of rows whose traffic could not happen.
         collisions: rows of implausible traffic in which the ego collides.
         failed: rows without a result.
+        avoided: of the excused collisions that a careful driver drove again, how many it avoided.
+        driven_again: the number of these.
     """
 
     conflicts: Mapping[tuple[str, str], int]
     implausible: Mapping[str, int]
     collisions: int
     failed: int
+    avoided: int = 0
+    driven_again: int = 0
 
     @classmethod
-    def of(cls, findings: Findings, harm: Float, ok: Bool) -> Self:
-        """Return what N rows hold, by their findings, harm and whether they have a result."""
+    def of(cls, findings: Findings, harm: Float, ok: Bool, avoids: Avoids | None = None) -> Self:
+        """Return what N rows hold.
+
+        Args:
+            findings: of the rows.
+            harm: ``(N,)``.
+            ok: ``(N,)`` bool, which have a result.
+            avoids: says of some rows, by their positions, whether a careful driver has no
+                collision in them; None: it is not known.
+        """
         contact, odd = findings.conflict == CONTACT, ok & (findings.implausible != "")
         excused = ok & is_excused(findings, harm)
         pairs = zip(findings.conflict[excused], findings.rule[excused], strict=True)
+        again = avoids(np.flatnonzero(excused & contact)) if avoids else np.zeros(0, np.bool_)
         return cls(
             Counter(pairs), Counter(findings.implausible[odd].tolist()),
-            int((odd & contact).sum()), int((~ok).sum()),
+            int((odd & contact).sum()), int((~ok).sum()), int(again.sum()), len(again),
         )  # fmt: skip
 
     @property
     def unsafe(self) -> int:
         """Rows in which there was no time to act from the start on: nothing can be said of them."""
         return sum(n for (_, rule), n in self.conflicts.items() if rule == Rule.UNSAFE_START.label)
+
+    @property
+    def by_foresight(self) -> str:
+        """Of excused collisions, that another driver avoids them, in words.
+
+        Rules of responsibility ask what braking can do once the danger is there; a careful driver
+        also slows down before.
+        """
+        return f"a careful driver avoids {self.avoided} of {self.driven_again}"
 
     @property
     def sentence(self) -> str:
@@ -129,7 +154,8 @@ class NotCounted:
             rules = {rule: n for (what, rule), n in self.conflicts.items() if what == kind}
             if rules:
                 total = sum(rules.values())
-                parts.append(f"{total} {one if total == 1 else many} ({_listed(rules)})")
+                also = f"; {self.by_foresight}" if kind == CONTACT and self.avoided else ""
+                parts.append(f"{total} {one if total == 1 else many} ({_listed(rules)}{also})")
         if self.implausible:
             total = sum(self.implausible.values())
             also = f"; {self.collisions} of them collisions" if self.collisions else ""
@@ -200,16 +226,20 @@ def bound(
             f"{fails} in {modes} way{'s' * (modes != 1)}: {harmful} of {evaluations} "
             f"evaluations; {_of_the_space(space, such)}."
         )
+    elif space.drawn == "fresh" and space.harmful:
+        verdict = "fails"
+        text = (
+            f"{fails} in {space.harmful} of {space.rows} fresh random draws, though in none of "
+            f"{evaluations} evaluations: {_margin(least)}; {_of_the_space(space, such)}."
+        )
     elif evaluations == failed:
         verdict, text = NOT_JUDGED, f"Not judged: no evaluation of {ego} has a result."
     elif why := _unjudged(evaluations, besides, happening):
         verdict, text = NOT_JUDGED, f"Not judged: {why}."
     else:
-        fresh = ""
-        if space.drawn == "fresh" and space.harmful:
-            fresh = f", but in {space.harmful} of {space.rows} fresh random draws"
+        but = f", but {besides.by_foresight} collisions not counted" if besides.avoided else ""
         text = (
-            f"{none} in {evaluations} evaluations{fresh}: {_margin(least)}; "
+            f"{none} in {evaluations} evaluations{but}: {_margin(least)}; "
             f"{_of_the_space(space, such)}."
         )
     return Bound(

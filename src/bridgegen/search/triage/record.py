@@ -380,6 +380,11 @@ class Bound(_Model):
         return f"{self.sentence} N{self.not_counted[1:]}." if self.not_counted else self.sentence
 
     @property
+    def failures(self) -> int:
+        """Harmful evaluations; if there are none, harmful ones of the fresh random draws."""
+        return self.harmful or (self.space.harmful if self.space.drawn == "fresh" else 0)
+
+    @property
     def judged(self) -> bool:
         """Whether the run supports a statement on its driver."""
         known = self.evaluations - self.failed - self.implausible

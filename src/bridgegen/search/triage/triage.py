@@ -13,11 +13,18 @@ from bridgegen.assess.conflict.happening import Happening
 from bridgegen.assess.conflict.harm import NEAR_MISS
 from bridgegen.assess.conflict.quantities import HARM
 from bridgegen.assess.criteria import OF_BASELINE
-from bridgegen.base.arrays import Bool, Float, Numbers
+from bridgegen.base.arrays import Bool, Float, Int, Numbers
 from bridgegen.engine.pipeline import Pipeline
 from bridgegen.engine.trials import EVENT
 from bridgegen.results.store import Recorded, Rows
-from bridgegen.search.triage.bound import UNBIASED, NotCounted, bound, estimate, least_margins
+from bridgegen.search.triage.bound import (
+    CONTACT,
+    UNBIASED,
+    NotCounted,
+    bound,
+    estimate,
+    least_margins,
+)
 from bridgegen.search.triage.effort import FULL, Effort
 from bridgegen.search.triage.influence import influences
 from bridgegen.search.triage.judgement import judgement
@@ -58,10 +65,13 @@ class Triaged:
     Attributes:
         record: the findings, without names of files.
         exports: positions of the rows to export, best first.
+        fresh: ``(K, len(space.names))`` harmful ones of the fresh random draws, the worst first,
+            where no row is harmful.
     """
 
     record: Triage
     exports: tuple[int, ...]
+    fresh: Float
 
 
 def triage(
@@ -148,6 +158,7 @@ class _Triage:
         self._unrecorded = 0
         self._preventable: dict[int, bool | None] = {}
         self._event: Float = np.zeros((0, len(EVENT)))
+        self._fresh: Float = np.zeros((0, len(self._space.names)))
 
     def run(self) -> Triaged:
         """Run the stages."""
@@ -174,7 +185,7 @@ class _Triage:
         groups, shown = [groups[k] for k in order], [shown[k] for k in order]
         minimal = self._minimal(groups, shown) if tests else [None] * len(groups)
         record = self._record(groups, shown, exports, tested, sample, minimal)
-        return Triaged(record, tuple(self._at[exports].tolist()))
+        return Triaged(record, tuple(self._at[exports].tolist()), self._fresh)
 
     # Stages; positions are those among the harmful rows.
 
@@ -318,7 +329,11 @@ class _Triage:
             return estimate("", 0, 0), [estimate("", 0, 0) for _ in groups], None
         random = np.random.Generator(np.random.PCG64([self._seed, _FRESH]))
         U = random.random((n, self._space.n_var))
-        results = self._pipeline.try_all(self._space.decode(U) + 0.0)
+        X = self._space.decode(U) + 0.0
+        results = self._pipeline.try_all(X)
+        if not len(self._at):
+            worst = np.argsort(-results.harm, kind="stable")
+            self._fresh = X[worst[results.harmful[worst]][: self._keep]]
         kinds = self._pipeline.runner.kinds
         keys = keys_of(results.findings, kinds, results.place.tolist(), [""] * n)
         mode = [0] * n
@@ -385,7 +400,10 @@ class _Triage:
             neighbours=NEIGHBOURS if self._tests else 0, radius=RADIUS, sampled=len(sample),
             bound=bound(
                 evaluations=len(ok),
-                besides=NotCounted.of(rows.findings.take(slice(None)), self._harm, ok),
+                besides=NotCounted.of(
+                    rows.findings.take(slice(None)), self._harm, ok,
+                    self._avoids if self._tests else None,
+                ),
                 happening=Happening.of(rows.findings.happened, self._domain),
                 harmful=len(self._at), space=space,
                 least=least_margins(
@@ -400,6 +418,17 @@ class _Triage:
             ),
             untested=untested, fresh=fresh,
         )  # fmt: skip
+
+    def _avoids(self, at: Int) -> Bool:
+        """Return in which of the first of some rows a careful driver has no collision."""
+        X = self._rows.X[at[: self._effort.placed]]
+        fixes = enumerate(self._pipeline.runner.fixes)
+        careful = [number for number, fix in fixes if fix.cause == Cause.PLANNING]
+        avoided = np.zeros(len(X), np.bool_)
+        for number in careful:
+            found = self._pipeline.try_all(X, fix=np.full(len(X), number))
+            avoided |= found.ok & ~found.harmful & (found.findings.conflict != CONTACT)
+        return avoided if careful else avoided[:0]
 
     def _judge(self, at: Sequence[int]) -> None:
         """Put the judgement of some rows on record, for which each is simulated once more."""
