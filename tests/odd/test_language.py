@@ -160,6 +160,22 @@ JUNK = st.sampled_from(
 )  # fmt: skip
 
 
+def test_a_route_on_a_leg_that_does_not_exist_is_reported_by_its_ends_alone(tmp_path):
+    scenario = yaml.safe_load(
+        resources.files("bridgegen.scenario.catalogue")
+        .joinpath("pedestrian-at-night.yaml")
+        .read_text("utf-8")
+    )
+    for end in ("start", "end"):
+        scenario = changed(scenario, ("participants", "ego", end, "leg"), "x")
+    file = tmp_path / "spoilt.yaml"
+    file.write_text(yaml.safe_dump(scenario), "utf-8")
+    with pytest.raises(InputError) as refused:
+        load(file)
+    assert len(refused.value.problems) == 2
+    assert all("a place lies on one of the legs" in one for one in refused.value.problems)
+
+
 @settings(max_examples=150, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(name=st.sampled_from(names()), data=st.data())
 def test_nonsense_anywhere_is_refused_or_taken_never_a_traceback(tmp_path, name, data):

@@ -292,6 +292,8 @@ class Storyboard:
         given: ParticipantSection,
         path: Path,
     ) -> None:
+        if not {start.leg, end.leg} <= {*self._roads.leg_names}:
+            return  # reported where the place was read
         by_points = given.start is not None and given.start.point is not None
         if self._roads.template == "road":
             if (start.leg, start.way, start.lane) != (end.leg, end.way, end.lane):
