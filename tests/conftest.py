@@ -27,9 +27,12 @@ LONGEST = (
 )  # fmt: skip
 """Files that take some ten seconds of processor time or more: processes take them first."""
 
+EXAMPLES = 60
+"""Examples that a property test draws, unless it states another number."""
+
 # No deadline: the first example may compile a kernel, and shared machines stall. The same examples
 # each time: whether a test passes is no matter of luck. BRIDGEGEN_EXPLORE=N draws N new ones.
-settings.register_profile("same", deadline=None, max_examples=60, derandomize=True)
+settings.register_profile("same", deadline=None, max_examples=EXAMPLES, derandomize=True)
 if explored := os.environ.get("BRIDGEGEN_EXPLORE"):
     settings.register_profile("explore", deadline=None, max_examples=int(explored))
 settings.load_profile("explore" if explored else "same")
@@ -56,6 +59,17 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """
     if "PYTEST_XDIST_WORKER" in os.environ:
         sort_by_file(items)
+    if explored:
+        explore(items, int(explored) / EXAMPLES)
+
+
+def explore(items: list[pytest.Item], factor: float) -> None:
+    """Let tests that state how many examples they draw, the slow ones, draw ``factor`` as many."""
+    drawn = "_hypothesis_internal_use_settings"
+    for test in {getattr(item, "obj", None) for item in items}:
+        own = getattr(test, drawn, None)
+        if own is not None and own.max_examples != int(os.environ["BRIDGEGEN_EXPLORE"]):
+            setattr(test, drawn, settings(own, max_examples=int(factor * own.max_examples) or 1))
 
 
 def sort_by_file(items: list[Any]) -> None:
