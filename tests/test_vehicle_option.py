@@ -9,7 +9,8 @@ from tests.campaign.braking import scenario_text, write_pair
 import bridgegen as bg
 from bridgegen.engine.options import PipelineOptions
 from bridgegen.engine.pipeline import Pipeline
-from bridgegen.jobs.preventability import CellClass, map_preventability
+from bridgegen.jobs.preventability.classes import CellClass
+from bridgegen.jobs.preventability.preventability import map_preventability
 from bridgegen.jobs.search.scenario_files import write_scenario
 from bridgegen.jobs.suite.suite import FILE, read_suite
 from bridgegen.scenario.language.reader import load

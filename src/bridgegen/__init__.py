@@ -12,7 +12,8 @@ if TYPE_CHECKING:
     from bridgegen.engine.simulate import simulate_file
     from bridgegen.jobs.compare import Comparison, compare
     from bridgegen.jobs.dashboard import Dashboard, build_dashboard
-    from bridgegen.jobs.preventability import PreventabilityMap, map_preventability
+    from bridgegen.jobs.preventability.preventability import map_preventability
+    from bridgegen.jobs.preventability.result import PreventabilityMap
     from bridgegen.jobs.risk.result import Risk
     from bridgegen.jobs.risk.risk import estimate_risk
     from bridgegen.jobs.safety_case import SafetyCase, export_safety_case
@@ -68,8 +69,8 @@ _HOMES = {
     "fit_exposure": "bridgegen.scenario.exposure.fit",
     "read_exposure": "bridgegen.scenario.exposure",
     "load": "bridgegen.scenario.language.reader",
-    "map_preventability": "bridgegen.jobs.preventability",
-    "PreventabilityMap": "bridgegen.jobs.preventability",
+    "map_preventability": "bridgegen.jobs.preventability.preventability",
+    "PreventabilityMap": "bridgegen.jobs.preventability.result",
     "Risk": "bridgegen.jobs.risk.result",
     "estimate_risk": "bridgegen.jobs.risk.risk",
     "resume": "bridgegen.jobs.search",

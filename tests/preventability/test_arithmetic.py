@@ -5,8 +5,9 @@ import pytest
 
 from bridgegen.base.errors import InputError
 from bridgegen.drivers.preventable import avoids_cut_in, avoids_deceleration
-from bridgegen.jobs.preventability import CellClass, map_preventability
 from bridgegen.jobs.preventability.arithmetic import NAMES
+from bridgegen.jobs.preventability.classes import CellClass
+from bridgegen.jobs.preventability.preventability import map_preventability
 
 
 def test_a_computed_cut_in_is_the_regulation_s(tmp_path):

@@ -9,10 +9,12 @@ import pytest
 from bridgegen.base.errors import InputError, Interrupted, StorageError, UnknownNameError
 from bridgegen.cli import main
 from bridgegen.drivers.preventable import avoids_cut_in
-from bridgegen.jobs.preventability import CellClass, GridAxis, map_preventability
+from bridgegen.jobs.frame import JobCallbacks
 from bridgegen.jobs.preventability import preventability as module
 from bridgegen.jobs.preventability import result as chunks
-from bridgegen.jobs.preventability.preventability import MapCallbacks
+from bridgegen.jobs.preventability.classes import CellClass
+from bridgegen.jobs.preventability.grid import GridAxis
+from bridgegen.jobs.preventability.preventability import map_preventability
 
 GRID = ["gap=1:61:13", "relative_speed=10 km/h:50 km/h:5", "lateral_speed=0.6:1.8:3"]
 HALT = """
@@ -122,7 +124,7 @@ def test_a_stopped_map_is_resumed_and_ends_the_same(whole, tmp_path, monkeypatch
     monkeypatch.setattr(chunks, "CHUNK", 50)
     out, made = tmp_path / "stopped", []
 
-    def stop(done: int, total: int) -> None:
+    def stop(what: str, done: int, total: int) -> None:
         if done >= 100:
             raise KeyboardInterrupt
 
@@ -130,7 +132,7 @@ def test_a_stopped_map_is_resumed_and_ends_the_same(whole, tmp_path, monkeypatch
         Interrupted, match=r"stopped after 100 of 195 cells; resume with 'bridgegen prev"
     ):
         map_preventability(
-            "r157/cut-in", whole.drivers, grid=GRID, out=out, callbacks=MapCallbacks(cells=stop)
+            "r157/cut-in", whole.drivers, grid=GRID, out=out, callbacks=JobCallbacks(progress=stop)
         )
     kept = sorted((out / "chunks").iterdir())
     assert [one.name for one in kept] == ["000000.npy", "000001.npy"]

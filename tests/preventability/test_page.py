@@ -7,8 +7,10 @@ import re
 import numpy as np
 from PIL import Image
 
-from bridgegen.jobs.preventability import CellClass, GridAxis, map_preventability
+from bridgegen.jobs.preventability.classes import CellClass
+from bridgegen.jobs.preventability.grid import GridAxis
 from bridgegen.jobs.preventability.page import COLOURS, png
+from bridgegen.jobs.preventability.preventability import map_preventability
 
 
 def test_a_pixel_has_the_colour_of_its_cell_s_class():

@@ -12,12 +12,13 @@ from tests.campaign.biased import biased_kind, not_finite
 
 from bridgegen.base.errors import InputError, Interrupted
 from bridgegen.base.statistics import clopper_pearson
+from bridgegen.jobs.frame import JobCallbacks
 from bridgegen.jobs.risk import elsewhere
 from bridgegen.jobs.risk.elsewhere import Group, compare, look_elsewhere, share_of
 from bridgegen.jobs.risk.estimators import subset
 from bridgegen.jobs.risk.estimators.problem import Aim
 from bridgegen.jobs.risk.outcomes import Column
-from bridgegen.jobs.risk.risk import RiskCallbacks, estimate_risk
+from bridgegen.jobs.risk.risk import estimate_risk
 from bridgegen.simulation import choice
 
 SCENARIO, DRIVER = "paper/crossroads-s1", "route-follower"
@@ -163,16 +164,18 @@ def counted_faster(found):
 
 
 def test_stopped_there_and_gone_on_it_is_the_same(simulators, tmp_path):
-    def stop(done, total):
-        if done >= 40:
+    def stop(what, done, total):
+        if what == "elsewhere" and done >= 40:
             raise KeyboardInterrupt
 
     given = {"simulator": "faster", "simulator_rows": 100}
     whole = risk(tmp_path / "whole", **given)
     with pytest.raises(Interrupted):
-        risk(tmp_path / "two", callbacks=RiskCallbacks(elsewhere=stop), **given)
+        risk(tmp_path / "two", callbacks=JobCallbacks(progress=stop), **given)
     made = []
-    callbacks = RiskCallbacks(elsewhere=lambda done, total: made.append(done))
+    callbacks = JobCallbacks(
+        progress=lambda what, done, total: made.append(done) if what == "elsewhere" else None
+    )
     again = risk(tmp_path / "two", callbacks=callbacks, **given)
     assert again.elsewhere == whole.elsewhere
     without = risk(tmp_path / "whole")

@@ -13,10 +13,11 @@ from bridgegen.assess.conflict.harm import NEAR_MISS
 from bridgegen.base.errors import InputError, StorageError
 from bridgegen.engine.options import PipelineOptions
 from bridgegen.engine.pipeline import Pipeline
+from bridgegen.jobs.frame import JobCallbacks
 from bridgegen.jobs.risk.experiment import Experiment
 from bridgegen.jobs.risk.ledger import BATCHES
 from bridgegen.jobs.risk.outcomes import Column, outcomes
-from bridgegen.jobs.risk.risk import RiskCallbacks, estimate_risk
+from bridgegen.jobs.risk.risk import estimate_risk
 from bridgegen.jobs.risk.text import number
 
 SCENARIO, DRIVER = "crossroads-s1", "route-follower"
@@ -123,7 +124,7 @@ def test_the_page_says_it_without_scripts(risk):
 
 @pytest.mark.parametrize("at", [1, 700])
 def test_stopped_and_gone_on_it_is_the_same(risk, tmp_path, at):
-    def stop(done, total):
+    def stop(what, done, total):
         if done >= at:
             raise KeyboardInterrupt
 
@@ -131,7 +132,7 @@ def test_stopped_and_gone_on_it_is_the_same(risk, tmp_path, at):
     given = GIVEN | {"budget": 4000, "method": "subset"}
     whole = estimate_risk(SCENARIO, out=tmp_path / "whole", **given)
     with pytest.raises(bg.errors.Interrupted, match=r"resume with 'bridgegen risk crossroads-s1"):
-        estimate_risk(SCENARIO, out=folder, callbacks=RiskCallbacks(evaluations=stop), **given)
+        estimate_risk(SCENARIO, out=folder, callbacks=JobCallbacks(progress=stop), **given)
     estimate_risk(SCENARIO, out=folder, **given)
     assert said(folder) == said(whole.folder)
     assert files(folder)["harmful.csv"] == files(whole.folder)["harmful.csv"]
@@ -225,7 +226,7 @@ def test_a_search_s_run_helps_and_counting_agrees(tmp_path):
         ({"exposure": "uniform", "count": "all"}, "unknown count 'all'"),
         ({"exposure": "uniform", "ego": "nobody"}, "unknown ego driver 'nobody'"),
         ({"exposure": "uniform", "budget": 3}, "--budget must be 20 to"),
-        ({"exposure": "uniform", "precision": 1.0}, "--precision must be at least 0 and below 1"),
+        ({"exposure": "uniform", "precision": 1.0}, "--precision must be 0 to 0.999"),
         ({"exposure": "uniform", "seed": -1}, "--seed must be at least 0"),
         ({"exposure": "uniform", "check": -1}, "--check must be 0 to"),
     ],

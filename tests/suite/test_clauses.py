@@ -6,7 +6,8 @@ from xml.etree import ElementTree
 import pytest
 
 from bridgegen.cli.verdict.of_suite import SuiteCriteria, figures_of
-from bridgegen.jobs.preventability import CellClass, map_preventability
+from bridgegen.jobs.preventability.classes import CellClass
+from bridgegen.jobs.preventability.preventability import map_preventability
 from bridgegen.jobs.suite.clauses import clause_results
 from bridgegen.jobs.suite.page import write_suite_page
 from bridgegen.jobs.suite.results import EntryResult, RowResult

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from bridgegen.cli import main
-from bridgegen.jobs.preventability import CellClass, preventability
+from bridgegen.jobs.preventability import preventability
+from bridgegen.jobs.preventability.classes import CellClass
 from bridgegen.jobs.preventability.grid import DEFAULT_GRIDS, Grid, coarse_axes
 from bridgegen.jobs.suite import maps as module
 from bridgegen.jobs.suite.maps import map_suite

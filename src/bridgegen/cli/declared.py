@@ -9,6 +9,7 @@ from typing import Annotated, Any
 
 import typer
 
+from bridgegen.base.errors import InputError
 from bridgegen.cli.completion import completing
 from bridgegen.engine.options import Option, PipelineOptions, SearchOptions, options_of
 
@@ -49,7 +50,10 @@ def expand(
 
 
 def with_declared_options(command: Callable[..., None]) -> Callable[..., None]:
-    """Give a command the options of the class that its parameter ``options`` is annotated with."""
+    """Give a command the options of the class that its parameter ``options`` is annotated with.
+
+    Those that are named by their place are its arguments.
+    """
     return with_options(*_names(command))(command)
 
 
@@ -73,6 +77,9 @@ def _with(command: Callable[..., None], names: Collection[str]) -> Callable[...,
 
     def fold(values: dict[str, Any]) -> PipelineOptions:
         given = {name: value for name, value in values.items() if value is not None}
+        needed = {name: one.spelling for name, one in declared.items() if one.is_required}
+        if missing := [needed[name] for name in needed if name not in given]:
+            raise InputError(f"missing: {', '.join(missing)}")
         return kind(**{n: declared[n].form.read(v, declared[n].spelling) for n, v in given.items()})
 
     made = {name: (_annotation(one), _default(one)) for name, one in declared.items()}
@@ -87,15 +94,18 @@ def declaration(name: str, *, shown: str | None = None) -> Any:
         shown: the command's default in words, where it is not the search's.
     """
     (one,) = (one for one in options_of(SearchOptions) if one.name == name)
-    return _declaration(one if shown is None else replace(one, shown=shown))
+    return declare(one if shown is None else replace(one, shown=shown))
 
 
 def _annotation(one: Option) -> Any:
     kind = one.form.kind
-    return Annotated[kind if kind is bool else kind | None, _declaration(one)]
+    if one.is_argument:
+        return Annotated[kind, typer.Argument(help=one.help, autocompletion=completing(one.names))]
+    return Annotated[kind if kind is bool else kind | None, declare(one)]
 
 
-def _declaration(one: Option) -> Any:
+def declare(one: Option) -> Any:
+    """Return the typer declaration of an option."""
     spelling = one.spelling
     if one.form.kind is bool:
         spelling = f"{spelling}/--no-{spelling.removeprefix('--')}"
@@ -103,7 +113,7 @@ def _declaration(one: Option) -> Any:
     return typer.Option(
         *filter(None, (spelling, one.also)),
         help=text,
-        show_default=one.shown or True,
+        show_default="required" if one.is_required else one.shown or True,
         rich_help_panel=one.group,
         autocompletion=completing(one.names),
     )
@@ -111,4 +121,6 @@ def _declaration(one: Option) -> Any:
 
 def _default(one: Option) -> Any:
     """Return the parser's default; None where only the options' class knows it."""
+    if one.is_argument:
+        return inspect.Parameter.empty
     return one.default if isinstance(one.default, bool | int | float | str) else None

@@ -61,7 +61,7 @@ def fit(
     Chooses a form for each parameter, tests it, measures how they depend on each other, and
     writes an exposure, and a page that shows how well it fits.
     """
-    from bridgegen.cli.terminal.risk import FitScreen, print_fit
+    from bridgegen.cli.terminal.fit import FitScreen, print_fit
     from bridgegen.jobs.fit import write_fit
 
     notes: list[str] = []

@@ -175,7 +175,8 @@ def schema(
     kind: Annotated[
         str | None,
         typer.Argument(
-            help="Of which files: scenario, fragment, exposure, run or safety-case.",
+            help="Of which files: scenario, fragment, exposure, run (of a search), risk or "
+            "preventability (run files of these), or safety-case.",
             show_default="scenario",
         ),
     ] = None,
@@ -189,15 +190,21 @@ def schema(
     Editors complete and check scenario files and run files with it; that of safety cases is for
     programs which read them.
     """
+    from bridgegen.cli.jobs import JOBS
+    from bridgegen.cli.jobs import schema_of as job_schema
     from bridgegen.cli.runs import run_file_schema
     from bridgegen.jobs.safety_case.model import json_schema
     from bridgegen.scenario.language.json_schema import as_text, schema_of, write_schema
 
     if None not in (kind, of) and kind != of:
         raise InputError(f"the schema of one kind of file is printed, got {kind} and --of {of}")
+    jobs = {job.name: job for job in JOBS}
     elsewhere = {"run": run_file_schema, "safety-case": json_schema}
     name = kind or of or "scenario"
-    made = elsewhere[name]() if name in elsewhere else schema_of(name)
+    if name in jobs:
+        made = job_schema(jobs[name])
+    else:
+        made = elsewhere[name]() if name in elsewhere else schema_of(name)
     if out is None:
         print(as_text(made), end="")
         return

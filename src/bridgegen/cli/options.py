@@ -14,6 +14,12 @@ from bridgegen.engine.options.forms import read_settings, read_value
 from bridgegen.engine.options.option import DRIVER, OBJECTIVE, OUTPUT, SEARCH, SIMULATOR
 from bridgegen.simulation.choice import SIMULATORS, SimulatorChoice, Value
 
+Save = Annotated[
+    Path | None,
+    typer.Option(
+        help="Write a new run file (.yaml) that repeats this call.", rich_help_panel=OUTPUT
+    ),
+]
 Json = Annotated[
     bool, typer.Option("--json", help="Print JSON for machines.", rich_help_panel=OUTPUT)
 ]

@@ -1,6 +1,6 @@
-"""Run files: the options of one or of several searches as YAML.
+"""Run files: the options of one or of several calls of a command as YAML.
 
-Their keys are the options of ``bridgegen search``, without the dashes; there is no second list.
+Their keys are the command's options, without the dashes; there is no second list.
 """
 
 import inspect
@@ -27,6 +27,9 @@ Values = Mapping[str, Any]
 
 SCENARIO, SAVE = "scenario", "save"
 _HEADS = {"run", "runs"}
+MOST_SEARCHED = 10_000
+"""Bytes of a damaged file in which its first key is looked for."""
+
 DATABASE = "run.sqlite"
 """The file that makes a folder a run's."""
 
@@ -43,6 +46,10 @@ _YAML = (".yaml", ".yml")
 
 _CODE = {"algorithm", "detector", "ego", "worse_than"}
 """Options whose value is a path in front of a colon, or a path if it ends in ``.fmu``."""
+
+
+_FILES = {SCENARIO, "exposure", "events"}
+"""Options whose value is a name, or a path if it ends like one."""
 
 
 @dataclass(frozen=True)
@@ -77,9 +84,14 @@ class FiledRun:
     values: Values
 
 
-def keys_of(command: Callable[..., Any]) -> dict[str, Key]:
-    """Return the keys of a run, by their spelling in a file, of the command ``search``."""
-    declared = {one.name: one for one in options_of(SearchOptions)}
+def keys_of(command: Callable[..., Any], kind: type[Any] = SearchOptions) -> dict[str, Key]:
+    """Return the keys of a run, by their spelling in a file.
+
+    Args:
+        command: that makes it.
+        kind: the class of its declared options.
+    """
+    declared = {one.name: one for one in options_of(kind)}
     found = {}
     for name, parameter in inspect.signature(command).parameters.items():
         if name == SAVE or get_origin(parameter.annotation) is not Annotated:
@@ -107,8 +119,8 @@ def is_run_file(scenario: str) -> bool:
         return False
     try:
         data = read_run_document(path).data
-    except BridgeGenError:
-        return False  # the reader of scenario files says what is wrong
+    except BridgeGenError:  # the reader of run files, or of scenario files, says what is wrong
+        return path.read_bytes()[:MOST_SEARCHED].lstrip().startswith((b"run:", b"runs:"))
     return isinstance(data, dict) and bool(_HEADS & {*data}) and SCENARIO not in data
 
 
@@ -216,17 +228,17 @@ def _moved(key: Key, value: Any, move: Callable[[str], object]) -> Any:
         if path.endswith(".py"):
             return f"{move(path)}{colon}{what}"
         return str(move(value)) if value.endswith(".fmu") else value
-    is_file = value.lower().endswith((*_YAML, ".xosc"))
-    return str(move(value)) if key.name == SCENARIO and is_file else value
+    is_file = value.lower().endswith((*_YAML, ".xosc", ".csv"))
+    return str(move(value)) if key.name in _FILES and is_file else value
 
 
 def save_run(path: Path, values: Values, keys: Mapping[str, Key]) -> None:
-    """Write the run file of a call of ``search``.
+    """Write the run file of a call.
 
     Args:
         path: of the file, new.
         values: that the call gave.
-        keys: of a run.
+        keys: of its command.
 
     Raises:
         StorageError: the file exists, or cannot be written.
@@ -314,12 +326,14 @@ def schema(keys: Mapping[str, Key]) -> dict[str, Any]:
 
 def with_run_files(
     several: Callable[[Path, list[FiledRun], Mapping[str, Key], Callable[[Values], Any]], None],
+    kind: type[Any] = SearchOptions,
 ) -> Callable[[Callable[..., Any]], Callable[..., None]]:
-    """Return what has the command ``search`` take a run file in place of a scenario.
+    """Return what has a command take a run file in place of a scenario.
 
     Args:
         several: runs a file of several runs: of the file, its runs, the keys of a run, and the
             command of one.
+        kind: the class of the command's declared options.
     """
 
     def decorate(command: Callable[..., Any]) -> Callable[..., None]:
@@ -327,7 +341,7 @@ def with_run_files(
 
         @wraps(command)
         def wrapper(context: typer.Context, **values: Any) -> None:
-            keys = keys_of(command)
+            keys = keys_of(command, kind)
             given = {
                 name: value
                 for name, value in values.items()

@@ -63,12 +63,7 @@ def search(
     fail_if: common.FailIf = None,
     junit: common.Junit = None,
     verbose: common.Verbose = False,
-    save: Annotated[
-        Path | None,
-        typer.Option(
-            help="Write a new run file (.yaml) that repeats this call.", rich_help_panel=OUTPUT
-        ),
-    ] = None,
+    save: common.Save = None,
 ) -> None:
     """Search a scenario for critical concrete scenarios.
 

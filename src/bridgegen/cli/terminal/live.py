@@ -3,7 +3,7 @@
 import threading
 import time
 from types import TracebackType
-from typing import Any, Self
+from typing import TYPE_CHECKING, Any, Self
 
 from rich.console import Console
 from rich.progress import (
@@ -14,6 +14,9 @@ from rich.progress import (
     TextColumn,
     TimeRemainingColumn,
 )
+
+if TYPE_CHECKING:
+    from bridgegen.jobs.frame import JobCallbacks
 
 
 class Live:
@@ -89,3 +92,17 @@ class Live:
     ) -> None:
         self._count.set()
         self._progress.stop()
+
+
+class JobScreen(Live):
+    """A job's live progress."""
+
+    @property
+    def callbacks(self) -> "JobCallbacks":
+        """The callbacks for a job."""
+        from bridgegen.jobs.frame import JobCallbacks
+
+        return JobCallbacks(
+            compile=self.say_compiling,
+            progress=lambda what, done, total: self.show(what=what, done=done, total=total),
+        )

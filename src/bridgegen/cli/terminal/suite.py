@@ -14,7 +14,7 @@ from bridgegen.cli.terminal.live import Live
 from bridgegen.cli.terminal.tables import WHOLE
 
 if TYPE_CHECKING:
-    from bridgegen.jobs.preventability import PreventabilityMap
+    from bridgegen.jobs.preventability.result import PreventabilityMap
     from bridgegen.jobs.suite.difference import Difference, WorseCallbacks, WorseThan
     from bridgegen.jobs.suite.results import EntryResult
     from bridgegen.jobs.suite.suite import SuiteCallbacks, SuiteRun

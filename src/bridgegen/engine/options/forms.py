@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from numbers import Integral, Real
 from os import PathLike
 from pathlib import Path
@@ -327,3 +327,6 @@ SCREEN = Form(
     must="a simulator",
 )
 """Likewise, or none."""
+
+ANOTHER_SIMULATOR = replace(SCREEN, words=_simulator_words)
+"""Likewise, as an option ``--simulator``."""

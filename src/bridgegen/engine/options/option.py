@@ -40,9 +40,11 @@ class Option:
         names: what a shell completes its value with: "algorithm", "driver", "metric" … as
             `bridgegen.cli.completion` knows them; empty where it completes nothing.
         also: another spelling on the command line; empty: none.
+        is_argument: whether it is named by its place on the command line, not by a spelling.
         help: what it means, in Python and on the command line; a whole sentence.
         name: of the field.
         default: of the field.
+        is_required: whether the field has none.
     """
 
     form: Form
@@ -54,15 +56,18 @@ class Option:
     group: str = WHAT
     names: str = ""
     also: str = ""
+    is_argument: bool = False
     help: str = ""
     name: str = ""
     default: Any = None
+    is_required: bool = False
 
     def words(self, value: Any) -> list[str]:
         """Return the words of a command line that give it a value; none for its absence."""
         if value is None or (isinstance(value, bool) and value == self.default):
             return []
-        return self.form.words(self.spelling, value)
+        words = self.form.words(self.spelling, value)
+        return [one for one in words if one != self.spelling] if self.is_argument else words
 
 
 def option(
@@ -77,9 +82,10 @@ def option(
     group: str = WHAT,
     names: str = "",
     also: str = "",
+    is_argument: bool = False,
 ) -> dict[str, Any]:
     """Return the metadata of a field that is an option; see `Option` for the arguments."""
-    declared = Option(form, spelling, hint, shown, limits, before, group, names, also)
+    declared = Option(form, spelling, hint, shown, limits, before, group, names, also, is_argument)
     return {"help": help, "option": declared}
 
 
@@ -103,6 +109,7 @@ def options_of(kind: type[Any]) -> tuple[Option, ...]:
             spelling=one.metadata["option"].spelling or f"--{one.name.replace('_', '-')}",
             name=one.name,
             default=None if one.default is MISSING else one.default,
+            is_required=one.default is MISSING and one.default_factory is MISSING,
         )
         for base in classes
         for name, one in declared.items()
@@ -122,6 +129,21 @@ def range_problems(options: object) -> list[str]:
                 f"({one.spelling}: {one.help[0].lower()}{one.help[1:].rstrip('.')})"
             )
     return problems
+
+
+class Declared:
+    """A base of options classes: each field that declares an option is read by its form."""
+
+    def __post_init__(self) -> None:
+        problems: list[str] = []
+        for one in options_of(type(self)):
+            try:
+                kept = one.form.taken(getattr(self, one.name), one.name, one.default)
+                object.__setattr__(self, one.name, kept)
+            except InputError as error:
+                problems += error.problems
+        if problems:
+            raise InputError(*problems)
 
 
 # --- Functions that take the fields of a dataclass as keywords, and check them ---

@@ -8,7 +8,6 @@ from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any, Self
 
-from bridgegen.base.errors import InputError
 from bridgegen.engine.options.forms import (
     CRITERIA,
     FIXED,
@@ -24,7 +23,7 @@ from bridgegen.engine.options.forms import (
     WHOLE,
 )
 from bridgegen.engine.options.option import DRIVER as OF_DRIVER
-from bridgegen.engine.options.option import OBJECTIVE, OUTPUT, SEARCH, option, options_of
+from bridgegen.engine.options.option import OBJECTIVE, OUTPUT, SEARCH, Declared, option
 from bridgegen.engine.options.option import SIMULATOR as OF_SIMULATOR
 from bridgegen.simulation.choice import EMBEDDED, SimulatorChoice, Value
 from bridgegen.simulation.vehicles import KINEMATIC
@@ -43,7 +42,7 @@ _CAUSES = option(
 
 
 @dataclass(frozen=True, kw_only=True)
-class PipelineOptions:
+class PipelineOptions(Declared):
     """The options of how a scenario is evaluated."""
 
     ego: str | None = field(
@@ -143,17 +142,6 @@ class PipelineOptions:
             names="cause",
         ),
     )
-
-    def __post_init__(self) -> None:
-        problems: list[str] = []
-        for one in options_of(type(self)):
-            try:
-                kept = one.form.taken(getattr(self, one.name), one.name, one.default)
-                object.__setattr__(self, one.name, kept)
-            except InputError as error:
-                problems += error.problems
-        if problems:
-            raise InputError(*problems)
 
     @classmethod
     def of(cls, options: "PipelineOptions", **changes: Any) -> Self:

@@ -1,101 +1,59 @@
 """Makes a map: the drivers and the models in every cell that needs them, chunk by chunk."""
 
-import shlex
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Sequence
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from bridgegen import drivers as egos
 from bridgegen.base.arrays import Bool, Float
 from bridgegen.base.errors import InputError, Interrupted
-from bridgegen.engine.options import PipelineOptions, checked
+from bridgegen.engine.options import PipelineOptions, called_with
 from bridgegen.engine.pipeline import Pipeline
 from bridgegen.engine.workers import CarriedDriver, Lost, Workers, open_workers
+from bridgegen.jobs.frame import JobCallbacks, command_of
 from bridgegen.jobs.preventability import arithmetic
 from bridgegen.jobs.preventability.classes import Codes, Outcome, outcomes
-from bridgegen.jobs.preventability.grid import Grid, GridAxis, grid_of
+from bridgegen.jobs.preventability.grid import Grid, grid_of
+from bridgegen.jobs.preventability.options import MapOptions
 from bridgegen.jobs.preventability.result import ChunkStore, PreventabilityMap, simulated
-from bridgegen.jobs.search.scenarios import driven_by, is_file, load
+from bridgegen.jobs.search.scenarios import driven_by, load
 from bridgegen.scenario.language.scenario import SearchedScenario
 from bridgegen.simulation import vehicles
 
-MODELS = ("un-r157", "fsm")
-"""The models of UN R157, annex 3: a collision that one of them avoids is preventable."""
 
-
-@dataclass(frozen=True)
-class MapCallbacks:
-    """Called as a map progresses.
-
-    Attributes:
-        compile: before kernels are compiled.
-        cells: with the number of cells that are done, and of all.
-    """
-
-    compile: Callable[[], None] = field(default=lambda: None)
-    cells: Callable[[int, int], None] = field(default=lambda done, total: None)
-
-
-@checked
-def map_preventability(
-    scenario: str | Path,
-    ego: str | Sequence[str],
-    *,
-    grid: Mapping[str, GridAxis] | Sequence[str] | None = None,
-    models: Sequence[str] = MODELS,
-    fixed: Mapping[str, float | str] | None = None,
-    vehicle: str | None = None,
-    others: str | None = None,
-    workers: int | str | Workers | None = None,
-    out: Path | str | None = None,
-    callbacks: MapCallbacks | None = None,
-) -> PreventabilityMap:
+@called_with(MapOptions)
+def map_preventability(given: MapOptions) -> PreventabilityMap:
     """Simulate a driver in every cell of a grid, and the models wherever it collides.
 
     Called again with the same arguments after it was stopped, it resumes. Results depend neither
-    on that nor on the workers.
+    on that nor on the workers. Beside drivers, ``ego`` and ``models`` may name those of
+    `arithmetic.NAMES`: models as the regulation computes them.
 
-    Args:
-        scenario: a name of the catalogue or of a pack, or the path of a file.
-        ego: the drivers under test, by name; one, or several to compare. Beside drivers,
-            `arithmetic.NAMES`: models as the regulation computes them.
-        grid: the axes, by the names of parameters: the pictures' X axis, Y axis, then what the
-            pictures differ in; or texts ``NAME=LOW:HIGH:N``. By default that of the scenario.
-        models: the drivers that decide whether a collision is preventable.
-        fixed: other parameters to hold at a value; at their defaults otherwise.
-        vehicle: how the egos move, those of the models too; see `bridgegen.simulation.vehicles`.
-        others: driver of the other participants: "attentive", "insistent" or "scripted"; the
-            scenario's choice by default.
-        workers: a number of processes, ``"ray"``, ``"ray://HOST:PORT"``, or open workers; threads
-            by default.
-        out: the map's folder; ``preventability/SCENARIO`` by default.
-        callbacks: called as it progresses.
+    Returns:
+        The map; its arrays, figures and page are written.
 
     Raises:
         InputError: an invalid argument or file.
         StorageError: the folder holds something else, or cannot be written.
         Interrupted: Ctrl-C; what is done is kept.
     """
-    say = callbacks or MapCallbacks()
-    drivers = _distinct([ego] if isinstance(ego, str) else ego, "driver")
-    judges = _distinct(models, "model")
+    drivers, judges = _distinct(given.ego, "driver"), _distinct(given.models, "model")
+    vehicle, say = given.vehicle, given.callbacks
     for name in (*drivers, *judges):
         if name not in arithmetic.NAMES:
             egos.get(name)
     if vehicle is not None:
         vehicles.require(vehicle)
-    logical = driven_by(load(scenario), others)
+    logical = driven_by(load(given.scenario), given.others)
     if any(name in arithmetic.NAMES for name in (*drivers, *judges)):
         arithmetic.require(logical.name)
-    space = logical.space(fixed=dict(fixed or {}))
-    cells = grid_of(logical.name, space, grid)
+    space = logical.space(fixed=dict(given.fixed))
+    cells = grid_of(logical.name, space, given.grid)
     if twice := [name for name in cells.names if name in space.fixed]:
         raise InputError(f"an axis of the grid cannot be held at a value: {', '.join(twice)}")
-    folder = Path("preventability", logical.name) if out is None else Path(out)
+    folder = Path("preventability", logical.name) if given.out is None else Path(given.out)
     names = simulated(drivers, judges)
     settings = {
         "version": version("bridgegen"),
@@ -108,12 +66,16 @@ def map_preventability(
         **({"vehicle": vehicle} if vehicle else {}),
         "files of drivers": {name: digest_of(name) for name in names},
     }
-    command = _command(scenario, drivers, judges, cells, fixed or {}, vehicle, others, folder)
+    axes = [
+        f"{name}={values[0]:.17g}:{values[-1]:.17g}:{len(values)}"
+        for name, values in zip(cells.names, cells.values, strict=True)
+    ]
+    command = command_of("preventability", given, folder, grid=axes)
     store = ChunkStore(folder, settings, len(names), cells.cells)
     found = np.empty((len(names), cells.cells), np.int8)
     done = 0
     try:
-        with open_workers(workers) as hands:
+        with open_workers(given.workers) as hands:
             run = _Run(logical, cells, drivers, judges, vehicle, hands, say)
             for i in range(store.count):
                 start, stop = store.bounds(i)
@@ -123,7 +85,7 @@ def map_preventability(
                     store.write(i, part)
                 found[:, start:stop] = part
                 done = stop
-                say.cells(done, cells.cells)
+                say.progress("cells", done, cells.cells)
     except KeyboardInterrupt:
         raise Interrupted(folder, done, cells.cells, what="cells", command=command) from None
     shaped = found.reshape(len(names), *cells.shape)
@@ -143,7 +105,7 @@ class _Run:
         models: Sequence[str],
         vehicle: str | None,
         workers: Workers,
-        say: MapCallbacks,
+        say: JobCallbacks,
     ) -> None:
         self._scenario, self._grid, self._workers, self._say = scenario, grid, workers, say
         self._vehicle = vehicle
@@ -205,29 +167,3 @@ def _distinct(names: Iterable[str], what: str) -> tuple[str, ...]:
 def digest_of(name: str) -> str | None:
     """Return a digest of the file of a user's driver; None where it has none."""
     return CarriedDriver.of(name).digest
-
-
-def _command(
-    scenario: str | Path,
-    drivers: Sequence[str],
-    models: Sequence[str],
-    grid: Grid,
-    fixed: Mapping[str, float | str],
-    vehicle: str | None,
-    others: str | None,
-    folder: Path,
-) -> str:
-    """Return the command line that makes the map again."""
-    where = str(Path(scenario).resolve()) if is_file(scenario) else str(scenario)
-    words: list[Any] = ["bridgegen", "preventability", where, "--ego", ",".join(drivers)]
-    for name, values in zip(grid.names, grid.values, strict=True):
-        words += ["--grid", f"{name}={values[0]:.17g}:{values[-1]:.17g}:{len(values)}"]
-    if tuple(models) != MODELS:
-        words += ["--models", ",".join(models)]
-    for name, value in fixed.items():
-        words += ["--fix", f"{name}={value}"]
-    if vehicle is not None:
-        words += ["--vehicle", vehicle]
-    if others is not None:
-        words += ["--others", others]
-    return shlex.join([*words, "--out", str(folder)])

@@ -13,8 +13,10 @@ import numpy as np
 from bridgegen.base.disk import write_whole, writing_whole
 from bridgegen.base.extras import is_installed
 from bridgegen.base.records import read_bytes
+from bridgegen.jobs.frame import Judged, Table
 from bridgegen.jobs.preventability.classes import CellClass, Codes, Outcome, classes
 from bridgegen.jobs.preventability.grid import Grid
+from bridgegen.jobs.preventability.options import FIGURES
 from bridgegen.results.folder import claim
 
 if TYPE_CHECKING:
@@ -85,6 +87,44 @@ class PreventabilityMap:
         }
         return {"driver": driver, **{names[one]: counts[one] for one in CellClass}, **shares}
 
+    @property
+    def work(self) -> str:
+        """How many cells there are."""
+        return f"{self.grid.cells:,} cells"
+
+    def to_json(self) -> list[dict[str, Any]]:
+        """Return the figures of each driver."""
+        return [self.figures(name) for name in self.drivers]
+
+    def lines(self) -> list[str | Table]:
+        """Return what the terminal shows: each driver's cells by class, and the files."""
+        figures = self.to_json()
+        rows = [(one["driver"], *(_cell(one, kind) for kind in CellClass)) for one in figures]
+        head = ("driver", *(kind.name.lower().replace("_", " ") for kind in CellClass))
+        return [(head, rows), f"\n{'page':<12}{self.page}", f"{'arrays':<12}{self.folder}"]
+
+    def judged(self) -> list[Judged]:
+        """Return each driver's figures; NaN: of outcomes, where no cell has any."""
+        return [self._judged(name) for name in self.drivers]
+
+    def _judged(self, driver: str) -> Judged:
+        known, name = self.figures(driver), self.scenario.name
+        holds = any(known[one] for one in ("avoided", "preventable", "unpreventable"))
+        figures = {
+            one: known[one] if holds or one in ("not_applicable", "no_result") else float("nan")
+            for one in FIGURES
+        }
+        facts = {"scenario": name, "ego": driver, "models": ", ".join(self.models)}
+        for axis, unit, v in zip(self.grid.names, self.grid.units, self.grid.values, strict=True):
+            facts[f"axis {axis}"] = f"{v[0]:.6g} to {v[-1]:.6g} {unit}, {len(v)} values"
+        counts = ((one, count) for one, count in figures.items() if not one.endswith("_share"))
+        return Judged(
+            suite=f"{name} preventability", group=f"bridgegen.{name}.{driver.replace('.', '_')}",
+            test="the map has results", holds=holds,
+            details=", ".join(f"{one} {count:.0f}" for one, count in counts), figures=figures,
+            facts=facts | {"command": self.command, "page": str(self.page)}, of=driver,
+        )  # fmt: skip
+
     def write(self) -> tuple[Path, ...]:
         """Write arrays, figures, the page, and a table where the extra for Parquet is there.
 
@@ -140,6 +180,11 @@ class PreventabilityMap:
                     index = pa.array(codes.ravel()[cells].astype(np.int32))
                     columns.append(pa.DictionaryArray.from_arrays(index, labels))
                 writer.write_table(pa.table(columns, schema=schema))
+
+
+def _cell(figures: Mapping[str, Any], kind: CellClass) -> str:
+    count, share = figures[kind.name.lower()], figures.get(f"{kind.name.lower()}_share")
+    return f"{count:,} {share:.1%}" if isinstance(share, float) else f"{count:,}"
 
 
 def simulated(drivers: Sequence[str], models: Sequence[str]) -> tuple[str, ...]:

@@ -17,6 +17,7 @@ from bridgegen.base.errors import UnknownNameError
 from bridgegen.engine.pipeline import Pipeline
 from bridgegen.engine.runner import Runner
 from bridgegen.jobs.risk.estimators.weighted import Weighted
+from bridgegen.jobs.risk.options import WORDS
 from bridgegen.scenario.exposure import Exposure
 from bridgegen.scenario.exposure.fit import Fit
 
@@ -138,16 +139,10 @@ class Event:
 
 
 EVENTS: Mapping[str, Event] = {
-    "conflict": Event(NEAR_MISS, "a near miss or a collision"),
-    "collision": Event(2.0 * NEAR_MISS, "a collision"),
+    "conflict": Event(NEAR_MISS, WORDS["conflict"]),
+    "collision": Event(2.0 * NEAR_MISS, WORDS["collision"]),
 }
 """By name; the last one is the default aim."""
-
-WORDS: Mapping[str, str] = {
-    **{name: one.description for name, one in EVENTS.items()},
-    INJURY: "a collision with a serious injury (MAIS3+)",
-}
-"""All that a risk states, by name."""
 
 
 def require(name: str) -> Event:

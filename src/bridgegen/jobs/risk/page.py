@@ -10,7 +10,8 @@ from pathlib import Path
 
 from bridgegen.base.disk import write_whole
 from bridgegen.jobs.risk.estimators.weighted import Probability
-from bridgegen.jobs.risk.outcomes import EVENTS, WORDS
+from bridgegen.jobs.risk.options import WORDS
+from bridgegen.jobs.risk.outcomes import EVENTS
 from bridgegen.jobs.risk.result import BINS, Finding, Likely, ParameterShare, Risk
 from bridgegen.jobs.risk.text import data_sentence, elsewhere_sentence, number, sentence
 from bridgegen.scenario.language.parameters import Parameter

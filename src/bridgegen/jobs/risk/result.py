@@ -14,10 +14,12 @@ import numpy as np
 
 from bridgegen.base.arrays import Float
 from bridgegen.base.disk import write_whole
+from bridgegen.jobs.frame import Judged, Table
 from bridgegen.jobs.risk.elsewhere import Elsewhere
 from bridgegen.jobs.risk.estimators.weighted import FEWEST_HITS, Probability, Weighted
 from bridgegen.jobs.risk.experiment import Estimated
-from bridgegen.jobs.risk.outcomes import EVENTS, INJURY, WORDS, Column, DataBand
+from bridgegen.jobs.risk.options import FIGURES, WORDS
+from bridgegen.jobs.risk.outcomes import EVENTS, INJURY, Column, DataBand
 from bridgegen.scenario.exposure import Exposure
 from bridgegen.scenario.exposure.exposure import Rate
 
@@ -248,6 +250,43 @@ class Risk:
             "elsewhere": None if self.elsewhere is None else self.elsewhere.to_dict(),
             "command": self.command,
         }  # fmt: skip
+
+    @property
+    def work(self) -> str:
+        """How much was simulated."""
+        return f"{self.weighted.evaluations:,} simulations"
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the same."""
+        return self.to_dict()
+
+    def lines(self) -> list[str | Table]:
+        """Return what the terminal shows."""
+        from bridgegen.jobs.risk import text
+
+        return [*text.lines(self)]
+
+    def judged(self) -> tuple[Judged, ...]:
+        """Return the figures, of which none is believed where the aimed event's is not."""
+        found = {"evaluations": float(self.weighted.evaluations)}
+        for name, one in self.findings.items():
+            p, nan = one.probability, float("nan")
+            found[name] = nan if p is None else p.estimate
+            found[f"{name}_upper"] = nan if p is None else p.upper
+            for unit, words in (("h", "hour"), ("km", "km")):
+                rate = self.rate(name, unit)
+                found[f"{name}_per_{words}"] = nan if rate is None else rate.estimate
+        name, method = self.exposure.scenario.name, self.estimated.method
+        return (
+            Judged(
+                suite=f"{name} risk", group=f"bridgegen.{name}.{self.driver.replace('.', '_')}",
+                test="the interval is believed", holds=self.believed,
+                details=self.findings[self.event].doubt or f"method {method}",
+                figures={one: found[one] for one in FIGURES},
+                facts={"scenario": name, "ego": self.driver, "method": method,
+                       "command": self.command},
+            ),
+        )  # fmt: skip
 
     def write(self) -> tuple[Path, ...]:
         """Write the record, the page and the table of harmful rows.

@@ -1,11 +1,14 @@
 """A risk in words."""
 
+from collections.abc import Iterator
 from math import isfinite
 
+from bridgegen.jobs.frame import Table
 from bridgegen.jobs.risk.elsewhere import Elsewhere, Ratio
 from bridgegen.jobs.risk.estimators.weighted import Probability
-from bridgegen.jobs.risk.outcomes import WORDS, DataBand
-from bridgegen.jobs.risk.result import Risk
+from bridgegen.jobs.risk.options import WORDS
+from bridgegen.jobs.risk.outcomes import EVENTS, DataBand
+from bridgegen.jobs.risk.result import PAGE, Risk
 from bridgegen.scenario.exposure.exposure import Rate
 
 
@@ -41,6 +44,34 @@ def sentence(risk: Risk) -> str:
         f"The probability of {what} is {number(p.estimate)} per encounter (95 %: {number(p.low)} "
         f"to {number(p.high)})."
     )
+
+
+def lines(risk: Risk) -> Iterator[str | Table]:
+    """Yield what the terminal shows of a risk: its sentence, its table, and what to know."""
+    yield f"{sentence(risk)}\n"
+    met = risk.exposure.encounters
+    units = [one for one in ("h", "km") if met is not None and getattr(met, _AMOUNTS[one])]
+    rows = []
+    for words, name, one in risk.stated:
+        row = [words, *interval(one.probability), f"{one.hits:,.0f}"]
+        row += [rate_text(None if name is None else risk.rate(name, unit)) for unit in units]
+        rows.append(row)
+    head = ("", "per encounter", "95 %", "below (95 %)", "effective rows")
+    yield (*head, *(f"per {unit}" for unit in units)), rows
+    for doubt in risk.weighted.doubts:
+        yield f"\ndoubt       {doubt}"
+    yield f"\n{'method':<12}{risk.estimated.method}: {risk.estimated.why}"
+    if risk.check is not None:
+        value, width, _ = interval(risk.check.probability(EVENTS[risk.event].score))
+        yield f"{'check':<12}{value} ({width}) in {risk.check.evaluations:,} by mc"
+    if risk.data is not None:
+        yield f"{'data':<12}{data_sentence(risk.data)}"
+    if risk.elsewhere is not None:
+        yield f"{'elsewhere':<12}{elsewhere_sentence(risk.elsewhere)}"
+    yield f"{'page':<12}{risk.folder / PAGE}"
+
+
+_AMOUNTS = {"h": "hours", "km": "km"}
 
 
 def _advice(risk: Risk) -> str:

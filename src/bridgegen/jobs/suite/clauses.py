@@ -11,7 +11,7 @@ from bridgegen.engine.options import PipelineOptions
 from bridgegen.engine.pipeline import Pipeline
 from bridgegen.engine.workers import Threads
 from bridgegen.jobs.preventability.classes import CellClass, Codes, Outcome, classes, outcomes
-from bridgegen.jobs.preventability.preventability import MODELS
+from bridgegen.jobs.preventability.options import MODELS
 from bridgegen.jobs.suite.results import (
     EXCUSED,
     FAILED,

@@ -8,10 +8,11 @@ from typing import Any
 
 import numpy as np
 
+from bridgegen.jobs.frame import JobCallbacks
 from bridgegen.jobs.preventability.classes import CellClass
 from bridgegen.jobs.preventability.grid import coarse_axes
 from bridgegen.jobs.preventability.page import COLOURS, data_uri
-from bridgegen.jobs.preventability.preventability import MapCallbacks, digest_of, map_preventability
+from bridgegen.jobs.preventability.preventability import digest_of, map_preventability
 from bridgegen.jobs.preventability.result import PreventabilityMap
 from bridgegen.jobs.search.scenarios import driven_by, load
 from bridgegen.jobs.suite.suite import SuiteRun
@@ -62,7 +63,7 @@ def map_suite(
                 grid=axes,
                 others=others,
                 out=suite.folder / FOLDER / _folder(scenario, list(egos)),
-                callbacks=MapCallbacks(cells=cells),
+                callbacks=JobCallbacks(progress=lambda what, done, total: cells(done, total)),
             )
         )
     return tuple(found)

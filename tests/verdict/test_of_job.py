@@ -6,8 +6,9 @@ import pytest
 
 from bridgegen.base.errors import InputError
 from bridgegen.cli import main
-from bridgegen.cli.verdict.of_map import FIGURES, MapCriteria, figures_of
-from bridgegen.jobs.preventability import map_preventability
+from bridgegen.cli.verdict.of_job import JobCriteria
+from bridgegen.jobs.preventability.options import FIGURES
+from bridgegen.jobs.preventability.preventability import map_preventability
 
 GRID = ["gap=36:46:2", "lateral_speed=1.7:1.8:2"]
 FIX = {"relative_speed": "40 km/h"}
@@ -22,7 +23,9 @@ def found(tmp_path_factory):
 
 
 def test_each_driver_is_judged_by_itself(found):
-    outcomes = MapCriteria.read(["preventable_share >= 0.5", "no_result > 0"], None).judge(found)
+    outcomes = JobCriteria.read(["preventable_share >= 0.5", "no_result > 0"], None, FIGURES).judge(
+        found
+    )
     assert [(one.test, one.verdict) for one in outcomes] == [
         ("route-follower: the map has results", "passed"),
         ("route-follower: not preventable_share >= 0.5", "failed"),
@@ -34,11 +37,12 @@ def test_each_driver_is_judged_by_itself(found):
 
 
 def test_the_figures_are_those_of_the_map(found):
-    assert figures_of(found, "route-follower") == {
+    first, second = found.judged()
+    assert first.figures == {
         "avoided": 0, "preventable": 4, "unpreventable": 0, "not_applicable": 0, "no_result": 0,
         "avoided_share": 0.0, "preventable_share": 1.0, "unpreventable_share": 0.0,
     }  # fmt: skip
-    assert figures_of(found, "un-r157").keys() == FIGURES.keys()
+    assert second.figures.keys() == FIGURES.keys()
 
 
 def test_a_map_without_results_does_not_pass(tmp_path):
@@ -47,14 +51,14 @@ def test_a_map_without_results_does_not_pass(tmp_path):
         "r157/cut-in", "fsm", grid=["ego_speed=20 km/h:30 km/h:2"],
         fixed={"relative_speed": "40 km/h"}, out=tmp_path / "map",
     )  # fmt: skip
-    outcomes = MapCriteria.read(["preventable > 0"], None).judge(nothing)
+    outcomes = JobCriteria.read(["preventable > 0"], None, FIGURES).judge(nothing)
     assert [one.verdict for one in outcomes] == ["unknown", "unknown"]
 
 
 def test_no_criteria_have_no_outcomes_and_wrong_ones_are_refused(found):
-    assert MapCriteria.read([], None).judge(found) == ()
+    assert JobCriteria.read([], None, FIGURES).judge(found) == ()
     with pytest.raises(InputError, match=r"did you mean 'preventable'"):
-        MapCriteria.read(["preventible > 0"], None)
+        JobCriteria.read(["preventible > 0"], None, FIGURES)
 
 
 def test_the_command_ends_with_3_and_writes_junit(tmp_path, monkeypatch, capsys):

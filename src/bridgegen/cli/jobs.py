@@ -1,0 +1,130 @@
+"""The commands that are made of jobs; see `bridgegen.jobs.frame`."""
+
+import inspect
+import json
+from collections.abc import Mapping
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from bridgegen.base.errors import InputError
+from bridgegen.cli import options as common
+from bridgegen.cli.app import FAILED, app
+from bridgegen.cli.connection import NO_CONNECTION, Connection, with_connection_options
+from bridgegen.cli.declared import declare, with_declared_options
+from bridgegen.cli.groups import SEARCH
+from bridgegen.cli.run_files import FiledRun, Key, keys_of, schema, with_run_files
+from bridgegen.engine.options import options_of
+from bridgegen.engine.options.option import OUTPUT
+from bridgegen.jobs.frame import Job, JobResult
+from bridgegen.jobs.preventability.options import JOB as PREVENTABILITY
+from bridgegen.jobs.risk.options import JOB as RISK
+
+JOBS = (PREVENTABILITY, RISK)
+"""In the order of ``--help``."""
+
+_OF_SIMULATOR = ("simulator", "simulator_set", "connection")
+
+
+def command_of(job: Job) -> Any:
+    """Return the function of a job's command, with the options that it declares."""
+    kind: Any = job.options
+    simulators = [one for one in options_of(kind) if one.name == "simulator"]
+
+    def command(
+        options: kind,
+        simulator: str | None = None,
+        simulator_set: common.SimulatorSettings = None,
+        connection: Connection = NO_CONNECTION,
+        fail_if: Annotated[
+            list[str] | None,
+            typer.Option(
+                help=f"End with exit status 3 if this holds, e.g. '{job.example}'; may be "
+                "repeated.",
+                show_default=False,
+                rich_help_panel=OUTPUT,
+            ),
+        ] = None,
+        junit: common.Junit = None,
+        as_json: common.Json = False,
+        save: common.Save = None,
+    ) -> None:
+        from bridgegen.cli.terminal.live import JobScreen
+        from bridgegen.cli.terminal.tables import print_outcomes
+        from bridgegen.cli.verdict.of_job import JobCriteria
+
+        assert save is None  # written by the run file's reader, which knows what was given
+        judges = JobCriteria.read(fail_if or (), junit, list(job.figures))
+        if simulators:
+            chosen = common.read_simulator(simulator, simulator_set, connection)
+            options = replace(options, simulator=chosen)
+        with JobScreen() as screen:
+            result = job.run(replace(options, callbacks=screen.callbacks))
+        _print(result, screen.seconds, as_json=as_json)
+        if not print_outcomes(judges.judge(result)):
+            raise typer.Exit(FAILED)
+
+    signature = inspect.signature(command)
+    named = {one.name: one for one in signature.parameters.values()}
+    for name in _OF_SIMULATOR if not simulators else ():
+        del named[name]
+    if simulators:
+        named["simulator"] = named["simulator"].replace(
+            annotation=Annotated[str | None, declare(simulators[0])]
+        )
+    command.__signature__ = signature.replace(  # type: ignore[attr-defined]
+        parameters=[*named.values()]
+    )
+    command.__name__, command.__doc__ = job.name, inspect.cleandoc(job.help)
+    made = with_declared_options(command)
+    return with_connection_options(made) if simulators else made
+
+
+def schema_of(job: Job) -> dict[str, Any]:
+    """Return the JSON Schema of the run files of a job."""
+    return schema(keys_of(command_of(job), job.options))
+
+
+def _print(result: JobResult, seconds: float, *, as_json: bool) -> None:
+    from bridgegen.cli.terminal.tables import print_table
+
+    if as_json:
+        print(json.dumps(result.to_json(), indent=1))
+        return
+    for one in result.lines():
+        if isinstance(one, str):
+            print(one)
+        else:
+            print_table(*one, as_json=False)
+    print(f"{'wall time':<12}{seconds:.1f} s, {result.work}")
+
+
+def run_all(
+    path: Path, runs: list[FiledRun], keys: Mapping[str, Key], command: Any, job: str
+) -> None:
+    """Do the jobs of a run file one after the other, each in a folder of its own."""
+    status = 0
+    for one in runs:
+        print(f"\n{one.name}", flush=True)
+        try:
+            command({"out": Path(job) / path.stem / one.name, **one.values})
+        except typer.Exit as ended:
+            status = max(status, ended.exit_code)
+        except InputError as error:
+            raise InputError(*(f"{one.name}: {problem}" for problem in error.problems)) from None
+    if status:
+        raise typer.Exit(status)
+
+
+def _add(job: Job) -> None:
+    several = partial(run_all, job=job.name)
+    app.command(job.name, rich_help_panel=SEARCH)(
+        with_run_files(several, job.options)(command_of(job))
+    )
+
+
+for _job in JOBS:
+    _add(_job)

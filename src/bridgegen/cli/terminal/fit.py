@@ -1,0 +1,83 @@
+"""A fit of an exposure as it is made, and what it found."""
+
+import json
+import math
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from bridgegen.cli.terminal.live import Live
+from bridgegen.cli.terminal.tables import print_table
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from bridgegen.scenario.exposure.exposure import Rate
+    from bridgegen.scenario.exposure.fit import Fit
+
+
+class FitScreen(Live):
+    """The bar of the parameters that are fitted."""
+
+    def progress(self, done: int, total: int) -> None:
+        """Show how many of how many parameters are done."""
+        self.show(what="parameters", done=done, total=total)
+
+
+def print_fit(fit: "Fit", written: "Sequence[Path]", *, as_json: bool) -> None:
+    """Print the forms with their goodness of fit, rates and files; on stderr what to know."""
+    from bridgegen.scenario.exposure.page import facts, remarks
+
+    for text in remarks(fit):
+        print(f"bridgegen: warning: {text}", file=sys.stderr)
+    if as_json:
+        print(json.dumps(_plain(fit, written), indent=2))
+        return
+    print_table(
+        ("parameter", "unit", "form", "D", "p"),
+        [
+            (
+                one.name, one.unit, one.form,
+                None if math.isnan(one.distance) else float(f"{one.distance:.3g}"),
+                None if math.isnan(one.p) else float(f"{one.p:.3g}"),
+            )
+            for one in fit.parameters.values()
+        ],
+        as_json=False,
+    )  # fmt: skip
+    print()
+    for text in facts(fit):
+        print(text)
+    print()
+    for path in written:
+        print(path)
+
+
+def _plain(fit: "Fit", written: "Sequence[Path]") -> dict[str, object]:
+    encounters = fit.exposure.encounters
+    return {
+        "scenario": fit.exposure.scenario.name,
+        "rows": fit.rows,
+        "used": fit.used,
+        "infeasible": fit.infeasible,
+        "parameters": {
+            name: {
+                "form": one.form,
+                "distance": None if math.isnan(one.distance) else one.distance,
+                "p": None if math.isnan(one.p) else one.p,
+                "ranking": [list(each) for each in one.ranking],
+            }
+            for name, one in fit.parameters.items()
+        },
+        "correlated": list(fit.correlated),
+        "correlation": fit.correlation.tolist(),
+        "per_hour": _rate(encounters.per_hour if encounters else None),
+        "per_km": _rate(encounters.per_km if encounters else None),
+        "feasible_share": fit.exposure.feasible_share.estimate,
+        "seed": fit.seed,
+        "files": [str(path) for path in written],
+    }
+
+
+def _rate(rate: "Rate | None") -> dict[str, float] | None:
+    return None if rate is None else {"estimate": rate.estimate, "low": rate.low, "high": rate.high}

@@ -1,0 +1,217 @@
+"""The frame of a job: declared options and a function of them; all else follows from these.
+
+A job's folder has its options, a subclass of `JobOptions`, and its function, which `called_with`
+makes one of keywords. From a `Job` follow the command with its help and completion
+(`bridgegen.cli.jobs`), run files and their schema, ``--json``, ``--fail-if``, JUnit, and the
+command that repeats it. Imports nothing slow: the command line needs it to start.
+"""
+
+import shlex
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from importlib import import_module
+from math import inf
+from pathlib import Path
+from typing import Any, Protocol
+
+from bridgegen.base.errors import InputError
+from bridgegen.engine.options import options_of
+from bridgegen.engine.options.forms import PATH, Form
+from bridgegen.engine.options.option import DRIVER, OUTPUT, SEARCH, WHAT, Declared, option
+
+Table = tuple[Sequence[str], Sequence[Sequence[object]]]
+"""Heads and rows."""
+
+
+def _named(value: Any) -> str:
+    """Return how a command names a scenario: a file by its whole path."""
+    is_file = Path(value).suffix.lower() in (".yaml", ".yml", ".xosc")
+    return str(Path(value).resolve()) if is_file else str(value)
+
+
+SCENARIO = Form(str, words=lambda spelling, value: [spelling, _named(value)])
+"""A name of the catalogue or of a pack, or the path of a file."""
+
+ANY = Form(str, valid=lambda value: value is not None, must="given")
+"""A text, or what Python code gives in its place; the job checks it."""
+
+
+@dataclass(frozen=True)
+class JobCallbacks:
+    """Called as a job progresses, all from the same thread.
+
+    Attributes:
+        compile: before kernels are compiled.
+        progress: with what is counted, how many of it are done, and of how many.
+    """
+
+    compile: Callable[[], None] = lambda: None
+    progress: Callable[[str, int, int], None] = lambda what, done, total: None
+
+
+@dataclass(frozen=True, kw_only=True)
+class JobOptions(Declared):
+    """What every job is given, besides the options of its own."""
+
+    vehicle: str | None = field(
+        default=None,
+        metadata=option(
+            ANY,
+            "How the ego moves: kinematic, single-track or multi-body.",
+            shown="kinematic",
+            group=DRIVER,
+            names="vehicle",
+        ),
+    )
+    others: str | None = field(
+        default=None,
+        metadata=option(
+            ANY,
+            "Driver of all other participants: attentive, insistent (gives way to none), or "
+            "scripted (they react to nothing).",
+            shown="what the scenario says",
+            group=DRIVER,
+            names="others",
+        ),
+    )
+    workers: Any = field(
+        default=None,
+        metadata=option(
+            ANY,
+            "Number of worker processes, or 'ray' / 'ray://HOST:PORT' for a Ray cluster (extra "
+            "ray). No result depends on it.",
+            shown="threads of one process, one for each core",
+            group=SEARCH,
+        ),
+    )
+    out: Path | str | None = field(
+        default=None,
+        metadata=option(
+            PATH,
+            "The result's folder; what was stopped is resumed there.",
+            shown="JOB/SCENARIO",
+            group=OUTPUT,
+        ),
+    )
+    callbacks: JobCallbacks = field(
+        default_factory=JobCallbacks, metadata={"help": "Called as the job progresses."}
+    )
+
+
+OF_SCENARIO = option(
+    SCENARIO,
+    "A name of the catalogue or of a pack, or the path of a YAML file.",
+    names="scenario",
+    group=WHAT,
+    is_argument=True,
+)
+"""Metadata of the field of the scenario that a job takes as its argument."""
+
+
+def require_ranges(options: object, limits: Mapping[str, tuple[float, float]]) -> None:
+    """Check numbers that are options.
+
+    Args:
+        options: of a job.
+        limits: by option the least and the greatest value, both allowed.
+
+    Raises:
+        InputError: one is out of its range; all that are.
+    """
+    spelling = {one.name: one.spelling for one in options_of(type(options))}
+    if problems := [
+        f"{spelling[name]} must be {_range(low, high)}, got {value:,g}"
+        for name, (low, high) in limits.items()
+        if not low <= (value := getattr(options, name)) <= high
+    ]:
+        raise InputError(*problems)
+
+
+def _range(low: float, high: float) -> str:
+    return f"at least {low:,g}" if high == inf else f"{low:,g} to {high:,g}"
+
+
+def command_of(name: str, options: JobOptions, out: Path, **resolved: Any) -> str:
+    """Return the command line that repeats a job.
+
+    Args:
+        name: of the job.
+        options: that it was given.
+        out: its folder.
+        resolved: options that it has resolved, by name.
+    """
+    stated = replace(options, workers=None, out=None)
+    values = {**vars(stated), **resolved}
+    of_places = [one for one in options_of(type(options)) if one.is_argument]
+    rest = [one for one in options_of(type(options)) if not one.is_argument]
+    words = [word for one in (*of_places, *rest) for word in one.words(values[one.name])]
+    return shlex.join(["bridgegen", name, *words, "--out", str(out)])
+
+
+@dataclass(frozen=True)
+class Judged:
+    """What fail conditions are applied to: a result, or one driver's part of it.
+
+    Attributes:
+        suite: its name in JUnit.
+        group: of its tests there.
+        test: what must hold before a figure is believed.
+        holds: whether it does.
+        details: why, in words.
+        figures: by name; NaN is one that is not known.
+        facts: further properties, by name.
+        of: the part, "" for the whole.
+    """
+
+    suite: str
+    group: str
+    test: str
+    holds: bool
+    details: str
+    figures: Mapping[str, float]
+    facts: Mapping[str, str]
+    of: str = ""
+
+
+class JobResult(Protocol):
+    """What a job returns: plain data, and itself in words."""
+
+    @property
+    def work(self) -> str:
+        """How much was done: "1,000 simulations"."""
+
+    def to_json(self) -> Any:
+        """Return the result as JSON's types."""
+
+    def lines(self) -> Sequence[str | Table]:
+        """Return what the terminal shows: texts and tables."""
+
+    def judged(self) -> Sequence[Judged]:
+        """Return what fail conditions are applied to."""
+
+
+@dataclass(frozen=True)
+class Job:
+    """A job, as the command line has it.
+
+    Attributes:
+        name: of its command.
+        options: their class.
+        function: its module and name, ``module:name``; of keywords, the fields of the options.
+        help: what it does; the first line is its summary.
+        figures: what ``--fail-if`` can compare, by name: what each means.
+        example: of a fail condition.
+    """
+
+    name: str
+    options: type[JobOptions]
+    function: str
+    help: str
+    figures: Mapping[str, str]
+    example: str
+
+    def run(self, options: JobOptions) -> JobResult:
+        """Do it."""
+        module, _, name = self.function.partition(":")
+        result: JobResult = getattr(import_module(module), name)(**vars(options))
+        return result

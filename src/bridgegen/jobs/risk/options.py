@@ -1,0 +1,141 @@
+"""What a risk can be asked, and the figures that it states."""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from bridgegen.engine.options.forms import ANOTHER_SIMULATOR, NUMBER, PATH, TEXT, WHOLE
+from bridgegen.engine.options.option import DRIVER, OUTPUT, SIMULATOR, option
+from bridgegen.jobs.frame import ANY, OF_SCENARIO, Job, JobOptions
+
+if TYPE_CHECKING:
+    from bridgegen.scenario.exposure import Exposure
+    from bridgegen.scenario.exposure.fit import Fit
+    from bridgegen.simulation.choice import SimulatorChoice
+
+WORDS = {
+    "conflict": "a near miss or a collision",
+    "collision": "a collision",
+    "mais3": "a collision with a serious injury (MAIS3+)",
+}
+"""All whose probability is stated, in words: the events, and a serious injury."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class RiskOptions(JobOptions):
+    """The options of ``estimate_risk``."""
+
+    scenario: str | Path = field(kw_only=False, metadata=OF_SCENARIO)
+    ego: str | None = field(
+        default=None,
+        metadata=option(
+            TEXT, "Driver under test.", shown="the scenario's choice", group=DRIVER,
+            names="driver",
+        ),
+    )  # fmt: skip
+    exposure: "str | Path | Exposure | None" = field(
+        default=None,
+        metadata=option(
+            ANY,
+            "How its parameters are distributed: a file (.yaml), an example of 'bridgegen list "
+            "exposures', or uniform.",
+            shown="the exposure in the scenario's file",
+        ),
+    )
+    event: str = field(
+        default="collision", metadata=option(TEXT, "Aimed at: conflict or collision.")
+    )
+    count: str = field(
+        default="ego",
+        metadata=option(
+            TEXT, "Conflicts that count: ego (it is responsible, or could prevent them), or any."
+        ),
+    )
+    method: str = field(
+        default="auto", metadata=option(TEXT, "auto, mc, subset, importance or stratified.")
+    )
+    precision: float = field(
+        default=0.2,
+        metadata=option(
+            NUMBER, "Stop when half of the 95 % interval is this part of the estimate; 0: never."
+        ),
+    )
+    budget: int = field(
+        default=200_000,
+        metadata=option(
+            WHOLE,
+            "Simulations of the estimate, at most; a tenth more look for the most likely harmful "
+            "ones.",
+        ),
+    )
+    seed: int = field(default=0, metadata=option(WHOLE, "Of all random numbers."))
+    start: str | Path | None = field(
+        default=None,
+        metadata=option(
+            PATH, "Run of a search, whose harmful scenarios importance sampling may use.",
+            spelling="--from",
+        ),
+    )  # fmt: skip
+    check: int = field(
+        default=0,
+        metadata=option(
+            WHOLE, "Also estimate by so many plain Monte Carlo simulations, to compare.",
+            shown="none",
+        ),
+    )  # fmt: skip
+    events: "str | Path | Fit | None" = field(
+        default=None,
+        metadata=option(
+            ANY,
+            "The table (.csv) that the exposure was fitted to: says how much few data leave open.",
+            shown="none",
+        ),
+    )
+    simulator: "SimulatorChoice | None" = field(
+        default=None,
+        metadata=option(
+            ANOTHER_SIMULATOR,
+            "Also simulate rows around the harmful ones in this simulator, and say by which "
+            "factor the event is more or less likely there.",
+            shown="none",
+            group=SIMULATOR,
+            names="simulator",
+        ),
+    )
+    simulator_rows: int = field(
+        default=200, metadata=option(WHOLE, "How many rows there.", group=SIMULATOR)
+    )
+    out: Path | str | None = field(
+        default=None,
+        metadata=option(
+            PATH, "The risk's folder; a stopped estimate is resumed.", shown="risk/SCENARIO",
+            group=OUTPUT,
+        ),
+    )  # fmt: skip
+
+
+_OF = {"": "probability of {} per encounter", "_upper": "it is below this, with 95 % confidence"}
+FIGURES = {
+    **{
+        f"{name}{end}": text.format(words)
+        for name, words in WORDS.items()
+        for end, text in _OF.items()
+    },
+    **{f"{name}_per_hour": f"{words}, per hour" for name, words in WORDS.items()},
+    **{f"{name}_per_km": f"{words}, per km" for name, words in WORDS.items()},
+    "evaluations": "simulations",
+}
+"""The figures of a risk that ``--fail-if`` accepts."""
+
+JOB = Job(
+    name="risk",
+    options=RiskOptions,
+    function="bridgegen.jobs.risk.risk:estimate_risk",
+    help="""Estimate how likely harm is per encounter, with an interval.
+
+    And per hour and kilometre, where the exposure says how often the scenario is met. Writes a
+    record, a page, the harmful rows, and the most likely one of each failure mode as a scenario.
+    """,
+    figures=FIGURES,
+    example="collision_upper > 1e-4",
+)

@@ -1,0 +1,150 @@
+"""One contract for all jobs: what follows from their options, on the command line and in files."""
+
+import json
+import shlex
+import sys
+from dataclasses import dataclass, fields, replace
+from pathlib import Path
+
+import jsonschema
+import pytest
+import yaml
+
+from bridgegen.cli import main
+from bridgegen.cli.jobs import JOBS, schema_of
+from bridgegen.engine.options import options_of
+from bridgegen.jobs.frame import Job, Judged, command_of
+from bridgegen.simulation.choice import SimulatorChoice
+
+GIVEN = {
+    "risk": {
+        "scenario": "cut-in", "ego": "careful", "exposure": "uniform", "event": "conflict",
+        "count": "any", "method": "mc", "precision": 0.125, "budget": 345, "seed": 7,
+        "start": Path("runs/one"), "check": 12, "events": "events.csv", "vehicle": "single-track",
+        "others": "insistent", "simulator": SimulatorChoice("esmini"), "simulator_rows": 3,
+    },
+    "preventability": {
+        "scenario": "r157/cut-in", "ego": ("careful", "reference"), "grid": ["gap=1:9:3"],
+        "models": ("fsm",), "fixed": {"relative_speed": "40 km/h"}, "vehicle": "multi-body",
+        "others": "scripted",
+    },
+}  # fmt: skip
+"""Of each job all options but those that no result depends on, none at its default."""
+
+
+@dataclass
+class Nothing:
+    """A result without figures that are known."""
+
+    figures: dict[str, float]
+    work: str = "no work"
+
+    def to_json(self):
+        return {"nothing": True}
+
+    def lines(self):
+        return ["a line", (("head",), [("cell",)])]
+
+    def judged(self):
+        part = {"facts": {"fact": "so"}, "suite": "suite", "group": "group"}
+        return [
+            Judged(test="it is known", holds=False, details="why", figures=self.figures, **part)
+        ]
+
+
+@pytest.fixture
+def asked(monkeypatch):
+    """The options that commands were run with."""
+    found = []
+
+    def run(self, options):
+        found.append(options)
+        return Nothing(dict.fromkeys(self.figures, float("nan")))
+
+    monkeypatch.setattr(Job, "run", run)
+    return found
+
+
+def call(monkeypatch, *words):
+    monkeypatch.setattr(sys, "argv", ["bridgegen", *map(str, words)])
+    with pytest.raises(SystemExit) as end:
+        main()
+    return end.value.code or 0
+
+
+def plain(options):
+    return replace(options, out=None, workers=None, callbacks=None)
+
+
+jobs = pytest.mark.parametrize("job", JOBS, ids=lambda job: job.name)
+
+
+@jobs
+def test_all_options_are_given_here(job):
+    free = {"workers", "out", "callbacks"}
+    assert {one.name for one in fields(job.options)} - free == {*GIVEN[job.name]}
+    assert all(one.help for one in options_of(job.options))
+
+
+@jobs
+def test_the_command_that_repeats_a_job_has_its_options(job, asked, monkeypatch, tmp_path):
+    options = job.options(**GIVEN[job.name])
+    command = command_of(job.name, options, tmp_path / "a folder")
+    assert call(monkeypatch, *shlex.split(command)[1:]) == 0
+    assert Path(asked[0].out) == tmp_path / "a folder"
+    assert plain(asked[0]) == plain(options)
+
+
+@jobs
+def test_a_run_file_has_the_options_of_the_call_that_saved_it(job, asked, monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    options = job.options(**GIVEN[job.name])
+    words = shlex.split(command_of(job.name, options, Path("folder")))[1:]
+    assert call(monkeypatch, *words, "--save", "run.yaml") == 0
+    jsonschema.validate(yaml.safe_load(Path("run.yaml").read_text()), schema_of(job))
+    monkeypatch.chdir("/")
+    assert call(monkeypatch, job.name, tmp_path / "run.yaml", "--workers", "2") == 0
+    assert str(asked[1].workers) == "2"
+    moved = {
+        name: kind(tmp_path / getattr(asked[0], name))
+        for name, kind in {"start": Path, "events": str}.items()
+        if hasattr(options, name)
+    }
+    assert plain(asked[1]) == plain(replace(asked[0], **moved))
+    assert Path(asked[1].out) == tmp_path / "folder"
+
+
+@jobs
+def test_a_file_of_several_runs_makes_each_in_a_folder_of_its_own(
+    job, asked, monkeypatch, tmp_path, capsys
+):
+    needed = {
+        one.name: GIVEN[job.name][one.name] for one in options_of(job.options) if one.is_required
+    }
+    needed = {name: list(v) if isinstance(v, tuple) else v for name, v in needed.items()}
+    file = tmp_path / "both.yaml"
+    file.write_text(json.dumps({"runs": {"a": needed, "b": {**needed, "others": "scripted"}}}))
+    assert call(monkeypatch, job.name, file) == 0
+    assert [one.others for one in asked] == [None, "scripted"]
+    assert [Path(one.out) for one in asked] == [Path(job.name) / "both" / name for name in "ab"]
+    file.write_text(f"runs: {{a: &a {json.dumps(needed)}, b: *a}}")
+    assert call(monkeypatch, job.name, file) == 2
+    assert "both.yaml" in capsys.readouterr().err
+    file.write_text(yaml.safe_dump({"run": {**needed, "bugdet": 3}}))
+    assert call(monkeypatch, job.name, file) == 2
+    assert "unknown key 'bugdet' in run" in capsys.readouterr().err
+
+
+@jobs
+def test_what_is_not_known_is_not_judged(job, asked, monkeypatch, tmp_path, capsys):
+    words = shlex.split(command_of(job.name, job.options(**GIVEN[job.name]), tmp_path))[1:]
+    assert call(monkeypatch, *words) == 0
+    assert capsys.readouterr().out.startswith("a line\nhead\ncell\nwall time   ")
+    assert call(monkeypatch, *words, "--json") == 0
+    assert capsys.readouterr().out == '{\n "nothing": true\n}\n'
+    junit = tmp_path / "junit.xml"
+    assert call(monkeypatch, *words, "--fail-if", job.example, "--junit", junit) == 3
+    assert "NOT JUDGED: it is known (why)" in capsys.readouterr().err
+    assert 'errors="2"' in junit.read_text()
+    assert call(monkeypatch, *words, "--fail-if", "harmm > 3") == 2
+    assert "unknown figure of --fail-if 'harmm'" in capsys.readouterr().err
