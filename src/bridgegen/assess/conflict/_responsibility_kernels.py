@@ -398,7 +398,7 @@ def of_striking(scene, e, k, risk, since, side, late, stands, avoidable, whole):
             return EGO, STANDING_AHEAD
         return NEITHER, UNSAFE_START
     if side != 0 and not moved and not mine:
-        begins, _ = entered(scene, 0, e, k, 0.0)  # UN R157: the bodies overlap across the way
+        begins, _ = entered(scene, 0, e, k, MARGIN)
         begins = visible_from(scene, e, begins, k)
         if scene.kinds[e] == BUS:  # it is to be let go, see `evident_since`
             begins = min(begins, since)
