@@ -37,6 +37,12 @@ def test_a_standing_ego_is_struck(track, meeting):
     assert "brakes" not in text
 
 
+def test_who_is_struck_in_the_side_strikes_nobody(track, meeting):
+    ego, other = track(x=-30.0, v=10.0), track(x=-2.0, y=-31.0, h=RIGHT_ANGLE, v=10.0)
+    text = of(meeting(ego, other, claims=[BY_SIGNS]))
+    assert text.startswith("The front of 'bv' struck the ego's right side at 10.0 m/s closing")
+
+
 def test_signs_against_the_other(track, meeting):
     rollout = meeting(
         track(x=-30.0, v=10.0), track(y=-30.0, h=RIGHT_ANGLE, v=10.0), claims=[BY_SIGNS]

@@ -249,6 +249,17 @@ def test_who_draws_level_and_stays_behind_does_not_pass(track, meeting, course):
     assert (analyse(rollout).kind[0] != VIOLATION).all()
 
 
+def test_who_is_overtaken_and_then_stays_ahead_has_not_overtaken(track, meeting, course):
+    """The cyclist draws level from behind within 2 s, and falls behind again."""
+    rollout = meeting(
+        track(v=4.0),
+        track(x=-7.0, y=-1.7, v=course((0.0, 8.0), (2.0, 8.0), (3.0, 2.5), (6.0, 2.5))),
+        kinds=[CAR, BICYCLE], boxes=[(4.0, 2.0, 0.0), (1.8, 0.6, 0.0)], **corridor(),
+    )  # fmt: skip
+    assert rollout.distance[0, 1].min() < 0.5
+    assert (analyse(rollout).kind[0] != VIOLATION).all()
+
+
 @pytest.mark.parametrize("who", ["the other", "the ego"])
 def test_who_comes_near_while_they_are_level(track, meeting, course, who):
     """They are level from 2.8 s on (22 m at 8 m/s), 2 m apart; then one moves over by 1.6 m."""

@@ -109,6 +109,13 @@ DOUBTS = 2.0
 time. Source: the careful
 driver of UN R157, Annex 3, who reacts to a time to collision below 2 s.
 """
+SYSTEM_REACTION, SYSTEM_BRAKING = 0.35, 6.0
+"""[s], [m/s²] By which an automated system must avoid a cut-in. Source: UN R157, 5.2.5.2."""
+LATERAL_SEEN = 0.72
+"""[s] For so long a cutting-in vehicle's lateral motion must have been visible. Source: the same.
+"""
+LATERAL_MOVE, JUST_BEFORE = 0.01, 0.2
+"""[m], [s] It moves sideways if it comes nearer by more than 1 cm in the 0.2 s before. Ours."""
 AHEAD_BY = 0.01
 """[m] A body that brakes and is farther ahead than without braking, by more, has not avoided the
 other by braking. Ours: rounding."""

@@ -39,6 +39,7 @@ from bridgegen.assess.conflict._codes import (
     CROSSWALK,
     CUT_IN,
     CUT_IN_PREVENTABLE,
+    CUT_IN_REQUIRED,
     DECIDED,
     EGO,
     EGO_STANDING,
@@ -84,6 +85,7 @@ from bridgegen.assess.conflict._codes import (
     WRONG_SIDE,
 )
 from bridgegen.assess.conflict._geometry_kernels import (
+    beside,
     entered,
     hidden,
     time_along_paths,
@@ -97,14 +99,19 @@ from bridgegen.assess.conflict._limits import (
     EVIDENT_EVERY,
     HARD,
     HORIZON,
+    JUST_BEFORE,
     JUST_NOW,
     LATELY,
+    LATERAL_MOVE,
+    LATERAL_SEEN,
     MARGIN,
     MARGIN_ON_FOOT,
     MOVES,
     OFF_LANE,
     STANDS,
     STOOD,
+    SYSTEM_BRAKING,
+    SYSTEM_REACTION,
     TURN_TIME,
     UNSURE,
 )
@@ -147,7 +154,7 @@ def judge(scene, e, k, at, kind, own, own_part, appears, whole, real):
             since = seen
     comes = kind == HEAD_ON and not scene.near  # standing does not avoid it unless it stops, too
     level = braked_and_stood(scene, 0, e, seen, seen, BRAKING, comes)
-    if comes and level != CLEAR and risk < seen < stands:
+    if (comes or kind == REAR_END_STRIKING) and level != CLEAR and risk < seen < stands:
         seen = foreseen_since(scene, e, risk, seen)
         level = braked_and_stood(scene, 0, e, seen, seen, BRAKING, comes)
     avoidable = real[STOOD_EGO] <= 0.0 and level == CLEAR and not appears
@@ -250,7 +257,7 @@ def decide(
     stands from ``stands`` on (k + 1: it moves); ``late``: it was hidden before ``risk``.
     """
     if kind == EGO_STANDING:
-        return OTHER, STRUCK_STANDING
+        return of_standing(scene, e, k, whole)
     if kind != REAR_END_STRIKING and kind != REAR_END_STRUCK:
         last = ahead_until(scene, k, real[TTC]) if scene.near else k
         mine, its = ran_red(scene, 0, k, last), ran_red(scene, e, k, last)
@@ -278,6 +285,23 @@ def decide(
     if kind in (SIDE_SWIPE, HEAD_ON):
         return of_leaving(scene, e, k, kind, own, since, avoidable)
     return of_crossing(scene, e, k, own, since, avoidable, whole)
+
+
+@kernel
+def of_standing(scene, e, k, whole):
+    """Decide where the other drives into the ego, which stands.
+
+    One that has priority need not brake harder than `COMFORT`, neither from when the ego came into
+    its way, nor, since it may expect that the ego stops before it, from when the ego stands there.
+    """
+    claim = scene.claims[e]
+    if claim < 0 and claim != -SIREN:
+        came, _ = entered(scene, e, 0, k, 0.0)
+        for since in (came, min(still_since(scene.v[0], scene.first, k), k)):
+            if braked(scene, e, 0, since, since, COMFORT) == COLLIDES:
+                whole[DECIDED] = since
+                return EGO, rule_of(claim)
+    return OTHER, STRUCK_STANDING
 
 
 @kernel
@@ -398,7 +422,7 @@ def of_striking(scene, e, k, risk, since, side, late, stands, avoidable, whole):
             return EGO, STANDING_AHEAD
         return NEITHER, UNSAFE_START
     if side != 0 and not moved and not mine:
-        begins, _ = entered(scene, 0, e, k, MARGIN)
+        begins, _ = entered(scene, 0, e, k, 0.0)  # UN R157: the bodies overlap across the way
         begins = visible_from(scene, e, begins, k)
         if scene.kinds[e] == BUS:  # it is to be let go, see `evident_since`
             begins = min(begins, since)
@@ -406,6 +430,9 @@ def of_striking(scene, e, k, risk, since, side, late, stands, avoidable, whole):
         whole[DECIDED], whole[PREVENTABLE] = begins, could
         if could:
             return EGO, CUT_IN_PREVENTABLE
+        if not scene.near and is_required(scene, e, risk, k):
+            whole[DECIDED] = risk
+            return EGO, CUT_IN_REQUIRED
         return OTHER, (rule_of(claim) if its and claim > 0 else CUT_IN)
     start = max(slowing_since(v[e], scene.first, min(stands, k), scene.dt), risk)
     level = braked(scene, 0, e, start, start, BRAKING)
@@ -423,6 +450,31 @@ def of_striking(scene, e, k, risk, since, side, late, stands, avoidable, whole):
     if kept or moved:
         return EGO, REAR_DISTANCE
     return NEITHER, UNSAFE_START
+
+
+@kernel
+def is_required(scene, e, since, k):
+    """Return whether a system must avoid body e, which cuts in at ``since``, until they meet at k.
+
+    Source: UN R157, 5.2.5.2: the time to collision at the intrusion, 0.3 m over the marking (see
+    `MARGIN`), exceeds v / (2 * 6 m/s²) + 0.35 s, at v the ego is faster; the other keeps its speed,
+    and its lateral motion has been visible for 0.72 s. On a road that gives less than 6 m/s², that
+    is taken instead.
+    """
+    x, y, c, s, v = scene.x, scene.y, scene.c, scene.s, scene.v
+    seen = since - int(LATERAL_SEEN / scene.dt + 0.5)
+    before = seen - int(JUST_BEFORE / scene.dt + 0.5)
+    if before < scene.first or visible_from(scene, e, seen, k) > seen:
+        return False
+    j, now = beside(x[0], y[0], c[0], s[0], scene.first, scene.n, seen, x[e, seen], y[e, seen])
+    _, then = beside(x[0], y[0], c[0], s[0], scene.first, scene.n, j, x[e, before], y[e, before])
+    if abs(then) - abs(now) < LATERAL_MOVE or v[e, since : k + 1].min() < v[e, since] - MOVES:
+        return False
+    ahead = (x[e, since] - x[0, since]) * c[0, since] + (y[e, since] - y[0, since]) * s[0, since]
+    gap = ahead - scene.half[0, 0] - scene.half[e, 0]
+    faster = v[0, since] - v[e, since] * (c[e, since] * c[0, since] + s[e, since] * s[0, since])
+    braking = min(SYSTEM_BRAKING, scene.friction)
+    return faster > 0.0 and gap > faster * (faster / (2.0 * braking) + SYSTEM_REACTION)
 
 
 @kernel

@@ -125,9 +125,9 @@ def passing(corridor, half, kinds, e, x, y, c, s, v, distance, dt, until, whole,
     """Find the ego's pass of body e, which rides, drives or walks on the lanes of its way.
 
     It passes once its front is ahead of the other's. Not counted is whom it drew level with before
-    it could have slowed down. ``real`` becomes the clearance [m] that is the ego's: the least one,
-    or that with which it drew level where the other moved over then; and the speed by which the ego
-    was faster [m/s]. ``x``, ``y`` are centres.
+    it could have slowed down, and who drew level from behind. ``real`` becomes the clearance [m]
+    that is the ego's: the least one, or that with which it drew level where the other moved over
+    then; and the speed by which the ego was faster [m/s]. ``x``, ``y`` are centres.
     """
     n, level, entry, own, early, i = samples(corridor), -1, 0.0, 0.0, False, -1
     reach = half[0, 0] + half[e, 0]
@@ -143,7 +143,7 @@ def passing(corridor, half, kinds, e, x, y, c, s, v, distance, dt, until, whole,
         faster = v[0, k] - v[e, k] * cosine
         if level < 0:
             level, entry, own = k, distance[k], its
-            early = k * dt < REACTION + max(faster, 0.0) / COMFORT
+            early = ahead < 0.0 or k * dt < REACTION + max(faster, 0.0) / COMFORT
         if early or cosine < SAME_WAY or ahead > half[0, 0] - half[e, 0]:
             continue
         if faster < PASSES or v[0, k] < WALKING_PACE:

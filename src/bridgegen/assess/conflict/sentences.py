@@ -40,6 +40,9 @@ _BY_BOTH = {
 }
 
 
+_CROSSINGS = (ConflictType.CROSSING, ConflictType.TURNING)
+
+
 def sentence(conflicts: Conflicts, row: int, other: int) -> str:
     """Return one English sentence on the conflict of the ego and another participant.
 
@@ -104,16 +107,19 @@ def _event(conflicts: Conflicts, row: int, other: int, name: str) -> str:
             f"at {closing:.1f} m/s closing speed, which needed "
             f"{conflicts.needed[row, other]:.1f} m/s² of braking"
         )
-    speed = f"at {closing:.1f} m/s closing speed"
+    speed, strikes = f"at {closing:.1f} m/s closing speed", "struck"
+    if closing < 0.05:  # m/s
+        speed, strikes = "without closing on it", "touched"
     if kind == ConflictType.EGO_STANDING:
         stood = conflicts.stood_ego[row, other]
         return (
-            f"The {its} of {name} struck the {own} of {whole}, which had stood for {stood:.1f} s, "
-            f"{speed}"
+            f"The {its} of {name} {strikes} the {own} of {whole}, which had stood for "
+            f"{stood:.1f} s, {speed}"
         )
-    if kind in (ConflictType.REAR_END_STRUCK, ConflictType.VRU_INTO_SIDE):
-        return f"The {its} of {name} struck the {mine} {speed}"
-    verb = "met" if kind == ConflictType.SIDE_SWIPE else "struck"
+    by_other = kind in (ConflictType.REAR_END_STRUCK, ConflictType.VRU_INTO_SIDE)
+    if by_other or (kind in _CROSSINGS and "front" in its and "front" not in own):
+        return f"The {its} of {name} {strikes} the {mine} {speed}"
+    verb = "met" if kind == ConflictType.SIDE_SWIPE and strikes == "struck" else strikes
     return f"The {mine} {verb} the {its} of {name} {speed}"
 
 

@@ -143,6 +143,7 @@ class Rule(IntEnum):
     PASSED_TOO_CLOSE = _codes.PASSED_TOO_CLOSE
     DID_NOT_KEEP_LANE = _codes.DID_NOT_KEEP_LANE
     LEFT_THE_ROAD = _codes.LEFT_THE_ROAD
+    CUT_IN_REQUIRED = _codes.CUT_IN_REQUIRED
 
     @property
     def label(self) -> str:
@@ -171,11 +172,11 @@ RULES = {
         "StVO § 4 (1)",
     ),
     Rule.CUT_IN: (
-        "cut in so closely that a careful driver could not have avoided it",
+        "cut in so closely that braking from then on could not have avoided it",
         "UN R157, 5.2.5.2 and Annex 3; StVO § 7 (5)",
     ),
     Rule.CUT_IN_PREVENTABLE: (
-        "did not brake for a cut-in that left enough time",
+        "did not avoid a cut-in that left enough time to brake",
         "UN R157, 5.2.5.2 and Annex 3",
     ),
     Rule.REVEALED_LATE: (
@@ -252,6 +253,11 @@ RULES = {
     Rule.PASSED_TOO_CLOSE: (
         "overtook a cyclist without enough room to the side",
         "StVO § 5 (4): 1.5 m at least in towns, 2 m outside them",
+    ),
+    Rule.CUT_IN_REQUIRED: (
+        "did not avoid a cut-in that a system must avoid: it came over the marking at more than "
+        "v / 12 m/s² + 0.35 s to collision, v being the closing speed",
+        "UN R157, 5.2.5.2",
     ),
     Rule.BRAKED_HARD_AHEAD: (
         "the vehicle ahead braked so hard that a careful driver would have come as near",
