@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from bridgegen.base import errors
     from bridgegen.engine.simulate import simulate_file
-    from bridgegen.jobs.compare import Comparison, compare
+    from bridgegen.jobs.compare.comparison import compare
+    from bridgegen.jobs.compare.result import Comparison
     from bridgegen.jobs.dashboard import Dashboard, build_dashboard
     from bridgegen.jobs.preventability.preventability import map_preventability
     from bridgegen.jobs.preventability.result import PreventabilityMap
@@ -54,8 +55,8 @@ __all__ = [
 ]
 
 _HOMES = {
-    "Comparison": "bridgegen.jobs.compare",
-    "compare": "bridgegen.jobs.compare",
+    "Comparison": "bridgegen.jobs.compare.result",
+    "compare": "bridgegen.jobs.compare.comparison",
     "Dashboard": "bridgegen.jobs.dashboard",
     "build_dashboard": "bridgegen.jobs.dashboard",
     "confirm": "bridgegen.jobs.search.confirm",

@@ -11,9 +11,10 @@ import numpy as np
 import pytest
 
 from bridgegen.base.errors import InputError, Interrupted, StorageError, UnknownNameError
-from bridgegen.jobs.benchmark import BenchmarkCallbacks, benchmark_planners
+from bridgegen.jobs.benchmark.benchmark import benchmark_planners
 from bridgegen.jobs.benchmark.failures import failures_of
 from bridgegen.jobs.benchmark.plan import Cell
+from bridgegen.jobs.compare.runs import RunsProgress
 from bridgegen.jobs.search.run import Run
 from bridgegen.scenario.participants import PARTICIPANTS
 
@@ -105,19 +106,21 @@ def test_every_link_of_the_page_leads_to_a_file(done):
     assert not re.search(r'(src|href)="(https?:)?//', text)
 
 
-def test_interrupted_and_resumed_it_is_the_same(done, tmp_path):
+def test_interrupted_and_resumed_it_is_the_same(done, tmp_path, monkeypatch):
     """Nor do results depend on how many runs there are at a time."""
     out = tmp_path / "other"
     ended = []
 
-    def interrupt(name: str, failure: str | None) -> None:
+    def interrupt(self, name: str, failure: str | None) -> None:
         ended.append(name)
         if len(ended) == 1:
             raise KeyboardInterrupt
 
     drive = ["blind", "un-r157"]
-    with pytest.raises(Interrupted, match=r"bridgegen benchmark planners --ego blind"):
-        benchmark_planners(drive, **GRID, out=out, callbacks=BenchmarkCallbacks(ended=interrupt))
+    with monkeypatch.context() as patched:
+        patched.setattr(RunsProgress, "ended", interrupt)
+        with pytest.raises(Interrupted, match=r"bridgegen benchmark planners --ego blind"):
+            benchmark_planners(drive, **GRID, out=out)
     assert not (out / "benchmark.html").exists()
     benchmark_planners(drive, **{**GRID, "workers": 2}, out=out)
     for name in TABLES:
@@ -125,14 +128,14 @@ def test_interrupted_and_resumed_it_is_the_same(done, tmp_path):
         assert table(out / name) == of_all != []
 
 
-def test_a_later_call_adds_runs_and_makes_none_again(done):
+def test_a_later_call_adds_runs_and_makes_none_again(done, monkeypatch):
     """Of its seeds, the first is triaged, and the second if it fails in another way."""
     out = done.plan.out
     before = {path: path.stat().st_mtime_ns for path in out.glob("runs/*/run.sqlite")}
     searched = []
-    callbacks = BenchmarkCallbacks(batch=lambda name, evaluations: searched.append(name))
+    monkeypatch.setattr(RunsProgress, "batch", lambda self, name, _: searched.append(name))
     drivers, grid = ["un-r157", "route-follower"], {**GRID, "scenarios": ["cut-in"], "seeds": 2}
-    more = benchmark_planners(drivers, **grid, out=out, callbacks=callbacks)
+    more = benchmark_planners(drivers, **grid, out=out)
     new = {"un-r157-perfect-1", "route-follower-perfect-0", "route-follower-perfect-1"}
     assert {*searched} == {f"cut-in-{name}" for name in new}
     assert all(path.stat().st_mtime_ns == then for path, then in before.items())
@@ -168,7 +171,7 @@ def test_a_driver_that_cannot_be_made_is_said_before_it_starts(package, tmp_path
         ({"scenarios": ["cut-in", "cut-in"]}, InputError, "cut-in must be named once"),
         ({"budget": 0}, InputError, "1 <= budget <= 10000000 must hold, got 0"),
         ({"seeds": 0}, InputError, "1 <= seeds <= 1000 must hold, got 0"),
-        ({"workers": 0}, InputError, "1 <= workers must hold, got 0"),
+        ({"workers": 0}, InputError, "workers must be a number of processes, 1 to"),
         ({"algorithm": "psoo"}, UnknownNameError, "did you mean 'pso'"),
     ],
 )

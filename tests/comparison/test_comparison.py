@@ -17,10 +17,11 @@ import pytest
 import bridgegen as bg
 from bridgegen.base.errors import InputError, Interrupted, StorageError, UnknownNameError
 from bridgegen.cli import main
-from bridgegen.jobs.compare import ComparisonCallbacks
 from bridgegen.jobs.compare.page import FIGURE_NAMES
 from bridgegen.jobs.compare.plan import Cell
 from bridgegen.jobs.compare.record import points
+from bridgegen.jobs.compare.runs import RunsProgress
+from bridgegen.jobs.frame import JobCallbacks
 from bridgegen.jobs.search.coverage import coverage_of
 from bridgegen.results.store import Store
 from bridgegen.search.algorithms.registry import ALGORITHMS
@@ -182,25 +183,27 @@ def test_killed_and_gone_on_with_it_is_the_same(done, tmp_path):
     kept = finished(out)
     assert kept >= 1
     told = []
-    callbacks = ComparisonCallbacks(begun=lambda plan, ended, made: told.append((ended, made)))
+    callbacks = JobCallbacks(progress=lambda *now: told.append(now))
     again = bg.compare("crossroads-s4", **GRID, workers=1, out=out, callbacks=callbacks)
-    assert told[0][0] >= kept
-    assert told[0][1] == 120 * told[0][0]
+    _, made, total, facts = told[0]
+    ended = int(facts.split()[0])
+    assert ended >= kept
+    assert (made, total) == (120 * ended, 480)
     assert not again.gaps
     assert the_same(done.folder, out)
 
 
-def test_stopped_it_says_how_to_go_on_and_then_it_may_grow(done, tmp_path):
-    def stop(name, evaluations):
+def test_stopped_it_says_how_to_go_on_and_then_it_may_grow(done, tmp_path, monkeypatch):
+    def stop(self, name, evaluations):
         if name.endswith("pso-0") and evaluations >= 80:
             raise KeyboardInterrupt
 
     out = tmp_path / "s4"
     small = {**GRID, "seeds": 1}
-    with pytest.raises(Interrupted) as caught:
-        bg.compare(
-            "crossroads-s4", **small, workers=1, out=out, callbacks=ComparisonCallbacks(batch=stop)
-        )
+    with monkeypatch.context() as patched:
+        patched.setattr(RunsProgress, "batch", stop)
+        with pytest.raises(Interrupted) as caught:
+            bg.compare("crossroads-s4", **small, workers=1, out=out)
     assert "stopped after 1 of 2 runs; resume with 'bridgegen compare" in str(caught.value)
     assert f"--seeds 1 --budget 120 --objective paper --out {out}'" in str(caught.value)
     assert finished(out) == 1

@@ -4,7 +4,8 @@ import os
 from pathlib import Path
 
 from bridgegen.engine.options import SearchOptions
-from bridgegen.jobs.compare.runs import RunCallbacks, Task, evaluations_of, run_all
+from bridgegen.jobs.compare.runs import RunsProgress, Task, evaluations_of, run_all
+from bridgegen.jobs.frame import JobCallbacks
 
 
 class Bomb(str):
@@ -22,15 +23,20 @@ def task(folder: Path, name: str, **more: object) -> Task:
 
 
 def test_a_process_that_dies_costs_one_run(tmp_path):
-    told: list[tuple[str, bool]] = []
-    callbacks = RunCallbacks(ended=lambda name, failure: told.append((name, failure is None)))
+    told: list[str] = []
+    said: list[str] = []
+    counts: list[tuple[int, int, str]] = []
     tasks = [task(tmp_path, "bomb", junction=Bomb()), task(tmp_path, "0")]
-    failures = run_all(tasks, 2, callbacks)
+    callbacks = JobCallbacks(say=said.append, progress=lambda what, *more: counts.append(more))
+    progress = RunsProgress(callbacks, len(tasks), 40, each=told.append)
+    failures = run_all(tasks, 2, progress)
     assert list(failures) == ["bomb"]
     assert failures["bomb"] in (
         "its process ended with exit status 7",
         "its process ended by SIGKILL",
     )
-    assert sorted(told) == [("0", True), ("bomb", False)]
+    assert sorted(told) == ["0", "bomb"]
+    assert said == [f"bomb failed: {failures['bomb']}"]
+    assert (counts[0], counts[-1]) == ((0, 80, "0 of 2 runs"), (40, 40, "2 of 2 runs, 1 failed"))
     assert evaluations_of(tmp_path / "0") == (40, True)
     assert evaluations_of(tmp_path / "bomb") == (0, False)

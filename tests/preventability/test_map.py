@@ -124,7 +124,7 @@ def test_a_stopped_map_is_resumed_and_ends_the_same(whole, tmp_path, monkeypatch
     monkeypatch.setattr(chunks, "CHUNK", 50)
     out, made = tmp_path / "stopped", []
 
-    def stop(what: str, done: int, total: int) -> None:
+    def stop(what: str, done: int, total: int, facts: str) -> None:
         if done >= 100:
             raise KeyboardInterrupt
 

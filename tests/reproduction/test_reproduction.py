@@ -22,11 +22,11 @@ import bridgegen as bg
 from bridgegen.base.errors import InputError, Interrupted, StorageError
 from bridgegen.cli import main
 from bridgegen.jobs.compare.figures import DARK
+from bridgegen.jobs.compare.runs import RunsProgress
 from bridgegen.jobs.search.restored import pipeline_of
 from bridgegen.results.store import Store
 from bridgegen.search.algorithms.evolved import PSO
 from bridgegen_reproduction import (
-    ReproductionCallbacks,
     paper,
     pictures,
     protocol,
@@ -205,13 +205,19 @@ def test_interrupted_and_gone_on_with_it_is_the_same(
 ):
     """Stopped in the middle of a run; then the command that it tells."""
 
-    def stop(name: str, evaluations: int) -> None:
-        if name == "with-perception/paper-crossroads-s3-pso-0" and evaluations >= 80:
-            raise KeyboardInterrupt
+    seen = []
+
+    def stop(self, name: str, evaluations: int) -> None:
+        if name == "paper-crossroads-s3-pso-0" and evaluations >= 80:
+            seen.append(evaluations)
+            if seen.count(80) == 2:  # as printed, it has ended; this is with perception
+                raise KeyboardInterrupt
 
     monkeypatch.chdir(tmp_path)
-    with pytest.raises(Interrupted) as caught:
-        reproduce(**tiny, workers=1, callbacks=ReproductionCallbacks(batch=stop))
+    with monkeypatch.context() as patched:
+        patched.setattr(RunsProgress, "batch", stop)
+        with pytest.raises(Interrupted) as caught:
+            reproduce(**tiny, workers=1)
     told = str(caught.value)
     stopped, _, command = told.partition("; resume with ")
     assert re.fullmatch(rf"stopped after 1\d of {COUNT} runs", stopped)
@@ -308,7 +314,10 @@ def test_the_last_spread_is_the_run_s(done):
     protocol = result.found.protocol
     arguments = {**protocol.arguments(PRINTED), "out": folder / "as-printed"}
     told = result.found.commands["as-printed"]
-    assert "--algorithms random,pso,nsga2-dt --seeds 2 --budget 120 --objective paper" in told
+    assert (
+        "--algorithms random,pso,nsga2-dt --distinct 0.1 --seeds 2 --budget 120 --objective paper"
+        in told
+    )
     assert "--ego route-follower" in told
     comparison = bg.compare(**arguments, workers=1, deliver=False)
     measured = comparison.measured["paper-crossroads-s4"]

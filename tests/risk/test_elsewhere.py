@@ -164,7 +164,7 @@ def counted_faster(found):
 
 
 def test_stopped_there_and_gone_on_it_is_the_same(simulators, tmp_path):
-    def stop(what, done, total):
+    def stop(what, done, total, facts):
         if what == "elsewhere" and done >= 40:
             raise KeyboardInterrupt
 
@@ -174,7 +174,7 @@ def test_stopped_there_and_gone_on_it_is_the_same(simulators, tmp_path):
         risk(tmp_path / "two", callbacks=JobCallbacks(progress=stop), **given)
     made = []
     callbacks = JobCallbacks(
-        progress=lambda what, done, total: made.append(done) if what == "elsewhere" else None
+        progress=lambda what, done, total, facts: made.append(done) if what == "elsewhere" else None
     )
     again = risk(tmp_path / "two", callbacks=callbacks, **given)
     assert again.elsewhere == whole.elsewhere

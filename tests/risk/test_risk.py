@@ -124,7 +124,7 @@ def test_the_page_says_it_without_scripts(risk):
 
 @pytest.mark.parametrize("at", [1, 700])
 def test_stopped_and_gone_on_it_is_the_same(risk, tmp_path, at):
-    def stop(what, done, total):
+    def stop(what, done, total, facts):
         if done >= at:
             raise KeyboardInterrupt
 

@@ -3,17 +3,18 @@
 import csv
 import io
 import json
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from bridgegen.base.disk import write_whole
 from bridgegen.base.errors import Interrupted, StorageError
 from bridgegen.engine.workers import read_choice
-from bridgegen.jobs.compare.comparison import ComparisonCallbacks, compare
+from bridgegen.jobs.compare.comparison import compare
 from bridgegen.jobs.compare.plan import RUNS, Cell
 from bridgegen.jobs.compare.result import Comparison
 from bridgegen.jobs.compare.runs import evaluations_of
+from bridgegen.jobs.frame import JobCallbacks
 from bridgegen_reproduction import paper
 from bridgegen_reproduction.claims import judge, of_fronts
 from bridgegen_reproduction.document import FIGURES, TABLES, Document, Picture, markdown
@@ -33,26 +34,6 @@ NUMBERS = (
     "avg_fitness", "median_fitness",
 )  # fmt: skip
 TIMES = ("seconds_to_k", "runtime")
-
-
-@dataclass(frozen=True)
-class ReproductionCallbacks:
-    """Called as a reproduction progresses.
-
-    Attributes:
-        begun: with the protocol, the number of its runs that have ended already, and their
-            evaluations.
-        compile: before the first run, whose simulator may have to be compiled.
-        batch: with a run's name and its evaluations so far.
-        ended: with a run's name, and why it failed or None.
-        stage: with the stage that begins when the runs are done: "read", "draw".
-    """
-
-    begun: Callable[[Protocol, int, int], None] = lambda protocol, ended, made: None
-    compile: Callable[[], None] = lambda: None
-    batch: Callable[[str, int], None] = lambda name, evaluations: None
-    ended: Callable[[str, str | None], None] = lambda name, failure: None
-    stage: Callable[[str], None] = lambda stage: None
 
 
 @dataclass(frozen=True)
@@ -94,7 +75,7 @@ def reproduce(
     workers: int | str | None = None,
     road_map: Path | str | None = None,
     junction: str | None = None,
-    callbacks: ReproductionCallbacks | None = None,
+    callbacks: JobCallbacks | None = None,
 ) -> Reproduction:
     """Run the paper's evaluation, Section V, and write it down beside the paper's numbers.
 
@@ -122,7 +103,7 @@ def reproduce(
         StorageError: the folder holds something else, is being written, or cannot be.
         Interrupted: Ctrl-C; every run keeps what it has done.
     """
-    callbacks = callbacks or ReproductionCallbacks()
+    callbacks = callbacks or JobCallbacks()
     read_choice(workers)  # before there is a folder
     protocol = make_protocol(
         seeds=seeds,
@@ -133,25 +114,24 @@ def reproduce(
         junction=junction,
     )
     _begin(protocol)
-    done: set[str] = set()
     comparisons: dict[str, Comparison] = {}
     try:
-        _tell_begun(protocol, callbacks, done)
+        progress = _Progress(protocol, callbacks)
         for part in PARTS:
-            seen = _callbacks_of(part, callbacks, done)
+            seen = progress.of(part)
             arguments = protocol.arguments(part)
             comparisons[part.name] = compare(
                 **arguments, workers=workers, deliver=False, callbacks=seen
             )
-        callbacks.stage("read")
+        callbacks.stage("reading the runs")
         found = _read(protocol, comparisons)
-        callbacks.stage("draw")
+        callbacks.stage("drawing")
         document = tell(found, pictures(found, comparisons[PRINTED.name]))
         _write(found, document)
     except (KeyboardInterrupt, Interrupted):
-        total = sum(1 for _ in protocol.cells())
+        ended = [is_ended for *_, is_ended in _runs_of(protocol)]
         raise Interrupted(
-            protocol.out, len(done), total, what="runs", command=protocol.command()
+            protocol.out, sum(ended), len(ended), what="runs", command=protocol.command()
         ) from None
     return Reproduction(protocol.out, found, document)
 
@@ -177,37 +157,34 @@ def _begin(protocol: Protocol) -> None:
     write_whole(out / MARK, [json.dumps(mark, indent=1).encode()])
 
 
-def _tell_begun(protocol: Protocol, callbacks: ReproductionCallbacks, done: set[str]) -> None:
-    made = 0
+def _runs_of(protocol: Protocol) -> Iterator[tuple[Part, int, bool]]:
+    """Yield of each run its part, its evaluations, and whether it has ended."""
     for part, cell in protocol.cells():
         try:
-            evaluations, is_ended = evaluations_of(protocol.run_folder(part, cell))
-        except StorageError:
-            continue  # the comparison tells of it
-        if is_ended:
-            done.add(_name(part, cell.name))
-            made += evaluations
-    callbacks.begun(protocol, len(done), made)
+            yield part, *evaluations_of(protocol.run_folder(part, cell))
+        except StorageError:  # the comparison tells of it
+            yield part, 0, False
 
 
-def _callbacks_of(
-    part: Part, callbacks: ReproductionCallbacks, done: set[str]
-) -> ComparisonCallbacks:
-    """Return the callbacks of one comparison, which name its runs by their part."""
+class _Progress:
+    """Says how far the runs of all parts are, each of which is a comparison."""
 
-    def ended(name: str, failure: str | None) -> None:
-        done.add(_name(part, name))
-        callbacks.ended(_name(part, name), failure)
+    def __init__(self, protocol: Protocol, callbacks: JobCallbacks) -> None:
+        self._callbacks = callbacks
+        self._total, self._made = 0, {part.name: 0 for part in PARTS}
+        for part, evaluations, is_ended in _runs_of(protocol):
+            self._total += protocol.budget
+            self._made[part.name] += evaluations if is_ended else 0
 
-    return ComparisonCallbacks(
-        compile=callbacks.compile,
-        batch=lambda name, evaluations: callbacks.batch(_name(part, name), evaluations),
-        ended=ended,
-    )
+    def of(self, part: Part) -> JobCallbacks:
+        """Return the callbacks of one part's comparison."""
 
+        def progress(what: str, made: int, total: int, facts: str) -> None:
+            self._made[part.name] = made
+            now = f"{part.name}: {facts}"
+            self._callbacks.progress(what, sum(self._made.values()), self._total, now)
 
-def _name(part: Part, run: str) -> str:
-    return f"{part.name}/{run}"
+        return replace(self._callbacks, progress=progress, stage=lambda what: None)
 
 
 def _read(protocol: Protocol, comparisons: Mapping[str, Comparison]) -> Found:

@@ -4,11 +4,8 @@ from typing import Any
 
 from rich.console import Console
 
-from bridgegen.cli.terminal.comparison import RunsScreen
-from bridgegen_reproduction.protocol import Protocol
-from bridgegen_reproduction.reproduction import Reproduction, ReproductionCallbacks, reproduce
-
-_STAGES = {"read": "reading the runs", "draw": "drawing"}
+from bridgegen.cli.terminal.live import JobScreen
+from bridgegen_reproduction.reproduction import Reproduction, reproduce
 
 
 def reproduce_and_print(**arguments: Any) -> Reproduction:
@@ -17,25 +14,10 @@ def reproduce_and_print(**arguments: Any) -> Reproduction:
     Args:
         arguments: of ``reproduce``, but for ``callbacks``.
     """
-    with ReproductionScreen() as screen:
+    with JobScreen() as screen:
         result = reproduce(**arguments, callbacks=screen.callbacks)
     print_reproduction(result, screen.seconds)
     return result
-
-
-class ReproductionScreen(RunsScreen):
-    """A reproduction's live progress: evaluations of all runs, runs that have ended."""
-
-    @property
-    def callbacks(self) -> ReproductionCallbacks:
-        """The callbacks for a reproduction."""
-        return ReproductionCallbacks(
-            begun=self._begin, compile=self.say_compiling, batch=self.batch, ended=self.end,
-            stage=lambda stage: self.show(what=_STAGES[stage], facts=""),
-        )  # fmt: skip
-
-    def _begin(self, protocol: Protocol, ended: int, made: int) -> None:
-        self.begin(sum(1 for _ in protocol.cells()), protocol.budget, ended, made)
 
 
 def print_reproduction(result: Reproduction, seconds: float) -> None:

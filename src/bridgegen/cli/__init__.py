@@ -10,8 +10,6 @@ from bridgegen.cli import (
     runs,
     views,
     confirmations,
-    comparisons,
-    benchmarks,
     suites,
     regressions,
     jobs,
@@ -29,8 +27,6 @@ from bridgegen.cli.app import app, main
 
 __all__ = [
     "app",
-    "benchmarks",
-    "comparisons",
     "confirmations",
     "dashboard",
     "demo",

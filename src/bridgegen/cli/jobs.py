@@ -12,18 +12,25 @@ import typer
 
 from bridgegen.base.errors import InputError
 from bridgegen.cli import options as common
-from bridgegen.cli.app import FAILED, app
-from bridgegen.cli.connection import NO_CONNECTION, Connection, with_connection_options
+from bridgegen.cli.app import FAILED, app, benchmarks
+from bridgegen.cli.connection import (
+    NO_CONNECTION,
+    Connection,
+    with_connection_options,
+    with_map_folder,
+)
 from bridgegen.cli.declared import declare, with_declared_options
 from bridgegen.cli.groups import SEARCH
 from bridgegen.cli.run_files import FiledRun, Key, keys_of, schema, with_run_files
 from bridgegen.engine.options import options_of
-from bridgegen.engine.options.option import OUTPUT
+from bridgegen.engine.options.option import OUTPUT, WHAT
+from bridgegen.jobs.benchmark.options import JOB as BENCHMARK
+from bridgegen.jobs.compare.options import JOB as COMPARE
 from bridgegen.jobs.frame import Job, JobResult
 from bridgegen.jobs.preventability.options import JOB as PREVENTABILITY
 from bridgegen.jobs.risk.options import JOB as RISK
 
-JOBS = (PREVENTABILITY, RISK)
+JOBS = (COMPARE, BENCHMARK, PREVENTABILITY, RISK)
 """In the order of ``--help``."""
 
 _OF_SIMULATOR = ("simulator", "simulator_set", "connection")
@@ -71,6 +78,8 @@ def command_of(job: Job) -> Any:
     named = {one.name: one for one in signature.parameters.values()}
     for name in _OF_SIMULATOR if not simulators else ():
         del named[name]
+    if not argument_of(job):
+        del named["save"]
     if simulators:
         named["simulator"] = named["simulator"].replace(
             annotation=Annotated[str | None, declare(simulators[0])]
@@ -78,14 +87,14 @@ def command_of(job: Job) -> Any:
     command.__signature__ = signature.replace(  # type: ignore[attr-defined]
         parameters=[*named.values()]
     )
-    command.__name__, command.__doc__ = job.name, inspect.cleandoc(job.help)
+    command.__name__, command.__doc__ = job.name.replace(" ", "_"), inspect.cleandoc(job.help)
     made = with_declared_options(command)
     return with_connection_options(made) if simulators else made
 
 
 def schema_of(job: Job) -> dict[str, Any]:
     """Return the JSON Schema of the run files of a job."""
-    return schema(keys_of(command_of(job), job.options))
+    return schema(keys_of(command_of(job), job.options), argument_of(job))
 
 
 def _print(result: JobResult, seconds: float, *, as_json: bool) -> None:
@@ -94,11 +103,11 @@ def _print(result: JobResult, seconds: float, *, as_json: bool) -> None:
     if as_json:
         print(json.dumps(result.to_json(), indent=1))
         return
-    for one in result.lines():
+    for one in result.shown():
         if isinstance(one, str):
             print(one)
         else:
-            print_table(*one, as_json=False)
+            print_table(one.head, one.rows, as_json=False, texts=one.texts)
     print(f"{'wall time':<12}{seconds:.1f} s, {result.work}")
 
 
@@ -119,11 +128,20 @@ def run_all(
         raise typer.Exit(status)
 
 
+def argument_of(job: Job) -> str:
+    """Return the name of what a job's command takes without a spelling; "" if there is none."""
+    return next((one.name for one in options_of(job.options) if one.is_argument), "")
+
+
 def _add(job: Job) -> None:
-    several = partial(run_all, job=job.name)
-    app.command(job.name, rich_help_panel=SEARCH)(
-        with_run_files(several, job.options)(command_of(job))
-    )
+    command = command_of(job)
+    if argument := argument_of(job):
+        several = partial(run_all, job=job.name)
+        command = with_run_files(several, job.options, argument)(command)
+    group, _, name = job.name.rpartition(" ")
+    parent = benchmarks if group else app
+    panel = None if group else SEARCH
+    parent.command(name, rich_help_panel=panel)(with_map_folder(WHAT)(command))
 
 
 for _job in JOBS:

@@ -10,9 +10,9 @@ from bridgegen.base.errors import InputError
 from bridgegen.cli.completion import completing
 from bridgegen.cli.connection import Connection
 from bridgegen.cli.declared import declaration
-from bridgegen.engine.options.forms import read_settings, read_value
+from bridgegen.engine.options.forms import read_settings
 from bridgegen.engine.options.option import DRIVER, OBJECTIVE, OUTPUT, SEARCH, SIMULATOR
-from bridgegen.simulation.choice import SIMULATORS, SimulatorChoice, Value
+from bridgegen.simulation.choice import SIMULATORS, SimulatorChoice
 
 Save = Annotated[
     Path | None,
@@ -219,15 +219,3 @@ def read_simulators(
     own = SIMULATORS[name].access if name and name in SIMULATORS else {}
     left = {k: v for k, v in connection.items() if k in own or k not in for_screen}
     return read_simulator(name, settings, left), replace(chosen, access=for_screen)
-
-
-def read_algorithm_settings(pairs: list[str] | None) -> dict[str, dict[str, Value]]:
-    """Read ``algorithm.name=value`` pairs."""
-    found: dict[str, dict[str, Value]] = {}
-    for pair in pairs or ():
-        name, equals, text = pair.partition("=")
-        algorithm, dot, setting = name.partition(".")
-        if not (equals and dot and algorithm and setting):
-            raise InputError(f"--set must read ALGORITHM.NAME=VALUE, got '{pair}'")
-        found.setdefault(algorithm, {})[setting] = read_value(text)
-    return found

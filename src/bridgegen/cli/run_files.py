@@ -139,7 +139,7 @@ def read_run_document(path: Path) -> "Document":
         raise FileFormatError(f"cannot be read: {error.strerror} ({path})") from None
 
 
-def read_runs(path: Path, keys: Mapping[str, Key]) -> list[FiledRun]:
+def read_runs(path: Path, keys: Mapping[str, Key], argument: str) -> list[FiledRun]:
     """Return the runs of a run file.
 
     Raises:
@@ -158,7 +158,9 @@ def read_runs(path: Path, keys: Mapping[str, Key]) -> list[FiledRun]:
     if len(_HEADS & data.keys()) != 1:
         problems.append(f"a run file must have the key 'run' or the key 'runs' ({document.at(())})")
     elif "run" in data:
-        found.append(FiledRun("", _read_run(document, ("run",), data["run"], keys, problems)))
+        found.append(
+            FiledRun("", _read_run(document, ("run",), data["run"], keys, argument, problems))
+        )
     elif not isinstance(data["runs"], dict) or not data["runs"]:
         problems.append(f"runs must be a mapping, NAME: OPTIONS ({document.at(('runs',))})")
     else:
@@ -171,7 +173,7 @@ def read_runs(path: Path, keys: Mapping[str, Key]) -> list[FiledRun]:
                     f"'{name}' ({document.at(('runs', name))})"
                 )
             place = ("runs", name)
-            found.append(FiledRun(name, _read_run(document, place, one, keys, problems)))
+            found.append(FiledRun(name, _read_run(document, place, one, keys, argument, problems)))
     if problems:
         raise InputError(*problems)
     return found
@@ -182,6 +184,7 @@ def _read_run(
     place: tuple[str, ...],
     data: object,
     keys: Mapping[str, Key],
+    argument: str,
     problems: list[str],
 ) -> Values:
     from bridgegen.scenario.language.parameters import nearest
@@ -206,8 +209,8 @@ def _read_run(
             problems.append(f"{label}.{spelling} {error}, got {value!r} ({where})")
             continue
         values[key.name] = _moved(key, parsed, lambda path: Path(document.place).parent / path)
-    if SCENARIO not in data:
-        problems.append(f"{label} must have the key '{SCENARIO}' ({document.at(place)})")
+    if argument not in data:
+        problems.append(f"{label} must have the key '{argument}' ({document.at(place)})")
     return values
 
 
@@ -291,7 +294,7 @@ def _text(path: Path, values: Values, keys: Mapping[str, Key]) -> str:
     return text
 
 
-def schema(keys: Mapping[str, Key]) -> dict[str, Any]:
+def schema(keys: Mapping[str, Key], argument: str = SCENARIO) -> dict[str, Any]:
     """Return the JSON Schema of run files."""
     properties = {}
     for spelling, key in keys.items():
@@ -302,7 +305,7 @@ def schema(keys: Mapping[str, Key]) -> dict[str, Any]:
     run = {
         "type": "object",
         "properties": properties,
-        "required": [SCENARIO],
+        "required": [argument],
         "additionalProperties": False,
     }
     return {
@@ -327,6 +330,7 @@ def schema(keys: Mapping[str, Key]) -> dict[str, Any]:
 def with_run_files(
     several: Callable[[Path, list[FiledRun], Mapping[str, Key], Callable[[Values], Any]], None],
     kind: type[Any] = SearchOptions,
+    argument: str = SCENARIO,
 ) -> Callable[[Callable[..., Any]], Callable[..., None]]:
     """Return what has a command take a run file in place of a scenario.
 
@@ -334,6 +338,7 @@ def with_run_files(
         several: runs a file of several runs: of the file, its runs, the keys of a run, and the
             command of one.
         kind: the class of the command's declared options.
+        argument: the name of what the command takes without a spelling.
     """
 
     def decorate(command: Callable[..., Any]) -> Callable[..., None]:
@@ -349,12 +354,13 @@ def with_run_files(
             }
             save = values.pop(SAVE)
             given.pop(SAVE, None)
-            path = Path(values[SCENARIO])
-            filed = is_run_file(values[SCENARIO])
+            first = values[argument][0] if isinstance(values[argument], list) else values[argument]
+            path, filed = Path(first), is_run_file(first)
             runs = [FiledRun("", given)]
             if filed:
-                del given[SCENARIO]
-                runs = [FiledRun(o.name, _over(o.values, given)) for o in read_runs(path, keys)]
+                del given[argument]
+                read = read_runs(path, keys, argument)
+                runs = [FiledRun(one.name, _over(one.values, given)) for one in read]
             if save is not None:
                 if len(runs) > 1 or runs[0].name:
                     raise InputError("--save writes one run, and this file has several")

@@ -11,16 +11,28 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from importlib import import_module
 from math import inf
+from os import PathLike
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Protocol
 
 from bridgegen.base.errors import InputError
-from bridgegen.engine.options import options_of
-from bridgegen.engine.options.forms import PATH, Form
+from bridgegen.engine.options import file_forms, options_of
+from bridgegen.engine.options.forms import PATH, Form, read_names
 from bridgegen.engine.options.option import DRIVER, OUTPUT, SEARCH, WHAT, Declared, option
 
-Table = tuple[Sequence[str], Sequence[Sequence[object]]]
-"""Heads and rows."""
+
+class Table(NamedTuple):
+    """A table of the terminal.
+
+    Attributes:
+        head: of its columns.
+        rows: a value for each column.
+        texts: how many of the first columns hold texts; numbers stand to the right.
+    """
+
+    head: Sequence[str]
+    rows: Sequence[Sequence[object]]
+    texts: int = 1_000
 
 
 def _named(value: Any) -> str:
@@ -29,8 +41,37 @@ def _named(value: Any) -> str:
     return str(Path(value).resolve()) if is_file else str(value)
 
 
+def _names(values: Any) -> tuple[Any, ...]:
+    return (values,) if isinstance(values, str | PathLike) else tuple(values or ())
+
+
+def _repeated(spelling: str, values: Sequence[Any]) -> list[str]:
+    return [word for value in values for word in (spelling, _named(value))]
+
+
 SCENARIO = Form(str, words=lambda spelling, value: [spelling, _named(value)])
 """A name of the catalogue or of a pack, or the path of a file."""
+
+SCENARIOS = Form(
+    list[str],
+    words=_repeated,
+    keep=_names,
+    in_file=file_forms.TEXTS,
+    valid=lambda values: all(isinstance(one, str | PathLike) for one in values),
+    must="names or paths",
+)
+"""Several of these; in Python one may stand alone."""
+
+DRIVERS = Form(
+    list[str],
+    read=lambda texts, _: tuple(read_names(",".join(texts))),
+    words=lambda spelling, names: [spelling, ",".join(names)] if names else [],
+    keep=_names,
+    in_file=file_forms.TEXTS,
+    valid=lambda names: all(isinstance(one, str) for one in names),
+    must="names",
+)
+"""Names, repeated or separated by commas; in Python one may stand alone."""
 
 ANY = Form(str, valid=lambda value: value is not None, must="given")
 """A text, or what Python code gives in its place; the job checks it."""
@@ -42,16 +83,20 @@ class JobCallbacks:
 
     Attributes:
         compile: before kernels are compiled.
-        progress: with what is counted, how many of it are done, and of how many.
+        stage: with the stage that begins, in words.
+        progress: with what is counted, how many of it are done, of how many, and further facts.
+        say: with a line that stays: what has failed, or what to expect.
     """
 
     compile: Callable[[], None] = lambda: None
-    progress: Callable[[str, int, int], None] = lambda what, done, total: None
+    stage: Callable[[str], None] = lambda what: None
+    progress: Callable[[str, int, int, str], None] = lambda what, done, total, facts: None
+    say: Callable[[str], None] = lambda text: None
 
 
 @dataclass(frozen=True, kw_only=True)
-class JobOptions(Declared):
-    """What every job is given, besides the options of its own."""
+class DriveOptions(Declared):
+    """How the ego moves, and who drives the others."""
 
     vehicle: str | None = field(
         default=None,
@@ -74,6 +119,12 @@ class JobOptions(Declared):
             names="others",
         ),
     )
+
+
+@dataclass(frozen=True, kw_only=True)
+class JobOptions(Declared):
+    """What every job is given, besides the options of its own."""
+
     workers: Any = field(
         default=None,
         metadata=option(
@@ -145,7 +196,7 @@ def command_of(name: str, options: JobOptions, out: Path, **resolved: Any) -> st
     of_places = [one for one in options_of(type(options)) if one.is_argument]
     rest = [one for one in options_of(type(options)) if not one.is_argument]
     words = [word for one in (*of_places, *rest) for word in one.words(values[one.name])]
-    return shlex.join(["bridgegen", name, *words, "--out", str(out)])
+    return shlex.join(["bridgegen", *name.split(), *words, "--out", str(out)])
 
 
 @dataclass(frozen=True)
@@ -183,7 +234,7 @@ class JobResult(Protocol):
     def to_json(self) -> Any:
         """Return the result as JSON's types."""
 
-    def lines(self) -> Sequence[str | Table]:
+    def shown(self) -> Sequence[str | Table]:
         """Return what the terminal shows: texts and tables."""
 
     def judged(self) -> Sequence[Judged]:
@@ -195,7 +246,7 @@ class Job:
     """A job, as the command line has it.
 
     Attributes:
-        name: of its command.
+        name: of its command, ``GROUP NAME`` if that is one of a group.
         options: their class.
         function: its module and name, ``module:name``; of keywords, the fields of the options.
         help: what it does; the first line is its summary.

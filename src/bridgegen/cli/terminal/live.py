@@ -104,5 +104,9 @@ class JobScreen(Live):
 
         return JobCallbacks(
             compile=self.say_compiling,
-            progress=lambda what, done, total: self.show(what=what, done=done, total=total),
+            stage=lambda what: self.show(what=what, facts=""),
+            progress=lambda what, done, total, facts: self.show(
+                what=what, done=done, total=total, facts=facts
+            ),
+            say=lambda text: self.console.print(text, markup=False, highlight=False),
         )

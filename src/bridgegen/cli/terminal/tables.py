@@ -22,8 +22,16 @@ LEAST = 24
 """The fewest characters that a line of a wrapped column holds."""
 
 
-def print_table(head: Sequence[str], rows: Sequence[Sequence[object]], *, as_json: bool) -> None:
+def print_table(
+    head: Sequence[str],
+    rows: Sequence[Sequence[object]],
+    *,
+    as_json: bool,
+    texts: int = 1_000,
+) -> None:
     """Print rows as a table, or as a JSON list of objects.
+
+    Columns from the number ``texts`` on hold numbers, which stand to the right.
 
     In a file or a pipe no text is wrapped. On a terminal only the widest column is; where not even
     that leaves it ``LEAST`` characters, each row is a block of lines, one for each of its texts.
@@ -31,25 +39,31 @@ def print_table(head: Sequence[str], rows: Sequence[Sequence[object]], *, as_jso
     if as_json:
         print(json.dumps([dict(zip(head, row, strict=True)) for row in rows], indent=2))
         return
-    texts = [["" if value is None else _shown(value) for value in row] for row in rows]
-    widths = [max(map(cell_len, column)) for column in zip(head, *texts, strict=True)]
+    shown = [["" if value is None else _shown(value) for value in row] for row in rows]
+    widths = [max(map(cell_len, column)) for column in zip(head, *shown, strict=True)]
     whole, widest = sum(widths) + 2 * (len(head) - 1), max(range(len(head)), key=widths.__getitem__)
     console = Console(markup=False, emoji=False, highlight=False)
     if not console.is_terminal:
-        for row in (head, *texts):
+        for row in (head, *shown):
+            spaces = [
+                " " * (width - cell_len(text)) for text, width in zip(row, widths, strict=True)
+            ]
             cells = [
-                text + " " * (width - cell_len(text))
-                for text, width in zip(row, widths, strict=True)
+                text + space if column < texts else space + text
+                for column, (text, space) in enumerate(zip(row, spaces, strict=True))
             ]
             print("  ".join(cells).rstrip())
         return
     if whole - widths[widest] + LEAST > console.width:
-        _print_blocks(console, head, texts)
+        _print_blocks(console, head, shown)
         return
     table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0), header_style="bold")
     for column, name in enumerate(head):
-        table.add_column(name, overflow="fold", no_wrap=column != widest)
-    for row in texts:
+        table.add_column(
+            name, overflow="fold", no_wrap=column != widest,
+            justify="left" if column < texts else "right",
+        )  # fmt: skip
+    for row in shown:
         table.add_row(*row)
     console.print(table)
 

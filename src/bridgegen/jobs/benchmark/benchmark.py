@@ -1,16 +1,21 @@
 """A benchmark of drivers from start to finish: search, triage, judge, write tables and a page."""
 
-from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from math import isfinite, isnan, nan
 from pathlib import Path
+from typing import Any
 
 from bridgegen.base.errors import InputError, Interrupted
 from bridgegen.engine.domain import needed_by
-from bridgegen.engine.options import PipelineOptions
+from bridgegen.engine.options import PipelineOptions, called_with
 from bridgegen.engine.runner import Runner
+from bridgegen.engine.workers import read_choice
 from bridgegen.engine.workers.processes import cores
+from bridgegen.jobs.benchmark.failures import CAREFUL
+from bridgegen.jobs.benchmark.options import BenchmarkOptions
 from bridgegen.jobs.benchmark.page import write_page
 from bridgegen.jobs.benchmark.plan import (
+    COLUMNS,
     FILE,
     KEEP,
     QUICK_BUDGET,
@@ -48,7 +53,9 @@ from bridgegen.jobs.benchmark.work import (
     task_of,
 )
 from bridgegen.jobs.compare.plan import RUN_PATTERN, RUNS
-from bridgegen.jobs.compare.runs import RunCallbacks, run_all
+from bridgegen.jobs.compare.runs import RunsProgress, run_all
+from bridgegen.jobs.compare.words import number
+from bridgegen.jobs.frame import JobCallbacks, Judged, Table
 from bridgegen.jobs.search.scenarios import load
 from bridgegen.results.folder import claim
 from bridgegen.results.store.sqlite import Lock
@@ -57,26 +64,6 @@ from bridgegen.search.algorithms.algorithm import Problem, resolve
 from bridgegen.search.triage.effort import effort
 
 LOCK = "benchmark.lock"
-
-
-@dataclass(frozen=True)
-class BenchmarkCallbacks(RunCallbacks):
-    """Called as a benchmark progresses.
-
-    Attributes:
-        stage: with the stage that begins: "domains", "speeds", "search", "triage", "judge",
-            "read".
-        measuring: with the name of a driver whose speed is measured.
-        estimated: with the plan, and how many seconds the runs take, about.
-        begun: with the number of runs, how many have ended already, and their evaluations.
-        tasks: with the number of tasks of a stage without evaluations, and how many are done.
-    """
-
-    stage: Callable[[str], None] = lambda stage: None
-    measuring: Callable[[str], None] = lambda driver: None
-    estimated: Callable[[Plan, float], None] = lambda plan, seconds: None
-    begun: Callable[[int, int, int], None] = lambda runs, ended, made: None
-    tasks: Callable[[int, int], None] = lambda number, done: None
 
 
 @dataclass(frozen=True)
@@ -97,21 +84,68 @@ class Benchmark:
     gaps: dict[Cell, str]
     page: Path
 
+    @property
+    def work(self) -> str:
+        """How many runs there are."""
+        return f"{len(self.plan.cells):,} runs"
 
-def benchmark_planners(
-    drivers: Sequence[str] | None = None,
-    *,
-    scenarios: Sequence[str | Path] | None = None,
-    budget: int | None = None,
-    seeds: int | None = None,
-    algorithm: str = "pso",
-    keep: int | None = None,
-    triage: str | None = None,
-    quick: bool = False,
-    workers: int | None = None,
-    out: Path | str | None = None,
-    callbacks: BenchmarkCallbacks | None = None,
-) -> Benchmark:
+    def to_json(self) -> list[dict[str, Any]]:
+        """Return what is known of each driver."""
+        return [
+            {
+                **vars(one), "first": one.first if isfinite(one.first) else None,
+                "avoided": {k: v if isfinite(v) else None for k, v in one.avoided.items()},
+            }
+            for one in self.standings
+        ]  # fmt: skip
+
+    def shown(self) -> list[str | Table]:
+        """Return what the terminal shows: the table of drivers, and the files."""
+        head = (
+            "driver", "perception", "modes", "robust", "first", "severity",
+            *(f"{name} avoids" for name in CAREFUL), "scenarios", "n/a", "no result",
+            "failed rows",
+        )  # fmt: skip
+        gaps = [f"missing: {cell.name}: {why}" for cell, why in self.gaps.items()]
+        return [
+            Table(head, [_row(one) for one in self.standings], texts=2),
+            *gaps,
+            f"\n{'page':<12}{self.page}",
+            f"{'tables':<12}{self.plan.out / '*.csv'}",
+            f"{'runs':<12}{self.plan.out / RUNS}  (bridgegen resume, view, …)",
+        ]
+
+    def judged(self) -> list[Judged]:
+        """Return the figures of each driver in each column of perception."""
+        facts = {"command": self.plan.command(), "page": str(self.page)}
+        return [
+            Judged(
+                suite="planners", group=f"bridgegen.planners.{one.driver.replace('.', '_')}",
+                test="it drove", holds=one.driven > 0,
+                details=f"{one.evaluations} evaluations in {one.driven} scenarios",
+                figures={
+                    "modes": one.modes, "robust": one.robust, "severity": one.severity,
+                    "failures": one.failures, "failed_rows": one.failed_rows,
+                    "no_result": one.failed,
+                },
+                facts=facts, of=f"{one.driver}, {COLUMNS[one.column]}",
+            )
+            for one in self.standings
+        ]  # fmt: skip
+
+
+def _row(one: Standing) -> list[object]:
+    shares = (one.avoided.get(name, nan) for name in CAREFUL)
+    return [
+        one.driver, COLUMNS[one.column].removesuffix(" perception"), one.modes, one.robust,
+        number(one.first, 0), f"{one.severity:.2f}",
+        *(number(100 * share, 0) + ("" if isnan(share) else " %") for share in shares),
+        one.driven, one.not_applicable, one.failed, one.failed_rows,
+    ]  # fmt: skip
+
+
+@called_with(BenchmarkOptions)
+def benchmark_planners(given: BenchmarkOptions) -> Benchmark:
     """Search scenarios for the failures of several drivers, and compare what is found.
 
     Each driver drives each scenario within its stated domain, with perfect perception and by what
@@ -119,43 +153,31 @@ def benchmark_planners(
     ``outcomes.csv``, ``modes.csv`` and a page. Killed at any moment and called again, it resumes;
     called with more drivers, scenarios or seeds, it adds their runs.
 
-    Args:
-        drivers: names, as of ``--ego``; by default all planners that are installed, and ours.
-        scenarios: names of the catalogue, or paths; the catalogue by default.
-        budget: evaluations of each run; 1,000 by default.
-        seeds: runs of each driver, scenario and column; 3 by default.
-        algorithm: that searches.
-        keep: scenarios that each run exports; 3 by default.
-        triage: how much of the findings is simulated again: "full", "short" or "none"; "short" by
-            default.
-        quick: whether other defaults hold: four scenarios, two of our drivers, 40 evaluations, one
-            seed, one scenario exported, no triage.
-        workers: number of runs at a time; one for each core by default. No result depends on it.
-        out: folder; ``benchmarks/planners`` by default, or ``benchmarks/planners-quick``.
-        callbacks: called as it progresses.
+    Returns:
+        The benchmark. A run that failed is a gap in it.
 
     Raises:
         InputError: an invalid argument or file, or a planner that is not installed.
         StorageError: the folder holds something else, is in use, or cannot be written.
         Interrupted: Ctrl-C; every run keeps what it has done.
     """
-    callbacks = callbacks or BenchmarkCallbacks()
-    budget = budget if budget is not None else QUICK_BUDGET if quick else 1000
-    seeds = seeds if seeds is not None else QUICK_SEEDS if quick else 3
-    keep = keep if keep is not None else QUICK_KEEP if quick else KEEP
-    triage = triage if triage is not None else QUICK_TRIAGE if quick else TRIAGE
-    at_once = cores() if workers is None else workers
+    callbacks, quick, algorithm = given.callbacks, given.quick, given.algorithm
+    usual = (QUICK_BUDGET, QUICK_SEEDS, QUICK_KEEP) if quick else (1000, 3, KEEP)
+    asked = (given.budget, given.seeds, given.keep)
+    budget, seeds, keep = (b if a is None else a for a, b in zip(asked, usual, strict=True))
+    triage = given.triage or (QUICK_TRIAGE if quick else TRIAGE)
+    at_once = cores() if given.workers is None else read_choice(given.workers)
     problems = number_problems(seeds, budget, keep)
-    if at_once < 1:
-        problems.append(f"1 <= workers must hold, got {workers}")
+    if not isinstance(at_once, int):
+        raise InputError(f"workers must be a number of processes, got {at_once}")
     if problems:
         raise InputError(*problems)
     effort(triage)
     resolve(toolkit.get(algorithm), Problem.unnamed(1), 0, {})
-    taking_part = entrants(drivers, QUICK_DRIVERS if quick else ours())
-    searched = [str(one) for one in scenarios or (QUICK_SCENARIOS if quick else catalogue())]
-    folder = Path(out or Path("benchmarks") / ("planners-quick" if quick else "planners"))
-    callbacks.stage("domains")
+    taking_part = entrants(given.drivers or None, QUICK_DRIVERS if quick else ours())
+    searched = [str(one) for one in given.scenarios or (QUICK_SCENARIOS if quick else catalogue())]
+    folder = Path(given.out or Path("benchmarks") / ("planners-quick" if quick else "planners"))
+    callbacks.stage("reading the scenarios")
     callbacks.compile()
     needs = {name: domain_of(name) for name in dict.fromkeys(searched)}
     plan = make_plan(
@@ -178,7 +200,7 @@ def benchmark_planners(
         lock.release()
 
 
-def _run(plan: Plan, at_once: int, callbacks: BenchmarkCallbacks, done: list[str]) -> Benchmark:
+def _run(plan: Plan, at_once: int, callbacks: JobCallbacks, done: list[str]) -> Benchmark:
     """Make what is missing, and conclude.
 
     Args:
@@ -187,55 +209,49 @@ def _run(plan: Plan, at_once: int, callbacks: BenchmarkCallbacks, done: list[str
         callbacks: called as it progresses.
         done: gets the names of the runs whose search has ended.
     """
-    callbacks.stage("speeds")
-    plan, speeds = measured(plan, callbacks.measuring)
+    callbacks.stage("measuring speeds")
+    plan, speeds = measured(plan, lambda driver: callbacks.stage(f"measuring {driver}"))
     failures: dict[Cell, str] = {}
     tasks, ended, made = searches(plan, failures)
     waiting = {one.name for one in tasks}
     done += [cell.name for cell in plan.cells if cell.name not in waiting and cell not in failures]
-    callbacks.estimated(plan, seconds_of(plan, speeds, at_once))
-    callbacks.stage("search")
-    callbacks.begun(len(plan.cells), ended, made)
-
-    def search_ended(name: str, failure: str | None) -> None:
-        done.append(name)
-        callbacks.ended(name, failure)
-
+    _say_plan(plan, seconds_of(plan, speeds, at_once), callbacks)
+    callbacks.stage("searching")
     by_name = {cell.name: cell for cell in plan.cells}
-    of_runs = RunCallbacks(callbacks.compile, callbacks.batch, search_ended)
-    failures |= {by_name[name]: why for name, why in run_all(tasks, at_once, of_runs).items()}
+    progress = RunsProgress(callbacks, len(plan.cells), plan.budget, ended, made, done.append)
+    failures |= {by_name[name]: why for name, why in run_all(tasks, at_once, progress).items()}
     failures = read_gaps(plan, failures)
 
     to_triage = chosen(plan, failures)
-    callbacks.stage("triage")
+    callbacks.stage("testing failures")
     delivered = [
         task_of(plan, cell, deliver=True)
         for cell in to_triage
         if not is_delivered(plan.folder(cell))
     ]
-    counting = _Counting(callbacks, len(delivered))
-    failed = run_all(delivered, at_once, RunCallbacks(ended=counting.ended))
+    counting = _Counting(callbacks, "testing failures", len(delivered))
+    failed = run_all(delivered, at_once, counting)
     failures |= {by_name[name]: why for name, why in failed.items()}
 
-    callbacks.stage("judge")
+    callbacks.stage("careful drivers")
     finished = [
         Finish(cell.name, plan.folder(cell), cell in to_triage)
         for cell in plan.cells
         if cell not in failures and not is_finished(plan.folder(cell))
     ]
-    counting = _Counting(callbacks, len(finished))
-    failed = finish_all(finished, at_once, RunCallbacks(ended=counting.ended))
+    counting = _Counting(callbacks, "careful drivers", len(finished))
+    failed = finish_all(finished, at_once, counting)
     failures |= {by_name[name]: why for name, why in failed.items()}
     return conclude(plan, failures, callbacks)
 
 
-def conclude(plan: Plan, failures: dict[Cell, str], callbacks: BenchmarkCallbacks) -> Benchmark:
+def conclude(plan: Plan, failures: dict[Cell, str], callbacks: JobCallbacks) -> Benchmark:
     """Read the runs, and write tables and page.
 
     Raises:
         StorageError: they cannot be written.
     """
-    callbacks.stage("read")
+    callbacks.stage("reading the runs")
     found = outcomes(plan, failures)
     result = Benchmark(plan, found, standings(found), failures, plan.out / "benchmark.html")
     write_tables(plan, result.outcomes, result.standings)
@@ -243,17 +259,41 @@ def conclude(plan: Plan, failures: dict[Cell, str], callbacks: BenchmarkCallback
     return result
 
 
-class _Counting:
+class _Counting(RunsProgress):
     """Counts the tasks of a stage."""
 
-    def __init__(self, callbacks: BenchmarkCallbacks, number: int) -> None:
-        self._callbacks, self._number, self._done = callbacks, number, 0
-        callbacks.tasks(number, 0)
+    def __init__(self, callbacks: JobCallbacks, what: str, number: int) -> None:
+        self._what = what
+        super().__init__(callbacks, number, 0)
+
+    def batch(self, name: str, evaluations: int) -> None:
+        """Its evaluations have been made already."""
 
     def ended(self, name: str, failure: str | None) -> None:
         """Count one more."""
-        self._done += 1
-        self._callbacks.tasks(self._number, self._done)
+        self._ended += 1
+        self._show()
+
+    def _show(self) -> None:
+        self._callbacks.progress(self._what, self._ended, self._runs, "")
+
+
+def _say_plan(plan: Plan, seconds: float, callbacks: JobCallbacks) -> None:
+    """Say who does not take part, and how long the runs take."""
+    for one in plan.entrants:
+        if one.problem:
+            callbacks.say(f"{one.name}: {one.problem}")
+    callbacks.say(
+        f"{len(plan.cells)} runs of {plan.budget:,} evaluations: about {_duration(seconds)}, by "
+        "the speed of each driver on this machine; less where runs have ended already"
+    )
+
+
+def _duration(seconds: float) -> str:
+    if seconds < 90:
+        return f"{seconds:.0f} s"
+    minutes = seconds / 60
+    return f"{minutes:.0f} min" if minutes < 90 else f"{minutes / 60:.1f} h"
 
 
 def domain_of(scenario: str) -> frozenset[str]:

@@ -1,7 +1,6 @@
 """The grid of a benchmark: scenarios × drivers × perception × seeds, and how long it will take."""
 
 import re
-import shlex
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -19,7 +18,9 @@ from bridgegen.engine.domain import in_words
 from bridgegen.engine.options import PipelineOptions, SearchOptions
 from bridgegen.engine.pipeline import Pipeline
 from bridgegen.engine.workers import Threads
+from bridgegen.jobs.benchmark.options import BenchmarkOptions
 from bridgegen.jobs.compare.plan import MAX_SEEDS, RUNS
+from bridgegen.jobs.frame import command_of
 from bridgegen.jobs.search.scenarios import is_file, load
 from bridgegen.scenario.language.reader import names
 
@@ -155,15 +156,12 @@ class Plan:
 
     def command(self) -> str:
         """Return the command line that starts or resumes this benchmark."""
-        words = ["bridgegen", "benchmark", "planners"]
-        for one in self.entrants:
-            words += ["--ego", one.name]
-        for given in self.scenarios.values():
-            words += ["--scenario", given]
-        words += ["--budget", str(self.budget), "--seeds", str(self.seeds)]
-        words += ["--algorithm", self.algorithm, "--keep", str(self.keep)]
-        words += ["--triage", self.triage]
-        return shlex.join([*words, "--out", str(self.out)])
+        given = BenchmarkOptions(
+            tuple(one.name for one in self.entrants), scenarios=tuple(self.scenarios.values()),
+            budget=self.budget, seeds=self.seeds, algorithm=self.algorithm, keep=self.keep,
+            triage=self.triage,
+        )  # fmt: skip
+        return command_of("benchmark planners", given, self.out)
 
     def identity(self) -> dict[str, Any]:
         """Return what must be equal in all runs of one folder, as JSON's types."""

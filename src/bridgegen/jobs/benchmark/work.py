@@ -15,7 +15,7 @@ from bridgegen.jobs.benchmark.failures import (
     write_reproductions,
 )
 from bridgegen.jobs.benchmark.plan import Cell, Plan
-from bridgegen.jobs.compare.runs import RunCallbacks, Task, evaluations_of
+from bridgegen.jobs.compare.runs import RunsProgress, Task, evaluations_of
 from bridgegen.jobs.search.run import REPORT, Run
 from bridgegen.search.triage.record import JSON_FILE
 
@@ -92,7 +92,7 @@ def is_delivered(folder: Path) -> bool:
     return (folder / JSON_FILE).exists() and (folder / REPORT).exists()
 
 
-def finish_all(tasks: Iterable[Finish], at_once: int, callbacks: RunCallbacks) -> dict[str, str]:
+def finish_all(tasks: Iterable[Finish], at_once: int, progress: RunsProgress) -> dict[str, str]:
     """Judge runs; return why some could not be, by name.
 
     Raises:
@@ -103,7 +103,7 @@ def finish_all(tasks: Iterable[Finish], at_once: int, callbacks: RunCallbacks) -
     def ended(task: Finish, problem: str | None, crash: str | None) -> None:
         if (why := crash or problem) is not None:
             problems[task.name] = why
-        callbacks.ended(task.name, why)
+        progress.ended(task.name, why)
 
     at_once = min(at_once, len(waiting))
     if at_once > 1:

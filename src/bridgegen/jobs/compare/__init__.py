@@ -1,6 +1,4 @@
-"""Comparisons of algorithms: a grid of runs, measures of each, and statistical tests."""
+"""Comparisons of algorithms: a grid of runs, measures of each, and statistical tests.
 
-from bridgegen.jobs.compare.comparison import ComparisonCallbacks, compare
-from bridgegen.jobs.compare.result import Comparison
-
-__all__ = ["Comparison", "ComparisonCallbacks", "compare"]
+Nothing is imported here, so that its options load without a simulator.
+"""

@@ -1,98 +1,29 @@
 """A comparison from start to finish: make the missing runs, measure, test, draw, write."""
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Mapping
 from pathlib import Path
 
 from bridgegen.base.errors import Interrupted, StorageError
 from bridgegen.engine.options import CommonOptions, called_with
 from bridgegen.engine.workers import read_choice
 from bridgegen.engine.workers.processes import cores
-from bridgegen.jobs.compare.distinct import APART
 from bridgegen.jobs.compare.measures import counts, measure, measures
+from bridgegen.jobs.compare.options import CompareOptions
 from bridgegen.jobs.compare.page import write_page
 from bridgegen.jobs.compare.plan import Cell, Plan, begin, make_plan
 from bridgegen.jobs.compare.record import read, space_of, terms_of
 from bridgegen.jobs.compare.result import Comparison
-from bridgegen.jobs.compare.runs import RunCallbacks, Task, evaluations_of, run_all
+from bridgegen.jobs.compare.runs import RunsProgress, Task, evaluations_of, run_all
 from bridgegen.jobs.compare.table import summarise, write_tables
+from bridgegen.jobs.frame import JobCallbacks
 from bridgegen.results.store.sqlite import Lock
 from bridgegen.scenario.language.space import SearchSpace
-from bridgegen.search.algorithms.algorithm import Value
 
 LOCK = "compare.lock"
 
 
-@dataclass(frozen=True)
-class ComparisonCallbacks(RunCallbacks):
-    """Called as a comparison progresses.
-
-    Attributes:
-        begun: with the plan, the number of its runs that have ended already, and their evaluations.
-        stage: with the stage that begins when the runs are done: "read", "draw".
-    """
-
-    begun: Callable[[Plan, int, int], None] = lambda plan, ended, made: None
-    stage: Callable[[str], None] = lambda stage: None
-
-
-@dataclass(frozen=True, kw_only=True)
-class ComparisonArguments(CommonOptions):
-    """The arguments of ``compare``: the options that all runs share, and those of the grid."""
-
-    scenarios: str | Path | Sequence[str | Path] = field(
-        kw_only=False, metadata={"help": "One or several, each as for ``run_search``."}
-    )
-    algorithms: str | Sequence[str] = field(
-        default=("random", "pso"),
-        metadata={
-            "help": "One or several names of ``bridgegen list algorithms``, or your own: "
-            "``module:Class``, ``file.py:Class``."
-        },
-    )
-    settings: Mapping[str, Mapping[str, Value]] | None = field(
-        default=None,
-        metadata={"help": "Settings of algorithms, by their names, that differ from the defaults."},
-    )
-    seeds: int = field(
-        default=10,
-        metadata={"help": "Runs of each algorithm in each scenario, with the seeds 0, 1, 2 …"},
-    )
-    budget: int = field(default=1000, metadata={"help": "Evaluations of each run."})
-    baseline: str | None = field(
-        default=None,
-        metadata={"help": "Algorithm that the others are tested against; the first by default."},
-    )
-    apart: float = field(
-        default=APART,
-        metadata={
-            "help": "Critical scenarios are different if their searched parameters differ by "
-            "this share of their ranges, in root mean square."
-        },
-    )
-    workers: int | str | None = field(
-        default=None,
-        metadata={
-            "help": "Number of runs at a time, each in a process and one thread; as many as "
-            'there are cores by default. Or ``"ray"`` / ``"ray://HOST:PORT"``: that many, whose '
-            "scenarios are simulated in a Ray cluster. No result depends on it."
-        },
-    )
-    out: Path | str | None = field(
-        default=None,
-        metadata={"help": "Folder of the comparison; ``comparisons/SCENARIOS`` by default."},
-    )
-    deliver: bool = field(
-        default=True,
-        metadata={"help": "Whether to write tables, figures and page; a later call can do it."},
-    )
-    callbacks: ComparisonCallbacks | None = field(
-        default=None, metadata={"help": "Called as the comparison progresses."}
-    )
-
-
-@called_with(ComparisonArguments)
-def compare(given: ComparisonArguments) -> Comparison:
+@called_with(CompareOptions)
+def compare(given: CompareOptions) -> Comparison:
     """Run algorithms on scenarios with several seeds, and test which is better in which measure.
 
     A grid of runs, each an ordinary run's folder under ``OUT/runs`` (``resume`` exports its
@@ -108,13 +39,12 @@ def compare(given: ComparisonArguments) -> Comparison:
         StorageError: the folder holds something else, is in use, or cannot be written.
         Interrupted: Ctrl-C; every run keeps what it has done.
     """
-    callbacks = given.callbacks or ComparisonCallbacks()
-    scenarios, algorithms = given.scenarios, given.algorithms
+    callbacks = given.callbacks
     executor = read_choice(given.workers)
     plan = make_plan(
-        [scenarios] if isinstance(scenarios, str | Path) else scenarios,
-        [algorithms] if isinstance(algorithms, str) else algorithms,
-        settings=given.settings or {},
+        given.scenarios,  # type: ignore[arg-type]
+        given.algorithms,
+        settings=given.settings,
         seeds=given.seeds,
         budget=given.budget,
         baseline=given.baseline,
@@ -142,7 +72,7 @@ def compare(given: ComparisonArguments) -> Comparison:
 
 
 def _run(
-    plan: Plan, executor: int | str | None, callbacks: ComparisonCallbacks, done: list[str]
+    plan: Plan, executor: int | str | None, callbacks: JobCallbacks, done: list[str]
 ) -> dict[Cell, str]:
     """Make the runs that are missing; return why some failed.
 
@@ -165,23 +95,17 @@ def _run(
             made += evaluations
         else:
             tasks.append(_task(plan, cell))
-    callbacks.begun(plan, len(done), made)
-
-    def ended(name: str, failure: str | None) -> None:
-        done.append(name)
-        callbacks.ended(name, failure)
-
+    progress = RunsProgress(callbacks, len(plan.cells), plan.budget, len(done), made, done.append)
     at_once, cluster = (executor, None) if isinstance(executor, int) else (cores(), executor)
-    of_runs = RunCallbacks(callbacks.compile, callbacks.batch, ended)
-    failed = run_all(tasks, at_once, of_runs, cluster)
+    failed = run_all(tasks, at_once, progress, cluster)
     return failures | {cell: failed[cell.name] for cell in plan.cells if cell.name in failed}
 
 
 def _conclude(
-    plan: Plan, failures: Mapping[Cell, str], callbacks: ComparisonCallbacks, *, deliver: bool
+    plan: Plan, failures: Mapping[Cell, str], callbacks: JobCallbacks, *, deliver: bool
 ) -> Comparison:
     """Read the runs, measure and test them, and write the results if requested."""
-    callbacks.stage("read")
+    callbacks.stage("reading the runs")
     gaps, records = dict(failures), {}
     spaces: dict[tuple[str, str], SearchSpace] = {}  # an adversary has other parameters
     terms = _common_terms(plan, gaps)
@@ -210,7 +134,7 @@ def _conclude(
     result = Comparison(plan, records, measured, gaps, lines, kinds)
     if deliver:
         write_tables(plan, records, values, gaps, lines, kinds)
-        callbacks.stage("draw")
+        callbacks.stage("drawing")
         write_page(result)
     return result
 

@@ -3,11 +3,8 @@
 import numpy as np
 
 from bridgegen.base.arrays import Bool, Float
+from bridgegen.jobs.compare.options import APART
 from bridgegen.scenario.language.space import SearchSpace
-
-APART = 0.1
-"""Two scenarios are different if their searched parameters differ by this share of their ranges or
-more, in root mean square; two random ones differ by 0.41."""
 
 LIMIT = 10_000
 """Maximum number of different scenarios that are counted per run: it bounds the time."""

@@ -2,7 +2,6 @@
 
 import hashlib
 import json
-import shlex
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from importlib.metadata import version
@@ -11,8 +10,9 @@ from typing import Any
 
 from bridgegen.base.errors import InputError, UnknownNameError
 from bridgegen.base.plugins import file_of, label_of
-from bridgegen.engine.options import CommonOptions, SearchOptions, options_of
-from bridgegen.jobs.compare.distinct import APART
+from bridgegen.engine.options import CommonOptions, SearchOptions
+from bridgegen.jobs.compare.options import CompareOptions
+from bridgegen.jobs.frame import command_of
 from bridgegen.jobs.search.scenarios import is_file, load
 from bridgegen.results.folder import claim
 from bridgegen.results.store.run_file import FILE as RUN_FILE
@@ -125,19 +125,17 @@ class Plan:
 
     def command(self) -> str:
         """Return the command line that starts or resumes this comparison."""
-        words = ["bridgegen", "compare", *self.scenarios.values()]
-        words += ["--algorithms", ",".join(self.methods.values())]
-        words += ["--seeds", str(self.seeds), "--budget", str(self.budget)]
-        if self.baseline != next(iter(self.algorithms)):
-            words += ["--baseline", self.baseline]
-        for name, settings in self.algorithms.items():
-            for key, value in settings.items():
-                words += ["--set", f"{name}.{key}={json.dumps(value)}"]
-        for one in options_of(CommonOptions):
-            words += one.words(getattr(self.options, one.name))
-        if self.apart != APART:
-            words += ["--distinct", repr(self.apart)]
-        return shlex.join([*words, "--out", str(self.out)])
+        given = CompareOptions.of(
+            self.options,
+            scenarios=tuple(self.scenarios.values()),
+            algorithms=tuple(self.methods.values()),
+            settings={name: one for name, one in self.algorithms.items() if one},
+            baseline=None if self.baseline == next(iter(self.algorithms)) else self.baseline,
+            apart=self.apart,
+            seeds=self.seeds,
+            budget=self.budget,
+        )
+        return command_of("compare", given, self.out)
 
     def identity(self) -> dict[str, Any]:
         """Return what must be equal in all runs of one folder, as JSON's types."""

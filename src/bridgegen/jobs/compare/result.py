@@ -5,6 +5,7 @@ import html
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from itertools import islice
+from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -13,6 +14,7 @@ from bridgegen.jobs.compare.measures import Measure, Measured
 from bridgegen.jobs.compare.plan import Cell, Plan
 from bridgegen.jobs.compare.record import Record
 from bridgegen.jobs.compare.table import RUNS_FILE, SUMMARY_FILE, TIMES_FILE, Line
+from bridgegen.jobs.frame import Judged, Table
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -51,6 +53,41 @@ class Comparison:
     def page(self) -> Path:
         """The HTML page with all results."""
         return self.folder / PAGE
+
+    @property
+    def work(self) -> str:
+        """How many runs there are."""
+        return f"{len(self.plan.cells):,} runs"
+
+    def to_json(self) -> list[dict[str, object]]:
+        """Return what ``summary.csv`` says, a measure of an algorithm each."""
+        return [
+            {
+                "scenario": one.scenario, "algorithm": one.algorithm, "measure": one.measure,
+                "runs": one.runs, "never": one.never,
+                **{name: number(value) for name, value in vars(one.quartiles).items()},
+                "p": number(one.p), "p_holm": number(one.p_holm), "a12": number(one.a12),
+            }
+            for one in self.lines
+        ]  # fmt: skip
+
+    def shown(self) -> list[str | Table]:
+        """Return what the terminal shows."""
+        from bridgegen.jobs.compare import words
+
+        return [*words.lines(self)]
+
+    def judged(self) -> tuple[Judged, ...]:
+        """Return how many runs have a result."""
+        figures = {"runs": float(len(self.records)), "missing": float(len(self.gaps))}
+        name = "-".join(self.plan.scenarios)
+        return (
+            Judged(
+                suite=f"{name} comparison", group=f"bridgegen.{name}", test="runs have results",
+                holds=bool(self.records), details=f"{len(self.records)} of {self.work}",
+                figures=figures, facts={"command": self.plan.command(), "page": str(self.page)},
+            ),
+        )  # fmt: skip
 
     def line(self, scenario: str, algorithm: str, measure: str) -> Line:
         """Return one measure of one algorithm in one scenario.
@@ -94,3 +131,8 @@ class Comparison:
 def _tr(kind: str, cells: Iterable[str]) -> str:
     inner = "".join(f"<{kind}>{html.escape(cell)}</{kind}>" for cell in cells)
     return f"<tr>{inner}</tr>"
+
+
+def number(value: float) -> float | None:
+    """Return a value as JSON has it: None for what is infinite or NaN."""
+    return value if isfinite(value) else None

@@ -9,6 +9,7 @@ from bridgegen.base.errors import BridgeGenError, InputError, Interrupted
 from bridgegen.engine.options import SearchOptions
 from bridgegen.engine.workers import Threads
 from bridgegen.engine.workers.tasks import READY, TaskPool
+from bridgegen.jobs.frame import JobCallbacks
 from bridgegen.jobs.search import SearchCallbacks, resume, run_search
 from bridgegen.jobs.search.loop import Progress
 from bridgegen.results.store import Store
@@ -36,19 +37,59 @@ class Task:
     may_be_refused: bool = False
 
 
-@dataclass(frozen=True)
-class RunCallbacks:
-    """Called as runs progress, all from the same thread.
+class RunsProgress:
+    """Says how far many runs are: evaluations of all, and how many runs have ended.
 
-    Attributes:
-        compile: before the first run, whose simulator may have to be compiled.
-        batch: with a run's name and its evaluations so far.
-        ended: with a run's name, and why it failed or None.
+    Args:
+        callbacks: are told.
+        runs: how many there are.
+        budget: evaluations of each.
+        ended: runs that have ended already.
+        made: evaluations of these.
+        each: called with the name of each run that ends.
     """
 
-    compile: Callable[[], None] = lambda: None
-    batch: Callable[[str, int], None] = lambda name, evaluations: None
-    ended: Callable[[str, str | None], None] = lambda name, failure: None
+    def __init__(
+        self,
+        callbacks: JobCallbacks,
+        runs: int,
+        budget: int,
+        ended: int = 0,
+        made: int = 0,
+        each: Callable[[str], object] = lambda name: None,
+    ) -> None:
+        self._callbacks, self._each = callbacks, each
+        self._runs, self._ended, self._failed = runs, ended, 0
+        self._budget, self._before = budget, made
+        self._total = made + (runs - ended) * budget
+        self._evaluations: dict[str, int] = {}
+        self._show()
+
+    def compile(self) -> None:
+        """Say that kernels may be compiled before the first run."""
+        self._callbacks.compile()
+
+    def batch(self, name: str, evaluations: int) -> None:
+        """Say how many evaluations a run has made so far."""
+        self._evaluations[name] = evaluations
+        self._show()
+
+    def ended(self, name: str, failure: str | None) -> None:
+        """Say that a run has ended, or why it failed."""
+        self._each(name)
+        self._ended += 1
+        if failure is not None:
+            self._failed += 1
+            self._callbacks.say(f"{name} failed: {failure}")
+        self._total -= self._budget - self._evaluations.get(name, 0)
+        self._show()
+
+    def _show(self) -> None:
+        made = self._before + sum(self._evaluations.values())
+        facts = f"{self._ended} of {self._runs} runs"
+        if self._failed:
+            facts += f", {self._failed} failed"
+        self._callbacks.progress("", made, self._total, facts)
 
 
 def evaluations_of(folder: Path) -> tuple[int, bool]:
@@ -119,7 +160,7 @@ def attempt(
 
 
 def run_all(
-    tasks: Iterable[Task], at_once: int, callbacks: RunCallbacks, cluster: str | None = None
+    tasks: Iterable[Task], at_once: int, progress: RunsProgress, cluster: str | None = None
 ) -> dict[str, str]:
     """Make runs; no result depends on how many at a time.
 
@@ -128,7 +169,7 @@ def run_all(
         at_once: how many at a time, ≥ 1. With 1, they are made in this process.
         cluster: where their scenarios are simulated, "ray" or "ray://HOST:PORT"; by default, a run
             is one thread.
-        callbacks: called as they progress.
+        progress: is told.
 
     Returns:
         Why runs failed, by name.
@@ -140,46 +181,46 @@ def run_all(
     waiting = list(tasks)
     at_once = min(at_once, len(waiting))
     if at_once > 1:
-        return _run_in_processes(waiting, at_once, callbacks, cluster)
-    return _run_sequentially(waiting, callbacks, cluster)
+        return _run_in_processes(waiting, at_once, progress, cluster)
+    return _run_sequentially(waiting, progress, cluster)
 
 
 def _run_sequentially(
-    tasks: Iterable[Task], callbacks: RunCallbacks, cluster: str | None
+    tasks: Iterable[Task], progress: RunsProgress, cluster: str | None
 ) -> dict[str, str]:
     failures = {}
 
     def stage(name: str) -> None:
         if name == "compile":
-            callbacks.compile()
+            progress.compile()
 
     for task in tasks:
 
         def batch(evaluations: int, name: str = task.name) -> None:
-            callbacks.batch(name, evaluations)
+            progress.batch(name, evaluations)
 
         failure = attempt(task, cluster, batch, stage)
         if failure is not None:
             failures[task.name] = failure
-        callbacks.ended(task.name, failure)
+        progress.ended(task.name, failure)
     return failures
 
 
 def _run_in_processes(
-    tasks: Iterable[Task], at_once: int, callbacks: RunCallbacks, cluster: str | None
+    tasks: Iterable[Task], at_once: int, progress: RunsProgress, cluster: str | None
 ) -> dict[str, str]:
     failures = {}
 
     def heard(task: Task, kind: str, *rest: Any) -> None:
         if kind == "batch":
-            callbacks.batch(task.name, *rest)
+            progress.batch(task.name, *rest)
         elif rest == ("compile",):
-            callbacks.compile()
+            progress.compile()
 
     def ended(task: Task, failure: str | None, crash: str | None) -> None:
         if (why := crash or failure) is not None:
             failures[task.name] = why
-        callbacks.ended(task.name, why)
+        progress.ended(task.name, why)
 
     TaskPool(tasks, make, (cluster,), heard=heard, ended=ended).run(at_once)
     return failures

@@ -1,7 +1,7 @@
 """A comparison in sentences and short numbers."""
 
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from math import isinf, isnan
 
 import numpy as np
@@ -10,6 +10,7 @@ from bridgegen.base.statistics import effect, mann_whitney
 from bridgegen.jobs.compare.measures import Measure, others
 from bridgegen.jobs.compare.result import Comparison
 from bridgegen.jobs.compare.table import Line
+from bridgegen.jobs.frame import Table
 
 SURE = 0.05
 """A corrected p below this is called a difference."""
@@ -62,6 +63,66 @@ def verdict(line: Line) -> str:
 def runs_that_find(line: Line) -> str:
     """Return in how many runs a time to the k-th scenario ended, "18 of 20"."""
     return f"{line.runs - line.never} of {line.runs}"
+
+
+_TEXTS = 1
+"""The algorithm's column of a table."""
+
+
+def lines(comparison: Comparison) -> Iterator[str | Table]:
+    """Yield what the terminal shows: of each scenario two tables and sentences; then the files."""
+    plan = comparison.plan
+    for scenario in plan.scenarios:
+        yield f"\n{scenario}, {plan.budget} evaluations a run, medians over the runs"
+        if scenario in comparison.measured:
+            yield _findings(comparison, scenario)
+            yield _others(comparison, scenario)
+        yield from sentences(comparison, scenario)
+    for cell, why in comparison.gaps.items():
+        yield f"missing: {cell.name}: {why}"
+    yield f"\n{'page':<12}{comparison.page}"
+    yield f"{'tables':<12}{comparison.folder / '*.csv'}"
+    yield f"{'runs':<12}{comparison.folder / 'runs'}  (bridgegen resume, coverage, …)"
+
+
+def _findings(comparison: Comparison, scenario: str) -> Table:
+    """Return the table of what was found and how soon, with the tests of ``distinct``."""
+    kinds = {one.name: one for one in comparison.measures}
+    early = [name for name in kinds if name.endswith(("_distinct", "_modes", "to_1"))]
+    head = ("algorithm", "found in", "modes", "distinct", "quartiles", "p", "A12",
+            *(kinds[name].title for name in early), "R_critic")  # fmt: skip
+    rows = []
+    for name in comparison.plan.algorithms:
+        of = {one: comparison.line(scenario, name, one) for one in kinds}
+        distinct = of["distinct"]
+        cells = [
+            name,
+            runs_that_find(of["to_1"]),
+            median(of["modes"], kinds["modes"]),
+            median(distinct, kinds["distinct"]),
+            span(distinct, kinds["distinct"]),
+            p_value(distinct.p_holm),
+            number(distinct.a12, 2),
+            *(median(of[one], kinds[one]) for one in (*early, "r_critic")),
+        ]
+        rows.append(cells)
+    return Table(head, rows, _TEXTS)
+
+
+_MORE = {
+    "t_critic", "to_10", "to_50", "critical_bins", "critical_pairs", "hypervolume", "gd",
+    "spread", "seconds",
+}  # fmt: skip
+
+
+def _others(comparison: Comparison, scenario: str) -> Table:
+    """Return the table of the other measures, and of the time that it took."""
+    shown = [one for one in comparison.measures if one.name in _MORE]
+    rows = []
+    for name in comparison.plan.algorithms:
+        of = (comparison.line(scenario, name, one.name) for one in shown)
+        rows.append([name, *(median(line, one) for line, one in zip(of, shown, strict=True))])
+    return Table(("algorithm", *(one.title for one in shown)), rows, _TEXTS)
 
 
 def sentences(comparison: Comparison, scenario: str) -> list[str]:

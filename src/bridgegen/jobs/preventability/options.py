@@ -1,26 +1,20 @@
 """What a preventability map can be asked, and the figures that it states."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from bridgegen.engine.options import file_forms
-from bridgegen.engine.options.forms import FIXED, NAMES, PATH, Form, read_names
+from bridgegen.engine.options.forms import FIXED, NAMES, PATH, Form
 from bridgegen.engine.options.option import DRIVER, OUTPUT, option
-from bridgegen.jobs.frame import OF_SCENARIO, Job, JobOptions
+from bridgegen.jobs.frame import DRIVERS, OF_SCENARIO, DriveOptions, Job, JobOptions
 
 if TYPE_CHECKING:
     from bridgegen.jobs.preventability.grid import GridAxis
 
 MODELS = ("un-r157", "fsm")
 """The models of UN R157, annex 3: a collision that one of them avoids is preventable."""
-
-
-def _drivers(given: Any) -> Any:
-    if isinstance(given, str):
-        return (given,)
-    return given if given is None else tuple(given)
 
 
 def _axes(grid: Any) -> list[str]:
@@ -34,15 +28,6 @@ def _repeated(spelling: str, texts: Sequence[str]) -> list[str]:
     return [word for text in texts for word in (spelling, text)]
 
 
-DRIVERS = replace(
-    NAMES,
-    kind=list[str],
-    read=lambda texts, _: tuple(read_names(",".join(texts))),
-    keep=_drivers,
-    in_file=file_forms.TEXTS,
-)
-"""Names, repeated or separated by commas; in Python one name is a text."""
-
 GRID = Form(
     list[str],
     words=lambda spelling, grid: _repeated(spelling, _axes(grid)),
@@ -53,7 +38,7 @@ GRID = Form(
 
 
 @dataclass(frozen=True, kw_only=True)
-class MapOptions(JobOptions):
+class MapOptions(DriveOptions, JobOptions):
     """The options of ``map_preventability``."""
 
     scenario: str | Path = field(kw_only=False, metadata=OF_SCENARIO)

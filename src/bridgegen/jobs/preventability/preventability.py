@@ -85,7 +85,7 @@ def map_preventability(given: MapOptions) -> PreventabilityMap:
                     store.write(i, part)
                 found[:, start:stop] = part
                 done = stop
-                say.progress("cells", done, cells.cells)
+                say.progress("cells", done, cells.cells, "")
     except KeyboardInterrupt:
         raise Interrupted(folder, done, cells.cells, what="cells", command=command) from None
     shaped = found.reshape(len(names), *cells.shape)

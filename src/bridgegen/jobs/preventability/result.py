@@ -96,12 +96,12 @@ class PreventabilityMap:
         """Return the figures of each driver."""
         return [self.figures(name) for name in self.drivers]
 
-    def lines(self) -> list[str | Table]:
+    def shown(self) -> list[str | Table]:
         """Return what the terminal shows: each driver's cells by class, and the files."""
         figures = self.to_json()
         rows = [(one["driver"], *(_cell(one, kind) for kind in CellClass)) for one in figures]
         head = ("driver", *(kind.name.lower().replace("_", " ") for kind in CellClass))
-        return [(head, rows), f"\n{'page':<12}{self.page}", f"{'arrays':<12}{self.folder}"]
+        return [Table(head, rows), f"\n{'page':<12}{self.page}", f"{'arrays':<12}{self.folder}"]
 
     def judged(self) -> list[Judged]:
         """Return each driver's figures; NaN: of outcomes, where no cell has any."""

@@ -260,7 +260,7 @@ class Risk:
         """Return the same."""
         return self.to_dict()
 
-    def lines(self) -> list[str | Table]:
+    def shown(self) -> list[str | Table]:
         """Return what the terminal shows."""
         from bridgegen.jobs.risk import text
 

@@ -133,7 +133,7 @@ def estimate_risk(given: RiskOptions) -> Risk:
         total = budget + check + (HERE if there else 0)
         experiment = Experiment(
             pipeline, met, hands, whose, ledger,
-            lambda done: say.progress("simulations", done, total),
+            lambda done: say.progress("simulations", done, total, ""),
         )  # fmt: skip
         try:
             aim = Aim(aimed.score, LEAST, budget, given.precision)
@@ -150,7 +150,7 @@ def estimate_risk(given: RiskOptions) -> Risk:
                 kept = kept_elsewhere(folder, elsewhere, settings)
                 beyond = Experiment(
                     there, met, hands, whose, kept,
-                    lambda done: say.progress("elsewhere", done, rows),
+                    lambda done: say.progress("elsewhere", done, rows, ""),
                 )  # fmt: skip
                 other = look_elsewhere(
                     experiment, beyond, elsewhere.name, found.weighted, aimed.score, rows, seed

@@ -57,7 +57,7 @@ def lines(risk: Risk) -> Iterator[str | Table]:
         row += [rate_text(None if name is None else risk.rate(name, unit)) for unit in units]
         rows.append(row)
     head = ("", "per encounter", "95 %", "below (95 %)", "effective rows")
-    yield (*head, *(f"per {unit}" for unit in units)), rows
+    yield Table((*head, *(f"per {unit}" for unit in units)), rows)
     for doubt in risk.weighted.doubts:
         yield f"\ndoubt       {doubt}"
     yield f"\n{'method':<12}{risk.estimated.method}: {risk.estimated.why}"

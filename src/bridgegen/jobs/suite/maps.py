@@ -63,7 +63,9 @@ def map_suite(
                 grid=axes,
                 others=others,
                 out=suite.folder / FOLDER / _folder(scenario, list(egos)),
-                callbacks=JobCallbacks(progress=lambda what, done, total: cells(done, total)),
+                callbacks=JobCallbacks(
+                    progress=lambda what, done, total, facts: cells(done, total)
+                ),
             )
         )
     return tuple(found)
