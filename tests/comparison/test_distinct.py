@@ -4,7 +4,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from bridgegen.jobs.compare.distinct import distinct, normalised
+from bridgegen.jobs.compare.record import distinct, normalised
 from bridgegen.scenario.language.reader import load
 
 clouds = st.tuples(st.integers(0, 40), st.integers(1, 4)).flatmap(

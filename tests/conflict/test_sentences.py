@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from bridgegen.assess.conflict.analysis import analyse
-from bridgegen.assess.conflict.sentences import sentence
+from bridgegen.assess.conflict.summary import sentence
 from bridgegen.drivers._claims import BY_SIGNS
 from bridgegen.drivers.kinds import CAR, PEDESTRIAN
 

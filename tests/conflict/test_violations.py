@@ -21,9 +21,8 @@ from bridgegen.assess.conflict.analysis import (
 )
 from bridgegen.assess.conflict.findings import Findings
 from bridgegen.assess.conflict.harm import NEAR_MISS, closeness_of_pairs, decisive, harm_of_pairs
-from bridgegen.assess.conflict.sentences import sentence
 from bridgegen.assess.conflict.severity import FRONT, severity
-from bridgegen.assess.conflict.summary import summarise
+from bridgegen.assess.conflict.summary import sentence, summarise
 from bridgegen.drivers.kinds import BICYCLE, CAR, OTHER, PEDESTRIAN
 from bridgegen.engine.options import PipelineOptions
 from bridgegen.engine.pipeline import Pipeline

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bridgegen.base.errors import InputError, ScenarioError
-from bridgegen.jobs.compare.distinct import normalised
+from bridgegen.jobs.compare.record import normalised
 from bridgegen.scenario.language.coverage import coverage
 from bridgegen.scenario.language.expression import parse
 from bridgegen.scenario.language.kinds import FLOAT, INTEGER, KINDS, Angle, Category

@@ -20,7 +20,7 @@ from bridgegen.jobs.search.loop import Reason, run_loop
 from bridgegen.results.store import Store
 from bridgegen.search.algorithms import Problem, Results, get
 from bridgegen.search.algorithms.observation import Observer, Reward, step_from
-from bridgegen.search.rl.walkers import Walkers
+from bridgegen.search.rl.agent import Walkers
 
 NAMES = ("dqn", "ddpg", "ppo")
 SMALL = {"epochs": 2, "width": 8, "population": 10}

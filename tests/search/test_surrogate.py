@@ -8,7 +8,7 @@ import sys
 import numpy as np
 import pytest
 
-from bridgegen.jobs.compare.distinct import distinct
+from bridgegen.jobs.compare.record import distinct
 from bridgegen.search.algorithms import Problem, Results
 from bridgegen.search.algorithms.surrogate import Surrogate
 from bridgegen.search.algorithms.turbo import TuRBO

@@ -11,8 +11,7 @@ from bridgegen.engine.options import PipelineOptions
 from bridgegen.engine.pipeline import Pipeline
 from bridgegen.jobs.suite.rows import rows_of
 from bridgegen.recordings.events.find import find_events
-from bridgegen.recordings.lanes.find import Located
-from bridgegen.recordings.lanes.fit import fit_of
+from bridgegen.recordings.lanes.find import Located, fit_of
 from bridgegen.recordings.lanes.placing import place
 from bridgegen.recordings.lanes.road_map import lanes_of_map
 from bridgegen.recordings.readers.clean import clean

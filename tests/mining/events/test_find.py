@@ -8,8 +8,7 @@ from bridgegen.drivers.kinds import CAR
 from bridgegen.recordings.events.event import EGO_CHANGES, OVERLAP
 from bridgegen.recordings.events.find import DETECTORS, find_events
 from bridgegen.recordings.events.of_scenarios import encounters_of, scenario_events, whole_share
-from bridgegen.recordings.lanes.find import Located
-from bridgegen.recordings.lanes.fit import fit_of
+from bridgegen.recordings.lanes.find import Located, fit_of
 from bridgegen.recordings.lanes.model import Strip, assemble
 from bridgegen.recordings.lanes.placing import place
 from bridgegen.recordings.readers.clean import clean

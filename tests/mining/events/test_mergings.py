@@ -10,8 +10,7 @@ from bridgegen.drivers.kinds import BICYCLE, CAR
 from bridgegen.recordings.events.event import NO_CHANGE, NOT_WHOLE
 from bridgegen.recordings.events.find import find_events
 from bridgegen.recordings.events.meetings import TOUCH
-from bridgegen.recordings.lanes.find import Located, locate
-from bridgegen.recordings.lanes.fit import fit_of
+from bridgegen.recordings.lanes.find import Located, fit_of, locate
 from bridgegen.recordings.lanes.model import Strip, assemble
 from bridgegen.recordings.lanes.placing import place
 from bridgegen.recordings.readers.clean import clean

@@ -2,8 +2,7 @@ import numpy as np
 import pytest
 
 from bridgegen.search.algorithms import Problem
-from bridgegen.search.surrogates.columns import Columns
-from bridgegen.search.surrogates.known import Known, distances
+from bridgegen.search.surrogates.known import Columns, Known, distances
 
 
 def told(known: Known, U: list[list[float]], critical: bool = False, ok: bool = True) -> None:

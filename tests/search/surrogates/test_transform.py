@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bridgegen.search.surrogates.transform import compressed
+from bridgegen.search.surrogates.known import compressed
 
 
 @given(st.lists(st.floats(allow_nan=False), min_size=1, max_size=30))

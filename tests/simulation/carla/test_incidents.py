@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from bridgegen.adapters.carla.incidents import red_lights
+from bridgegen.adapters.carla.simulator import red_lights
 from bridgegen.assess import metrics
 from bridgegen.openx.openscenario.read import read
 from bridgegen.simulation.choice import SimulatorChoice

@@ -1,11 +1,90 @@
 """The rows that a search has been told of."""
 
+from math import prod
+
 import numpy as np
 
 from bridgegen.base.arrays import Bool, Float, Int
 from bridgegen.search.algorithms.algorithm import Problem
-from bridgegen.search.surrogates.columns import Columns
-from bridgegen.search.surrogates.transform import compressed
+
+# --- The columns of U as a model sees them ---
+
+
+class Columns:
+    """What the columns of U are: continuous, or levels, which are equal intervals of the cube.
+
+    Rows of one level are one scenario, so a model sees a level as one number: its place among the
+    levels, 0 to 1.
+
+    Attributes:
+        levels: ``(n_var,)`` of them, per column; 0 where it is continuous.
+        discrete: ``(n_var,)`` bool, which columns have levels.
+        count: number of different rows; 0 where it is infinite, or beyond 2⁶².
+
+    Args:
+        n_var: number of columns.
+        levels: per column the number of levels, 0 for a continuous one; empty: all continuous.
+
+    Source: Garrido-Merchán and Hernández-Lobato (2020), doi:10.1016/j.neucom.2019.11.004, for
+    kernels that round.
+    """
+
+    def __init__(self, n_var: int, levels: tuple[int, ...] = ()) -> None:
+        self.levels = levels or (0,) * n_var
+        numbers = np.array(self.levels, np.float64)
+        self.discrete = numbers > 0.0
+        count = prod(self.levels)
+        self.count = count if count < 2**62 else 0
+        self._of = numbers[self.discrete]
+
+    def snapped(self, U: Float) -> Float:
+        """Return rows with each level at the centre of its interval."""
+        rows = U.copy()
+        number = np.minimum(np.floor(U[:, self.discrete] * self._of), self._of - 1.0)
+        rows[:, self.discrete] = (number + 0.5) / self._of
+        return rows
+
+    def points(self, U: Float) -> Float:
+        """Return what a model sees of rows: ``(n, n_var)`` float64 in the unit cube."""
+        points = U.copy()
+        number = np.minimum(np.floor(U[:, self.discrete] * self._of), self._of - 1.0)
+        points[:, self.discrete] = number / np.maximum(self._of - 1.0, 1.0)
+        return points
+
+    def everything(self) -> Float:
+        """Return all rows there are, ``(count, n_var)``, snapped; only where there are few."""
+        grids = np.meshgrid(*[(np.arange(k) + 0.5) / k for k in self._of.tolist()], indexing="ij")
+        return np.stack([grid.ravel() for grid in grids], axis=1)
+
+
+# --- Objectives as numbers that a Gaussian process can learn ---
+
+
+def compressed(F: Float) -> Float:
+    """Return the signed logarithms of the standardised distances from the median.
+
+    Outliers keep their order and their distance from the rest, but do not rule the scale. An
+    infinite value counts as the nearest finite one.
+
+    Args:
+        F: ``(n,)`` float64, no NaN.
+
+    Returns:
+        ``(n,)`` float64, finite, about 1 in size; 0 where no value is finite, or all are equal.
+    """
+    finite = np.isfinite(F)
+    if not finite.any():
+        return np.zeros(len(F))
+    known = F[finite] / max(np.abs(F[finite]).max(), np.finfo(np.float64).tiny)  # no overflow
+    values = np.where(F > 0.0, known.max(), known.min())
+    values[finite] = known
+    values -= np.median(known)
+    spread = known.std()
+    if not spread > 1e-12:
+        return np.zeros(len(F))
+    scores: Float = np.sign(values) * np.log1p(np.abs(values) / spread)
+    return scores
+
 
 FEW = 100_000
 """Different rows up to which all are enumerated in search of a new one."""
