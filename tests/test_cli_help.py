@@ -9,6 +9,7 @@ import pytest
 from tests.command_lines import commands
 from typer.main import get_command
 
+import bridgegen
 from bridgegen.cli import app
 from bridgegen.cli.groups import PANELS
 from bridgegen.engine.options.option import GROUPS
@@ -103,3 +104,10 @@ def test_the_command_line_starts_without_what_only_runs_need():
     )
     found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert found.stdout.strip() == ""
+
+
+def test_the_package_runs_as_a_module_and_knows_its_version():
+    words = [sys.executable, "-m", "bridgegen", "--version"]
+    found = subprocess.run(words, capture_output=True, text=True, check=True).stdout
+    assert found == f"bridgegen {bridgegen.__version__}\n"
+    assert bridgegen.__version__ == version("bridgegen")

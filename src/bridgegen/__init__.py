@@ -85,6 +85,10 @@ _HOMES = {
 
 def __getattr__(name: str) -> Any:
     """Import what is asked for when it is asked for: the command line should start at once."""
+    if name == "__version__":
+        from importlib.metadata import version
+
+        return version("bridgegen")
     if name not in _HOMES:
         raise AttributeError(f"module 'bridgegen' has no attribute '{name}'")
     from importlib import import_module
@@ -95,4 +99,4 @@ def __getattr__(name: str) -> Any:
 
 def __dir__() -> list[str]:
     """Return all names, also those not imported yet, so that Tab completes them."""
-    return sorted({*globals(), *__all__})
+    return sorted({*globals(), *__all__, "__version__"})

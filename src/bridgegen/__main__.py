@@ -1,0 +1,5 @@
+"""``python -m bridgegen``: the command line."""
+
+from bridgegen.cli import main
+
+main()
