@@ -238,7 +238,7 @@ class Conditions:
 
     def _telling(self, V: Float, harmful: Bool, spans: Mapping[int, _Span]) -> int:
         """Return the parameter that differs most between the harmful rows and the others."""
-        if not harmful.any():
+        if not harmful.any() or harmful.all():  # the latter of too few that are feasible
             return max(spans)
 
         def apart(i: int) -> float:
@@ -361,7 +361,8 @@ def others(space: SearchSpace, X: Float, named: Sequence[str]) -> str:
             speak. What is at default in the first alone is named without a value.
         named: the parameters that conditions name.
     """
-    moved, fixed = [], []
+    moved: list[str] = []
+    fixed: list[str] = []
     for name, one in space.parameters.items():
         unit = "" if one.unit in _UNITLESS or one.kind.names else f" {one.unit}"
         values, default = X[:, space.index(name)], one.kind.text(one.default, _number)
