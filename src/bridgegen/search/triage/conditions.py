@@ -120,7 +120,8 @@ class Conditions:
         with suppress(_SpentError):
             confirmed, inside = self._confirmed(self._spans(needed))
         conditions = [self._condition(i, confirmed.get(i)) for i in self._named]
-        X = nearest(self._space, np.concatenate([self._x[np.newaxis], self._region]))
+        rows = [self._x[np.newaxis], *([self._region] if confirmed else [])]
+        X = nearest(self._space, np.concatenate(rows))
         return conditions, inside, others(self._space, X, [one.name for one in conditions])
 
     def _harmful(self, V: Float) -> tuple[Bool, Float]:
@@ -220,21 +221,38 @@ class Conditions:
     ) -> tuple[dict[int, tuple[_Span, Probes]], Probes]:
         """Return the spans that probes confirm together, each with its probes outside."""
         left = dict(spans)
+        outside = self._pruned(left)
+        while left:
+            inside = self._tested(left)
+            if inside is None:
+                continue  # probes outside are dearer: they wait until all is well inside
+            if outside.keys() == left.keys():
+                return {i: (left[i], outside[i]) for i in left}, inside
+            tested, outside = left.copy(), self._pruned(left)
+            if left == tested:
+                return {i: (left[i], outside[i]) for i in left}, inside
+        return {}, Probes(rows=0, harmful=0)
+
+    def _pruned(self, left: dict[int, _Span]) -> dict[int, Probes]:
+        """Drop spans, the worst first, until no harm is outside; return the others' probes."""
         while left:
             outside = {i: self._outside(i, left) for i in left}
             worst = max(left, key=lambda i: outside[i][1])
-            if outside[worst][1] > 1.0 - SURE:
-                del left[worst]
-                continue
-            corners, V = self._corners(left), self._inside(left)
-            harmful, _ = self._harmful(np.concatenate([corners, V]))
-            n = len(corners)
-            inside = Probes(rows=len(V), harmful=int(harmful[n:].sum()))
-            if 2 * inside.rows >= INSIDE and harmful.all():
-                self._region = np.concatenate([corners, V])
-                return {i: (left[i], outside[i][0]) for i in left}, inside
-            del left[self._telling(np.concatenate([corners, V]), harmful, left)]
-        return {}, Probes(rows=0, harmful=0)
+            if outside[worst][1] <= 1.0 - SURE:
+                return {i: probes for i, (probes, _) in outside.items()}
+            del left[worst]
+        return {}
+
+    def _tested(self, left: dict[int, _Span]) -> Probes | None:
+        """Return the random probes inside; None if a probe is harmless: then drop a span."""
+        corners, V = self._corners(left), self._inside(left)
+        probes = np.concatenate([corners, V])
+        harmful, _ = self._harmful(probes)
+        if 2 * len(V) >= INSIDE and harmful.all():
+            self._region = probes
+            return Probes(rows=len(V), harmful=len(V))
+        del left[self._telling(probes, harmful, left)]
+        return None
 
     def _telling(self, V: Float, harmful: Bool, spans: Mapping[int, _Span]) -> int:
         """Return the parameter that differs most between the harmful rows and the others."""
