@@ -8,6 +8,7 @@ from bridgegen.search.triage.judgement import judgement
 from bridgegen.search.triage.neighbours import neighbourhoods
 
 BRAKING = "braking 0.75 s after the risk arose"
+NONE = "none of the fixes that were tried (perception is ideal, un-r157 drives, the road is dry)"
 
 
 def near(space, world, fixed, harm):
@@ -32,10 +33,10 @@ def by(fix):
          "scenarios"),
         (0, False, f"root cause perception: {BRAKING} would not have avoided it; ideal perception "
          "does, in 32 of 32 nearby scenarios"),
-        (9, False, "root cause not found: the ego is responsible, but no fix prevents it in "
-         f"nearby scenarios, nor would {BRAKING}"),
-        (9, True, f"root cause not found: {BRAKING} would have avoided it, but no fix does in "
-         "nearby scenarios"),
+        (9, False, f"root cause not found: the ego is responsible, but {NONE} prevents it in "
+         f"a significant share of nearby scenarios, nor would {BRAKING}"),
+        (9, True, f"root cause not found: {BRAKING} would have avoided it, but {NONE} does in "
+         "a significant share of nearby scenarios"),
     ],
 )  # fmt: skip
 def test_where_judges_differ_the_sentence_says_which_says_what(
@@ -49,16 +50,24 @@ def test_only_what_the_ego_is_not_responsible_for_is_called_unavoidable(space, w
     """Who must give way, or keep its distance, could have; that no fix does is another matter."""
     tested = near(space, world, fixed, by(9))
     text = judgement(tested.cause, tested, preventable=False, responsible="other")
-    assert text == f"unavoidable: no fix prevents it in nearby scenarios, nor would {BRAKING}"
+    assert text == (
+        f"unavoidable by what was tried: {NONE} prevents it in a significant share of nearby "
+        f"scenarios, nor would {BRAKING}"
+    )
     passed = judgement(tested.cause, tested, preventable=None, responsible="ego")
     assert passed == (
-        "root cause not found: the ego is responsible, but no fix prevents it in nearby scenarios"
+        f"root cause not found: the ego is responsible, but {NONE} prevents it in a significant "
+        "share of nearby scenarios"
     )
 
 
 def test_what_one_replay_says_is_no_more(space):
     text = judgement("planning", None, preventable=False, responsible="ego")
     assert text.endswith("a driver that yields earlier does, in one replay")
+    text = judgement("unavoidable", None, preventable=None, responsible="other")
+    assert text == (
+        "unavoidable by what was tried: none of the fixes that were tried prevents it in one replay"
+    )
     assert judgement("", None, preventable=True, responsible="ego") == ""
 
 

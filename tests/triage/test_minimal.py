@@ -3,7 +3,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bridgegen.search.triage.conditions import INSIDE, sentence
+from bridgegen.scenario.language.reader import load
+from bridgegen.search.triage.conditions import INSIDE, Conditions, sentence
 from bridgegen.search.triage.effort import FULL
 from bridgegen.search.triage.minimal import Minimiser
 from bridgegen.search.triage.modes import Key
@@ -140,6 +141,132 @@ def test_a_slanted_region_is_not_said_to_be_a_box(space, world):
     assert {one.name for one in found.conditions} == {"ego_speed", "bv_speed"}
     assert len(confirmed) < 2
     assert "for example" in found.sentence
+
+
+def stated(space, world, harm, x, needed, noise_key=1):
+    """The conditions of a scenario that is taken as minimal, whether it is or not."""
+    pipeline, steps = world(space, harm), RADIUS * ranges(space)
+    columns = [space.variables.index(name) for name in needed]
+    found, inside, _ = Conditions(pipeline, x, x, steps, noise_key, 0, 500).find(columns)
+    return {one.name: one for one in found}, inside
+
+
+def test_an_end_that_a_constraint_sets_is_stated(every, world):
+    """Wind of 30 % lets fog be 61.75 %, all of it harmful; of 20 % 84.25 %, most of it harmless."""
+
+    def harm(v, fix):
+        dense = (v["fog_density"] >= 50.0) & (v["fog_density"] <= 62.0)
+        return np.where(dense & (v["wind_intensity"] >= 20.0), 0.7, 0.0)
+
+    x = every.row({"fog_density": 55.0, "wind_intensity": 30.0})
+    found, inside = stated(every, world, harm, x, ["fog_density"])
+    fog = found["fog_density"]
+    assert fog.confirmed
+    assert 50.0 <= fog.limit < 50.5
+    assert 61.0 <= fog.until <= 61.75
+    assert fog.needs == f"from {fog.limit:.4g} to {fog.until:.4g} %"
+    assert inside == Probes(rows=INSIDE, harmful=INSIDE)
+
+
+def test_probes_inside_meet_all_conditions_when_constraints_are_kept(every, world):
+    """Wind of 13 % or more limits fog: what it moves out of the conditions is no probe."""
+
+    def harm(v, fix):
+        inside = (v["fog_density"] >= 50.0) & (v["wind_intensity"] >= 20.0)
+        return np.where(inside, 0.7, 0.0)
+
+    pipeline = world(every, harm)
+    x = every.row({"fog_density": 55.0, "wind_intensity": 21.0})
+    columns = [every.variables.index(name) for name in ("fog_density", "wind_intensity")]
+    steps = RADIUS * ranges(every)
+    found, inside, _ = Conditions(pipeline, x, x, steps, 1, 0, 500).find(columns)
+    assert [one.confirmed for one in found] == [True, True]
+    assert inside == Probes(rows=INSIDE, harmful=INSIDE)
+    assert 55.0 < found[0].until < 100.0  # 82 % with wind of 21 %
+    for one in found:
+        values = pipeline.asked[-1][0][:, every.index(one.name)]
+        assert (values >= one.limit - 1e-6).all()
+        assert (values <= one.until + 1e-6).all()
+
+
+def test_a_harmless_corner_makes_an_example(space, world):
+    """A corner of one in sixteen hundred is harmless: no random probe meets it."""
+
+    def cut(v, fix):
+        inside = (v["ego_speed"] >= 7.9) & (v["bv_start"] <= 8.5)
+        fast = v["ego_speed"] > high[0] - 0.02 * (high[0] - 7.9)
+        near = v["bv_start"] < low[1] + 0.02 * (8.5 - low[1])
+        return np.where(inside & ~(fast & near), 0.7, 0.0)
+
+    pair = [space.parameters[name] for name in ("ego_speed", "bv_start")]
+    low, high = [one.low for one in pair], [one.high for one in pair]
+    x = space.row({"ego_speed": 8.0, "bv_start": 8.4})
+    found, _ = stated(space, world, cut, x, ["ego_speed", "bv_start"])
+    assert sum(one.confirmed for one in found.values()) == 1
+    found, _ = stated(space, world, planted, x, ["ego_speed", "bv_start"])
+    assert all(one.confirmed for one in found.values())
+
+
+def test_a_harmless_part_inside_makes_an_example(space, world):
+    """A hole of 8 % that no corner meets: some of 40 points do, and one is enough."""
+
+    def holed(v, fix):
+        fast = (v["ego_speed"] > 8.3) & (v["ego_speed"] < 8.6)
+        hole = fast & (v["bv_start"] > 7.3) & (v["bv_start"] < 7.7)
+        return np.where(hole, 0.0, planted(v, fix))
+
+    x = space.row({"ego_speed": 8.0, "bv_start": 8.4})
+    for key in range(10):
+        found, _ = stated(space, world, holed, x, ["ego_speed", "bv_start"], key)
+        assert sum(one.confirmed for one in found.values()) < 2, key
+
+
+def test_what_constraints_move_from_its_default_is_named(every, world):
+    """Rain needs clouds: cloudiness is not at its default of 10 %."""
+    pipeline = world(every, lambda v, fix: np.where(v["precipitation"] >= 20.0, 0.7, 0.0))
+    found = minimal(pipeline, every.row({"precipitation": 60.0, "cloudiness": 90.0}))
+    (rain,) = found.conditions
+    value = dict(zip(every.names, found.x, strict=True))["cloudiness"]
+    assert value == rain.value >= 20.0
+    assert found.sentence == (
+        f"fails if precipitation ≥ {rain.limit:.4g} %, other parameters at default or as near as "
+        f"bounds allow (cloudiness {value:.4g} %, sun_altitude_angle)"
+    )
+
+
+def test_what_is_further_from_its_default_than_needed_is_an_example(every, world):
+    def harm(v, fix):
+        return np.where(v["precipitation"] >= 20.0, 0.7, 0.0)
+
+    x = every.row({"precipitation": 25.0, "cloudiness": 60.0})
+    found, _ = stated(every, world, harm, x, ["precipitation"])
+    assert found["precipitation"].confirmed
+    assert found["cloudiness"].needs == "= 60 %"
+    assert not found["cloudiness"].confirmed
+
+
+def test_what_moves_within_the_stated_region_is_named_too(every, world):
+    """The sun stands at its default under thin fog, lower where the fog is dense."""
+    pipeline = world(every, lambda v, fix: np.where(v["fog_density"] >= 40.0, 0.7, 0.0))
+    found = minimal(pipeline, every.row({"fog_density": 60.0}))
+    assert found.sentence.endswith("at default or as near as bounds allow (sun_altitude_angle)")
+
+
+def test_what_a_run_fixes_is_named(world):
+    fixed = load("crossroads-s4").space(("participants",), {"bv_speed": 3.0})
+    found = minimal(world(fixed, lambda v, fix: np.full(len(v["ego_speed"]), 0.7)), fixed.row({}))
+    assert found.sentence == (
+        "fails already with all parameters at their defaults or fixed (bv_speed 3 m/s)"
+    )
+
+
+def test_of_a_driver_that_draws_random_numbers_it_says_so(space, world, far):
+    pipeline = world(space, planted)
+    pipeline.draws = True
+    quiet, found = minimal(world(space, planted), far), minimal(pipeline, far)
+    assert found.sentence == (
+        f"{quiet.sentence}, with these random numbers (noise key in its file)"
+    )
 
 
 def test_without_simulations_left_all_are_examples(space, world, far):

@@ -98,6 +98,11 @@ class Driver:
         return "perception" in self.stages
 
     @property
+    def draws(self) -> bool:
+        """Whether its motion may follow from random numbers: those of its sensors, or its own."""
+        return self.is_own or "perception" in self.stages - self.ideal
+
+    @property
     def label(self) -> str:
         """The name, and the idealised stages."""
         return f"{self.name} (ideal {join(self.ideal)})" if self.ideal else self.name

@@ -404,6 +404,12 @@ class Pipeline:
         """Whether ``try_all`` is available: rows are simulated by the embedded simulator."""
         return self._simulated_by == EMBEDDED
 
+    @property
+    def draws(self) -> bool:
+        """Whether results may follow from random numbers: its driver's, or the baseline's."""
+        beside = self.baseline is not None and self.baseline.driver.draws
+        return self.driver.draws or beside
+
     def try_all(self, X: Float, fix: Int | None = None, noise: Float | None = None) -> Trials:
         """Simulate N rows again, each unchanged or with one stage idealised; see `Trials`.
 

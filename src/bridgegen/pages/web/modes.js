@@ -12,7 +12,7 @@ import { addSection } from "./sections.js";
 
 const CAUSES_SAID = {
   perception: "perception", planning: "planning", control: "control", "vehicle dynamics": "vehicle dynamics",
-  unavoidable: "unavoidable: no fix removes the harm", sensitive: "sensitive: small changes of the parameters alone remove most of the harm",
+  unavoidable: "unavoidable by what was tried: none of the fixes removes the harm", sensitive: "sensitive: small changes of the parameters alone remove most of the harm",
 };
 
 const capital = (text) => text.charAt(0).toUpperCase() + text.slice(1);

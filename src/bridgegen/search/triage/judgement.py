@@ -44,7 +44,7 @@ def judgement(
     if cause == "not known":
         return "root cause not known: too few nearby scenarios have a result with each fix"
     if cause == Cause.UNAVOIDABLE.label:
-        return _unavoidable(tested is not None, preventable, responsible)
+        return _unavoidable(tested, preventable, responsible)
     fix = tested.fix if tested is not None else None
     where = _IN_ONE_REPLAY
     if tested is not None and fix is not None:
@@ -59,15 +59,20 @@ def judgement(
     return f"root cause {cause}: {helps} prevents it {where}"
 
 
-def _unavoidable(tested: bool, preventable: bool | None, responsible: str) -> str:
-    where = "in nearby scenarios" if tested else _IN_ONE_REPLAY
+def _unavoidable(tested: Neighbourhood | None, preventable: bool | None, responsible: str) -> str:
+    """Return that no fix was found, with those that were tried: another driver may cope."""
+    where, which = _IN_ONE_REPLAY, ""
+    if tested is not None:
+        where = "in a significant share of nearby scenarios"
+        which = f" ({', '.join(one.name for one in tested.fixes)})"
+    none = f"none of the fixes that were tried{which}"
     if preventable:
-        return f"root cause not found: {BRAKING} would have avoided it, but no fix does {where}"
-    said = "unavoidable:"
+        return f"root cause not found: {BRAKING} would have avoided it, but {none} does {where}"
+    said = "unavoidable by what was tried:"
     if responsible in ("ego", "shared"):  # it could have kept its duty
         said = "root cause not found: the ego is responsible, but"
     braking = f", nor would {BRAKING}" if preventable is False else ""
-    return f"{said} no fix prevents it {where}{braking}"
+    return f"{said} {none} prevents it {where}{braking}"
 
 
 def _harmful(near: Neighbourhood, fix: Treatment) -> int:

@@ -225,7 +225,7 @@ class Minimiser:
         for k, m in enumerate(modes):
             if not tried.harmful[k]:
                 continue
-            conditions, inside = Conditions(
+            conditions, inside, rest = Conditions(
                 self._pipeline, X[k], self._bases[m], ladders[m].step, int(noise[k]), self._seed,
                 self._effort.probes,
             ).find(_needed(ladders[m], here[m]))  # fmt: skip
@@ -237,7 +237,8 @@ class Minimiser:
             found[m] = Minimal(
                 name=names[m], x=tuple(X[k].tolist()), noise_key=str(noise[k]),
                 values=self._pipeline.runner.facts(X[k]),
-                conditions=tuple(conditions), sentence=sentence(conditions),
+                conditions=tuple(conditions),
+                sentence=sentence(conditions, rest, draws=self._pipeline.draws),
                 rows=rows, harmful=hits, robustness=share if rows else None,
                 harm=float(tried.harm[k]), severity=float(tried.severity[k]), inside=inside,
             )  # fmt: skip

@@ -188,8 +188,8 @@ class Condition(_Model):
         sign: ">=" where the parameter lies above its nominal value, "<=" below it.
         limit: the harm persists as far as here when this parameter alone is moved on towards its
             nominal value, and not one step further.
-        until: likewise away from its nominal value; None where the harm persists to the end of its
-            range.
+        until: likewise away from its nominal value, or where a constraint ends the move; None where
+            the harm persists to the end of its range.
         step: of that parameter.
         value: in the minimal scenario.
         nominal: value of the parameter in the nominal scenario.
@@ -225,7 +225,8 @@ class Minimal(_Model):
         values: the parameters that its scenario depends on, by name.
         conditions: the parameters that must differ from nominal, those furthest from it first.
         sentence: they in words.
-        inside: random probes that meet all confirmed conditions, all else as in the scenario.
+        inside: feasible random probes that meet all confirmed conditions; examples as in the
+            scenario, all else at its default or as near to it as constraints allow.
         rows: neighbours that have a result.
         harmful: of them.
         robustness: harmful / rows.
