@@ -120,6 +120,15 @@ def test_a_damaged_file_is_read_or_refused(write, tmp_path_factory, data):
             assert np.isfinite(getattr(one, name)).all(), name
 
 
+def test_a_database_whose_texts_are_no_utf_8_is_refused(tmp_path):
+    path = w.write_smarts(tmp_path)
+    whole = bytearray(path.read_bytes())
+    whole[4060] = 0x80  # in the SQL of a table, which SQLite quotes in its error
+    path.write_bytes(whole)
+    _, error = _cleaned(path)
+    assert "is no valid database" in error
+
+
 @settings(max_examples=100, deadline=None)
 @given(data=st.binary(max_size=300), head=st.sampled_from(
     [b"", b"\x80\x04", b"SQLite format 3\x00", b"<fcd-export>", b'{"objects": [], "position": ',

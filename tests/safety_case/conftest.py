@@ -21,11 +21,11 @@ SEARCHES = {
     ),
     "clean": ("cut-in", {"ego": "reference", "algorithm": "random"}),
     "judged": (
-        "cut-in",
+        "pedestrian-at-night",
         {
-            "ego": "un-r157",
+            "ego": "reference",
             "algorithm": "random",
-            "criteria": ["R-12: always(gap to bv > 2 m)", "R-13: always(ego.v >= -1 m/s)"],
+            "criteria": ["R-12: always(gap to any > 2 m)", "R-13: always(ego.v >= -1 m/s)"],
         },
     ),
 }

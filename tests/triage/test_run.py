@@ -225,18 +225,19 @@ def test_a_failure_among_fresh_draws_alone_is_one_and_is_exported(tmp_path, caps
 
 def test_a_run_says_how_many_excused_collisions_a_careful_driver_avoids(tmp_path):
     run = bg.run_search(
-        "cut-in", ego="un-r157", budget=100, seed=4, algorithm="random", out=tmp_path / "run"
-    )
+        "cut-out", ego="reference", budget=200, seed=0, algorithm="random", keep=2, causes=False,
+        out=tmp_path / "run",
+    )  # fmt: skip
     said = re.search(r"careful driver avoids (\d+) of (\d+) coll", run.triage.bound.sentence)
     avoided, again = map(int, said.groups())
     frame = run.frame()
     excused = frame[(frame["conflict"] == "contact") & frame["implausible"].isna()]
     excused = excused[excused["harm"] < NEAR_MISS]
     assert again == len(excused)
-    X = excused[list(bg.model("cut-in").columns)].to_numpy()
+    X = excused[list(bg.model("cut-out").columns)].to_numpy()
     clean = np.zeros(len(X), bool)
     for driver in ("careful", "careful-fsm"):
-        others = bg.model("cut-in", ego=driver).evaluate(X)
+        others = bg.model("cut-out", ego=driver).evaluate(X)
         clean |= (others["conflict"] != "contact") & (others["harm"] < NEAR_MISS)
     assert avoided == clean.sum() > 0
 

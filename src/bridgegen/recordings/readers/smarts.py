@@ -54,7 +54,7 @@ def _read(path: Path) -> Iterator[RecordedTraffic]:
                     f"{' or '.join(sorted(TABLES - tables))}"
                 )
             yield _recording(path, base)
-    except sqlite3.Error as error:
+    except (sqlite3.Error, UnicodeDecodeError) as error:  # names and texts are UTF-8
         raise FileFormatError(f"{path}: is no valid database: {error}") from None
 
 
