@@ -189,6 +189,13 @@ def test_legs_that_are_offset_are_joined_by_two_arcs() -> None:
     assert lane.widths[0].a + lane.widths[0].b * way.length == pytest.approx(4.0)
 
 
+def test_a_way_that_leads_less_than_a_millimetre_aside_is_straight() -> None:
+    """Its arcs would have radii of 10,000 km, at which single precision errs by 0.4 m."""
+    (line,) = joining(Ray(0.0, 0.0, 0.0), Ray(90.0, 2e-4, 0.0), "a way")
+    assert line.shape == Line()
+    assert len(joining(Ray(0.0, 0.0, 0.0), Ray(90.0, 2e-3, 0.0), "a way")) == 2
+
+
 def test_more_lanes_in_than_there_are_opposite() -> None:
     legs = [
         leg("A", "1", 270.0, (3.5, 3.5, 3.5, 3.5), (3.5,)),

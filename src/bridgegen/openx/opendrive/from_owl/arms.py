@@ -33,6 +33,9 @@ LEAST_RADIUS = 2.0
 _SHORTEST = 1e-4
 """Lines shorter than this [m] are left out."""
 _STRAIGHT = 1e-9
+_ASIDE = 1e-3
+"""[m] A way that leads less to one side is straight: an arc of so large a radius that CARLA, which
+computes in single precision, would put it up to 0.4 m aside."""
 _ALMOST_PARALLEL = math.radians(1.0)
 _LINE = Line()
 
@@ -84,7 +87,7 @@ def along(s: float, x: float, y: float, h: float, length: float, curvature: floa
 
 def _bends(ahead: float, aside: float, turn: float) -> list[tuple[float, float]]:
     """Return (curvature [1/m], length [m]) of each part, in the frame of the start."""
-    if abs(turn) < _STRAIGHT and abs(aside) < _STRAIGHT * max(1.0, abs(ahead)):
+    if abs(turn) < _STRAIGHT and abs(aside) < max(_STRAIGHT * max(1.0, abs(ahead)), _ASIDE):
         return [(0.0, ahead)]
     if abs(turn) > _ALMOST_PARALLEL:
         # Both rays run through one corner, `before` ahead of the start, `after` behind the end.
