@@ -10,7 +10,8 @@ import pytest
 
 import bridgegen as bg
 from bridgegen.base.errors import InputError
-from bridgegen.cli import comparisons, main, runs
+from bridgegen.cli import main, runs
+from bridgegen.cli.jobs import COMPARE, command_of
 from bridgegen.engine.options import CommonOptions, PipelineOptions, SearchOptions, options_of
 from bridgegen.engine.options.forms import read_names, read_numbers, read_settings, read_terms
 from bridgegen.jobs.suite.suite import run_suite
@@ -57,7 +58,7 @@ def test_keywords_are_those_of_the_options():
         (bg.run_search, ("cut-in", 3), {}, "run_search: too many positional arguments"),
         (bg.run_search, (5,), {}, "scenario must be str | pathlib.Path, got 5"),
         (bg.compare, ("cut-in",), {"sedes": 3}, "'sedes'; did you mean 'seeds'?"),
-        (bg.compare, ("cut-in",), {"seeds": "x"}, "seeds must be int, got 'x'"),
+        (bg.compare, ("cut-in",), {"seeds": "x"}, "seeds must be a whole number, got 'x'"),
         (run_suite, ("cut-in",), {"options": {}}, "options must be .*CommonOptions, got {}"),
         (bg.resume, ("runs/a",), {"eog": "x"}, "'eog'; did you mean 'ego'?"),
         (bg.confirm, ("runs/a",), {}, "confirm: missing a required argument: 'simulator'"),
@@ -121,7 +122,7 @@ def test_texts_are_read_as_on_the_command_line():
 def test_the_command_line_has_them_all():
     search = inspect.signature(runs.search).parameters
     assert {*DECLARED} - {*search} == set()
-    compare = inspect.signature(comparisons.compare).parameters
+    compare = inspect.signature(command_of(COMPARE)).parameters
     assert {one.name for one in options_of(CommonOptions)} - {*compare} == set()
 
 

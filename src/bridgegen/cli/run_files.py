@@ -139,7 +139,7 @@ def read_run_document(path: Path) -> "Document":
         raise FileFormatError(f"cannot be read: {error.strerror} ({path})") from None
 
 
-def read_runs(path: Path, keys: Mapping[str, Key], argument: str) -> list[FiledRun]:
+def read_runs(path: Path, keys: Mapping[str, Key], argument: str = SCENARIO) -> list[FiledRun]:
     """Return the runs of a run file.
 
     Raises:
