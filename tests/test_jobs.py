@@ -10,6 +10,7 @@ import jsonschema
 import pytest
 import yaml
 
+from bridgegen.base.errors import StorageError
 from bridgegen.cli import main
 from bridgegen.cli.jobs import JOBS, schema_of
 from bridgegen.engine.options import CommonOptions, options_of
@@ -151,6 +152,25 @@ def test_a_file_of_several_runs_makes_each_in_a_folder_of_its_own(
     file.write_text(yaml.safe_dump({"run": {**needed, "bugdet": 3}}))
     assert call(monkeypatch, job.name, file) == 2
     assert "unknown key 'bugdet' in run" in capsys.readouterr().err
+
+
+@of_files
+def test_one_run_that_fails_does_not_keep_the_others(job, asked, monkeypatch, tmp_path, capsys):
+    required = [one.name for one in options_of(job.options) if one.is_required]
+    needed = {name: GIVEN[job.name][name] for name in required}
+    needed = {name: list(v) if isinstance(v, tuple) else v for name, v in needed.items()}
+    file, run = tmp_path / "both.yaml", Job.run
+
+    def refuse_the_first(self, options):
+        if Path(options.out).name == "a":
+            raise StorageError("there is something else")
+        return run(self, options)
+
+    monkeypatch.setattr(Job, "run", refuse_the_first)
+    file.write_text(json.dumps({"runs": {"a": needed, "b": needed}}))
+    assert call(monkeypatch, job.name, file) == 2
+    assert "bridgegen: error: a: there is something else" in capsys.readouterr().err
+    assert [Path(one.out).name for one in asked] == ["b"]
 
 
 @jobs

@@ -31,6 +31,7 @@ from bridgegen.search.triage.record import (
 )
 
 SPACE = Estimate(drawn="fresh", rows=200, harmful=10, share=0.05, low=0.024, high=0.09)
+HARMLESS = Estimate(drawn="fresh", rows=200, harmful=0, share=0.0, low=0.0, high=0.02)
 
 
 def mode(number=1, shown=0, **changes):
@@ -66,7 +67,8 @@ def triage(*modes, evaluations=120, harmful=40):
         scenario="crossroads-s4", ego="route-follower", count="ego", results="0" * 64, seed=0,
         neighbours=32, radius=0.025, sampled=0,
         bound=Bound(
-            evaluations=evaluations, failed=0, implausible=0, harmful=harmful, space=SPACE,
+            evaluations=evaluations, failed=0, implausible=0, harmful=harmful,
+            space=SPACE if harmful else HARMLESS,
             least=(Least(quantity="d_min", value=1.5, unit="m", evaluation=3),),
             sentence="At most 2 % of the space is harmful (95 %).",
         ),
@@ -357,4 +359,10 @@ def test_where_nothing_was_found_the_nearest_scenario_plays(browser, report, tmp
     button = page.locator("#play").bounding_box()
     assert button["y"] + button["height"] < 720  # on the first screen
     assert page.locator("#list").is_hidden()
+    bound = quiet.triage.bound.model_copy(update={"space": SPACE})
+    drawn = replace(quiet, triage=quiet.triage.model_copy(update={"bound": bound}))
+    write_report(tmp_path / "drawn.html", drawn)
+    page.goto((tmp_path / "drawn.html").as_uri())
+    title = page.locator("#modes-title").inner_text()
+    assert title == "Route-follower fails in fresh random draws alone"
     page.close()

@@ -12,6 +12,7 @@ import bridgegen as bg
 from bridgegen.assess.conflict.harm import NEAR_MISS
 from bridgegen.cli.verdict.of_run import figures_of
 from bridgegen.jobs.search.restored import pipeline_of
+from bridgegen.pages.findings_payload import triage_payload
 from bridgegen.results.store import Store
 from bridgegen.search.triage import JSON_FILE
 from bridgegen.search.triage.minimal import Ladder
@@ -221,6 +222,10 @@ def test_a_failure_among_fresh_draws_alone_is_one_and_is_exported(tmp_path, caps
     assert out.startswith("FAILS  reference in bus-pulls-out: in 1 of 256 fresh random draws")
     assert str(run.fresh_scenarios[0]) in out
     assert figures_of(run)["modes"] == 1
+    assert triage_payload(run.triage)["bound"]["failures"] == 1  # the page's title depends on it
+    page = run.report.read_text("utf-8")
+    assert "These draws are exported: critical/fresh-01.xosc" in page
+    assert "No scenario is exported" not in page
 
 
 def test_a_run_says_how_many_excused_collisions_a_careful_driver_avoids(tmp_path):

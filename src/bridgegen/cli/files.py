@@ -190,7 +190,7 @@ def schema(
     Editors complete and check scenario files and run files with it; that of safety cases is for
     programs which read them.
     """
-    from bridgegen.cli.jobs import JOBS
+    from bridgegen.cli.jobs import JOBS, argument_of
     from bridgegen.cli.jobs import schema_of as job_schema
     from bridgegen.cli.runs import run_file_schema
     from bridgegen.jobs.safety_case.model import json_schema
@@ -198,7 +198,7 @@ def schema(
 
     if None not in (kind, of) and kind != of:
         raise InputError(f"the schema of one kind of file is printed, got {kind} and --of {of}")
-    jobs = {job.name: job for job in JOBS}
+    jobs = {job.name: job for job in JOBS if argument_of(job)}
     elsewhere = {"run": run_file_schema, "safety-case": json_schema}
     name = kind or of or "scenario"
     if name in jobs:

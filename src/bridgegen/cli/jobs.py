@@ -2,6 +2,7 @@
 
 import inspect
 import json
+import sys
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import partial
@@ -10,7 +11,7 @@ from typing import Annotated, Any
 
 import typer
 
-from bridgegen.base.errors import InputError
+from bridgegen.base.errors import BridgeGenError, Interrupted
 from bridgegen.cli import options as common
 from bridgegen.cli.app import FAILED, app, benchmarks
 from bridgegen.cli.connection import (
@@ -114,7 +115,10 @@ def _print(result: JobResult, seconds: float, *, as_json: bool) -> None:
 def run_all(
     path: Path, runs: list[FiledRun], keys: Mapping[str, Key], command: Any, job: str
 ) -> None:
-    """Do the jobs of a run file one after the other, each in a folder of its own."""
+    """Do the jobs of a run file one after the other, each in a folder of its own.
+
+    One that fails does not keep the others from running; the exit status is then 2.
+    """
     status = 0
     for one in runs:
         print(f"\n{one.name}", flush=True)
@@ -122,8 +126,12 @@ def run_all(
             command({"out": Path(job) / path.stem / one.name, **one.values})
         except typer.Exit as ended:
             status = max(status, ended.exit_code)
-        except InputError as error:
-            raise InputError(*(f"{one.name}: {problem}" for problem in error.problems)) from None
+        except Interrupted:
+            raise
+        except BridgeGenError as error:
+            for problem in error.problems:
+                print(f"bridgegen: error: {one.name}: {problem}", file=sys.stderr)
+            status = 2
     if status:
         raise typer.Exit(status)
 

@@ -120,7 +120,11 @@ def is_run_file(scenario: str) -> bool:
     try:
         data = read_run_document(path).data
     except BridgeGenError:  # the reader of run files, or of scenario files, says what is wrong
-        return path.read_bytes()[:MOST_SEARCHED].lstrip().startswith((b"run:", b"runs:"))
+        try:
+            with path.open("rb") as file:
+                return file.read(MOST_SEARCHED).lstrip().startswith((b"run:", b"runs:"))
+        except OSError:
+            return False
     return isinstance(data, dict) and bool(_HEADS & {*data}) and SCENARIO not in data
 
 

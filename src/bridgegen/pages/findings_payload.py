@@ -87,6 +87,7 @@ def triage_payload(found: Triage) -> dict[str, Any]:
         "bound": {
             "sentence": found.bound.in_full,
             "judged": found.bound.judged,
+            "failures": found.bound.failures,
             "evaluations": found.bound.evaluations,
             "failed": found.bound.failed,
             "implausible": found.bound.implausible,

@@ -28,7 +28,7 @@ class Modes {
   fill() {
     const found = data.triage;
     const n = found.modes.length + found.more;
-    $("modes-title").textContent = n ? `${number(n)} ${n === 1 ? "way" : "ways"} in which ${found.ego} fails${found.baseline ? ` and ${found.baseline} does not` : ""}` : found.bound.judged === false ? "Not judged" : data.criteria ? "No harm found" : "No failure found";
+    $("modes-title").textContent = n ? `${number(n)} ${n === 1 ? "way" : "ways"} in which ${found.ego} fails${found.baseline ? ` and ${found.baseline} does not` : ""}` : found.bound.failures ? `${capital(found.ego)} fails in fresh random draws alone` : found.bound.judged === false ? "Not judged" : data.criteria ? "No harm found" : "No failure found";
     $("modes-lead").textContent = capital(found.bound.sentence.replace(n ? /^[^:]*: / : /^(Not judged: |No (failure found|scenario in which .*? was found) in )/, "")); // the title says the rest
     this.buttons = [];
     $("modes-list").replaceChildren(...found.modes.map((mode) => this.card(mode)));

@@ -21,8 +21,9 @@ function nameCell(run) {
 }
 
 const shareCell = ({ share, low, high, unjudged }) => (share === null || unjudged ? ["–"] : [perCent(share), element("small", {}, `${perCent(low)} to ${perCent(high)}`)]);
-const noneFound = ({ finished, problem, judged, unjudged, violated }) => {
+const noneFound = ({ finished, problem, judged, unjudged, violated, failures }) => {
   if (!finished || problem || (unjudged && violated)) return ""; // a violation is a verdict
+  if (failures) return "fails in fresh random draws alone";
   return unjudged ? "not judged" : judged ? "no harm found" : "no failure found";
 };
 const judgedCell = ({ judged, violated }) => (judged ? [element("small", { class: violated ? "problem" : "" }, judged)] : []);
