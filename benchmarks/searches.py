@@ -23,9 +23,8 @@ from run import seconds_a_row
 import bridgegen as bg
 from bridgegen.base.errors import BridgeGenError
 from bridgegen.base.plugins import label_of
+from bridgegen.jobs.compare.record import distinct, modes_of, normalised, space_of
 from bridgegen.jobs.compare.result import Comparison
-from bridgegen.jobs.compare.record import distinct, normalised
-from bridgegen.jobs.compare.record import modes_of, space_of
 from bridgegen.results.store import Store
 from bridgegen.scenario.language.space import SearchSpace
 
