@@ -9,7 +9,7 @@ from html.parser import HTMLParser
 import pytest
 
 from bridgegen.base.errors import StorageError
-from bridgegen.pages import page
+from bridgegen.pages import page, templates
 from bridgegen.pages.page import write_report
 from bridgegen.pages.payload import to_json
 from bridgegen.pages.sections import SECTIONS
@@ -129,6 +129,7 @@ def test_every_style_of_ours_is_used():
     needed = [page._bundled(page.SERVED)[1], page._bundled(("runs.js",))[1]]
     needed.append(page._bundled(("suite.js",))[1])
     needed += [page._own(name) for name in (*STILL, "dashboard.css", "safety_case.css")]
+    needed += [templates.ROOT.joinpath(name).read_bytes() for name in templates.STYLES]
     assert [name for name in ours if not any(page._own(name) in one for one in needed)] == []
 
 

@@ -237,7 +237,8 @@ def write_still_page(path: Path, template: str, title: str, body: bytes) -> None
 
 def still_page(template: str, title: str, body: bytes) -> list[bytes]:
     """Return a page without scripts, in parts; see `write_still_page`."""
-    style = _own("common.css") + b"\n" + _own(template.replace(".html", ".css"))
+    own = template.replace(".html", ".css")
+    style = b"\n".join(_own(name) for name in ("base.css", "common.css", own))
     return filled(template, title, style, body=body)
 
 
@@ -259,7 +260,7 @@ def filled(template: str, title: str, css: bytes, **more: bytes) -> list[bytes]:
 @cache
 def _bundled(entries: tuple[str, ...]) -> tuple[bytes, bytes]:
     script, style = bundle(entries, _text)
-    return script.encode(), style.encode()
+    return script.encode(), _own("base.css") + style.encode()
 
 
 def _text(name: str) -> str | None:

@@ -1,0 +1,185 @@
+"""Charts of pages without scripts, as SVG; their colours are those of ``web/still.css``."""
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from markupsafe import Markup, escape
+
+from bridgegen.base.arrays import Float
+
+
+def element(name: str, *content: object, **attributes: object) -> Markup:
+    """Return an element: ``class_`` is its class, an underscore in a name a hyphen."""
+    given = Markup("").join(
+        Markup(' {}="{}"').format(key.rstrip("_").replace("_", "-"), _rounded(value))
+        for key, value in attributes.items()
+        if value is not None
+    )
+    inside = Markup("").join(map(escape, content))
+    return Markup("<{}{}>{}</{}>").format(Markup(name), given, inside, Markup(name))
+
+
+def _rounded(value: object) -> object:
+    return f"{value:.1f}".removesuffix(".0") if isinstance(value, float) else value
+
+
+def svg(width: float, height: float, label: str, parts: Iterable[Markup], kind: str = "") -> Markup:
+    """Return a picture with its name for those who do not see it."""
+    return element(
+        "svg", *parts, class_=kind or None, viewBox=f"0 0 {width:g} {height:.0f}", role="img",
+        aria_label=label,
+    )  # fmt: skip
+
+
+class Plot:
+    """A plot: marks are given in data units, and lie over those that were added before.
+
+    Values outside an axis's range stand at its end.
+
+    Args:
+        size: width and height [pixels].
+        x: the range of the horizontal axis.
+        y: the range of the vertical axis, upwards.
+        margins: left, right, top and bottom [pixels].
+    """
+
+    def __init__(
+        self, size: tuple[float, float], x: tuple[float, float], y: tuple[float, float],
+        margins: tuple[float, float, float, float],
+    ) -> None:  # fmt: skip
+        self.size, self._ranges = size, (x, y)
+        left, right, top, bottom = margins
+        self.left, self.right, self.top, self.base = left, size[0] - right, top, size[1] - bottom
+        self._parts: list[Markup] = []
+
+    def at(self, x: float) -> float:
+        """Return the pixel of a value of the horizontal axis."""
+        return float(self._x(np.array(x)))
+
+    def height(self, y: float) -> float:
+        """Return the pixel of a value of the vertical axis."""
+        return float(self._y(np.array(y)))
+
+    def _x(self, x: Float) -> Float:
+        low, high = self._ranges[0]
+        return self.left + (np.clip(x, low, high) - low) / (high - low) * (self.right - self.left)
+
+    def _y(self, y: Float) -> Float:
+        low, high = self._ranges[1]
+        return self.base - (np.clip(y, low, high) - low) / (high - low) * (self.base - self.top)
+
+    def add(self, name: str, *content: object, **attributes: object) -> None:
+        """Add an element in pixels; see `element`."""
+        self._parts.append(element(name, *content, **attributes))
+
+    def text(
+        self, x: float, y: float, text: object, anchor: str = "middle", kind: str = ""
+    ) -> None:
+        """Write at a pixel."""
+        self.add("text", text, class_=kind or None, x=x, y=y, text_anchor=anchor)
+
+    def bars(self, edges: Float, heights: Float) -> None:
+        """Add a bar between each two edges, from the axis on."""
+        left, tops = self._x(edges), self._y(heights)
+        for a, b, y in zip(left[:-1].tolist(), left[1:].tolist(), tops.tolist(), strict=True):
+            self.add("rect", class_="bar", x=a, y=y, width=max(b - a - 1.0, 0.5),
+                     height=self.base - y)  # fmt: skip
+
+    def band(self, x: Float, low: Float, high: Float) -> None:
+        """Add the area between two curves."""
+        points = self._points(np.concatenate([x, x[::-1]]), np.concatenate([high, low[::-1]]))
+        self.add("polygon", class_="band", points=points)
+
+    def line(self, x: Float, y: Float, kind: str = "line") -> None:
+        """Add a curve."""
+        self.add("polyline", class_=kind, points=self._points(x, y))
+
+    def dots(self, x: Float, y: Float, radius: float = 1.8) -> None:
+        """Add a dot for each pair of values."""
+        for a, b in zip(self._x(x).tolist(), self._y(y).tolist(), strict=True):
+            self.add("circle", class_="dot", cx=a, cy=b, r=radius)
+
+    def frame(self, x_label: str, y_label: str = "") -> None:
+        """Add the axes with round numbers; the vertical one if it has a label."""
+        self.add("path", class_="axis", d=f"M{self.left:g} {self.base:g}H{self.right:g}"
+                 + (f"M{self.left:g} {self.top:g}V{self.base:g}" if y_label else ""))  # fmt: skip
+        for tick in ticks(*self._ranges[0]):
+            self.text(self.at(tick), self.base + 18.0, f"{tick:g}")
+        self.text(0.5 * (self.left + self.right), self.base + 36.0, x_label)
+        if y_label:
+            for tick in ticks(*self._ranges[1]):
+                self.text(self.left - 6.0, self.height(tick) + 4.0, f"{tick:g}", "end")
+            middle = 0.5 * (self.top + self.base)
+            self.add("text", y_label, text_anchor="middle",
+                     transform=f"translate(14 {middle:.0f}) rotate(-90)")  # fmt: skip
+
+    def svg(self, label: str, kind: str = "chart") -> Markup:
+        """Return the picture."""
+        return svg(*self.size, label, self._parts, kind)
+
+    def _points(self, x: Float, y: Float) -> str:
+        pairs = zip(self._x(x).tolist(), self._y(y).tolist(), strict=True)
+        return " ".join(f"{a:.1f},{b:.1f}" for a, b in pairs)
+
+
+def ticks(low: float, high: float) -> list[float]:
+    """Return round numbers in a range, about six."""
+    step = 10.0 ** np.floor(np.log10((high - low) / 5.0))
+    step *= next(one for one in (1.0, 2.0, 5.0, 10.0) if (high - low) / (step * one) <= 7.0)
+    first = np.ceil(low / step - 1e-9)
+    return [
+        float(f"{k * step:.10g}") + 0.0
+        for k in np.arange(first, np.floor(high / step + 1e-9) + 1.0)
+    ]
+
+
+@dataclass(frozen=True)
+class Interval:
+    """A positive estimate with its interval: what it is of, its colour's class, and the numbers."""
+
+    words: str
+    kind: str
+    low: float
+    estimate: float
+    high: float
+
+
+def intervals(lines: Sequence[Interval], label: str, longest: int = 48) -> Markup:
+    """Return intervals below each other over a logarithmic axis.
+
+    Args:
+        lines: at least one, with estimates above 0.
+        label: of the picture.
+        longest: characters of a line's words that are shown.
+    """
+    least = min(one.low if one.low > 0.0 else one.estimate / 10.0 for one in lines)
+    first = math.floor(math.log10(least))
+    last = max(math.ceil(math.log10(max(one.high for one in lines))), first + 1)
+    height = 30.0 * len(lines) + 40.0
+    plot = Plot((900.0, height), (first, last), (0.0, 1.0), (330.0, 30.0, 6.0, 28.0))
+    for power in range(first, last + 1):
+        plot.add("path", class_="grid", d=f"M{plot.at(power):.1f} 6V{plot.base:g}")
+        plot.text(plot.at(power), height - 10.0, f"1e{power}")
+    for row, one in enumerate(lines):
+        y, short = 20.0 + 30.0 * row, one.words[: longest - 2] + "…"
+        words = one.words if len(one.words) < longest else short
+        low, middle, high = (
+            plot.at(math.log10(max(value, 10.0**first)))
+            for value in (one.low, one.estimate, one.high)
+        )
+        plot.text(318.0, y + 4.0, words, "end", one.kind)
+        plot.add("path", class_=f"interval {one.kind}", d=f"M{low:.1f} {y:g}H{high:.1f}")
+        plot.add("circle", class_=one.kind, cx=middle, cy=y, r=4.5)
+    return plot.svg(label)
+
+
+def bars(shares: Float, level: float, label: str) -> Markup:
+    """Return a small chart of shares, and a dashed line at the share that is nothing special."""
+    top = max(float(shares.max()), 2.0 * level)
+    n = len(shares)
+    plot = Plot((260.0, 98.0), (0.0, n), (0.0, top), (0.0, 0.0, 6.0, 6.0))
+    plot.bars(np.arange(n + 1.0), shares)
+    plot.line(np.array([0.0, n]), np.full(2, level), "even")
+    return plot.svg(label)
