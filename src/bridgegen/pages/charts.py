@@ -64,11 +64,13 @@ class Plot:
 
     def _x(self, x: Float) -> Float:
         low, high = self._ranges[0]
-        return self.left + (np.clip(x, low, high) - low) / (high - low) * (self.right - self.left)
+        share = (np.clip(x, low, high) - low) / ((high - low) or 1.0)
+        return self.left + share * (self.right - self.left)
 
     def _y(self, y: Float) -> Float:
         low, high = self._ranges[1]
-        return self.base - (np.clip(y, low, high) - low) / (high - low) * (self.base - self.top)
+        share = (np.clip(y, low, high) - low) / ((high - low) or 1.0)
+        return self.base - share * (self.base - self.top)
 
     def add(self, name: str, *content: object, **attributes: object) -> None:
         """Add an element in pixels; see `element`."""
@@ -101,15 +103,20 @@ class Plot:
         for a, b in zip(self._x(x).tolist(), self._y(y).tolist(), strict=True):
             self.add("circle", class_="dot", cx=a, cy=b, r=radius)
 
-    def frame(self, x_label: str, y_label: str = "") -> None:
-        """Add the axes with round numbers; the vertical one if it has a label."""
+    def image(self, address: str) -> None:
+        """Add a picture that fills the plot."""
+        self.add("image", x=self.left, y=self.top, width=self.right - self.left,
+                 height=self.base - self.top, preserveAspectRatio="none", href=address)  # fmt: skip
+
+    def frame(self, x_label: str, y_label: str = "", most: int = 7) -> None:
+        """Add the axes, each with ``most`` round numbers; the vertical one if it has a label."""
         self.add("path", class_="axis", d=f"M{self.left:g} {self.base:g}H{self.right:g}"
                  + (f"M{self.left:g} {self.top:g}V{self.base:g}" if y_label else ""))  # fmt: skip
-        for tick in ticks(*self._ranges[0]):
+        for tick in ticks(*self._ranges[0], most):
             self.text(self.at(tick), self.base + 18.0, f"{tick:g}")
         self.text(0.5 * (self.left + self.right), self.base + 36.0, x_label)
         if y_label:
-            for tick in ticks(*self._ranges[1]):
+            for tick in ticks(*self._ranges[1], most):
                 self.text(self.left - 6.0, self.height(tick) + 4.0, f"{tick:g}", "end")
             middle = 0.5 * (self.top + self.base)
             self.add("text", y_label, text_anchor="middle",
@@ -124,10 +131,12 @@ class Plot:
         return " ".join(f"{a:.1f},{b:.1f}" for a, b in pairs)
 
 
-def ticks(low: float, high: float) -> list[float]:
-    """Return round numbers in a range, about six."""
-    step = 10.0 ** np.floor(np.log10((high - low) / 5.0))
-    step *= next(one for one in (1.0, 2.0, 5.0, 10.0) if (high - low) / (step * one) <= 7.0)
+def ticks(low: float, high: float, most: int = 7) -> list[float]:
+    """Return round numbers in a range, at most ``most`` steps apart."""
+    if low == high:
+        return [low]
+    step = 10.0 ** np.floor(np.log10((high - low) / (most - 2.0)))
+    step *= next(one for one in (1.0, 2.0, 5.0, 10.0) if (high - low) / (step * one) <= most)
     first = np.ceil(low / step - 1e-9)
     return [
         float(f"{k * step:.10g}") + 0.0

@@ -14,6 +14,8 @@ from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from markupsafe import Markup
+
 from bridgegen.base.disk import write_whole
 
 if TYPE_CHECKING:
@@ -38,16 +40,17 @@ def page(template: str, **values: Any) -> bytes:
 
     Args:
         template: its path in the package ("jobs/risk/page.html").
-        values: what it prints; ``css`` is its whole style, by default the common one and its own.
+        values: what it prints; ``css`` is its whole style, by default `style`'s.
     """
-    from markupsafe import Markup
-
-    if "css" not in values:
-        own = template.removesuffix(".html") + ".css"
-        styles = (*STYLES, own) if ROOT.joinpath(own).is_file() else STYLES
-        values["css"] = Markup("".join(ROOT.joinpath(one).read_text("utf-8") for one in styles))
+    values.setdefault("css", Markup(style(template.removesuffix(".html") + ".css")))
     text = _environment().get_template(template).render(values)
     return text.encode("utf-8", "replace")
+
+
+def style(own: str = "") -> str:
+    """Return the style of a page without scripts: the common one, and its own if there is one."""
+    found = (ROOT.joinpath(name) for name in (*STYLES, own) if name)
+    return "".join(one.read_text("utf-8") for one in found if one.is_file())
 
 
 @cache
