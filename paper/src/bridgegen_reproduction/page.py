@@ -94,8 +94,8 @@ def _folded(block: Folded) -> str:
     )
     return (
         f'<div class="card"><details><summary>{escape(block.title)}</summary><div class="wide">'
-        f'<table class="data runs"><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table></div>'
-        f'</details><p class="files">All of it: <a href="{escape(block.file)}">'
+        f'<table class="data runs"><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table>'
+        f'</div></details><p class="files">All of it: <a href="{escape(block.file)}">'
         f"{escape(block.file)}</a></p></div>"
     )
 
