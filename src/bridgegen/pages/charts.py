@@ -192,3 +192,28 @@ def bars(shares: Float, level: float, label: str) -> Markup:
     plot.bars(np.arange(n + 1.0), shares)
     plot.line(np.array([0.0, n]), np.full(2, level), "even")
     return plot.svg(label)
+
+
+def ground(lines: Sequence[tuple[str, Float]], low: Float, high: Float, label: str) -> Markup:
+    """Return lines on the ground seen from above, x to the right, with a bar of round length.
+
+    Args:
+        lines: class and points, ``(n, 2)`` [m].
+        low: lower left corner of what is shown, ``(2,)`` [m].
+        high: upper right corner.
+        label: of the picture.
+    """
+    width = 900.0
+    span = np.maximum(high - low, 1.0)
+    scale = min((width - 20.0) / span[0], 220.0 / span[1])
+    height = float(span[1] * scale) + 40.0
+    parts = []
+    for kind, points in lines:
+        xy = np.array([10.0, height - 30.0]) + (points - low) * scale * np.array([1.0, -1.0])
+        text = " ".join(f"{x:.1f},{y:.1f}" for x, y in xy.tolist())
+        parts.append(element("polyline", class_=kind, points=text))
+    length = 10.0 ** np.floor(np.log10(0.4 * (width - 20.0) / scale))
+    end = float(length * scale)
+    parts.append(element("path", class_="scale", d=f"M10 {height - 8.0:.1f}h{end:.1f}"))
+    parts.append(element("text", f"{length:g} m", x=16.0 + end, y=height - 4.0))
+    return svg(width, height, label, parts, "chart")
