@@ -194,6 +194,93 @@ def bars(shares: Float, level: float, label: str) -> Markup:
     return plot.svg(label)
 
 
+@dataclass(frozen=True)
+class Point:
+    """A share in a chart of successive results.
+
+    Attributes:
+        share: in [0, 1].
+        low: lower end of its interval; equal to the upper end where there is none.
+        high: its upper end.
+        text: the share in words.
+        is_some: whether anything was counted.
+        words: what it is of, shown where the pointer is.
+        group: what it shares with its neighbours, short for the axis and in full.
+        href: where it leads; nowhere if empty.
+    """
+
+    share: float
+    low: float
+    high: float
+    text: str
+    is_some: bool
+    words: str
+    group: tuple[str, str]
+    href: str = ""
+
+
+MOST_NUMBERS = 6
+"""Points whose values are written beside them; more would overlap."""
+
+
+def trend(points: Sequence[Point], label: str) -> Markup:
+    """Return a chart: a dot for each result with its interval, a line where the group changes.
+
+    Args:
+        points: at least one, in the order of time.
+        label: of the picture.
+    """
+    n, most = len(points), max(one.high for one in points)
+    top = next((one for one in (0.01, 0.02, 0.05, 0.1, 0.2, 0.5) if most <= one), 1.0)
+    plot = Plot((340.0, 150.0), (0.0, n), (0.0, top), (44.0, 12.0, 18.0, 34.0))
+    for value in (0.0, 0.5 * top, top):
+        y = plot.height(value)
+        plot.add("path", class_="grid", d=f"M{plot.left:g} {y:.1f}H{plot.right:g}")
+        text = f"{100.0 * value:g}\N{NARROW NO-BREAK SPACE}%"
+        plot.text(plot.left - 5.0, y + 4.0, text, "end")
+    starts = [i for i, one in enumerate(points) if not i or one.group != points[i - 1].group]
+    for start, end in zip(starts, [*starts[1:], n], strict=True):
+        left, right = plot.at(start), plot.at(end)
+        room, (name, words) = max(3, int((right - left) / 6.0)), points[start].group
+        if start:
+            plot.add("path", class_="new", d=f"M{left:.1f} {plot.top:g}V{plot.base:g}")
+        short = name if len(name) <= room else f"…{name[-(room - 1) :]}"
+        plot.add("text", short, element("title", words), x=0.5 * (left + right),
+                 y=plot.base + 20.0, text_anchor="middle")  # fmt: skip
+    plot.line(np.arange(0.5, n), np.array([one.share for one in points]))
+    for i, one in enumerate(points):
+        x, y = plot.at(i + 0.5), plot.height(one.share)
+        low, high = plot.height(one.low), plot.height(one.high)
+        parts = [element("title", one.words)]
+        if one.low != one.high:
+            parts.append(element("path", class_="range", d=f"M{x:.1f} {low:.1f}V{high:.1f}"))
+        kind = "dot some" if one.is_some else "dot"
+        parts.append(element("circle", class_=kind, cx=x, cy=y, r=4.0))
+        if one.href:
+            plot.add("a", element("g", *parts), href=one.href)
+        else:
+            plot.add("g", *parts)
+        if n <= MOST_NUMBERS or i == n - 1:
+            plot.text(x, max(high - 5.0, 10.0), one.text)
+    return plot.svg(label)
+
+
+def strip(counts: Sequence[int]) -> Markup:
+    """Return bins in a row, the fuller the darker; empty ones are outlined only."""
+    most = max(counts, default=0) or 1
+    width = 120.0 / max(len(counts), 1)
+    cells = (
+        element(
+            "rect", element("title", f"{count:,}"), x=i * width, width=max(width - 1.0, 1.0),
+            class_=None if count else "none",
+            fill_opacity=f"{0.25 + 0.75 * count / most:.2f}" if count else None,
+        )
+        for i, count in enumerate(counts)
+    )  # fmt: skip
+    bins = Markup("").join(cells)
+    return element("svg", bins, class_="strip", viewBox="0 0 120 14", aria_hidden="true")
+
+
 def ground(lines: Sequence[tuple[str, Float]], low: Float, high: Float, label: str) -> Markup:
     """Return lines on the ground seen from above, x to the right, with a bar of round length.
 

@@ -6,6 +6,7 @@ What a template prints is escaped, unless it is `Markup` of our own.
 """
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from datetime import UTC, datetime
 from functools import cache
 from importlib.metadata import version
@@ -66,6 +67,35 @@ def _environment() -> "Environment":
     }  # fmt: skip
     made.globals["version"] = version("bridgegen")
     return made
+
+
+@dataclass(frozen=True)
+class Cell:
+    """A table's cell that is more than a text, a count, or a pair of a text and a note.
+
+    Attributes:
+        text: what it says.
+        notes: below it, small.
+        kind: class of the text.
+        href: where the text leads; nowhere if empty.
+        label: of that link for screen readers.
+        before: plain text before the link.
+        mark: a sign before the text that a screen reader does not say, and its class.
+        code: a formula below the text.
+        links: address, text and label of further links, below it.
+        more: after these.
+    """
+
+    text: str
+    notes: Sequence[str] = ()
+    kind: str = ""
+    href: str = ""
+    label: str = ""
+    before: str = ""
+    mark: tuple[str, str] | None = None
+    code: str = ""
+    links: Sequence[tuple[str, str, str]] = ()
+    more: str = ""
 
 
 def shown(value: object) -> object:
