@@ -121,8 +121,9 @@ def number(value: float) -> str:
 
 
 def counted(count: int, noun: str, many: str = "") -> str:
-    """Return a count with its noun: "1 run", "2,000 runs"."""
-    return f"{count:,} {noun if count == 1 else many or f'{noun}s'}"
+    """Return a count with its noun: "1 run", "2,000 runs", "3 near misses"."""
+    plural = many or noun + ("es" if noun.endswith("s") else "s")
+    return f"{count:,} {noun if count == 1 else plural}"
 
 
 def joined(names: Sequence[str], most: int = 4) -> str:
