@@ -62,9 +62,7 @@ def _environment() -> "Environment":
         loader=PackageLoader("bridgegen", "."), autoescape=True, undefined=StrictUndefined,
         trim_blocks=True, lstrip_blocks=True, auto_reload=False,
     )  # fmt: skip
-    made.filters |= {
-        "counted": counted, "joined": joined, "number": number, "shown": shown, "when": when,
-    }  # fmt: skip
+    made.filters |= {"counted": counted, "shown": shown}
     made.globals["version"] = version("bridgegen")
     return made
 
