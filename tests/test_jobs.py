@@ -11,6 +11,7 @@ import pytest
 import yaml
 
 from bridgegen.base.errors import StorageError
+from bridgegen.cli import jobs as cli_jobs
 from bridgegen.cli import main
 from bridgegen.cli.jobs import JOBS, schema_of
 from bridgegen.engine.options import CommonOptions, options_of
@@ -22,6 +23,15 @@ GIVEN = {
         "scenarios": ("cut-in", "crossroads-s4"), "algorithms": ("pso", "ga"), "seeds": 2,
         "settings": {"ga": {"population": 7}}, "baseline": "ga", "apart": 0.25, "budget": 9,
         "deliver": True,
+    },
+    "suite": {
+        "files": ("cut-in", "packs"), "egos": ("careful", "exec:python3 my,driver.py"),
+        "matrix": "2026", "samples": 3, "seed": 4, "simulator": SimulatorChoice("esmini"),
+        "with_maps": True,
+    },
+    "diff": {
+        "files": ("cut-in",), "egos": ("careful", "reference"), "matrix": "none", "samples": 3,
+        "seed": 4, "budget": 0,
     },
     "benchmark planners": {
         "drivers": ("careful", "reference"), "scenarios": ("cut-in", "lead-brakes"), "budget": 4,
@@ -72,6 +82,9 @@ def asked(monkeypatch):
         return Nothing(dict.fromkeys(self.figures, float("nan")))
 
     monkeypatch.setattr(Job, "run", run)
+    monkeypatch.setattr(
+        cli_jobs, "_CRITERIA", {}
+    )  # a class of criteria of its own knows its result
     return found
 
 
@@ -84,6 +97,15 @@ def call(monkeypatch, *words):
 
 def plain(options):
     return replace(options, out=None, workers=None, callbacks=None)
+
+
+def in_file(job, values):
+    """Values of options as a run file names and holds them."""
+    spelling = {one.name: one.name if one.is_argument else one.spelling[2:]
+                for one in options_of(job.options)}  # fmt: skip
+    return {
+        spelling[name]: list(one) if isinstance(one, tuple) else one for name, one in values.items()
+    }
 
 
 def first_of(job):
@@ -140,7 +162,7 @@ def test_a_file_of_several_runs_makes_each_in_a_folder_of_its_own(
     needed = {
         one.name: GIVEN[job.name][one.name] for one in options_of(job.options) if one.is_required
     }
-    needed = {name: list(v) if isinstance(v, tuple) else v for name, v in needed.items()}
+    needed = in_file(job, needed)
     file = tmp_path / "both.yaml"
     file.write_text(json.dumps({"runs": {"a": needed, "b": {**needed, "others": "scripted"}}}))
     assert call(monkeypatch, job.name, file) == 0
@@ -158,7 +180,7 @@ def test_a_file_of_several_runs_makes_each_in_a_folder_of_its_own(
 def test_one_run_that_fails_does_not_keep_the_others(job, asked, monkeypatch, tmp_path, capsys):
     required = [one.name for one in options_of(job.options) if one.is_required]
     needed = {name: GIVEN[job.name][name] for name in required}
-    needed = {name: list(v) if isinstance(v, tuple) else v for name, v in needed.items()}
+    needed = in_file(job, needed)
     file, run = tmp_path / "both.yaml", Job.run
 
     def refuse_the_first(self, options):

@@ -21,6 +21,8 @@ if TYPE_CHECKING:
     from bridgegen.jobs.search import Run, resume, run_search
     from bridgegen.jobs.search.confirm import confirm
     from bridgegen.jobs.search.model import Model, model
+    from bridgegen.jobs.suite.difference import DriverDifference, compare_drivers
+    from bridgegen.jobs.suite.suite import SuiteRun, run_suite
     from bridgegen.scenario.exposure import Exposure, exposure_of, read_exposure
     from bridgegen.scenario.exposure.fit import Fit, fit_exposure
     from bridgegen.scenario.language.reader import load
@@ -29,6 +31,7 @@ if TYPE_CHECKING:
 __all__ = [
     "Comparison",
     "Dashboard",
+    "DriverDifference",
     "Exposure",
     "Fit",
     "Model",
@@ -37,8 +40,10 @@ __all__ = [
     "Run",
     "SafetyCase",
     "SimulatorChoice",
+    "SuiteRun",
     "build_dashboard",
     "compare",
+    "compare_drivers",
     "confirm",
     "errors",
     "estimate_risk",
@@ -51,6 +56,7 @@ __all__ = [
     "read_exposure",
     "resume",
     "run_search",
+    "run_suite",
     "simulate_file",
 ]
 
@@ -64,6 +70,10 @@ _HOMES = {
     "Model": "bridgegen.jobs.search.model",
     "model": "bridgegen.jobs.search.model",
     "Run": "bridgegen.jobs.search",
+    "DriverDifference": "bridgegen.jobs.suite.difference",
+    "SuiteRun": "bridgegen.jobs.suite.suite",
+    "compare_drivers": "bridgegen.jobs.suite.difference",
+    "run_suite": "bridgegen.jobs.suite.suite",
     "Exposure": "bridgegen.scenario.exposure",
     "Fit": "bridgegen.scenario.exposure.fit",
     "exposure_of": "bridgegen.scenario.exposure",

@@ -25,7 +25,7 @@ from bridgegen.jobs.dashboard.scenery import scenery_of
 from bridgegen.jobs.dashboard.sentences import failing_sentence, requirements_sentence
 from bridgegen.jobs.dashboard.trends import trends
 from bridgegen.jobs.suite.growth import add_failures
-from bridgegen.jobs.suite.suite import read_suite, run_suite
+from bridgegen.jobs.suite.suite import evaluate_suite, read_suite
 from bridgegen.results.failures import FILE, OLD_FILE, Failure, read_failures, write_failures
 from bridgegen.scenario.language.reader import load
 from bridgegen.search.triage.record import Estimate, read_record
@@ -352,7 +352,7 @@ def grown(project, tmp_path_factory) -> Path:
 
 def _grow(folder):
     add_failures([folder / "runs" / "route-follower"], folder / "suites" / "mine")
-    run_suite(
+    evaluate_suite(
         folder / "suites" / "mine", egos=["route-follower"], workers=1,
         out=folder / "suites" / "mine-results",
     )  # fmt: skip

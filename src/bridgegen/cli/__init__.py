@@ -10,7 +10,6 @@ from bridgegen.cli import (
     runs,
     views,
     confirmations,
-    suites,
     regressions,
     jobs,
     dashboard,
@@ -42,6 +41,5 @@ __all__ = [
     "reproductions",
     "runs",
     "safety_cases",
-    "suites",
     "views",
 ]

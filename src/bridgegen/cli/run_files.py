@@ -44,12 +44,11 @@ _FORMS: Mapping[Any, FileForm] = {
 _CRITERIA = "criteria"
 _YAML = (".yaml", ".yml")
 
-_CODE = {"algorithm", "detector", "ego", "worse_than"}
-"""Options whose value is a path in front of a colon, or a path if it ends in ``.fmu``."""
+_CODE = {"algorithm", "detector", "ego", "egos", "drivers", "worse_than"}
+"""Options whose values are a path in front of a colon, or a path if they end in ``.fmu``."""
 
-
-_FILES = {SCENARIO, "exposure", "events"}
-"""Options whose value is a name, or a path if it ends like one."""
+_FILES = {SCENARIO, "scenarios", "files", "exposure", "events"}
+"""Options whose values are a name, or a path if they end like one or are a folder's."""
 
 
 @dataclass(frozen=True)
@@ -224,6 +223,8 @@ def _moved(key: Key, value: Any, move: Callable[[str], object]) -> Any:
         return Path(str(move(str(value))))
     if key.name == _CRITERIA:
         return [str(move(one)) if one.lower().endswith(_YAML) else one for one in value]
+    if isinstance(value, list):
+        return [_moved(key, one, move) for one in value]
     if not isinstance(value, str):
         return value
     from bridgegen.drivers import is_remote
@@ -235,8 +236,10 @@ def _moved(key: Key, value: Any, move: Callable[[str], object]) -> Any:
         if path.endswith(".py"):
             return f"{move(path)}{colon}{what}"
         return str(move(value)) if value.endswith(".fmu") else value
+    moved = str(move(value))
     is_file = value.lower().endswith((*_YAML, ".xosc", ".csv"))
-    return str(move(value)) if key.name in _FILES and is_file else value
+    is_path = is_file or Path(value).is_dir() or Path(moved).is_dir()
+    return moved if key.name in _FILES and is_path else value
 
 
 def save_run(path: Path, values: Values, keys: Mapping[str, Key]) -> None:

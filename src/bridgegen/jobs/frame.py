@@ -64,14 +64,19 @@ SCENARIOS = Form(
 
 DRIVERS = Form(
     list[str],
-    read=lambda texts, _: tuple(read_names(",".join(texts))),
-    words=lambda spelling, names: [spelling, ",".join(names)] if names else [],
+    read=lambda texts, _: tuple(
+        name
+        for text in texts
+        for name in ([text] if text.startswith("exec:") else read_names(text))
+    ),
+    words=_repeated,
     keep=_names,
     in_file=file_forms.TEXTS,
     valid=lambda names: all(isinstance(one, str) for one in names),
     must="names",
 )
-"""Names, repeated or separated by commas; in Python one may stand alone."""
+"""Names, repeated or separated by commas, which a program's call may hold; in Python one may stand
+alone."""
 
 ANY = Form(str, valid=lambda value: value is not None, must="given")
 """A text, or what Python code gives in its place; the job checks it."""
@@ -147,6 +152,11 @@ class JobOptions(Declared):
     callbacks: JobCallbacks = field(
         default_factory=JobCallbacks, metadata={"help": "Called as the job progresses."}
     )
+
+    @property
+    def more_figures(self) -> Sequence[str]:
+        """The figures that these options add to those of the job: pass criteria, say."""
+        return ()
 
 
 OF_SCENARIO = option(
@@ -237,6 +247,10 @@ class JobResult(Protocol):
     def shown(self) -> Sequence[str | Table]:
         """Return what the terminal shows: texts and tables."""
 
+
+class JudgedResult(JobResult, Protocol):
+    """A result to which fail conditions are applied part by part."""
+
     def judged(self) -> Sequence[Judged]:
         """Return what fail conditions are applied to."""
 
@@ -252,6 +266,7 @@ class Job:
         help: what it does; the first line is its summary.
         figures: what ``--fail-if`` can compare, by name: what each means.
         example: of a fail condition.
+        fails: what fails it without conditions, in words; "" for nothing.
     """
 
     name: str
@@ -260,6 +275,7 @@ class Job:
     help: str
     figures: Mapping[str, str]
     example: str
+    fails: str = ""
 
     def run(self, options: JobOptions) -> JobResult:
         """Do it."""

@@ -6,7 +6,7 @@ from dataclasses import replace
 from bridgegen.cli.verdict.conditions import Conditions
 from bridgegen.cli.verdict.fail_if import Outcome
 from bridgegen.cli.verdict.junit import Suite, case_of, write_junit
-from bridgegen.jobs.frame import JobResult, Judged
+from bridgegen.jobs.frame import Judged, JudgedResult
 
 
 class JobCriteria(Conditions):
@@ -14,7 +14,7 @@ class JobCriteria(Conditions):
 
     known = ()
 
-    def judge(self, result: JobResult) -> tuple[Outcome, ...]:
+    def judge(self, result: JudgedResult) -> tuple[Outcome, ...]:
         """Apply the criteria to each part of a result, and write the JUnit XML if requested.
 
         Without criteria and JUnit XML there are no outcomes. Otherwise the first of each part is
