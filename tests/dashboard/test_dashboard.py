@@ -13,11 +13,11 @@ from tests.dashboard.conftest import R_12
 
 import bridgegen as bg
 from bridgegen.base.errors import FileFormatError, StorageError
-from bridgegen.cli.verdict.of_dashboard import FIGURES
 from bridgegen.jobs.dashboard.dashboard import Dashboard
 from bridgegen.jobs.dashboard.markup import within
 from bridgegen.jobs.dashboard.modes import Decisions, failure_modes
 from bridgegen.jobs.dashboard.odd import coverage
+from bridgegen.jobs.dashboard.options import JOB
 from bridgegen.jobs.dashboard.page import MOST_MODES, write_page
 from bridgegen.jobs.dashboard.project import Problem, Project
 from bridgegen.jobs.dashboard.requirements import matrices
@@ -128,7 +128,10 @@ def test_the_command_judges_and_keeps_statuses(cli, copy):
     file = copy / FILE
     text = file.read_text("utf-8")
     file.write_text(text.replace("status: new", "status: accepted # in May"), "utf-8")
-    status, out, err = cli("dashboard", copy, "--update", "--fail-if", "new > 0", "--json")
+    accepted = ("dashboard", copy, "--update", "--fail-if", "new > 0", "--json")
+    status, out, err = cli(*accepted)
+    assert (status, "NOT JUDGED: all results are read" in err) == (3, True)  # two are damaged
+    status, out, err = cli(*accepted, "--fail-if", "problems > 9")
     assert status == 0
     facts = json.loads(out)
     assert facts["added"] == 0
@@ -207,7 +210,7 @@ def test_an_unknown_figure_is_named(cli, copy):
 
 
 def test_every_figure_is_there_and_explained(found):
-    assert set(found.figures) == set(FIGURES)
+    assert set(found.figures) == set(JOB.figures)
 
 
 def test_a_changed_scenario_is_named_and_not_counted(copy, tmp_path):

@@ -294,7 +294,8 @@ def test_a_safety_case_of_a_run_that_is_not_judged_ends_with_3(cli, stuck_run, t
     status = {line.split()[0]: line.split()[1] for line in out.splitlines() if line[:1] == "G"}
     assert (status["G1.3"], status["G1.4"]) == ("undeveloped", "undeveloped")
     assert status["G1.5"] == "incomplete"  # although the criterion is met in each evaluation
-    assert f"NOT JUDGED: {stuck_run.folder} supports no claim on its driver: the scenario" in err
+    assert "NOT JUDGED: the runs could be judged" in err
+    assert f"({stuck_run.folder} supports no claim on its driver: the scenario" in err
 
 
 def test_a_list_of_runs_does_not_say_that_it_has_no_failures(stuck_run):

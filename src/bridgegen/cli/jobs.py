@@ -22,21 +22,28 @@ from bridgegen.cli.connection import (
     with_map_folder,
 )
 from bridgegen.cli.declared import declare, with_declared_options
-from bridgegen.cli.groups import DEFAULT, SEARCH, DefaultCommand
+from bridgegen.cli.groups import DEFAULT, DefaultCommand
 from bridgegen.cli.run_files import FiledRun, Key, keys_of, schema, with_run_files
 from bridgegen.engine.options import options_of
 from bridgegen.engine.options.option import OUTPUT, WHAT
 from bridgegen.jobs.benchmark.options import JOB as BENCHMARK
 from bridgegen.jobs.compare.options import JOB as COMPARE
+from bridgegen.jobs.dashboard.options import JOB as DASHBOARD
 from bridgegen.jobs.frame import Job, JobResult
+from bridgegen.jobs.mine.options import JOB as MINE
 from bridgegen.jobs.preventability.options import JOB as PREVENTABILITY
 from bridgegen.jobs.risk.options import JOB as RISK
+from bridgegen.jobs.safety_case.options import JOB as SAFETY_CASE
 from bridgegen.jobs.suite.options import DIFF, SUITE
 
-JOBS = (COMPARE, SUITE, DIFF, BENCHMARK, PREVENTABILITY, RISK)
+JOBS = (COMPARE, SUITE, DIFF, BENCHMARK, PREVENTABILITY, RISK, DASHBOARD, SAFETY_CASE, MINE)
 """In the order of ``--help``."""
 
-_CRITERIA = {SUITE.name: "of_suite:SuiteCriteria", DIFF.name: "of_difference:DifferenceCriteria"}
+_CRITERIA = {
+    SUITE.name: "of_suite:SuiteCriteria",
+    DIFF.name: "of_difference:DifferenceCriteria",
+    SAFETY_CASE.name: "of_job:JobVerdict",
+}
 """In `bridgegen.cli.verdict`, the classes of criteria by job; of all others ``JobCriteria``."""
 
 _OF_SIMULATOR = ("simulator", "simulator_set", "connection")
@@ -163,7 +170,7 @@ def _add(job: Job) -> None:
     elif job is BENCHMARK:
         benchmarks.command(job.name.split()[-1])(command)
     else:
-        app.command(job.name, rich_help_panel=SEARCH)(command)
+        app.command(job.name, rich_help_panel=job.panel)(command)
 
 
 for _job in JOBS:

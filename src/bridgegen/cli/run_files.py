@@ -40,6 +40,7 @@ _FORMS: Mapping[Any, FileForm] = {
     str: file_forms.TEXT,
     Path: file_forms.TEXT,
     list[str]: file_forms.TEXTS,
+    list[Path]: file_forms.PATHS,
 }
 _CRITERIA = "criteria"
 _YAML = (".yaml", ".yml")
@@ -107,7 +108,7 @@ def keys_of(command: Callable[..., Any], kind: type[Any] = SearchOptions) -> dic
         words = [one for one in (info.default, *(info.param_decls or ())) if isinstance(one, str)]
         spelling = words[0].partition("/")[0][2:] if words else name.replace("_", "-")
         limits = option.limits if option else None
-        found[spelling] = Key(name, form, info.help or "", Path in types, limits)
+        found[spelling] = Key(name, form, info.help or "", bool(types & {Path, list[Path]}), limits)
     return found
 
 
@@ -219,12 +220,12 @@ def _read_run(
 
 def _moved(key: Key, value: Any, move: Callable[[str], object]) -> Any:
     """Return a value with its path, if it holds one, moved to or from the file's folder."""
-    if key.is_path:
-        return Path(str(move(str(value))))
     if key.name == _CRITERIA:
         return [str(move(one)) if one.lower().endswith(_YAML) else one for one in value]
     if isinstance(value, list):
         return [_moved(key, one, move) for one in value]
+    if key.is_path:
+        return Path(str(move(str(value))))
     if not isinstance(value, str):
         return value
     from bridgegen.drivers import is_remote

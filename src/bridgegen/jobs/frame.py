@@ -8,7 +8,7 @@ command that repeats it. Imports nothing slow: the command line needs it to star
 
 import shlex
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from importlib import import_module
 from math import inf
 from os import PathLike
@@ -61,6 +61,18 @@ SCENARIOS = Form(
     must="names or paths",
 )
 """Several of these; in Python one may stand alone."""
+
+PATHS = Form(
+    list[Path],
+    words=lambda spelling, paths: [
+        word for path in paths for word in (spelling, str(path.resolve()))
+    ],
+    keep=lambda paths: tuple(map(Path, _names(paths))),
+    in_file=file_forms.PATHS,
+    valid=lambda paths: all(isinstance(one, Path) for one in paths),
+    must="paths",
+)
+"""Several files or folders; in Python one may stand alone."""
 
 DRIVERS = Form(
     list[str],
@@ -130,16 +142,6 @@ class DriveOptions(Declared):
 class JobOptions(Declared):
     """What every job is given, besides the options of its own."""
 
-    workers: Any = field(
-        default=None,
-        metadata=option(
-            ANY,
-            "Number of worker processes, or 'ray' / 'ray://HOST:PORT' for a Ray cluster (extra "
-            "ray). No result depends on it.",
-            shown="threads of one process, one for each core",
-            group=SEARCH,
-        ),
-    )
     out: Path | str | None = field(
         default=None,
         metadata=option(
@@ -157,6 +159,22 @@ class JobOptions(Declared):
     def more_figures(self) -> Sequence[str]:
         """The figures that these options add to those of the job: pass criteria, say."""
         return ()
+
+
+@dataclass(frozen=True, kw_only=True)
+class SimulatingOptions(JobOptions):
+    """What a job that simulates is given besides."""
+
+    workers: Any = field(
+        default=None,
+        metadata=option(
+            ANY,
+            "Number of worker processes, or 'ray' / 'ray://HOST:PORT' for a Ray cluster (extra "
+            "ray). No result depends on it.",
+            shown="threads of one process, one for each core",
+            group=SEARCH,
+        ),
+    )
 
 
 OF_SCENARIO = option(
@@ -201,8 +219,7 @@ def command_of(name: str, options: JobOptions, out: Path, **resolved: Any) -> st
         out: its folder.
         resolved: options that it has resolved, by name.
     """
-    stated = replace(options, workers=None, out=None)
-    values = {**vars(stated), **resolved}
+    values = {**vars(options), "workers": None, "out": None, **resolved}
     of_places = [one for one in options_of(type(options)) if one.is_argument]
     rest = [one for one in options_of(type(options)) if not one.is_argument]
     words = [word for one in (*of_places, *rest) for word in one.words(values[one.name])]
@@ -222,6 +239,7 @@ class Judged:
         figures: by name; NaN is one that is not known.
         facts: further properties, by name.
         of: the part, "" for the whole.
+        missing: the figure that says how much is missing where the test does not hold; "": none.
     """
 
     suite: str
@@ -232,6 +250,7 @@ class Judged:
     figures: Mapping[str, float]
     facts: Mapping[str, str]
     of: str = ""
+    missing: str = ""
 
 
 class JobResult(Protocol):
@@ -267,6 +286,7 @@ class Job:
         figures: what ``--fail-if`` can compare, by name: what each means.
         example: of a fail condition.
         fails: what fails it without conditions, in words; "" for nothing.
+        panel: of ``bridgegen --help`` that lists it.
     """
 
     name: str
@@ -276,6 +296,7 @@ class Job:
     figures: Mapping[str, str]
     example: str
     fails: str = ""
+    panel: str = "Search"
 
     def run(self, options: JobOptions) -> JobResult:
         """Do it."""

@@ -10,7 +10,7 @@ from bridgegen.engine.options.forms import FLAG, PATH, TEXT, WHOLE
 from bridgegen.engine.options.forms import SIMULATOR as CHOICE
 from bridgegen.engine.options.option import DRIVER, OUTPUT, SEARCH, SIMULATOR, WHAT, option
 from bridgegen.engine.options.search import MAX_BUDGET
-from bridgegen.jobs.frame import DRIVERS, SCENARIOS, Job, JobOptions
+from bridgegen.jobs.frame import DRIVERS, SCENARIOS, Job, SimulatingOptions
 from bridgegen.simulation.choice import EMBEDDED, SimulatorChoice
 
 BUDGET = 300
@@ -26,7 +26,7 @@ def _of_search(name: str) -> Mapping[str, Any]:
 
 
 @dataclass(frozen=True, kw_only=True)
-class ScenariosOptions(JobOptions):
+class ScenariosOptions(SimulatingOptions):
     """The options of what runs many scenarios with all their variations."""
 
     files: str | Path | Sequence[str | Path] = field(
