@@ -14,11 +14,10 @@ from tests.dashboard.conftest import R_12
 import bridgegen as bg
 from bridgegen.base.errors import FileFormatError, StorageError
 from bridgegen.jobs.dashboard.dashboard import Dashboard
-from bridgegen.jobs.dashboard.markup import within
 from bridgegen.jobs.dashboard.modes import Decisions, failure_modes
 from bridgegen.jobs.dashboard.odd import coverage
 from bridgegen.jobs.dashboard.options import JOB
-from bridgegen.jobs.dashboard.page import MOST_MODES, write_page
+from bridgegen.jobs.dashboard.page import MOST_MODES, within, write_page
 from bridgegen.jobs.dashboard.project import Problem, Project
 from bridgegen.jobs.dashboard.requirements import matrices
 from bridgegen.jobs.dashboard.scenery import scenery_of
@@ -329,9 +328,9 @@ def test_a_damaged_map_is_named(copy, damage):
     assert "maps/half" in {one.place for one in found.project.problems}
 
 
-def test_parts_that_do_not_fit_are_counted():
-    assert within(["aaa", "bb", "cc"], 5, "x") == 'aaabb<p class="muted">and 1 x more</p>'
-    assert within(["aaaaaaaa"], 5, "x") == "aaaaaaaa"
+def test_as_many_parts_are_shown_as_fit_and_the_first():
+    assert within([3, 2, 2], 5) == 2
+    assert within([8], 5) == 1
 
 
 # ---- one decision in one place ----

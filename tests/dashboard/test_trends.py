@@ -6,9 +6,10 @@ from xml.etree import ElementTree
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bridgegen.jobs.dashboard.charts import chart, strip
+from bridgegen.jobs.dashboard.page import chart
 from bridgegen.jobs.dashboard.results_of import SuiteLine
 from bridgegen.jobs.dashboard.trends import MOST_POINTS, Point, Series, trends
+from bridgegen.pages.charts import strip
 from bridgegen.search.triage.record import Estimate
 
 
@@ -69,7 +70,7 @@ points = st.builds(
 
 @given(st.lists(points, min_size=1, max_size=MOST_POINTS), st.text(max_size=20))
 def test_a_chart_is_well_formed_and_stays_in_its_box(some, title):
-    text = chart(Series(title, "d", "harmful share", tuple(some)), {})
+    text = chart(Series(title, "d", "harmful share", tuple(some)), ".")
     legal = re.sub("[^\t\n\r\u0020-\ud7ff\ue000-\ufffd]", "", text)
     for one in ElementTree.fromstring(legal).iter("circle"):
         assert 0.0 <= float(one.get("cx")) <= 340.0

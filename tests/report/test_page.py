@@ -5,17 +5,16 @@ import subprocess
 import sys
 from dataclasses import replace
 from html.parser import HTMLParser
+from pathlib import Path
 
 import pytest
 
 from bridgegen.base.errors import StorageError
-from bridgegen.pages import page
+from bridgegen.pages import page, templates
 from bridgegen.pages.page import write_report
 from bridgegen.pages.payload import to_json
 from bridgegen.pages.sections import SECTIONS
 
-PAGES = ("page.html", "show.html", "runs.html", "suite.html", "scenario.html", "pair.html")
-STILL = ("scenario.css", "pair.css")
 SCRIPTED = ("show", "runs", "suite")
 VOID = {"meta", "link", "input", "br", "img", "hr"}
 
@@ -95,10 +94,14 @@ def test_nothing_is_fetched(written):
     assert "http" not in policy
     assert "connect-src 'none'" in policy
     assert "unsafe-eval" not in policy
-    parts = [page._own(name) for name in (*PAGES, *STILL, "player.html")]
+    parts = [
+        one.read_text("utf-8")
+        for end in ("html", "css")
+        for one in Path(str(templates.ROOT)).rglob(f"*.{end}")
+    ]
     for entries in (page.REPORT, *((f"{name}.js",) for name in SCRIPTED)):
         parts += page._bundled(entries)
-    own = b"".join(parts).decode()
+    own = "".join(parts)
     own = own.replace("http://www.w3.org/2000/svg", "")  # a namespace's name is no address
     for word in ("http:", "https:", "fetch(", "XMLHttpRequest", "import(", "url(", "@import"):
         assert word not in own
@@ -109,7 +112,7 @@ def test_the_data_inside_is_the_data(written, report):
 
 
 def test_every_id_that_a_script_asks_for_exists(written):
-    scripts = page._bundled(page.SERVED)[0].decode()
+    scripts = page._bundled(page.SERVED)[0]
     asked = set(re.findall(r'\$\("([\w-]+)"\)', scripts))
     assert len(asked) > 30
     assert asked <= set(Page(written).values("id"))
@@ -117,19 +120,23 @@ def test_every_id_that_a_script_asks_for_exists(written):
 
 @pytest.mark.parametrize("name", SCRIPTED)
 def test_every_id_of_a_small_page_exists(name):
-    scripts = page._bundled((f"{name}.js",))[0].decode()
+    scripts = page._bundled((f"{name}.js",))[0]
     asked = set(re.findall(r'\$\("([\w-]+)"\)', scripts))
-    parts = page.page_of(f"{name}.js", "", "{}")
-    assert asked <= set(re.findall(r'id="([\w-]+)"', b"".join(parts).decode()))
+    text = page.page_of(f"{name}.js", "", "{}").decode()
+    assert asked <= set(re.findall(r'id="([\w-]+)"', text))
 
 
 def test_every_style_of_ours_is_used():
     ours = [file.name for file in page.WEB.iterdir() if file.name.endswith(".css")]
     assert len(ours) > 8
-    needed = [page._bundled(page.SERVED)[1], page._bundled(("runs.js",))[1]]
-    needed.append(page._bundled(("suite.js",))[1])
-    needed += [page._own(name) for name in (*STILL, "dashboard.css", "safety_case.css")]
-    assert [name for name in ours if not any(page._own(name) in one for one in needed)] == []
+    bundled = [page._bundled(one)[1] for one in (page.SERVED, ("runs.js",), ("suite.js",))]
+    still = {name.rpartition("/")[2] for name in templates.STYLES}
+    still |= {one.name.replace(".html", ".css") for one in page.WEB.iterdir()}
+    assert [
+        name
+        for name in ours
+        if name not in still and not any(page._text(name) in one for one in bundled)
+    ] == []
 
 
 def test_every_section_has_a_place_and_its_data(written):
@@ -137,7 +144,7 @@ def test_every_section_has_a_place_and_its_data(written):
     ids = Page(written).values("id")
     sent = json.loads(embedded(written))
     for section in SECTIONS:
-        text = page._own(section.module).decode()
+        text = page._text(section.module)
         assert f'key: "{section.key}"' in text
         assert section.key in sent
         (host,) = re.findall(r'addSection\(\{ id: "([\w-]+)"', text)

@@ -18,7 +18,7 @@ from bridgegen.jobs.risk.experiment import Experiment
 from bridgegen.jobs.risk.ledger import BATCHES
 from bridgegen.jobs.risk.outcomes import Column, outcomes
 from bridgegen.jobs.risk.risk import estimate_risk
-from bridgegen.jobs.risk.text import number
+from bridgegen.pages.templates import number
 
 SCENARIO, DRIVER = "crossroads-s1", "route-follower"
 GIVEN = {"ego": DRIVER, "exposure": "uniform", "method": "mc", "precision": 0.0, "budget": 1200}

@@ -6,6 +6,7 @@ from html import escape
 from importlib.metadata import version
 from importlib.resources import files
 
+from bridgegen.pages.templates import style
 from bridgegen_reproduction.document import (
     FIGURES,
     TABLES,
@@ -24,10 +25,9 @@ from bridgegen_reproduction.table import to_html
 
 def html(document: Document) -> str:
     """Return the page; text is data in it, never markup."""
-    css = _own("bridgegen.jobs.compare", "page.css") + _own("bridgegen_reproduction", "page.css")
     fill = {
         "title": escape(document.title),
-        "css": css,
+        "css": style("jobs/compare/page.css") + _own("page.css"),
         "facts": "".join(f"<li>{escape(one)}</li>" for one in document.facts),
         "nav": "".join(
             f'<a href="#{_anchor(one)}">{escape(one.title)}</a>' for one in document.sections
@@ -35,7 +35,7 @@ def html(document: Document) -> str:
         "sections": "\n".join(_section(one) for one in document.sections),
         "version": escape(version("bridgegen")),
     }
-    parts = re.split(r"\{\{(\w+)\}\}", _own("bridgegen_reproduction", "page.html"))
+    parts = re.split(r"\{\{(\w+)\}\}", _own("page.html"))
     return "".join(fill[part] if i % 2 else part for i, part in enumerate(parts))
 
 
@@ -94,8 +94,8 @@ def _folded(block: Folded) -> str:
     )
     return (
         f'<div class="card"><details><summary>{escape(block.title)}</summary><div class="wide">'
-        f'<table class="runs"><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table></div>'
-        f'</details><p class="files">All of it: <a href="{escape(block.file)}">'
+        f'<table class="data runs"><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table>'
+        f'</div></details><p class="files">All of it: <a href="{escape(block.file)}">'
         f"{escape(block.file)}</a></p></div>"
     )
 
@@ -104,5 +104,5 @@ def _data(png: bytes) -> str:
     return f"data:image/png;base64,{base64.b64encode(png).decode()}"
 
 
-def _own(package: str, name: str) -> str:
-    return files(package).joinpath(name).read_text("utf-8")
+def _own(name: str) -> str:
+    return files("bridgegen_reproduction").joinpath(name).read_text("utf-8")

@@ -87,7 +87,7 @@ def to_html(table: Table) -> str:
     notes = "".join(f"<li>{escape(note)}</li>" for note in table.notes)
     return (
         f'<div class="card" id="{escape(table.name)}"><h3>{escape(table.title)}</h3>'
-        '<div class="wide" tabindex="0"><table>'
+        '<div class="wide" tabindex="0"><table class="data">'
         f"<thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table>"
         f"</div>{f'<ul class=notes>{notes}</ul>' if notes else ''}</div>"
     )

@@ -8,8 +8,8 @@ from typing import Literal, cast
 from bridgegen.base.disk import write_whole
 from bridgegen.base.errors import InputError, StorageError
 from bridgegen.openx.openscenario.exposure import distribution_xml, left_out
+from bridgegen.pages.exposure import refuse_other_page, write_page
 from bridgegen.scenario.exposure.fit import Fit, Progress, fit_exposure
-from bridgegen.scenario.exposure.page import refuse_other_page, write_page
 from bridgegen.scenario.exposure.reader import refuse_other_file, write_exposure
 from bridgegen.scenario.language.reader import load
 

@@ -1,7 +1,4 @@
-"""Tables of names that strangers gave: for spreadsheets, and on pages."""
-
-from collections.abc import Sequence
-from html import escape
+"""Tables of names that strangers gave, for spreadsheets."""
 
 
 def cell(value: object) -> object:
@@ -17,13 +14,3 @@ def _is_number(text: str) -> bool:
     except ValueError:
         return False
     return True
-
-
-def html_table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """Return a table of a page; the first column names the row."""
-    top = "".join(f"<th>{escape(name)}</th>" for name in head)
-    body = "".join(
-        f"<tr><th>{escape(row[0])}</th>{''.join(f'<td>{escape(one)}</td>' for one in row[1:])}</tr>"
-        for row in rows
-    )
-    return f"<table><thead><tr>{top}</tr></thead><tbody>{body}</tbody></table>"

@@ -6,7 +6,7 @@ import numpy as np
 from tests.mining.events.test_find import LEFT, RIGHT, T, change, placed
 
 from bridgegen.recordings.events.find import find_events, named
-from bridgegen.recordings.events.playback import MOST_OTHERS, SHOWN, closest, playback_section
+from bridgegen.recordings.events.playback import MOST_OTHERS, SHOWN, caption, closest
 from bridgegen.recordings.excerpt import clock_of
 
 
@@ -35,9 +35,7 @@ def test_the_closest_events_of_all_recordings_are_shown():
         for i, name in enumerate(called)
     }  # fmt: skip
     assert names == sorted(gaps, key=gaps.get)[:SHOWN]
-    page = playback_section(kept)
-    assert [page.count(f"id='{name}'") for name in gaps] == [1, 0, 1, 1, 0]
-    assert "<script" not in page
+    assert all(one.name in caption(one) for one in kept)
 
 
 def test_a_picture_has_the_ego_the_other_of_the_event_and_some_more():
@@ -50,10 +48,3 @@ def test_a_picture_has_the_ego_the_other_of_the_event_and_some_more():
     assert len(one.motion.names) == MOST_OTHERS + 1
     assert abs(one.when - 2.0) < 0.1  # from 2 s before it
     assert abs(one.seconds - 2.0) < 0.1
-
-
-def test_names_of_strangers_are_text():
-    recordings = [placed((20.0 * T, RIGHT), (40.0 + 20.0 * T, change(4.0, 4.0, LEFT, RIGHT)))]
-    kept, _ = played(recordings)
-    kept[0].__dict__["recording"] = "<script>alert(1)</script>"
-    assert "<script" not in playback_section(kept)

@@ -68,9 +68,9 @@ def test_it_writes_scenarios_their_fits_and_the_difference(cli, tmp_path, record
     }  # fmt: skip
     page = (out / "recordings.html").read_text(encoding="utf-8")
     for name in ("yaml", "html"):
-        assert f"href='scenarios/slower-lead-mined.{name}'" in page
+        assert f'href="scenarios/slower-lead-mined.{name}"' in page
     events = (out / "events.csv").read_text(encoding="utf-8")
-    assert page.count("<figure id='approach-") == 3
+    assert page.count('<figure id="approach-') == 3
     assert all(f"\napproach-{k}," in events for k in (1, PAIRS))
 
     texts = {one.name: one.read_bytes() for one in (out / "scenarios").iterdir()}
@@ -91,7 +91,7 @@ def test_events_on_the_page_have_their_names_in_the_table(cli, tmp_path, recordi
     page = (out / "recordings.html").read_text(encoding="utf-8")
     with (out / "events.csv").open(newline="", encoding="utf-8") as file:
         rows = {row["name"]: row for row in csv.DictReader(file)}
-    shown = re.findall(r"<figcaption>(\S+): ego (\S+ \d+) of (\w+), from", page)
+    shown = re.findall(r"<figcaption[^>]*>(\S+): ego (\S+ \d+) of (\w+), from", page)
     assert {recording for _, _, recording in shown} == {"traffic", "again"}
     for name, ego, of in shown:
         assert (rows[name]["ego"], rows[name]["recording"]) == (ego, of)

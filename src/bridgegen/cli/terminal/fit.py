@@ -26,9 +26,7 @@ class FitScreen(Live):
 
 def print_fit(fit: "Fit", written: "Sequence[Path]", *, as_json: bool) -> None:
     """Print the forms with their goodness of fit, rates and files; on stderr what to know."""
-    from bridgegen.scenario.exposure.page import facts, remarks
-
-    for text in remarks(fit):
+    for text in fit.remarks():
         print(f"bridgegen: warning: {text}", file=sys.stderr)
     if as_json:
         print(json.dumps(_plain(fit, written), indent=2))
@@ -46,7 +44,7 @@ def print_fit(fit: "Fit", written: "Sequence[Path]", *, as_json: bool) -> None:
         as_json=False,
     )  # fmt: skip
     print()
-    for text in facts(fit):
+    for text in fit.facts():
         print(text)
     print()
     for path in written:

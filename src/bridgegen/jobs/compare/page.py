@@ -1,11 +1,7 @@
 """The comparison on one self-contained page: sentences, tables, figures, and every run."""
 
 import base64
-import re
-from collections.abc import Iterable, Mapping, Sequence
-from html import escape
-from importlib.metadata import version
-from importlib.resources import files
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -21,6 +17,8 @@ from bridgegen.jobs.compare.plan import RUNS, Cell
 from bridgegen.jobs.compare.record import points
 from bridgegen.jobs.compare.result import Comparison
 from bridgegen.jobs.compare.table import Line
+from bridgegen.pages import templates
+from bridgegen.pages.templates import counted
 
 FIGURES = "figures"
 
@@ -40,24 +38,25 @@ def write_page(comparison: Comparison) -> None:
     except OSError as error:
         raise StorageError(f"{comparison.folder}: cannot be written: {error.strerror}") from None
     settled = [one for one in comparison.measures if not one.timed]
-    fill = {
-        "title": escape(f"Comparison: {', '.join(plan.scenarios)}"),
-        "css": _own("page.css"),
-        "facts": "".join(f"<li>{escape(one)}</li>" for one in _facts(comparison)),
-        "scenarios": "\n".join(_scenario(comparison, name, settled) for name in plan.scenarios),
-        "method": _method(comparison, settled),
-        "command": escape(plan.command()),
-        "version": escape(version("bridgegen")),
-    }
-    parts = re.split(r"\{\{(\w+)\}\}", _own("page.html"))
-    text = "".join(fill[part] if i % 2 else part for i, part in enumerate(parts))
-    write_whole(comparison.page, [text.encode("utf-8", "replace")])
+    templates.write_page(
+        comparison.page, "jobs/compare/page.html",
+        title=f"Comparison: {', '.join(plan.scenarios)}",
+        facts=[*_facts(comparison)],
+        scenarios=[_scenario(comparison, name, settled) for name in plan.scenarios],
+        measures=settled,
+        shown=[one for one in settled if one.name != "t_critic"],
+        baseline=plan.baseline, sure=words.SURE, apart=100 * plan.apart,
+        tested=counted(len(plan.algorithms) - 1, "algorithm"),
+        waited=waited_for(plan.budget), tenth=ordinal(10),
+        boxes=_boxes(comparison),
+        command=plan.command(),
+    )  # fmt: skip
 
 
-def _facts(comparison: Comparison) -> Iterable[str]:
+def _facts(comparison: Comparison) -> Iterator[str]:
     plan = comparison.plan
-    yield _many(len(plan.algorithms), "algorithm")
-    yield _many(plan.seeds, "seed")
+    yield counted(len(plan.algorithms), "algorithm")
+    yield counted(plan.seeds, "seed")
     yield f"{plan.budget:,} evaluations a run"
     yield f"baseline: {plan.baseline}"
     for name, value in vars(plan.options).items():
@@ -71,7 +70,7 @@ def _facts(comparison: Comparison) -> Iterable[str]:
                 )
             yield name.replace("_", " ") if value is True else f"{name.replace('_', ' ')}: {shown}"
     if comparison.gaps:
-        yield f"{_many(len(comparison.gaps), 'run')} failed"
+        yield f"{counted(len(comparison.gaps), 'run')} failed"
 
 
 def _shown(value: str | Mapping[str, Any]) -> str:
@@ -79,58 +78,43 @@ def _shown(value: str | Mapping[str, Any]) -> str:
     return value if isinstance(value, str) else f"{value['id']}: {value['formula']}"
 
 
-def _scenario(comparison: Comparison, scenario: str, measures: Sequence[Measure]) -> str:
-    text = "".join(f"<p>{escape(one)}</p>" for one in words.sentences(comparison, scenario))
-    parts = [f"<h2>{escape(scenario)}</h2>", f'<div class="card">{text}</div>']
-    if scenario in comparison.measured:
-        legend = _legend(comparison.plan.baseline)
-        first = [one.name for one in measures].index("r_critic")
-        found, often = measures[:first], [one for one in measures[first:] if one.name[0] in "rt"]
-        other = [one for one in measures[first:] if one not in often]
-        parts.append(_figures(comparison, scenario))
-        parts.append(_medians(comparison, scenario, found, "What was found, and how soon", legend))
-        parts.append(_medians(comparison, scenario, often, "How often"))
-        parts.append(_medians(comparison, scenario, other, "How bad at once"))
-    parts.append(_runs(comparison, scenario, measures))
-    return f"<section>{''.join(parts)}</section>"
+def _scenario(
+    comparison: Comparison, scenario: str, measures: Sequence[Measure]
+) -> dict[str, object]:
+    first = [one.name for one in measures].index("r_critic")
+    often = [one for one in measures[first:] if one.name[0] in "rt"]
+    groups = (
+        ("What was found, and how soon", measures[:first]),
+        ("How often", often),
+        ("How bad at once", [one for one in measures[first:] if one not in often]),
+    )
+    is_measured = scenario in comparison.measured
+    return {
+        "name": scenario,
+        "sentences": [*words.sentences(comparison, scenario)],
+        "figures": [*_figures(comparison, scenario)] if is_measured else [],
+        "medians": [
+            (title, some, _medians(comparison, scenario, some)) for title, some in groups
+        ] if is_measured else [],
+        "runs": [
+            (name, [_run(comparison, cell, measures) for cell in comparison.plan.cells_in_order
+                    if (cell.scenario, cell.algorithm) == (scenario, name)])
+            for name in comparison.plan.algorithms
+        ],
+    }  # fmt: skip
 
 
 def _medians(
-    comparison: Comparison, scenario: str, measures: Sequence[Measure], title: str, note: str = ""
-) -> str:
-    """Return a table of medians and quartiles; the best of each column is marked."""
-    plan = comparison.plan
-    columns = [
-        [comparison.line(scenario, name, one.name) for name in plan.algorithms] for one in measures
+    comparison: Comparison, scenario: str, measures: Sequence[Measure]
+) -> list[tuple[str, list[dict[str, object]]]]:
+    """Return each algorithm's medians and quartiles; the best of each measure is marked."""
+    names = comparison.plan.algorithms
+    columns = [[comparison.line(scenario, name, one.name) for name in names] for one in measures]
+    cells = [
+        [_median(line, one, _best(column, one)) for line in column]
+        for column, one in zip(columns, measures, strict=True)
     ]
-    best = [_best(column, one) for column, one in zip(columns, measures, strict=True)]
-    head = "".join(
-        f'<th scope="col" title="{escape(one.text)}">{escape(one.title)} '
-        f"{'↑' if one.larger else '↓'}</th>"
-        for one in measures
-    )
-    rows = []
-    for row, name in enumerate(plan.algorithms):
-        cells = "".join(
-            _median(column[row], one, column[row].quartiles.median == top)
-            for column, one, top in zip(columns, measures, best, strict=True)
-        )
-        link = f'<a href="#{_anchor(scenario, name)}">{escape(name)}</a>'
-        rows.append(f'<tr><th scope="row">{link}</th>{cells}</tr>')
-    return (
-        f'<div class="card"><h3>{escape(title)}: medians and quartiles over the runs</h3>{note}'
-        f'<div class="wide"><table><thead><tr><th scope="col">algorithm</th>{head}</tr></thead>'
-        f"<tbody>{''.join(rows)}</tbody></table></div></div>"
-    )
-
-
-def _legend(baseline: str) -> str:
-    return (
-        '<p class="muted">↑ larger is better, ↓ smaller; shaded: the best median. '
-        f"▲ better, ▼ worse than {escape(baseline)} with p &lt; {words.SURE} after correction; "
-        f"A12: how often a run is better than one of {escape(baseline)}. A name leads to its "
-        "runs.</p>"
-    )
+    return [(name, [column[row] for column in cells]) for row, name in enumerate(names)]
 
 
 def _best(column: Sequence[Line], one: Measure) -> float:
@@ -140,21 +124,22 @@ def _best(column: Sequence[Line], one: Measure) -> float:
     return max(known) if one.larger else min(known)
 
 
-def _median(line: Line, one: Measure, is_best: bool) -> str:
-    mark = {"better": "▲", "worse": "▼", "": ""}[words.verdict(line)]
-    title = {"better": "better", "worse": "worse", "": ""}[words.verdict(line)]
-    parts = [f"<b>{escape(words.median(line, one))}</b>"]
-    if mark:
-        parts.append(f' <span class="mark" title="{title}">{mark}</span>')
-    parts.append(f"<small>{escape(words.span(line, one))}</small>")
+def _median(line: Line, one: Measure, best: float) -> dict[str, object]:
+    notes = [words.span(line, one)]
     if not np.isnan(line.p_holm):
-        parts.append(f"<small>p {escape(words.p_value(line.p_holm))}, A12 {line.a12:.2f}</small>")
+        notes.append(f"p {words.p_value(line.p_holm)}, A12 {line.a12:.2f}")
     if 0 < line.never < line.runs:
-        parts.append(f"<small>never in {line.never} of {line.runs}</small>")
-    return f"<td{' class=best' if is_best else ''}>{''.join(parts)}</td>"
+        notes.append(f"never in {line.never} of {line.runs}")
+    return {
+        "median": words.median(line, one),
+        "verdict": words.verdict(line),
+        "notes": notes,
+        "is_best": line.quartiles.median == best,
+    }
 
 
-def _figures(comparison: Comparison, scenario: str) -> str:
+def _figures(comparison: Comparison, scenario: str) -> Iterator[tuple[str, str, str]]:
+    """Yield each figure in a light and a dark theme, and its caption; write the light ones."""
     plan, measured = comparison.plan, comparison.measured[scenario]
 
     def of(name: str) -> list[Cell]:
@@ -192,60 +177,22 @@ def _figures(comparison: Comparison, scenario: str) -> str:
         f"Critical scenarios found. {band}.",
         f"Hypervolume of the front. {band}.",
     )
-    for kind, light in zip(FIGURE_NAMES, drawn[0], strict=True):
+    for kind, light, dark, caption in zip(FIGURE_NAMES, *drawn, captions, strict=True):
         write_whole(comparison.folder / FIGURES / f"{scenario}-{kind}.png", [light])
-    shown = (_figure(*one) for one in zip(*drawn, captions, strict=True))
-    return f'<div class="figures">{"".join(shown)}</div>'
+        yield _data(light), _data(dark), caption
 
 
-def _figure(light: bytes, dark: bytes, caption: str) -> str:
-    return (
-        '<figure class="card"><picture>'
-        f'<source media="(prefers-color-scheme: dark)" srcset="{_data(dark)}">'
-        f'<img alt="{escape(caption)}" src="{_data(light)}"></picture>'
-        f"<figcaption>{escape(caption)}</figcaption></figure>"
-    )
-
-
-def _runs(comparison: Comparison, scenario: str, measures: Sequence[Measure]) -> str:
-    """Return every run of a scenario: its figures, its folder, and the command that repeats it."""
-    shown = [one for one in measures if one.name != "t_critic"]
-    head = "".join(f'<th scope="col">{escape(one.title)}</th>' for one in shown)
-    parts = []
-    for name in comparison.plan.algorithms:
-        rows = "".join(
-            _run(comparison, cell, shown)
-            for cell in comparison.plan.cells_in_order
-            if (cell.scenario, cell.algorithm) == (scenario, name)
-        )
-        parts.append(
-            f'<details id="{_anchor(scenario, name)}"><summary>{escape(name)}</summary>'
-            '<div class="wide"><table class="runs"><thead><tr><th scope="col">run</th>'
-            f'<th scope="col">evaluations</th>{head}<th scope="col">the same run again</th>'
-            f"</tr></thead><tbody>{rows}</tbody></table></div></details>"
-        )
-    return (
-        '<div class="card"><h3>Every run</h3><p class="muted"><code>bridgegen resume FOLDER</code> '
-        "writes a run’s critical scenarios and its report; <code>bridgegen coverage FOLDER</code> "
-        f"shows what it searched.</p>{''.join(parts)}</div>"
-    )
-
-
-def _run(comparison: Comparison, cell: Cell, measures: Sequence[Measure]) -> str:
-    folder = f"{RUNS}/{cell.name}"
-    link = f'<th scope="row"><a href="{escape(folder)}/">{cell.seed}</a></th>'
+def _run(comparison: Comparison, cell: Cell, measures: Sequence[Measure]) -> dict[str, object]:
+    """Return a run: its figures, its folder, and the command that repeats it; or why it failed."""
+    about = {"seed": cell.seed, "folder": f"{RUNS}/{cell.name}", "gap": comparison.gaps.get(cell)}
     if cell in comparison.gaps:
-        span = len(measures) + 1
-        text = f"failed: {comparison.gaps[cell]}"
-        return f'<tr>{link}<td colspan="{span}"></td><td>{escape(text)}</td></tr>'
+        return about
     record = comparison.records[cell]
     row: Mapping[str, float] = comparison.measured[cell.scenario].values[cell]
-    values = "".join(f"<td>{words.number(row[one.name], one.digits)}</td>" for one in measures)
-    command = (
-        "<td><details><summary>command</summary>"
-        f"<code>{escape(record.command)}</code></details></td>"
-    )
-    return f"<tr>{link}<td>{record.evaluations:,}</td>{values}{command}</tr>"
+    values = [words.number(row[one.name], one.digits) for one in measures if one.name != "t_critic"]
+    return {
+        **about, "evaluations": record.evaluations, "values": values, "command": record.command
+    }  # fmt: skip
 
 
 def _range(term: Quantity, worst: float, best: float) -> str:
@@ -254,11 +201,9 @@ def _range(term: Quantity, worst: float, best: float) -> str:
     return f"{term.name} {low:.4g} to {high:.4g} {term.unit}".removesuffix(" 1")
 
 
-def _method(comparison: Comparison, measures: Sequence[Measure]) -> str:
-    plan = comparison.plan
-    terms = "".join(f"<dt>{escape(one.title)}</dt><dd>{escape(one.text)}</dd>" for one in measures)
-    k = waited_for(plan.budget)
-    boxes = "; ".join(
+def _boxes(comparison: Comparison) -> str:
+    """Return the range of each objective over all runs, by scenario, in words."""
+    return "; ".join(
         f"{name}: " + ", ".join(
             _range(quantity(term), worst, best)
             for term, worst, best in zip(
@@ -268,44 +213,7 @@ def _method(comparison: Comparison, measures: Sequence[Measure]) -> str:
         )
         for name, one in comparison.measured.items()
     )  # fmt: skip
-    texts = [
-        f"T_critic is the number of evaluations until {k} critical scenarios, 5 % of the budget, "
-        "divided by the least median of all algorithms here. If that is never reached (for example "
-        f"the {ordinal(10)} critical scenario of a run that found nine), the value is censored: "
-        "ranked last, tied with the other censored ones.",
-        f"Two critical scenarios are different if their searched parameters differ by "
-        f"{100 * plan.apart:g} % of their ranges or more, in root mean square; they are counted in "
-        "the order in which the run found them, each compared with those counted before it, up to "
-        "10,000.",
-        "Modes are the different conflicts of a run’s critical scenarios: type, responsible party, "
-        "rule, and the other participant. A critical scenario without a near miss or a contact, "
-        "which the paper’s thresholds allow, has none.",
-        "Bins are five a parameter, and pairs of bins those of two parameters, as "
-        "“bridgegen coverage” counts them.",
-        "Hypervolume, distance and spread are those of the objective’s metrics, whatever the "
-        "algorithm minimised, scaled by the range over all runs of the scenario, "
-        f"least to most critical ({boxes}). The reference point is the least critical corner, "
-        "and the reference front that of all runs together.",
-        f"p is that of the two-sided Mann–Whitney U test against {plan.baseline}, with Holm’s "
-        f"correction for the {_many(len(plan.algorithms) - 1, 'algorithm')} tested in each measure "
-        "and scenario. A12 is Vargha and Delaney’s: how probable it is that a run is better than "
-        f"one of {plan.baseline}, ties counting half; small from 0.56, "
-        "medium from 0.64, large from 0.71.",
-    ]
-    return f"<dl>{terms}</dl>" + "".join(f"<p>{escape(text)}</p>" for text in texts)
-
-
-def _anchor(scenario: str, algorithm: str) -> str:
-    return escape(f"runs-{scenario}-{algorithm}".replace(" ", "_"))
-
-
-def _many(n: int, noun: str) -> str:
-    return f"{n:,} {noun}{'' if n == 1 else 's'}"
 
 
 def _data(png: bytes) -> str:
     return f"data:image/png;base64,{base64.b64encode(png).decode()}"
-
-
-def _own(name: str) -> str:
-    return files("bridgegen.jobs.compare").joinpath(name).read_text("utf-8")

@@ -1,308 +1,46 @@
 """The dashboard's page: failure modes, requirements, trends; one file without scripts."""
 
-from importlib.metadata import version
+import os
+from collections.abc import Iterable, Iterator, Sequence
+from itertools import accumulate, groupby
+from typing import Any
 from urllib.parse import quote
 
 from bridgegen.assess.criteria import margin_in_words
-from bridgegen.jobs.dashboard.charts import chart
-from bridgegen.jobs.dashboard.dashboard import Dashboard
-from bridgegen.jobs.dashboard.markup import (
-    base_of,
-    counted,
-    folded,
-    joined,
-    link,
-    section,
-    span,
-    table,
-    text,
-    when,
-    within,
-)
+from bridgegen.jobs.dashboard.dashboard import GENERATOR, Dashboard
 from bridgegen.jobs.dashboard.modes import OpenMode
-from bridgegen.jobs.dashboard.page_results import odd_part, problems_part, results_part
-from bridgegen.jobs.dashboard.requirements import Cell, Matrix, statements
-from bridgegen.jobs.dashboard.results import versions
+from bridgegen.jobs.dashboard.odd import Coverage, Covered
+from bridgegen.jobs.dashboard.requirements import Matrix, statements
+from bridgegen.jobs.dashboard.results import Result, versions
+from bridgegen.jobs.dashboard.results_of import SuiteLine
 from bridgegen.jobs.dashboard.sentences import failing_sentence, requirements_sentence
-from bridgegen.jobs.dashboard.trends import Point, Series
-from bridgegen.pages.page import write_still_page
-from bridgegen.pages.sentences import NARROW, share
-from bridgegen.results.failures import FILE, Failure
-
-# --- The page's part on failure modes ---
-
+from bridgegen.jobs.dashboard.taxonomy import SOURCE
+from bridgegen.jobs.dashboard.trends import Series
+from bridgegen.pages import charts, templates
+from bridgegen.pages.sentences import share
+from bridgegen.pages.templates import Cell, counted, joined, when
+from bridgegen.results.failures import FILE
 
 MOST_MODES = 500
 """Failure modes of a table; the others are counted."""
-
 MOST_RESULTS = 5
 """Results of a failure mode that are linked."""
-
-_HEADS = ("failure mode", "status", "scenario", "driver", "evaluations", "MAIS3+", "last seen")
-
-
-def modes_part(found: Dashboard, base: str) -> str:
-    """Return the section: what fails now, what failed before, what no result has any more."""
-    now = list(found.failing)
-    before = [one for one in found.modes if not one.fails_now]
-    lead = (
-        "Each is counted once, whatever number of results has it. The status is that of its block "
-        f"in {FILE}, of a suite that keeps it or of this folder; without a block it is new."
-    )
-    parts = [f"<p>{text(one)}</p>" for one in found.notes[:MOST_RESULTS]]
-    parts.append(_table("Failure modes of current results", now, base) if now else "<p>None.</p>")
-    if before:
-        summary = f"{counted(len(before), 'failure mode')} that no current result has"
-        parts.append(folded(summary, _table(summary, before, base)))
-    if found.unseen:
-        summary = f"{counted(len(found.unseen), 'failure mode')} in no result of this project"
-        parts.append(folded(summary, _decisions(found.unseen)))
-    return section("modes", "Failing now", "".join(parts), lead=lead)
-
-
-def _table(name: str, modes: list[OpenMode], base: str) -> str:
-    return _some(name, _HEADS, [_row(one, base) for one in modes[:MOST_MODES]], len(modes))
-
-
-def _some(name: str, heads: tuple[str, ...], rows: list[list[str]], total: int) -> str:
-    more = total - len(rows)
-    return table(name, heads, rows) + (f'<p class="muted">and {more:,} more</p>' if more else "")
-
-
-def _row(one: OpenMode, base: str) -> list[str]:
-    word = "regression" if one.is_regression else one.status
-    said = "fixed, but fails again" if one.is_regression else one.status
-    note = f"<small>{text(one.comment)}</small>" if one.comment else ""
-    decided = f" ({text(one.decided)})" if one.decided else ""
-    edge = "<small>knife-edge: small changes make it vanish</small>" if one.knife_edge else ""
-    latest = one.results[0]
-    links = ", ".join(
-        link(base, result.page, result.source, f"{result.source}: {one.title}")
-        for result in one.results[:MOST_RESULTS]
-    )
-    more = len(one.results) - MOST_RESULTS
-    links += f" and {more:,} more" if more > 0 else ""
-    labels = f"<small>{text(joined(one.versions, 6))}</small>" if one.versions else ""
-    return [
-        f'{text(one.title)}{edge}{note}<small class="id">{one.key.id}{decided}</small>',
-        f'<span class="status {word}">{text(said)}</span>',
-        text(one.key.scenario),
-        f"{text(one.key.driver)}{labels}",
-        f"{one.count:,}",
-        text(share(one.severity)) if one.severity else "–",
-        f"{when(latest.time)}<small>{links}</small>",
-    ]
-
-
-def _decisions(some: dict[str, Failure]) -> str:
-    rows = [
-        [text(one.title or id), text(one.status), text(one.scenario), text(one.driver),
-         text(one.comment)]
-        for id, one in [*some.items()][:MOST_MODES]
-    ]  # fmt: skip
-    heads = ("failure mode", "status", "scenario", "driver", "comment")
-    return _some("Failure modes in no result", heads, rows, len(some))
-
-
-# --- The page's part on requirements: a matrix for each driver ---
-
-
-MOST_REQUIREMENTS = 40
-"""Columns of a matrix; the gravest."""
-
-MOST_SCENARIOS = 200
-"""Rows of a matrix."""
-
-SIZE = 1_000_000
-"""Characters of all matrices; the first is always there."""
-
-_OPEN = 40
-"""Matrices with more rows together are folded."""
-
-
-def requirements_part(found: Dashboard, base: str) -> str:
-    """Return the section: all requirements, then scenarios × requirements by driver."""
-    if not found.criteria:
-        names = joined(found.scenarios, 8)
-        lead = f"No pass criterion is stated in any result. Scenarios: {names or 'none'}."
-        return section("requirements", "Requirements", lead=lead)
-    parts = [_list(found)]
-    is_open = sum(len(one.scenarios) for one in found.requirements) <= _OPEN
-    matrices = (
-        folded(f"{_label(one)}: {_in_words(one)}", _matrix(one, base), is_open=is_open)
-        for one in found.requirements
-    )
-    parts.append(within(matrices, SIZE, "driver"))
-    lead = "By the current results: those of the version of each driver that was tested last."
-    return section("requirements", "Requirements", *parts, lead=lead)
-
-
-def _label(one: Matrix) -> str:
-    names = joined([label for label in one.labels if label != one.driver], 3)
-    return one.driver + (f" ({names})" if names else "")
-
-
-def _in_words(one: Matrix) -> str:
-    violated = [each.id for each in one.requirements if one.violated(each.id)]
-    words = f"violates {joined(violated)}" if violated else "violates none"
-    if one.without:
-        words += f"; {counted(len(one.without), 'scenario')} without requirement"
-    return words
-
-
-def _list(found: Dashboard) -> str:
-    rows, stated = [], statements(found.project.results)
-    for one in found.criteria[:MOST_SCENARIOS]:
-        violated = found.violated.get(one.id, [])
-        who = "; ".join(f"{matrix.driver} in {joined(names, 3)}" for matrix, names in violated)
-        if one.id in found.untested:
-            state = '<span class="status untested">tested by no scenario</span>'
-        elif violated:
-            state = f'<span class="status regression">violated</span><small>{text(who)}</small>'
-        else:
-            state = '<span class="status fixed">met</span>'
-        words = f"{text(one.text)}<code>{text(one.states)}</code>"
-        others = [each for each in stated.get(one.id, []) if each != one.states]
-        if others:
-            words += f"<small>stated otherwise in some results: {text(joined(others, 3))}</small>"
-        rows.append([f'<span class="id">{text(one.id)}</span>', words, text(one.severity), state])
-    return table("Requirements", ("id", "requirement", "severity", "state"), rows, "list ids")
-
-
-def _matrix(one: Matrix, base: str) -> str:
-    shown = one.requirements[:MOST_REQUIREMENTS]
-    rows = []
-    for name in one.scenarios[:MOST_SCENARIOS]:
-        cells = [_cell(one.cell(name, each.id), base, f"{each.id} in {name}") for each in shown]
-        none = name in one.without
-        first = text(name) + ("<small>without requirement</small>" if none else "")
-        rows.append([first, *cells])
-    left = [
-        f"{counted(len(all_) - most, noun)} left out"
-        for all_, most, noun in (
-            (one.requirements, MOST_REQUIREMENTS, "requirement"),
-            (one.scenarios, MOST_SCENARIOS, "scenario"),
-        )
-        if len(all_) > most
-    ]
-    after = f'<p class="muted">{text("; ".join(left))}</p>' if left else ""
-    heads = ("scenario", *(each.id for each in shown))
-    return table(f"Requirements of {one.driver} by scenario", heads, rows, "matrix") + after
-
-
-def _cell(cell: Cell | None, base: str, name: str) -> str:
-    if cell is None:
-        return '<span class="muted">not tested</span>'
-    worst = "" if cell.worst is None else margin_in_words(cell.worst, cell.unit, 3)
-    total = cell.met + cell.violated
-    if cell.verdict == "violated":
-        words = f"{cell.violated:,} of {total:,} violate"
-        target = link(base, cell.page, words, f"{name}: {words}")
-        return f'<span class="bad">✗ {target}</span><small>worst {text(worst)}</small>'
-    if cell.verdict == "met":
-        target = link(base, cell.page, "met", f"{name}: met")
-        return f'<span class="good">✓ {target}</span><small>least {text(worst)}</small>'
-    return '<span class="muted">no result</span>'
-
-
-# --- The page's part on trends: a chart for each scenario or suite, and driver ---
-
-
+MOST_REQUIREMENTS, MOST_SCENARIOS = 40, 200
+"""Columns and rows of a matrix; the gravest requirements."""
+MOST_CELLS = 10_000
+"""Of all matrices; the first is always there."""
 MOST_CHARTS = 48
-"""Charts of the page: those that grew the most, then those with the largest share."""
+"""Those that grew the most, then those with the largest share."""
+MOST_ROWS = 2000
+"""Rows of a table."""
+MOST_PARAMETERS, MOST_BIN_ROWS = 60, 1000
+"""Parameters of a scenario, and of all scenarios."""
+OPEN_MATRICES, OPEN = 40, 12
+"""Matrices, and other tables, with more rows are folded."""
 
-MOST_ROWS = 300
-
-
-def trends_part(found: Dashboard, base: str) -> str:
-    """Return the section: versions, charts of what was measured again, a table of the rest."""
-    again = [one for one in found.trends if len(one.points) > 1]
-    once = [one for one in found.trends if len(one.points) == 1]
-    links = {
-        point.source: f"./{quote(_address(base, point))}"
-        for one in again
-        for point in one.points
-        if point.page
-    }
-    parts = [_versions(found)]
-    if again:
-        figures = "".join(_figure(one, links) for one in again[:MOST_CHARTS])
-        more = len(again) - MOST_CHARTS
-        after = f'<p class="muted">and {counted(more, "chart")} more</p>' if more > 0 else ""
-        parts.append(f'<div class="charts">{figures}</div>{after}')
-    if once:
-        summary = f"Measured once: {counted(len(once), 'scenario and driver', 'pairs')}"
-        parts.append(folded(summary, _once(once, base), is_open=not again))
-    lead = (
-        "Harmful share of the search space, of random rows, with its 95"
-        f"{NARROW}% interval; of suites the share of variations that fail. Results are in the "
-        "order of time; a version ends the name of a driver behind a hyphen: stack-1.2."
-    )
-    return section("trends", "Trends over driver versions", *parts, lead=lead)
-
-
-def _address(base: str, point: Point) -> str:
-    return point.page if base == "." else f"{base}/{point.page}"
-
-
-def _figure(one: Series, links: dict[str, str]) -> str:
-    left = f", {counted(one.left_out, 'earlier result')} left out" if one.left_out else ""
-    return (
-        f"<figure>{chart(one, links)}<figcaption><b>{text(one.title)}</b> {text(one.driver)}"
-        f"<small>{text(one.measure)}{left}</small></figcaption></figure>"
-    )
-
-
-def _versions(found: Dashboard) -> str:
-    rows = []
-    for _, some in sorted(versions(found.project.results).items()):
-        for driver in some:
-            of_it = [one for one in found.project.results if one.driver == driver]
-            keys = {failure.key for one in of_it for failure in one.failures}
-            rows.append(
-                [
-                    text(driver.label),
-                    text(driver.version or "not known"),
-                    when(min(one.time for one in of_it)),
-                    f"{len({one.scenario for one in of_it}):,}",
-                    f"{sum(one.evaluations for one in of_it):,}",
-                    f"{len(keys):,}",
-                ]
-            )
-    heads = ("driver", "version", "first result (UTC)", "scenarios", "evaluations",
-             "failure modes")  # fmt: skip
-    shown = rows[-MOST_ROWS:]
-    return table("Versions of drivers", heads, shown)
-
-
-def _once(some: list[Series], base: str) -> str:
-    rows = []
-    for one in some[:MOST_ROWS]:
-        point = one.points[0]
-        rows.append(
-            [
-                text(one.title),
-                text(point.driver),
-                text(one.measure),
-                span(point.share, point.low, point.high),
-                f"{point.count:,} of {point.of:,}",
-                link(base, point.page, point.source),
-            ]
-        )
-    heads = ("scenario or suite", "driver", "measure", "share", "count", "result")
-    more = len(some) - len(rows)
-    after = f'<p class="muted">and {more:,} more</p>' if more else ""
-    return table("Measured once", heads, rows) + after
-
-
-_PARTS = (
-    ("modes", "Failing now"),
-    ("requirements", "Requirements"),
-    ("trends", "Trends"),
-    ("odd", "Coverage"),
-    ("results", "All results"),
-    ("problems", "Not read"),
-)
+Row = Sequence[object]
+Table = dict[str, Any]
+"""A table as the template shows it: its name, heads, rows, and how many rows are left out."""
 
 
 def write_page(found: Dashboard) -> None:
@@ -311,47 +49,402 @@ def write_page(found: Dashboard) -> None:
     Raises:
         StorageError: it cannot be written.
     """
-    base = base_of(found.project.folder, found.page)
-    parts = [
-        _head(found),
-        modes_part(found, base),
-        requirements_part(found, base),
-        trends_part(found, base),
-        odd_part(found),
-        results_part(found, base),
-        problems_part(found),
-        f'<footer class="muted">BridgeGen {text(version("bridgegen"))}. Made of what was in the '
-        "folder; the same command makes it again.</footer>",
+    name = found.project.folder.name
+    base = os.path.relpath(found.project.folder, found.page.resolve().parent).replace(os.sep, "/")
+    again = [one for one in found.trends if len(one.points) > 1]
+    partly = {one.partly for one in found.coverage.sceneries.values() if one.partly}
+    templates.write_page(
+        found.page, "jobs/dashboard/page.html",
+        title=f"{name or 'project'}: dashboard", heading=name or "Project", generator=GENERATOR,
+        facts=[*_facts(found)], problems=found.project.problems,
+        lead=[one for one in (failing_sentence(found), requirements_sentence(found)) if one],
+        file=FILE, notes=found.notes[:MOST_RESULTS],
+        modes=_modes("Failure modes of current results", found.failing, base),
+        before=_modes(
+            "Failure modes of earlier results",
+            [one for one in found.modes if not one.fails_now], base,
+        ),
+        unseen=_table(
+            "Failure modes in no result", ("failure mode", "status", "scenario", "driver",
+                                           "comment"),
+            [[one.title or id, one.status, one.scenario, one.driver, one.comment]
+             for id, one in found.unseen.items()], MOST_MODES,
+        ),
+        scenarios=joined(found.scenarios, 8) or "none",
+        requirements=_requirements(found) if found.criteria else None,
+        matrices=_matrices(found, base),
+        versions=_versions(found),
+        figures=[(one, chart(one, base)) for one in again[:MOST_CHARTS]],
+        more_figures=len(again) - MOST_CHARTS,
+        once=_once([one for one in found.trends if len(one.points) == 1], base),
+        source=SOURCE, counts=found.coverage.counts,
+        attributes=[*_attributes(found.coverage.attributes)], partly=sorted(partly),
+        parameters=_parameters(found.coverage),
+        results=[one for one in _results(found, base) if one["rows"]],
+        unread=_table("What cannot be read", ("folder or scenario", "why"),
+                      [[one.place, one.why] for one in found.project.problems]),
+        open=OPEN,
+    )  # fmt: skip
+
+
+def _facts(found: Dashboard) -> Iterator[str]:
+    for name, noun in (
+        ("runs", "run"), ("suites", "suite"), ("maps", "preventability map"),
+        ("comparisons", "comparison"), ("scenarios", "scenario"), ("drivers", "driver"),
+        ("evaluations", "evaluation"),
+    ):  # fmt: skip
+        if found.figures[name]:
+            yield counted(int(found.figures[name]), noun)
+
+
+def _address(base: str, page: str) -> str:
+    """Return the relative link to a page of the project's folder; "" where there is no page."""
+    path = page if base == "." else f"{base}/{page}"
+    return f"./{quote(path, errors='replace')}" if page else ""
+
+
+def _table(
+    name: str, heads: Sequence[str], rows: Sequence[Row], most: int = MOST_ROWS,
+    kind: str = "list", title: str = "",
+) -> Table:  # fmt: skip
+    return {"name": name, "title": title or name, "heads": heads, "rows": rows[:most],
+            "more": max(0, len(rows) - most), "kind": kind}  # fmt: skip
+
+
+def _span(value: float, low: float, high: float) -> str | tuple[str, str]:
+    """Return a share with its interval."""
+    return share(value) if low == high else (share(value), f"{share(low)} to {share(high)}")
+
+
+def within(sizes: Iterable[int], most: int) -> int:
+    """Return how many parts fit, by their sizes; the first always does."""
+    return max(1, sum(one <= most for one in accumulate(sizes)))
+
+
+# --- Failure modes: what fails now, what failed before ---
+
+
+def _modes(name: str, some: Sequence[OpenMode], base: str) -> Table:
+    heads = ("failure mode", "status", "scenario", "driver", "evaluations", "MAIS3+", "last seen")
+    return _table(name, heads, [_mode(one, base) for one in some], MOST_MODES)
+
+
+def _mode(one: OpenMode, base: str) -> Row:
+    notes = ["knife-edge: small changes make it vanish"] if one.knife_edge else []
+    notes += [one.comment] if one.comment else []
+    notes.append(one.key.id + (f" ({one.decided})" if one.decided else ""))
+    more = len(one.results) - MOST_RESULTS
+    return [
+        Cell(one.title, notes),
+        Cell("fixed, but fails again", kind="status regression")
+        if one.is_regression
+        else Cell(one.status, kind=f"status {one.status}"),
+        one.key.scenario,
+        (one.key.driver, joined(one.versions, 6)),
+        one.count,
+        share(one.severity) if one.severity else "–",
+        Cell(
+            when(one.results[0].time),
+            links=[
+                (_address(base, each.page), each.source, f"{each.source}: {one.title}")
+                for each in one.results[:MOST_RESULTS]
+            ],
+            more=f" and {more:,} more" if more > 0 else "",
+        ),
     ]
-    title = f"{found.project.folder.name or 'project'}: dashboard – BridgeGen"
-    body = "\n".join(filter(None, parts)).encode("utf-8", "replace")
-    write_still_page(found.page, "dashboard.html", title, body)
 
 
-def _head(found: Dashboard) -> str:
-    figures, problems = found.figures, found.project.problems
-    nouns = {
-        "runs": ("run", ""),
-        "suites": ("suite", ""),
-        "maps": ("preventability map", ""),
-        "comparisons": ("comparison", ""),
-        "scenarios": ("scenario", ""),
-        "drivers": ("driver", ""),
-        "evaluations": ("evaluation", ""),
+# --- Requirements: all of them, then a matrix of scenarios × requirements for each driver ---
+
+
+def _requirements(found: Dashboard) -> Table:
+    rows: list[Row] = []
+    stated = statements(found.project.results)
+    for one in found.criteria:
+        violated = found.violated.get(one.id, [])
+        who = "; ".join(f"{matrix.driver} in {joined(names, 3)}" for matrix, names in violated)
+        state = Cell("met", kind="status fixed")
+        if one.id in found.untested:
+            state = Cell("tested by no scenario", kind="status untested")
+        elif violated:
+            state = Cell("violated", [who], kind="status regression")
+        others = [each for each in stated.get(one.id, []) if each != one.states]
+        notes = [f"stated otherwise in some results: {joined(others, 3)}"] if others else []
+        words = Cell(one.text, notes, code=one.states)
+        rows.append([Cell(one.id, kind="id"), words, one.severity, state])
+    heads = ("id", "requirement", "severity", "state")
+    return _table("Requirements", heads, rows, MOST_SCENARIOS, "list ids")
+
+
+def _matrices(found: Dashboard, base: str) -> dict[str, Any]:
+    some = found.requirements
+    cells = (
+        min(len(one.scenarios), MOST_SCENARIOS) * min(len(one.requirements), MOST_REQUIREMENTS)
+        for one in some
+    )
+    fit = within(cells, MOST_CELLS)
+    return {
+        "tables": [_matrix(one, base) for one in some[:fit]],
+        "more": max(0, len(some) - fit),
+        "is_open": sum(len(one.scenarios) for one in some) <= OPEN_MATRICES,
     }
-    facts = [counted(int(figures[name]), *noun) for name, noun in nouns.items() if figures[name]]
-    items = "".join(f"<li>{text(one)}</li>" for one in facts)
-    if problems:
-        items += f'<li class="warn">{text(counted(len(problems), "problem"))}</li>'
-    sentences = (failing_sentence(found), requirements_sentence(found))
-    lead = "".join(f"<p>{text(one)}</p>" for one in sentences if one)
-    links = "".join(
-        f'<a href="#{key}">{text(title)}</a>'
-        for key, title in _PARTS
-        if key != "problems" or problems
-    )
-    return (
-        f"<h1>{text(found.project.folder.name or 'Project')}</h1>"
-        f'<ul class="facts" aria-label="What is here">{items}</ul>'
-        f'<div class="card lead">{lead}</div><nav aria-label="Sections">{links}</nav>'
-    )
+
+
+def _matrix(one: Matrix, base: str) -> Table:
+    labels = joined([label for label in one.labels if label != one.driver], 3)
+    violated = [each.id for each in one.requirements if one.violated(each.id)]
+    words = one.driver + (f" ({labels})" if labels else "")
+    words += f": violates {joined(violated)}" if violated else ": violates none"
+    if one.without:
+        words += f"; {counted(len(one.without), 'scenario')} without requirement"
+    shown = one.requirements[:MOST_REQUIREMENTS]
+    left = [
+        f"{counted(len(all_) - most, noun)} left out"
+        for all_, most, noun in (
+            (one.requirements, MOST_REQUIREMENTS, "requirement"),
+            (one.scenarios, MOST_SCENARIOS, "scenario"),
+        )
+        if len(all_) > most
+    ]
+    rows = [
+        [
+            (name, "without requirement" if name in one.without else ""),
+            *(_verdict(one, name, each.id, base) for each in shown),
+        ]
+        for name in one.scenarios[:MOST_SCENARIOS]
+    ]
+    name, heads = f"Requirements of {one.driver} by scenario", [each.id for each in shown]
+    return {**_table(name, ("scenario", *heads), rows, kind="matrix", title=words),
+            "left": "; ".join(left)}  # fmt: skip
+
+
+def _verdict(matrix: Matrix, scenario: str, requirement: str, base: str) -> Cell:
+    cell = matrix.cell(scenario, requirement)
+    if cell is None or cell.verdict == "unknown":
+        return Cell("no result" if cell else "not tested", kind="muted")
+    is_met, words = cell.verdict == "met", "met"
+    if not is_met:
+        words = f"{cell.violated:,} of {cell.met + cell.violated:,} violate"
+    worst = "" if cell.worst is None else margin_in_words(cell.worst, cell.unit, 3)
+    return Cell(
+        words, [f"{'least' if is_met else 'worst'} {worst}"],
+        kind="good" if is_met else "bad", before="✓ " if is_met else "✗ ",
+        href=_address(base, cell.page), label=f"{requirement} in {scenario}: {words}",
+    )  # fmt: skip
+
+
+# --- Trends: versions, a chart for each series, and what was measured once ---
+
+
+def chart(one: Series, base: str) -> str:
+    """Return a series as a chart; a dot leads to its result's page."""
+    points = [
+        charts.Point(
+            point.share, point.low, point.high, share(point.share), bool(point.count),
+            f"{point.driver}, {when(point.time)} UTC: {share(point.share)} ({point.count:,} of "
+            f"{point.of:,}); {point.source}",
+            (point.version, point.driver), _address(base, point.page),
+        )
+        for point in one.points
+    ]  # fmt: skip
+    latest = ", ".join(f"{point.driver} {share(point.share)}" for point in one.points[-5:])
+    return charts.trend(points, f"{one.measure} of {one.driver} in {one.title}: {latest}")
+
+
+def _versions(found: Dashboard) -> Table:
+    rows = []
+    for _, some in sorted(versions(found.project.results).items()):
+        for driver in some:
+            of_it = [one for one in found.project.results if one.driver == driver]
+            rows.append([
+                driver.label, driver.version or "not known", when(min(one.time for one in of_it)),
+                len({one.scenario for one in of_it}), sum(one.evaluations for one in of_it),
+                len({failure.key for one in of_it for failure in one.failures}),
+            ])  # fmt: skip
+    heads = ("driver", "version", "first result (UTC)", "scenarios", "evaluations",
+             "failure modes")  # fmt: skip
+    return _table("Versions of drivers", heads, rows[-MOST_ROWS:])
+
+
+def _once(some: list[Series], base: str) -> Table:
+    rows = [
+        [
+            one.title, point.driver, one.measure, _span(point.share, point.low, point.high),
+            f"{point.count:,} of {point.of:,}",
+            Cell(point.source, href=_address(base, point.page)),
+        ]
+        for one in some
+        for point in one.points
+    ]  # fmt: skip
+    title = f"Measured once: {counted(len(some), 'scenario and driver', 'pairs')}"
+    heads = ("scenario or suite", "driver", "measure", "share", "count", "result")
+    return _table("Measured once", heads, rows, title=title)
+
+
+# --- The operational design domain: the taxonomy, then parameters ---
+
+
+def _attributes(some: Iterable[Covered]) -> Iterator[tuple[str, list[tuple[str, Table, str]]]]:
+    """Yield each part of the taxonomy in words, with its groups: name, table, what is left out."""
+    for top, part in groupby(some, lambda one: one.attribute.path[0]):
+        members = list(part)
+        states = [_state(one) for one in members]
+        covered, cannot = states.count("covered"), states.count("not expressible")
+        words = f"{top}: {covered} of {len(members) - cannot} covered"
+        words += f", {cannot} not expressible" if cannot else ""
+        groups = groupby(members, lambda one: one.attribute.path[1:-1])
+        yield words, [_group(" / ".join(path), list(each)) for path, each in groups]
+
+
+def _state(one: Covered) -> str:
+    if not one.attribute.expressible:
+        return "not expressible"
+    return "covered" if one.scenarios else "not covered"
+
+
+def _group(name: str, some: list[Covered]) -> tuple[str, Table, str]:
+    rows = [_attribute(one) for one in some if one.attribute.expressible]
+    cannot = [
+        one.attribute.path[-1] + (f" ({one.attribute.note})" if one.attribute.note else "")
+        for one in some
+        if not one.attribute.expressible
+    ]
+    table = _table(name, ("attribute", "evaluations", "covered by"), rows, kind="list odd")
+    return name, table, "; ".join(cannot)
+
+
+def _attribute(one: Covered) -> Row:
+    state, note = _state(one), one.attribute.note
+    kind, names = state.replace(" ", "-"), [f"{name} ({n:,})" for name, n in one.scenarios.items()]
+    by = Cell(state, kind=kind)
+    if names:
+        by = Cell(joined(names, 2))
+    elif one.unread:
+        by = Cell(state, [f"not read of {counted(one.unread, 'scenario')}"], kind=kind)
+    mark = "✓ " if state == "covered" else "○ "
+    name = Cell(one.attribute.path[-1], [note] if note else [], mark=(mark, kind))
+    return [name, one.evaluations, by]
+
+
+def _parameters(of: Coverage) -> dict[str, Any]:
+    sizes = (min(len(of.sceneries[name].parameters), MOST_PARAMETERS) for name in of.seen)
+    fit = within(sizes, MOST_BIN_ROWS)
+    names = [*of.seen]
+    return {"tables": [_bins(of, name) for name in names[:fit]], "more": max(0, len(names) - fit)}
+
+
+def _bins(of: Coverage, name: str) -> Table:
+    """Return the bins of a scenario's parameters."""
+    seen, rows = of.seen[name], []
+    for one in of.sceneries[name].parameters:
+        counts = seen.bins.get(one.name, [])
+        unit = "" if one.unit in ("1", "count") else f" {one.unit}"
+        outside = seen.outside.get(one.name, 0)
+        rows.append([
+            one.name, one.kind.span_text(one.low, one.high, "{:.4g}".format, unit),
+            f"{sum(count > 0 for count in counts)} of {len(counts)}",
+            (charts.strip(counts), f"{outside:,} outside" if outside else ""),
+        ])  # fmt: skip
+    bins = [count for counts in seen.bins.values() for count in counts]
+    words = f"{name}: {counted(seen.evaluations, 'evaluation')}"
+    if bins:
+        words += f", {sum(n > 0 for n in bins):,} of {counted(len(bins), 'bin')}"
+    heads = ("parameter", "declared", "bins met", "evaluations by bin")
+    return _table(f"Parameters of {name}", heads, rows, MOST_PARAMETERS, title=words)
+
+
+# --- All results, the latest first ---
+
+
+def _results(found: Dashboard, base: str) -> Iterator[Table]:
+    project = found.project
+    runs = sorted(project.runs, key=lambda one: (-one.time, one.source))
+    suites = sorted(project.suites, key=lambda one: (-one.time, one.source))
+    compared = [one for one in suites if one.difference]
+    for title, heads, rows in (
+        (
+            counted(len(runs), "run"),
+            ("run", "scenario", "driver", "evaluations", "harmful", "of the space",
+             "changed (UTC)"),
+            [_run(one, base) for one in runs],
+        ),
+        (
+            counted(len(suites), "suite"),
+            ("suite", "drivers", "scenarios", "not judged", "variations", "fail", "not run",
+             "changed (UTC)"),
+            [_suite(one, base) for one in suites],
+        ),
+        (
+            counted(len(compared), "difference of two drivers", "differences of two drivers"),
+            ("suite", "first driver", "second driver", "only the first fails",
+             "only the second fails", "both fail", "both pass", "by chance"),
+            [_difference(one, base) for one in compared],
+        ),
+        (
+            counted(len(project.maps), "preventability map"),
+            ("map", "scenario", "driver", "cells", "avoided", "not avoided though preventable",
+             "not preventable"),
+            [*_maps(found, base)],
+        ),
+        (
+            counted(len(project.comparisons), "comparison of algorithms",
+                    "comparisons of algorithms"),
+            ("comparison", "scenarios", "algorithms", "runs"),
+            [
+                [Cell(one.source, href=_address(base, one.page)), joined(one.scenarios),
+                 joined(one.algorithms), one.runs]
+                for one in project.comparisons
+            ],
+        ),
+    ):  # fmt: skip
+        yield _table(title, heads, rows)
+
+
+def _run(one: Result, base: str) -> Row:
+    space = one.space
+    is_known = space is not None and space.share is not None and not one.unjudged
+    return [
+        Cell(one.source, [] if one.finished else ["not finished"], href=_address(base, one.page)),
+        one.scenario,
+        (one.driver.label, f"worse than {one.worse_than}" if one.worse_than else ""),
+        one.evaluations,
+        "not judged" if one.unjudged else one.failed if space or one.worse_than else "–",
+        _span(space.share or 0.0, space.low, space.high) if space and is_known else "–",
+        when(one.time),
+    ]
+
+
+def _suite(one: SuiteLine, base: str) -> Row:
+    return [
+        Cell(one.source, href=_address(base, one.page)),
+        joined(one.egos),
+        len({each.entry for each in one.results}),
+        len({each.entry for each in one.results if each.unjudged}),
+        *(sum(getattr(each, name) for each in one.results)
+          for name in ("evaluations", "failed", "lost")),
+        when(one.time),
+    ]  # fmt: skip
+
+
+def _difference(one: SuiteLine, base: str) -> Row:
+    found = one.difference
+    assert found is not None
+    return [
+        Cell(one.source, href=_address(base, one.page)), found.first, found.second,
+        *(found.counts[name] for name in ("fixed", "broken", "both fail", "both pass")),
+        f"p = {found.p_value:.2g}",
+    ]  # fmt: skip
+
+
+def _maps(found: Dashboard, base: str) -> Iterator[Row]:
+    for one in found.project.maps:
+        href = _address(base, one.page)
+        if not one.scenario:
+            yield [Cell(one.source, ["not finished"], href=href), *[""] * 6]
+            continue
+        for each in one.drivers:
+            numbers = (each.avoided, each.preventable, each.unpreventable)
+            yield [
+                Cell(one.source, href=href), one.scenario, each.driver, one.cells,
+                *((n, share(n / each.judged)) if each.judged else "–" for n in numbers),
+            ]  # fmt: skip

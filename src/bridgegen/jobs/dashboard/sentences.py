@@ -1,7 +1,7 @@
 """What fails now, in two sentences."""
 
 from bridgegen.jobs.dashboard.dashboard import Dashboard
-from bridgegen.jobs.dashboard.markup import counted, joined
+from bridgegen.pages.templates import counted, joined
 
 MOST_NAMED = 3
 

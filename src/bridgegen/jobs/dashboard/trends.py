@@ -4,9 +4,9 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-from bridgegen.jobs.dashboard.markup import counted
 from bridgegen.jobs.dashboard.results import Result, in_order
 from bridgegen.jobs.dashboard.results_of import SuiteLine
+from bridgegen.pages.templates import counted
 
 Measure = Literal["harmful share", "failed variations"]
 

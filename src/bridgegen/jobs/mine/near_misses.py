@@ -1,7 +1,6 @@
 """Near misses on the page of recordings, and as a table."""
 
 from collections.abc import Iterator, Sequence
-from html import escape
 
 from bridgegen.jobs.mine.mine import CRITICAL, Mined, Summary
 from bridgegen.recordings.conflicts.find import RecordedConflict
@@ -50,51 +49,27 @@ def in_words(one: Summary) -> str:
     return text
 
 
-def section(mined: Mined) -> str:
-    """Return the section with the events that are written, each with its picture."""
-    lines = "".join(
-        f"<li>{escape(one.facts.name)}: {escape(in_words(one))}</li>" for one in mined.recordings
-    )
-    events = "".join(_event(number, one) for number, one in enumerate(mined.replays, 1))
-    return (
-        f"<section><h2>Near misses</h2><div class='card'><ul>{lines}</ul>"
-        "<p class='muted'>By the conflict analysis of a search, with every motor vehicle as the "
-        "ego; of each pair the more harmful view. All are in conflicts.csv.</p></div>"
-        f"{events}</section>"
-    )
-
-
-def _event(number: int, one: Replay) -> str:
+def shown(one: Replay) -> dict[str, object]:
+    """Return what the page shows of an event that is written."""
     event, found = one.event, one.event.event.found
-    ego, other = (escape(name) for name in event.names)
+    ego, other = event.names
+    paths = (one.scenario.with_suffix(end) for end in (".xosc", ".xodr", ".owl"))
     facts = [
-        f"the ego is {ego}, the other {other}, of {escape(event.recording)}",
-        f"responsible: {escape(found.responsible or 'unknown')}; {escape(found.type)}",
+        f"the ego is {ego}, the other {other}, of {event.recording}",
+        f"responsible: {found.responsible or 'unknown'}; {found.type}",
         f"time to collision {found.ttc:.2f} s, {found.needed_deceleration:.1f} m/s² needed",
-        _proof(one),
+        f"not simulated: {one.problem}"
+        if one.problem
+        else f"simulated here, all participants are within {max(one.off, 0.001):.3f} m of where "
+        f"they were recorded, and within {max(one.too_fast, 0.01):.2f} m/s of their speed",
     ]
-    if event.event.doubt:
-        facts.append(f"doubtful: {escape(event.event.doubt)}")
-    stem = one.scenario.stem
-    links = ", ".join(
-        f"<a href='{CRITICAL}/{path.name}'>{path.name}</a>"
-        for path in (one.scenario.with_suffix(end) for end in (".xosc", ".xodr", ".owl"))
-        if path.exists()
-    )
-    picture = moving_picture(event.motion, 1, event.when, found.sentence)
-    return (
-        f"<div class='card event' id='{stem}'><h3>{number}. {escape(found.sentence)}</h3>{picture}"
-        f"<ul>{''.join(f'<li>{fact}</li>' for fact in facts)}<li>{links}</li></ul></div>"
-    )
-
-
-def _proof(one: Replay) -> str:
-    if one.problem:
-        return f"not simulated: {escape(one.problem)}"
-    return (
-        f"simulated here, all participants are within {max(one.off, 0.001):.3f} m of where they "
-        f"were recorded, and within {max(one.too_fast, 0.01):.2f} m/s of their speed"
-    )
+    return {
+        "id": one.scenario.stem,
+        "sentence": found.sentence,
+        "picture": moving_picture(event.motion, 1, event.when, found.sentence),
+        "facts": [*facts, f"doubtful: {event.event.doubt}"] if event.event.doubt else facts,
+        "files": [(f"{CRITICAL}/{path.name}", path.name) for path in paths if path.exists()],
+    }
 
 
 def screen_rows(mined: Mined) -> Iterator[tuple[str, str, str, str, float, float, str]]:

@@ -3,11 +3,7 @@
 import csv
 import io
 import math
-import re
 from collections.abc import Iterable, Iterator, Sequence
-from html import escape
-from importlib.metadata import version
-from importlib.resources import files
 from pathlib import Path
 
 import numpy as np
@@ -17,14 +13,17 @@ from bridgegen.base.errors import StorageError
 from bridgegen.drivers.kinds import BICYCLE, MOTORCYCLE, NAMES, PEDESTRIAN
 from bridgegen.jobs.mine import near_misses as conflicts
 from bridgegen.jobs.mine.mine import CRITICAL, PATHS_SHOWN, Mined, Summary
-from bridgegen.recordings.cells import cell, html_table
-from bridgegen.recordings.events.playback import playback_section
-from bridgegen.recordings.events.tables import FOLDER, events_section
+from bridgegen.pages import charts, exposure, templates
+from bridgegen.recordings.cells import cell
+from bridgegen.recordings.events.playback import SHOWN, caption
+from bridgegen.recordings.events.tables import FOLDER, against_in_words, kind_rows, rates_in_words
 from bridgegen.recordings.events.tables import HEAD as EVENTS_HEAD
 from bridgegen.recordings.events.tables import TABLE as EVENTS
 from bridgegen.recordings.lanes.account import LanesFound
+from bridgegen.recordings.replays.write import moving_picture
+from bridgegen.recordings.scenarios.files import ENDINGS
 from bridgegen.recordings.scenarios.files import FOLDER as SCENARIOS
-from bridgegen.recordings.scenarios.files import scenarios_section
+from bridgegen.recordings.scenarios.mined import MinedScenario, Unmade
 
 GENERATOR = "BridgeGen recordings"
 PAGE, TABLE, LANES, QUALITY = "recordings.html", "recordings.csv", "lanes.csv", "quality.csv"
@@ -39,7 +38,6 @@ LANES_HEAD = (
     "rms_m", "p95_m",
 )  # fmt: skip
 QUALITY_HEAD = ("recording", "file", "rule", "participants", "count", "examples")
-HEIGHT, WIDTH = 260, 900
 SPACE = 3.0
 """Around the paths [m]."""
 CARRIAGEWAYS_SHOWN = 12
@@ -48,6 +46,7 @@ SOURCES = {
     "markings": "between the recording's lane markings", "inferred": "inferred from the paths",
 }  # fmt: skip
 TWO_WHEELED = (BICYCLE, MOTORCYCLE)
+_LINKS = ("scenario", "how well its distributions fit", "OpenSCENARIO distribution")
 
 
 def refuse_foreign(out: Path, more: Sequence[str] = ()) -> None:
@@ -97,22 +96,27 @@ def write_all(mined: Mined) -> None:
     write_whole(mined.out / LANES, _csv(LANES_HEAD, _lane_rows(mined)))
     write_whole(mined.out / QUALITY, _csv(QUALITY_HEAD, _quality_rows(mined)))
     write_whole(mined.out / CONFLICTS, _csv(conflicts.HEAD, conflicts.rows(mined)))
-    fill = {
-        "title": "What was recorded",
-        "css": _own("page.css"),
-        "facts": "".join(f"<li>{escape(one)}</li>" for one in _facts(mined)),
-        "table": _table(mined),
-        "events": events_section([one.events for one in mined.recordings], mined.scenarios),
-        "playback": playback_section(mined.played),
-        "scenarios": scenarios_section(mined.mined),
-        "recordings": "\n".join(_section(one, mined.time_step) for one in mined.recordings),
-        "conflicts": conflicts.section(mined),
-        "left_out": _left_out(mined),
-        "version": escape(version("bridgegen")),
-    }
-    parts = re.split(r"\{\{(\w+)\}\}", _own("page.html"))
-    text = "".join(fill[part] if i % 2 else part for i, part in enumerate(parts))
-    write_whole(mined.out / PAGE, [text.encode("utf-8", "replace")])
+    templates.write_page(
+        mined.out / PAGE, "jobs/mine/page.html",
+        title="What was recorded", generator=GENERATOR, facts=[*_facts(mined)],
+        **_recordings(mined), **_events(mined),
+        played={
+            kind: [(one.name, moving_picture(one.motion, 1, one.when, caption(one)), caption(one))
+                   for one in mined.played if one.kind == kind]
+            for kind in dict.fromkeys(one.kind for one in mined.played)
+        },
+        per_kind=SHOWN,
+        mined=[one for one in mined.mined if isinstance(one, MinedScenario)],
+        unmade=_grouped((one.source, one.reason) for one in mined.mined if isinstance(one, Unmade)),
+        files=[*zip(ENDINGS, _LINKS, strict=True)], folder=SCENARIOS,
+        conflicts=_grouped(conflicts.recordings_in_words(mined)),
+        near_misses=map(conflicts.shown, mined.replays),
+        left_out=[*(text for _, texts in mined.skipped for text in texts),
+                  *(f"{path}: no recording" for path in mined.others)],
+    )  # fmt: skip
+    for one in mined.mined:
+        if isinstance(one, MinedScenario):
+            exposure.write_page(mined.out / SCENARIOS / f"{one.name}{ENDINGS[1]}", one.fit)
 
 
 def _row(one: Summary) -> list[object]:
@@ -167,46 +171,100 @@ def _facts(mined: Mined) -> Iterator[str]:
         yield "1 file skipped" if count == 1 else f"{count} files skipped"
 
 
-def _table(mined: Mined) -> str:
+def _grouped(pairs: Iterable[tuple[str, str]]) -> list[str]:
+    """Return what is said of each name, once for all names of which the same is said."""
+    names: dict[str, list[str]] = {}
+    for name, text in pairs:
+        names.setdefault(text, []).append(name)
+    return [f"{', '.join(some)}: {text}" for text, some in names.items()]
+
+
+def _recordings(mined: Mined) -> dict[str, object]:
+    """Return the table of recordings, and what is shown of each."""
     kinds = [name for name in NAMES if any(name in one.participants for one in mined.recordings)]
-    head = ["recording", "format", "time step", "duration", *kinds, "h", "km"]
     rows = [
         [
             one.facts.name, one.facts.format, f"{one.facts.time_step:.4g} s",
-            f"{one.duration:.4g} s", *(f"{one.participants.get(kind, 0):,}" for kind in kinds),
+            f"{one.duration:.4g} s", *(one.participants.get(kind, 0) for kind in kinds),
             f"{one.hours:.4g}", f"{one.kilometres:.4g}",
         ]
         for one in mined.recordings
     ]  # fmt: skip
-    return html_table(head, rows)
+    return {
+        "kinds": kinds, "rows": rows,
+        "recordings": [_recording(one, mined.time_step) for one in mined.recordings],
+    }  # fmt: skip
 
 
-def _section(one: Summary, time_step: float) -> str:
-    facts = one.facts
-    used = " (not read)" if one.lanes.source in ("inferred", "none") else ""
-    about = [
-        f"file: {facts.source}",
-        f"frame: {facts.frame}",
-        f"map: {facts.map}{used}" if facts.map else "map: none named",
-        f"{one.states:,} states read, every {facts.time_step:.4g} s; {one.tracks:,} tracks after "
-        f"cleaning, every {time_step:g} s",
-        f"{one.read_hours:.4g} h and {one.read_kilometres:.4g} km before cleaning, "
-        f"{one.hours:.4g} h and {one.kilometres:.4g} km after",
-        f"traffic lights: {len(facts.lights) or 'none recorded'}",
-        *facts.notes,
-    ]
-    findings = [
-        [each.rule.value, f"{each.participants:,}", f"{each.count:,}", "; ".join(each.examples)]
-        for each in one.findings
-    ]
-    head = ["quality", "participants", "count", "first places"]
-    lines = "".join(f"<li>{escape(text)}</li>" for text in about)
-    return (
-        f"<section><h2>{escape(facts.name)}</h2><div class='card'><ul>{lines}</ul></div>"
-        f"<div class='card'>{_picture(one)}<p class='muted'>{_caption(one)}</p></div>"
-        f"{_lanes(one.lanes)}"
-        f"<div class='card'><div class='wide'>{html_table(head, findings)}</div></div></section>"
-    )
+def _events(mined: Mined) -> dict[str, object]:
+    """Return the tables of events and scenarios; those without any event in a line."""
+    found = [one.events for one in mined.recordings]
+    kinds = [*kind_rows(found)]
+    met = [
+        (one.complete + one.incomplete, [one.scenario, one.kind, one.complete, one.incomplete,
+         *rates_in_words(one.encounters), ", ".join(one.unmapped) or "–"])
+        for one in mined.scenarios
+    ]  # fmt: skip
+    return {
+        "seen": [row for row in kinds if row[1] or row[4]],
+        "unseen": _grouped(
+            (kind, "not seen" if hour == km == "–" else f"{hour} per hour, {km} per 1000 km")
+            for kind, count, hour, km, refused in kinds
+            if not count and not refused
+        ),
+        "met": [row for count, row in met if count],
+        "unmet": _grouped(
+            (f"{one.scenario} ({', '.join(one.unmapped)} not given)" if one.unmapped
+             else one.scenario, f"no {one.kind}")
+            for one, (count, _) in zip(mined.scenarios, met, strict=True)
+            if not count
+        ),
+        "against": [f"{one.scenario}: {text}"
+                    for one in mined.scenarios for text in against_in_words(one)],
+        "driven": [sum(getattr(one, name) for one in found)
+                   for name in ("hours", "kilometres", "all_hours", "all_kilometres")],
+    }  # fmt: skip
+
+
+def _recording(one: Summary, time_step: float) -> dict[str, object]:
+    facts, lanes = one.facts, one.lanes
+    used = " (not read)" if lanes.source in ("inferred", "none") else ""
+    ways = lanes.carriageways
+    return {
+        "name": facts.name,
+        "about": [
+            f"file: {facts.source}",
+            f"frame: {facts.frame}",
+            f"map: {facts.map}{used}" if facts.map else "map: none named",
+            f"{one.states:,} states read, every {facts.time_step:.4g} s; {one.tracks:,} tracks "
+            f"after cleaning, every {time_step:g} s",
+            f"{one.read_hours:.4g} h and {one.read_kilometres:.4g} km before cleaning, "
+            f"{one.hours:.4g} h and {one.kilometres:.4g} km after",
+            f"traffic lights: {len(facts.lights) or 'none recorded'}",
+            *facts.notes,
+        ],
+        "picture": _picture(one),
+        "paths": "all"
+        if len(one.paths) == one.tracks
+        else f"{len(one.paths):,} of {one.tracks:,}",
+        "lanes": [
+            f"lanes: {lanes_in_words(lanes)}; {lanes.km_on:.4g} km on lanes, "
+            f"{lanes.km_off:.4g} km off",
+            *lanes.notes,
+        ],
+        "ways": [
+            [f"{each.number + 1}", f"{each.lanes or '–'}", f"{each.width:.2f} m",
+             f"{each.length:.0f} m", each.states, f"{each.rms:.2f} m", f"{each.p95:.2f} m"]
+            for each in ways[:CARRIAGEWAYS_SHOWN]
+        ],
+        "more_ways": max(0, len(ways) - CARRIAGEWAYS_SHOWN),
+        "findings": [
+            [each.rule.value, each.participants, each.count, "; ".join(each.examples)]
+            for each in one.findings if each.count or each.participants
+        ],
+        "clean": [each.rule.value for each in one.findings
+                  if not (each.count or each.participants)],
+    }  # fmt: skip
 
 
 def lanes_in_words(found: LanesFound) -> str:
@@ -224,64 +282,12 @@ of vehicles that drive on them"
     return f"{SOURCES[found.source]}: {ways} with traffic{share}"
 
 
-def _lanes(found: LanesFound) -> str:
-    notes = [f"lanes: {lanes_in_words(found)}; {found.km_on:.4g} km on lanes, {found.km_off:.4g} \
-km off", *found.notes]  # fmt: skip
-    head = ["carriageway", "lanes", "mean width", "length", "states", "off the middle, RMS",
-            "95 % within"]  # fmt: skip
-    rows = [
-        [f"{each.number + 1}", f"{each.lanes or '–'}", f"{each.width:.2f} m",
-         f"{each.length:.0f} m", f"{each.states:,}", f"{each.rms:.2f} m", f"{each.p95:.2f} m"]
-        for each in found.carriageways[:CARRIAGEWAYS_SHOWN]
-    ]  # fmt: skip
-    lines = "".join(f"<li>{escape(text)}</li>" for text in notes)
-    more = len(found.carriageways) - len(rows)
-    rest = f"<p class='muted'>And {more:,} more, in {LANES}.</p>" if more > 0 else ""
-    table = f"<div class='wide'>{html_table(head, rows)}</div>{rest}" if rows else ""
-    return f"<div class='card'><ul>{lines}</ul>{table}</div>"
-
-
-def _caption(one: Summary) -> str:
-    shown = "all" if len(one.paths) == one.tracks else f"{len(one.paths):,} of {one.tracks:,}"
-    return f"Paths of {shown} tracks, x to the right, y up. <span class='walks'>On foot</span>, \
-<span class='cycles'>two-wheeled</span>, all others dark; \
-<span class='lanes'>borders of lanes</span>."
-
-
 def _picture(one: Summary) -> str:
+    def kind(code: int) -> str:
+        return "walks" if code == PEDESTRIAN else "cycles" if code in TWO_WHEELED else "drives"
+
     points = np.concatenate([path for _, path in one.paths])
+    lines = [("lane", border) for border in one.lanes.borders]
+    lines += [(kind(code), path) for code, path in one.paths[:PATHS_SHOWN]]
     low, high = points.min(axis=0) - SPACE, points.max(axis=0) + SPACE
-    span = np.maximum(high - low, 1.0)
-    scale = min((WIDTH - 20) / span[0], (HEIGHT - 40) / span[1])
-    height = span[1] * scale + 40
-    length = 10.0 ** np.floor(np.log10(0.4 * (WIDTH - 20) / scale))
-    lines = []
-    for border in one.lanes.borders:
-        xy = (border - low) * scale
-        text = " ".join(f"{10 + x:.1f},{height - 30 - y:.1f}" for x, y in xy.tolist())
-        lines.append(f'<polyline class="lane" points="{text}"/>')
-    for kind, path in one.paths[:PATHS_SHOWN]:
-        xy = (path - low) * scale
-        text = " ".join(f"{10 + x:.1f},{height - 30 - y:.1f}" for x, y in xy.tolist())
-        name = "walks" if kind == PEDESTRIAN else "cycles" if kind in TWO_WHEELED else "drives"
-        lines.append(f'<polyline class="{name}" points="{text}"/>')
-    bar = (
-        f'<path class="bar" d="M10 {height - 8:.1f}h{length * scale:.1f}"/>'
-        f'<text x="{16 + length * scale:.1f}" y="{height - 4:.1f}">{length:g} m</text>'
-    )
-    return (
-        f'<svg viewBox="0 0 {WIDTH} {height:.0f}" role="img" aria-label="Paths of the recording">'
-        f"{''.join(lines)}{bar}</svg>"
-    )
-
-
-def _left_out(mined: Mined) -> str:
-    if not mined.skipped and not mined.others:
-        return "<p>No file was left out.</p>"
-    lines = [f"<li>{escape(text)}</li>" for _, texts in mined.skipped for text in texts]
-    lines += [f"<li>{escape(str(path))}: no recording</li>" for path in mined.others]
-    return f"<ul>{''.join(lines)}</ul>"
-
-
-def _own(name: str) -> str:
-    return files("bridgegen.jobs.mine").joinpath(name).read_text("utf-8")
+    return charts.ground(lines, low, high, "Paths of the recording")

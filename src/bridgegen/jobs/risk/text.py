@@ -1,7 +1,6 @@
 """A risk in words."""
 
 from collections.abc import Iterator
-from math import isfinite
 
 from bridgegen.jobs.frame import Table
 from bridgegen.jobs.risk.elsewhere import Elsewhere, Ratio
@@ -9,22 +8,8 @@ from bridgegen.jobs.risk.estimators.weighted import Probability
 from bridgegen.jobs.risk.options import WORDS
 from bridgegen.jobs.risk.outcomes import EVENTS, DataBand
 from bridgegen.jobs.risk.result import PAGE, Risk
+from bridgegen.pages.templates import number
 from bridgegen.scenario.exposure.exposure import Rate
-
-
-def number(value: float) -> str:
-    """Return a number with three digits; small ones with a power of ten.
-
-    A rate per unit so short that it exceeds all numbers is "beyond 1e308".
-    """
-    if value == 0.0:
-        return "0"
-    if not isfinite(value):
-        return "beyond 1e308"
-    if 1e-3 <= value < 1e4:
-        return f"{value:.3g}"
-    digits, power = f"{value:.2e}".split("e")
-    return f"{digits}e{int(power)}"
 
 
 def sentence(risk: Risk) -> str:

@@ -6,6 +6,8 @@ from dataclasses import dataclass
 from html import escape
 from itertools import pairwise
 
+from markupsafe import Markup
+
 from bridgegen.jobs.safety_case.model import Element, RelationKind, SafetyCase
 
 # --- Where the elements of an argument are drawn: a head, and a column for each goal below it ---
@@ -219,7 +221,7 @@ _CLASS = {
 }
 
 
-def drawing(found: Layout, label: str) -> str:
+def drawing(found: Layout, label: str) -> Markup:
     """Return an inline SVG.
 
     Args:
@@ -234,7 +236,7 @@ def drawing(found: Layout, label: str) -> str:
         *map(_element, found.boxes),
         "</svg>",
     ]
-    return "".join(parts)
+    return Markup("".join(parts))
 
 
 def _edge(edge: Edge) -> str:

@@ -239,7 +239,7 @@ def export_safety_case(given: SafetyCaseOptions) -> Exported:
     case = build(found, folder)
     data = case.model_dump_json(indent=1).encode() + b"\n"
     write_whole(folder / FILE, [data])
-    write_whole(folder / PAGE, page(case, data))
+    write_whole(folder / PAGE, [page(case, data)])
     write_whole(
         folder / SCRIPT, [files("bridgegen.jobs.safety_case").joinpath(SCRIPT).read_bytes()]
     )

@@ -5,7 +5,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from bridgegen.base.disk import write_whole
 from bridgegen.base.errors import BridgeGenError
 from bridgegen.engine.options import CommonOptions
 from bridgegen.engine.options.option import options_of
@@ -17,7 +16,7 @@ from bridgegen.jobs.suite.page_payload import Key, key_of, payload
 from bridgegen.jobs.suite.replay import Replayed, replay_command
 from bridgegen.jobs.suite.results import EntryResult, rank
 from bridgegen.jobs.suite.suite import SuiteRun
-from bridgegen.pages.page import code_of, page_of
+from bridgegen.pages.page import code_of, write_page
 from bridgegen.pages.payload import script_json
 from bridgegen.pages.playback import Playback
 from bridgegen.pages.playbacks import beside_others, measured_playbacks
@@ -92,8 +91,8 @@ def _write(
     pictures = [picture_payload(one, suite.folder) for one in maps]
     data = payload(suite, played, commands, searches=searches, maps=pictures, code=code_of(_MODULE))
     path = suite.folder / FILE
-    title = f"{suite.folder.resolve().name}: suite – BridgeGen"
-    write_whole(path, page_of(_MODULE, title, script_json(data)))
+    title = f"{suite.folder.resolve().name}: suite"
+    write_page(path, _MODULE, title, script_json(data))
     return path
 
 

@@ -1,6 +1,5 @@
 """A folder of runs as a site: a page that lists them, each run's report, two runs side by side."""
 
-import html
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -9,7 +8,8 @@ from bridgegen.assess.criteria import headline
 from bridgegen.base.errors import StorageError
 from bridgegen.jobs.view.overview import RunLine, find_runs, read_line
 from bridgegen.jobs.view.run_view import RunView
-from bridgegen.pages.page import page_of, still_page
+from bridgegen.pages import templates
+from bridgegen.pages.page import page_of
 from bridgegen.pages.payload import script_json
 from bridgegen.pages.sentences import NARROW, share
 from bridgegen.search.triage.record import Mode
@@ -45,7 +45,7 @@ class FolderView:
         self._find()
         lines = [_facts(k, read_line(self.folder, one)) for k, one in enumerate(self._runs)]
         data = script_json({"folder": str(self.folder), "runs": lines})
-        return b"".join(page_of("runs.js", f"{self.folder.name}: runs – BridgeGen", data))
+        return page_of("runs.js", f"{self.folder.name}: runs", data)
 
     def run(self, number: int) -> RunView | None:
         """Return the site of a run by its number; None if there is none.
@@ -66,8 +66,11 @@ class FolderView:
         if max(first, second) >= len(self._runs):
             return None
         a, b = (read_line(self.folder, self._runs[k]) for k in (first, second))
-        body = "\n".join(_pair((first, a), (second, b))).encode("utf-8", "replace")
-        return b"".join(still_page("pair.html", f"{a.path} and {b.path} – BridgeGen", body))
+        rows = [(name, of(a), of(b)) for name, of in _FIGURES.items()]
+        return templates.page(
+            "jobs/view/pair.html", title=f"{a.path} and {b.path}", runs=((first, a), (second, b)),
+            rows=rows, matched=[*_matched(a, b)],
+        )  # fmt: skip
 
 
 def _facts(number: int, line: RunLine) -> Mapping[str, Any]:
@@ -88,32 +91,6 @@ def _facts(number: int, line: RunLine) -> Mapping[str, Any]:
         "low": bound.space.low if bound else None,
         "high": bound.space.high if bound else None,
     }  # fmt: skip
-
-
-def _pair(*runs: tuple[int, RunLine]) -> Iterator[str]:
-    (first, a), (second, b) = runs
-    yield '<p><a href="./">All runs</a></p>'
-    yield "<h1>Two runs side by side</h1>"
-    yield '<div class="card wide"><table class="pair"><thead><tr><th></th>'
-    yield "".join(f'<th scope="col">{_text(line.path)}</th>' for _, line in runs)
-    yield "</tr></thead><tbody>"
-    for name, of in _FIGURES.items():
-        cells = [of(line) for _, line in runs]
-        mark = ' class="differs"' if cells[0] != cells[1] else ""
-        yield f'<tr{mark}><th scope="row">{name}</th>'
-        yield "".join(f"<td>{_text(cell)}</td>" for cell in cells) + "</tr>"
-    yield "</tbody></table></div>"
-    for title, modes in _matched(a, b):
-        if modes:
-            items = "".join(f"<li>{_text(one)}</li>" for one in modes)
-            yield f'<section class="card"><h2>{title}</h2><ul>{items}</ul></section>'
-    yield '<div class="frames">'
-    for number, line in ((first, a), (second, b)):
-        if line.problem:
-            yield f'<p class="card">{_text(line.problem)}</p>'
-        else:
-            yield f'<iframe src="run/{number}/" title="{_text(line.path)}"></iframe>'
-    yield "</div>"
 
 
 def _failures(line: RunLine) -> str:
@@ -162,7 +139,7 @@ def _matched(a: RunLine, b: RunLine) -> Iterator[tuple[str, list[str]]]:
     for line, own, other in ((a, ours, theirs), (b, theirs, ours)):
         alone = [one for key, one in own.items() if key not in other]
         words = [f"{one[0].title}: {_count(one)} evaluations" for one in alone]
-        yield f"Only in {_text(line.path)}", words
+        yield f"Only in {line.path}", words
 
 
 def _by_key(line: RunLine) -> dict[tuple[str, ...], list[Mode]]:
@@ -176,7 +153,3 @@ def _by_key(line: RunLine) -> dict[tuple[str, ...], list[Mode]]:
 
 def _count(modes: list[Mode]) -> str:
     return f"{sum(one.count for one in modes):,}"
-
-
-def _text(text: str) -> str:
-    return html.escape(text)

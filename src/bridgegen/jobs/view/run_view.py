@@ -71,7 +71,7 @@ class RunView:
             rows = self._read(store)
             run = Run.of(store, rows)
             data = run_data(self._pipeline, run, rows, run.exported(len(rows)))
-            return b"".join(report_page(data, live=True))
+            return report_page(data, live=True)
 
     def news(self, after: int) -> Mapping[str, Any]:
         """Return what is new since the page knew of so many evaluations."""

@@ -1,9 +1,8 @@
-"""The closest events of each kind, with the motion around them, for the page."""
+"""The closest events of each kind, with the motion around them."""
 
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from html import escape
 
 import numpy as np
 
@@ -13,7 +12,6 @@ from bridgegen.recordings.events.find import FoundEvents
 from bridgegen.recordings.excerpt import Clock, excerpt
 from bridgegen.recordings.readers.table import RecordedTraffic
 from bridgegen.recordings.replays.scenario import others_near
-from bridgegen.recordings.replays.write import moving_picture
 from bridgegen.scenario.language.event_kinds import EVENT_KINDS
 from bridgegen.simulation.rollout import Rollout
 
@@ -120,37 +118,15 @@ def _played(
         )  # fmt: skip
 
 
-def playback_section(played: Sequence[PlayedEvent]) -> str:
-    """Return the cards of the closest events, each a moving picture."""
-    cards = []
-    for kind in EVENT_KINDS:
-        same = [one for one in played if one.kind == kind]
-        if same:
-            pictures = "".join(map(_picture, same))
-            cards.append(f"<div class='card event'><h3>{escape(kind)}</h3>{pictures}</div>")
-    if not cards:
-        return ""
-    return (
-        f"<p class='muted'>Of each kind up to {SHOWN} events, those with the least gap by the "
-        "ego's speed, or post-encroachment time. Blue is the ego, orange the other; pale outlines "
-        "show where both were when the event began.</p>"
-        f"{''.join(cards)}"
-    )
-
-
-def _picture(one: PlayedEvent) -> str:
-    if MEETING in EVENT_KINDS[one.kind].quantities:
+def caption(one: PlayedEvent) -> str:
+    """Return what a picture of an event shows: whose, where, and how close it was."""
+    quantities = EVENT_KINDS[one.kind].quantities
+    gap = ""
+    if MEETING in quantities:
         gap = f"; {one.time_gap:.2f} s between them"
-    elif "gap" in EVENT_KINDS[one.kind].quantities:
+    elif "gap" in quantities:
         gap = f"; {one.time_gap:.2f} s behind" if np.isfinite(one.time_gap) else "; no leader"
-    else:
-        gap = ""
-    about = (
+    return (
         f"{one.name}: ego {one.ego} of {one.recording}, from {one.seconds:.2f} s by the "
         f"recording's clock{gap}"
-    )
-    picture = moving_picture(one.motion, 1, one.when, about)
-    return (
-        f"<figure id='{escape(one.name)}'>{picture}"
-        f"<figcaption>{escape(about)}</figcaption></figure>"
     )

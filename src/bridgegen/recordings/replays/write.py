@@ -7,6 +7,7 @@ from html import escape
 from pathlib import Path
 
 import numpy as np
+from markupsafe import Markup
 
 from bridgegen.base.arrays import Bool, Float
 from bridgegen.base.disk import write_whole
@@ -150,7 +151,7 @@ LEAST = 30.0  # m, that the picture shows
 STANDS = 1.0  # m; over a shorter way the ego's heading says where it goes
 
 
-def moving_picture(motion: Rollout, other: int, when: float, caption: str) -> str:
+def moving_picture(motion: Rollout, other: int, when: float, caption: str) -> Markup:
     """Return the picture of an event, seen from above, over and over.
 
     Args:
@@ -184,7 +185,7 @@ def moving_picture(motion: Rollout, other: int, when: float, caption: str) -> st
                 f'{place[1]:.2f}) rotate({np.degrees(place[2]):.1f})"/>'
             )
         parts += _moving(looks, outline, motion.names[e], (x[e], y[e], h[e]), there[e], seconds)
-    return "".join((*parts, "</g></svg>"))
+    return Markup("".join((*parts, "</g></svg>")))
 
 
 def _turned(motion: Rollout) -> Rollout:

@@ -1,8 +1,7 @@
-"""Mined scenarios as files, as individuals of the ontology, and on the page."""
+"""Mined scenarios as files, and as individuals of the ontology."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict
-from html import escape
 from pathlib import Path
 
 import numpy as np
@@ -10,13 +9,11 @@ import numpy as np
 from bridgegen.base.disk import write_whole
 from bridgegen.base.errors import StorageError
 from bridgegen.openx.openscenario.exposure import distribution_xml
-from bridgegen.recordings.cells import html_table
 from bridgegen.recordings.events.find import FoundEvents
 from bridgegen.recordings.events.of_scenarios import ScenarioEvents, Sought
 from bridgegen.recordings.events.tables import FOLDER as EVENTS
-from bridgegen.recordings.scenarios.draft import MinedRange, mined_name
+from bridgegen.recordings.scenarios.draft import mined_name
 from bridgegen.recordings.scenarios.mined import MinedScenario, Unmade, mined_scenario
-from bridgegen.scenario.exposure.page import facts, rate_text, write_page
 from bridgegen.scenario.ontology.builder import Builder
 from bridgegen.scenario.ontology.files import save
 from bridgegen.scenario.ontology.graph import Individuals
@@ -105,9 +102,8 @@ def write_mined(
         table = out / EVENTS / f"{events.scenario}.csv"
         result = mined_scenario(one, events, found, table, time_step)
         if isinstance(result, MinedScenario):
-            scenario, page, distribution = (folder / f"{result.name}{end}" for end in ENDINGS)
+            scenario, _, distribution = (folder / f"{result.name}{end}" for end in ENDINGS)
             write_whole(scenario, [result.text.encode()])
-            write_page(page, result.fit)
             write_whole(distribution, [distribution_xml(result.fit.exposure, date=DATE)])
         made.append(result)
     fitting(len(scenarios), len(scenarios))
@@ -128,46 +124,7 @@ def _emptied(folder: Path, names: Sequence[str]) -> None:
         raise StorageError(f"{folder}: cannot be made: {error.strerror}") from None
 
 
-# --- Mined scenarios on the page of recordings, in the terminal, and as plain data ---
-
-
-_LINKS = ("scenario", "how well its distributions fit", "OpenSCENARIO distribution")
-
-
-def scenarios_section(mined: Sequence[MinedScenario | Unmade]) -> str:
-    """Return the cards of scenarios that were made, and why the others were not."""
-    made = "".join(_card(one) for one in mined if isinstance(one, MinedScenario))
-    lines = "".join(
-        f"<li>{escape(one.source)}: {escape(one.reason)}</li>"
-        for one in mined
-        if isinstance(one, Unmade)
-    )
-    rest = f"<div class='card'><h3>Not made</h3><ul>{lines}</ul></div>" if lines else ""
-    return made + rest
-
-
-def _card(one: MinedScenario) -> str:
-    head = ("parameter", "declared", "seen", "mined", "form", "")
-    rows = [
-        [f"{each.parameter} [{each.unit}]", *_ranges(each),
-         one.fit.parameters[each.parameter].form, each.remark]
-        for each in one.ranges
-    ]  # fmt: skip
-    known = "".join(f"<li>{escape(text)}</li>" for text in facts(one.fit))
-    rules = "".join(f"<li>{escape(rule)}</li>" for rule in one.tightened)
-    tightened = f"<p>Constraints added:</p><ul>{rules}</ul>" if rules else ""
-    links = ", ".join(
-        f"<a href='{FOLDER}/{escape(one.name)}{end}'>{text}</a>"
-        for end, text in zip(ENDINGS, _LINKS, strict=True)
-    )
-    return (
-        f"<div class='card' id='{escape(one.name)}'><h3>{escape(one.name)}</h3><ul>{known}</ul>"
-        f"<div class='wide'>{html_table(head, rows)}</div>{tightened}<p>{links}</p></div>"
-    )
-
-
-def _ranges(one: MinedRange) -> list[str]:
-    return [f"{each.low:g} to {each.high:g}" for each in (one.declared, one.seen, one.mined)]
+# --- Mined scenarios in the terminal, and as plain data ---
 
 
 def made_row(one: MinedScenario) -> tuple[str, int, str, str]:
@@ -176,7 +133,7 @@ def made_row(one: MinedScenario) -> tuple[str, int, str, str]:
     rate = met.per_hour if met else None
     beyond = [each.parameter for each in one.ranges if each.remark]
     return (
-        one.name, one.fit.used, rate_text(rate, "h") if rate else "–", ", ".join(beyond) or "–",
+        one.name, one.fit.used, rate.in_words("h") if rate else "–", ", ".join(beyond) or "–",
     )  # fmt: skip
 
 

@@ -54,6 +54,10 @@ class Rate:
     low: float
     high: float
 
+    def in_words(self, unit: str) -> str:
+        """Return it with its interval, per a unit."""
+        return f"{self.estimate:.3g} per {unit} (95 %: {self.low:.3g} to {self.high:.3g})"
+
 
 def poisson_interval(count: int, level: float = LEVEL) -> tuple[float, float]:
     """Return the exact two-sided interval for the mean of a Poisson distribution.

@@ -8,7 +8,7 @@ Bands: the 2.5 and 97.5 % quantiles of fits to events that were drawn with repla
 
 import hashlib
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from importlib.metadata import version
@@ -116,6 +116,22 @@ class Fit:
     replicates: tuple[Exposure, ...]
     seed: int
     notes: tuple[str, ...]
+
+    def facts(self) -> Iterator[str]:
+        """Yield what was found, a few words each."""
+        yield f"{self.used:,} of {self.rows:,} events fitted"
+        encounters = self.exposure.encounters
+        if encounters is not None:
+            for unit, rate in (("h", encounters.per_hour), ("km", encounters.per_km)):
+                if rate is not None:
+                    yield rate.in_words(unit)
+        yield f"{self.exposure.feasible_share.estimate:.2%} keep the constraints"
+        yield f"seed {self.seed}"
+
+    def remarks(self) -> list[str]:
+        """Return what a reader must know, a sentence each."""
+        broken = [f"{count} events break '{rule}'" for rule, count in self.infeasible.items()]
+        return [*self.outside, *broken, *self.notes]
 
 
 def fit_exposure(
