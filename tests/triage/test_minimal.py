@@ -8,7 +8,8 @@ from bridgegen.search.triage.conditions import INSIDE, Conditions, sentence
 from bridgegen.search.triage.effort import FULL
 from bridgegen.search.triage.minimal import Minimiser
 from bridgegen.search.triage.modes import Key
-from bridgegen.search.triage.neighbours import RADIUS, nearest, ranges, searched
+from bridgegen.search.triage.moves import nearest, ranges, searched
+from bridgegen.search.triage.neighbours import RADIUS
 from bridgegen.search.triage.record import Condition, Probes
 
 WAY = Key("contact", "front-to-rear striking", "ego", "truck", "")

@@ -2,7 +2,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bridgegen.search.triage.neighbours import around, nearest, ranges, searched
+from bridgegen.search.triage.moves import around, nearest, ranges, searched
 
 seeds = st.integers(0, 2**32 - 1)
 

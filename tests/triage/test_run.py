@@ -17,7 +17,7 @@ from bridgegen.results.store import Store
 from bridgegen.search.triage import JSON_FILE
 from bridgegen.search.triage.minimal import Ladder
 from bridgegen.search.triage.modes import keys_of
-from bridgegen.search.triage.neighbours import nearest
+from bridgegen.search.triage.moves import nearest
 
 GIVEN = {
     "algorithm": "random", "budget": 150, "seed": 0, "ego": "route-follower", "keep": 4,

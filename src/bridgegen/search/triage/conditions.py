@@ -27,7 +27,7 @@ import numpy as np
 from bridgegen.base.arrays import Bool, Float
 from bridgegen.engine.pipeline import Pipeline
 from bridgegen.scenario.language.space import SearchSpace
-from bridgegen.search.triage.neighbours import nearest, searched
+from bridgegen.search.triage.moves import nearest, searched
 from bridgegen.search.triage.record import Condition, Probes
 
 INSIDE, OUTSIDE = 40, 20

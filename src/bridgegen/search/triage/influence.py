@@ -6,7 +6,7 @@ import numpy as np
 
 from bridgegen.base.arrays import Bool, Numbers
 from bridgegen.scenario.language.space import SearchSpace
-from bridgegen.search.triage.neighbours import searched
+from bridgegen.search.triage.moves import searched
 from bridgegen.search.triage.record import Influence
 
 END = 0.025

@@ -24,15 +24,8 @@ from bridgegen.scenario.language.space import SearchSpace
 from bridgegen.search.triage.conditions import Conditions, sentence
 from bridgegen.search.triage.effort import FULL, Effort
 from bridgegen.search.triage.modes import Key, keys_of
-from bridgegen.search.triage.neighbours import (
-    NEIGHBOURS,
-    RADIUS,
-    ROBUST,
-    around,
-    nearest,
-    ranges,
-    searched,
-)
+from bridgegen.search.triage.moves import around, nearest, ranges, searched
+from bridgegen.search.triage.neighbours import NEIGHBOURS, RADIUS, ROBUST
 from bridgegen.search.triage.record import Minimal
 
 BACK = (0, 1, 2, 4, 8)

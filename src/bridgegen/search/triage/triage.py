@@ -40,7 +40,8 @@ from bridgegen.search.triage.modes import (
     title,
     where,
 )
-from bridgegen.search.triage.neighbours import NEIGHBOURS, RADIUS, AsIs, neighbourhoods, searched
+from bridgegen.search.triage.moves import searched
+from bridgegen.search.triage.neighbours import NEIGHBOURS, RADIUS, AsIs, neighbourhoods
 from bridgegen.search.triage.record import (
     MOST_EXAMPLES,
     MOST_MODES,
