@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from bridgegen.base.errors import BridgeGenError, InputError, Interrupted
+from bridgegen.base.statistics import clopper_pearson
 from bridgegen.engine.options import SearchOptions, called_with
 from bridgegen.jobs.frame import JobCallbacks, Table
 from bridgegen.jobs.search import Run, resume, run_search
@@ -92,14 +93,8 @@ class Difference:
         Source: Clopper and Pearson, Biometrika 26 (1934) 404. It holds where variations are a
         sample, as those of a logical scenario are; not where they are all that there are.
         """
-        from scipy.stats import binomtest
-
         counts = self.counts
-        n = len(self.rows) - counts["not comparable"]
-        if not n:
-            return 0.0, 1.0
-        found = binomtest(counts[change], n).proportion_ci(0.95, "exact")
-        return float(found.low), float(found.high)
+        return clopper_pearson(counts[change], len(self.rows) - counts["not comparable"])
 
     @property
     def p_value(self) -> float:
