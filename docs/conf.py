@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 HERE = Path(__file__).parent
-sys.path[:0] = [str(HERE), str(HERE.parent / "paper/src")]
+sys.path[:0] = [str(HERE)]
 
 project = "BridgeGen"
 author = "The BridgeGen developers"

@@ -8,7 +8,7 @@ import pytest
 
 from bridgegen.assess.conflict.analysis import analyse
 from bridgegen.assess.conflict.plausibility import plausibility
-from bridgegen.assess.metrics.perceived import CLASSES
+from bridgegen.assess.metrics.perception import CLASSES
 from bridgegen.base.errors import ScenarioError
 from bridgegen.drivers.kinds import MISSED, NAMES, SEEN_BY
 from bridgegen.engine.pipeline import Pipeline

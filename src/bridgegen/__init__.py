@@ -12,15 +12,19 @@ if TYPE_CHECKING:
     from bridgegen.engine.simulate import simulate_file
     from bridgegen.jobs.compare.comparison import compare
     from bridgegen.jobs.compare.result import Comparison
-    from bridgegen.jobs.dashboard import Dashboard, build_dashboard
+    from bridgegen.jobs.dashboard.dashboard import Dashboard, build_dashboard
+    from bridgegen.jobs.mine.mine import Mined, mine
     from bridgegen.jobs.preventability.preventability import map_preventability
     from bridgegen.jobs.preventability.result import PreventabilityMap
     from bridgegen.jobs.risk.result import Risk
     from bridgegen.jobs.risk.risk import estimate_risk
-    from bridgegen.jobs.safety_case import SafetyCase, export_safety_case
+    from bridgegen.jobs.safety_case.export import export_safety_case
+    from bridgegen.jobs.safety_case.model import SafetyCase
     from bridgegen.jobs.search import Run, resume, run_search
     from bridgegen.jobs.search.confirm import confirm
     from bridgegen.jobs.search.model import Model, model
+    from bridgegen.jobs.suite.difference import DriverDifference, compare_drivers
+    from bridgegen.jobs.suite.suite import SuiteRun, run_suite
     from bridgegen.scenario.exposure import Exposure, exposure_of, read_exposure
     from bridgegen.scenario.exposure.fit import Fit, fit_exposure
     from bridgegen.scenario.language.reader import load
@@ -29,16 +33,20 @@ if TYPE_CHECKING:
 __all__ = [
     "Comparison",
     "Dashboard",
+    "DriverDifference",
     "Exposure",
     "Fit",
+    "Mined",
     "Model",
     "PreventabilityMap",
     "Risk",
     "Run",
     "SafetyCase",
     "SimulatorChoice",
+    "SuiteRun",
     "build_dashboard",
     "compare",
+    "compare_drivers",
     "confirm",
     "errors",
     "estimate_risk",
@@ -47,23 +55,31 @@ __all__ = [
     "fit_exposure",
     "load",
     "map_preventability",
+    "mine",
     "model",
     "read_exposure",
     "resume",
     "run_search",
+    "run_suite",
     "simulate_file",
 ]
 
 _HOMES = {
     "Comparison": "bridgegen.jobs.compare.result",
     "compare": "bridgegen.jobs.compare.comparison",
-    "Dashboard": "bridgegen.jobs.dashboard",
-    "build_dashboard": "bridgegen.jobs.dashboard",
+    "Dashboard": "bridgegen.jobs.dashboard.dashboard",
+    "build_dashboard": "bridgegen.jobs.dashboard.dashboard",
     "confirm": "bridgegen.jobs.search.confirm",
     "errors": "bridgegen.base.errors",
+    "Mined": "bridgegen.jobs.mine.mine",
+    "mine": "bridgegen.jobs.mine.mine",
     "Model": "bridgegen.jobs.search.model",
     "model": "bridgegen.jobs.search.model",
     "Run": "bridgegen.jobs.search",
+    "DriverDifference": "bridgegen.jobs.suite.difference",
+    "SuiteRun": "bridgegen.jobs.suite.suite",
+    "compare_drivers": "bridgegen.jobs.suite.difference",
+    "run_suite": "bridgegen.jobs.suite.suite",
     "Exposure": "bridgegen.scenario.exposure",
     "Fit": "bridgegen.scenario.exposure.fit",
     "exposure_of": "bridgegen.scenario.exposure",
@@ -76,8 +92,8 @@ _HOMES = {
     "estimate_risk": "bridgegen.jobs.risk.risk",
     "resume": "bridgegen.jobs.search",
     "run_search": "bridgegen.jobs.search",
-    "export_safety_case": "bridgegen.jobs.safety_case",
-    "SafetyCase": "bridgegen.jobs.safety_case",
+    "export_safety_case": "bridgegen.jobs.safety_case.export",
+    "SafetyCase": "bridgegen.jobs.safety_case.model",
     "simulate_file": "bridgegen.engine.simulate",
     "SimulatorChoice": "bridgegen.simulation.choice",
 }

@@ -8,9 +8,9 @@ import pytest
 from bridgegen.assess.conflict.analysis import CONTACT, COURSE, NEAR_MISS, ConflictType, analyse
 from bridgegen.assess.conflict.harm import decisive
 from bridgegen.assess.conflict.types import RULES, Responsible, Rule
-from bridgegen.drivers._claims import BY_MAP, BY_SIGNS, FROM_THE_RIGHT, ONCOMING, SIREN
 from bridgegen.drivers.kinds import BICYCLE, CAR, OTHER, PEDESTRIAN
 from bridgegen.drivers.preventable import avoids_cut_in
+from bridgegen.drivers.right_of_way import BY_MAP, BY_SIGNS, FROM_THE_RIGHT, ONCOMING, SIREN
 
 DT = 0.05
 RIGHT_ANGLE = np.pi / 2

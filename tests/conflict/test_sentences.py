@@ -5,8 +5,8 @@ import pytest
 
 from bridgegen.assess.conflict.analysis import analyse
 from bridgegen.assess.conflict.summary import sentence
-from bridgegen.drivers._claims import BY_SIGNS
 from bridgegen.drivers.kinds import CAR, PEDESTRIAN
+from bridgegen.drivers.right_of_way import BY_SIGNS
 
 RIGHT_ANGLE = np.pi / 2
 

@@ -9,7 +9,7 @@ import pytest
 
 import bridgegen as bg
 from bridgegen.jobs.dashboard.results import Driver, Failure, Judged, ModeKey, Result
-from bridgegen.jobs.suite.suite import run_suite
+from bridgegen.jobs.suite.suite import evaluate_suite
 from bridgegen.scenario.language.criteria import Criterion
 
 R_12 = "R-12: always(gap to bv > 2 m)"
@@ -31,7 +31,7 @@ def project(tmp_path_factory: pytest.TempPathFactory) -> Path:
             out=out,
             **options,
         )
-    run_suite(
+    evaluate_suite(
         ["cut-in", "left-across-path"],
         egos=["route-follower", "reference"],
         samples=6,

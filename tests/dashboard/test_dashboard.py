@@ -13,10 +13,10 @@ from tests.dashboard.conftest import R_12
 
 import bridgegen as bg
 from bridgegen.base.errors import FileFormatError, StorageError
-from bridgegen.cli.verdict.of_dashboard import FIGURES
 from bridgegen.jobs.dashboard.dashboard import Dashboard
 from bridgegen.jobs.dashboard.modes import Decisions, failure_modes
 from bridgegen.jobs.dashboard.odd import coverage
+from bridgegen.jobs.dashboard.options import JOB
 from bridgegen.jobs.dashboard.page import MOST_MODES, within, write_page
 from bridgegen.jobs.dashboard.project import Problem, Project
 from bridgegen.jobs.dashboard.requirements import matrices
@@ -24,7 +24,7 @@ from bridgegen.jobs.dashboard.scenery import scenery_of
 from bridgegen.jobs.dashboard.sentences import failing_sentence, requirements_sentence
 from bridgegen.jobs.dashboard.trends import trends
 from bridgegen.jobs.suite.growth import add_failures
-from bridgegen.jobs.suite.suite import read_suite, run_suite
+from bridgegen.jobs.suite.suite import evaluate_suite, read_suite
 from bridgegen.results.failures import FILE, OLD_FILE, Failure, read_failures, write_failures
 from bridgegen.scenario.language.reader import load
 from bridgegen.search.triage.record import Estimate, read_record
@@ -127,7 +127,10 @@ def test_the_command_judges_and_keeps_statuses(cli, copy):
     file = copy / FILE
     text = file.read_text("utf-8")
     file.write_text(text.replace("status: new", "status: accepted # in May"), "utf-8")
-    status, out, err = cli("dashboard", copy, "--update", "--fail-if", "new > 0", "--json")
+    accepted = ("dashboard", copy, "--update", "--fail-if", "new > 0", "--json")
+    status, out, err = cli(*accepted)
+    assert (status, "NOT JUDGED: all results are read" in err) == (3, True)  # two are damaged
+    status, out, err = cli(*accepted, "--fail-if", "problems > 9")
     assert status == 0
     facts = json.loads(out)
     assert facts["added"] == 0
@@ -206,7 +209,7 @@ def test_an_unknown_figure_is_named(cli, copy):
 
 
 def test_every_figure_is_there_and_explained(found):
-    assert set(found.figures) == set(FIGURES)
+    assert set(found.figures) == set(JOB.figures)
 
 
 def test_a_changed_scenario_is_named_and_not_counted(copy, tmp_path):
@@ -351,7 +354,7 @@ def grown(project, tmp_path_factory) -> Path:
 
 def _grow(folder):
     add_failures([folder / "runs" / "route-follower"], folder / "suites" / "mine")
-    run_suite(
+    evaluate_suite(
         folder / "suites" / "mine", egos=["route-follower"], workers=1,
         out=folder / "suites" / "mine-results",
     )  # fmt: skip

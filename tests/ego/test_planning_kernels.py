@@ -21,8 +21,8 @@ from bridgegen.drivers._following_kernels import (
     stop_for,
 )
 from bridgegen.drivers._lights_kernels import stop_at_lights, stop_at_signs
+from bridgegen.drivers._path_kernels import UNSHIFTED as STAYS
 from bridgegen.drivers._prediction_kernels import LOST, PASSAGE, add_straight, predict
-from bridgegen.drivers._shift_kernels import UNSHIFTED as STAYS
 from bridgegen.drivers._speed_kernels import bend_speed, limit_speed, scan_length, sight_speed
 from bridgegen.drivers._surroundings_kernels import AROUND, surround
 from bridgegen.drivers._yielding_kernels import (

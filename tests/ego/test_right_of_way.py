@@ -6,8 +6,20 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bridgegen.drivers._claims import BY_MAP, BY_SIGNS, FROM_THE_RIGHT, OFF_ROAD, ONCOMING, SIREN
-from bridgegen.drivers.right_of_way import NO_RULE, THEY_WAIT, WE_WAIT, claim, claims, right_of_way
+from bridgegen.drivers.right_of_way import (
+    BY_MAP,
+    BY_SIGNS,
+    FROM_THE_RIGHT,
+    NO_RULE,
+    OFF_ROAD,
+    ONCOMING,
+    SIREN,
+    THEY_WAIT,
+    WE_WAIT,
+    claim,
+    claims,
+    right_of_way,
+)
 from bridgegen.drivers.scene import stop_signs
 from bridgegen.engine.pipeline import Pipeline
 from bridgegen.openx.opendrive.model import OpenDrive, Priority

@@ -7,11 +7,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bridgegen.drivers._path_kernels import pursue
-from bridgegen.drivers._shift_kernels import (
+from bridgegen.drivers._path_kernels import (
     LATERAL_COMFORT,
     UNSHIFTED,
     aside_at,
+    pursue,
     pursue_beside,
     shift_length,
     shift_speed,

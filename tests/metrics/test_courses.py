@@ -7,12 +7,8 @@ import pytest
 from hypothesis import assume, example, given
 from hypothesis import strategies as st
 
-from bridgegen.assess.metrics.btn import btn
-from bridgegen.assess.metrics.drac import MOST, drac
-from bridgegen.assess.metrics.tet import TARGET, tet
-from bridgegen.assess.metrics.thw import thw
-from bridgegen.assess.metrics.tit import tit
-from bridgegen.assess.metrics.ttc import ttc
+from bridgegen.assess.metrics.braking import MOST, btn, drac
+from bridgegen.assess.metrics.times import TARGET, tet, thw, tit, ttc
 
 GRIP = 0.85 * 9.81
 """m/s², of a tyre on dry asphalt: Wong, table 1.3."""

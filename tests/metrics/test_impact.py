@@ -3,9 +3,7 @@
 import numpy as np
 import pytest
 
-from bridgegen.assess.metrics.impact_speed import impact_speed
-from bridgegen.assess.metrics.relative_impact_speed import relative_impact_speed
-from bridgegen.assess.metrics.speed_reduction import speed_reduction
+from bridgegen.assess.metrics.impact import impact_speed, relative_impact_speed, speed_reduction
 
 
 def test_a_slower_car_is_hit_at_the_difference_of_speeds(rollout_of):

@@ -12,13 +12,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bridgegen.assess import metrics
-from bridgegen.assess.metrics.a_change import a_change
-from bridgegen.assess.metrics.d_min import d_min
-from bridgegen.assess.metrics.l_offset import l_offset
+from bridgegen.assess.metrics.braking import a_change, n_brake
+from bridgegen.assess.metrics.distances import d_min, v_d
+from bridgegen.assess.metrics.impact import n_collision
 from bridgegen.assess.metrics.metric import Metric, in_steps
-from bridgegen.assess.metrics.n_brake import n_brake
-from bridgegen.assess.metrics.n_collision import n_collision
-from bridgegen.assess.metrics.v_d import v_d
+from bridgegen.assess.metrics.road import l_offset
 from bridgegen.base.errors import InputError, UnknownNameError
 
 ALL = list(metrics.METRICS)

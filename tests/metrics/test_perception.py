@@ -10,11 +10,9 @@ import shapely
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bridgegen.assess.metrics import perceived
-from bridgegen.assess.metrics.e_position import e_position
-from bridgegen.assess.metrics.iou import iou
-from bridgegen.assess.metrics.mean_average_precision import mean_average_precision
-from bridgegen.assess.metrics.r_red import r_red
+from bridgegen.assess.metrics import perception as perceived
+from bridgegen.assess.metrics.perception import e_position, iou, mean_average_precision
+from bridgegen.assess.metrics.road import r_red
 from bridgegen.drivers import kinds
 from bridgegen.drivers.kinds import BOTH, MISSED, NO_FRAME
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import shapely
 
-from bridgegen.assess.metrics.pet import pet
+from bridgegen.assess.metrics.times import pet
 
 # By hand. Boxes are 4 m × 2 m about the reference point; 0.05 s a step.
 

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bridgegen.assess.metrics.rss import Parameters, rss
+from bridgegen.assess.metrics.distances import Parameters, rss
 
 P = Parameters()
 

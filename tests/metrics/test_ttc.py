@@ -8,7 +8,7 @@ import shapely
 from hypothesis import assume, example, given
 from hypothesis import strategies as st
 
-from bridgegen.assess.metrics.ttc import ttc, ttc_over_time
+from bridgegen.assess.metrics.times import ttc, ttc_over_time
 
 CAR = (4.0, 2.0, 0.0)  # length, width, the centre at the reference point
 

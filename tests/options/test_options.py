@@ -14,7 +14,7 @@ from bridgegen.cli import main, runs
 from bridgegen.cli.jobs import COMPARE, command_of
 from bridgegen.engine.options import CommonOptions, PipelineOptions, SearchOptions, options_of
 from bridgegen.engine.options.forms import read_names, read_numbers, read_settings, read_terms
-from bridgegen.jobs.suite.suite import run_suite
+from bridgegen.jobs.suite.suite import evaluate_suite
 from bridgegen.simulation.choice import SimulatorChoice
 
 DECLARED = {one.name: one for one in options_of(SearchOptions)}
@@ -59,7 +59,7 @@ def test_keywords_are_those_of_the_options():
         (bg.run_search, (5,), {}, "scenario must be str | pathlib.Path, got 5"),
         (bg.compare, ("cut-in",), {"sedes": 3}, "'sedes'; did you mean 'seeds'?"),
         (bg.compare, ("cut-in",), {"seeds": "x"}, "seeds must be a whole number, got 'x'"),
-        (run_suite, ("cut-in",), {"options": {}}, "options must be .*CommonOptions, got {}"),
+        (evaluate_suite, ("cut-in",), {"samples": "x"}, "samples must be a whole number, got 'x'"),
         (bg.resume, ("runs/a",), {"eog": "x"}, "'eog'; did you mean 'ego'?"),
         (bg.confirm, ("runs/a",), {}, "confirm: missing a required argument: 'simulator'"),
         (bg.estimate_risk, ("cut-in",), {"evnet": "x"}, "'evnet'; did you mean 'event'?"),

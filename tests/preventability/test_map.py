@@ -208,7 +208,7 @@ def test_the_command_line(tmp_path, monkeypatch, capsys):
         assert name in printed.split()
     assert str(out / "preventability.html") in printed.replace("\n", "")
     page = (out / "preventability.html").read_text("utf-8")
-    assert "bridgegen preventability r157/deceleration --ego route-follower,fsm" in page
+    assert "bridgegen preventability r157/deceleration --ego route-follower --ego fsm" in page
     figures = json.loads((out / "summary.json").read_text())["drivers"]
     assert [one["preventable"] for one in figures] == [6, 0]  # all that the models avoid at 2 s
 

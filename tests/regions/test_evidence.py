@@ -43,6 +43,12 @@ def test_nothing_says_nothing():
     assert Evidence(4, 1).share == 0.25
 
 
+def test_weighted_rows_need_not_be_a_whole_number():
+    low, high = clopper_pearson(0.7 * 41.5, 41.5)
+    assert clopper_pearson(29, 42)[0] < low < 0.7 < high < clopper_pearson(29, 41)[1]
+    assert clopper_pearson(3.0000000000000004, 3.0) == pytest.approx((0.025 ** (1 / 3), 1.0))
+
+
 def test_wilson_is_what_is_worked_by_hand_and_near_the_exact_one():
     low, high = wilson(10, 100)
     assert (low, high) == pytest.approx((0.05522914, 0.17436566), abs=1e-7)

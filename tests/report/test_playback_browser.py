@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from bridgegen.assess.metrics.perceived import perceived
-from bridgegen.assess.metrics.ttc import ttc_over_time
+from bridgegen.assess.metrics.perception import perceived
+from bridgegen.assess.metrics.times import ttc_over_time
 from bridgegen.drivers import _weather_columns as column
 from bridgegen.engine.options import PipelineOptions
 from bridgegen.engine.pipeline import Pipeline

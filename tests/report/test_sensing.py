@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from bridgegen.assess.metrics.e_position import e_position
-from bridgegen.assess.metrics.perceived import perceived
+from bridgegen.assess.metrics.perception import e_position, perceived
 from bridgegen.drivers.kinds import DETECTION
 from bridgegen.engine.options import PipelineOptions
 from bridgegen.engine.pipeline import Pipeline

@@ -33,7 +33,7 @@ def test_the_page_is_beside_the_file(owl):
     picture = sent(page)["pictures"][0]
     assert picture["violations"] == []
     assert re.match(r"\d+ constraints checked \(\d+ of every scenario, ", picture["checked"])
-    assert "<title>it.owl: all-layers</title>" in page.read_text(encoding="utf-8")
+    assert "<title>it.owl: all-layers – BridgeGen</title>" in page.read_text(encoding="utf-8")
 
 
 def test_a_scenario_of_the_catalogue_is_held_against_it(owl):

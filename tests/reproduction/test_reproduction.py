@@ -447,23 +447,10 @@ def test_quick_is_one_seed(monkeypatch, capsys):
     assert "--quick is one seed" in capsys.readouterr().err
 
 
-def test_without_its_package_the_command_says_how_to_install_it(cli, monkeypatch, tmp_path):
-    monkeypatch.setitem(sys.modules, "bridgegen_reproduction", None)
-    status, out, err = cli("reproduce", "--quick", "--out", tmp_path / "r")
-    assert (status, out) == (2, "")
-    (line,) = err.splitlines()
-    assert "pip install ./paper" in line
-    assert not (tmp_path / "r").exists()
-
-
-def test_its_distribution_goes_with_this_version_of_bridgegen():
+def test_the_citation_has_the_version():
     root = Path(__file__).parents[2]
-    house, beside = (
-        tomllib.loads((folder / "pyproject.toml").read_text("utf-8"))["project"]
-        for folder in (root, root / "paper")
-    )
-    assert beside["version"] == house["version"]
-    assert beside["dependencies"] == [f"{house['name']}=={house['version']}"]
+    house = tomllib.loads((root / "pyproject.toml").read_text("utf-8"))["project"]
+    assert f"\nversion: {house['version']}\n" in (root / "CITATION.cff").read_text("utf-8")
 
 
 def test_the_default_is_the_paper_s():

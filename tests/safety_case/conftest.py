@@ -61,8 +61,8 @@ def case(run):
 def cases(made, tmp_path_factory) -> dict:
     """The cases of each run, and of all; read only."""
     base = tmp_path_factory.mktemp("cases")
-    found = {name: bg.export_safety_case([path], base / name) for name, path in made.items()}
-    return found | {"all": bg.export_safety_case([*made.values()], base / "all")}
+    found = {name: bg.export_safety_case([path], out=base / name) for name, path in made.items()}
+    return found | {"all": bg.export_safety_case([*made.values()], out=base / "all")}
 
 
 def check(folder: Path) -> tuple[int, list[str], str]:

@@ -112,7 +112,7 @@ def test_each_run_is_given_once_and_one_at_least(run, tmp_path):
     with pytest.raises(InputError, match="one run at least"):
         bg.export_safety_case([])
     with pytest.raises(InputError, match="is the folder of a run"):
-        bg.export_safety_case([folder], folder)
+        bg.export_safety_case([folder], out=folder)
 
 
 def test_names_from_a_record_lead_nowhere_else(run, edited):

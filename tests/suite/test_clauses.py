@@ -12,7 +12,7 @@ from bridgegen.jobs.suite.clauses import clause_results
 from bridgegen.jobs.suite.page import write_suite_page
 from bridgegen.jobs.suite.results import EntryResult, RowResult
 from bridgegen.jobs.suite.sentences import clause_in_words
-from bridgegen.jobs.suite.suite import run_suite
+from bridgegen.jobs.suite.suite import evaluate_suite
 from bridgegen.scenario import packs
 
 PACK = Path(packs.__path__[0]) / "r157"
@@ -22,7 +22,7 @@ PACK = Path(packs.__path__[0]) / "r157"
 def suite(tmp_path_factory):
     out = tmp_path_factory.mktemp("suites") / "out"
     files = [PACK / "cut-in.yaml", PACK / "lane-keeping-side-vehicle.yaml"]
-    return run_suite(files, egos=["route-follower", "fsm"], samples=40, out=out, workers=1)
+    return evaluate_suite(files, egos=["route-follower", "fsm"], samples=40, out=out, workers=1)
 
 
 def test_collisions_count_as_the_preventability_map_has_them(suite, tmp_path):
@@ -66,7 +66,7 @@ def test_a_lane_that_is_left_fails_its_clause(tmp_path):
     text = (PACK / "lane-keeping-side-vehicle.yaml").read_text("utf-8")
     path = tmp_path / "strict.yaml"
     path.write_text(text.replace("<= 0.8 m", "<= 1 mm"), "utf-8")
-    found = run_suite(path, egos=["reference"], samples=8, out=tmp_path / "out", workers=1)
+    found = evaluate_suite(path, egos=["reference"], samples=8, out=tmp_path / "out", workers=1)
     (one,) = clause_results(found.results, "reference")
     assert one.verdict == "failed"
     assert found.results[0].rows[0].clauses in "fp"
@@ -121,7 +121,7 @@ def test_junit_and_page_name_the_clauses(suite, tmp_path):
 def test_results_do_not_depend_on_workers(tmp_path):
     files = [PACK / "cut-in.yaml", PACK / "lane-keeping-side-vehicle.yaml"]
     one, two = (
-        run_suite(files, egos=["route-follower"], samples=12, out=tmp_path / f"{n}", workers=n)
+        evaluate_suite(files, egos=["route-follower"], samples=12, out=tmp_path / f"{n}", workers=n)
         for n in (1, 2)
     )
     assert one.results == two.results

@@ -9,12 +9,11 @@ from tests.campaign.braking import USUAL, value_sets, write_pair
 import bridgegen as bg
 from bridgegen.base.errors import InputError, StorageError, UnknownNameError
 from bridgegen.cli.verdict.of_suite import SuiteCriteria, figures_of
-from bridgegen.engine.options import CommonOptions
 from bridgegen.engine.simulate import simulate_file
 from bridgegen.jobs.suite import growth
 from bridgegen.jobs.suite.growth import add_failures
 from bridgegen.jobs.suite.results import counts
-from bridgegen.jobs.suite.suite import run_suite
+from bridgegen.jobs.suite.suite import evaluate_suite
 from bridgegen.results.failures import FILE, read_failures
 
 FAST = "R-1: always(ego.v < 13 m/s)"
@@ -95,7 +94,7 @@ def test_adding_again_changes_no_byte(run, tmp_path):
 def test_a_suite_of_kept_failures_adds_none(run, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     add_failures([run.folder], tmp_path / "suites" / "mine")
-    suite = run_suite("suites/mine", workers=1)
+    suite = evaluate_suite("suites/mine", workers=1)
     assert suite.folder.name == "mine-results"  # beside the scenarios, not among them
     assert {one.verdict for one in suite.results} == {"failed"}
     made = add_failures([suite.folder], tmp_path / "suites" / "mine")
@@ -185,8 +184,8 @@ def test_the_worst_variation_of_a_suite_is_kept_and_its_criterion_judges_there(t
         {"EgoSpeed": 8, "Gap": 100}, {"EgoSpeed": 12, "Gap": 15},
         {"EgoSpeed": 14.123456789012345, "Gap": 25},
     ))  # fmt: skip
-    suite = run_suite(
-        made, egos=["route-follower", "reference"], options=CommonOptions(criteria=[FAST]),
+    suite = evaluate_suite(
+        made, egos=["route-follower", "reference"], criteria=[FAST],
         out=tmp_path / "out", workers=1,
     )  # fmt: skip
     follower, reference = suite.results
@@ -201,7 +200,7 @@ def test_the_worst_variation_of_a_suite_is_kept_and_its_criterion_judges_there(t
     assert by_conflict[""].driver == "reference"
     assert by_conflict[""].criteria == [{"id": "R-1", "formula": "always(ego.v < 13 m/s)"}]
     assert by_conflict["contact"].harm == max(row.harm for row in follower.rows)
-    again = run_suite(to, out=tmp_path / "again", workers=1)  # without the option
+    again = evaluate_suite(to, out=tmp_path / "again", workers=1)  # without the option
     assert figures_of(again)["criterion:R-1"] == 2
     assert counts(again.results) == {
         "passed": 0, "failed": 2, "not judged": 0, "not run": 0,
@@ -215,7 +214,7 @@ def test_only_new_failures_stop_a_suite(run, tmp_path):
 
     def judged(status):
         path.write_text(text.replace("status: new", f"status: {status}"), "utf-8")
-        suite = run_suite(to, out=tmp_path / "out", workers=1)
+        suite = evaluate_suite(to, out=tmp_path / "out", workers=1)
         xml = tmp_path / "junit.xml"
         (outcome,) = SuiteCriteria.read((), xml).judge(suite)
         figures = figures_of(suite)
@@ -240,15 +239,16 @@ def test_only_new_failures_stop_a_suite(run, tmp_path):
 
 def test_violations_that_make_a_scenario_critical_are_kept_by_their_criterion(tmp_path):
     write_pair(tmp_path / "files", value_sets({"EgoSpeed": 14, "Gap": 60}))
-    options = CommonOptions(criteria=[FAST], critical="criterion:R-1")
-    suite = run_suite(
-        tmp_path / "files", egos=["reference"], options=options, out=tmp_path / "out", workers=1
+    options = {"criteria": [FAST], "critical": "criterion:R-1"}
+    suite = evaluate_suite(
+        tmp_path / "files", egos=["reference"], **options, out=tmp_path / "out", workers=1
     )
     assert suite.results[0].rows[0].critical
     (made,) = add_failures([suite.folder], tmp_path / "mine")
     assert (made.outcome, made.title) == ("added", "violates R-1")
     assert (
-        run_suite(tmp_path / "mine", out=tmp_path / "o", workers=1).results[0].verdict == "failed"
+        evaluate_suite(tmp_path / "mine", out=tmp_path / "o", workers=1).results[0].verdict
+        == "failed"
     )
 
 
@@ -259,7 +259,7 @@ def test_a_driver_is_that_of_the_run_and_code_is_named(run, tmp_path):
     driver = tmp_path / "blind.py"
     driver.write_text(BLIND)
     ego = f"{driver}:Blind"
-    suite = run_suite(scenario, egos=[ego], out=tmp_path / "out", workers=1)
+    suite = evaluate_suite(scenario, egos=[ego], out=tmp_path / "out", workers=1)
     assert suite.results[0].verdict == "failed"
     with pytest.raises(InputError, match="which is code; to run it, name it"):
         add_failures([suite.folder], tmp_path / "mine")
@@ -269,7 +269,7 @@ def test_a_driver_is_that_of_the_run_and_code_is_named(run, tmp_path):
     assert (made.outcome, made.is_same) == ("added", True)
     (kept,) = read_failures(tmp_path / "mine").failures.values()
     assert kept.driver.startswith(str(driver))
-    again = run_suite(tmp_path / "mine", egos=[ego], out=tmp_path / "again", workers=1)
+    again = evaluate_suite(tmp_path / "mine", egos=[ego], out=tmp_path / "again", workers=1)
     assert again.results[0].rows[0].harm == suite.results[0].rows[0].harm
 
 

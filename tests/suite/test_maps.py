@@ -14,7 +14,7 @@ from bridgegen.jobs.preventability.grid import DEFAULT_GRIDS, Grid, coarse_axes
 from bridgegen.jobs.suite import maps as module
 from bridgegen.jobs.suite.maps import map_suite
 from bridgegen.jobs.suite.page import write_suite_page
-from bridgegen.jobs.suite.suite import run_suite
+from bridgegen.jobs.suite.suite import evaluate_suite
 from bridgegen.scenario import packs
 from bridgegen.scenario.language.reader import load
 
@@ -28,7 +28,7 @@ def mapped(tmp_path_factory):
         patch.setattr(module, "MOST_CELLS", CELLS)
         out = tmp_path_factory.mktemp("suites") / "out"
         files = [PACK / "deceleration.yaml", PACK / "following.yaml"]
-        suite = run_suite(files, egos=["route-follower"], samples=2, out=out, workers=1)
+        suite = evaluate_suite(files, egos=["route-follower"], samples=2, out=out, workers=1)
         return suite, map_suite(suite)
 
 

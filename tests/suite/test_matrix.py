@@ -13,7 +13,7 @@ from bridgegen.jobs.suite.page_payload import payload
 from bridgegen.jobs.suite.replay import replay
 from bridgegen.jobs.suite.results import EntryResult, GridResult, RowResult
 from bridgegen.jobs.suite.sentences import colour_of, outcomes, points, points_of
-from bridgegen.jobs.suite.suite import run_suite
+from bridgegen.jobs.suite.suite import evaluate_suite
 from bridgegen.scenario.language.reader import pack_names
 
 
@@ -39,7 +39,7 @@ def test_scenarios_without_an_edition_are_left_out():
 @pytest.fixture(scope="module")
 def turn(tmp_path_factory):
     """The matrix of 2023 of one scenario, by a driver that brakes and one that does not."""
-    return run_suite(
+    return evaluate_suite(
         ["ncap-aeb/ccfhos"], egos=["route-follower", "reference"], matrix="2023",
         out=tmp_path_factory.mktemp("suite") / "out", workers=1,
     )  # fmt: skip

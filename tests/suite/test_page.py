@@ -14,16 +14,15 @@ import numpy as np
 import pytest
 from tests.results.test_failures import failure
 
-from bridgegen.engine.options import CommonOptions
 from bridgegen.jobs.suite import page
 from bridgegen.jobs.suite.page import FILE, write_suite_page
 from bridgegen.jobs.suite.page_payload import payload
 from bridgegen.jobs.suite.results import EntryResult, RowResult
 from bridgegen.jobs.suite.sentences import difference, differences, headline
-from bridgegen.jobs.suite.suite import SuiteRun, run_suite
+from bridgegen.jobs.suite.suite import SuiteRun, evaluate_suite
 from bridgegen.results.failures import read_failures, write_failures
 
-CRITERIA = CommonOptions(criteria=["C-1: always(ego.v < 12 m/s)"])
+CRITERIA = {"criteria": ["C-1: always(ego.v < 12 m/s)"]}
 HIT = RowResult(critical=True, harm=0.5, severity=0.1, collisions=1.0, d_min=0.0)
 KEPT = RowResult(d_min=3.0)
 LOST = RowResult(problem="it diverges")
@@ -242,8 +241,8 @@ def test_a_thousand_entries_with_many_variations_fit():
 
 @pytest.fixture
 def run(folder, tmp_path):
-    return run_suite(
-        folder, egos=["route-follower", "reference"], options=CRITERIA, out=tmp_path / "out",
+    return evaluate_suite(
+        folder, egos=["route-follower", "reference"], **CRITERIA, out=tmp_path / "out",
         workers=1,
     )  # fmt: skip
 

@@ -4,10 +4,9 @@ from pathlib import Path
 
 import pytest
 
-from bridgegen.engine.options import CommonOptions
 from bridgegen.jobs.suite.page import write_suite_page
 from bridgegen.jobs.suite.results import EntryResult, RowResult
-from bridgegen.jobs.suite.suite import SuiteRun, run_suite
+from bridgegen.jobs.suite.suite import SuiteRun, evaluate_suite
 
 pytestmark = pytest.mark.browser
 
@@ -40,9 +39,9 @@ def show(browser):
 def written(folder, tmp_path):
     """The page of two drivers on the files, one of which is broken."""
     (folder / "broken.xosc").write_text("<OpenSCENARIO>", "utf-8")
-    run = run_suite(
+    run = evaluate_suite(
         folder, egos=["route-follower", "reference"],
-        options=CommonOptions(criteria=["C-1: always(ego.v < 12 m/s)"]), out=tmp_path / "out",
+        criteria=["C-1: always(ego.v < 12 m/s)"], out=tmp_path / "out",
         workers=1,
     )  # fmt: skip
     return run, write_suite_page(run, run.jobs)

@@ -8,13 +8,12 @@ import pytest
 from tests.campaign.braking import deterministic, value_sets, write_pair
 
 from bridgegen.base.errors import InputError, StorageError, UnknownNameError
-from bridgegen.engine.options import CommonOptions
 from bridgegen.engine.simulate import simulate_file
 from bridgegen.jobs.suite.entries import find_entries
 from bridgegen.jobs.suite.page import FILE as PAGE
 from bridgegen.jobs.suite.page import write_replay_page
 from bridgegen.jobs.suite.replay import replay, replay_command
-from bridgegen.jobs.suite.suite import FILE, read_suite, run_suite
+from bridgegen.jobs.suite.suite import FILE, evaluate_suite, read_suite
 from bridgegen.openx.openscenario.parameters import numbers
 from bridgegen.openx.openscenario.read import read
 
@@ -29,9 +28,9 @@ def suite(tmp_path_factory):
     """A suite of a file with a distribution and of a logical scenario, with two drivers."""
     place = tmp_path_factory.mktemp("suite")
     _, ranges = write_pair(place / "files", SETS)
-    return run_suite(
+    return evaluate_suite(
         [ranges, "cut-in"], egos=["route-follower", "reference"], samples=12, seed=3,
-        options=CommonOptions(criteria=["R-1: always(ego.v < 13 m/s)"]), workers=1,
+        criteria=["R-1: always(ego.v < 13 m/s)"], workers=1,
         out=place / "out",
     )  # fmt: skip
 
@@ -85,7 +84,7 @@ def test_a_variation_that_passes_is_played_too(suite, tmp_path):
 
 def test_variations_that_were_run_again_are_no_scenarios_of_a_suite(suite, tmp_path):
     place, _ = write_pair(tmp_path / "all", deterministic())
-    made = run_suite(place, out=place.parent / "out", egos=["reference"], workers=1)
+    made = evaluate_suite(place, out=place.parent / "out", egos=["reference"], workers=1)
     replay(made.folder, "brake", 1)
     assert len([*place.parent.rglob("*.xosc")]) == 3
     assert [one.name for one in find_entries([place])] == ["brake"]
@@ -115,7 +114,7 @@ def test_what_cannot_be_run_again_is_said(suite, tmp_path):
 
 def test_a_changed_scenario_is_refused(tmp_path):
     scenario, _ = write_pair(tmp_path / "files")
-    suite = run_suite(scenario, egos=["reference"], out=tmp_path / "out", workers=1)
+    suite = evaluate_suite(scenario, egos=["reference"], out=tmp_path / "out", workers=1)
     scenario.write_text(scenario.read_text("utf-8").replace('name="s"', 'name="t"'), "utf-8")
     with pytest.raises(StorageError, match="is not what it was when the suite was run"):
         replay(suite.folder, "brake", 1)
@@ -123,7 +122,7 @@ def test_a_changed_scenario_is_refused(tmp_path):
 
 def test_code_in_results_is_not_run_unless_it_is_named(tmp_path):
     scenario, _ = write_pair(tmp_path / "files")
-    suite = run_suite(scenario, egos=["reference"], out=tmp_path / "out", workers=1)
+    suite = evaluate_suite(scenario, egos=["reference"], out=tmp_path / "out", workers=1)
     marker = tmp_path / "ran"
     (tmp_path / "evil.py").write_text(f"open({str(marker)!r}, 'w')\nclass D: pass\n")
     path = suite.folder / FILE

@@ -12,13 +12,13 @@ from bridgegen.base.errors import InputError, StorageError
 from bridgegen.cli.verdict.fail_if import Comparison
 from bridgegen.cli.verdict.of_difference import figures_of as figures_of_difference
 from bridgegen.cli.verdict.of_suite import SuiteCriteria, figures_of
-from bridgegen.engine.options import CommonOptions
+from bridgegen.jobs.frame import JobCallbacks
 from bridgegen.jobs.suite.difference import difference
 from bridgegen.jobs.suite.entries import find_entries
 from bridgegen.jobs.suite.results import EntryResult, RowResult, counts
-from bridgegen.jobs.suite.suite import FILE, read_suite, run_suite
+from bridgegen.jobs.suite.suite import FILE, evaluate_suite, read_suite
 
-CRITERIA = CommonOptions(criteria=["C-1: always(ego.v < 12 m/s)"])
+CRITERIA = {"criteria": ["C-1: always(ego.v < 12 m/s)"]}
 
 
 def test_scenarios_and_distributions_are_found_in_folders(folder):
@@ -53,8 +53,8 @@ def test_what_is_no_scenario_is_refused(folder, tmp_path):
 
 
 def test_all_variations_run_and_are_judged(folder, tmp_path):
-    suite = run_suite(
-        folder, egos=["route-follower"], options=CRITERIA, out=tmp_path / "out", workers=1
+    suite = evaluate_suite(
+        folder, egos=["route-follower"], **CRITERIA, out=tmp_path / "out", workers=1
     )
     by_name = {one.entry: one for one in suite.results}
     varied = by_name["varied_distribution"]
@@ -76,36 +76,35 @@ def test_texts_of_value_sets_are_written_as_texts(tmp_path):
     )
     sets = value_sets({"EgoSpeed": 8, "Surface": "dry"}, {"EgoSpeed": 14, "Surface": "wet"})
     write_pair(tmp_path, sets, text)
-    suite = run_suite(tmp_path, egos=["reference"], out=tmp_path / "out", workers=1)
+    suite = evaluate_suite(tmp_path, egos=["reference"], out=tmp_path / "out", workers=1)
     (varied,) = suite.results
     rows = [dict(zip(varied.parameters, row.x, strict=True)) for row in varied.rows]
     assert [(row["EgoSpeed"], row["Surface"]) for row in rows] == [(8.0, "dry"), (14.0, "wet")]
 
 
 def test_workers_and_resuming_change_no_bit(folder, tmp_path):
-    whole = run_suite(folder, egos=["reference"], out=tmp_path / "a", workers=1)
+    whole = evaluate_suite(folder, egos=["reference"], out=tmp_path / "a", workers=1)
     text = (tmp_path / "a" / FILE).read_bytes()
     (tmp_path / "b").mkdir()
     head, first, *_ = text.splitlines(keepends=True)
     (tmp_path / "b" / FILE).write_bytes(head + first + b'{"entry": "torn')  # killed while writing
-    again = run_suite(folder, egos=["reference"], out=tmp_path / "b", workers=2)
+    again = evaluate_suite(folder, egos=["reference"], out=tmp_path / "b", workers=2)
     assert again.results == whole.results
     read = {one.entry: one for one in read_suite(tmp_path / "b").results}
     assert read == {one.entry: one for one in whole.results}
 
 
 def test_a_changed_file_is_run_again(folder, tmp_path):
-    run_suite(folder, egos=["reference"], out=tmp_path / "a", workers=1)
+    evaluate_suite(folder, egos=["reference"], out=tmp_path / "a", workers=1)
     path = folder / "plain.xosc"
     path.write_text(path.read_text("utf-8").replace('name="s"', 'name="t"'), "utf-8")
-    ran = []
-    from bridgegen.jobs.suite.suite import SuiteCallbacks
-
-    run_suite(
+    counted = []
+    evaluate_suite(
         folder, egos=["reference"], out=tmp_path / "a", workers=1,
-        callbacks=SuiteCallbacks(ended=lambda one: ran.append(one.entry)),
+        callbacks=JobCallbacks(progress=lambda what, *done: counted.append(done)),
     )  # fmt: skip
-    assert ran == ["plain"]
+    total = counted[0][1]
+    assert [done for done, *_ in counted] == [total - 1, total]
 
 
 def test_a_changed_map_is_noticed(folder, tmp_path):
@@ -117,26 +116,17 @@ def test_a_changed_map_is_noticed(folder, tmp_path):
     assert not {*before.values()} & {*after.values()}  # the distribution's scenario names it, too
 
 
-def test_an_option_that_means_nothing_in_a_suite_is_refused(folder):
-    options = CommonOptions(fixed={"a": 1.0}, axes=["weather"])
-    with pytest.raises(InputError) as refused:
-        run_suite(folder, options=options)
-    assert [*refused.value.problems] == [
-        "a suite takes no option 'axes'", "a suite takes no option 'fixed'",
-    ]  # fmt: skip
-
-
 def test_other_settings_are_refused(folder, tmp_path):
-    run_suite(folder / "plain.xosc", egos=["reference"], out=tmp_path / "a", workers=1)
+    evaluate_suite(folder / "plain.xosc", egos=["reference"], out=tmp_path / "a", workers=1)
     with pytest.raises(StorageError, match=r"other settings \(criteria\)"):
-        run_suite(folder / "plain.xosc", egos=["reference"], options=CRITERIA, out=tmp_path / "a")
+        evaluate_suite(folder / "plain.xosc", egos=["reference"], **CRITERIA, out=tmp_path / "a")
 
 
 def test_a_broken_file_is_a_row_and_the_others_run(folder, tmp_path):
     (folder / "broken.xosc").write_text("<OpenSCENARIO><Storyboard>")
     text = (folder / "plain.xosc").read_text("utf-8")
     (folder / "nomap.xosc").write_text(text.replace("straight.xodr", "nowhere.xodr"), "utf-8")
-    suite = run_suite(folder, egos=["reference"], out=tmp_path / "a", workers=1)
+    suite = evaluate_suite(folder, egos=["reference"], out=tmp_path / "a", workers=1)
     problems = {one.entry: one.problem for one in suite.results}
     assert "not well-formed XML" in problems["broken"]
     assert "nowhere.xodr" in problems["nomap"]
@@ -148,7 +138,7 @@ def test_a_broken_file_is_a_row_and_the_others_run(folder, tmp_path):
 
 
 def test_results_are_untrusted(folder, tmp_path):
-    run_suite(folder / "plain.xosc", egos=["reference"], out=tmp_path / "a", workers=1)
+    evaluate_suite(folder / "plain.xosc", egos=["reference"], out=tmp_path / "a", workers=1)
     path = tmp_path / "a" / FILE
     head, line, *_ = path.read_text("utf-8").splitlines()
     for bad in ('{"suite": 1}', "[1]", line.replace('"rows"', '"rowz"'), "{" * 9000):

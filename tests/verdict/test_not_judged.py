@@ -14,12 +14,12 @@ from bridgegen.cli.verdict.of_difference import DifferenceCriteria
 from bridgegen.cli.verdict.of_run import PassFailCriteria
 from bridgegen.cli.verdict.of_suite import SuiteCriteria, figures_of
 from bridgegen.engine.simulate import simulate_file
-from bridgegen.jobs.suite.difference import difference
+from bridgegen.jobs.suite.difference import DriverDifference, difference
 from bridgegen.jobs.suite.entries import RESULTS
 from bridgegen.jobs.suite.known_failures import KnownFailures
 from bridgegen.jobs.suite.replay import replay
 from bridgegen.jobs.suite.results import EntryResult, RowResult
-from bridgegen.jobs.suite.suite import SuiteRun, read_suite, run_suite
+from bridgegen.jobs.suite.suite import SuiteRun, evaluate_suite, read_suite
 from bridgegen.jobs.view.folder_view import FolderView
 from bridgegen.results.failures import read_failures, write_failures
 
@@ -105,14 +105,14 @@ def test_results_of_earlier_versions_can_be_read():
 
 def test_results_of_earlier_versions_are_not_taken_for_passes(tmp_path):
     out = tmp_path / "out"
-    run_suite(DOUBLE_PARKED, samples=3, out=out, workers=1)
+    evaluate_suite(DOUBLE_PARKED, samples=3, out=out, workers=1)
     file = out / RESULTS
     header, line = file.read_text().splitlines()
     before = json.loads(line)
     del before["not_happened"], before["outside"]
     file.write_text(f"{header}\n{json.dumps(before)}\n")
     assert read_suite(out).results[0].verdict == "passed"  # it is read as it was
-    assert run_suite(DOUBLE_PARKED, samples=3, out=out, workers=1).results[0].unjudged
+    assert evaluate_suite(DOUBLE_PARKED, samples=3, out=out, workers=1).results[0].unjudged
 
 
 # ---- suites ----
@@ -187,16 +187,16 @@ def test_an_ego_that_stands_behind_a_van_is_not_judged(cli, tmp_path):
 def test_a_kept_failure_passes_where_the_ego_stops_for_what_it_hit(tmp_path):
     """A file of a collision with what stands: stopping behind it is what the fix is for."""
     out = tmp_path / "out"
-    run_suite(DOUBLE_PARKED, samples=0, out=out, workers=1)
+    evaluate_suite(DOUBLE_PARKED, samples=0, out=out, workers=1)
     (file,) = [one for one in replay(out, "double-parked", 1).files if one.suffix == ".xosc"]
-    alone = run_suite(file, out=tmp_path / "alone", workers=1)
+    alone = evaluate_suite(file, out=tmp_path / "alone", workers=1)
     assert [one.unjudged[:48] for one in alone.results] == [
         "the scenario did not happen: stuck in 1 of 1: st"
     ]
     assert "stuck in 1 of 1: stands behind" in simulate_file(file).unjudged
     fixed = failure("b", files=[file.name], status="fixed")
     write_failures(read_failures(file.parent), {"b": fixed})
-    kept = run_suite(file, out=tmp_path / "kept", workers=1)
+    kept = evaluate_suite(file, out=tmp_path / "kept", workers=1)
     assert [one.verdict for one in kept.results] == ["passed"]
 
 
@@ -229,19 +229,22 @@ def test_what_is_not_judged_is_not_compared():
     suite = suite_of(*first, *second)
 
     def verdicts(*texts: str) -> list[str]:
-        return [one.verdict for one in DifferenceCriteria.read(texts).judge(suite, found, ())]
+        made = DriverDifference(suite, found, (), Path())
+        return [one.verdict for one in DifferenceCriteria.read(texts).judge(made)]
 
     assert verdicts() == ["unknown"]
     assert verdicts("broken > 0", "fixed > 0") == ["failed", "unknown"]
     assert verdicts("fixed > 0", "not_judged_entries > 1") == ["passed", "passed"]
     same = difference(first[:1], second[:1], ("one", "two"))
-    assert DifferenceCriteria.read([]).judge(suite, same, ()) == ()
+    assert DifferenceCriteria.read([]).judge(DriverDifference(suite, same, (), Path())) == ()
 
 
 def test_the_junit_of_a_difference_calls_an_error_what_could_not_be_compared(tmp_path):
     first, second = entry(JUMP), entry(JUMP, ego="two")
     suite, found = suite_of(first, second), difference([first], [second], ("one", "two"))
-    outcomes = DifferenceCriteria.read([], tmp_path / "j.xml").judge(suite, found, ())
+    outcomes = DifferenceCriteria.read([], tmp_path / "j.xml").judge(
+        DriverDifference(suite, found, (), tmp_path)
+    )
     assert [one.verdict for one in outcomes] == ["unknown", "passed"]
     errors = ElementTree.parse(tmp_path / "j.xml").getroot().findall(".//error")
     assert [one.get("message") for one in errors] == [
@@ -291,7 +294,8 @@ def test_a_safety_case_of_a_run_that_is_not_judged_ends_with_3(cli, stuck_run, t
     status = {line.split()[0]: line.split()[1] for line in out.splitlines() if line[:1] == "G"}
     assert (status["G1.3"], status["G1.4"]) == ("undeveloped", "undeveloped")
     assert status["G1.5"] == "incomplete"  # although the criterion is met in each evaluation
-    assert f"NOT JUDGED: {stuck_run.folder} supports no claim on its driver: the scenario" in err
+    assert "NOT JUDGED: the runs could be judged" in err
+    assert f"({stuck_run.folder} supports no claim on its driver: the scenario" in err
 
 
 def test_a_list_of_runs_does_not_say_that_it_has_no_failures(stuck_run):
@@ -322,7 +326,7 @@ def test_an_ego_that_stops_for_the_target_of_a_test_is_judged(scenario, ego, fix
 
 
 def test_a_suite_judges_an_ego_that_stops_for_the_target_of_a_test(tmp_path):
-    suite = run_suite(
+    suite = evaluate_suite(
         "r157/stationary-vehicle", egos=["un-r157"], samples=8, out=tmp_path / "out", workers=1
     )
     assert [one.verdict for one in suite.results] == ["passed"]
@@ -332,5 +336,5 @@ def test_criteria_beside_harm_do_not_excuse_a_stuck_ego(tmp_path):
     """Such a criterion need not ask for what the scenario is about."""
     text = DOUBLE_PARKED.read_text() + "criteria:\n  - {id: C-1, formula: impact_speed < 1 m/s}\n"
     (tmp_path / "van.yaml").write_text(text)
-    suite = run_suite(tmp_path / "van.yaml", samples=8, out=tmp_path / "out", workers=1)
+    suite = evaluate_suite(tmp_path / "van.yaml", samples=8, out=tmp_path / "out", workers=1)
     assert [one.verdict for one in suite.results] == ["not judged"]

@@ -24,7 +24,7 @@ EFFECTS = ((0.71, "large"), (0.64, "medium"), (0.56, "small"))
 
 
 def clopper_pearson(
-    successes: int, trials: int, confidence: float = CONFIDENCE
+    successes: float, trials: float, confidence: float = CONFIDENCE
 ) -> tuple[float, float]:
     """Return an interval that contains a probability with at least this confidence.
 
@@ -33,15 +33,15 @@ def clopper_pearson(
     Source: C. Clopper and E. Pearson, Biometrika 26 (1934).
 
     Args:
-        successes: 0 .. trials.
+        successes: 0 .. trials; not whole where rows have weights.
         trials: 0 gives (0, 1).
         confidence: in (0, 1).
     """
     from scipy.special import betaincinv
 
     miss, failures = (1.0 - confidence) / 2.0, trials - successes
-    low = float(betaincinv(successes, failures + 1, miss)) if successes else 0.0
-    high = float(betaincinv(successes + 1, failures, 1.0 - miss)) if failures else 1.0
+    low = float(betaincinv(successes, failures + 1, miss)) if successes > 0.0 else 0.0
+    high = float(betaincinv(successes + 1, failures, 1.0 - miss)) if failures > 0.0 else 1.0
     return low, high
 
 

@@ -82,7 +82,9 @@ def _with(command: Callable[..., None], names: Collection[str]) -> Callable[...,
             raise InputError(f"missing: {', '.join(missing)}")
         return kind(**{n: declared[n].form.read(v, declared[n].spelling) for n, v in given.items()})
 
-    made = {name: (_annotation(one), _default(one)) for name, one in declared.items()}
+    # Python wants parameters without a default first, and arguments are the only ones.
+    places = sorted(declared.items(), key=lambda of: not of[1].is_argument)
+    made = {name: (_annotation(one), _default(one)) for name, one in places}
     return expand(command, "options", made, fold)
 
 

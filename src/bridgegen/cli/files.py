@@ -1,8 +1,10 @@
 """The commands that take files: convert, check, draw, ask."""
 
 import sys
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -175,8 +177,8 @@ def schema(
     kind: Annotated[
         str | None,
         typer.Argument(
-            help="Of which files: scenario, fragment, exposure, run (of a search), risk or "
-            "preventability (run files of these), or safety-case.",
+            help="Of which files: scenario, fragment, exposure, run (of a search), compare, suite, "
+            "diff, risk, preventability, dashboard or mine (run files of these), or safety-case.",
             show_default="scenario",
         ),
     ] = None,
@@ -198,13 +200,13 @@ def schema(
 
     if None not in (kind, of) and kind != of:
         raise InputError(f"the schema of one kind of file is printed, got {kind} and --of {of}")
-    jobs = {job.name: job for job in JOBS if argument_of(job)}
-    elsewhere = {"run": run_file_schema, "safety-case": json_schema}
+    known: dict[str, Callable[[], dict[str, Any]]] = {
+        **{job.name: partial(job_schema, job) for job in JOBS if argument_of(job)},
+        "run": run_file_schema,
+        "safety-case": json_schema,  # of the case itself, which programs read
+    }
     name = kind or of or "scenario"
-    if name in jobs:
-        made = job_schema(jobs[name])
-    else:
-        made = elsewhere[name]() if name in elsewhere else schema_of(name)
+    made = known[name]() if name in known else schema_of(name)
     if out is None:
         print(as_text(made), end="")
         return

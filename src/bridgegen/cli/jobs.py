@@ -6,6 +6,7 @@ import sys
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import partial
+from importlib import import_module
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -13,7 +14,7 @@ import typer
 
 from bridgegen.base.errors import BridgeGenError, Interrupted
 from bridgegen.cli import options as common
-from bridgegen.cli.app import FAILED, app, benchmarks
+from bridgegen.cli.app import FAILED, app, benchmarks, suites
 from bridgegen.cli.connection import (
     NO_CONNECTION,
     Connection,
@@ -21,18 +22,29 @@ from bridgegen.cli.connection import (
     with_map_folder,
 )
 from bridgegen.cli.declared import declare, with_declared_options
-from bridgegen.cli.groups import SEARCH
+from bridgegen.cli.groups import DEFAULT, DefaultCommand
 from bridgegen.cli.run_files import FiledRun, Key, keys_of, schema, with_run_files
 from bridgegen.engine.options import options_of
 from bridgegen.engine.options.option import OUTPUT, WHAT
 from bridgegen.jobs.benchmark.options import JOB as BENCHMARK
 from bridgegen.jobs.compare.options import JOB as COMPARE
+from bridgegen.jobs.dashboard.options import JOB as DASHBOARD
 from bridgegen.jobs.frame import Job, JobResult
+from bridgegen.jobs.mine.options import JOB as MINE
 from bridgegen.jobs.preventability.options import JOB as PREVENTABILITY
 from bridgegen.jobs.risk.options import JOB as RISK
+from bridgegen.jobs.safety_case.options import JOB as SAFETY_CASE
+from bridgegen.jobs.suite.options import DIFF, SUITE
 
-JOBS = (COMPARE, BENCHMARK, PREVENTABILITY, RISK)
+JOBS = (COMPARE, SUITE, DIFF, BENCHMARK, PREVENTABILITY, RISK, DASHBOARD, SAFETY_CASE, MINE)
 """In the order of ``--help``."""
+
+_CRITERIA = {
+    SUITE.name: "of_suite:SuiteCriteria",
+    DIFF.name: "of_difference:DifferenceCriteria",
+    SAFETY_CASE.name: "of_job:JobVerdict",
+}
+"""In `bridgegen.cli.verdict`, the classes of criteria by job; of all others ``JobCriteria``."""
 
 _OF_SIMULATOR = ("simulator", "simulator_set", "connection")
 
@@ -52,7 +64,7 @@ def command_of(job: Job) -> Any:
             typer.Option(
                 help=f"End with exit status 3 if this holds, e.g. '{job.example}'; may be "
                 "repeated.",
-                show_default=False,
+                show_default=job.fails or False,
                 rich_help_panel=OUTPUT,
             ),
         ] = None,
@@ -62,13 +74,13 @@ def command_of(job: Job) -> Any:
     ) -> None:
         from bridgegen.cli.terminal.live import JobScreen
         from bridgegen.cli.terminal.tables import print_outcomes
-        from bridgegen.cli.verdict.of_job import JobCriteria
 
         assert save is None  # written by the run file's reader, which knows what was given
-        judges = JobCriteria.read(fail_if or (), junit, list(job.figures))
+        known = [*job.figures, *options.more_figures]
+        judges = _criteria_of(job).read(fail_if or (), junit, known)
         if simulators:
             chosen = common.read_simulator(simulator, simulator_set, connection)
-            options = replace(options, simulator=chosen)
+            options = replace(options, simulator=chosen) if chosen else options
         with JobScreen() as screen:
             result = job.run(replace(options, callbacks=screen.callbacks))
         _print(result, screen.seconds, as_json=as_json)
@@ -91,6 +103,12 @@ def command_of(job: Job) -> Any:
     command.__name__, command.__doc__ = job.name.replace(" ", "_"), inspect.cleandoc(job.help)
     made = with_declared_options(command)
     return with_connection_options(made) if simulators else made
+
+
+def _criteria_of(job: Job) -> Any:
+    """Return the class of the criteria for a job's results."""
+    module, _, name = _CRITERIA.get(job.name, "of_job:JobCriteria").partition(":")
+    return getattr(import_module(f"bridgegen.cli.verdict.{module}"), name)
 
 
 def schema_of(job: Job) -> dict[str, Any]:
@@ -146,10 +164,13 @@ def _add(job: Job) -> None:
     if argument := argument_of(job):
         several = partial(run_all, job=job.name)
         command = with_run_files(several, job.options, argument)(command)
-    group, _, name = job.name.rpartition(" ")
-    parent = benchmarks if group else app
-    panel = None if group else SEARCH
-    parent.command(name, rich_help_panel=panel)(with_map_folder(WHAT)(command))
+    command = with_map_folder(WHAT)(command)
+    if job is SUITE:
+        suites.command(DEFAULT, cls=DefaultCommand)(command)
+    elif job is BENCHMARK:
+        benchmarks.command(job.name.split()[-1])(command)
+    else:
+        app.command(job.name, rich_help_panel=job.panel)(command)
 
 
 for _job in JOBS:

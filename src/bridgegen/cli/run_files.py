@@ -40,16 +40,16 @@ _FORMS: Mapping[Any, FileForm] = {
     str: file_forms.TEXT,
     Path: file_forms.TEXT,
     list[str]: file_forms.TEXTS,
+    list[Path]: file_forms.PATHS,
 }
 _CRITERIA = "criteria"
 _YAML = (".yaml", ".yml")
 
-_CODE = {"algorithm", "detector", "ego", "worse_than"}
-"""Options whose value is a path in front of a colon, or a path if it ends in ``.fmu``."""
+_CODE = {"algorithm", "detector", "ego", "egos", "drivers", "worse_than"}
+"""Options whose values are a path in front of a colon, or a path if they end in ``.fmu``."""
 
-
-_FILES = {SCENARIO, "exposure", "events"}
-"""Options whose value is a name, or a path if it ends like one."""
+_FILES = {SCENARIO, "scenarios", "files", "exposure", "events"}
+"""Options whose values are a name, or a path if they end like one or are a folder's."""
 
 
 @dataclass(frozen=True)
@@ -108,7 +108,7 @@ def keys_of(command: Callable[..., Any], kind: type[Any] = SearchOptions) -> dic
         words = [one for one in (info.default, *(info.param_decls or ())) if isinstance(one, str)]
         spelling = words[0].partition("/")[0][2:] if words else name.replace("_", "-")
         limits = option.limits if option else None
-        found[spelling] = Key(name, form, info.help or "", Path in types, limits)
+        found[spelling] = Key(name, form, info.help or "", bool(types & {Path, list[Path]}), limits)
     return found
 
 
@@ -220,10 +220,12 @@ def _read_run(
 
 def _moved(key: Key, value: Any, move: Callable[[str], object]) -> Any:
     """Return a value with its path, if it holds one, moved to or from the file's folder."""
-    if key.is_path:
-        return Path(str(move(str(value))))
     if key.name == _CRITERIA:
         return [str(move(one)) if one.lower().endswith(_YAML) else one for one in value]
+    if isinstance(value, list):
+        return [_moved(key, one, move) for one in value]
+    if key.is_path:
+        return Path(str(move(str(value))))
     if not isinstance(value, str):
         return value
     from bridgegen.drivers import is_remote
@@ -235,8 +237,10 @@ def _moved(key: Key, value: Any, move: Callable[[str], object]) -> Any:
         if path.endswith(".py"):
             return f"{move(path)}{colon}{what}"
         return str(move(value)) if value.endswith(".fmu") else value
+    moved = str(move(value))
     is_file = value.lower().endswith((*_YAML, ".xosc", ".csv"))
-    return str(move(value)) if key.name in _FILES and is_file else value
+    is_path = is_file or Path(value).is_dir() or Path(moved).is_dir()
+    return moved if key.name in _FILES and is_path else value
 
 
 def save_run(path: Path, values: Values, keys: Mapping[str, Key]) -> None:

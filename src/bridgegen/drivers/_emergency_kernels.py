@@ -6,8 +6,7 @@
 import math
 
 from bridgegen.base.compiled import kernel
-from bridgegen.drivers._path_kernels import pose
-from bridgegen.drivers._shift_kernels import aside_at
+from bridgegen.drivers._path_kernels import aside_at, pose
 from bridgegen.drivers._surroundings_kernels import (
     ACROSS,
     ALONG,

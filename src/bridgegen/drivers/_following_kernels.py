@@ -11,7 +11,7 @@ heuristic: a short gap to a leader that is not slower needs no hard braking).
 import math
 
 from bridgegen.base.compiled import kernel
-from bridgegen.drivers._shift_kernels import aside_at
+from bridgegen.drivers._path_kernels import aside_at
 from bridgegen.drivers._surroundings_kernels import (
     ACROSS,
     ALONG,

@@ -27,7 +27,7 @@ from bridgegen.drivers._following_kernels import (
     keep_distance,
     stop_for,
 )
-from bridgegen.drivers._shift_kernels import aside_at, shift_length
+from bridgegen.drivers._path_kernels import aside_at, shift_length
 from bridgegen.drivers._speed_kernels import FAST_ROAD, LEFT, LIMIT, RIGHT, sight_speed
 from bridgegen.drivers._surroundings_kernels import (
     ACROSS,

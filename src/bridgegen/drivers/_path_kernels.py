@@ -4,12 +4,13 @@ A path is ``(L, 6)`` float64: x, y [m], heading [rad], its cosine and sine, curv
 its L rows the first n are real, and row i is at station i · ds.
 """
 
-# mypy: allow-untyped-defs
-# Numba infers what kernels take; their wrappers are typed.
-
 import math
 
 from bridgegen.base.compiled import kernel
+
+# mypy: allow-untyped-defs
+# Numba infers what kernels take; their wrappers are typed.
+
 
 X, Y, H, COS, SIN, CURVATURE = 0, 1, 2, 3, 4, 5
 
@@ -78,5 +79,93 @@ def pursue(path, n, ds, s, x, y, h, distance):
     """
     gx, gy, _ = pose(path, n, ds, s + distance)
     dx, dy = gx - x, gy - y
+    left = -math.sin(h) * dx + math.cos(h) * dy
+    return 2.0 * left / max(dx * dx + dy * dy, 1e-6)
+
+
+# --- Polylines of the map in the egos' frames ---
+
+
+# mypy: allow-untyped-defs
+# Numba infers what kernels take; their wrappers are typed.
+
+
+@kernel
+def gather_points(at, counts, pieces, directions, x, y, cosine, sine, points, mask):
+    """Fill ``points`` ``(N, Q, V, 4)`` and ``mask`` ``(N, Q, V)``, which are zeros.
+
+    ``at`` ``(N, Q)`` are rows of ``pieces`` ``(K, V, 3)`` and of ``directions`` ``(K, V, 2)``, the
+    first ``counts`` ``(K,)`` points of which count; the ego of row i is at x, y with a heading.
+    """
+    for i in range(at.shape[0]):
+        c, s = cosine[i], sine[i]
+        for q in range(at.shape[1]):
+            k = at[i, q]
+            for j in range(counts[k]):
+                dx, dy = pieces[k, j, 0] - x[i], pieces[k, j, 1] - y[i]
+                u, w = directions[k, j, 0], directions[k, j, 1]
+                points[i, q, j, 0], points[i, q, j, 1] = dx * c + dy * s, dy * c - dx * s
+                points[i, q, j, 2], points[i, q, j, 3] = u * c + w * s, w * c - u * s
+                mask[i, q, j] = True
+
+
+# --- The ego's course beside its route: its offset, and how that changes ---
+# A shift is four numbers: an offset to the left of the route [m], the one that follows, the station
+# where the change begins, and its length [m]. Between them is a quintic whose slope and bend are 0
+# at # both ends.
+
+
+# mypy: allow-untyped-defs
+# Numba infers what kernels take; their wrappers are typed.
+
+
+UNSHIFTED = (0.0, 0.0, 0.0, 0.0)
+
+LATERAL_COMFORT = 1.0  # m/s², aside of the lane's own bend; source: UN R79, ACSF category C: 1 m/s²
+LATERAL_SHARE = 0.15  # of the friction limit that a change may use
+SPARE = 1.5  # as much lateral acceleration as was planned, if it speeds up meanwhile
+STEEPEST = 5.7735  # 10/√3: the quintic's greatest second derivative for a change of 1 over 1
+SHARPEST = 0.08  # 1/m, the curvature that it plans with at a crawl
+
+
+@kernel
+def aside_at(shift, s):
+    """Return how far left of the route the ego's centre line is at a station [m]."""
+    before, after, begins, length = shift
+    if before == after or s >= begins + length:
+        return after
+    if s <= begins:
+        return before
+    u = (s - begins) / length
+    return before + (after - before) * u * u * u * (10.0 + u * (6.0 * u - 15.0))
+
+
+@kernel
+def shift_length(across, v, friction_limit):
+    """Return the length [m] over which one moves so far across comfortably, at a speed v [m/s]."""
+    lateral = min(LATERAL_COMFORT, LATERAL_SHARE * friction_limit)
+    bend = STEEPEST * abs(across)
+    return max(v * math.sqrt(bend / lateral), math.sqrt(bend / SHARPEST))
+
+
+@kernel
+def shift_speed(shift, s, friction_limit):
+    """Return the speed [m/s] that the shift allows at a station; +inf where it is over."""
+    before, after, begins, length = shift
+    if before == after or s >= begins + length:
+        return math.inf
+    lateral = SPARE * min(LATERAL_COMFORT, LATERAL_SHARE * friction_limit)
+    return length * math.sqrt(lateral / (STEEPEST * abs(after - before)))
+
+
+@kernel
+def pursue_beside(path, n, ds, s, shift, x, y, h, distance):
+    """Return the curvature [1/m] of the circle through the rear axle and a point of the course.
+
+    As `bridgegen.drivers._path_kernels.pursue`, on a course that is shifted from the route.
+    """
+    gx, gy, gh = pose(path, n, ds, s + distance)
+    aside = aside_at(shift, s + distance)
+    dx, dy = gx - aside * math.sin(gh) - x, gy + aside * math.cos(gh) - y
     left = -math.sin(h) * dx + math.cos(h) * dy
     return 2.0 * left / max(dx * dx + dy * dy, 1e-6)

@@ -21,10 +21,10 @@ from bridgegen.drivers._following_kernels import (
 )
 from bridgegen.drivers._lane_change_kernels import LAST, change_lane, look_back, shift_of
 from bridgegen.drivers._lights_kernels import stop_at_lights, stop_at_signs
+from bridgegen.drivers._path_kernels import UNSHIFTED, pursue_beside, shift_speed
 from bridgegen.drivers._perception_kernels import perceive
 from bridgegen.drivers._prediction_kernels import predict, predict_truly
 from bridgegen.drivers._route_follower_kernels import hold_speed, keep_to_route, preview
-from bridgegen.drivers._shift_kernels import UNSHIFTED, pursue_beside, shift_speed
 from bridgegen.drivers._sight_kernels import LIGHT, REAR, WALKER, column_of, seen_in
 from bridgegen.drivers._speed_kernels import (
     FAST_ROAD,

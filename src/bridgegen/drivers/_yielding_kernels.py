@@ -25,8 +25,7 @@ from bridgegen.drivers._following_kernels import (
     follow,
     stop_for,
 )
-from bridgegen.drivers._path_kernels import COS, SIN, X, Y
-from bridgegen.drivers._shift_kernels import aside_at
+from bridgegen.drivers._path_kernels import COS, SIN, X, Y, aside_at
 
 SIDE_MARGIN = 0.6  # m, kept to another body's side
 TIME_MARGIN = 1.0  # s, kept between two bodies' passages of one point, …

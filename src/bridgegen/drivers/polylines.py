@@ -89,7 +89,7 @@ def gather(scene: Scene, observation: Observation) -> Polylines:
     Raises:
         InputError: the driver does not want "map".
     """
-    from bridgegen.drivers._polyline_kernels import gather_points  # numba is slow to import
+    from bridgegen.drivers._path_kernels import gather_points  # numba is slow to import
 
     view = observation.map
     if view is None:

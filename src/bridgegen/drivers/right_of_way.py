@@ -12,12 +12,20 @@ from typing import NamedTuple
 import numpy as np
 
 from bridgegen.base.arrays import Int
-from bridgegen.drivers._claims import BY_MAP, BY_SIGNS, FROM_THE_RIGHT, OFF_ROAD, ONCOMING, SIREN
 from bridgegen.openx.opendrive.furniture import Signal
 from bridgegen.openx.opendrive.lanes import borders, lane_pose, section_index
 from bridgegen.openx.opendrive.legs import governs, signals_on
 from bridgegen.openx.opendrive.model import DRIVABLE, OpenDrive, Road
 from bridgegen.openx.opendrive.routes import Route, Step
+
+# --- Why one of two participants goes first: the reasons of a claim (`right_of_way.claim`) ---
+
+
+BY_MAP, BY_SIGNS, FROM_THE_RIGHT, ONCOMING, SIREN, OFF_ROAD = 1, 2, 3, 4, 5, 6
+"""The junction's priorities, signs, priority to the right, the rule that a left turn waits for
+oncoming traffic, that all give way to an emergency vehicle on a call, or that who comes from off
+the road gives way to all on it."""
+
 
 STOP_SIGN = "206"
 WAIT = ("205", STOP_SIGN)

@@ -8,7 +8,7 @@ command that repeats it. Imports nothing slow: the command line needs it to star
 
 import shlex
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from importlib import import_module
 from math import inf
 from os import PathLike
@@ -62,16 +62,33 @@ SCENARIOS = Form(
 )
 """Several of these; in Python one may stand alone."""
 
+PATHS = Form(
+    list[Path],
+    words=lambda spelling, paths: [
+        word for path in paths for word in (spelling, str(path.resolve()))
+    ],
+    keep=lambda paths: tuple(map(Path, _names(paths))),
+    in_file=file_forms.PATHS,
+    valid=lambda paths: all(isinstance(one, Path) for one in paths),
+    must="paths",
+)
+"""Several files or folders; in Python one may stand alone."""
+
 DRIVERS = Form(
     list[str],
-    read=lambda texts, _: tuple(read_names(",".join(texts))),
-    words=lambda spelling, names: [spelling, ",".join(names)] if names else [],
+    read=lambda texts, _: tuple(
+        name
+        for text in texts
+        for name in ([text] if text.startswith("exec:") else read_names(text))
+    ),
+    words=_repeated,
     keep=_names,
     in_file=file_forms.TEXTS,
     valid=lambda names: all(isinstance(one, str) for one in names),
     must="names",
 )
-"""Names, repeated or separated by commas; in Python one may stand alone."""
+"""Names, repeated or separated by commas, which a program's call may hold; in Python one may stand
+alone."""
 
 ANY = Form(str, valid=lambda value: value is not None, must="given")
 """A text, or what Python code gives in its place; the job checks it."""
@@ -125,16 +142,6 @@ class DriveOptions(Declared):
 class JobOptions(Declared):
     """What every job is given, besides the options of its own."""
 
-    workers: Any = field(
-        default=None,
-        metadata=option(
-            ANY,
-            "Number of worker processes, or 'ray' / 'ray://HOST:PORT' for a Ray cluster (extra "
-            "ray). No result depends on it.",
-            shown="threads of one process, one for each core",
-            group=SEARCH,
-        ),
-    )
     out: Path | str | None = field(
         default=None,
         metadata=option(
@@ -146,6 +153,27 @@ class JobOptions(Declared):
     )
     callbacks: JobCallbacks = field(
         default_factory=JobCallbacks, metadata={"help": "Called as the job progresses."}
+    )
+
+    @property
+    def more_figures(self) -> Sequence[str]:
+        """The figures that these options add to those of the job: pass criteria, say."""
+        return ()
+
+
+@dataclass(frozen=True, kw_only=True)
+class SimulatingOptions(JobOptions):
+    """What a job that simulates is given besides."""
+
+    workers: Any = field(
+        default=None,
+        metadata=option(
+            ANY,
+            "Number of worker processes, or 'ray' / 'ray://HOST:PORT' for a Ray cluster (extra "
+            "ray). No result depends on it.",
+            shown="threads of one process, one for each core",
+            group=SEARCH,
+        ),
     )
 
 
@@ -191,8 +219,7 @@ def command_of(name: str, options: JobOptions, out: Path, **resolved: Any) -> st
         out: its folder.
         resolved: options that it has resolved, by name.
     """
-    stated = replace(options, workers=None, out=None)
-    values = {**vars(stated), **resolved}
+    values = {**vars(options), "workers": None, "out": None, **resolved}
     of_places = [one for one in options_of(type(options)) if one.is_argument]
     rest = [one for one in options_of(type(options)) if not one.is_argument]
     words = [word for one in (*of_places, *rest) for word in one.words(values[one.name])]
@@ -212,6 +239,7 @@ class Judged:
         figures: by name; NaN is one that is not known.
         facts: further properties, by name.
         of: the part, "" for the whole.
+        missing: the figure that says how much is missing where the test does not hold; "": none.
     """
 
     suite: str
@@ -222,6 +250,7 @@ class Judged:
     figures: Mapping[str, float]
     facts: Mapping[str, str]
     of: str = ""
+    missing: str = ""
 
 
 class JobResult(Protocol):
@@ -236,6 +265,10 @@ class JobResult(Protocol):
 
     def shown(self) -> Sequence[str | Table]:
         """Return what the terminal shows: texts and tables."""
+
+
+class JudgedResult(JobResult, Protocol):
+    """A result to which fail conditions are applied part by part."""
 
     def judged(self) -> Sequence[Judged]:
         """Return what fail conditions are applied to."""
@@ -252,6 +285,8 @@ class Job:
         help: what it does; the first line is its summary.
         figures: what ``--fail-if`` can compare, by name: what each means.
         example: of a fail condition.
+        fails: what fails it without conditions, in words; "" for nothing.
+        panel: of ``bridgegen --help`` that lists it.
     """
 
     name: str
@@ -260,6 +295,8 @@ class Job:
     help: str
     figures: Mapping[str, str]
     example: str
+    fails: str = ""
+    panel: str = "Search"
 
     def run(self, options: JobOptions) -> JobResult:
         """Do it."""

@@ -10,7 +10,7 @@ import matplotlib
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
-from bridgegen.assess.metrics.d_min import first_closest
+from bridgegen.assess.metrics.distances import first_closest
 from bridgegen.base.arrays import Float
 from bridgegen.drivers.kinds import BLUE, BRAKE, LEFT, RIGHT
 from bridgegen.pages.playback import AREA_KINDS, Playback

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from bridgegen.assess.metrics.d_min import first_closest
+from bridgegen.assess.metrics.distances import first_closest
 from bridgegen.base.arrays import Float
 from bridgegen.pages.findings_payload import conflict_payload
 from bridgegen.pages.playback import Beside, Course, Lamp, Planned, Playback, Sensed, Weather

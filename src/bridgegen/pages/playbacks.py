@@ -11,7 +11,7 @@ from bridgegen.assess.conflict.analysis import Conflicts, analyse
 from bridgegen.assess.conflict.harm import Count
 from bridgegen.assess.conflict.outcomes import with_outcomes
 from bridgegen.assess.conflict.summary import summarise
-from bridgegen.assess.metrics.ttc import ttc_over_time
+from bridgegen.assess.metrics.times import ttc_over_time
 from bridgegen.base.arrays import Float
 from bridgegen.base.errors import FileFormatError
 from bridgegen.drivers import _weather_columns as column

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from bridgegen.assess.metrics.perceived import THRESHOLDS, perceived
+from bridgegen.assess.metrics.perception import THRESHOLDS, perceived
 from bridgegen.drivers import kinds as column
 from bridgegen.drivers.kinds import NAMES
 from bridgegen.pages.playback import Sensed

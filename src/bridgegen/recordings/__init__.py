@@ -3,3 +3,6 @@
 `excerpt.py` makes a rollout of recorded traffic, so that every analysis applies to it. Imports
 `search` and below.
 """
+
+TIME_STEP = 0.05
+"""Recordings are resampled at, by default [s]."""

@@ -83,7 +83,7 @@ class ObjectClass:
         lamps: luminous intensity of the lamps that it shows [cd].
         reflectance: at 905 nm [1].
         mistaken_for: the name of the class it is taken for where its own is not recognised.
-        detection_class: one of `bridgegen.assess.metrics.perceived.CLASSES`.
+        detection_class: one of `bridgegen.assess.metrics.perception.CLASSES`.
         limits: what its bodies can do at most.
         injury: whose injury curve holds for the persons on or in it, see
             `bridgegen.assess.conflict.severity`; None: there are none.

@@ -1,4 +1,4 @@
-"""Messages: against another implementation of msgpack, and against any bytes at all."""
+"""Messages: what is packed is read, within bounds, and any bytes at all are read or refused."""
 
 import ast
 import struct
@@ -42,7 +42,7 @@ def has_dtype(value):
 
 
 @given(MESSAGES.filter(lambda one: not has_dtype(one)))
-def test_msgpack_reads_what_is_packed_and_is_read(message):
+def test_what_is_packed_is_read_by_msgpack_and_by_us(message):
     message = {**message, "type": "any"}
     frame = pack(message)
     assert length(frame[:4]) == len(frame) - 4
@@ -54,10 +54,9 @@ def test_msgpack_reads_what_is_packed_and_is_read(message):
 @given(st.lists(arrays(), min_size=1, max_size=3))
 def test_arrays_keep_their_bits(found):
     message = {"type": "act", "arrays": found}
-    for _ in range(2):  # the second time their heads are known
-        for one, two in zip(found, unpack(pack(message)[4:])["arrays"], strict=True):
-            assert (one.dtype, one.shape, one.tobytes()) == (two.dtype, two.shape, two.tobytes())
-            assert two.flags.writeable
+    for one, two in zip(found, unpack(pack(message)[4:])["arrays"], strict=True):
+        assert (one.dtype, one.shape, one.tobytes()) == (two.dtype, two.shape, two.tobytes())
+        assert two.flags.writeable
 
 
 @given(arrays())
@@ -82,25 +81,11 @@ def test_any_bytes_are_a_message_or_a_protocol_error(data):
 def test_a_changed_byte_of_a_message_is_a_message_or_a_protocol_error(
     message, array, place, byte, cut
 ):
-    """Whatever heads of arrays have been seen before: the result is that of a fresh reader."""
     data = bytearray(pack({**message, "type": "x", "array": array, "again": [array]})[4:])
-    try:
-        unpack(bytes(data))
-    except ProtocolError:  # a generated map is no array
-        return
     place %= len(data)
     data[place] = byte
-    data = bytes(data[: place + 1] if cut else data)
-
-    def outcome():
-        try:
-            return repr(unpack(data))
-        except ProtocolError as error:
-            return str(error)
-
-    known = outcome()
-    messages._heads.clear()
-    assert outcome() == known
+    with suppress(ProtocolError):
+        assert isinstance(unpack(bytes(data[: place + 1] if cut else data))["type"], str)
 
 
 @pytest.mark.parametrize(
@@ -111,9 +96,12 @@ def test_a_changed_byte_of_a_message_is_a_message_or_a_protocol_error(
         (msgpack.packb({"type": 3}), "must be a map with a text 'type'"),
         (msgpack.packb({1: 2}), "keys of a map must be texts"),
         (msgpack.packb({"type": "a"}) + b"\x00", "more follows its end"),
-        (msgpack.packb({"type": "a"})[:-1], "ends too early"),
-        (b"\x81\xa4type" + b"\x91" * (MAX_DEPTH + 1), "nested too deeply"),
-        (b"\x81\xa4type\xdd\xff\xff\xff\xff", "too many parts"),
+        (msgpack.packb({"type": "a"})[:-1], "no msgpack.* incomplete"),
+        (b"\x82\xa4type\xa1a\xa1x" + b"\x91" * MAX_DEPTH + b"\xc0", "nested too deeply"),
+        (b"\x82\xa4type\xa1a\xa1x" + b"\x91" * 5000 + b"\xc0", "nested too deeply"),
+        (b"\x81\xa4type\xdd\xff\xff\xff\xff", "too large"),
+        (msgpack.packb({"type": "a", "x": [[0] * 400] * 3}), "too many parts"),
+        (msgpack.packb({"type": "a", "x": msgpack.ExtType(5, b"")}), "extension of msgpack: 5"),
         (
             msgpack.packb({"type": "a", "x": {"dtype": "object", "shape": [1], "data": b""}}),
             "dtype must be one of float64, .* got 'object'",
@@ -136,7 +124,7 @@ def test_a_changed_byte_of_a_message_is_a_message_or_a_protocol_error(
 )
 def test_what_is_no_message(message, error):
     with pytest.raises(ProtocolError, match=error):
-        unpack(message)
+        unpack(message, max_items=1024)
 
 
 def test_a_length_is_bounded():
@@ -153,14 +141,14 @@ def test_what_no_message_can_hold(value):
 
 
 @pytest.mark.parametrize("module", [messages, server])
-def test_the_driver_s_end_needs_numpy_alone_and_an_older_python(module):
+def test_the_driver_s_end_needs_numpy_and_msgpack_alone_and_an_older_python(module):
     tree = ast.parse(Path(module.__file__).read_text("utf-8"), feature_version=(3, 9))
     names = {one.module for one in ast.walk(tree) if isinstance(one, ast.ImportFrom)}
     names |= {
         alias.name for one in ast.walk(tree) if isinstance(one, ast.Import) for alias in one.names
     }
     roots = {name.partition(".")[0] for name in names}
-    assert roots - sys.stdlib_module_names <= {"numpy", "bridgegen", "messages"}
+    assert roots - sys.stdlib_module_names <= {"numpy", "msgpack", "bridgegen", "messages"}
     assert {name for name in names if name.startswith("bridgegen")} <= {"bridgegen.drivers.remote"}
 
 

@@ -169,7 +169,7 @@ def test_a_program_fails_as_a_class_does(driver, name, kind, message):
         (
             pack({"type": "control", "acceleration": np.ones(N), "curvature": [{}] * 2000}),
             "answered nonsense",
-            "too many parts",
+            "too large",
         ),
         (
             pack({"type": "error", "message": "out of \x1b[31m\nideas"}),

@@ -5,7 +5,7 @@ import pytest
 from tests.mining.events.simulated import compare, observed, simulated
 from tests.mining.events.truth import at_time, crossing_of, some_rows
 
-from bridgegen.assess.metrics.pet import pet
+from bridgegen.assess.metrics.times import pet
 
 FEW = 5
 """Changes of pace that are recorded from before."""

@@ -11,7 +11,7 @@ import pytest
 from tests.mining.events.simulated import compare, observed, simulated
 from tests.mining.events.truth import at_time, crossing_of, encounter, some_rows
 
-from bridgegen.assess.metrics.pet import pet
+from bridgegen.assess.metrics.times import pet
 
 
 def sees_through(rollout, other, van, last, lately):

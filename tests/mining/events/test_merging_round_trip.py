@@ -8,7 +8,7 @@ import pytest
 from tests.mining.events.simulated import compare, observed, simulated
 from tests.mining.events.truth import at_time, centres, encounter, some_rows
 
-from bridgegen.assess.metrics.pet import pet
+from bridgegen.assess.metrics.times import pet
 
 NEAR, SHARED = 2.0, 10.0  # m
 BARELY = (1.0, 11.0)  # m; rows in which the shared part is as short are left out

@@ -36,8 +36,8 @@ def test_the_names_of_a_line_have_different_numbers():
 @pytest.mark.parametrize(
     "modules",
     [
-        ("_action", "_begin", "_global", "_pursuit", "_presence"),  # Program.actions
-        ("_probe", "_relation", "_distance"),  # Program.probes
+        ("_start", "_begin", "_world", "_pursuit", "_presence"),  # Program.actions
+        ("_trigger", "_relation"),  # Program.probes
     ],
 )
 def test_kinds_that_one_column_holds_have_different_numbers(modules):

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from bridgegen.assess.conflict.analysis import Responsible, analyse
 from bridgegen.assess.conflict.plausibility import plausibility
 from bridgegen.assess.conflict.summary import sentence
-from bridgegen.assess.metrics.n_collision import n_collision
+from bridgegen.assess.metrics.impact import n_collision
 from bridgegen.base.errors import UnsupportedError
 from bridgegen.simulation.accidents import accidents
 from bridgegen.simulation.embedded.motion._towing_kernels import drawn

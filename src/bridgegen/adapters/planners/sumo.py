@@ -3,7 +3,7 @@
 Each row has a straight road of its own in one simulation of SUMO (`_sumo_road`). At every instant
 all vehicles are put where they are, SUMO makes one step, and the ego's next speed is read: it is
 the acceleration. If SUMO has put the ego on the lane beside, that lane is its goal: the course
-there is ours, a quintic with 1 m/s² of lateral acceleration (`bridgegen.drivers._shift_kernels`)
+there is ours, a quintic with 1 m/s² of lateral acceleration (`bridgegen.drivers._path_kernels`)
 that pure pursuit follows. In SUMO a vehicle is on one lane, here that of its centre, or on two
 while it changes lane. So the model also follows what is ahead on the lane that the ego's body is
 leaving, and bodies that reach into the ego's lane from another one or from beside the road. At a
@@ -41,8 +41,8 @@ from bridgegen.adapters.planners._sumo_road import Arrays, Eyes, Seen, StraightR
 from bridgegen.adapters.planners._sumo_script import SCRIPT
 from bridgegen.adapters.planners._sumo_simulation import MODELS, Simulation, types_text
 from bridgegen.base.physics import GRAVITY
+from bridgegen.drivers._path_kernels import aside_at, shift_length
 from bridgegen.drivers._route_follower_kernels import preview
-from bridgegen.drivers._shift_kernels import aside_at, shift_length
 from bridgegen.drivers.interface import Control, Observation, Scene
 from bridgegen.drivers.planners import Planner, require
 

@@ -30,8 +30,7 @@ from bridgegen.assess.conflict._limits import (
     SERIOUS_DECELERATION,
     SERIOUS_TTC,
 )
-from bridgegen.assess.metrics._pet_kernels import separation
-from bridgegen.assess.metrics._ttc_kernels import STANDSTILL, time_to_contact
+from bridgegen.assess.metrics._time_kernels import STANDSTILL, separation, time_to_contact
 from bridgegen.base.compiled import kernel
 
 CLEAR, COMES_NEAR, COLLIDES = range(3)

@@ -31,8 +31,8 @@ NEITHER, EGO, OTHER, SHARED = range(4)
     PASSED_TOO_CLOSE, DID_NOT_KEEP_LANE, LEFT_THE_ROAD, CUT_IN_REQUIRED,
 ) = range(30)  # fmt: skip
 """Rules of responsibility. The four from MAP_PRIORITY on are in the order of the claims of
-`bridgegen.drivers._claims`; EMERGENCY_VEHICLE and FROM_OFF_ROAD are those of a siren and of who
-comes from off the road."""
+`bridgegen.drivers.right_of_way`; EMERGENCY_VEHICLE and FROM_OFF_ROAD are those of a siren and of
+who comes from off the road."""
 
 (
     KIND, TYPE, RESPONSIBLE, RULE, INSTANT, DECIDED, ZONE_EGO, ZONE_OTHER, PREVENTABLE, LEADS_EGO,

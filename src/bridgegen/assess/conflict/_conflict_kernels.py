@@ -68,7 +68,7 @@ from bridgegen.assess.conflict._limits import (
 )
 from bridgegen.assess.conflict._responsibility_kernels import judge
 from bridgegen.assess.conflict._type_kernels import type_of
-from bridgegen.assess.metrics._ttc_kernels import STANDSTILL, time_to_contact
+from bridgegen.assess.metrics._time_kernels import STANDSTILL, time_to_contact
 from bridgegen.base.compiled import kernel
 
 

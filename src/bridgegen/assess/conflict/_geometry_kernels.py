@@ -17,8 +17,7 @@ from bridgegen.assess.conflict._codes import (
     RIGHT,
 )
 from bridgegen.assess.conflict._limits import FINEST, FLUSH, HALVINGS, JUMPS
-from bridgegen.assess.metrics._pet_kernels import separation
-from bridgegen.assess.metrics._ttc_kernels import sweep
+from bridgegen.assess.metrics._time_kernels import separation, sweep
 from bridgegen.base.arrays import Float, Int
 from bridgegen.base.compiled import kernel
 

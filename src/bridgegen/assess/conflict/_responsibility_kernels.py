@@ -117,7 +117,6 @@ from bridgegen.assess.conflict._limits import (
 )
 from bridgegen.assess.conflict._type_kernels import strikes_with_front, turns
 from bridgegen.base.compiled import kernel
-from bridgegen.drivers._claims import SIREN
 from bridgegen.drivers.kinds import (
     BUS,
     HAZARD,
@@ -128,6 +127,7 @@ from bridgegen.drivers.kinds import (
     LEFT,
     RIGHT,
 )
+from bridgegen.drivers.right_of_way import SIREN
 
 
 @kernel

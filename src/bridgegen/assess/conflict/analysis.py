@@ -11,8 +11,7 @@ from bridgegen.assess.conflict import _codes as codes
 from bridgegen.assess.conflict import severity as injury
 from bridgegen.assess.conflict._codes import CONTACT, COURSE, NEAR_MISS, NO_CONFLICT, VIOLATION
 from bridgegen.assess.conflict.types import ConflictType, Responsible, Rule, Zone
-from bridgegen.assess.metrics.metric import recorded, shared
-from bridgegen.assess.metrics.motion import motion
+from bridgegen.assess.metrics.metric import motion, recorded, shared
 from bridgegen.base.arrays import Bool, Float, Int
 from bridgegen.drivers.kinds import IS_OBSTACLE
 from bridgegen.simulation.rollout import Rollout

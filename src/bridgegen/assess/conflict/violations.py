@@ -22,8 +22,7 @@ from bridgegen.assess.conflict._limits import (
 )
 from bridgegen.assess.conflict.analysis import CONTACT, COURSE, NEAR_MISS, VIOLATION, Conflicts
 from bridgegen.assess.conflict.types import ConflictType, Responsible, Rule
-from bridgegen.assess.metrics.metric import recorded
-from bridgegen.assess.metrics.motion import Motion, motion
+from bridgegen.assess.metrics.metric import Motion, motion, recorded
 from bridgegen.base.arrays import Bool, Int
 from bridgegen.drivers.kinds import CAR, OTHER
 from bridgegen.drivers.lane_tables import EDGES, HEADING, LANES

@@ -6,8 +6,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from bridgegen.assess.metrics.metric import shared
-from bridgegen.assess.metrics.motion import motion
+from bridgegen.assess.metrics.metric import motion, shared
 from bridgegen.base.arrays import Bool, Float
 from bridgegen.scenario.language.criteria import ANY
 from bridgegen.simulation.rollout import Rollout
@@ -97,7 +96,7 @@ def _by_instant(of: Float, e: int) -> Float:
 
 
 def _ttc(rollout: Rollout, e: int) -> Float:
-    from bridgegen.assess.metrics import _ttc_kernels
+    from bridgegen.assess.metrics import _time_kernels as _ttc_kernels
 
     n, _, t = rollout.shape
     out = np.empty(n * t)
@@ -112,7 +111,7 @@ def _ttc(rollout: Rollout, e: int) -> Float:
 
 
 def _thw(rollout: Rollout, e: int) -> Float:
-    from bridgegen.assess.metrics import _course_kernels
+    from bridgegen.assess.metrics import _time_kernels as _course_kernels
 
     m, (n, _, t) = motion(rollout), rollout.shape
     out = np.empty(n * t)

@@ -1,11 +1,19 @@
-"""Criticality metrics: one file per metric, each a function of a recorded rollout.
+"""Criticality metrics: one file per family, each metric a function of a recorded rollout.
 
 ``registry`` knows them by name. A metric is the same whichever simulator made the rollout.
 """
 
-from bridgegen.assess.metrics.choice import existing, held_by, require, to_record
 from bridgegen.assess.metrics.metric import Metric, Need, Quantity
-from bridgegen.assess.metrics.registry import METRICS, TABLE_I, evaluate, get
+from bridgegen.assess.metrics.registry import (
+    METRICS,
+    TABLE_I,
+    evaluate,
+    existing,
+    get,
+    held_by,
+    require,
+    to_record,
+)
 
 __all__ = [
     "METRICS",

@@ -3,6 +3,8 @@
 Only the first ``n_steps`` instants of a scenario count; the padding after them is never read.
 """
 
+import math
+
 import numpy as np
 
 from bridgegen.base.arrays import Float, Int
@@ -107,3 +109,141 @@ def braking_edges(a: Float, n_steps: Int, threshold: float, out: Float) -> None:
                 count += 1
             braking = hard
         out[i] = count
+
+
+# --- Compiled box centres of bodies; public wrapper: ``motion.motion`` ---
+
+
+@kernel
+def place(
+    box: Float, x: Float, y: Float, cosine: Float, sine: Float, n_steps: Int,
+    centre_x: Float, centre_y: Float,
+) -> None:  # fmt: skip
+    """Write the centre of each body's box."""
+    n_rows, n_entities, _ = x.shape
+    for i in range(n_rows):
+        for e in range(n_entities):
+            ahead = box[e, 2]
+            for k in range(n_steps[i]):
+                centre_x[i, e, k] = x[i, e, k] + ahead * cosine[i, e, k]
+                centre_y[i, e, k] = y[i, e, k] + ahead * sine[i, e, k]
+
+
+# --- Compiled count of red lights run; public wrapper: ``r_red.r_red`` ---
+
+
+RED, RED_AND_YELLOW = 1, 2  # of Rollout.lights
+
+
+@kernel
+def red_lights(
+    front: float, x: Float, y: Float, cosine: Float, sine: Float, lines: Float, stop_lights: Int,
+    lights: Int, n_steps: Int, aside: float, out: Float,
+) -> None:  # fmt: skip
+    """Count the lights whose stop line the ego crosses while they are red.
+
+    ``front`` [m] is how far its front bumper is ahead of its reference point.
+    """
+    n_rows, n_lights, _ = lights.shape
+    ran = np.empty(n_lights, dtype=np.bool_)
+    for i in range(n_rows):
+        ran[:] = False
+        for j in range(lines.shape[1]):
+            c, s = math.cos(lines[i, j, 2]), math.sin(lines[i, j, 2])
+            light = stop_lights[j]
+            before = math.inf
+            for k in range(n_steps[i]):
+                px = (x[i, 0, k] - lines[i, j, 0]) + front * cosine[i, 0, k]
+                py = (y[i, 0, k] - lines[i, j, 1]) + front * sine[i, 0, k]
+                past = px * c + py * s
+                if before <= 0.0 and past > 0.0 and abs(py * c - px * s) <= aside:
+                    state = lights[i, light, k - 1]
+                    ran[light] = ran[light] or state in (RED, RED_AND_YELLOW)
+                before = past
+        out[i] = np.sum(ran)
+
+
+# --- Compiled RSS distances; public wrapper: ``rss.rss``, with its ``Parameters`` as an array ---
+
+
+EGO_RESPONSE, OTHER_RESPONSE, ACCEL, BRAKE, HARD_BRAKE, SIDE_ACCEL, SIDE_BRAKE, MARGIN = range(8)
+
+
+@kernel
+def advance(v: float, response: float, accel: float, brake: float) -> float:
+    """Return the worst-case distance [m] of a body that approaches at v [m/s]; < 0: it recedes.
+
+    It accelerates during its response time, then brakes to a stop.
+    """
+    after = v + response * accel
+    return 0.5 * (v + after) * response + after * abs(after) / (2.0 * brake)
+
+
+@kernel
+def approach(v: float, toward: float, response: float, p: Float) -> float:
+    """Return `advance` on an axis; ``toward`` is the cosine of the body's heading to it.
+
+    A receding one may brake hard at once, as a leader does, except for its lateral motion.
+    """
+    share = abs(toward)
+    across = math.sqrt(max(1.0 - share * share, 0.0))
+    accel = max(toward, 0.0) * p[ACCEL] + across * p[SIDE_ACCEL]
+    brake = share * p[BRAKE] + across * p[SIDE_BRAKE]
+    worst: float = advance(v * toward, response, accel, brake)
+    if toward < 0.0:
+        braking = -((v * toward) ** 2) / (2.0 * p[HARD_BRAKE])
+        worst = share * share * braking + across * across * worst
+    return worst
+
+
+@kernel
+def share_of_safe(gap: float, safe: float) -> float:
+    """Return a distance as a share of the safe one; 1 if it is safe."""
+    if gap <= 0.0:
+        return 0.0
+    return gap / safe if gap < safe else 1.0
+
+
+@kernel
+def missing_share(
+    half: Float, x: Float, y: Float, cosine: Float, sine: Float, v: Float, distance: Float,
+    n_steps: Int, p: Float, out: Float,
+) -> None:  # fmt: skip
+    """Write the largest share of the safe distances that is missing both along and across."""
+    n_rows, n_entities, n_instants = x.shape
+    la, wa = half[0, 0], half[0, 1]
+    ego_across = approach(0.0, 0.0, p[EGO_RESPONSE], p)
+    ego_ahead, ego_back = np.empty(n_instants), np.empty(n_instants)
+    for i in range(n_rows):
+        least = 1.0
+        for k in range(n_steps[i]):
+            ego_ahead[k] = approach(v[i, 0, k], 1.0, p[EGO_RESPONSE], p)
+            ego_back[k] = approach(v[i, 0, k], -1.0, p[EGO_RESPONSE], p)
+        for e in range(1, n_entities):
+            lb, wb = half[e, 0], half[e, 1]
+            for k in range(n_steps[i]):
+                if distance[i, e, k] == math.inf:
+                    continue
+                ca, sa = cosine[i, 0, k], sine[i, 0, k]
+                dx, dy = x[i, e, k] - x[i, 0, k], y[i, e, k] - y[i, 0, k]
+                c = ca * cosine[i, e, k] + sa * sine[i, e, k]
+                s = ca * sine[i, e, k] - sa * cosine[i, e, k]
+                ahead, left = dx * ca + dy * sa, dy * ca - dx * sa
+                vb = v[i, e, k]
+                gap = abs(ahead) - (la + (abs(c) * lb + abs(s) * wb))
+                side = abs(left) - (wa + (abs(s) * lb + abs(c) * wb))
+                across = 0.0
+                if side > 0.0:
+                    to = 1.0 if left > 0.0 else -1.0
+                    safe = ego_across + approach(vb, -to * s, p[OTHER_RESPONSE], p)
+                    across = share_of_safe(side, p[MARGIN] + max(safe, 0.0))
+                    if across >= least:  # most are: vehicles in another lane
+                        continue
+                along = 0.0
+                if gap > 0.0:
+                    to = 1.0 if ahead > 0.0 else -1.0
+                    safe = ego_ahead[k] if ahead > 0.0 else ego_back[k]
+                    safe += approach(vb, -to * c, p[OTHER_RESPONSE], p)
+                    along = share_of_safe(gap, safe)
+                least = min(least, max(along, across))
+        out[i] = 1.0 - least

@@ -1,52 +1,42 @@
-"""All metrics by name. A new one: its own file with a ``METRIC``, and one entry here.
+"""All metrics by name.
 
-Or a package's: an entry point of the group ``bridgegen.assess.metrics``.
+A new one: a function and its ``Metric`` in the file of its family, and one entry here. Or a
+package's: an entry point of the group ``bridgegen.assess.metrics``.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from bridgegen.assess.metrics import (
-    a_change,
-    btn,
-    d_min,
-    drac,
-    e_position,
-    impact_speed,
-    iou,
-    l_offset,
-    mean_average_precision,
-    n_brake,
-    n_collision,
-    pet,
-    r_red,
-    relative_impact_speed,
-    rss,
-    speed_reduction,
-    tet,
-    thw,
-    tit,
-    ttc,
-    v_d,
+from bridgegen.assess.metrics.braking import A_CHANGE, BTN, DRAC, N_BRAKE
+from bridgegen.assess.metrics.distances import D_MIN, RSS, V_D
+from bridgegen.assess.metrics.impact import (
+    IMPACT_SPEED,
+    N_COLLISION,
+    RELATIVE_IMPACT_SPEED,
+    SPEED_REDUCTION,
 )
-from bridgegen.assess.metrics.metric import Metric
+from bridgegen.assess.metrics.metric import Metric, Need
+from bridgegen.assess.metrics.perception import E_POSITION, IOU, MEAN_AVERAGE_PRECISION
+from bridgegen.assess.metrics.road import L_OFFSET, R_RED
+from bridgegen.assess.metrics.times import PET, TET, THW, TIT, TTC
 from bridgegen.base.arrays import Float
 from bridgegen.base.errors import InputError, UnknownNameError
 from bridgegen.base.plugins import PlugIns, Registry
+from bridgegen.drivers import DRIVERS, Driver
 from bridgegen.simulation.rollout import Rollout
 
 _TABLE_I = (
-    r_red, n_collision, ttc, d_min, v_d, l_offset, iou, e_position, mean_average_precision,
-    a_change, n_brake,
+    R_RED, N_COLLISION, TTC, D_MIN, V_D, L_OFFSET, IOU, E_POSITION, MEAN_AVERAGE_PRECISION,
+    A_CHANGE, N_BRAKE,
 )  # fmt: skip
 
 _BEYOND = (
-    pet, drac, btn, thw, tet, tit, rss, impact_speed, relative_impact_speed, speed_reduction,
+    PET, DRAC, BTN, THW, TET, TIT, RSS, IMPACT_SPEED, RELATIVE_IMPACT_SPEED, SPEED_REDUCTION,
 )  # fmt: skip
 
-_OURS: dict[str, Metric] = {module.METRIC.name: module.METRIC for module in (*_TABLE_I, *_BEYOND)}
+_OURS: dict[str, Metric] = {one.name: one for one in (*_TABLE_I, *_BEYOND)}
 
 ADDED = PlugIns("metric", "bridgegen.metrics")
 
@@ -93,7 +83,7 @@ def _checked(found: object, name: str) -> Metric:
 METRICS: Mapping[str, Metric] = Registry(_OURS, ADDED, _checked)
 """In the order of Table I, then ours beyond it, then those of installed packages."""
 
-TABLE_I = tuple(module.METRIC.name for module in _TABLE_I)
+TABLE_I = tuple(one.name for one in _TABLE_I)
 """The names of the paper's eleven, which every run records as far as its rollouts allow."""
 
 
@@ -125,3 +115,65 @@ def evaluate(rollout: Rollout, names: Sequence[str]) -> Float:
     for j, metric in enumerate(metrics):
         out[:, j] = metric.compute(rollout)
     return out
+
+
+# --- Which metrics exist: for example no mean IoU with a driver that does not perceive ---
+
+
+def held_by(driver: Driver, *, detects: bool = False) -> tuple[Need, ...]:
+    """Return what a simulator's rollouts of a driver hold besides motion.
+
+    Args:
+        driver: of the ego.
+        detects: whether a detector records detections, whatever the driver.
+    """
+    perceives = detects or driver.perceives
+    return ("detections", "lights", "offset") if perceives else ("lights", "offset")
+
+
+def existing(names: Sequence[str], held: Collection[Need]) -> tuple[str, ...]:
+    """Return those of the named metrics that exist where rollouts hold ``held``.
+
+    Raises:
+        UnknownNameError: a name is not a metric's.
+    """
+    return tuple(name for name in names if get(name).needs in (None, *held))
+
+
+def require(names: Sequence[str], held: Collection[Need], source: str) -> tuple[str, ...]:
+    """Return the names, all of which must exist where rollouts hold ``held``.
+
+    Args:
+        names: of metrics.
+        held: what the rollouts hold.
+        source: of the rollouts, for the message.
+
+    Raises:
+        UnknownNameError: a name is not a metric's.
+        InputError: those that do not exist there, all at once.
+    """
+    perceive = ", ".join(one.name for one in DRIVERS.values() if one.perceives)
+    hints = {"detections": f"; drivers that perceive (--ego): {perceive}" if perceive else ""}
+    needs = {name: get(name).needs for name in names}
+    problems = [
+        f"the metric '{name}' needs {need}, and {source} has none{hints.get(need, '')}"
+        for name, need in needs.items()
+        if need is not None and need not in held
+    ]
+    if problems:
+        raise InputError(*problems)
+    return tuple(names)
+
+
+def to_record(driver: Driver, asked: Sequence[str], *, detects: bool = False) -> tuple[str, ...]:
+    """Return what a search records: Table I's metrics, as far as they exist, and requested ones.
+
+    Others are recorded only on request: together they take longer than the paper's.
+
+    Raises:
+        UnknownNameError: a name is not a metric's.
+        InputError: a requested one does not exist with this driver.
+    """
+    held = held_by(driver, detects=detects)
+    chosen = require(asked, held, f"the driver '{driver.name}'")
+    return tuple(dict.fromkeys((*existing(TABLE_I, held), *chosen)))

@@ -6,27 +6,10 @@ from bridgegen.cli.verdict.conditions import Conditions
 from bridgegen.cli.verdict.fail_if import Outcome, Verdict, unless_judged
 from bridgegen.cli.verdict.junit import Case, Suite, case_of, write_junit
 from bridgegen.cli.verdict.of_suite import case_of_rows, named
-from bridgegen.jobs.suite.difference import Difference, WorseThan
+from bridgegen.jobs.suite.difference import Difference, DriverDifference, WorseThan
+from bridgegen.jobs.suite.options import DIFF
 from bridgegen.jobs.suite.results import EntryResult
 from bridgegen.jobs.suite.suite import SuiteRun
-
-FIGURES = {
-    "broken": "variations that the first ego passes and the second fails",
-    "fixed": "variations that the first ego fails and the second passes",
-    "both_fail": "variations that both fail",
-    "both_pass": "variations that both pass",
-    "not_comparable": "variations that could not be judged with one of them, or did not run",
-    "not_run": "variations that one of them did not run",
-    "not_judged_entries": "entries of which fewer than half of the variations could be compared",
-    "more_severe": "variations in which the second's severity is larger",
-    "less_severe": "variations in which the second's severity is smaller",
-    "p_value": "of McNemar's exact test",
-    "worse": "evaluations of the searches that the second ego fails and the first passes",
-    "worse_modes": "failure modes that they make up",
-    "worse_scenarios": "scenarios in which a search finds any",
-    "not_searched": "scenarios whose search failed, or could not be judged",
-}
-"""The figures of a difference that ``--fail-if`` accepts."""
 
 
 class DifferenceCriteria(Conditions):
@@ -37,12 +20,11 @@ class DifferenceCriteria(Conditions):
     could be compared leaves no condition passed, unless one of them states how many may be so.
     """
 
-    known = FIGURES
+    known = tuple(DIFF.figures)
 
-    def judge(
-        self, suite: SuiteRun, found: Difference, searches: Sequence[WorseThan]
-    ) -> tuple[Outcome, ...]:
+    def judge(self, result: DriverDifference) -> tuple[Outcome, ...]:
         """Apply the criteria, and write the JUnit XML if requested."""
+        suite, found, searches = result.suite, result.difference, result.searches
         figures = figures_of(found, searches)
         outcomes = tuple(one.judge(figures) for one in self.conditions)
         why = named([f"{entry}: {text}" for entry, text in _unjudged(suite, found).items()])
@@ -64,7 +46,7 @@ class DifferenceCriteria(Conditions):
 
 
 def figures_of(found: Difference, searches: Sequence[WorseThan]) -> dict[str, float]:
-    """Return FIGURES."""
+    """Return the figures of a difference and of its searches."""
     compared = [one for one in found.rows if one.change != "not comparable"]
     return {
         **{change.replace(" ", "_"): count for change, count in found.counts.items()},

@@ -2,39 +2,52 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import ClassVar
 
 from bridgegen.cli.verdict.conditions import Conditions
 from bridgegen.cli.verdict.fail_if import Outcome
 from bridgegen.cli.verdict.junit import Suite, case_of, write_junit
-from bridgegen.jobs.frame import JobResult, Judged
+from bridgegen.jobs.frame import Judged, JudgedResult
 
 
 class JobCriteria(Conditions):
     """The criteria for a job; its `bridgegen.jobs.frame.Job` has the figures."""
 
     known = ()
+    always: ClassVar[bool] = False
 
-    def judge(self, result: JobResult) -> tuple[Outcome, ...]:
+    def judge(self, result: JudgedResult) -> tuple[Outcome, ...]:
         """Apply the criteria to each part of a result, and write the JUnit XML if requested.
 
-        Without criteria and JUnit XML there are no outcomes. Otherwise the first of each part is
-        whether its figures can be believed.
+        Without criteria and JUnit XML there are no outcomes; if `always`, those that do not pass.
+        Otherwise the first of each part is whether its figures can be believed, but where a
+        condition says how much may be missing.
         """
-        if not self.conditions and self.junit is None:
+        is_asked = bool(self.conditions) or self.junit is not None
+        if not is_asked and not self.always:
             return ()
         parts = [(one, self._of(one)) for one in result.judged()]
         if self.junit is not None:
             write_junit(self.junit, [_suite(*one) for one in parts])
-        return tuple(one for _, some in parts for one in some)
+        found = tuple(one for _, some in parts for one in some)
+        return found if is_asked else tuple(one for one in found if one.verdict != "passed")
 
     def _of(self, part: Judged) -> list[Outcome]:
         head = f"{part.of}: " if part.of else ""
         verdict = "passed" if part.holds else "unknown"
         outcomes = [Outcome(f"{head}{part.test}", verdict, part.details)]  # type: ignore[arg-type]
+        if any(part.missing in one.figures for one in self.conditions):
+            outcomes = []
         for one in self.conditions:
             outcome = one.judge(part.figures)
             outcomes.append(replace(outcome, test=f"{head}{outcome.test}"))
         return outcomes
+
+
+class JobVerdict(JobCriteria):
+    """The criteria for a job whose result may be worth nothing: that is judged without any, too."""
+
+    always = True
 
 
 def _suite(part: Judged, outcomes: Sequence[Outcome]) -> Suite:

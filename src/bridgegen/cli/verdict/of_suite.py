@@ -9,34 +9,13 @@ from bridgegen.cli.verdict.fail_if import Outcome, Verdict, unless_judged, words
 from bridgegen.cli.verdict.junit import Case, Problem, Suite, case_of, write_junit
 from bridgegen.jobs.suite.clauses import clause_results
 from bridgegen.jobs.suite.known_failures import EXCUSED
+from bridgegen.jobs.suite.options import SUITE
 from bridgegen.jobs.suite.replay import replay_command
 from bridgegen.jobs.suite.results import FAILED, EntryResult, RowResult, counts
 from bridgegen.jobs.suite.sentences import clause_in_words
 from bridgegen.jobs.suite.suite import SuiteRun
 from bridgegen.scenario.language.criteria import read_criterion
 from bridgegen.scenario.language.protocols import read_clause
-
-FIGURES = {
-    "entries": "scenarios with their variations, of all egos",
-    "variations": "variations, of all egos",
-    "passed": "variations that pass",
-    "failed": "variations that fail: critical, or a pass criterion or clause is violated",
-    "known": "failed ones that the suite's index calls known or accepted",
-    "regressions": "failed ones that the suite's index calls fixed",
-    "new_failures": "the other failed ones",
-    "not_judged": "variations that could not be judged: they say nothing of the ego",
-    "not_judged_entries": "entries that could not be judged",
-    "not_run": "variations that did not run; an entry that cannot run is one",
-    "failed_entries": "entries in which a variation fails",
-    "failed_clauses": "clauses of a regulation that an ego fails",
-    "critical": "variations that are critical",
-    "collisions": "variations in which the ego collides",
-    "mitigated": "variations in which it hits something, slower than at the start",
-    "not_avoided": "variations in which it hits something, not slower than at the start",
-    "worst_impact": "the fastest impact [m/s]",
-    "worst_severity": "the worst probability of MAIS3+",
-}
-"""The figures of a suite that ``--fail-if`` accepts."""
 
 MOST_NAMED = 20
 """Variations that a test's text names."""
@@ -52,7 +31,7 @@ class SuiteCriteria(Conditions):
     judged leaves no condition passed, unless one of them states how many may be so.
     """
 
-    known = FIGURES
+    known = tuple(SUITE.figures)
 
     def judge(self, suite: SuiteRun) -> tuple[Outcome, ...]:
         """Apply the criteria to a suite, and write the JUnit XML if requested."""
@@ -68,7 +47,7 @@ class SuiteCriteria(Conditions):
 
 
 def figures_of(suite: SuiteRun) -> dict[str, float]:
-    """Return FIGURES of a suite, and of each criterion the variations that violate it."""
+    """Return the figures of a suite, and of each criterion the variations that violate it."""
     results = suite.results
     standing = suite.known_failures.counts(results)
     rows = [row for one in results for row in one.rows]

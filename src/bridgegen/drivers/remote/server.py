@@ -4,8 +4,8 @@
     output python -m bridgegen.drivers.remote my_driver.py:MyDriver 127.0.0.1:5555    # listens
     there
 
-This file and ``messages.py`` need NumPy only, and Python 3.9: where BridgeGen is not installed,
-copy the two, and run this one in the same way. ``protocol.json`` describes the messages.
+This file and ``messages.py`` need NumPy and msgpack only, and Python 3.9: where BridgeGen is not
+installed, copy the two, and run this one in the same way. ``protocol.json`` describes the messages.
 """
 
 from __future__ import annotations

@@ -119,6 +119,7 @@ WHOLE = FileForm({"type": "integer"}, _typed(int, "a whole number"))
 NUMBER = FileForm({"type": "number"}, _number)
 FLAG = FileForm({"type": "boolean"}, _typed(bool, "true or false"))
 TEXTS = FileForm(_TEXTS, _words, list)
+PATHS = FileForm(_TEXTS, _words, lambda paths: [str(path) for path in paths])
 NAMES = FileForm(
     _TEXTS,
     lambda value: ",".join(_words(value)),

@@ -144,14 +144,14 @@ class PipelineOptions(Declared):
     )
 
     @classmethod
-    def of(cls, options: "PipelineOptions", **changes: Any) -> Self:
+    def of(cls, options: Declared, **changes: Any) -> Self:
         """Return the fields of other options that this class has too, some of them changed.
 
         Args:
-            options: whose class is a base of this one, or derived from it.
+            options: of any class; what it lacks keeps its default.
             changes: fields, by name; those that ``options`` lacks among them.
         """
-        shared = {one.name for one in fields(options)} & {one.name for one in fields(cls)}
+        shared = vars(options).keys() & {one.name for one in fields(cls)}
         return cls(**{name: getattr(options, name) for name in shared} | changes)
 
 

@@ -7,11 +7,11 @@ from typing import Any
 
 from bridgegen.engine.options.forms import FLAG, PATH, TEXT, WHOLE
 from bridgegen.engine.options.option import DRIVER, OUTPUT, SEARCH, WHAT, option
-from bridgegen.jobs.frame import ANY, DRIVERS, SCENARIOS, Job, JobOptions
+from bridgegen.jobs.frame import ANY, DRIVERS, SCENARIOS, Job, SimulatingOptions
 
 
 @dataclass(frozen=True, kw_only=True)
-class BenchmarkOptions(JobOptions):
+class BenchmarkOptions(SimulatingOptions):
     """The options of ``benchmark_planners``."""
 
     drivers: Sequence[str] = field(

@@ -10,7 +10,7 @@ from bridgegen.base.errors import InputError
 from bridgegen.engine.options import CommonOptions, file_forms
 from bridgegen.engine.options.forms import NAMES, NUMBER, PATH, TEXT, WHOLE, Form, read_value
 from bridgegen.engine.options.option import OUTPUT, SEARCH, WHAT, option
-from bridgegen.jobs.frame import ANY, SCENARIOS, Job, JobOptions
+from bridgegen.jobs.frame import ANY, SCENARIOS, Job, SimulatingOptions
 from bridgegen.simulation.choice import Value
 
 APART = 0.1
@@ -66,7 +66,7 @@ ALGORITHMS = Form(
 
 
 @dataclass(frozen=True, kw_only=True)
-class CompareOptions(CommonOptions, JobOptions):
+class CompareOptions(CommonOptions, SimulatingOptions):
     """The options of ``compare``: those that all runs share, and those of the grid."""
 
     scenarios: str | Path | Sequence[str | Path] = field(

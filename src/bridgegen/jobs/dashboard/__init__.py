@@ -3,7 +3,3 @@
 ``project.py`` finds and reads them; ``modes.py``, ``requirements.py``, ``trends.py`` and ``odd.py``
 say what follows; ``page.py`` writes it. What a person decides is in `bridgegen.results.failures`.
 """
-
-from bridgegen.jobs.dashboard.dashboard import Dashboard, build_dashboard
-
-__all__ = ["Dashboard", "build_dashboard"]

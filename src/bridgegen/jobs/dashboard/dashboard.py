@@ -1,12 +1,14 @@
 """A dashboard: what a project's results say together, and the page that shows it."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 from bridgegen.base.disk import refuse_other
 from bridgegen.base.errors import FileFormatError
+from bridgegen.engine.options import called_with
 from bridgegen.jobs.dashboard.modes import (
     OpenMode,
     contradictions,
@@ -16,9 +18,11 @@ from bridgegen.jobs.dashboard.modes import (
     unseen,
 )
 from bridgegen.jobs.dashboard.odd import Coverage, coverage
+from bridgegen.jobs.dashboard.options import DashboardOptions
 from bridgegen.jobs.dashboard.project import Project, read_project
 from bridgegen.jobs.dashboard.requirements import Matrix, matrices
 from bridgegen.jobs.dashboard.trends import Series, trends
+from bridgegen.jobs.frame import Judged, Table
 from bridgegen.results.failures import (
     FILE,
     OLD_FILE,
@@ -27,10 +31,13 @@ from bridgegen.results.failures import (
     read_old_file,
     write_failures,
 )
-from bridgegen.scenario.language.criteria import Criterion, read_criteria
+from bridgegen.scenario.language.criteria import Criterion, read_criterion
 
 PAGE = "dashboard.html"
 GENERATOR = "bridgegen dashboard"
+
+MOST_LINES = 12
+"""Failure modes, problems and notes that the terminal shows, of each."""
 
 
 @dataclass(frozen=True)
@@ -117,9 +124,80 @@ class Dashboard:
         """The labels of all drivers, each version by itself."""
         return sorted({one.driver.label for one in self.project.results})
 
+    @property
+    def work(self) -> str:
+        """How much was read."""
+        return f"{sum(one.evaluations for one in self.project.results):,} evaluations"
+
+    def to_json(self) -> Any:
+        """Return figures, failure modes, notes and problems as JSON's types."""
+        return {
+            "page": str(self.page),
+            "figures": self.figures,
+            "added": self.added,
+            "modes": [
+                {
+                    "id": one.key.id,
+                    "status": one.status,
+                    "comment": one.comment,
+                    "decided": one.decided,
+                    "fails_now": one.fails_now,
+                    "regression": one.is_regression,
+                    "scenario": one.key.scenario,
+                    "driver": one.key.driver,
+                    "title": one.title,
+                    "evaluations": one.count,
+                    "severity": one.severity,
+                    "results": [result.source for result in one.results],
+                }
+                for one in self.modes
+            ],
+            "notes": list(self.notes),
+            "problems": [{"place": one.place, "why": one.why} for one in self.project.problems],
+        }
+
+    def shown(self) -> list[str | Table]:
+        """Return what fails now, in two sentences and by failure mode; then the files."""
+        from bridgegen.jobs.dashboard.sentences import failing_sentence, requirements_sentence
+
+        lines: list[str | Table] = [failing_sentence(self)]
+        if words := requirements_sentence(self):
+            lines.append(words)
+        for one in self.failing[:MOST_LINES]:
+            status = "regression" if one.is_regression else one.status
+            of = f"{one.key.scenario}, {one.key.driver}: {one.title}"
+            lines.append(f"  {status:<11}{one.key.id}  {of}")
+        if len(self.failing) > MOST_LINES:
+            lines.append(f"  and {len(self.failing) - MOST_LINES:,} more")
+        problems = self.project.problems
+        lines += [f"  not read    {one.place}: {one.why}" for one in problems[:MOST_LINES]]
+        if len(problems) > MOST_LINES:
+            lines.append(f"  and {len(problems) - MOST_LINES:,} more are not read")
+        lines += [f"{'note':<12}{note}" for note in self.notes[:MOST_LINES]]
+        if self.added:
+            lines.append(f"{'statuses':<12}{self.status_path}: {self.added:,} added as new")
+        return [*lines, f"{'page':<12}{self.page}"]
+
+    def judged(self) -> list[Judged]:
+        """Return whether all results could be read, and the figures."""
+        problems = self.project.problems
+        return [
+            Judged(
+                suite=str(self.page),
+                group="bridgegen.dashboard",
+                test="all results are read",
+                holds=not problems,
+                details="; ".join(f"{one.place}: {one.why}" for one in problems[:MOST_LINES])
+                or self.work,
+                figures=self.figures,
+                facts={},
+                missing="problems",
+            )
+        ]
+
     @cached_property
     def figures(self) -> dict[str, float]:
-        """The figures that ``--fail-if`` judges, see ``of_dashboard.FIGURES``."""
+        """The figures that ``--fail-if`` judges, see `bridgegen.jobs.dashboard.options`."""
         failing = [one.status for one in self.failing]
         project = self.project
         return {
@@ -145,23 +223,12 @@ class Dashboard:
         }
 
 
-def build_dashboard(
-    folder: Path | str,
-    *,
-    out: Path | str | None = None,
-    criteria: Sequence[str] = (),
-    update: bool = False,
-    begun: Callable[[int, int], None] | None = None,
-) -> Dashboard:
+@called_with(DashboardOptions)
+def build_dashboard(given: DashboardOptions) -> Dashboard:
     """Read all results below a folder, and write one page that shows them together.
 
-    Args:
-        folder: of the project.
-        out: the page; ``dashboard.html`` in the folder by default.
-        criteria: requirements that the project has, tested or not: as of ``--criterion``.
-        update: whether to add failure modes that no ``failures.yaml`` names to that in the folder,
-            with the status "new".
-        begun: called with the number of folders that are read, and of all.
+    Returns:
+        What the results say together.
 
     Raises:
         StorageError: there are no results; or the page or the file cannot be written, or another
@@ -171,14 +238,16 @@ def build_dashboard(
     """
     from bridgegen.jobs.dashboard.page import write_page
 
-    folder = Path(folder)
-    page = folder / PAGE if out is None else Path(out)
+    folder, update = Path(given.folder), given.update
+    page = folder / PAGE if given.out is None else Path(given.out)
     status_path = folder / FILE
     file, old = read_failures(folder), read_old_file(folder)
     own = {**old, **file.failures}
-    declared = read_criteria(criteria)
+    declared = tuple(map(read_criterion, given.criteria))
     refuse_other(page, GENERATOR, "dashboard")
-    project = read_project(folder, begun)
+    project = read_project(
+        folder, lambda number, total: given.callbacks.progress("folders", number, total, "")
+    )
     if update and (damaged := [one.why for one in project.problems if one.place.endswith(FILE)]):
         raise FileFormatError(*damaged)  # it may name modes that seem to be new
     modes = failure_modes(project.results, decisions_of(own, project))

@@ -1,15 +1,19 @@
 """``bridgegen mine``: read recordings, clean and place them, find near misses, account for all."""
 
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from bridgegen import drivers as egos
 from bridgegen.base.arrays import Float
 from bridgegen.base.errors import FileFormatError, InputError, StorageError
+from bridgegen.engine.options import called_with, range_problems
+from bridgegen.jobs.frame import Judged, Table
+from bridgegen.jobs.mine.options import MineOptions
 from bridgegen.recordings.conflicts.find import RecordedConflict, conflicts_of, order
 from bridgegen.recordings.events.find import FoundEvents, find_events
 from bridgegen.recordings.events.of_scenarios import (
@@ -22,7 +26,7 @@ from bridgegen.recordings.events.tables import write_events
 from bridgegen.recordings.excerpt import Clock, clock_of
 from bridgegen.recordings.lanes.account import LanesFound, account_of
 from bridgegen.recordings.lanes.find import Located, locate, read_map
-from bridgegen.recordings.readers.clean import TIME_STEP, Cleaned, clean
+from bridgegen.recordings.readers.clean import Cleaned, clean
 from bridgegen.recordings.readers.formats import files_of, read
 from bridgegen.recordings.readers.quality import Finding
 from bridgegen.recordings.readers.table import Facts, RecordedTraffic, kind_in_words
@@ -38,8 +42,6 @@ POINTS_SHOWN = 40
 """Of a path in the picture."""
 MARGIN = 10.0
 """Around the paths in the picture [m]."""
-KEEP = 10
-"""Events that are written as scenarios."""
 CRITICAL, SUFFIXES = "critical", (".xosc", ".xodr", ".owl")
 """The folder of these, as of a run, and what its files end in."""
 
@@ -113,40 +115,62 @@ class Mined:
     mined: tuple[MinedScenario | Unmade, ...] = ()
     updates: tuple[Update, ...] = ()
 
+    @property
+    def work(self) -> str:
+        """How much was read."""
+        return f"{sum(one.states for one in self.recordings):,} states"
 
-def mine(
-    paths: Sequence[Path],
-    *,
-    out: Path,
-    road_map: Path | None = None,
-    lenient: bool = False,
-    time_step: float = TIME_STEP,
-    scenarios: Sequence[Path] = (),
-    update: Sequence[Path] = (),
-    keep: int = KEEP,
-    ego: str | None = None,
-    progress: Callable[[int, int], None] = lambda done, total: None,
-    fitting: Callable[[int, int], None] = lambda done, total: None,
-) -> Mined:
+    def to_json(self) -> Any:
+        """Return what was recorded, found and written as JSON's types."""
+        from bridgegen.jobs.mine.shown import json_of
+
+        return json_of(self)
+
+    def shown(self) -> list[str | Table]:
+        """Return what was recorded, the events, the quality, and the files."""
+        from bridgegen.jobs.mine.shown import shown_of
+
+        return [*shown_of(self)]
+
+    def judged(self) -> list[Judged]:
+        """Return whether all files could be read, and the figures."""
+        conflicts = [each for one in self.recordings for each in one.conflicts]
+        figures = {
+            "recordings": len(self.recordings),
+            "skipped": len(self.skipped),
+            "hours": sum(one.hours for one in self.recordings),
+            "kilometres": sum(one.kilometres for one in self.recordings),
+            "near_misses": sum(not one.is_contact for one in conflicts),
+            "contacts": sum(one.is_contact for one in conflicts),
+            "events": sum(len(kind) for one in self.recordings for kind in one.events.kinds),
+            "scenarios": len(self.replays),
+            "mined": sum(isinstance(one, MinedScenario) for one in self.mined),
+        }
+        return [
+            Judged(
+                suite=str(self.out),
+                group="bridgegen.mine",
+                test="all recordings are read",
+                holds=not self.skipped,
+                details=f"{len(self.recordings)} read, {len(self.skipped)} skipped",
+                figures=figures,
+                facts={},
+                missing="skipped",
+            )
+        ]
+
+
+@called_with(MineOptions)
+def mine(given: MineOptions) -> Mined:
     """Read and clean recordings, place them on lanes, find near misses, and write all that.
 
-    Args:
-        paths: files, or folders of files.
-        out: a folder, new or of an earlier call; gets recordings.html, recordings.csv, lanes.csv,
-            quality.csv, events.csv, conflicts.csv, in the folder ``events`` the parameters of
-            scenarios, in the folder ``scenarios`` logical scenarios made of them, and in the folder
-            ``critical`` the most critical near misses as concrete ones.
-        road_map: the OpenDRIVE map of all of them; without one the lanes are those that come with
-            the recording, or inferred from its paths.
-        lenient: leave out what cannot be read, and list it.
-        time_step: to resample at [s].
-        scenarios: files of scenarios that declare their events, besides those that ship.
-        update: files of scenarios that declare their events, for which ranges are proposed that
-            hold them: ``NAME.yaml.diff``. The files stay as they are.
-        keep: how many of the most critical events are written as scenarios.
-        ego: driver that takes the ego's place in these; by default it does what was recorded.
-        progress: is told how many of how many files are done.
-        fitting: is told how many of how many scenarios are made of the events.
+    The folder gets recordings.html, recordings.csv, lanes.csv, quality.csv, events.csv,
+    conflicts.csv, in the folder ``events`` the parameters of scenarios, in the folder ``scenarios``
+    logical scenarios made of them, and in the folder ``critical`` the most critical near misses as
+    concrete ones.
+
+    Returns:
+        What was recorded, and what was left out.
 
     Raises:
         FileFormatError: a file that is no recording, or breaks its format's rules.
@@ -156,24 +180,28 @@ def mine(
         StorageError: the folder holds other files of these names, or cannot be written.
     """
     from bridgegen.jobs.mine.page import refuse_foreign, write_all
+    from bridgegen.jobs.mine.shown import warnings_of
 
-    if keep < 0:
-        raise InputError(f"0 <= keep must hold, got {keep}")
-    if ego is not None:
-        egos.get(ego)
+    if problems := range_problems(given):
+        raise InputError(*problems)
+    if given.ego is not None:
+        egos.get(given.ego)
+    out = Path(given.out or "mined")
+    update, scenarios = _paths(given.update), _paths(given.scenarios)
+    time_step = given.time_step
     _refuse_replaced([*update, *scenarios], out / MINED)
     refuse_same_names(update)
     refuse_foreign(out, [f"{path.name}{DIFF}" for path in update])
     sought = recorded_scenarios([*update, *(path for path in scenarios if path not in update)])
-    on_map = read_map(road_map) if road_map is not None else None
-    files, others = _files(paths)
+    on_map = read_map(Path(given.road_map)) if given.road_map is not None else None
+    files, others = _files(_paths(given.recordings))
     found: list[Summary] = []
     skipped: list[tuple[Path, tuple[str, ...]]] = []
     kept: list[Prepared] = []
     played: list[PlayedEvent] = []
     counts: Counter[str] = Counter()
     for number, file in enumerate(files):
-        progress(number, len(files))
+        given.callbacks.progress("files", number, len(files), "")
         try:
             for traffic in read(file):
                 cleaned = clean(traffic, time_step)
@@ -184,9 +212,9 @@ def mine(
                 clock = clock_of(cleaned.traffic)
                 played = closest(played, cleaned.traffic, clock, one.events, counts)
                 counts.update({each.kind.name: len(each) for each in one.events.kinds})
-                kept = _most_critical(kept, cleaned.traffic, clock, conflicts, keep)
+                kept = _most_critical(kept, cleaned.traffic, clock, conflicts, given.keep)
         except FileFormatError as error:
-            if not lenient:
+            if not given.lenient:
                 if len(files) == 1:
                     raise
                 raise FileFormatError(
@@ -194,16 +222,22 @@ def mine(
                     "--lenient leaves out files that cannot be read, and lists them",
                 ) from None
             skipped.append((file, error.problems))
-    progress(len(files), len(files))
     if not found:
         problems = [text for _, texts in skipped for text in texts]
         raise FileFormatError(*problems, "no recording could be read")
-    replays = _written(kept, out / CRITICAL, ego)
+    replays = _written(kept, out / CRITICAL, given.ego)
     warnings = on_map.warnings if on_map is not None else ()
     events = [one.events for one in found]
     met = tuple(scenario_events(one.scenario, one.spec, events) for one in sought)
     write_events(out, events, met)
-    made = write_mined(out, sought, met, events, time_step, fitting)
+    made = write_mined(
+        out,
+        sought,
+        met,
+        events,
+        time_step,
+        lambda done, total: given.callbacks.progress("scenarios", done, total, ""),
+    )
     updates = write_updates(out, sought, met, update)
     mined = Mined(
         tuple(found), tuple(skipped), tuple(others), time_step, out, warnings, replays,
@@ -211,7 +245,14 @@ def mine(
         updates,
     )  # fmt: skip
     write_all(mined)
+    for text in warnings_of(mined):
+        given.callbacks.say(f"bridgegen: {text}")
     return mined
+
+
+def _paths(given: Any) -> list[Path]:
+    """Return the paths that an option holds; its form has made them a tuple of these."""
+    return list(given)
 
 
 def _refuse_replaced(paths: Sequence[Path], folder: Path) -> None:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from bridgegen.engine.options import file_forms
 from bridgegen.engine.options.forms import FIXED, NAMES, PATH, Form
 from bridgegen.engine.options.option import DRIVER, OUTPUT, option
-from bridgegen.jobs.frame import DRIVERS, OF_SCENARIO, DriveOptions, Job, JobOptions
+from bridgegen.jobs.frame import DRIVERS, OF_SCENARIO, DriveOptions, Job, SimulatingOptions
 
 if TYPE_CHECKING:
     from bridgegen.jobs.preventability.grid import GridAxis
@@ -38,7 +38,7 @@ GRID = Form(
 
 
 @dataclass(frozen=True, kw_only=True)
-class MapOptions(DriveOptions, JobOptions):
+class MapOptions(DriveOptions, SimulatingOptions):
     """The options of ``map_preventability``."""
 
     scenario: str | Path = field(kw_only=False, metadata=OF_SCENARIO)

@@ -18,10 +18,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import scipy.stats
 
 from bridgegen.base.arrays import Bool, Float
 from bridgegen.base.errors import InputError
+from bridgegen.base.statistics import clopper_pearson
 from bridgegen.jobs.risk.estimators.problem import block_of
 from bridgegen.jobs.risk.estimators.proposals import OF_CHAIN, Proposals
 from bridgegen.jobs.risk.estimators.weighted import FEWEST_HITS, LEVEL, Weighted
@@ -224,11 +224,7 @@ def share_of(weights: Float, yes: Bool) -> Ratio:
     if not n:
         return Ratio(math.nan, 0.0, 1.0)
     share = float(np.sum(weights * yes) / weights.sum())
-    tail, hits = 0.5 * (1.0 - LEVEL), share * n
-    beta = scipy.stats.beta.ppf
-    low = float(beta(tail, hits, n - hits + 1.0)) if hits > 0.0 else 0.0
-    high = float(beta(1.0 - tail, hits + 1.0, n - hits)) if hits < n else 1.0
-    return Ratio(share, low, high)
+    return Ratio(share, *clopper_pearson(share * n, n, LEVEL))
 
 
 def _evaluated(there: Experiment, Z: Float) -> Float:

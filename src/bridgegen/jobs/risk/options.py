@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from bridgegen.engine.options.forms import ANOTHER_SIMULATOR, NUMBER, PATH, TEXT, WHOLE
 from bridgegen.engine.options.option import DRIVER, OUTPUT, SIMULATOR, option
-from bridgegen.jobs.frame import ANY, OF_SCENARIO, DriveOptions, Job, JobOptions
+from bridgegen.jobs.frame import ANY, OF_SCENARIO, DriveOptions, Job, SimulatingOptions
 
 if TYPE_CHECKING:
     from bridgegen.scenario.exposure import Exposure
@@ -22,7 +22,7 @@ WORDS = {
 
 
 @dataclass(frozen=True, kw_only=True)
-class RiskOptions(DriveOptions, JobOptions):
+class RiskOptions(DriveOptions, SimulatingOptions):
     """The options of ``estimate_risk``."""
 
     scenario: str | Path = field(kw_only=False, metadata=OF_SCENARIO)

@@ -1,6 +1,7 @@
 """The safety case of runs: made, and written with its page and the script that recomputes it."""
 
 import os
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from importlib.resources import files
@@ -9,6 +10,8 @@ from pathlib import Path
 from bridgegen.base.disk import write_whole
 from bridgegen.base.errors import InputError, StorageError
 from bridgegen.base.statistics import CONFIDENCE
+from bridgegen.engine.options import called_with
+from bridgegen.jobs.frame import Judged, Table
 from bridgegen.jobs.safety_case.argument import RunArgument
 from bridgegen.jobs.safety_case.builder import Draft, finish
 from bridgegen.jobs.safety_case.context import (
@@ -21,6 +24,7 @@ from bridgegen.jobs.safety_case.facts import Facts, Files, read_facts
 from bridgegen.jobs.safety_case.measured import measure
 from bridgegen.jobs.safety_case.model import FILE, Number, RunFacts, SafetyCase
 from bridgegen.jobs.safety_case.numbers import Numbers
+from bridgegen.jobs.safety_case.options import JOB, SafetyCaseOptions
 from bridgegen.jobs.safety_case.page import PAGE, page
 from bridgegen.search.triage.record import NOT_JUDGED
 
@@ -157,14 +161,54 @@ class Exported:
         """What recomputes it."""
         return self.folder / SCRIPT
 
+    @property
+    def work(self) -> str:
+        """How many numbers it states."""
+        return f"{len(self.case.numbers):,} numbers"
 
-def export_safety_case(runs: Sequence[Path | str], out: Path | None = None) -> Exported:
+    def to_json(self) -> list[dict[str, str]]:
+        """Return the goals that decide, with their status, as JSON's types."""
+        return [
+            {"goal": one.id, "status": one.status, "claim": one.statement.text}
+            for one in self.case.main_goals()
+        ]
+
+    def shown(self) -> list[str | Table]:
+        """Return the goals that decide, then the files."""
+        goals = [(one.id, one.status, one.statement.text) for one in self.case.main_goals()]
+        return [
+            Table(("goal", "status", "claim"), goals),
+            f"\n{'page':<12}{self.page}",
+            f"{'case':<12}{self.file}",
+            f"{'check it':<12}python {self.script}",
+        ]
+
+    def judged(self) -> list[Judged]:
+        """Return whether all runs could be judged, and the goals by status."""
+        status = Counter(one.status for one in self.case.main_goals())
+        whys = [
+            f"{run} supports no claim on its driver: {why.removeprefix('Not judged: ')}"
+            for run, why in self.unjudged.items()
+        ]
+        return [
+            Judged(
+                suite=self.case.title,
+                group="bridgegen.safety-case",
+                test="the runs could be judged",
+                holds=not whys,
+                details="; ".join(whys) or f"{len(self.case.runs)} runs",
+                figures={name: status[name.replace("_", " ")] for name in JOB.figures},  # type: ignore[index]
+                facts={},
+            )
+        ]
+
+
+@called_with(SafetyCaseOptions)
+def export_safety_case(given: SafetyCaseOptions) -> Exported:
     """Write the safety case of finished runs; the same runs give the same bytes.
 
-    Args:
-        runs: folders, at least one; each once.
-        out: the folder to write to; ``safety-case`` in the run's folder by default, and in the
-            working directory for several runs.
+    Returns:
+        The case, and its files.
 
     Raises:
         InputError: no run, one given twice, or one that cannot be argued about: not finished,
@@ -172,7 +216,7 @@ def export_safety_case(runs: Sequence[Path | str], out: Path | None = None) -> E
         FileFormatError: a record of a run is damaged, or another run's.
         StorageError: not a run, damaged or changed since; or the files cannot be written.
     """
-    folders = [Path(one) for one in runs]
+    folders: list[Path] = list(given.runs)  # type: ignore[arg-type]  # its form makes them so
     if not folders:
         raise InputError("a safety case is of one run at least, got none")
     seen: set[Path] = set()
@@ -180,7 +224,11 @@ def export_safety_case(runs: Sequence[Path | str], out: Path | None = None) -> E
         if one.resolve() in seen:
             raise InputError(f"{one}: a safety case takes each run once, and it is given twice")
         seen.add(one.resolve())
-    folder = out or (folders[0] / FOLDER if len(folders) == 1 else Path(FOLDER))
+    folder = (
+        Path(given.out)
+        if given.out
+        else (folders[0] / FOLDER if len(folders) == 1 else Path(FOLDER))
+    )
     found = [read_facts(one) for one in folders]
     if folder.resolve() in seen:
         raise InputError(f"{folder}: is the folder of a run; choose another --out")

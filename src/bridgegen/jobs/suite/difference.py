@@ -6,18 +6,21 @@ import re
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 from bridgegen.base.errors import BridgeGenError, InputError, Interrupted
-from bridgegen.engine.options import SearchOptions
+from bridgegen.base.statistics import clopper_pearson
+from bridgegen.engine.options import SearchOptions, called_with
+from bridgegen.jobs.frame import JobCallbacks, Table
 from bridgegen.jobs.search import Run, resume, run_search
 from bridgegen.jobs.search.campaign import SearchCallbacks
 from bridgegen.jobs.suite.evaluate import Job, pipeline_of
+from bridgegen.jobs.suite.options import BUDGET, DIFF, DiffOptions
 from bridgegen.jobs.suite.results import EntryResult, RowResult, Verdict
 from bridgegen.jobs.suite.rows import is_sample
-from bridgegen.jobs.suite.suite import SuiteRun
+from bridgegen.jobs.suite.suite import SuiteRun, run_entries
 from bridgegen.results.store.run_file import FILE
 from bridgegen.search.triage.bound import too_few
 from bridgegen.search.triage.record import NOT_JUDGED
@@ -90,14 +93,8 @@ class Difference:
         Source: Clopper and Pearson, Biometrika 26 (1934) 404. It holds where variations are a
         sample, as those of a logical scenario are; not where they are all that there are.
         """
-        from scipy.stats import binomtest
-
         counts = self.counts
-        n = len(self.rows) - counts["not comparable"]
-        if not n:
-            return 0.0, 1.0
-        found = binomtest(counts[change], n).proportion_ci(0.95, "exact")
-        return float(found.low), float(found.high)
+        return clopper_pearson(counts[change], len(self.rows) - counts["not comparable"])
 
     @property
     def p_value(self) -> float:
@@ -155,9 +152,6 @@ def _change(
 FOLDER = "worse"
 """In a suite's folder, that of the searches, a run each."""
 
-BUDGET = 300
-"""Evaluations of a search, each with both egos."""
-
 ALGORITHM = "es"
 """It finds the most failure modes with few evaluations; see docs/decisions/search.md."""
 
@@ -185,27 +179,13 @@ class WorseThan:
     problem: str = ""
 
 
-@dataclass(frozen=True)
-class WorseCallbacks:
-    """Called as searches progress, all from the same thread.
-
-    Attributes:
-        begun: with the name of the entry that is searched next, its number from 0, and how many
-            there are.
-        batch: with the evaluations of that search so far.
-    """
-
-    begun: Callable[[str, int, int], None] = lambda entry, number, count: None
-    batch: Callable[[int], None] = lambda evaluations: None
-
-
 def search_worse(
     suite: SuiteRun,
     egos: tuple[str, str],
     *,
     budget: int = BUDGET,
     seed: int = 0,
-    callbacks: WorseCallbacks | None = None,
+    callbacks: JobCallbacks | None = None,
 ) -> tuple[WorseThan, ...]:
     """Search each scenario of a suite for where the second ego fails and the first does not.
 
@@ -226,7 +206,7 @@ def search_worse(
         Interrupted: Ctrl-C; what is done is kept.
         StorageError: a folder cannot be written.
     """
-    callbacks = callbacks or WorseCallbacks()
+    callbacks = callbacks or JobCallbacks()
     if not budget:
         return ()
     first, second = egos
@@ -240,9 +220,15 @@ def search_worse(
     ]
     found = []
     for number, job in enumerate(jobs):
-        callbacks.begun(job.entry.name, number, len(jobs))
-        found.append(_searched(job, first, suite.folder / FOLDER, budget, seed, callbacks))
+        facts = f"{number + 1} of {len(jobs)}: {job.entry.name}"
+        progress = partial(_show, callbacks, budget, facts)
+        progress(0)
+        found.append(_searched(job, first, suite.folder / FOLDER, budget, seed, progress))
     return tuple(found)
+
+
+def _show(callbacks: JobCallbacks, budget: int, facts: str, evaluations: int) -> None:
+    callbacks.progress("searching", evaluations, budget, facts)
 
 
 def _is_searched(job: Job) -> bool:
@@ -251,14 +237,14 @@ def _is_searched(job: Job) -> bool:
 
 
 def _searched(
-    job: Job, first: str, home: Path, budget: int, seed: int, callbacks: WorseCallbacks
+    job: Job, first: str, home: Path, budget: int, seed: int, progress: Callable[[int], None]
 ) -> WorseThan:
     """Search one scenario, resume the search, or read what it found."""
     options = SearchOptions.of(
         job.options, ego=job.ego, worse_than=first, distribution=job.entry.distribution,
         algorithm=ALGORITHM, budget=budget, seed=seed, simulator=job.simulator, causes=True,
     )  # fmt: skip
-    how = SearchCallbacks(batch=lambda progress: callbacks.batch(progress.evaluations))
+    how = SearchCallbacks(batch=lambda batch: progress(batch.evaluations))
     name = job.entry.name
     folder = home / _folder_name(job, replace(job, ego=first), options)
     try:
@@ -288,3 +274,70 @@ def _folder_name(job: Job, first: Job, options: SearchOptions) -> str:
     facts = [job.entry.digest, job.driver_digest, first.driver_digest, repr(options)]
     short = hashlib.sha256(json.dumps(facts).encode()).hexdigest()[:8]
     return f"{re.sub(r'[^A-Za-z0-9._-]+', '-', job.entry.name)}-{short}"
+
+
+# --- The job: a suite with two egos, their difference, and searches ---
+
+
+@dataclass(frozen=True)
+class DriverDifference:
+    """Two drivers compared on the same variations, and by searches.
+
+    Attributes:
+        suite: of both.
+        difference: of the first from the second, variation by variation.
+        searches: for where the second is worse, of each logical scenario.
+        page: that shows all this.
+    """
+
+    suite: SuiteRun
+    difference: Difference
+    searches: tuple[WorseThan, ...]
+    page: Path
+
+    @property
+    def work(self) -> str:
+        """How much was done."""
+        searched = sum(one.evaluations for one in self.searches)
+        return f"{self.suite.work}, {searched:,} evaluations of searches"
+
+    def to_json(self) -> Any:
+        """Return counts, what is broken or fixed, and the searches as JSON's types."""
+        from bridgegen.jobs.suite.shown import json_of_difference
+
+        return json_of_difference(self)
+
+    def shown(self) -> Sequence[str | Table]:
+        """Return what is broken and fixed, with intervals, then what searches found."""
+        from bridgegen.jobs.suite.shown import difference_shown
+
+        return difference_shown(self)
+
+
+@called_with(DiffOptions)
+def compare_drivers(given: DiffOptions) -> DriverDifference:
+    """Compare two drivers on the same variations, and search for where the second is worse.
+
+    Returns:
+        What the second breaks and fixes; it is resumed as `run_suite` is.
+
+    Raises:
+        InputError: no scenario is found, there are not two drivers, or an argument breaks a rule.
+        StorageError: the folder holds something else, or cannot be written.
+        Interrupted: Ctrl-C; what is done is kept.
+    """
+    from bridgegen.jobs.suite.page import write_suite_page
+
+    if len(given.egos) != 2 or given.egos[0] == given.egos[1]:
+        raise InputError(
+            f"two different drivers are compared: --ego A --ego B, got {', '.join(given.egos)}"
+        )
+    egos = (given.egos[0], given.egos[1])
+    suite = run_entries(DIFF, given)
+    searches = search_worse(
+        suite, egos, budget=given.budget, seed=given.seed, callbacks=given.callbacks
+    )
+    given.callbacks.stage("page")
+    page = write_suite_page(suite, suite.jobs, searches=searches)
+    found = difference(suite.of_ego(egos[0]), suite.of_ego(egos[1]), egos)
+    return DriverDifference(suite, found, searches, page)

@@ -19,9 +19,10 @@ from bridgegen.jobs.search.exported import FOLDER, exported_scenarios, read_fact
 from bridgegen.jobs.search.run import Run
 from bridgegen.jobs.suite.entries import RESULTS, Entry, find_entries
 from bridgegen.jobs.suite.evaluate import Job, evaluate, pipeline_of, rows_of_job
+from bridgegen.jobs.suite.options import SAMPLES
 from bridgegen.jobs.suite.replay import job_of, refuse_code
 from bridgegen.jobs.suite.results import EntryResult
-from bridgegen.jobs.suite.suite import SAMPLES, read_suite
+from bridgegen.jobs.suite.suite import read_suite
 from bridgegen.openx.file_scenario import FileScenario
 from bridgegen.openx.openscenario.declarations import CAUSE
 from bridgegen.results.store.run_file import FILE as RUN_FILE

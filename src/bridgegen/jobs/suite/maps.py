@@ -2,7 +2,6 @@
 
 import hashlib
 import json
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -31,7 +30,7 @@ FOLDER = "maps"
 
 
 def map_suite(
-    suite: SuiteRun, cells: Callable[[int, int], None] = lambda done, total: None
+    suite: SuiteRun, callbacks: JobCallbacks | None = None
 ) -> tuple[PreventabilityMap, ...]:
     """Map each scenario of a suite that has a grid of its own, with all egos.
 
@@ -39,7 +38,7 @@ def map_suite(
 
     Args:
         suite: finished.
-        cells: called with the number of cells of a map that are done, and of all.
+        callbacks: called as maps progress.
 
     Raises:
         StorageError: a map cannot be written.
@@ -63,9 +62,7 @@ def map_suite(
                 grid=axes,
                 others=others,
                 out=suite.folder / FOLDER / _folder(scenario, list(egos)),
-                callbacks=JobCallbacks(
-                    progress=lambda what, done, total, facts: cells(done, total)
-                ),
+                callbacks=callbacks or JobCallbacks(),
             )
         )
     return tuple(found)

@@ -2,12 +2,13 @@
 
 import json
 import os
+from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, replace
 from functools import cached_property
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from pydantic import ValidationError
 
@@ -15,14 +16,15 @@ from bridgegen import drivers as egos
 from bridgegen.base.disk import write_whole
 from bridgegen.base.errors import InputError, Interrupted, StorageError
 from bridgegen.base.records import parse_json
-from bridgegen.engine.options import CommonOptions, called_with
+from bridgegen.engine.options import called_with, range_problems
 from bridgegen.engine.workers.processes import cores
 from bridgegen.engine.workers.tasks import TaskPool
-from bridgegen.jobs.search.scenarios import PAPER
+from bridgegen.jobs import frame
 from bridgegen.jobs.suite.entries import RESULTS as FILE
 from bridgegen.jobs.suite.entries import find_entries, of_edition
 from bridgegen.jobs.suite.evaluate import Job, evaluate
 from bridgegen.jobs.suite.known_failures import KnownFailures
+from bridgegen.jobs.suite.options import SUITE, ScenariosOptions, SuiteOptions
 from bridgegen.jobs.suite.results import EntryResult, Header
 from bridgegen.results.store.sqlite import Lock
 from bridgegen.scenario.language.criteria import read_criterion
@@ -30,81 +32,13 @@ from bridgegen.scenario.language.protocols import read_clause
 from bridgegen.simulation import vehicles
 from bridgegen.simulation.choice import EMBEDDED, SimulatorChoice
 
+if TYPE_CHECKING:
+    from bridgegen.jobs.frame import Table
+    from bridgegen.jobs.preventability.result import PreventabilityMap
+
 LOCK = "suite.lock"
 MOST_BYTES = 2**30
 """Of a file of results."""
-
-SAMPLES = 100
-
-NOT_OF_A_SUITE = (
-    "ego", "worse_than", "metrics", "causes", "cause", "distribution", "axes", "fixed", "road_map",
-    "junction", "weights", "scale", "objectives", "adversary",
-)  # fmt: skip
-"""Options of a search that would mean nothing in a suite."""
-
-
-@dataclass(frozen=True)
-class SuiteCallbacks:
-    """Called as a suite progresses, all from the same thread.
-
-    Attributes:
-        begun: with the number of entries (of all egos), and of those that are done already.
-        ended: with each entry's result.
-    """
-
-    begun: Callable[[int, int], None] = lambda entries, done: None
-    ended: Callable[[EntryResult], None] = lambda result: None
-
-
-@dataclass(frozen=True, kw_only=True)
-class SuiteArguments:
-    """The arguments of ``run_suite``."""
-
-    files: Sequence[str | Path] | str | Path = field(
-        kw_only=False,
-        metadata={
-            "help": "Folders, scenario and distribution files, or names of the catalogue, of a "
-            "pack or of its scenarios."
-        },
-    )
-    egos: Sequence[str] = field(
-        default=(), metadata={"help": "Drivers to test; the scenarios' own by default."}
-    )
-    options: CommonOptions = field(
-        default_factory=CommonOptions,
-        metadata={
-            "help": "Options of all scenarios: criteria, critical, count, ideal, "
-            "vehicle, others, time_limit, empty_trigger."
-        },
-    )
-    samples: int = field(
-        default=SAMPLES,
-        metadata={
-            "help": "Evenly spread rows of each logical scenario without a matrix, besides its "
-            "defaults."
-        },
-    )
-    matrix: str | None = field(
-        default=None,
-        metadata={
-            "help": "Edition of the logical scenarios' matrices; all by default, ``none`` for "
-            "``samples`` instead."
-        },
-    )
-    seed: int = field(default=0, metadata={"help": "Of these rows."})
-    simulator: SimulatorChoice = field(
-        default=EMBEDDED, metadata={"help": "Simulator that runs the scenarios."}
-    )
-    workers: int | None = field(
-        default=None, metadata={"help": "Processes; as many as there are cores by default."}
-    )
-    out: Path | str | None = field(
-        default=None,
-        metadata={"help": "Folder of the results, new or to resume; ``suites/NAME`` by default."},
-    )
-    callbacks: SuiteCallbacks | None = field(
-        default=None, metadata={"help": "Called as the suite progresses."}
-    )
 
 
 @dataclass(frozen=True)
@@ -117,6 +51,8 @@ class SuiteRun:
         results: of each entry, in the order of entries, then of egos.
         settings: on which the results depend.
         jobs: of which they are the results, in the same order; empty where they were only read.
+        maps: preventability maps of its scenarios, in its folder.
+        page: that shows all this; None where none was written.
     """
 
     folder: Path
@@ -124,6 +60,8 @@ class SuiteRun:
     results: tuple[EntryResult, ...]
     settings: dict[str, Any]
     jobs: tuple[Job, ...] = ()
+    maps: "tuple[PreventabilityMap, ...]" = ()
+    page: Path | None = None
 
     @cached_property
     def known_failures(self) -> KnownFailures:
@@ -134,17 +72,55 @@ class SuiteRun:
         """
         return KnownFailures.of(self.results)
 
+    @property
+    def work(self) -> str:
+        """How many variations have a result."""
+        return f"{sum(len(one.rows) for one in self.results):,} variations"
+
     def of_ego(self, ego: str) -> tuple[EntryResult, ...]:
         """Return the results with one ego."""
         return tuple(one for one in self.results if one.ego == ego)
 
+    def to_json(self) -> Any:
+        """Return the verdicts, counts, points, clauses and maps as JSON's types."""
+        from bridgegen.jobs.suite.shown import json_of_suite
 
-@called_with(SuiteArguments)
-def run_suite(given: SuiteArguments) -> SuiteRun:
-    """Run scenario files with all their variations, with one ego or several.
+        return json_of_suite(self)
+
+    def shown(self) -> "Sequence[str | Table]":
+        """Return the entries, what does not pass first, then clauses and totals."""
+        from bridgegen.jobs.suite.shown import suite_shown
+
+        return suite_shown(self)
+
+
+@called_with(SuiteOptions)
+def run_suite(given: SuiteOptions) -> SuiteRun:
+    """Run scenario files with all their variations, with one ego or several, and write the page.
 
     Killed at any moment and called again, it resumes: what has been run with the same settings and
     unchanged files is kept. No result depends on the number of workers.
+
+    Returns:
+        The results, with maps and page. An entry that cannot run is one of them, with its problem.
+
+    Raises:
+        InputError: no scenario is found, or an argument breaks a rule.
+        StorageError: the folder holds something else, or cannot be written.
+        Interrupted: Ctrl-C; what is done is kept.
+    """
+    from bridgegen.jobs.suite.maps import map_suite
+    from bridgegen.jobs.suite.page import write_suite_page
+
+    suite = run_entries(SUITE, given)
+    maps = map_suite(suite, given.callbacks) if given.with_maps else ()
+    given.callbacks.stage("page")
+    return replace(suite, maps=maps, page=write_suite_page(suite, suite.jobs, maps=maps))
+
+
+@called_with(SuiteOptions)
+def evaluate_suite(given: SuiteOptions) -> SuiteRun:
+    """Run scenario files with all their variations; as `run_suite`, without maps and page.
 
     Returns:
         The results. An entry that cannot run is one of them, with its problem.
@@ -154,19 +130,37 @@ def run_suite(given: SuiteArguments) -> SuiteRun:
         StorageError: the folder holds something else, or cannot be written.
         Interrupted: Ctrl-C; what is done is kept.
     """
-    callbacks = given.callbacks or SuiteCallbacks()
+    return run_entries(SUITE, given)
+
+
+def run_entries(job: frame.Job, given: ScenariosOptions) -> SuiteRun:
+    """Run scenario files with all their variations; see `run_suite`.
+
+    Args:
+        job: for which; its command repeats this.
+        given: its options.
+
+    Returns:
+        The results. An entry that cannot run is one of them, with its problem.
+
+    Raises:
+        InputError: no scenario is found, or an argument breaks a rule.
+        StorageError: the folder holds something else, or cannot be written.
+        Interrupted: Ctrl-C; what is done is kept.
+    """
     files = [given.files] if isinstance(given.files, str | Path) else list(given.files)
-    _check(given)
+    simulator = given.simulator if isinstance(given, SuiteOptions) else EMBEDDED
+    _check(given, simulator)
     entries = of_edition(find_entries(files), given.matrix)
     drivers = tuple(dict.fromkeys(given.egos)) or ("",)
     folder = Path(given.out) if given.out is not None else _folder(files)
-    settings = _settings(given)
+    settings = _settings(given, simulator)
     jobs = [
         Job(
             one,
             ego or None,
-            given.options,
-            given.simulator,
+            given.of_each,
+            simulator,
             given.samples,
             given.seed,
             given.matrix,
@@ -183,11 +177,11 @@ def run_suite(given: SuiteArguments) -> SuiteRun:
     try:
         done = _done(path, settings, jobs)
         waiting = [job for job in jobs if (job.entry.name, job.ego or "") not in done]
-        callbacks.begun(len(jobs), len(done))
-        _run(waiting, given.workers, path, done, callbacks)
+        given.callbacks.compile()
+        _run(waiting, given, path, done, len(jobs))
     except KeyboardInterrupt:
         done = _done(path, settings, jobs)
-        again = f"bridgegen suite … --out {folder}"
+        again = frame.command_of(job.name, given, folder)
         raise Interrupted(folder, len(done), len(jobs), what="entries", command=again) from None
     finally:
         lock.release()
@@ -208,30 +202,17 @@ def read_suite(folder: Path) -> SuiteRun:
     return SuiteRun(folder, egos, tuple(results), header.settings)
 
 
-def _check(given: SuiteArguments) -> None:
-    problems = []
+def _check(given: ScenariosOptions, simulator: SimulatorChoice) -> None:
+    problems = range_problems(given)
     for name in given.egos:
-        egos.get(name, (), given.options.time_limit)
-    vehicle = given.options.vehicle
-    if vehicle is not None:
-        vehicles.require(vehicle)
-        if vehicle != vehicles.KINEMATIC and given.simulator.name != EMBEDDED.name:
+        egos.get(name, (), given.time_limit)
+    if given.vehicle is not None:
+        vehicles.require(given.vehicle)
+        if given.vehicle != vehicles.KINEMATIC and simulator.name != EMBEDDED.name:
             problems.append(
-                f"the vehicle '{vehicle}' is of the embedded simulator; {given.simulator.name} "
+                f"the vehicle '{given.vehicle}' is of the embedded simulator; {simulator.name} "
                 f"moves the ego in its own way (--vehicle {vehicles.KINEMATIC})"
             )
-    if given.samples < 0:
-        problems.append(f"samples must be at least 0, got {given.samples}")
-    if given.workers is not None and given.workers < 1:
-        problems.append(f"workers must be at least 1, got {given.workers}")
-    if given.options.objective and PAPER in given.options.objective and given.options.critical:
-        problems.append("the objective 'paper' says what is critical; leave --critical out")
-    default = CommonOptions()
-    problems += [
-        f"a suite takes no option '{name}'"
-        for name in NOT_OF_A_SUITE
-        if getattr(given.options, name) != getattr(default, name)
-    ]
     if problems:
         raise InputError(*problems)
 
@@ -245,18 +226,17 @@ def _folder(files: Sequence[str | Path]) -> Path:
     return folder
 
 
-def _settings(given: SuiteArguments) -> dict[str, Any]:
+def _settings(options: ScenariosOptions, simulator: SimulatorChoice) -> dict[str, Any]:
     """Return what results depend on besides the files, as JSON's types."""
-    options = given.options
     return {
-        "samples": given.samples,
-        "matrix": given.matrix,
-        "seed": given.seed,
-        "simulator": given.simulator.name,
-        "simulator_settings": dict(given.simulator.settings),
+        "samples": options.samples,
+        "matrix": options.matrix,
+        "seed": options.seed,
+        "simulator": simulator.name,
+        "simulator_settings": dict(simulator.settings),
         "criteria": [dict(one) for one in options.criteria],
         "critical": options.critical,
-        "objective": dict(options.objective) if options.objective else None,
+        "objective": None,  # each scenario's own; earlier versions took one for all
         "count": options.count,
         "ideal": list(options.ideal),
         "vehicle": options.vehicle,
@@ -269,13 +249,21 @@ def _settings(given: SuiteArguments) -> dict[str, Any]:
 
 def _run(
     jobs: Sequence[Job],
-    workers: int | None,
+    given: ScenariosOptions,
     path: Path,
     done: dict[tuple[str, str], EntryResult],
-    callbacks: SuiteCallbacks,
+    total: int,
 ) -> None:
     """Run entries, and append each result to the file as it is there."""
-    at_once = min(workers or cores(), len(jobs))
+    at_once = min(given.workers or cores(), len(jobs))
+    number: Counter[str] = Counter()
+
+    def show() -> None:
+        facts = [f"{number[one]} {one}" for one in ("not judged", "not run") if number[one]]
+        facts = [f"{number['failed']} failed", *facts]
+        given.callbacks.progress("scenarios", len(done), total, ", ".join(facts))
+
+    show()
 
     def ended(job: Job, result: EntryResult | None, crash: str | None) -> None:
         if result is None:
@@ -285,7 +273,8 @@ def _run(
             )  # fmt: skip
         done[job.entry.name, job.ego or ""] = result
         _append(path, result.model_dump_json() + "\n")
-        callbacks.ended(result)
+        number[result.verdict] += 1
+        show()
 
     if at_once > 1:
         TaskPool(jobs, work, ended=ended).run(at_once)

@@ -6,7 +6,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from bridgegen.assess.metrics.pet import pet
+from bridgegen.assess.metrics.times import pet
 from bridgegen.base.arrays import Bool
 from bridgegen.recordings.events.event import NOT_WHOLE, Events, events_of
 from bridgegen.recordings.events.pace import apart, pace_changes, set_off_instants

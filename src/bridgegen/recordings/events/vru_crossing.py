@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from bridgegen.assess.conflict._geometry_kernels import extent, hidden
-from bridgegen.assess.metrics.motion import motion
+from bridgegen.assess.metrics.metric import motion
 from bridgegen.base.arrays import Float, Int
 from bridgegen.drivers.kinds import BICYCLE, PEDESTRIAN
 from bridgegen.recordings.events.changes import LaneChanges

@@ -10,6 +10,7 @@ import numpy.typing as npt
 from bridgegen.base.arrays import Bool, Float, Int
 from bridgegen.base.errors import FileFormatError, InputError
 from bridgegen.drivers.kinds import BICYCLE, CAR, MOTORCYCLE, PEDESTRIAN, TRUCK
+from bridgegen.recordings import TIME_STEP
 from bridgegen.recordings.readers import quality as plausibility
 from bridgegen.recordings.readers import smoothing
 from bridgegen.recordings.readers import smoothing as cuts
@@ -17,8 +18,6 @@ from bridgegen.recordings.readers.quality import Quality, Rule
 from bridgegen.recordings.readers.states import headings, usual_box, velocities
 from bridgegen.recordings.readers.table import UNKNOWN_KIND, RecordedTraffic, kind_in_words, wrap
 
-TIME_STEP = 0.05
-"""That of most scenarios of the catalogue [s]."""
 LEAST_STEP, MOST_STEP = 0.01, 1.0  # s
 SAME = 1e-6  # s
 COLUMNS = ("time", "x", "y", "heading", "vx", "vy", "acceleration")

@@ -1,5 +1,7 @@
 """Columns of large comma-separated files, read in chunks of bounded size."""
 
+import csv
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,15 +12,6 @@ import numpy.typing as npt
 from bridgegen.base.arrays import Float, Int
 from bridgegen.base.errors import FileFormatError
 from bridgegen.openx.xml import read_bytes
-from bridgegen.recordings.readers._csv_kernels import (
-    BAD_QUOTE,
-    COMMA,
-    FEW_FIELDS,
-    MANY_FIELDS,
-    NOT_A_NUMBER,
-    SPACE,
-    read_lines,
-)
 
 CHUNK = 2**24  # bytes
 MOST_BYTES = 8 * 2**30
@@ -76,7 +69,7 @@ def read_columns(
                 head = header(first)
                 _check(path, head, [*numbers, *texts])
             wanted = [*numbers, *(name for name in optional if name in head)]
-            reading = _Reading(path, head, wanted, list(texts), COMMA if names is None else SPACE)
+            reading = _Reading(path, head, wanted, list(texts), "," if names is None else None)
             rest = b""
             while chunk := file.read(CHUNK):
                 whole, cut, rest = (rest + chunk).rpartition(b"\n")
@@ -84,8 +77,10 @@ def read_columns(
                     raise FileFormatError(
                         f"{path}: a line may have {LONGEST_LINE} bytes, one has more"
                     )
-                reading.add(whole + cut)
-            reading.add(rest + b"\n" if rest else b"")
+                if cut:
+                    reading.add(whole)
+            if rest:
+                reading.add(rest)
     except OSError as error:
         raise FileFormatError(f"{path}: cannot be read: {error.strerror}") from None
     return reading.columns()
@@ -101,58 +96,113 @@ def _check(path: Path, head: list[str], wanted: list[str]) -> None:
 
 
 class _Reading:
-    """The lines of a file, chunk by chunk."""
+    """The lines of a file, chunk by chunk; the separator None is any run of spaces and tabs."""
 
     def __init__(
-        self, path: Path, head: list[str], numbers: list[str], texts: list[str], separator: int
+        self,
+        path: Path,
+        head: list[str],
+        numbers: list[str],
+        texts: list[str],
+        separator: str | None,
     ) -> None:
         self.path, self.head, self.separator = path, head, separator
         self.numbers, self.texts = numbers, texts
-        self.slot = np.full(len(head), -1, dtype=np.int64)
-        for k, name in enumerate(numbers):
-            self.slot[head.index(name)] = k
-        for k, name in enumerate(texts):
-            self.slot[head.index(name)] = -2 - k
+        self.at = [head.index(name) for name in numbers]
+        self.at_texts = [head.index(name) for name in texts]
         self.values: list[list[Float]] = [[] for _ in numbers]
         self.codes: list[list[Int]] = [[] for _ in texts]
         self.known: list[dict[str, int]] = [{} for _ in texts]
-        self.lines = 1 if separator == COMMA else 0
+        self.lines = 1 if separator else 0
         self.rows = 0
 
     def add(self, chunk: bytes) -> None:
-        if not chunk:
-            return
-        data = np.frombuffer(chunk, dtype=np.uint8)
-        most = chunk.count(b"\n")
-        values = np.empty((most, len(self.numbers)))
-        hashes = np.empty((most, len(self.texts)), dtype=np.int64)
-        spans = np.empty((most, len(self.texts), 2), dtype=np.int64)
-        found = np.zeros(4, dtype=np.int64)
-        read_lines(data, self.separator, len(self.head), self.slot, values, hashes, spans, found)
-        rows, lines, code, field = found.tolist()
-        if code:
-            raise FileFormatError(self._problem(chunk, lines, code, field))
-        self.lines += lines
-        self.rows += rows
-        if self.rows > MOST_LINES:
-            raise FileFormatError(f"{self.path}: may hold {MOST_LINES:,} lines, got more")
-        for k in range(len(self.numbers)):
-            self.values[k].append(values[:rows, k].copy())
-        for k in range(len(self.texts)):
-            self.codes[k].append(self._coded(k, chunk, hashes[:rows, k], spans[:rows, k]))
+        """Add whole lines, without the last line's break."""
+        lines = chunk.decode("utf-8", errors="replace").replace("\r\n", "\n").split("\n")
+        count = len(lines)
+        while lines and not lines[-1].strip():
+            lines.pop()
+        if lines:
+            if self.lines > self.rows + bool(self.separator):  # an empty line is before these
+                self._check_count([], 1 + self.rows + bool(self.separator))
+            values, texts = self._fast(lines) or self._line_by_line(lines)
+            self.rows += len(lines)
+            if self.rows > MOST_LINES:
+                raise FileFormatError(f"{self.path}: may hold {MOST_LINES:,} lines, got more")
+            for k in range(len(self.numbers)):
+                self.values[k].append(values[:, k].copy())
+            for k, column in enumerate(texts):
+                self.codes[k].append(self._coded(k, column))
+        self.lines += count
 
-    def _coded(self, k: int, chunk: bytes, hashes: Int, spans: Int) -> Int:
-        _, at, inverse = np.unique(hashes, return_index=True, return_inverse=True)
-        numbers = np.empty(len(at), dtype=np.int64)
-        for j in np.argsort(at):
-            begin, end = spans[at[j]].tolist()
-            text = chunk[begin:end].decode("utf-8", errors="replace").strip()
-            if len(self.known[k]) >= MOST_TEXTS:
+    def _fast(self, lines: list[str]) -> tuple[Float, list[list[str]]] | None:
+        """Return numbers and texts; None where a line may be wrong or has quotation marks."""
+        fields, separator = len(self.head), self.separator
+        if separator:
+            if {line.count(separator) for line in lines} != {fields - 1}:
+                return None
+        elif {len(line.split()) for line in lines} != {fields}:
+            return None
+        if any('"' in line for line in lines):
+            return None
+        try:
+            try:
+                values = self._loaded(lines)
+            except ValueError:
+                values = self._loaded([_filled(line) for line in lines])
+        except ValueError:
+            return None
+        if len(values) != len(lines) or np.isinf(values).any():
+            return None
+        return values, [[line.split(separator, k + 1)[k] for line in lines] for k in self.at_texts]
+
+    def _loaded(self, lines: list[str]) -> Float:
+        return np.loadtxt(lines, delimiter=self.separator, usecols=self.at, comments=None, ndmin=2)
+
+    def _line_by_line(self, lines: list[str]) -> tuple[Float, list[list[str]]]:
+        """Return numbers and texts of lines.
+
+        Raises:
+            FileFormatError: one has too few or many fields, or a field is no number.
+        """
+        values = np.empty((len(lines), len(self.at)))
+        texts: list[list[str]] = [[] for _ in self.at_texts]
+        for row, line in enumerate(lines):
+            number = self.lines + row + 1
+            try:
+                fields = next(csv.reader([line], strict=True)) if self.separator else line.split()
+            except csv.Error as error:
                 raise FileFormatError(
-                    f"{self.path}: {self.texts[k]} may have {MOST_TEXTS:,} values, got more"
-                )
-            numbers[j] = self.known[k].setdefault(text, len(self.known[k]))
-        return numbers[inverse]
+                    f"{self.path}, line {number}: a quotation mark is not closed, or stands amid "
+                    f"a field ({error})"
+                ) from None
+            self._check_count(fields, number)
+            for k, at in enumerate(self.at):
+                try:
+                    values[row, k] = _number(fields[at])
+                except ValueError:
+                    raise FileFormatError(
+                        f"{self.path}, line {number}: {self.head[at]} must be a number, got "
+                        f"'{fields[at].strip()[:40]}'"
+                    ) from None
+            for column, at in zip(texts, self.at_texts, strict=True):
+                column.append(fields[at])
+        return values, texts
+
+    def _check_count(self, fields: list[str], number: int) -> None:
+        if len(fields) != len(self.head):
+            raise FileFormatError(
+                f"{self.path}, line {number}: must have {len(self.head)} fields, got {len(fields)}"
+            )
+
+    def _coded(self, k: int, column: list[str]) -> Int:
+        known = self.known[k]
+        codes = [known.setdefault(text.strip(), len(known)) for text in column]
+        if len(known) > MOST_TEXTS:
+            raise FileFormatError(
+                f"{self.path}: {self.texts[k]} may have {MOST_TEXTS:,} values, got more"
+            )
+        return np.array(codes, dtype=np.int64)
 
     def columns(self) -> Columns:
         if not self.rows:
@@ -167,18 +217,25 @@ class _Reading:
         }
         return Columns(numbers, texts)
 
-    def _problem(self, chunk: bytes, line: int, code: int, field: int) -> str:
-        place = f"{self.path}, line {self.lines + line}"
-        if code in (FEW_FIELDS, MANY_FIELDS):
-            more = "more" if code == MANY_FIELDS else str(field)
-            return f"{place}: must have {len(self.head)} fields, got {more}"
-        if code == BAD_QUOTE:
-            return f"{place}: a quotation mark is not closed"
-        assert code == NOT_A_NUMBER
-        text = chunk.split(b"\n", line)[line - 1].decode("utf-8", errors="replace")
-        parts = text.split(",") if self.separator == COMMA else text.split()
-        shown = parts[field].strip()[:40] if field < len(parts) else ""
-        return f"{place}: {self.head[field]} must be a number, got '{shown}'"
+
+def _filled(line: str) -> str:
+    """Return a line with "nan" in its empty fields."""
+    if ",," in line:
+        line = line.replace(",,", ",nan,").replace(",,", ",nan,")
+    return f"{'nan' * line.startswith(',')}{line}{'nan' * line.endswith(',')}"
+
+
+def _number(text: str) -> float:
+    """Return a finite number; NaN for an empty field.
+
+    Raises:
+        ValueError: it is none.
+    """
+    text = text.strip()
+    value = float(text) if text else math.nan
+    if math.isinf(value) or "_" in text or not text.isascii():
+        raise ValueError
+    return value
 
 
 def whole_numbers(path: Path, name: str, values: Float, head: int = 1) -> npt.NDArray[np.int64]:

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from bridgegen.assess.metrics.d_min import first_closest
+from bridgegen.assess.metrics.distances import first_closest
 from bridgegen.base.arrays import Bool, Float
 from bridgegen.results.confirmation.differences import (
     PARTED,

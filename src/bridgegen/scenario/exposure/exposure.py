@@ -21,6 +21,7 @@ import scipy
 
 from bridgegen.base.arrays import Bool, Float, as_float
 from bridgegen.base.errors import InputError
+from bridgegen.base.statistics import clopper_pearson
 from bridgegen.scenario.exposure.dependence import GaussianCopula
 from bridgegen.scenario.exposure.marginals import Conditional, Marginal
 from bridgegen.scenario.language.constraints import order
@@ -251,7 +252,7 @@ class Exposure:
         while tried < _TRIED or (kept < _ENOUGH and tried < _MOST_TRIED):
             X, good = self._proposed(_ESTIMATE, tried // _BLOCK)
             if kept == tried and good.all() and tried + len(X) >= _TRIED:
-                return FeasibleShare(1.0, _lower_end(_TRIED, _TRIED), 1.0, _TRIED, {})
+                return FeasibleShare(1.0, *clopper_pearson(_TRIED, _TRIED), _TRIED, {})
             for rule, bad in self.broken(X):
                 broken[rule] = broken.get(rule, 0) + int(bad.sum())
             tried, kept = tried + len(X), kept + int(good.sum())
@@ -264,8 +265,7 @@ class Exposure:
                 f"scenario's constraints, got {kept} of {tried} random rows; {share:.4%} break "
                 f"'{rule}'{at(self.place)}"
             )
-        high = 1.0 if kept == tried else 1.0 - _lower_end(tried - kept, tried)
-        return FeasibleShare(kept / tried, _lower_end(kept, tried), high, tried, shares)
+        return FeasibleShare(kept / tried, *clopper_pearson(kept, tried), tried, shares)
 
     def log_density(self, X: npt.ArrayLike) -> Float:
         """Return the natural logarithm of the density of rows, conditioned on the feasible set.
@@ -464,8 +464,3 @@ class Exposure:
                 yield one.kind.rule(name, one.low, one.high), outside
             for rule, bad in self.scenario.broken(table).items():
                 yield rule, bad
-
-
-def _lower_end(kept: int, tried: int) -> float:
-    """Return the lower end of the exact 95 % interval of a share (Clopper and Pearson, 1934)."""
-    return float(scipy.special.betaincinv(kept, tried - kept + 1, 0.025)) if kept else 0.0

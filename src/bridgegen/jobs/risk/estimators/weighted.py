@@ -17,9 +17,12 @@ import scipy.special
 import scipy.stats
 
 from bridgegen.base.arrays import Float, Int
+from bridgegen.base.statistics import clopper_pearson
 from bridgegen.jobs.risk.estimators.problem import SCORE
 
 LEVEL = 0.95
+ONE_SIDED = 0.9
+"""The two-sided level whose upper end is the one-sided bound of `LEVEL`."""
 FEWEST_HITS = 30.0
 """Effective number of hits below which an interval of unequal weights is not believed."""
 
@@ -133,11 +136,8 @@ def of_counts(hits: int, rows: int, each: float) -> Probability:
     if not rows:
         return Probability(0.0, 0.0, 1.0, 1.0)
     factor = rows * float(each)
-    tail = 0.5 * (1.0 - LEVEL)
-    beta = scipy.stats.beta.ppf
-    low = float(beta(tail, hits, rows - hits + 1)) if hits else 0.0
-    high = float(beta(1.0 - tail, hits + 1, rows - hits)) if hits < rows else 1.0
-    upper = float(beta(LEVEL, hits + 1, rows - hits)) if hits < rows else 1.0
+    low, high = clopper_pearson(hits, rows, LEVEL)
+    _, upper = clopper_pearson(hits, rows, ONE_SIDED)
     return Probability(hits / rows * factor, low * factor, high * factor, upper * factor)
 
 

@@ -1,26 +1,25 @@
-"""What is asked for seldom: relative speeds, accelerations, angles, contacts, distances to places.
-
-One function, for the code of all instants would grow by it.
-"""
-
-# mypy: allow-untyped-defs
-# Numba infers what kernels take; their wrappers are typed.
+"""What conditions measure: distances, relations, whether the lanes around an entity are clear."""
 
 import math
 
 from bridgegen.base.compiled import kernel
-from bridgegen.drivers._path_kernels import pose, project
+from bridgegen.drivers._path_kernels import COS, SIN, X, Y, pose, project
+from bridgegen.simulation._box_kernels import box_gap
 from bridgegen.simulation.embedded._codes import (
     ACCELERATING,
     ANGLE,
+    AT_MARK,
+    BOXES,
     CLEARANCE,
     CLOSELY,
     COLLISION,
     COLLISION_WITH_TYPE,
+    COUNTS,
     DISTANCE,
     END_OF_ROAD,
     ENTITY_SYSTEM,
     EQUAL,
+    EUCLIDIAN,
     GREATER,
     GREATER_EQUAL,
     LATERAL,
@@ -32,36 +31,343 @@ from bridgegen.simulation.embedded._codes import (
     LONGITUDINAL,
     MEASURE,
     OFFROAD,
+    OPPOSITE,
     OTHER,
     PATH_SYSTEM,
+    PLACE,
     PROBE,
+    RANGES,
+    RANGES_END,
     RELATIVE_ANGLE,
     ROAD_SYSTEM,
     RULE,
     SPEED_DIFFERENCE,
     SYSTEM,
+    TIME_HEADWAY,
     TIME_OF_DAY,
     TOTAL,
     VALUE,
     WHO,
     WITHIN,
 )
-from bridgegen.simulation.embedded.conditions._clearance_kernels import find_cell, is_clear
-from bridgegen.simulation.embedded.conditions._distance_kernels import (
-    apart,
-    look_ahead,
-)
+from bridgegen.simulation.embedded._motion_kernels import nearest
 from bridgegen.simulation.embedded.places._lane_kernels import (
+    FIRST,
+    LANE,
     LEAVE,
     NODE,
+    PAST,
+    ROAD,
     STATION,
     T_LEAVE,
+    TRAFFIC,
     WAY,
     T,
     span_at,
     turned,
 )
 from bridgegen.simulation.embedded.world import time_of_day
+
+# --- Distances between entities, and between an entity and a place, as conditions measure them ---
+
+
+# mypy: allow-untyped-defs
+# Numba infers what kernels take; their wrappers are typed.
+
+
+@kernel
+def look_ahead(p, k, plan, roads, state, record):
+    """Return (whether it is defined, the distance [m], time to collision [s] or headway [s]).
+
+    Distances are absolute. A headway is defined for an entity that moves towards a target not
+    behind it, a time to collision for one that approaches it.
+    """
+    kind, e, other = plan.probes[p, PROBE], plan.probes[p, WHO], plan.probes[p, OTHER]
+    measure, free = plan.probes[p, MEASURE], plan.probes[p, BOXES] == 1
+    x, y, h, v = record.x[e, k], record.y[e, k], record.h[e, k], record.v[e, k]
+    own = plan.bodies[e]
+    if other >= 0:
+        ox, oy, oh, w = (
+            record.x[other, k],
+            record.y[other, k],
+            record.h[other, k],
+            record.v[other, k],
+        )
+        length, width, ahead = (
+            plan.bodies[other, 0],
+            plan.bodies[other, 1],
+            plan.bodies[other, 2],
+        )
+    else:
+        at = state.marks if other == AT_MARK else roads.points
+        ox, oy = at[plan.probes[p, PLACE], 0], at[plan.probes[p, PLACE], 1]
+        if math.isnan(ox):  # there is no such place
+            return False, 0.0
+        oh = w = length = width = ahead = 0.0
+    if measure == EUCLIDIAN:
+        gap, closing = as_the_crow_flies(ox - x, oy - y, v, h, w, oh)
+        if free:
+            gap = apart(own, length, width, ahead, ox - x, oy - y, h, oh)
+    else:
+        turn, other_turn = 0.0, oh - h
+        along, aside = in_frame(ox - x, oy - y, h)
+        path = state.on[e]
+        if plan.probes[p, SYSTEM] != ENTITY_SYSTEM and path >= 0:
+            along, aside, turn, other_turn = along_path(
+                roads.paths[path], roads.counts[path], roads.steps[path], state.station[e],
+                x, y, h, ox, oy, oh,
+            )  # fmt: skip
+        gap = aside if measure == LATERAL else along
+        closing = v * math.cos(turn) - w * math.cos(other_turn)
+        if measure == LATERAL:
+            closing = v * math.sin(turn) - w * math.sin(other_turn)
+        if free:
+            gap = between_boxes(gap, own, length, width, ahead, turn, other_turn, measure)
+    if kind == DISTANCE:
+        return True, abs(gap)
+    if kind == TIME_HEADWAY:
+        is_ahead = gap >= 0.0 and (measure != EUCLIDIAN or in_frame(ox - x, oy - y, h)[0] >= 0.0)
+        return v > 0.0 and is_ahead, gap / max(v, 1e-9)
+    if gap == 0.0:
+        return True, 0.0
+    closes = closing > 0.0 if gap > 0.0 else closing < 0.0
+    return closes, gap / closing if closes else 0.0
+
+
+@kernel
+def as_the_crow_flies(dx, dy, v, h, w, other_h):
+    """Return (distance [m], how fast it shrinks [m/s]) of a body from another at (dx, dy)."""
+    gap = math.hypot(dx, dy)
+    closing = dx * (v * math.cos(h) - w * math.cos(other_h)) + dy * (
+        v * math.sin(h) - w * math.sin(other_h)
+    )
+    return gap, closing / max(gap, 1e-9)
+
+
+@kernel
+def in_frame(dx, dy, h):
+    """Return a vector's parts along a heading and to its left."""
+    c, s = math.cos(h), math.sin(h)
+    return c * dx + s * dy, c * dy - s * dx
+
+
+@kernel
+def along_path(path, n, ds, station, x, y, h, ox, oy, oh):
+    """Return how far another body is ahead along a path and to its left, and both bodies' turns.
+
+    A turn is by how much a body's heading differs from the path's direction at its foot. The body
+    itself is near ``station``; the other's foot is looked for all along the path, and beyond its
+    ends on the tangents.
+    """
+    s, d = project(path, n, ds, station, x, y)
+    q = nearest(path, n, ds, ox, oy)
+    q, t = project(path, n, ds, q, ox, oy)
+    if q <= 0.0:
+        q = min(path[0, COS] * (ox - path[0, X]) + path[0, SIN] * (oy - path[0, Y]), 0.0)
+    elif q >= (n - 1) * ds:
+        end = path[n - 1]
+        q += max(end[COS] * (ox - end[X]) + end[SIN] * (oy - end[Y]), 0.0)
+    return q - s, t - d, h - pose(path, n, ds, s)[2], oh - pose(path, n, ds, q)[2]
+
+
+@kernel
+def apart(own, length, width, ahead, dx, dy, h, other_h):
+    """Return the distance of two boxes [m], 0 where they touch."""
+    c, s, oc, os = math.cos(h), math.sin(h), math.cos(other_h), math.sin(other_h)
+    return box_gap(own, (length, width, ahead), dx, dy, c, s, oc, os)
+
+
+@kernel
+def between_boxes(gap, own, length, width, ahead, turn, other_turn, measure):
+    """Return the gap of two boxes along an axis [m], signed; 0 where they are side by side.
+
+    ``gap`` is that of their reference points along the axis; turns are from the axis that is
+    longitudinal.
+    """
+    c, s, oc, os = math.cos(turn), math.sin(turn), math.cos(other_turn), math.sin(other_turn)
+    if measure == LATERAL:
+        c, s, oc, os = s, c, os, oc
+    middle = gap + ahead * oc - own[2] * c
+    reach = 0.5 * (abs(c) * own[0] + abs(s) * own[1] + abs(oc) * length + abs(os) * width)
+    return math.copysign(max(abs(middle) - reach, 0.0), middle)
+
+
+# --- Which lanes a place is on, and whether the lanes around an entity are clear of others ---
+# Lanes are cut into cells, ``(Q, 8)`` float64: x, y [m] of four corners, one after the other around
+# it. A cell's node leads along its lane's traffic.
+
+
+# mypy: allow-untyped-defs
+# Numba infers what kernels take; their wrappers are typed.
+
+
+FAR = 50.0  # m, no cell is so large
+SLACK = 1e-6  # m², twice the area by which a place may lie outside: the rounding of a corner
+SAMPLE = 0.5  # m, between two places of a body that are looked at
+
+
+@kernel
+def find_cell(cells, first, x, y):
+    """Return the number of the first cell, from one on, that a place is in; -1 if there is none."""
+    for i in range(first, cells.shape[0]):
+        cell = cells[i]
+        if abs(cell[0] - x) > FAR or abs(cell[1] - y) > FAR:
+            continue
+        left = right = True
+        for a in range(4):
+            b = (a + 1) % 4
+            side = (cell[2 * b] - cell[2 * a]) * (y - cell[2 * a + 1]) - (
+                cell[2 * b + 1] - cell[2 * a + 1]
+            ) * (x - cell[2 * a])
+            left, right = left and side >= -SLACK, right and side <= SLACK
+        if left != right:  # both: a cell without an inside
+            return i
+    return -1
+
+
+@kernel
+def lanes_left(lane, other, way):
+    """Return how many lanes to the left another one lies, as one goes; there is no lane 0."""
+    count = other - lane
+    if (other > 0) != (lane > 0):
+        count -= 1 if count > 0 else -1
+    return count * way
+
+
+@kernel
+def is_in_ranges(count, first, last, ranges):
+    """Return whether so many lanes to the left lies within one of some ranges; none: it does."""
+    for i in range(first, last):
+        if ranges[i, 0] <= count <= ranges[i, 1]:
+            return True
+    return first == last
+
+
+@kernel
+def node_at(path, station, plan, roads, state, record):
+    """Return the node that a path leads along at a station."""
+    spans = roads.spans[path]
+    return int(spans[span_at(spans, roads.span_counts[path], station), NODE])
+
+
+@kernel
+def lane_at(node, x, y, plan, roads, state, record):
+    """Return the id of the lane of a node's road that a place is on; the node's own if on none."""
+    i = find_cell(roads.cells, 0, x, y)
+    while i >= 0:
+        if roads.nodes[roads.cell_nodes[i], ROAD] == roads.nodes[node, ROAD]:
+            return roads.nodes[roads.cell_nodes[i], LANE]
+        i = find_cell(roads.cells, i + 1, x, y)
+    return roads.nodes[node, LANE]
+
+
+@kernel
+def is_clear(p, k, plan, roads, state, record):
+    """Return whether none of probe p's entities is near its own entity, on the lanes that it names.
+
+    Near is within its distances ahead and behind, along the entity's path. Without such a lane, or
+    for an entity on no lane, there is no clearance.
+    """
+    e = plan.probes[p, WHO]
+    row, path = plan.clearances[plan.probes[p, OTHER]], state.along[p]
+    if path < 0:
+        return False
+    x, y = record.x[e, k], record.y[e, k]
+    table, n, ds = roads.paths[path], roads.counts[path], roads.steps[path]
+    s, _ = project(table, n, ds, nearest(table, n, ds, x, y), x, y)
+    node = node_at(path, s, plan, roads, state, record)
+    way, lane = roads.nodes[node, WAY], lane_at(node, x, y, plan, roads, state, record)
+    traffic, exists = roads.nodes[node, TRAFFIC], False
+    for i in range(roads.nodes[node, FIRST], roads.nodes[node, PAST]):
+        if roads.nodes[i, LANE] == lane:
+            traffic = roads.nodes[i, TRAFFIC]
+    for i in range(roads.nodes[node, FIRST], roads.nodes[node, PAST]):
+        count = lanes_left(lane, roads.nodes[i, LANE], way)
+        counts = row[OPPOSITE] == 1 or roads.nodes[i, TRAFFIC] == traffic
+        exists = exists or (
+            counts and is_in_ranges(count, row[RANGES], row[RANGES_END], plan.ranges)
+        )
+    if not exists:
+        return False
+    shift = lanes_left(roads.nodes[node, LANE], lane, way)
+    with_traffic = way == traffic
+    for other in range(record.x.shape[0]):
+        if (
+            other != e
+            and state.present[other]
+            and row[COUNTS + other] == 1
+            and is_near(p, k, other, s, plan, roads, state, record)
+            and is_on_lanes(p, k, other, path, shift, with_traffic, plan, roads, state, record)
+        ):
+            return False
+    return True
+
+
+@kernel
+def is_near(p, k, other, station, plan, roads, state, record):
+    """Return whether a body, or its reference point, is as near along the way as probe p asks."""
+    e, path = plan.probes[p, WHO], state.along[p]
+    along, _, _, turn = along_path(
+        roads.paths[path], roads.counts[path], roads.steps[path], station, record.x[e, k],
+        record.y[e, k], record.h[e, k], record.x[other, k], record.y[other, k], record.h[other, k],
+    )  # fmt: skip
+    reach = 0.0
+    if plan.probes[p, BOXES] == 1:
+        c, sine, body = math.cos(turn), math.sin(turn), plan.bodies[other]
+        along += body[2] * c
+        reach = 0.5 * (abs(c) * body[0] + abs(sine) * body[1])
+    forward = state.slots[plan.probes[p, LIMIT]]
+    backward = state.slots[plan.probes[p, WITHIN]]
+    return along - reach <= forward and along + reach >= -backward
+
+
+@kernel
+def is_on_lanes(p, k, other, path, shift, with_traffic, plan, roads, state, record):
+    """Return whether a body touches, or its reference point is on, the lanes that probe p names."""
+    x, y, h, body = record.x[other, k], record.y[other, k], record.h[other, k], plan.bodies[other]
+    if plan.probes[p, BOXES] == 0:
+        return is_on_lane(p, x, y, path, shift, with_traffic, plan, roads, state, record)
+    c, s = math.cos(h), math.sin(h)
+    n, m = max(math.ceil(body[0] / SAMPLE), 1), max(math.ceil(body[1] / SAMPLE), 1)
+    for i in range(n + 1):
+        u = body[2] + body[0] * (i / n - 0.5)
+        for j in range(m + 1):
+            w = body[1] * (j / m - 0.5)
+            at_x, at_y = x + u * c - w * s, y + u * s + w * c
+            if is_on_lane(p, at_x, at_y, path, shift, with_traffic, plan, roads, state, record):
+                return True
+    return False
+
+
+@kernel
+def is_on_lane(p, x, y, path, shift, with_traffic, plan, roads, state, record):
+    """Return whether a place is on one of the lanes that probe p names, along a path.
+
+    ``shift`` is how many lanes to the left of the path's the entity itself is.
+    """
+    row = plan.clearances[plan.probes[p, OTHER]]
+    table, n, ds = roads.paths[path], roads.counts[path], roads.steps[path]
+    node = node_at(path, nearest(table, n, ds, x, y), plan, roads, state, record)
+    way = roads.nodes[node, WAY]
+    i = find_cell(roads.cells, 0, x, y)
+    while i >= 0:
+        there = roads.cell_nodes[i]
+        if roads.nodes[there, ROAD] == roads.nodes[node, ROAD]:
+            count = lanes_left(roads.nodes[node, LANE], roads.nodes[there, LANE], way) - shift
+            counts = row[OPPOSITE] == 1 or (roads.nodes[there, TRAFFIC] == way) == with_traffic
+            if counts and is_in_ranges(count, row[RANGES], row[RANGES_END], plan.ranges):
+                return True
+        i = find_cell(roads.cells, i + 1, x, y)
+    return False
+
+
+# --- What is asked for seldom: relative speeds, accelerations, angles, contacts, distances to place
+# One function, for the code of all instants would grow by it.
+
+
+# mypy: allow-untyped-defs
+# Numba infers what kernels take; their wrappers are typed.
+
 
 AT_END = 1e-6  # m
 SAME_TIME = 1e-6  # s, the rounding of a date

@@ -2,18 +2,22 @@
 
 from bridgegen.simulation.embedded.drivers._chassis_kernels import move_chassis, move_multi_body
 from bridgegen.simulation.embedded.drivers._conflict_view_kernels import see_conflicts_of_rows
-from bridgegen.simulation.embedded.drivers._control_kernels import (
+from bridgegen.simulation.embedded.drivers._ego_kernels import (
     begin_control,
+    begin_waiting,
+    demand,
+    ego_is_through,
+    egos_are_through,
+    heed,
+    impose_rows,
     is_steered,
+    move_heeding,
     move_paced,
     move_steered,
 )
-from bridgegen.simulation.embedded.drivers._ego_kernels import demand, ego_is_through
-from bridgegen.simulation.embedded.drivers._imposed_kernels import egos_are_through, impose_rows
 from bridgegen.simulation.embedded.drivers._lane_view_kernels import LANES, see_lanes_of_rows
 from bridgegen.simulation.embedded.drivers._map_view_kernels import MEMORY, see_map_of_rows
 from bridgegen.simulation.embedded.drivers._observation_kernels import observe_rows
-from bridgegen.simulation.embedded.drivers._others_kernels import begin_waiting, heed, move_heeding
 from bridgegen.simulation.embedded.drivers._own_driver_kernels import (
     ACCELERATION,
     ANSWER,

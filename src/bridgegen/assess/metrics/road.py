@@ -1,10 +1,43 @@
-"""r_red: number of red lights that the ego ran."""
+"""Metrics of the road: the ego's offset from its lane's centre, red lights that it ran."""
 
 import numpy as np
 
 from bridgegen.assess.metrics.metric import Metric, recorded, steps, without_failed
 from bridgegen.base.arrays import Float, as_float
 from bridgegen.simulation.rollout import Rollout
+
+# --- l_offset: the ego's largest lateral offset from its lane's centre ---
+
+
+def l_offset(rollout: Rollout) -> Float:
+    """Return the ego's largest absolute lateral offset from its route's lane centre.
+
+    Returns:
+        ``(N,)`` float64 [m], ≥ 0, Frenet |d| of the reference point; NaN where the scenario
+        failed.
+
+    Source: paper, Table I.
+    """
+    from bridgegen.assess.metrics import _kernels
+
+    out = np.empty(rollout.shape[0])
+    _kernels.largest_offset(recorded(rollout, "offset"), steps(rollout), out)
+    return without_failed(rollout, out)
+
+
+L_OFFSET = Metric(
+    name="l_offset",
+    unit="m",
+    description="largest absolute lateral offset of the ego from its lane's centre",
+    sense="larger",
+    cap=0.0,
+    compute=l_offset,
+    needs="offset",
+)
+
+
+# --- r_red: number of red lights that the ego ran ---
+
 
 ASIDE = 3.5
 """[m] A body that crosses a stop line's prolongation farther than a lane's width from the route
@@ -25,7 +58,7 @@ def r_red(rollout: Rollout) -> Float:
 
     Source: paper, Table I.
     """
-    from bridgegen.assess.metrics import _light_kernels
+    from bridgegen.assess.metrics import _kernels as _light_kernels
 
     n, _, t = rollout.shape
     n_lights = rollout.lights.shape[1] if rollout.lights.size else 0
@@ -50,7 +83,7 @@ def r_red(rollout: Rollout) -> Float:
     return without_failed(rollout, out)
 
 
-METRIC = Metric(
+R_RED = Metric(
     name="r_red",
     unit="count",
     description="red lights that the ego ran",

@@ -1,13 +1,93 @@
-"""rss: missing share of the distance that Responsibility-Sensitive Safety requires."""
+"""Metrics of distance: the smallest, the speed at it, what Responsibility-Sensitive Safety asks."""
 
 from dataclasses import astuple, dataclass
 
 import numpy as np
 
-from bridgegen.assess.metrics.metric import Metric, without_failed
-from bridgegen.assess.metrics.motion import motion
-from bridgegen.base.arrays import Float
+from bridgegen.assess.metrics.metric import (
+    Metric,
+    distance,
+    motion,
+    recorded,
+    steps,
+    without_failed,
+)
+from bridgegen.base.arrays import Float, Int
 from bridgegen.simulation.rollout import Rollout
+
+# --- d_min: the ego's smallest distance to another participant ---
+
+
+def d_min(rollout: Rollout) -> Float:
+    """Return the smallest distance between the ego's oriented box and any other's.
+
+    Returns:
+        ``(N,)`` float64 [m], 0 at contact, +inf where there is no other entity, NaN where the
+        scenario failed.
+
+    Source: paper, Table I.
+    """
+    return without_failed(rollout, closest(rollout)[0])
+
+
+def closest(rollout: Rollout) -> tuple[Float, Int]:
+    """Return the smallest distance ``(N,)`` [m] and the first instant within 1e-9 m of it ``(N,)``.
+
+    The instant is −1 where there is no other entity.
+    """
+    from bridgegen.assess.metrics import _kernels
+
+    n = rollout.shape[0]
+    least, instant = np.empty(n), np.empty(n, dtype=np.int64)
+    _kernels.closest(distance(rollout), steps(rollout), least, instant)
+    return least, instant
+
+
+def first_closest(distance: Float) -> int:
+    """Return the first instant within 1e-9 m of the least of ``(T,)`` distances [m]."""
+    from bridgegen.assess.metrics import _kernels
+
+    return int((distance <= distance.min() + _kernels.TIE).argmax())
+
+
+D_MIN = Metric(
+    name="d_min",
+    unit="m",
+    description="smallest distance between the ego's oriented box and any other's",
+    sense="smaller",
+    cap=200.0,  # beyond a LiDAR's range
+    compute=d_min,
+)
+
+
+# --- v_d: the ego's speed at its smallest distance ---
+
+
+def v_d(rollout: Rollout) -> Float:
+    """Return the ego's speed at the moment of d_min, the first within 1e-9 m of it.
+
+    Returns:
+        ``(N,)`` float64 [m/s], ≥ 0, ahead or in reverse: on a collision the speed at first contact;
+        0 where there is no other entity; NaN where the scenario failed.
+
+    Source: paper, Table I.
+    """
+    _, instant = closest(rollout)
+    speed = recorded(rollout, "v")[np.arange(len(instant)), 0, instant]
+    return without_failed(rollout, np.where(instant < 0, 0.0, np.abs(speed)))
+
+
+V_D = Metric(
+    name="v_d",
+    unit="m/s",
+    description="ego speed at the moment of d_min",
+    sense="larger",
+    cap=0.0,
+    compute=v_d,
+)
+
+
+# --- rss: missing share of the distance that Responsibility-Sensitive Safety requires ---
 
 
 @dataclass(frozen=True)
@@ -60,7 +140,7 @@ def rss(rollout: Rollout, parameters: Parameters | None = None) -> Float:
     cars (2017), definitions 1 (following), 2 (opposite directions) with the same brakes for both,
     and 6 (lateral).
     """
-    from bridgegen.assess.metrics import _rss_kernels
+    from bridgegen.assess.metrics import _kernels as _rss_kernels
 
     m = motion(rollout)
     out = np.empty(len(m.n_steps))
@@ -71,7 +151,7 @@ def rss(rollout: Rollout, parameters: Parameters | None = None) -> Float:
     return without_failed(rollout, out)
 
 
-METRIC = Metric(
+RSS = Metric(
     name="rss",
     unit="1",
     description="largest share of the RSS safe distance that was missing, along and across",
