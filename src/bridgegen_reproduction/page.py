@@ -27,7 +27,7 @@ def html(document: Document) -> str:
     """Return the page; text is data in it, never markup."""
     fill = {
         "title": escape(document.title),
-        "css": style("jobs/compare/page.css") + _own("page.css"),
+        "css": style() + _own("page.css"),
         "facts": "".join(f"<li>{escape(one)}</li>" for one in document.facts),
         "nav": "".join(
             f'<a href="#{_anchor(one)}">{escape(one.title)}</a>' for one in document.sections

@@ -302,7 +302,7 @@ def ontology_docs(
     out: Annotated[Path, typer.Option(help="The page (.html).")] = Path("bridgegen-ontology.html"),
 ) -> None:
     """Write all classes and properties as one page."""
-    from bridgegen.scenario.ontology.docs import write_docs
+    from bridgegen.pages.ontology import write_docs
 
     write_docs(out)
     print(out)

@@ -33,6 +33,11 @@ def svg(width: float, height: float, label: str, parts: Iterable[Markup], kind: 
     )  # fmt: skip
 
 
+def points_of(pairs: Iterable[tuple[float, float]]) -> str:
+    """Return pixels as the attribute of a line or an area."""
+    return " ".join(f"{x:.1f},{y:.1f}" for x, y in pairs)
+
+
 class Plot:
     """A plot: marks are given in data units, and lie over those that were added before.
 
@@ -127,8 +132,7 @@ class Plot:
         return svg(*self.size, label, self._parts, kind)
 
     def _points(self, x: Float, y: Float) -> str:
-        pairs = zip(self._x(x).tolist(), self._y(y).tolist(), strict=True)
-        return " ".join(f"{a:.1f},{b:.1f}" for a, b in pairs)
+        return points_of(zip(self._x(x).tolist(), self._y(y).tolist(), strict=True))
 
 
 def ticks(low: float, high: float, most: int = 7) -> list[float]:
@@ -223,14 +227,14 @@ MOST_NUMBERS = 6
 """Points whose values are written beside them; more would overlap."""
 
 
-def trend(points: Sequence[Point], label: str) -> Markup:
+def trend(some: Sequence[Point], label: str) -> Markup:
     """Return a chart: a dot for each result with its interval, a line where the group changes.
 
     Args:
-        points: at least one, in the order of time.
+        some: at least one, in the order of time.
         label: of the picture.
     """
-    n, most = len(points), max(one.high for one in points)
+    n, most = len(some), max(one.high for one in some)
     top = next((one for one in (0.01, 0.02, 0.05, 0.1, 0.2, 0.5) if most <= one), 1.0)
     plot = Plot((340.0, 150.0), (0.0, n), (0.0, top), (44.0, 12.0, 18.0, 34.0))
     for value in (0.0, 0.5 * top, top):
@@ -238,17 +242,17 @@ def trend(points: Sequence[Point], label: str) -> Markup:
         plot.add("path", class_="grid", d=f"M{plot.left:g} {y:.1f}H{plot.right:g}")
         text = f"{100.0 * value:g}\N{NARROW NO-BREAK SPACE}%"
         plot.text(plot.left - 5.0, y + 4.0, text, "end")
-    starts = [i for i, one in enumerate(points) if not i or one.group != points[i - 1].group]
+    starts = [i for i, one in enumerate(some) if not i or one.group != some[i - 1].group]
     for start, end in zip(starts, [*starts[1:], n], strict=True):
         left, right = plot.at(start), plot.at(end)
-        room, (name, words) = max(3, int((right - left) / 6.0)), points[start].group
+        room, (name, words) = max(3, int((right - left) / 6.0)), some[start].group
         if start:
             plot.add("path", class_="new", d=f"M{left:.1f} {plot.top:g}V{plot.base:g}")
         short = name if len(name) <= room else f"…{name[-(room - 1) :]}"
         plot.add("text", short, element("title", words), x=0.5 * (left + right),
                  y=plot.base + 20.0, text_anchor="middle")  # fmt: skip
-    plot.line(np.arange(0.5, n), np.array([one.share for one in points]))
-    for i, one in enumerate(points):
+    plot.line(np.arange(0.5, n), np.array([one.share for one in some]))
+    for i, one in enumerate(some):
         x, y = plot.at(i + 0.5), plot.height(one.share)
         low, high = plot.height(one.low), plot.height(one.high)
         parts = [element("title", one.words)]
@@ -295,10 +299,9 @@ def ground(lines: Sequence[tuple[str, Float]], low: Float, high: Float, label: s
     scale = min((width - 20.0) / span[0], 220.0 / span[1])
     height = float(span[1] * scale) + 40.0
     parts = []
-    for kind, points in lines:
-        xy = np.array([10.0, height - 30.0]) + (points - low) * scale * np.array([1.0, -1.0])
-        text = " ".join(f"{x:.1f},{y:.1f}" for x, y in xy.tolist())
-        parts.append(element("polyline", class_=kind, points=text))
+    for kind, line in lines:
+        xy = np.array([10.0, height - 30.0]) + (line - low) * scale * np.array([1.0, -1.0])
+        parts.append(element("polyline", class_=kind, points=points_of(xy.tolist())))
     length = 10.0 ** np.floor(np.log10(0.4 * (width - 20.0) / scale))
     end = float(length * scale)
     parts.append(element("path", class_="scale", d=f"M10 {height - 8.0:.1f}h{end:.1f}"))

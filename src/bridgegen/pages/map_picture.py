@@ -1,6 +1,5 @@
 """A map from above as SVG: its roads, and its places by their ids."""
 
-import html
 from collections.abc import Callable, Collection, Iterator, Mapping
 from pathlib import Path
 from types import MappingProxyType
@@ -14,6 +13,7 @@ from bridgegen.openx.opendrive.lanes import points
 from bridgegen.openx.opendrive.model import OpenDrive
 from bridgegen.openx.opendrive.outline import AREAS, outline
 from bridgegen.openx.opendrive.site import road_ends
+from bridgegen.pages.charts import element, points_of
 
 SIDE = 1400.0
 """Length of the longer side of the picture in pixels."""
@@ -86,7 +86,7 @@ def map_picture(
     ]  # fmt: skip
     if fitting is not None:
         key = f"green: the scenario fits ({len(fitting) + len(roads)})"
-        body.append(f'<text class="key" x="12" y="18">{key}</text>')
+        body.append(element("text", key, class_="key", x=12, y=18))
     return (
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width:.0f} {height:.0f}" '
         f'role="img" aria-label="Map with its places"><style>{_STYLE}</style>'
@@ -97,8 +97,7 @@ def map_picture(
 def _areas(shapes: list[tuple[str, Float]], pixels: _Pixels) -> Iterator[str]:
     for kind, line in sorted(shapes, key=lambda one: one[0] in ("driving", "junction")):
         name = "area" if kind in ("driving", "junction") else "beside"
-        corners = " ".join(f"{x:.1f},{y:.1f}" for x, y in pixels(line).tolist())
-        yield f'<polygon class="{name}" points="{corners}"/>'
+        yield element("polygon", class_=name, points=points_of(pixels(line).tolist()))
 
 
 def _marks(model: OpenDrive, fitting: Collection[str] | None, pixels: _Pixels) -> Iterator[str]:
@@ -113,10 +112,8 @@ def _marks(model: OpenDrive, fitting: Collection[str] | None, pixels: _Pixels) -
         ((x, y),) = pixels(np.mean(ends, axis=0, keepdims=True)).tolist()
         name = "fits" if fitting is not None and junction.id in fitting else "ring"
         radius = 8.0 + 4.0 * len(junction.id)
-        yield (
-            f'<ellipse class="{name}" cx="{x:.1f}" cy="{y:.1f}" rx="{radius:g}" ry="12"/>'
-            f'<text x="{x:.1f}" y="{y:.1f}">{html.escape(junction.id)}</text>'
-        )
+        yield element("ellipse", class_=name, cx=x, cy=y, rx=radius, ry=12)
+        yield element("text", junction.id, x=x, y=y)
 
 
 def _lines(model: OpenDrive, stretches: Mapping[str, str], pixels: _Pixels) -> Iterator[str]:
@@ -128,12 +125,9 @@ def _lines(model: OpenDrive, stretches: Mapping[str, str], pixels: _Pixels) -> I
         road = model.road(road_id)
         s = np.linspace(0.0, road.length, 2 + int(road.length / _STEP))
         line = pixels(points(road, s, np.zeros(len(s))))
-        corners = " ".join(f"{x:.1f},{y:.1f}" for x, y in line.tolist())
         x, y = line[len(line) // 2].tolist()
         text = ", ".join(places)
-        yield (
-            f'<polyline class="road" points="{corners}"/>'
-            f'<rect class="fits" x="{x - 4 * len(text) - 6:.1f}" y="{y - 11:.1f}" '
-            f'width="{8 * len(text) + 12}" height="22" rx="11"/>'
-            f'<text x="{x:.1f}" y="{y:.1f}">{html.escape(text)}</text>'
-        )
+        yield element("polyline", class_="road", points=points_of(line.tolist()))
+        yield element("rect", class_="fits", x=x - 4 * len(text) - 6, y=y - 11,
+                      width=8 * len(text) + 12, height=22, rx=11)  # fmt: skip
+        yield element("text", text, x=x, y=y)

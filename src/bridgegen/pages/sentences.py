@@ -11,6 +11,7 @@ from bridgegen.assess.criteria import headline
 from bridgegen.base.arrays import Bool
 from bridgegen.base.statistics import wilson
 from bridgegen.pages.data import ReportData, RunSummary
+from bridgegen.pages.templates import counted
 from bridgegen.results.confirmation.words import sentences as verdicts
 
 NARROW = "\N{NARROW NO-BREAK SPACE}"
@@ -43,7 +44,7 @@ def _sentences(data: ReportData) -> list[str]:
     s = data.summary
     also = f", and with {s.baseline} to compare," if s.baseline else ""
     words = [
-        f"{_count(s.n_evaluations, 'concrete scenario')} of “{s.title}” "
+        f"{counted(s.n_evaluations, 'concrete scenario')} of “{s.title}” "
         f"{'was' if s.n_evaluations == 1 else 'were'} simulated with the driver {s.ego}{also} "
         f"on {s.road}, chosen by {s.algorithm} in {duration(s.wall_seconds)}."
     ]
@@ -136,8 +137,8 @@ def provenance(s: RunSummary) -> list[tuple[str, str]]:
         ("Baseline", s.baseline),
         ("Algorithm", s.algorithm),
         ("Seed", str(s.seed)),
-        ("Budget", _count(s.budget, "evaluation")),
-        ("Done", _count(s.n_evaluations, "evaluation") + ("" if s.finished else ", interrupted")),
+        ("Budget", counted(s.budget, "evaluation")),
+        ("Done", counted(s.n_evaluations, "evaluation") + ("" if s.finished else ", interrupted")),
         ("Started", s.started),
         ("BridgeGen", s.version),
     ]
@@ -213,7 +214,7 @@ def _implausible(data: ReportData) -> list[str]:
         return []
     part = share(n / data.summary.n_evaluations)
     return [
-        f"{_count(n, 'scenario')} ({part}) {'has' if n == 1 else 'have'} traffic that could not "
+        f"{counted(n, 'scenario')} ({part}) {'has' if n == 1 else 'have'} traffic that could not "
         f"happen and {'is' if n == 1 else 'are'} not counted."
     ]
 
@@ -227,14 +228,14 @@ def _worst_harm(data: ReportData) -> str:
     contact = critical & (e.findings.conflict == "contact")
     n_contact = int(np.count_nonzero(contact))
     n_near = int(np.count_nonzero(critical & (e.findings.conflict == "near miss")))
-    others = _count(n_near, "near miss")
+    others = counted(n_near, "near miss")
     if n_violations := int(np.count_nonzero(critical & _violates(e.findings))):
-        others += f", {_count(n_violations, 'violation')}"
+        others += f", {counted(n_violations, 'violation')}"
     if not n_contact and n_near < np.count_nonzero(critical):  # violations, or other criteria
         return f"{others} among them; no collision."
     if not n_contact:
         return f"{'It is a near miss' if n_near == 1 else 'All are near misses'}; no collision."
-    text = f"{_count(n_contact, 'collision')}"
+    text = f"{counted(n_contact, 'collision')}"
     severity = next((one.whole for one in e.metrics if one.name == "severity"), None)
     if severity is not None:
         worst = float(severity[contact].max())
@@ -255,7 +256,7 @@ def _worst(data: ReportData) -> str:
     n_hits = 0 if hits is None else int(np.count_nonzero(hits[ok] > 0))
     v_d = columns.get("v_d")
     if n_hits:
-        text = f"{_count(n_hits, 'scenario')} {'ends' if n_hits == 1 else 'end'} in a collision"
+        text = f"{counted(n_hits, 'scenario')} {'ends' if n_hits == 1 else 'end'} in a collision"
         if hits is not None and v_d is not None:
             top = v_d[ok & (hits > 0) & np.isfinite(v_d)]
             text += f", the fastest at {speed(float(top.max()))}" if top.size else ""
@@ -277,11 +278,6 @@ def _interval(s: RunSummary) -> str:
     low, high = wilson(s.n_critical, s.n_evaluations)
     digits = 1 if high - low > 0.01 else 2
     return f"{100.0 * low:.{digits}f} to {100.0 * high:.{digits}f}{NARROW}%"
-
-
-def _count(n: int, noun: str) -> str:
-    plural = "es" if noun.endswith("s") else "s"
-    return f"{n:,} {noun}{'' if n == 1 else plural}"
 
 
 def _at(evaluation: int | None) -> str:

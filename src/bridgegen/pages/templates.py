@@ -62,9 +62,7 @@ def _environment() -> "Environment":
         loader=PackageLoader("bridgegen", "."), autoescape=True, undefined=StrictUndefined,
         trim_blocks=True, lstrip_blocks=True, auto_reload=False,
     )  # fmt: skip
-    made.filters |= {
-        "counted": counted, "joined": joined, "number": number, "shown": shown, "when": when,
-    }  # fmt: skip
+    made.filters |= {"counted": counted, "shown": shown}
     made.globals["version"] = version("bridgegen")
     return made
 
@@ -121,8 +119,9 @@ def number(value: float) -> str:
 
 
 def counted(count: int, noun: str, many: str = "") -> str:
-    """Return a count with its noun: "1 run", "2,000 runs"."""
-    return f"{count:,} {noun if count == 1 else many or f'{noun}s'}"
+    """Return a count with its noun: "1 run", "2,000 runs", "3 near misses"."""
+    plural = many or noun + ("es" if noun.endswith("s") else "s")
+    return f"{count:,} {noun if count == 1 else plural}"
 
 
 def joined(names: Sequence[str], most: int = 4) -> str:

@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Sequence
 
 from bridgegen.jobs.mine.mine import CRITICAL, Mined, Summary
+from bridgegen.pages.templates import counted
 from bridgegen.recordings.conflicts.find import RecordedConflict
 from bridgegen.recordings.replays.write import Replay, moving_picture
 
@@ -38,7 +39,7 @@ def in_words(one: Summary) -> str:
     near = [each for each in one.conflicts if not each.is_contact]
     doubtful = sum(each.doubt != "" for each in near)
     touching = {p for each in one.conflicts if each.is_contact for p in (each.ego, each.other)}
-    text = f"{len(near):,} near miss{'' if len(near) == 1 else 'es'}"
+    text = counted(len(near), "near miss")
     if doubtful:
         text += f", {doubtful:,} of them with motion that could not happen"
     if touching:

@@ -14,6 +14,7 @@ from bridgegen.drivers.kinds import BICYCLE, MOTORCYCLE, NAMES, PEDESTRIAN
 from bridgegen.jobs.mine import near_misses as conflicts
 from bridgegen.jobs.mine.mine import CRITICAL, PATHS_SHOWN, Mined, Summary
 from bridgegen.pages import charts, exposure, templates
+from bridgegen.pages.templates import counted
 from bridgegen.recordings.cells import cell
 from bridgegen.recordings.events.playback import SHOWN, caption
 from bridgegen.recordings.events.tables import FOLDER, against_in_words, kind_rows, rates_in_words
@@ -160,15 +161,13 @@ def _csv(head: Iterable[str], rows: Iterable[Iterable[object]]) -> Iterator[byte
 
 
 def _facts(mined: Mined) -> Iterator[str]:
-    n = len(mined.recordings)
-    yield "1 recording" if n == 1 else f"{n:,} recordings"
+    yield counted(len(mined.recordings), "recording")
     yield f"{sum(sum(one.participants.values()) for one in mined.recordings):,} participants"
     yield f"{sum(one.hours for one in mined.recordings):.4g} h"
     yield f"{sum(one.kilometres for one in mined.recordings):.4g} km"
     yield f"cleaned at {mined.time_step:g} s"
     if mined.skipped:
-        count = len(mined.skipped)
-        yield "1 file skipped" if count == 1 else f"{count} files skipped"
+        yield f"{counted(len(mined.skipped), 'file')} skipped"
 
 
 def _grouped(pairs: Iterable[tuple[str, str]]) -> list[str]:
@@ -277,8 +276,7 @@ def lanes_in_words(found: LanesFound) -> str:
         else f", {found.vehicle_share:.1%} of the states \
 of vehicles that drive on them"
     )
-    count = len(found.carriageways)
-    ways = "1 carriageway" if count == 1 else f"{count:,} carriageways"
+    ways = counted(len(found.carriageways), "carriageway")
     return f"{SOURCES[found.source]}: {ways} with traffic{share}"
 
 

@@ -7,7 +7,7 @@ from bridgegen.base.arrays import Float
 from bridgegen.jobs.risk.options import WORDS
 from bridgegen.jobs.risk.outcomes import EVENTS
 from bridgegen.jobs.risk.result import Finding, ParameterShare, Risk
-from bridgegen.jobs.risk.text import data_sentence, elsewhere_sentence, sentence
+from bridgegen.jobs.risk.text import data_sentence, elsewhere_sentence, interval, sentence
 from bridgegen.pages import charts, templates
 from bridgegen.pages.templates import number
 
@@ -109,10 +109,8 @@ def _rates(risk: Risk, name: str | None) -> Iterator[tuple[str, str] | None]:
 
 
 def _cells(one: Finding) -> tuple[str, ...]:
-    p, hits = one.probability, f"{one.hits:,.0f}"
-    if p is None:
-        return "not known", one.doubt, "–", hits
-    return number(p.estimate), f"{number(p.low)} to {number(p.high)}", number(p.upper), hits
+    value, width, upper = interval(one.probability)
+    return value, width if one.probability else one.doubt, upper, f"{one.hits:,.0f}"
 
 
 def _intervals(risk: Risk) -> str:

@@ -9,6 +9,7 @@ from bridgegen.drivers import STORYBOARD, is_spec
 from bridgegen.jobs.safety_case.builder import Draft
 from bridgegen.jobs.safety_case.facts import Facts, Files
 from bridgegen.pages.scenario_page import story_lines
+from bridgegen.pages.templates import counted
 from bridgegen.scenario.language.parameters import Axis, Parameter
 from bridgegen.scenario.language.scenario import LogicalScenario
 from bridgegen.simulation.choice import EMBEDDED
@@ -25,7 +26,7 @@ def add_context(top: Draft, facts: Facts, files: Files) -> None:
     inputs = [f"file {one}" for one in files.inputs]
     top.add(
         "Context", f"{at}.1",
-        f"What was searched: {scenario.name}, {_count(len(searched), 'parameter')} over the "
+        f"What was searched: {scenario.name}, {counted(len(searched), 'parameter')} over the "
         "declared ranges, within the declared constraints.",
         details=[
             scenario.title,
@@ -127,10 +128,6 @@ def _value(one: Parameter, value: float) -> str:
 
 def _unit(one: Parameter) -> str:
     return "" if one.unit in _UNITLESS else f" {one.unit}"
-
-
-def _count(n: int, what: str) -> str:
-    return f"{n} {what}{'s' * (n != 1)}"
 
 
 def add_assumptions(strategy: Draft, egos: list[Facts]) -> None:

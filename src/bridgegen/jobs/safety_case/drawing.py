@@ -1,14 +1,14 @@
 """An argument drawn: where its elements are, and as SVG in the shapes of the notation."""
 
 import textwrap
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from html import escape
 from itertools import pairwise
 
 from markupsafe import Markup
 
 from bridgegen.jobs.safety_case.model import Element, RelationKind, SafetyCase
+from bridgegen.pages.charts import element, points_of
 
 # --- Where the elements of an argument are drawn: a head, and a column for each goal below it ---
 
@@ -228,98 +228,80 @@ def drawing(found: Layout, label: str) -> Markup:
         found: what is drawn.
         label: of the whole, for people who do not see it.
     """
-    parts = [
-        f'<svg class="gsn" role="img" aria-label="{escape(label)}" width="{found.width + 4:.0f}" '
-        f'height="{found.height + 4:.0f}" viewBox="-2 -2 {found.width + 4:.0f} '
-        f'{found.height + 4:.0f}">',
-        *map(_edge, found.edges),
-        *map(_element, found.boxes),
-        "</svg>",
-    ]
-    return Markup("".join(parts))
+    width, height = round(found.width + 4.0), round(found.height + 4.0)
+    return element(
+        "svg", *map(_edge, found.edges), *map(_element, found.boxes), class_="gsn", role="img",
+        aria_label=label, width=width, height=height, viewBox=f"-2 -2 {width} {height}",
+    )  # fmt: skip
 
 
-def _edge(edge: Edge) -> str:
-    line = " ".join(f"{x:.1f},{y:.1f}" for x, y in edge.points)
+def _edge(edge: Edge) -> Markup:
     (x0, y0), (x, y) = next(
         pair for pair in reversed([*pairwise(edge.points)]) if pair[0] != pair[1]
     )
     dx, dy = (x > x0) - (x < x0), (y > y0) - (y < y0)
-    back = [(x - 9 * dx - 4 * dy, y - 9 * dy - 4 * dx), (x - 9 * dx + 4 * dy, y - 9 * dy + 4 * dx)]
-    tip = " ".join(f"{a:.1f},{b:.1f}" for a, b in (back[0], (x, y), back[1]))
+    left = (x - 9 * dx - 4 * dy, y - 9 * dy - 4 * dx)
+    right = (x - 9 * dx + 4 * dy, y - 9 * dy + 4 * dx)
     kind = edge.kind.lower()
-    return f'<polyline class="{kind}" points="{line}"/><polygon class="tip {kind}" points="{tip}"/>'
+    return element("polyline", class_=kind, points=points_of(edge.points)) + element(
+        "polygon", class_=f"tip {kind}", points=points_of((left, (x, y), right))
+    )
 
 
-def _element(box: Box) -> str:
+def _element(box: Box) -> Markup:
     one = box.element
     kind = one.kind.removeprefix("Counter").lower()
     counter = " counter" if one.kind.startswith("Counter") else ""
     words = f"{one.id}: {one.statement.text}" + (f" ({one.status})" if one.status else "")
-    return (
-        f'<a href="#{escape(one.id)}" class="{kind}{counter} {_CLASS[one.status]}">'
-        f"<title>{escape(words)}</title>{_shape(box)}{_text(box)}{_marks(box)}</a>"
-    )
+    return element(
+        "a", element("title", words), *_shape(box), *_text(box), *_marks(box),
+        href=f"#{one.id}", class_=f"{kind}{counter} {_CLASS[one.status]}",
+    )  # fmt: skip
 
 
-def _shape(box: Box) -> str:
+def _shape(box: Box) -> Iterator[Markup]:
     x, y, w, h = box.x, box.y, box.width, box.height
     kind = box.element.kind
     if box.badge:
         r = 0.5 * BADGE - 2.0
         cx, cy = x + 0.5 * BADGE, y + 0.5 * BADGE
         if kind in ("Solution", "CounterSolution"):
-            return f'<circle class="shape" cx="{cx:.1f}" cy="{cy:.1f}" r="{r:.1f}"/>'
-        letter = kind[0]
-        return (
-            f'<ellipse class="shape" cx="{cx:.1f}" cy="{cy:.1f}" rx="{r:.1f}" ry="{0.7 * r:.1f}"/>'
-            f'<text class="letter" x="{cx + r - 6:.1f}" y="{cy + 0.7 * r + 7:.1f}">{letter}</text>'
-        )
-    if kind == "Strategy":
+            yield element("circle", class_="shape", cx=cx, cy=cy, r=r)
+            return
+        yield element("ellipse", class_="shape", cx=cx, cy=cy, rx=r, ry=0.7 * r)
+        yield element("text", kind[0], class_="letter", x=cx + r - 6, y=cy + 0.7 * r + 7)
+    elif kind == "Strategy":
         corners = ((x + SLANT, y), (x + w, y), (x + w - SLANT, y + h), (x, y + h))
-        points = " ".join(f"{a:.1f},{b:.1f}" for a, b in corners)
-        return f'<polygon class="shape" points="{points}"/>'
-    rounded = ' rx="16"' if kind == "Context" else ""
-    return (
-        f'<rect class="shape" x="{x:.1f}" y="{y:.1f}" width="{w:.1f}" height="{h:.1f}"{rounded}/>'
-    )
+        yield element("polygon", class_="shape", points=points_of(corners))
+    else:
+        rx = "16" if kind == "Context" else None
+        yield element("rect", class_="shape", x=x, y=y, width=w, height=h, rx=rx)
 
 
-def _text(box: Box) -> str:
+def _text(box: Box) -> Iterator[Markup]:
     one = box.element
     if box.badge:
         x, y = box.x + BADGE + 4.0, box.y + 13.0
         middle, height = box.x + 0.5 * BADGE, box.y + 0.5 * BADGE
         letters = one.id.rstrip("0123456789.")
-        name = "".join(
-            f'<text class="badge" x="{middle:.1f}" y="{height + drop:.1f}">{escape(part)}</text>'
-            for part, drop in ((letters, -1.5), (one.id.removeprefix(letters), 9.0))
-        )
+        for part, drop in ((letters, -1.5), (one.id.removeprefix(letters), 9.0)):
+            yield element("text", part, class_="badge", x=middle, y=height + drop)
     else:
         x = box.x + PAD + (SLANT if one.kind == "Strategy" else 0.0)
         y = box.y + PAD + 10.0
-        word = f' <tspan class="status">{one.status}</tspan>' if one.status else ""
-        name = f'<text class="id" x="{x:.1f}" y="{y:.1f}">{escape(one.id)}{word}</text>'
+        word = (" ", element("tspan", one.status, class_="status")) if one.status else ()
+        yield element("text", one.id, *word, class_="id", x=x, y=y)
         y += LINE
-    lines = "".join(
-        f'<tspan x="{x:.1f}" y="{y + k * LINE:.1f}">{escape(line)}</tspan>'
-        for k, line in enumerate(box.lines)
-    )
-    return f"{name}<text>{lines}</text>"
+    lines = (element("tspan", line, x=x, y=y + k * LINE) for k, line in enumerate(box.lines))
+    yield element("text", *lines)
 
 
-def _marks(box: Box) -> str:
-    """Return the diamond of an undeveloped goal, and the cross of a defeated one."""
+def _marks(box: Box) -> Iterator[Markup]:
+    """Yield the diamond of an undeveloped goal, and the cross of a defeated one."""
     x, y, one = box.x + 0.5 * box.width, box.bottom, box.element
-    marks = ""
     if one.undeveloped:
         corners = ((x, y), (x + 9, y + 9), (x, y + 18), (x - 9, y + 9))
-        points = " ".join(f"{a:.1f},{b:.1f}" for a, b in corners)
-        marks += f'<polygon class="diamond" points="{points}"/>'
+        yield element("polygon", class_="diamond", points=points_of(corners))
     if one.defeated:
-        left, right = box.x, box.x + box.width
         for a, b in ((box.y, y), (y, box.y)):
-            marks += (
-                f'<line class="cross" x1="{left:.1f}" y1="{a:.1f}" x2="{right:.1f}" y2="{b:.1f}"/>'
-            )
-    return marks
+            yield element("line", class_="cross", x1=box.x, y1=a, x2=box.x + box.width, y2=b)
