@@ -160,7 +160,7 @@ class Interval:
 
 
 def intervals(lines: Sequence[Interval], label: str, longest: int = 48) -> Markup:
-    """Return intervals below each other over a logarithmic axis.
+    """Return intervals below each other over a logarithmic axis, each below its words.
 
     Args:
         lines: at least one, with estimates above 0.
@@ -170,22 +170,22 @@ def intervals(lines: Sequence[Interval], label: str, longest: int = 48) -> Marku
     least = min(one.low if one.low > 0.0 else one.estimate / 10.0 for one in lines)
     first = math.floor(math.log10(least))
     last = max(math.ceil(math.log10(max(one.high for one in lines))), first + 1)
-    height = 30.0 * len(lines) + 40.0
-    plot = Plot((900.0, height), (first, last), (0.0, 1.0), (330.0, 30.0, 6.0, 28.0))
+    height = 44.0 * len(lines) + 34.0
+    plot = Plot((480.0, height), (first, last), (0.0, 1.0), (20.0, 20.0, 6.0, 28.0))
     for power in range(first, last + 1):
         plot.add("path", class_="grid", d=f"M{plot.at(power):.1f} 6V{plot.base:g}")
         plot.text(plot.at(power), height - 10.0, f"1e{power}")
     for row, one in enumerate(lines):
-        y, short = 20.0 + 30.0 * row, one.words[: longest - 2] + "…"
+        y, short = 34.0 + 44.0 * row, one.words[: longest - 2] + "…"
         words = one.words if len(one.words) < longest else short
         low, middle, high = (
             plot.at(math.log10(max(value, 10.0**first)))
             for value in (one.low, one.estimate, one.high)
         )
-        plot.text(318.0, y + 4.0, words, "end", one.kind)
+        plot.text(20.0, y - 14.0, words, "start", one.kind)
         plot.add("path", class_=f"interval {one.kind}", d=f"M{low:.1f} {y:g}H{high:.1f}")
         plot.add("circle", class_=one.kind, cx=middle, cy=y, r=4.5)
-    return plot.svg(label)
+    return plot.svg(label, "chart intervals")
 
 
 def bars(shares: Float, level: float, label: str) -> Markup:
@@ -195,7 +195,7 @@ def bars(shares: Float, level: float, label: str) -> Markup:
     plot = Plot((260.0, 98.0), (0.0, n), (0.0, top), (0.0, 0.0, 6.0, 6.0))
     plot.bars(np.arange(n + 1.0), shares)
     plot.line(np.array([0.0, n]), np.full(2, level), "even")
-    return plot.svg(label)
+    return plot.svg(label, "chart intervals")
 
 
 @dataclass(frozen=True)

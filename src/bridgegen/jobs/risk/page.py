@@ -57,19 +57,19 @@ def unsure(risk: Risk) -> Iterator[str]:
         )
     if "explored_hits" in risk.weighted.facts:
         yield (
-            "Harm was found by rows that are spread over the ranges, for no ever more harmful rows "
-            "lead to it; a region so small that none of them lay in it is allowed for in the upper "
-            "end alone."
+            "Harm was found by rows that are spread over the ranges, since no gradient of harm "
+            "leads to it; a region so small that none of them lay in it is allowed for in the "
+            "upper end alone."
         )
     elif "spread" in risk.weighted.facts:
         yield (
-            "Harm that is reached through no ever more harmful rows is found only where one of "
+            "Harm to which no gradient leads is found only where one of "
             f"{risk.weighted.facts['spread']:,.0f} rows lies in it that are spread over the "
             "ranges; mc assumes nothing."
         )
     elif risk.estimated.method in ("subset", "importance"):
         yield (
-            "Harm that is reached through no ever more harmful rows is not found by this method, "
+            "Harm to which no gradient leads is not found by this method, "
             "however much of it there is; mc assumes nothing."
         )
     if risk.data is not None:
