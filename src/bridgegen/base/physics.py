@@ -4,7 +4,7 @@ Kernels freeze them; ``compilation.sources`` counts this module as a source of t
 """
 
 GRAVITY = 9.81
-"""[m/s²]"""
+"""Gravitational acceleration [m/s²]."""
 
 DRY_FRICTION = 0.85
 """[1] Peak friction of a tyre on dry asphalt, 0.8 to 0.9.
@@ -23,7 +23,7 @@ HARD_BRAKING = 4.9
 """[m/s²] Deceleration from which on braking is hard. Source: paper, Table I."""
 
 CAREFUL_REACTION = 0.75
-"""[s] From the risk until a careful driver begins to brake.
+"""Reaction time of a careful driver, from the risk until braking begins [s].
 
 Source: UN R157, Annex 3, performance model."""
 
@@ -31,7 +31,7 @@ CAREFUL_BRAKING_G = 0.774
 """[g] What a careful driver brakes by at most. Source: as for ``CAREFUL_REACTION``."""
 
 CAREFUL_BRAKING = CAREFUL_BRAKING_G * GRAVITY
-"""[m/s²] The same."""
+"""Deceleration of a careful driver in an emergency [m/s²]; source as of `CAREFUL_BRAKING_G`."""
 
 CAREFUL_JERK = 12.65
 """[m/s³] How fast a careful driver's deceleration rises: to its most in 0.6 s.

@@ -13,7 +13,7 @@ from bridgegen.cli.groups import SEARCH
 from bridgegen.engine.options.forms import read_names
 
 PACKAGE = "bridgegen_reproduction"
-"""By name, since nothing of this package imports it."""
+"""Package of the reproductions, as a name, since nothing of this package imports it."""
 
 
 @app.command(rich_help_panel=SEARCH)

@@ -14,11 +14,12 @@ if TYPE_CHECKING:
     import carla
 
 FULL_THROTTLE, FULL_BRAKE = 4.0, 9.0
-"""What a pedal pressed down gives, about [m/s²]: where the controller starts from, not what it
-relies on. A car's 0 to 100 km/h in 7 s is 4 on average; braking on a dry road 0.9 g."""
+"""Approximate acceleration at full throttle, and deceleration at full braking [m/s²], from which
+the controller starts: a car's 0 to 100 km/h in 7 s is 4 on average; braking on a dry road 0.9 g."""
 
 PROPORTIONAL, INTEGRAL = 0.5, 0.4
-"""Of the difference from the speed that the demands come to, pedal per m/s and per m/s·s."""
+"""Gains of the controller of the speed error: proportional [pedal per m/s], integral [pedal per
+m/s·s]."""
 
 LEAD = 1.5
 """The speed that the demands come to is at most so far from the car's [m/s]: else a car that has no

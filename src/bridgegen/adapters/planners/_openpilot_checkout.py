@@ -51,7 +51,7 @@ _NAMES_ONLY = (
     f"{_LIB}.longitudinal_mpc_lib.c_generated_code",
 )  # fmt: skip
 _LIMITS = {"ACCEL_MIN": -3.5, "ACCEL_MAX": 2.0}
-"""[m/s²]; opendbc's car/interfaces.py, after ISO 15622:2018."""
+"""Limits of the acceleration [m/s²], from opendbc's car/interfaces.py, after ISO 15622:2018."""
 
 _LIBRARIES = ("libblasfeo.so", "libhpipm.so", "libqpOASES_e.so.3.1", "libacados.so")
 

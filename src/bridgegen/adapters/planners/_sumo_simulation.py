@@ -24,7 +24,7 @@ MODELS = {
     "CACC": "SUMO's cooperative ACC; as nobody ahead is a CACC vehicle, cruise control from a time "
     "gap of 1.5 to 2 s on, its ACC below",
 }
-"""The car-following models."""
+"""Descriptions of SUMO's car-following models by name."""
 
 MIN_GAP = 2.5
 """m, SUMO's ``minGap`` of all vehicles."""

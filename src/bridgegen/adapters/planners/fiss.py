@@ -61,13 +61,13 @@ PLAN_EVERY, CONTROL_STEP = 2, 0.05
 """Instants between two plans, and seconds between two instants; as in the closed loop."""
 
 RANGE, ENLARGED = 120.0, 0.2
-"""How far others are seen, by how much their boxes are larger [m]; as there."""
+"""Range within which other participants are seen, and enlargement of their boxes [m]; as there."""
 
 BEYOND = 0.5
 """Seconds by which predictions are longer than plans; as there."""
 
 PREDICTION_STEP = 0.1
-"""[s], as there."""
+"""Time step of predictions [s]; as there."""
 
 MOVING = 0.5
 """[m/s], from which on a heading is that of the velocity; as there."""

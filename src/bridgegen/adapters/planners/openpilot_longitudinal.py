@@ -65,7 +65,7 @@ AHEAD = 2.0
 """Seconds from now to the second lead; openpilot's ``LEAD_T_OFFSETS[1]``."""
 
 BEYOND = 110
-"""How many points the way has beyond those of the observation's route: along the map's lanes."""
+"""Number of points appended to the observation's route, along the map's lanes."""
 
 ON_THE_ROAD = 0.5
 """The route's last point is on the map's way if it is nearer than so many metres."""
@@ -80,7 +80,7 @@ LEAST_TO_STOP = -0.5
 """[m/s²], as openpilot's own plant brakes when the planner wants to stop."""
 
 STANDSTILL = 0.01
-"""[m/s], as there."""
+"""Speed below which the car stands [m/s]; as in openpilot's own plant."""
 
 CAR = {"openpilotLongitudinalControl": True, "longitudinalActuatorDelay": 0.15, "vEgoStopping": 0.5}
 """opendbc's defaults of the car parameters that the planner reads (``car/interfaces.py``)."""

@@ -145,7 +145,8 @@ FEATURES = (
     "avx", "avx2", "bmi", "bmi2", "cmov", "crc32", "cx16", "cx8", "f16c", "fma", "fxsr", "lzcnt",
     "mmx", "movbe", "popcnt", "sahf", "sse", "sse2", "sse3", "sse4.1", "sse4.2", "ssse3", "xsave",
 )  # fmt: skip
-"""Its instructions, as LLVM names them. Source: x86-64 psABI, micro-architecture levels."""
+"""Instructions of ``BASELINE``, as LLVM names them. Source: x86-64 psABI, micro-architecture
+levels."""
 
 
 @dataclass(frozen=True)

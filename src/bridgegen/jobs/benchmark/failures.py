@@ -120,7 +120,7 @@ RESPONSIBLE = frozenset({"ego", "shared"})
 """Labels of who is responsible where the ego is."""
 
 JSON_FILE = "careful.json"
-"""In a run's folder: a `Judgement`."""
+"""File of a `Judgement` in a run's folder."""
 
 Count = Annotated[int, Field(ge=0, le=10**8)]
 

@@ -25,7 +25,7 @@ from bridgegen.jobs.search.scenarios import is_file, load
 from bridgegen.scenario.language.reader import names
 
 FILE = "benchmark.json"
-"""In a benchmark's folder: what is equal in all its runs."""
+"""File in a benchmark's folder with the settings that are equal in all its runs."""
 
 PERFECT, SENSED = "perfect", "sensed"
 COLUMNS = {PERFECT: "perfect perception", SENSED: "with perception"}
@@ -40,7 +40,8 @@ QUICK_SCENARIOS = ("cut-in", "lead-brakes", "left-across-path", "pedestrian-behi
 QUICK_DRIVERS = ("reference", "un-r157")
 QUICK_BUDGET, QUICK_SEEDS, QUICK_KEEP = 40, 1, 1
 TRIAGE, QUICK_TRIAGE = "short", "none"
-"""How much of the findings is simulated again, of `bridgegen.search.triage.effort.EFFORTS`."""
+"""Triage efforts of a full and of a quick benchmark, of
+`bridgegen.search.triage.effort.EFFORTS`."""
 
 
 @dataclass(frozen=True)

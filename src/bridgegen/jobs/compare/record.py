@@ -94,7 +94,7 @@ def distinct(
 
 
 POINTS = 50
-"""Of a curve over the evaluations."""
+"""Number of points of a curve over the evaluations."""
 
 
 @dataclass(frozen=True)

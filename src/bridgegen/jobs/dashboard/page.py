@@ -28,9 +28,9 @@ MOST_RESULTS = 5
 MOST_REQUIREMENTS, MOST_SCENARIOS = 40, 200
 """Columns and rows of a matrix; the gravest requirements."""
 MOST_CELLS = 10_000
-"""Of all matrices; the first is always there."""
+"""Largest number of cells of all matrices; the first matrix is always shown."""
 MOST_CHARTS = 48
-"""Those that grew the most, then those with the largest share."""
+"""Largest number of charts: those that grew the most, then those with the largest share."""
 MOST_ROWS = 2000
 """Rows of a table."""
 MOST_PARAMETERS, MOST_BIN_ROWS = 60, 1000

@@ -18,7 +18,7 @@ from bridgegen.scenario.language.space import SearchSpace
 
 PREFIX = "computed:"
 NAMES = tuple(PREFIX + name for name in KNOWN)
-"""What they are called beside drivers."""
+"""Names of the computed models, which set them apart from drivers."""
 
 SIDE = 0.375
 """m beside the middle of the way, beyond which the vehicle ahead cuts out (UN R157, annex 3)."""

@@ -30,7 +30,7 @@ _LONGEST_MODE = 400
 _DAMAGED = (
     ValueError, TypeError, LookupError, EOFError, MemoryError, RuntimeError, zipfile.BadZipFile,
 )  # fmt: skip
-"""What reading a damaged or hostile batch may raise."""
+"""Exceptions that reading a damaged or hostile batch may raise."""
 
 
 class Ledger:

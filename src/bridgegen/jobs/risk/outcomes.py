@@ -142,7 +142,7 @@ EVENTS: Mapping[str, Event] = {
     "conflict": Event(NEAR_MISS, WORDS["conflict"]),
     "collision": Event(2.0 * NEAR_MISS, WORDS["collision"]),
 }
-"""By name; the last one is the default aim."""
+"""Events by name; the last one is the default."""
 
 
 def require(name: str) -> Event:

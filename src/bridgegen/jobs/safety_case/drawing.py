@@ -210,7 +210,7 @@ def wrapped(text: str, width: float) -> tuple[str, ...]:
 
 
 SLANT = 12.0
-"""By how much a strategy's sides lean [pixels]."""
+"""Horizontal inclination of a strategy's sides [pixels]."""
 
 _CLASS = {
     "supported": "ok",

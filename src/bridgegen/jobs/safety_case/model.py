@@ -20,15 +20,15 @@ Kind = Literal[
 RelationKind = Literal["SupportedBy", "InContextOf", "Challenges"]
 
 Status = Literal["supported", "not supported", "incomplete", "undeveloped", ""]
-"""Of a goal; "incomplete": nothing speaks against it, and a goal below it is undeveloped; "" of
-elements that are no goals."""
+"""Status of a goal; "incomplete": nothing speaks against it, and a goal below it is undeveloped; ""
+of elements that are no goals."""
 
 Declaration = Literal["asserted", "needsSupport", "assumed", "axiomatic", "defeated", ""]
 """SACM's assertionDeclaration of a claim; "" of what is no claim."""
 
 Form = Literal["count", "percent", "percent_up", "percent_down", "number", "text"]
-"""How a number is written: shares in per cent, rounded to 3 digits, bounds away from the share;
-"text": a sentence that is quoted from a file."""
+"""Format of a number: shares in per cent, rounded to 3 digits, bounds away from the share; "text":
+a sentence that is quoted from a file."""
 
 SACM: dict[Kind, str] = {
     "Goal": "Claim",

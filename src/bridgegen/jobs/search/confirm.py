@@ -35,7 +35,7 @@ SECONDS = 1.0
 """Results may wait so long before they are written [s]."""
 
 Tally = Counter[bool | None]
-"""How many scenarios are confirmed (True), are not (False), and failed (None)."""
+"""Numbers of scenarios that are confirmed (True), not confirmed (False), and failed (None)."""
 
 MOST_TRACKS = 100
 """Scenarios whose tracks are recorded: some ten kilobytes each."""

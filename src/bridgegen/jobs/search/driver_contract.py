@@ -33,7 +33,7 @@ FIXED_BATCH = (
     "so little is rounding: networks and matrix products round differently by the size of the "
     "batch, unless they are called through bridgegen.drivers.batches.FixedBatch"
 )
-"""What to do about a driver that differs by rounding only."""
+"""Advice for a driver whose answers differ by rounding only."""
 
 ROUNDING = 1e-5
 """A difference, relative or in the unit, up to which rounding explains that a motion differs."""
@@ -45,7 +45,8 @@ _STATES = {
     "y": "y [m]",
     "h": "h [rad]",
 }
-"""What is compared, that which a driver decides first: an acceleration acts from its instant on."""
+"""States that are compared; first those that a driver decides first: an acceleration acts from its
+instant on."""
 
 DRIVEN = "every row is driven to its end"
 AGAIN = "the same row again gives the same motion"
@@ -59,7 +60,7 @@ IN_SHORT = {
     "deterministic": (AGAIN, ANEW),
     "free of cross-talk": (ORDER, ALONE, BEFORE),
 }
-"""What the rules come to."""
+"""Rules of the contract by the word that summarises them."""
 
 
 @dataclass(frozen=True)

@@ -150,7 +150,7 @@ def _change(
 
 
 FOLDER = "worse"
-"""In a suite's folder, that of the searches, a run each."""
+"""Folder in a suite's folder that holds the searches, a run each."""
 
 ALGORITHM = "es"
 """It finds the most failure modes with few evaluations; see docs/decisions/search.md."""

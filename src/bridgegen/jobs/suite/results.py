@@ -25,8 +25,8 @@ REDUCED = 1.0 / 3.6
 of the test speed in that protocol (section 4.3.2)."""
 
 PASSED, FAILED, EXCUSED, NOT_RUN, NOT_APPLICABLE = "pfunx"
-"""What a variation means for a clause: it passes, or fails; passes although the ego collides, for
-the models do, too; has no result; or says nothing, as its traffic could not happen, say."""
+"""Results of a variation for a clause: it passes; fails; passes although the ego collides, since
+the models do, too; has no result; or says nothing, e.g. as its traffic could not happen."""
 
 
 class Strict(BaseModel):

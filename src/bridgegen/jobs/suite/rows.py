@@ -26,7 +26,7 @@ _DRAWS = 31  # a stream of random numbers of its own
 
 
 NO_MATRIX = "none"
-"""In place of an edition: evenly spread rows, of scenarios with a matrix too."""
+"""Name in place of an edition for evenly spread rows, also of scenarios with a matrix."""
 
 
 @dataclass(frozen=True)

@@ -54,7 +54,7 @@ def explore(problem: Problem, aim: Aim, seed: int) -> Weighted:
 
 STARTS, CHILDREN = 8, 8
 EVALUATIONS = 2048
-"""At most: 32 rounds."""
+"""Largest number of evaluations of a search for the most likely point: 32 rounds."""
 _STEP, _GROW, _SHRINK = 0.3, 1.3, 0.8  # standard deviation of moves, and its factors
 _TOWARDS = 0.5  # chance of a coordinate to move towards the middle
 _CENTRAL = 1e-6  # of equally likely points the most central one

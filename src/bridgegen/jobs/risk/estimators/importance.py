@@ -190,7 +190,8 @@ PREPARED, FOUND = 0.6, 0.5
 EXPLORED, CHECKED = 0.5, 0.1
 """The share of what is left that exploration may take, if subset simulation is in doubt or not."""
 STRANGE = 0.25
-"""Of the first proposals at most are around spread points, beside those of levels."""
+"""Largest share of the first proposals that are around spread points rather than those of
+levels."""
 FEW = 50
 """Spread points at most that rows are drawn around where they are too few for more."""
 BLOCK, FIRST = 16_384, 1024
