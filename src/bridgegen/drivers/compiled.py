@@ -46,7 +46,8 @@ SCENE = _record(
     "time_step", "n_steps", "length", "width", "centre",
     "max_speed", "max_acceleration", "max_deceleration", "max_curvature",
 )  # fmt: skip
-"""What does not change, see `bridgegen.drivers.interface.Scene`; all are float64."""
+"""Record of what is constant in a scenario, see `bridgegen.drivers.interface.Scene`; all are
+float64."""
 
 EGO = _record(
     "time", "x", "y", "h", "v", "a", "target_speed", "offset", "stop_distance", "light"
@@ -91,7 +92,8 @@ PIECE = np.dtype(
 """
 
 PLACE = np.dtype([("lane", np.int64), ("near", np.int64, (NEAR_PIECES,))])
-"""What of the map is near, see `bridgegen.drivers.interface.MapView`; one record."""
+"""Record of the ego's lane and the pieces of the map near it, see
+`bridgegen.drivers.interface.MapView`."""
 
 CONFLICT = _record("enter", "leave", "other_enter", "other_leave", "priority", "how")
 """One way of a participant across the route, see `bridgegen.drivers.interface.Conflicts`."""

@@ -47,7 +47,7 @@ WANTS = {
     "conflicts": "where the ways of others meet the route, and who gives way there",
     "history": "the tracks of the last second",
 }
-"""What a driver may ask for, by its attribute ``wants``."""
+"""Inputs that a driver may ask for by its attribute ``wants``, with descriptions."""
 
 
 @dataclass(frozen=True)
@@ -287,11 +287,11 @@ class BatchDriver(Protocol):
 # --- The road network, for drivers that want "map" ------------------------------------------------
 
 CENTRE, BORDER, CROSSWALK, STOP_LINE = range(4)
-"""What a piece of the map is."""
+"""Kinds of the pieces of a map."""
 
 UNMARKED, BROKEN, SOLID = range(3)
-"""How a border is marked: by nothing, by what one may cross (from either side), or by a line that
-one may not cross, from one side at least."""
+"""Markings of a border: none, one that may be crossed (from either side), or a line that may not be
+crossed, from one side at least."""
 
 PIECE_POINTS = 11
 """V, how many points a piece has at most, 2 m apart at most."""

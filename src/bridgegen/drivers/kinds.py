@@ -3,7 +3,7 @@
 from bridgegen.scenario.participants import OBJECT_CLASSES
 
 NAMES = tuple(one.name for one in OBJECT_CLASSES)
-"""In words, by number."""
+"""Names of the object classes, by code."""
 
 CAR, TRUCK, BUS, MOTORCYCLE, BICYCLE, PEDESTRIAN, ANIMAL, OTHER = (
     NAMES.index(name)
@@ -18,7 +18,8 @@ CAR, TRUCK, BUS, MOTORCYCLE, BICYCLE, PEDESTRIAN, ANIMAL, OTHER = (
 
 
 LEFT, RIGHT, BRAKE = 1, 2, 4
-"""What shows; both indicators are hazard lights, which tell of no change of lane."""
+"""Bits of the indicators and brake lights that are lit; both indicators are hazard lights, which
+announce no lane change."""
 
 SWITCHED = 8
 """Besides ``BRAKE``: brake lights are as the storyboard has switched them."""
@@ -43,16 +44,16 @@ SEEN_BY = 0
 X, Y = 1, 2
 """The detected box's centre in the world [m]."""
 HEADING = 3
-"""[rad], counter-clockwise from +x."""
+"""The detected box's heading [rad], counter-clockwise from +x."""
 LENGTH, WIDTH = 4, 5
-"""[m], > 0."""
+"""The detected box's length and width [m], > 0."""
 CONFIDENCE = 6
-"""0 to 1."""
+"""The detection's confidence, 0 to 1."""
 KIND = 7
 """The class assigned to it, a code of `bridgegen.drivers.kinds`."""
 
 DETECTION = 8
-"""Number of columns."""
+"""Number of columns of a detection."""
 
 NO_FRAME, MISSED, CAMERA, LIDAR, BOTH = -1, 0, 1, 2, 3
 """No sensor took a frame at this instant; a frame missed the entity; the sensors that saw it."""
@@ -75,7 +76,7 @@ USES_LANES = tuple(one in ("vehicle", "bicycle") for one in _CONDUCT)
 """Whether it drives or rides."""
 
 IS_ON_FOOT = tuple(one in ("pedestrian", "animal") for one in _CONDUCT)
-"""Whether it walks."""
+"""Whether each kind walks, by code."""
 
 NEEDS_ROOM = tuple(one in ("bicycle", "pedestrian") for one in _CONDUCT)
 """Whether it is passed with more room than a vehicle."""
@@ -90,7 +91,8 @@ LAMPS = tuple(one.lamps for one in OBJECT_CLASSES)
 """cd, of the lamps that each kind shows; UN R7 asks 4 of each of two rear lamps."""
 
 REFLECTANCE = tuple(one.reflectance for one in OBJECT_CLASSES)
-"""Of each kind at 905 nm: dark clothes 0.1; with plates and reflectors, vehicles more."""
+"""Reflectance of each kind at 905 nm: dark clothes 0.1; with plates and reflectors, vehicles
+more."""
 
 MISTAKEN_FOR = tuple(NAMES.index(one.mistaken_for) for one in OBJECT_CLASSES)
 """The class that each kind is mistaken for where its own is not recognised."""

@@ -29,7 +29,7 @@ CORRIDOR = 8
 """Columns of a corridor, and how many there are; see `corridor_along`."""
 
 STRAYS = 0.2
-"""[m] A body that is no farther beside its route is in its lane, of whatever width. Ours."""
+"""Distance beside its route up to which a body is in its lane, of whatever width [m]. Ours."""
 
 PAVED = frozenset(("shoulder", "stop", "parking", "biking"))
 """Types of lanes beside the driving lanes on which a car has left its lane, but not the road."""

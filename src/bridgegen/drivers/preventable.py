@@ -55,7 +55,7 @@ LANE_GAP = 1.6
 SIZE = (4.3, 1.9)
 """m, length and width of a car in the Commission's code."""
 MODELS = ("un-r157", "fsm")
-"""The regulation's models."""
+"""Names of the regulation's driver models."""
 KNOWN = (*MODELS, "rss")
 """All models that drive here."""
 RSS_ACCELERATION, RSS_BRAKING = 3.0, 6.0

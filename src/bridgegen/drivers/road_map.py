@@ -42,7 +42,7 @@ SPACING = 2.0
 """Distance between two points of a lane or piece [m], at most."""
 
 ROUNDING = 1e-6
-"""By how much it may be more, in parts of it."""
+"""Relative tolerance of ``SPACING``."""
 
 MOST_CUTS = 10.0
 """Cuts across a section per metre, at most."""

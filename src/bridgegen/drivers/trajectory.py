@@ -16,7 +16,7 @@ MOST_STATES = 1000
 """K, how many states a trajectory has at most."""
 
 JUMP, TURN = 2.0, 1.0
-"""How far from the ego [m], and how far from its heading [rad], a trajectory may begin."""
+"""Largest distance of a trajectory's start from the ego [m], and from its heading [rad]."""
 
 ROUNDED, SLACK = 1.2, 0.5
 """Two states may be this many times as far apart as their greater speed allows, and so much

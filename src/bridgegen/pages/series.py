@@ -12,7 +12,7 @@ import numpy as np
 from bridgegen.base.arrays import Float, Int
 
 LARGEST = 2.0**50
-"""In units. Larger values count as missing: beyond, JavaScript's integers are not exact."""
+"""Largest value, in units; larger ones count as missing, as JavaScript's integers are not exact."""
 
 Runs = list[list[int]]
 

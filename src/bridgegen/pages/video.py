@@ -29,7 +29,7 @@ CODECS = {
 """Options of ffmpeg by the ends of the names."""
 
 TIMEOUT = 600.0
-"""How long it may take [s]."""
+"""Time limit of making a film [s]."""
 
 
 def program() -> str:
@@ -114,7 +114,7 @@ STILL = (".png", ".svg")
 
 SIZES, MAX_FPS = (160, 3840), 50
 BEFORE, AFTER = 8.0, 2.0
-"""What a film shows by default: so long before and after the decisive instant [s]."""
+"""Default duration of a film before and after the decisive instant [s]."""
 
 _COLOURS = 128
 

@@ -13,8 +13,8 @@ from bridgegen.simulation.rollout import Rollout
 
 Derived = TypeVar("Derived")
 Need = Literal["detections", "lights", "offset"]
-"""What a rollout may lack: detections unless its ego perceives; traffic lights and the offset from
-the route if it is a recording from elsewhere, not a simulator's."""
+"""Data that a rollout may lack: detections unless its ego perceives; traffic lights and the offset
+from the route if it is a recording from elsewhere, not a simulator's."""
 
 
 @dataclass(frozen=True)

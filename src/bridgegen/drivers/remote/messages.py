@@ -21,7 +21,7 @@ MAX_FRAME = 64 * 2**20
 """Most bytes of a message."""
 
 DTYPES = ("float64", "float32", "int64", "int32", "int8", "bool")
-"""What the elements of an array may be."""
+"""Types that the elements of an array may have."""
 
 _SENT = {name: np.dtype("uint8" if name == "bool" else name).newbyteorder("<") for name in DTYPES}
 """Types of elements as they are in messages."""

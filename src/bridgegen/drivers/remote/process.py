@@ -25,7 +25,7 @@ from bridgegen.drivers.user_drivers import NAMES, Traits
 from bridgegen.drivers.views import MapSender
 
 AGAIN_SECONDS = 10.0
-"""For so long [s] a server is tried again that has been there: it may be starting again."""
+"""Time for which a server that has answered before is tried again [s]: it may be starting again."""
 
 MAX_ITEMS = 1024
 """Most elements of the lists and maps of an answer."""

@@ -130,7 +130,8 @@ _BESIDE = {
     "curb": "sidewalk",
     "median": "median",
 }
-"""How lanes are drawn that cars do not travel on; others are left out."""
+"""Drawing styles of lanes that cars do not travel on, by OpenDRIVE's type; other lanes are left
+out."""
 
 
 def outline(

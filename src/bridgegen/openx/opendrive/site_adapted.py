@@ -26,7 +26,7 @@ from bridgegen.scenario.ontology.site import Facility, Leg, Site
 from bridgegen.scenario.ontology.templates import phases_of
 
 END_MARGIN = 1.0
-"""How far before the end of its leg a shortened route ends [m]."""
+"""Distance between the end of a shortened route and the end of its leg [m]."""
 
 
 _BOTH_WAYS: tuple[tuple[str, Way], ...] = (("main", "in"), ("main", "out"))

@@ -27,7 +27,7 @@ TIME_STEP = "time_step"
 """The header's property for the step [s] of the evaluation: the standard has no place for it."""
 
 DEFAULT_TIME_STEP = 0.05
-"""[s], the default without the header's value."""
+"""Time step where the header states none [s]."""
 
 CAUSE = "cause"
 """The header's property for what a critical scenario's harm is put down to."""

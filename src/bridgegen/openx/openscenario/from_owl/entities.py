@@ -149,7 +149,7 @@ def plain_text(individuals: Individuals, node: Subject, name: str) -> str:
 
 
 RADIANS = repr(math.pi / 180.0)
-"""In a degree, as a part of a formula."""
+"""Radians per degree, as a part of a formula."""
 
 _ALONG_LANE = osc.Orientation(osc.ReferenceContext.RELATIVE, h=0.0)
 
