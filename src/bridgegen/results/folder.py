@@ -13,7 +13,8 @@ MOST_SHOWN = 1000
 """Characters of one setting in a message."""
 
 CHANGED = ("algorithm ", "scenario ", "map", "files of drivers")
-"""How the names of settings begin that are digests of files: they have changed, and no more."""
+"""Prefixes of the names of settings that are digests of files: only that they changed is
+reported."""
 
 
 def claim(

@@ -15,7 +15,7 @@ if TYPE_CHECKING:  # it is part of the command line, which starts fast
     from bridgegen.simulation.simulator import Simulator
 
 Value = bool | int | float | str
-"""Of a setting."""
+"""Value of a simulator's setting."""
 
 
 @dataclass(frozen=True)

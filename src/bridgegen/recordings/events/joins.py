@@ -14,11 +14,11 @@ from bridgegen.recordings.lanes.model import NONE, RecordedLanes
 from bridgegen.recordings.readers.table import wrap
 
 LOOK_BACK = 5.0
-"""Before they join, where courses are compared [m]."""
+"""Distance before two paths join at which courses are compared [m]."""
 LEAST_SHARED = 10.0
 """Length of the way that both go then [m]."""
 MOST_SHARED = 15.0
-"""Of it, from which its bend is taken [m]."""
+"""Greatest length of the shared path from which its bend is taken [m]."""
 ANGLES = (20.0, 150.0)
 """Between the courses before, of paths that join [deg]."""
 CROSSES = 30.0

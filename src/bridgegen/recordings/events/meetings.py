@@ -22,15 +22,15 @@ LEAST_SEEN = 1.0
 AFTER = 1.0
 """The bodies are looked at until so long after the second passes [s]."""
 AVERAGED = 1.0
-"""Before and after the crossing point, over which a speed is averaged [s]."""
+"""Time before and after the crossing point over which a speed is averaged [s]."""
 LEAST_PACE = 0.5
-"""By which the other changes its pace, at least [m/s]."""
+"""Least change of the other participant's speed that counts as a change of pace [m/s]."""
 STRAIGHT = 30.0
 """Who turns less than this goes straight on [deg]."""
 CROSSING = (30.0, 150.0)
 """Angles at which paths cross [deg]."""
 OPPOSITE = 145.0
-"""From this angle between their courses before, two come from opposite directions [deg]."""
+"""Angle between their courses before, from which on two come from opposite directions [deg]."""
 TOUCH = "bodies touch"
 
 

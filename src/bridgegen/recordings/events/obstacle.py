@@ -10,7 +10,7 @@ from bridgegen.recordings.events.scene import Scene
 from bridgegen.recordings.lanes.placing import WALKS
 
 FARTHEST = 50.0
-"""Ahead [m]."""
+"""Largest distance of an obstacle ahead [m]."""
 CLEAR = 0.5
 """Who would have passed it by less than this has it in the way [m]."""
 BEFORE = 4.0

@@ -16,11 +16,11 @@ from bridgegen.scenario.language.event_kinds import EVENT_KINDS
 from bridgegen.simulation.rollout import Rollout
 
 SHOWN = 3
-"""Of each kind."""
+"""Number of events of each kind that are shown."""
 AROUND = 2.0
-"""Before and after an event [s]."""
+"""Time before and after an event that is shown [s]."""
 LONGEST = 15.0
-"""Of a picture [s]."""
+"""Longest duration of a moving picture [s]."""
 MOST_OTHERS = 12
 """Participants besides the ego."""
 GAPS = {"cut-in": "crossing_gap"}

@@ -13,9 +13,9 @@ from bridgegen.base.arrays import Bool, Float, Int
 from bridgegen.recordings.events.scene import Scene
 
 SPAN = 20.0
-"""Longest window [s]."""
+"""Longest window of a fit [s]."""
 MARGIN = 1.5
-"""Of the window before and after the step [s]."""
+"""Time of the window before and after the step [s]."""
 ROUNDS, ITERATIONS = 4, 10
 AT_ONCE = 512
 LANES = 16

@@ -42,10 +42,10 @@ LEAST_IN_LANE, LEAST_ON_AVERAGE = 3, 6
 SHORTEST = 50.0  # m, a lane
 STRETCH, GAP = 20.0, 3  # m; stretches in a row without a vehicle that do not end a lane
 MOST_RMS, MOST_IN_LANE = 0.19, 0.22
-"""Of distances from the middles of lanes, in widths, of all lanes and of each: 0.29 if paths are
-spread evenly."""
+"""Largest root mean square of distances from the middles of lanes, of all lanes and of each [lane
+widths]: 0.29 if paths are spread evenly."""
 LEAST_SHARE = 0.85
-"""Of the paths' length that is on the lanes."""
+"""Least share of the paths' length that is on the lanes."""
 SKEW = np.radians(30.0)
 MOST_CARRIAGEWAYS = 200
 

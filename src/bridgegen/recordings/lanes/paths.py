@@ -28,7 +28,7 @@ SECTORS = 24
 CROSSING = math.radians(40.0)
 """Paths within 8 m that differ by more than this, and less than its supplement, cross."""
 REACH = 20.0
-"""To either side of a reference line [m]."""
+"""Lateral distance from a reference line within which points are located along it [m]."""
 MOST_PIECES = 200_000
 LEAST_VEHICLES = 10
 

@@ -44,7 +44,7 @@ KINDS = {
     ))},
     (_PEDESTRIAN, 0): PEDESTRIAN, (_PEDESTRIAN, 1): PEDESTRIAN, (_PEDESTRIAN, 2): ANIMAL,
 }  # fmt: skip
-"""By type and category; a trailer is an entity of its own."""
+"""Kinds by esmini's type and category of an entity; a trailer is an entity of its own."""
 
 
 def _recognises(head: Head) -> bool:

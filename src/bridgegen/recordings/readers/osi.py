@@ -126,7 +126,7 @@ OBJECT = Shape({
 LIGHT = Shape({1: {1: "id"}, 3: {1: "color", 3: "mode"}})
 
 TYPES = {3: PEDESTRIAN, 4: ANIMAL, 1: OTHER}
-"""Of moving objects that are no vehicles."""
+"""Kinds by OSI's type of moving objects that are no vehicles."""
 VEHICLE_TYPES = {
     2: CAR, 3: CAR, 4: CAR, 5: CAR, 6: CAR, 7: TRUCK, 8: TRUCK, 9: TRUCK, 10: MOTORCYCLE,
     11: BICYCLE, 12: BUS, 13: OTHER, 14: OTHER, 15: PEDESTRIAN, 16: TRUCK, 17: BICYCLE, 18: OTHER,

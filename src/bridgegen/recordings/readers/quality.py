@@ -84,11 +84,11 @@ class Quality:
 FASTEST = 100.0
 """Faster than any traffic [m/s]."""
 LARGEST_SHARE = 0.05
-"""Of the states that may be faster: ids jump, but not so often."""
+"""Largest share of states that may be faster than `FASTEST`: ids jump, but not so often."""
 WIDEST = 200_000.0
 """The extent of a recording at most [m]."""
 CARS = (2.0, 9.0)
-"""Within these the median length of cars must lie [m]."""
+"""Range of the median length of cars [m]."""
 AGREEMENT = 1.25
 """Speeds given, and those of the positions, may differ by this factor (median)."""
 OVER = 1.0

@@ -22,9 +22,9 @@ NEIGHBOURS = (2.0, 6.0)
 NEAREST_LINE = 0.5  # m
 PARALLEL = np.cos(np.radians(30.0))
 SAME_PLACE = 3.0
-"""How far the ends of neighbours may be apart along the lanes [m]."""
+"""Largest distance between the ends of neighbouring lanes along them [m]."""
 MOST_PAIRS = 20_000_000
-"""Of points within reach of each other."""
+"""Largest number of pairs of points within reach of each other."""
 
 
 @dataclass(frozen=True, eq=False)

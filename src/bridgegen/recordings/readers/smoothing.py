@@ -23,7 +23,7 @@ theirs."""
 LAG = 0.4
 """Time over which positions change [s]."""
 WINDOW = 1.0
-"""Of the filter [s]."""
+"""Window of the smoothing filter [s]."""
 DEGREE = 3
 COARSEST = 0.2
 """Time step [s] up to which a window holds enough states."""

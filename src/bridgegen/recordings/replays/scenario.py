@@ -113,7 +113,7 @@ def _simpson(n: int) -> Float:
 
 EGO = "ego"
 DATE = "2025-01-01T00:00:00"
-"""Of all files, so that the same recording gives the same bytes."""
+"""Date of all files, so that the same recording gives the same bytes."""
 AROUND = 80.0
 """Who comes nearer to the ego [m] is there."""
 MOST_OTHERS = 60
@@ -122,7 +122,7 @@ FASTER = 1.0
 """A driver is told of the highest speed of the recorded ego if that is so much [m/s] above its
 first one."""
 RATE = 2.0
-"""How fast it is to get there [m/s²]."""
+"""Acceleration to the recorded ego's highest speed [m/s²]."""
 
 
 def others_near(

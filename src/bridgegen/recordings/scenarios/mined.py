@@ -18,7 +18,7 @@ from bridgegen.scenario.language.scenario import LogicalScenario
 REPLICATES = 100
 """Resampled fits, for bands and p values."""
 NAMES_SHOWN = 5
-"""Of recordings."""
+"""Number of recordings that are named."""
 HEAD = "# Mined by 'bridgegen mine'. A later call replaces this file: change a copy of it."
 
 

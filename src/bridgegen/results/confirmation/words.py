@@ -26,7 +26,7 @@ NARROW = (0.25, 0.25)
 narrowly."""
 
 NARROW_HARM = 0.02
-"""Likewise for harm."""
+"""Largest difference of harm from the threshold with which a scenario misses it narrowly."""
 
 TURNED = math.radians(10.0)
 """A larger difference of the direction of travel is reported."""

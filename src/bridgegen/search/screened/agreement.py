@@ -235,7 +235,7 @@ APART = 0.1
 """Root mean square distance in the unit cube within which a row is nearly the same."""
 
 OF_OBJECTIVE = 0.3
-"""What the best objective counts, against certainty that a row is critical."""
+"""Weight of the best objective, relative to certainty that a row is critical."""
 
 
 class Pool:

@@ -33,8 +33,8 @@ NEAR = 0.25
 """Share of the screen's later evaluations that lie near the best rows of the run's simulator."""
 
 PARENTS, STEPS, MOVED = 10, (0.02, 0.2), 0.5
-"""How many of the best rows others lie near; least and greatest standard deviation of the steps to
-them; share of the parameters that change."""
+"""Number of the best rows that others lie near; least and greatest standard deviation of the steps
+to them; share of the parameters that change."""
 
 CHECKS = 8
 """One row in so many is random: it shows what the screen does not, and how far both agree."""

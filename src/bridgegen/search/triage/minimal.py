@@ -38,7 +38,8 @@ ROBUST_SHARES, MOST_ROBUST_ROUNDS = (1, 2), 6
 """The same if each jump must leave the scenario robust."""
 
 Holds = Callable[[Sequence["Ladder"], Sequence[Key], Sequence[Int]], list[Bool]]
-"""From ladders and keys of modes and rungs ``(n, n_var)`` of each: where harm persists."""
+"""Function that evaluates where harm persists, given ladders and keys of modes, and rungs ``(n,
+n_var)`` of each."""
 
 
 @dataclass(frozen=True, eq=False)

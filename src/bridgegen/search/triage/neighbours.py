@@ -35,8 +35,8 @@ ENOUGH = NEIGHBOURS // 2
 """So many neighbours must have a result with each fix to say that no fix helps."""
 
 AsIs = dict[int, tuple[Bool, Bool, Float]]
-"""By evaluation: which unchanged neighbours are harmful, which have a result, and up to when each
-is known to be harmless [s]."""
+"""Results of unchanged neighbours, by evaluation: which are harmful, which have a result, and up to
+when each is known to be harmless [s]."""
 
 
 def neighbourhoods(

@@ -22,10 +22,10 @@ OBSERVED = (
     "ego's speed", "ego's acceleration", "distance from the ego",
     "way to the conflict", "ego's way to it", "time to the conflict", "ego's time to it",
 )  # fmt: skip
-"""What an adversary sees at each decision, each scaled to about -1 .. 1 and cut at -3 and 3.
+"""Observations of an adversary at each decision, each scaled to about -1 .. 1 and cut at -3 and 3.
 
-Ways lead to where its route and the ego's meet, times are at present speeds; 3 where they never do.
-"""
+Ways lead to where its route and the ego's meet, times are at present speeds; 3 where they never
+do."""
 
 FAR, LONG, FAST, HARD = 30.0, 5.0, 10.0, 5.0  # m, s, m/s, m/s²: what counts as 1
 

@@ -29,7 +29,7 @@ from bridgegen.simulation.embedded.compiler.tables import Tables
 UNSAID = -1
 
 Part = osc.AssignControllerAction | osc.ActivateControllerAction | osc.OverrideControllerValueAction
-"""What an action does to controllers."""
+"""Action that assigns, activates or overrides controllers."""
 
 Switching = osc.AssignControllerAction | osc.ActivateControllerAction
 
