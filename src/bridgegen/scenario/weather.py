@@ -25,10 +25,11 @@ DRIZZLE, CLOUDBURST = 0.1, 500.0
 """[mm/h] Rain just above 0 %; and how many times more it is at 100 %: 50 mm/h."""
 
 CLEAR_AIR, THICK_FOG = 1e4, 200.0
-"""[m] Visual range at 0 % of fog; and how many times less it is at 100 %: 50 m."""
+"""Visual range at 0 % of fog [m], and the factor by which it is shorter at 100 %, where it is 50
+m."""
 
 GALE = 20.0
-"""[m/s] Wind at 100 %: Beaufort 8."""
+"""Wind speed at 100 % [m/s]: Beaufort 8."""
 
 
 @dataclass(frozen=True)
@@ -134,10 +135,11 @@ _PHYSICAL = (
 )
 
 PHYSICAL: Mapping[str, Physical] = MappingProxyType({one.name: one for one in _PHYSICAL})
-"""By name, in the order of the elements in which files are read."""
+"""Physical quantities of the weather by name, in the order of the elements in which files are
+read."""
 
 COLUMNS = tuple(one for one in _PHYSICAL if one.is_simulated)
-"""What a storyboard states of the simulated weather, by column."""
+"""Physical quantities of the simulated weather that a storyboard states, by column."""
 
 
 def column(name: str) -> int:
@@ -230,7 +232,7 @@ _PARAMETERS = (
 )  # fmt: skip
 
 PARAMETERS: Mapping[str, Parameter] = MappingProxyType({one.name: one for one in _PARAMETERS})
-"""By name; parameters of one part follow each other."""
+"""Weather parameters by name; parameters of one part follow each other."""
 
 PARTS: Mapping[Part, tuple[Parameter, ...]] = MappingProxyType(
     {
@@ -243,7 +245,7 @@ PARTS: Mapping[Part, tuple[Parameter, ...]] = MappingProxyType(
 STATED_BY: Mapping[str, Parameter] = MappingProxyType(
     {one.stands_for: one for one in _PARAMETERS if one.stands_for}
 )
-"""By physical quantity, the parameter that stands for it."""
+"""Weather parameters by the physical quantity that they stand for."""
 
 # -- CARLA -----------------------------------------------------------------------------------------
 
@@ -281,7 +283,7 @@ CARLA_FIELDS: Mapping[str, CarlaField] = MappingProxyType(
         "dust_storm": CarlaField(0.0, 100.0, 0.0),
     }
 )
-"""By name."""
+"""Fields of CARLA's weather by name."""
 
 CARLA_NAMES: Mapping[str, str] = MappingProxyType(
     {name: name for name in CARLA_FIELDS}
@@ -323,7 +325,8 @@ PHRASES: Mapping[str, tuple[Phrase, ...]] = MappingProxyType(
         "friction_scale": (Phrase("friction {} % of dry", below=0.95, times=100.0),),
     }
 )  # fmt: skip
-"""By physical quantity, in the order of a sentence; of each the first that holds is said."""
+"""Phrases by physical quantity, in the order of a sentence; the first of each that holds is
+used."""
 
 
 def in_words(values: Mapping[str, float]) -> str:

@@ -107,7 +107,7 @@ SUPPORT = 4.0
 """A form whose criterion is worse by this has considerably less support."""
 
 TAIL_SHARE = 0.1
-"""Of the values, those that are a tail of their own."""
+"""Share of the values that form a tail of their own."""
 
 _DIGITS = 6
 _BODIES = ("uniform", "normal", "lognormal", "exponential", "gamma", "weibull", "beta", "kde")
@@ -394,7 +394,7 @@ _LIMITS: dict[str, Callable[[Float, float, float], Limits]] = {
     "weibull": _weibull, "beta": _beta, "pareto": _pareto,
 }  # fmt: skip
 _KEYS = {name: FAMILIES[name].keys for name in _LIMITS} | {"pareto": ("shape", "scale")}
-"""By family: the numbers that are fitted."""
+"""Names of the fitted numbers by family."""
 
 
 def _rounded(value: float, digits: int = _DIGITS) -> float:

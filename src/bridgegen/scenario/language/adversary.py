@@ -206,14 +206,14 @@ def _value(quantity: Quantity, values: Mapping[str, float]) -> float:
 ATTENTIVE, INSISTENT, SCRIPTED = "attentive", "insistent", "scripted"
 
 LOOKING = (ATTENTIVE, INSISTENT)
-"""Those that limit the script by what is in the way."""
+"""Drivers that limit the script by what is in the way."""
 
 DRIVERS = (*LOOKING, SCRIPTED)
-"""What a participant other than the ego may have as its driver."""
+"""Drivers that a participant other than the ego may have."""
 
 EGO = "ego"
 ABLE = ("vehicle", "bicycle", "pedestrian")
-"""How participants move that get the driver which a scenario states for all."""
+"""Conduct of participants that get the driver which a scenario states for all."""
 
 
 def require(name: str) -> str:

@@ -108,7 +108,8 @@ LEG_NAMES: Mapping[str, tuple[str, ...]] = MappingProxyType(
 """The legs of a template that has no headings."""
 
 CROSSWALK_GAP = 1.0
-"""From the junction's edge to a leg's crosswalk, and from that to the stop line [m]; ours."""
+"""Distance from the junction's edge to a leg's crosswalk, and from there to the stop line [m];
+ours."""
 
 LETTERS = "ABCDE"
 """Legs with a heading are called so; the paper numbers their points P1, P2 (A) to P9, P10 (E)."""

@@ -30,7 +30,7 @@ from bridgegen.scenario.ontology.site import (
 JUNCTION_ID = "100"
 
 BESIDE = 0.75
-"""How far beside the road's edge signs, lights and lamps stand [m]; source: RSA 21, 0.5 to 1.5."""
+"""Distance of signs, lights and lamps from the road's edge [m]; source: RSA 21, 0.5 to 1.5."""
 
 RAMP_HEADING = 190.0
 """A ramp joins a carriageway that runs along +x at 10° from its right [deg]; ours."""

@@ -26,10 +26,9 @@ VOCABULARIES = {
     "auto": ("A.U.T.O.", "http://purl.org/auto/"),
     "openlabel": ("ASAM OpenLABEL", "https://openlabel.asam.net/V1-0-0/ontologies/"),
 }
-"""Those that classes are aligned with by ``rdfs:seeAlso``: per prefix, name and namespace.
+"""Vocabularies that classes are aligned with by ``rdfs:seeAlso``: name and namespace by prefix.
 
-Every term is taken from the vocabulary itself; ``docs/decisions.md`` names the sources.
-"""
+Every term is taken from the vocabulary itself; ``docs/decisions.md`` names the sources."""
 PREFIXES = {"bg": BG, "dcterms": DCTERMS, "owl": OWL, "rdfs": RDFS, "xsd": XSD}
 
 Subject = ox.NamedNode | ox.BlankNode

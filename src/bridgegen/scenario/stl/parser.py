@@ -27,7 +27,7 @@ MAX_DEPTH = 60
 """Parentheses and operators inside one another."""
 
 MAX_NUMBER = 1e30
-"""Of a formula, as written."""
+"""Largest number in a formula, as written."""
 
 _TEMPORAL = ("always", "eventually", "historically", "once")
 _BINARY = ("until", "since")

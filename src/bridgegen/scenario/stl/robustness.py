@@ -15,7 +15,8 @@ the sign of a margin says exactly whether a formula holds, strict comparisons an
 included."""
 
 _ROUNDING = 1e-9
-"""Of an instant's number [steps]: 0.15 s are three steps of 0.05 s, despite binary fractions."""
+"""Rounding tolerance of an instant's number [steps]: 0.15 s are three steps of 0.05 s, despite
+binary fractions."""
 
 
 def robustness(
