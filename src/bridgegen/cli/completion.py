@@ -168,4 +168,4 @@ NAMES: dict[str, Callable[[typer.Context], Iterable[str]]] = {
     "count": _fixed("ego", "any"),
     "flavour": _flavours,
 }
-"""The names of each kind."""
+"""Functions that list the names to complete, by kind."""

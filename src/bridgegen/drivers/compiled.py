@@ -52,7 +52,7 @@ float64."""
 EGO = _record(
     "time", "x", "y", "h", "v", "a", "target_speed", "offset", "stop_distance", "light"
 )  # fmt: skip
-"""The ego, see `Observation`."""
+"""Record of the ego's state, see `Observation`."""
 
 ROUTE = _record("x", "y", "h", "curvature")
 """A point of the route ahead [m, rad, 1/m]; there are ``ROUTE_POINTS``, every ``ROUTE_STEP``."""

@@ -26,7 +26,7 @@ from bridgegen.scenario.language.adversary import ATTENTIVE
 from bridgegen.scenario.participants import PARTICIPANTS, Body
 
 MOST = 100
-"""Vehicles that all traffic of a file may have."""
+"""Largest number of vehicles of all traffic of a file."""
 STEP = 5.0
 """Distance between two places on a lane at which a vehicle may start [m]."""
 APART = 15.0
@@ -44,7 +44,7 @@ _CATEGORIES = {
     "bus": "bus",
     "motorbike": "motorcycle",
 }
-"""The kinds of vehicles that traffic may be made of, and which of our bodies each has."""
+"""Kinds of bodies by the kind of vehicle that traffic may be made of."""
 
 Source = osc.TrafficSourceAction | osc.TrafficSwarmAction
 Made = tuple[osc.ScenarioObject, osc.Private, osc.GlobalAction | None, float]

@@ -32,7 +32,8 @@ THIN = 0.01
 
 
 PLAN_POINTS, PLANS_EVERY = 20, 0.2
-"""Points of a trajectory that are shown at most, and seconds between two of them at least."""
+"""Largest number of points of a trajectory that are shown, and least time between two trajectories
+[s]."""
 
 APART = 0.05
 """Least distance between an entity's positions with two drivers for the playback to show both

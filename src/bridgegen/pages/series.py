@@ -61,7 +61,7 @@ def unpacked(runs: Runs, n: int, scale: int) -> Float:
 
 
 DIGITS = 5
-"""Significant digits of the largest value of a column in bulk."""
+"""Number of significant digits of the largest value of a column in bulk."""
 
 
 def significant(values: Float, digits: int = DIGITS) -> list[float | None]:

@@ -26,7 +26,7 @@ CODECS = {
     ".webm": ("-c:v", "libvpx-vp9", "-b:v", "0", "-crf", "32", "-pix_fmt", "yuv420p",
               "-row-mt", "1"),
 }  # fmt: skip
-"""Options of ffmpeg by the ends of the names."""
+"""Options of ffmpeg by the ending of the film's name."""
 
 TIMEOUT = 600.0
 """Time limit of making a film [s]."""
@@ -108,7 +108,7 @@ HEADS = {
     ".gif": (0, b"GIF8"), ".webp": (0, b"RIFF"), ".mp4": (4, b"ftyp"),
     ".webm": (0, b"\x1a\x45\xdf\xa3"), ".png": (0, b"\x89PNG"), ".svg": (0, b"<svg"),
 }  # fmt: skip
-"""The formats by the ends of their names, with bytes of such a file and where they are."""
+"""Formats by the ending of the name, with bytes of such a file and where they are."""
 
 STILL = (".png", ".svg")
 

@@ -25,7 +25,7 @@ FILE = "failures.yaml"
 """File of known failures in the folder of a suite or a project."""
 
 OLD_FILE = "failure-modes.yaml"
-"""The dashboard's statuses before they were in `FILE`; read, and never written."""
+"""File of the dashboard's statuses before they were in `FILE`; read, and never written."""
 
 Status = Literal["new", "known", "accepted", "fixed"]
 
@@ -38,7 +38,7 @@ HEAD = """\
 """
 
 MOST_TEXT = 2000
-"""Characters of one text."""
+"""Largest number of characters of one text."""
 
 _Id = Annotated[str, Field(min_length=1, max_length=200)]
 _File = Annotated[str, Field(pattern=r"^[a-z0-9][a-z0-9-]{0,99}\.xosc$")]
@@ -58,15 +58,15 @@ class Failure(ShapedSection):
     """
 
     title: _OrNone = ""
-    """The failure in words."""
+    """Title: the failure in words."""
     status: Status = "new"
-    """Set by a person."""
+    """Status that a person sets."""
     comment: _OrNone = ""
     """Comment of a person."""
     scenario: _OrNone = ""
-    """The scenario in which it was found."""
+    """Scenario in which the failure was found."""
     conflict: _Text = ""
-    """"contact", "near miss", …"""
+    """Conflict: "contact", "near miss", …"""
     type: _Text = ""
     """Type of the conflict."""
     responsible: _Text = ""
@@ -82,9 +82,9 @@ class Failure(ShapedSection):
     minimal: _Text = ""
     """Conditions that the minimal scenario needs, in words."""
     violates: list[CriterionSection] = Field(default_factory=list, max_length=1000)
-    """The pass criteria that it violates."""
+    """Pass criteria that the failure violates."""
     count: Literal["ego", "any"] = "ego"
-    """Whose conflicts count as harm."""
+    """Party whose conflicts count as harm: the ego alone, or any."""
     driver: _OrNone = ""
     """Driver that failed."""
     found: _Text = ""

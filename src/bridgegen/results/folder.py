@@ -10,7 +10,7 @@ from bridgegen.base.errors import StorageError
 from bridgegen.base.records import parse_json, read_bytes
 
 MOST_SHOWN = 1000
-"""Characters of one setting in a message."""
+"""Largest number of characters of one setting in a message."""
 
 CHANGED = ("algorithm ", "scenario ", "map", "files of drivers")
 """Prefixes of the names of settings that are digests of files: only that they changed is

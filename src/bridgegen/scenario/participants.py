@@ -486,7 +486,7 @@ TYPES = tuple(one.name for one in _ALL if one.takes_part)
 _NAMES = {alias: one.name for one in _ALL for alias in (one.name, *one.aliases)}
 
 TYPE_NAMES = tuple(alias for one in _ALL if one.takes_part for alias in (one.name, *one.aliases))
-"""The same, with all names that a scenario file may say."""
+"""Types of participants, with all names that a scenario file may give."""
 
 QUEUES = tuple(one.name for one in _ALL if one.queues)
 """Types of vehicles that a jam may consist of."""

@@ -106,7 +106,8 @@ def _checked(found: object, name: str) -> Kind:
 
 
 SIMULATORS: MutableMapping[str, Kind] = Registry(_OURS, ADDED, _checked)
-"""Ours, then those found by entry points: CARLA (`adapters`), and those of other packages."""
+"""Simulators by name: ours, then those found by entry points: CARLA (`adapters`), and those of
+other packages."""
 
 
 @dataclass(frozen=True)

@@ -26,7 +26,8 @@ from bridgegen.simulation.trace import COLUMNS, MORE
 STATES = ("time", "x", "y", "h", "speed")
 MAX_PROBLEMS = 20
 MOST = 1e9
-"""Larger than any place on Earth, and than what may be squared without thinking."""
+"""Largest coordinate or other number [m]: larger than any place on Earth, and than what may be
+squared without thinking."""
 
 
 @dataclass
@@ -157,7 +158,7 @@ LOG_FIELDS = {
 """Index of each quantity among the fields of one entity; esmini's reference point is
 OpenSCENARIO's."""
 LOG_WIDTH = 31
-"""Fields of one entity."""
+"""Number of fields of one entity."""
 
 
 def _read_log(text: str, found: Tracks) -> None:

@@ -22,15 +22,15 @@ PROPORTIONAL, INTEGRAL = 0.5, 0.4
 m/s·s]."""
 
 LEAD = 1.5
-"""The speed that the demands come to is at most so far from the car's [m/s]: else a car that has no
-grip, or no power, would make up for it long afterwards."""
+"""Largest difference of the demanded speed from the car's [m/s]: else a car that has no grip, or no
+power, would make up for it long afterwards."""
 
 PEDAL_RATE, STEERING_RATE = 8.0, 2.5
 """Shares of full travel per second: a foot goes from throttle to brake in 0.25 s; a wheel is turned
 from straight to full lock in 0.4 s, as in an emergency."""
 
 STANDING = 0.1
-"""Slower [m/s], and not meant to go, it is held by the brake."""
+"""Speed below which the brake holds a car that is not meant to go [m/s]."""
 
 
 @dataclass(frozen=True)

@@ -27,10 +27,10 @@ MODELS = {
 """Descriptions of SUMO's car-following models by name."""
 
 MIN_GAP = 2.5
-"""m, SUMO's ``minGap`` of all vehicles."""
+"""Least gap between vehicles [m]; SUMO's ``minGap`` of all vehicles."""
 
 EMERGENCY = 9.0
-"""m/s², SUMO's ``emergencyDecel`` of passenger cars."""
+"""Largest deceleration of passenger cars [m/s²]; SUMO's ``emergencyDecel``."""
 
 
 class Simulation:

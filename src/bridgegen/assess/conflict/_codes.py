@@ -38,11 +38,11 @@ who comes from off the road."""
     KIND, TYPE, RESPONSIBLE, RULE, INSTANT, DECIDED, ZONE_EGO, ZONE_OTHER, PREVENTABLE, LEADS_EGO,
 ) = range(10)  # fmt: skip
 INTEGERS = 10
-"""Columns of a pair's row of whole numbers, and their number."""
+"""Number of columns of a pair's row of whole numbers, after the columns themselves."""
 
 (
     TTC, NEEDED, ACROSS, ALONG, V_EGO, V_OTHER, STOOD_EGO, STOOD_OTHER, OVERLAP, NEARNESS,
     LEFT_TO_ACT,
 ) = range(11)  # fmt: skip
 FLOATS = 11
-"""Columns of a pair's row of floats, and their number."""
+"""Number of columns of a pair's row of floats, after the columns themselves."""

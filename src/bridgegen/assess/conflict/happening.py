@@ -21,11 +21,11 @@ from bridgegen.drivers.kinds import IS_OBSTACLE, IS_ON_FOOT
 from bridgegen.simulation.rollout import Rollout
 
 NEAR, NEAR_TIME = 5.0, 2.0
-"""Another is near if the gap to it is at most 5 m and what the ego drives in 2 s: the distance that
-drivers are taught to keep."""
+"""Largest gap to another that is near: a distance [m], and time of the ego's travel [s]: the
+distance that drivers are taught to keep."""
 
 STANDS = 0.5
-"""[m/s] Below this the ego stands; people walk at 1.4 m/s."""
+"""Speed below which the ego stands [m/s]; people walk at 1.4 m/s."""
 
 WITHOUT_REASON = 5.0
 """Time that an ego may stand without a reason [s]; the first driver at a green light takes about 2

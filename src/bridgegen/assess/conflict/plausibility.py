@@ -16,11 +16,9 @@ from bridgegen.scenario.participants import OBJECT_CLASSES
 from bridgegen.simulation.rollout import Rollout
 
 SLIP = float(np.tan(np.radians(10.0)))
-"""Motion across a wheeled body, as a share of its speed: tyres slide beyond 10° of slip.
-
+"""Largest motion across a wheeled body, as a share of its speed: tyres slide beyond 10° of slip.
 Source: lateral force of tyres peaks at slip angles of 4° to 10°: Wong, Theory of Ground Vehicles
-(4th edition, 2008), 1.4.
-"""
+(4th edition, 2008), 1.4."""
 
 WINDOW = 0.25
 """Time over which changes of speed and heading are judged [s].

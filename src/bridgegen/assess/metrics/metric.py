@@ -112,7 +112,7 @@ def without_failed(rollout: Rollout, values: Float) -> Float:
 
 
 STANDS = 0.05
-"""A body that is slower than this [m/s] stands, and does not turn round by the sign of noise."""
+"""Speed below which a body stands, and does not turn round by the sign of noise [m/s]."""
 
 
 @dataclass(frozen=True)

@@ -85,7 +85,7 @@ METRICS: Mapping[str, Metric] = Registry(_OURS, ADDED, _checked)
 packages."""
 
 TABLE_I = tuple(one.name for one in _TABLE_I)
-"""The names of the paper's eleven, which every run records as far as its rollouts allow."""
+"""Names of the paper's eleven metrics, which every run records as far as its rollouts allow."""
 
 
 def get(name: str) -> Metric:

@@ -19,7 +19,8 @@ MAIN = PACKAGE / "simulation" / "embedded" / "_rollout_kernels.py"
 """Source file of the kernel that every search calls."""
 
 OF_A_SEARCH = 230
-"""About how many kernels the first search compiles: files ``code/*.bc`` after crossroads-s4."""
+"""Approximate number of kernels that the first search compiles: files ``code/*.bc`` after
+crossroads-s4."""
 
 
 def is_compiled() -> bool:

@@ -275,7 +275,7 @@ FIXED = Form(
     lambda values: _is_mapping(values, Real, str),
     "values by name",
 )
-"""``name=number`` or ``name=name``, repeated."""
+"""Form of fixed values: ``name=number`` or ``name=name``, repeated."""
 
 SETTINGS = Form(
     list[str],
@@ -308,7 +308,7 @@ CRITERIA = Form(
     lambda given: isinstance(given, tuple),
     "criteria",
 )
-"""``ID: FORMULA``, a mapping in braces, or the path of a file; repeated."""
+"""Form of criteria: ``ID: FORMULA``, a mapping in braces, or the path of a file; repeated."""
 
 SIMULATOR = Form(
     None,
@@ -329,4 +329,4 @@ SCREEN = Form(
 """Form of the low-fidelity simulator, or none; like `SIMULATOR`."""
 
 ANOTHER_SIMULATOR = replace(SCREEN, words=_simulator_words)
-"""Likewise, as an option ``--simulator``."""
+"""Form of another simulator, or none, as an option ``--simulator``."""

@@ -230,7 +230,7 @@ def read_judgement(folder: Path) -> Judgement | None:
 
 
 OBSERVATIONS, SCRIPT = "-observations.npz", "-reproduce.py"
-"""Ends of the names of the files, beside ``0001.xosc``."""
+"""Endings of the names of files beside ``0001.xosc``."""
 
 
 def write_reproductions(run: Run, rows: Rows) -> dict[str, str]:

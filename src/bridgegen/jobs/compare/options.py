@@ -14,8 +14,8 @@ from bridgegen.jobs.frame import ANY, SCENARIOS, Job, SimulatingOptions
 from bridgegen.simulation.choice import Value
 
 APART = 0.1
-"""Two scenarios are different if their searched parameters differ by this share of their ranges or
-more, in root mean square; two random ones differ by 0.41."""
+"""Least distance of two scenarios that are different: root mean square over the searched
+parameters, as shares of their ranges; two random ones differ by 0.41."""
 
 
 def _read_settings(texts: Sequence[str], spelling: str) -> dict[str, dict[str, Value]]:

@@ -43,7 +43,7 @@ POINTS_SHOWN = 40
 MARGIN = 10.0
 """Margin around the paths in the picture [m]."""
 CRITICAL, SUFFIXES = "critical", (".xosc", ".xodr", ".owl")
-"""The folder of these, as of a run, and what its files end in."""
+"""Folder of the critical scenarios, as of a run, and endings of its files."""
 
 
 @dataclass(frozen=True)

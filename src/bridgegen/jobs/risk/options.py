@@ -18,7 +18,7 @@ WORDS = {
     "collision": "a collision",
     "mais3": "a collision with a serious injury (MAIS3+)",
 }
-"""All whose probability is stated, in words: the events, and a serious injury."""
+"""Quantities whose probability is stated, in words: the events, and a serious injury."""
 
 
 @dataclass(frozen=True, kw_only=True)

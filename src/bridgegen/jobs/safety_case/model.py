@@ -43,7 +43,7 @@ SACM: dict[Kind, str] = {
 """The element of SACM 2 that each kind of GSN's corresponds to."""
 
 PLACE = re.compile(r"\{([\w.:-]+)\}")
-"""A number's place in a template, by its id."""
+"""Regular expression of a number's place in a template, by its id."""
 
 Text = Annotated[str, Field(max_length=20_000)]
 Id = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.:-]{0,199}$")]

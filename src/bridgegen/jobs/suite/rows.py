@@ -20,7 +20,7 @@ from bridgegen.scenario.language.scenario import LogicalScenario, SearchedScenar
 from bridgegen.scenario.language.space import SearchSpace
 
 MOST_ROWS = 100_000
-"""Variations of one entry."""
+"""Largest number of variations of one entry."""
 
 _DRAWS = 31  # a stream of random numbers of its own
 

@@ -33,7 +33,7 @@ SUB_SCORES: dict[Colour, float] = {
 KMH = 3.6
 
 _ROUNDING = 1e-6
-"""[km/h] By which a speed may exceed a limit and be within it."""
+"""Tolerance by which a speed may exceed a limit and be within it [km/h]."""
 
 _BANDS: tuple[tuple[float, tuple[tuple[float, Colour], ...]], ...] = (
     (50.0, ((10.0, "yellow"), (20.0, "orange"), (30.0, "brown"))),
@@ -130,7 +130,7 @@ def _sub_score(colour: Colour | None, grid: GridResult) -> float:
 
 
 MOST_DIFFERENCES = 4
-"""Kinds of differences that a sentence names."""
+"""Largest number of kinds of differences that a sentence names."""
 
 _WORD: dict[Verdict, str] = {
     "failed": "fails", "passed": "passes", "not judged": "is not judged", "not run": "did not run",

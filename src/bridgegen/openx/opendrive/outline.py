@@ -119,7 +119,7 @@ Shape = tuple[str, Float]
 
 _WAIT = ("205", "206")  # signs: give way, stop (VzKat)
 _NEAR = 15.0
-"""A stop line of the map's own this near a road's end [m] is the one there."""
+"""Distance from a road's end within which a stop line of the map's own is the one there [m]."""
 
 _BESIDE = {
     "shoulder": "shoulder",

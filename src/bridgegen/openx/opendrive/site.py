@@ -195,7 +195,7 @@ def _arm(model: OpenDrive, road: Road, end: str) -> tuple[ArmRoad, ...]:
 
 
 SHORTEST = 20.0
-"""Shorter stretches are left out [m]: the shortest road of a scenario file."""
+"""Length below which stretches are left out [m]: the shortest road of a scenario file."""
 
 MAIN = "main"
 """Name of the only leg of a scenario of a road."""

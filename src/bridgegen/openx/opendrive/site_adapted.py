@@ -224,7 +224,7 @@ def _shortened(one: Participant, site: Site, notes: list[str]) -> Participant:
 
 
 NEAR = 40.0
-"""A light or a sign within this distance before a junction [m] is for that junction."""
+"""Distance before a junction within which a light or a sign is for that junction [m]."""
 
 
 def furnished(model: OpenDrive, site: Site, roads: RoadsSpec) -> Site:

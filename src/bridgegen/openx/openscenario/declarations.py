@@ -43,7 +43,8 @@ RESPONSIBLE = "responsible"
 """The header's property for the responsible party: ego, other, shared or none."""
 
 SEVERITY = "severity"
-"""The header's property for its severity, the probability of a MAIS3+ injury."""
+"""The header's property for the decisive conflict's severity, the probability of a MAIS3+
+injury."""
 
 KIND = "participant_kind"
 """Property of a body: its kind, where its category is only the nearest that the standard has."""

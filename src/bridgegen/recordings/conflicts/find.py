@@ -28,11 +28,12 @@ MOVES = 1.0
 HORIZON = 4.0
 """Prediction horizon of candidate pairs [s], as of the conflict analysis."""
 FARTHEST = 150.0
-"""Between two participants [m] that may meet within the horizon: 2 · 67 km/h, or 135 km/h."""
+"""Largest distance between two participants that may meet within the horizon [m]: 2 · 67 km/h, or
+135 km/h."""
 MARGIN = 0.5
 """Distance by which two bodies may miss each other at constant velocity and be analysed [m]."""
 BLOCK = 2000
-"""Instants whose pairs are looked for at once: a pair is found anew at each."""
+"""Number of instants whose pairs are sought at once: a pair is found anew at each."""
 SPAN = 60.0
 """Duration of an ego's path that is analysed at once [s]."""
 CONTEXT = 15.0

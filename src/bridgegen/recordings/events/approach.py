@@ -10,7 +10,7 @@ from bridgegen.recordings.events.steps import least_of, runs_of
 LEAST_CLOSING = 2.0
 """Least closing speed of an approach [m/s]."""
 HORIZON = 10.0
-"""Time to collision at present speeds [s]."""
+"""Largest time to collision at present speeds of an approach [s]."""
 LEAST_TIME = 0.5
 """Least duration of an approach [s]."""
 STEADY = 1.0

@@ -11,7 +11,7 @@ from bridgegen.recordings.lanes.model import NONE
 from bridgegen.recordings.readers.states import usual
 
 ONSET = 1.0
-"""Deceleration over 2 s from which it may brake [m/s²]."""
+"""Deceleration over 2 s from which on the leader may brake [m/s²]."""
 LEAST_DECELERATION = 2.0
 """Least mean deceleration of the leader's braking [m/s²]."""
 LEAST_DROP = 2.0

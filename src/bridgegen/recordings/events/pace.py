@@ -13,7 +13,7 @@ from bridgegen.recordings.readers.states import centre_ahead
 LEAST_RATE = 0.3
 """Least acceleration or deceleration of a change of pace [m/s²]."""
 WORST_FIT = 0.15
-"""RMS of what remains of the speed, as a share of the change."""
+"""Largest root mean square of the residual speed, as a share of the change."""
 LEAST_RMS = 0.6
 """Root mean square of the residual speed that is accepted for any change [m/s]: noise of
 recordings."""
@@ -104,11 +104,11 @@ def _run(scene: Scene, who: int, until: float) -> tuple[int, int, int, int] | No
 
 
 STANDS = 0.3
-"""It has moved by less than this [m] within `STANDS_TIME`."""
+"""Distance moved within `STANDS_TIME` below which a participant stands [m]."""
 STANDS_TIME = 1.0
 """Time for which a participant must have stood before it sets off [s]."""
 STILL = 0.3
-"""Speed before the ramp at most [m/s]."""
+"""Largest speed before the ramp [m/s]."""
 RAMP = 0.6
 """Duration of the speed ramp with which its fit begins [s]."""
 

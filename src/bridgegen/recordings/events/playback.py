@@ -22,13 +22,14 @@ AROUND = 2.0
 LONGEST = 15.0
 """Longest duration of a moving picture [s]."""
 MOST_OTHERS = 12
-"""Participants besides the ego."""
+"""Largest number of participants besides the ego."""
 GAPS = {"cut-in": "crossing_gap"}
-"""The gap that counts, by kind; of the others their gap at the beginning."""
+"""Gaps that rank the events, by kind; events of other kinds are ranked by their gap at the
+beginning."""
 MEETING = "pet"
-"""Who meets on crossing paths has this time instead."""
+"""Quantity that ranks the events of crossing paths instead of a gap: post-encroachment time."""
 LEAST_SPEED = 1.0
-"""Slower egos count as so fast [m/s]."""
+"""Speed that slower egos count as [m/s]."""
 
 
 @dataclass(frozen=True, eq=False)

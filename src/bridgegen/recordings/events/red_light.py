@@ -11,13 +11,13 @@ from bridgegen.recordings.events.stop_lines import LEAST_FOLLOWED, Passing
 from bridgegen.recordings.readers.table import wrap
 
 RED_FOR = 0.3
-"""Who passes less than this after the light has turned red is not counted [s]."""
+"""Time after the light has turned red within which who passes is not counted [s]."""
 TURNS = 45.0
 """Least angle of a right turn [deg]."""
 BEFORE, BEYOND = 5.0, 25.0
 """Path length before and after the stop line over which the turn angle is measured [m]."""
 HALTS = 0.5
-"""Who was slower than this within `AHEAD` before the line has stopped there [m/s]."""
+"""Speed below which who was slower within `AHEAD` before the line has stopped there [m/s]."""
 JUNCTION = 60.0
 """Greatest path length from a stop line to where paths cross [m]."""
 RIGHT_ON_RED = "it turns right after a stop, which is legal in places"

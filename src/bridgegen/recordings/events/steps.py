@@ -19,7 +19,8 @@ MARGIN = 1.5
 ROUNDS, ITERATIONS = 4, 10
 AT_ONCE = 512
 LANES = 16
-"""NumPy may compute the rest of a row otherwise than whole SIMD registers; rows have whole ones."""
+"""Number to a multiple of which rows are padded: NumPy may compute the rest of a row otherwise than
+whole SIMD registers."""
 DAMPING = 1e-9
 Shape = Literal["cosine", "ramp"]
 

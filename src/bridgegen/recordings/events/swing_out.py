@@ -19,11 +19,11 @@ from bridgegen.recordings.readers.states import centre_ahead
 from bridgegen.recordings.readers.table import wrap
 
 FARTHEST = 90.0
-"""Ahead of the ego [m]."""
+"""Largest distance of the bicycle ahead of the ego [m]."""
 EVERY = 0.5
-"""Between the instants at which it is looked who is near whom [s]."""
+"""Interval between the instants at which pairs near each other are sought [s]."""
 ALONG = 30.0
-"""Between the courses of both, at most [deg]."""
+"""Largest angle between the courses of ego and bicycle [deg]."""
 SMOOTHED = 40.0
 """Distance before and after a point of the ego's path over which a parabola is fitted there [m]."""
 SHORTEST_PATH = 20.0
@@ -44,9 +44,9 @@ LEAST_MOVE = 0.5
 SHORTEST = 0.5
 """Least duration of the bicycle's lateral movement [s]."""
 WORST_FIT = 0.15
-"""RMS of what remains of the offset, as a share of the move."""
+"""Largest root mean square of the residual offset, as a share of the lateral movement."""
 LEAST_SPEED = 1.0
-"""Slower egos count as so fast [m/s]."""
+"""Speed that slower egos count as [m/s]."""
 
 
 @dataclass(frozen=True)

@@ -23,7 +23,7 @@ from bridgegen.recordings.lanes.placing import WALKS
 LATELY = 2.0
 """Time before somebody crosses the ego's path in which an occlusion counts [s]."""
 BESIDE = 10.0
-"""Bodies farther off the line of sight than this hide nobody [m]."""
+"""Distance from the line of sight beyond which bodies hide nobody [m]."""
 
 
 class Bodies(NamedTuple):

@@ -28,7 +28,7 @@ from bridgegen.recordings.readers.table import (
 )
 
 VERSION = (5, 3)
-"""Written by esmini 3.2 to 3.6."""
+"""Version of the format, written by esmini 3.2 to 3.6."""
 MOST_BYTES = 512 * 2**20
 LONGEST_NAME = 200
 _ENTITY, _TYPE, _CATEGORY, _TIME, _NAME, _SPEED = 0, 2, 3, 5, 6, 7

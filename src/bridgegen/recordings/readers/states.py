@@ -79,7 +79,7 @@ STANDING = 0.5
 SHORTEST_ARM = 0.1
 """Least distance from a rear axle to the point ahead of it whose path gives the heading [m]."""
 AWAY = 1.0
-"""The first direction of a track is that to the first state this far away [m]."""
+"""Distance of the state that gives the first direction of a track [m]."""
 
 
 def velocities(time: Float, x: Float, y: Float) -> tuple[Float, Float]:

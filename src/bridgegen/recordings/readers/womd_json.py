@@ -27,7 +27,7 @@ TIME_STEP = 0.1
 """Time step of the Waymo Open Motion Dataset [s]; the file does not repeat it."""
 KINDS = {"vehicle": CAR, "pedestrian": PEDESTRIAN, "cyclist": BICYCLE}
 BICYCLE_LANE = 3
-"""Waymo's number of this kind of lane."""
+"""Waymo's number of bicycle lanes."""
 MOST_BYTES = 256 * 2**20
 
 

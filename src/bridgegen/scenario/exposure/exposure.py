@@ -38,7 +38,7 @@ LEVEL = 0.95
 """Level of confidence of intervals."""
 
 MOST = 10**12
-"""Encounters that may have been counted."""
+"""Largest number of encounters that may have been counted."""
 
 
 @dataclass(frozen=True)

@@ -227,7 +227,7 @@ def _copula(
 
 
 UNIFORM = "uniform"
-"""Names the exposure in which each parameter is uniform over its range: no road is like that."""
+"""Name of the exposure in which each parameter is uniform over its range: no road is like that."""
 ROWS = 200_000
 """Number of rows of an exposure, always the same ones, that show how likely parts of a search space
 are."""

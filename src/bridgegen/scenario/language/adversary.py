@@ -22,10 +22,12 @@ from bridgegen.scenario.participants import PARTICIPANTS
 
 
 PERIOD = 0.5
-"""Seconds between two decisions: less than an alert driver's reaction, more than a controller's."""
+"""Time between two decisions [s]: less than an alert driver's reaction, more than a
+controller's."""
 
 MARGIN = 0.1
-"""Metres that its body keeps to the edges of its lane: it overshoots by a centimetre at times."""
+"""Distance that its body keeps to the edges of its lane [m]: it overshoots by a centimetre at
+times."""
 
 
 def first_speed(adversary: Adversary, values: Mapping[str, float]) -> float:

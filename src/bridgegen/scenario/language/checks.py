@@ -32,10 +32,10 @@ NEEDED = {one.name: one.unit for one in PARAMETERS.values() if one.is_declared} 
 these."""
 
 _CLEARANCE = 0.4
-"""Between the boxes of two that start in one lane [m]."""
+"""Least distance between the boxes of two that start in one lane [m]."""
 
 _ASIDE = 0.25
-"""Between the sides of two that start beside each other in one lane [m]."""
+"""Least distance between the sides of two that start beside each other in one lane [m]."""
 
 
 def use_problems(

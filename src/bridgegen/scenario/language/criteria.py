@@ -83,11 +83,11 @@ class CriterionSection(ShapedSection):
     formula: Text
     """Formula that must hold; see docs/criteria.md."""
     text: Text | None = None
-    """The requirement in words."""
+    """Requirement in words."""
     severity: Severity = "major"
     """Severity of a violation."""
     tags: Annotated[list[Tag], Field(default=[])]
-    """Words to group criteria by."""
+    """Tags by which criteria are grouped."""
 
 
 class CriteriaFile(ShapedSection):

@@ -22,7 +22,7 @@ from bridgegen.scenario.language.shape import ID, Number, NumberOrName, ShapedSe
 
 
 MOST_ROWS = 100_000
-"""Combinations of all grids of a file together."""
+"""Largest number of combinations of all grids of a file together."""
 
 Score = Literal["relative impact speed", "impact speed", "speed reduction", "avoidance"]
 """Quantity by which a row is rated."""

@@ -89,7 +89,7 @@ KNOBS: Mapping[Template, Mapping[str, Knob]] = MappingProxyType(
         },
     }
 )
-"""The measures of each template."""
+"""Parameters of each template of a road network."""
 
 HEADINGS: Mapping[str, Mapping[str, float]] = MappingProxyType(
     {
@@ -112,7 +112,7 @@ CROSSWALK_GAP = 1.0
 ours."""
 
 LETTERS = "ABCDE"
-"""Legs with a heading are called so; the paper numbers their points P1, P2 (A) to P9, P10 (E)."""
+"""Names of legs with a heading; the paper numbers their points P1, P2 (A) to P9, P10 (E)."""
 
 
 @dataclass(frozen=True)

@@ -273,7 +273,7 @@ class ScenarioFile(ShapedSection):
     road_works: dict[str, WorksSection] = {}
     """Lanes closed by cones, by name (layer 3)."""
     effects: list[EffectSection] = []
-    """Functions of yours that add to each scenario."""
+    """Functions of your own that add to each scenario."""
     parameters: dict[str, ParameterSection] = {}
     """Parameters that may vary, by name."""
     defaults: dict[str, NumberOrName] = {}

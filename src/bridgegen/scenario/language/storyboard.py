@@ -48,7 +48,7 @@ MOST_ASIDE = 4.0
 """Largest offset from the lane's centre [m]: a lane and a shoulder are seldom wider."""
 
 FASTEST_REVERSE = -5.0
-"""[m/s]; 18 km/h is about what a reverse gear does."""
+"""Fastest speed in reverse [m/s]; 18 km/h is about what a reverse gear does."""
 
 _OF_EVENTS = ("after", "began")
 

@@ -353,7 +353,7 @@ FARTHEST_BESIDE = 5.0
 (signs stand 0.5 to 1.5 m from it, RSA 21)."""
 
 _OURS = "FILTER NOT EXISTS { ?value bg:has_s ?s }"
-"""Places on an imported map are left to it."""
+"""SPARQL filter that leaves places on an imported map to the map."""
 
 
 def placement_rules() -> Iterator[Rule]:

@@ -14,7 +14,7 @@ import math
 from bridgegen.scenario.language.expression import Expression
 
 UNDEFINED = "?undefined"
-"""Never bound: using it is SPARQL's error, the counterpart of NaN."""
+"""Variable that is never bound: using it is SPARQL's error, the counterpart of NaN."""
 
 _ARITHMETIC: dict[type[ast.operator], str] = {
     ast.Add: "+",

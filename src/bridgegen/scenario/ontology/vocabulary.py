@@ -13,7 +13,7 @@ import pyoxigraph as ox
 ONTOLOGY = "https://w3id.org/bridgegen"
 BG = ONTOLOGY + "#"
 SCENARIOS = ONTOLOGY + "/scenarios/"
-"""Each scenario's individuals live in a namespace of their own below this."""
+"""Namespace below which each scenario's individuals have one of their own."""
 
 OWL = "http://www.w3.org/2002/07/owl#"
 RDF = "http://www.w3.org/1999/02/22-rdf-syntax-ns#"

@@ -44,7 +44,7 @@ RESTART_WITHIN = Setting(
     0.0,
     1.0,
 )
-"""The setting of an algorithm whose population converges."""
+"""Setting that restarts an algorithm whose population converges."""
 
 
 class Arena(Protocol):

@@ -19,7 +19,7 @@ SIGNIFICANT = 0.01
 """Probability of an unequal distribution of the differences by chance, for all parameters."""
 
 PARTS = 3
-"""Equal intervals of a parameter that are compared."""
+"""Number of equal intervals of a parameter that are compared."""
 
 
 @dataclass(frozen=True)

@@ -17,10 +17,10 @@ JSON_FILE = "triage.json"
 """File of the triage's record in a run's folder."""
 
 MOST_MODES = 50
-"""Failure modes that are recorded; those that hold the most harmful rows."""
+"""Largest number of failure modes that are recorded; those that hold the most harmful rows."""
 
 MOST_EXAMPLES = 20
-"""Evaluations that are named of a mode, worst first."""
+"""Largest number of evaluations that are named of a mode, worst first."""
 
 MOST_NEIGHBOURHOODS = 2000
 

@@ -30,8 +30,9 @@ do."""
 FAR, LONG, FAST, HARD = 30.0, 5.0, 10.0, 5.0  # m, s, m/s, m/s²: what counts as 1
 
 Act = Callable[[Float, Bool], Float]
-"""``(N, len(OBSERVED))`` observations and ``(N,)`` whether a row still runs → ``(N, 2)`` decisions
-in [0, 1]: the speed that it makes for, up to its highest; its place, from right to left."""
+"""Function that decides: ``(N, len(OBSERVED))`` observations and ``(N,)`` whether a row still runs
+→ ``(N, 2)`` decisions in [0, 1]: the speed that it makes for, up to its highest; its place, from
+right to left."""
 
 
 class Arena:

@@ -31,7 +31,7 @@ LEAST_RADIUS = 2.0
 """Tightest curve that is built [m]; below it even a small car must reverse."""
 
 _SHORTEST = 1e-4
-"""Lines shorter than this [m] are left out."""
+"""Length below which lines are left out [m]."""
 _STRAIGHT = 1e-9
 _ASIDE = 1e-3
 """Lateral offset below which a path is straight [m]: it would be an arc of so large a radius that

@@ -37,7 +37,7 @@ STATES = {
 """States that a phase shows to a light that it names, by property; to other lights it shows red."""
 
 STOP_LINE_WIDTH = 0.5
-"""Along the road [m]; source: RMS-1, 50 cm."""
+"""Width of a stop line along the road [m]; source: RMS-1, 50 cm."""
 
 _HEIGHT = {"light": 5.0, "sign": 2.2, "lamp": 6.0}  # m, of the lower edge or the top; ours
 _SLACK = 1e-6

@@ -26,7 +26,7 @@ MEASURES = ("has_size", "has_radius", "has_ring_lane_width", "has_merge_length",
 
 _SLACK = 1e-9
 _LEAST_GAP = 45.0
-"""Between two legs of an intersection [deg]."""
+"""Least angle between two legs of an intersection [deg]."""
 
 
 def opendrive_from_owl(individuals: Individuals) -> OpenDrive:

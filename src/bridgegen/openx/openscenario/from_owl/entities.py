@@ -19,7 +19,7 @@ MAX_SPEED = "max_speed"
 """Property of a pedestrian: the greatest speed [m/s]; the standard has it for vehicles."""
 
 LIFTED = {"has_reason_to_exceed": "exceeds_limit", "has_siren": SIREN}
-"""Properties of individuals of vehicles, and what they are called in files."""
+"""Names in files of properties of vehicles' individuals."""
 
 _ESMINI_CONTROLLER = "ExternalController"
 

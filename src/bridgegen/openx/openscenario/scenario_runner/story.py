@@ -141,7 +141,7 @@ STATES = ("off", "red", "red", "yellow", "green")
 """States of a light in CARLA, by the code in `Rollout.lights`; CARLA has no red with yellow."""
 
 LIGHT_REACH = 2.0
-"""A light is the first that stands nearer than this to its ``pos=x,y`` [m]."""
+"""Largest distance of a light from its ``pos=x,y`` [m]; the first that is nearer is taken."""
 
 _STOP_SIGN = "206"  # VzKat; CARLA makes a traffic.stop of it
 
