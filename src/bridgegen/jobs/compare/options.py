@@ -94,7 +94,7 @@ class CompareOptions(CommonOptions, SimulatingOptions):
         default_factory=dict,
         metadata=option(
             SETTINGS,
-            "Settings of algorithms, where they are not to be their defaults.",
+            "Override a setting of an algorithm.",
             spelling="--set",
             hint="ALGORITHM.NAME=VALUE, of your own CLASS.NAME=VALUE; may be repeated.",
             group=SEARCH,
@@ -122,7 +122,9 @@ class CompareOptions(CommonOptions, SimulatingOptions):
     )
     seeds: int = field(
         default=10,
-        metadata=option(WHOLE, "Runs of each, with the seeds 0, 1, 2 …", group=SEARCH),
+        metadata=option(
+            WHOLE, "Runs of each algorithm in each scenario, with the seeds 0, 1, 2 …", group=SEARCH
+        ),
     )
     budget: int = field(
         default=1000, metadata=option(WHOLE, "Evaluations of each run, exactly.", group=SEARCH)

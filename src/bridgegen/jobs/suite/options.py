@@ -80,7 +80,7 @@ class ScenariosOptions(SimulatingOptions):
             group=SEARCH,
         ),
     )
-    seed: int = field(default=0, metadata=option(WHOLE, "Seed of these variations.", group=SEARCH))
+    seed: int = field(default=0, metadata=option(WHOLE, "Seed of the variations.", group=SEARCH))
     workers: int | None = field(
         default=None,
         metadata=option(
