@@ -253,7 +253,7 @@ def test_pages_that_are_made_of_the_code_can_be_made(tmp_path):
         assert words in commands
     keys = (tmp_path / "scenario-files.md").read_text("utf-8")
     assert "| **`template`** | `crossroads`, `t-junction`" in keys
-    assert "| `to` | text | The other participant" in keys
+    assert "| `to` | text | Other participant" in keys
     assert "cloudiness ≥ precipitation" in (tmp_path / "weather.md").read_text("utf-8")
 
 

@@ -66,7 +66,7 @@ class Cause(IntEnum):
 CAUSES = (
     Cause.PERCEPTION, Cause.VEHICLE_DYNAMICS, Cause.PLANNING, Cause.CONTROL, Cause.UNAVOIDABLE,
 )  # fmt: skip
-"""In the order in which they are sought."""
+"""Root causes in the order in which they are sought."""
 
 
 @dataclass(frozen=True)

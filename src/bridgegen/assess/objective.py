@@ -24,7 +24,8 @@ Weights = Literal["fixed", "entropy"]
 Scale = Literal["raw", "standardised"]
 Objectives = Literal["one", "many"]
 Rule = Literal["harm", "thresholds", "criteria"]
-"""What makes a scenario critical: its harm, the paper's thresholds, or a violated criterion."""
+"""Rule by which a scenario is critical: its harm, the paper's thresholds, or a violated
+criterion."""
 
 RULES: tuple[Rule, ...] = get_args(Rule)
 

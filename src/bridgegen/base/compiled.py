@@ -221,7 +221,7 @@ def _called_at(_: Any, address: Any, arrays: Any) -> Any:
 
 
 DEMAND = numba.types.UniTuple(numba.types.float64, 2)
-"""What a kernel returns that is called by its address."""
+"""Return type of a kernel that is called by its address: two numbers."""
 
 
 def _calls_kernel(returns: Any) -> Callable[..., Any]:
@@ -286,7 +286,8 @@ def address_of(function: Callable[..., Any], kinds: tuple[Any, ...]) -> int:
 
 
 _ADDRESSES: dict[tuple[Any, ...], tuple[int, tuple[Any, ...]]] = {}
-"""Where kernels lie in this process; with the types, which must live as long as their ids count."""
+"""Addresses of kernels in this process, with the types, which must live as long as their ids
+count."""
 
 
 def row_type(rows: Any, axes: int = 1) -> Any:

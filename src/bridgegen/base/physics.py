@@ -4,36 +4,36 @@ Kernels freeze them; ``compilation.sources`` counts this module as a source of t
 """
 
 GRAVITY = 9.81
-"""[m/s²]"""
+"""Gravitational acceleration [m/s²]."""
 
 DRY_FRICTION = 0.85
-"""[1] Peak friction of a tyre on dry asphalt, 0.8 to 0.9.
+"""Peak friction of a tyre on dry asphalt [1], 0.8 to 0.9.
 
 Source: Wong, Theory of Ground Vehicles, table 1.3."""
 
 GRIP = DRY_FRICTION * GRAVITY
-"""[m/s²] What a tyre gives on a dry road, in any direction."""
+"""Largest acceleration that a tyre gives on a dry road, in any direction [m/s²]."""
 
 MOST_LATERAL = 4.0
-"""[m/s²] Lateral acceleration that drivers rarely exceed.
+"""Lateral acceleration that drivers rarely exceed [m/s²].
 
 Source: Mitschke and Wallentowitz, Dynamik der Kraftfahrzeuge."""
 
 HARD_BRAKING = 4.9
-"""[m/s²] Deceleration from which on braking is hard. Source: paper, Table I."""
+"""Deceleration from which on braking is hard [m/s²]. Source: paper, Table I."""
 
 CAREFUL_REACTION = 0.75
-"""[s] From the risk until a careful driver begins to brake.
+"""Reaction time of a careful driver, from the risk until braking begins [s].
 
 Source: UN R157, Annex 3, performance model."""
 
 CAREFUL_BRAKING_G = 0.774
-"""[g] What a careful driver brakes by at most. Source: as for ``CAREFUL_REACTION``."""
+"""Largest deceleration of a careful driver [g]. Source: as for ``CAREFUL_REACTION``."""
 
 CAREFUL_BRAKING = CAREFUL_BRAKING_G * GRAVITY
-"""[m/s²] The same."""
+"""Deceleration of a careful driver in an emergency [m/s²]; source as of `CAREFUL_BRAKING_G`."""
 
 CAREFUL_JERK = 12.65
-"""[m/s³] How fast a careful driver's deceleration rises: to its most in 0.6 s.
+"""Jerk with which a careful driver's deceleration rises, to its most in 0.6 s [m/s³].
 
 Source: as for ``CAREFUL_REACTION``."""

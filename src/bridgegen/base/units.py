@@ -40,14 +40,14 @@ WRITTEN: Mapping[str, Mapping[str, tuple[Fraction, Fraction]]] = MappingProxyTyp
         }.items()
     }
 )  # fmt: skip
-"""By unit of a parameter: the units that a number may be written in, with factor and offset."""
+"""Units that a number may be written in, with factor and offset, by unit of the parameter."""
 
 _SYMBOLS = sorted({symbol for symbols in WRITTEN.values() for symbol in symbols})
 _NUMBER = r"[-+]?(?:\.[0-9]+|[0-9]+(?:\.[0-9]*)?)(?:[eE][-+]?[0-9]{1,2})?"
 _UNIT = r"[A-Za-z°%][\w°%/²^]{0,15}"
 _FORM = re.compile(rf"\s*({_NUMBER})(?:\s*({_UNIT})|\s+(1/k?m))\s*")
 PATTERN = rf"^{_NUMBER} ?({'|'.join(re.escape(one) for one in _SYMBOLS)})$"
-"""Of a number with a unit, for JSON Schema."""
+"""Regular expression of a number with a unit, for JSON Schema."""
 
 
 def has_unit(text: str) -> bool:

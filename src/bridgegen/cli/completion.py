@@ -10,7 +10,8 @@ import typer
 from bridgegen.cli.groups import DEFAULT
 
 Complete = Callable[[typer.Context, str], list[str]]
-"""Of a command line so far and the beginning of a word: the words that it may become."""
+"""Function that completes a word: from the command line so far and the word's beginning to
+candidates."""
 
 
 def completing(kind: str) -> Complete | None:
@@ -167,4 +168,4 @@ NAMES: dict[str, Callable[[typer.Context], Iterable[str]]] = {
     "count": _fixed("ego", "any"),
     "flavour": _flavours,
 }
-"""The names of each kind."""
+"""Functions that list the names to complete, by kind."""

@@ -78,7 +78,7 @@ OPTIONS: Mapping[str, Any] = {
         ),
     ],
 }
-"""By parameter: those that the simulators declare."""
+"""Connection options that the simulators declare, by parameter name."""
 
 
 def with_connection_options(command: Callable[..., None]) -> Callable[..., None]:

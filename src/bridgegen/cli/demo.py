@@ -13,7 +13,8 @@ from bridgegen.cli.app import app
 from bridgegen.cli.groups import SEARCH
 
 SCENARIO, DRIVER, ALGORITHM, BUDGET = "cyclist-right-turn", "route-follower", "nsga2", 600
-"""UN R157's driver brakes for what is on its lane, and for nothing that crosses it."""
+"""Search of the demonstration: UN R157's driver brakes for what is on its lane, and for nothing
+that crosses it."""
 
 
 @app.command(rich_help_panel=SEARCH)

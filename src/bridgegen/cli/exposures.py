@@ -39,7 +39,7 @@ def fit(
         float | None, typer.Option(help="Hours of driving in which the events happened [h].")
     ] = None,
     km: Annotated[
-        float | None, typer.Option(help="Length of driving in which they happened [km].")
+        float | None, typer.Option(help="Distance of driving in which the events happened [km].")
     ] = None,
     ignore: Annotated[
         list[str] | None,
@@ -53,7 +53,7 @@ def fit(
         str | None, typer.Option(help="Where the events come from, for the file.")
     ] = None,
     replicates: Annotated[int, typer.Option(help="Resampled fits, for bands and p values.")] = 200,
-    seed: Annotated[int, typer.Option(help="Of all random numbers.")] = 0,
+    seed: Annotated[int, typer.Option(help="Seed of the random number generator.")] = 0,
     as_json: common.Json = False,
 ) -> None:
     """Fit distributions of a scenario's parameters to events.

@@ -177,12 +177,14 @@ def schema(
     kind: Annotated[
         str | None,
         typer.Argument(
-            help="Of which files: scenario, fragment, exposure, run (of a search), compare, suite, "
+            help="Kind of file: scenario, fragment, exposure, run (of a search), compare, suite, "
             "diff, risk, preventability, dashboard or mine (run files of these), or safety-case.",
             show_default="scenario",
         ),
     ] = None,
-    of: Annotated[str | None, typer.Option(help="The same.", show_default=False)] = None,
+    of: Annotated[
+        str | None, typer.Option(help="Kind of file, like the argument.", show_default=False)
+    ] = None,
     out: Annotated[
         Path | None, typer.Option(help="A file for it, new or an earlier schema; else printed.")
     ] = None,

@@ -37,14 +37,14 @@ from bridgegen.jobs.safety_case.options import JOB as SAFETY_CASE
 from bridgegen.jobs.suite.options import DIFF, SUITE
 
 JOBS = (COMPARE, SUITE, DIFF, BENCHMARK, PREVENTABILITY, RISK, DASHBOARD, SAFETY_CASE, MINE)
-"""In the order of ``--help``."""
+"""Jobs in the order of ``--help``."""
 
 _CRITERIA = {
     SUITE.name: "of_suite:SuiteCriteria",
     DIFF.name: "of_difference:DifferenceCriteria",
     SAFETY_CASE.name: "of_job:JobVerdict",
 }
-"""In `bridgegen.cli.verdict`, the classes of criteria by job; of all others ``JobCriteria``."""
+"""Classes of criteria in `bridgegen.cli.verdict` by job; ``JobCriteria`` for all others."""
 
 _OF_SIMULATOR = ("simulator", "simulator_set", "connection")
 

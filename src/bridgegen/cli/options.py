@@ -55,7 +55,7 @@ OnlyMetrics = Annotated[
     str | None,
     typer.Option(
         "--metrics",
-        help="Only these, e.g. pet,drac.",
+        help="Metrics to report, e.g. pet,drac.",
         show_default="all",
         rich_help_panel=OUTPUT,
         autocompletion=completing("metric"),

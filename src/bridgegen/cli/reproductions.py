@@ -13,7 +13,7 @@ from bridgegen.cli.groups import SEARCH
 from bridgegen.engine.options.forms import read_names
 
 PACKAGE = "bridgegen_reproduction"
-"""By name, since nothing of this package imports it."""
+"""Package of the reproductions, as a name, since nothing of this package imports it."""
 
 
 @app.command(rich_help_panel=SEARCH)
@@ -29,11 +29,13 @@ def reproduce(
         ),
     ] = None,
     iterations: Annotated[
-        int, typer.Option(help="Of each run, 40 evaluations each; the paper's are 25.")
+        int, typer.Option(help="Iterations of each run, 40 evaluations each; the paper has 25.")
     ] = 25,
     scenarios: Annotated[
         str | None,
-        typer.Option(help="Which of crossroads-s1 to -s4, S4 among them.", show_default="all"),
+        typer.Option(
+            help="Scenarios, of crossroads-s1 to -s4; S4 must be among them.", show_default="all"
+        ),
     ] = None,
     workers: options.RunWorkers = None,
     road_map: options.RoadMap = None,

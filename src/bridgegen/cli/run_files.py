@@ -23,7 +23,7 @@ if TYPE_CHECKING:  # the command line starts without them
     from bridgegen.scenario.language.plain_yaml import Document
 
 Values = Mapping[str, Any]
-"""Of parameters of the command ``search``, by name, as its parser returns them."""
+"""Values of the parameters of the command ``search``, by name, as its parser returns them."""
 
 SCENARIO, SAVE = "scenario", "save"
 _HEADS = {"run", "runs"}

@@ -402,7 +402,7 @@ def check_driver(
     scenario: Annotated[
         list[str] | None,
         typer.Option(
-            help="Try it in this one; may be repeated.",
+            help="Scenario to drive in; may be repeated.",
             show_default="four that ship",
             autocompletion=completing("scenario"),
         ),

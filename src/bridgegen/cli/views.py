@@ -75,16 +75,23 @@ def video(
     ] = None,
     evaluation: Annotated[
         int | None,
-        typer.Option(help="Which, counted from 1.", show_default="the worst exported scenario"),
+        typer.Option(
+            help="Evaluation to show, counted from 1.", show_default="the worst exported scenario"
+        ),
     ] = None,
     size: Annotated[str, typer.Option(help="Width and height [pixels].")] = "960x540",
     fps: Annotated[int, typer.Option(help="Frames per second.")] = 20,
     start: Annotated[
         float | None,
-        typer.Option("--from", help="Start [s].", show_default="8 s before the conflict"),
+        typer.Option(
+            "--from",
+            help="Start of the film, or instant of the picture [s].",
+            show_default="8 s before the conflict",
+        ),
     ] = None,
     end: Annotated[
-        float | None, typer.Option("--to", help="End [s].", show_default="2 s after the conflict")
+        float | None,
+        typer.Option("--to", help="End of the film [s].", show_default="2 s after the conflict"),
     ] = None,
     ego: options.OwnEgo = None,
 ) -> None:

@@ -46,7 +46,8 @@ from bridgegen.drivers.kinds import IS_ON_FOOT
 
 BEFORE, AFTER, BEGINS, LENGTH, HELD_UP = range(control.SIZE + 3, control.SIZE + 8)
 LAST = control.SIZE + 8
-"""Slots of ``mind``: the shift, and for how long the ego has been held up [s]."""
+"""Number of slots of ``mind`` with those of lane changes: the shift, and for how long the ego has
+been held up [s]."""
 
 SLOW = 0.5  # of the possible speed; an actor that is slower than that, and …
 SLOWER = 3.0  # … by so many m/s, holds the ego up

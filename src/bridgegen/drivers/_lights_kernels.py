@@ -9,7 +9,7 @@ from bridgegen.base.compiled import kernel
 from bridgegen.drivers._following_kernels import STOP_MARGIN, stop_for
 
 RED, RED_YELLOW, YELLOW = 1, 2, 3
-"""As `Rollout.lights` has them."""
+"""Codes of a traffic light's states, as in `Rollout.lights`."""
 
 YELLOW_DECELERATION = 3.0  # m/s²; a driver that needs more at yellow onset passes; source: ITE,
 # Traffic Signal Timing Manual, 3.0 m/s² (10 ft/s²)

@@ -21,9 +21,10 @@ RAIN_ON_GLASS = 0.01  # h/mm, of light that wet glass scatters over the picture:
 CLEAR_NORMAL = 127_500.0  # lx, of the sun outside the air; IES RP-21-84
 CLEAR_DEPTH = 0.21  # optical depth of a clear sky per air mass; the same
 AT_HORIZON, AT_CIVIL, AT_NAUTICAL, AT_NIGHT = 400.0, 3.4, 0.008, 0.001
-"""lx on the ground with the sun at 0, −6, −12 and −18° or below: sunset, the ends of civil and of
-nautical twilight, a moonless night. Source: P. K. Seidelmann (ed.), Explanatory Supplement to the
-Astronomical Almanac, 1992; the last from the RCA Electro-Optics Handbook, 1974."""
+"""Illuminance on the ground with the sun at 0, −6, −12 and −18° or below [lx]: sunset, the ends of
+civil and of nautical twilight, a moonless night. Source: P. K. Seidelmann (ed.), Explanatory
+Supplement to the Astronomical Almanac, 1992; the last from the RCA Electro-Optics Handbook,
+1974."""
 CLOUD_SHADE, CLOUD_POWER = 0.75, 3.4  # 1 − 0.75·n^3.4; Kasten, Czeplak, Sol. Energy 24 (1980)
 GROUND_ALBEDO = 0.2  # of the scene behind a target: grey asphalt, walls, trees
 GLARE, GLARE_FROM = 10.0, 1.0  # Stiles–Holladay, L = 10·E/θ² with θ in degrees, from 1° on

@@ -25,7 +25,7 @@ from bridgegen.drivers._weather_columns import ATTENUATION, GLARE, N_GLARES, SIG
 from bridgegen.drivers.kinds import CAR, LAMPS, PEDESTRIAN, REFLECTANCE
 
 LIGHT, REAR, WALKER = 0, 1, 2
-"""What is looked for: a traffic light, a car from behind, a pedestrian."""
+"""Objects to be seen: a traffic light, a car from behind, a pedestrian."""
 
 CAR_WIDTH, CAR_HEIGHT = 1.8, 1.5  # m
 WALKER_WIDTH, WALKER_HEIGHT = 0.5, 1.7  # m

@@ -18,7 +18,7 @@ FRICTION_SCALE = column("friction_scale")  # of dry friction
 STATED = len(COLUMNS)
 
 CLEAR_DAY = tuple(one.clear for one in COLUMNS)
-"""What is stated where a file states nothing: WMO's clear air, the sun in the south at 45°."""
+"""Values of the weather where a file states none: WMO's clear air, the sun in the south at 45°."""
 
 # What follows, see ``_weather_kernels``.
 EXTINCTION = STATED  # 1/m, of contrast

@@ -41,7 +41,7 @@ KEEP_CLEAR_ROUNDS = 3  # zones that overlap in a row, at most
 HORIZON = 10.0  # s, how far ahead arrivals are compared
 ENTER, LEAVE, OTHER_ENTERS, OTHER_LEAVES, HOW, EDGE = range(6)
 ZONE = 6
-"""Columns of a zone, and how many there are."""
+"""Number of columns of a zone, after the columns themselves."""
 STATION, SPEED, FRONT, REAR, ENTITY, GAIN, RANK = range(ZONE, ZONE + 7)
 """Columns of a passage after its zone."""
 

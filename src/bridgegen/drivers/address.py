@@ -9,7 +9,7 @@ from bridgegen.base.errors import InputError
 CONNECT, UNIX, EXEC = "connect:", "unix:", "exec:"
 
 MAX_PATH = 103
-"""Most bytes of a unix socket's path: Linux takes 107, macOS 103."""
+"""Largest length of a unix socket's path [bytes]: Linux takes 107, macOS 103."""
 
 
 @dataclass(frozen=True)

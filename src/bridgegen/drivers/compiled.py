@@ -46,12 +46,13 @@ SCENE = _record(
     "time_step", "n_steps", "length", "width", "centre",
     "max_speed", "max_acceleration", "max_deceleration", "max_curvature",
 )  # fmt: skip
-"""What does not change, see `bridgegen.drivers.interface.Scene`; all are float64."""
+"""Record of what is constant in a scenario, see `bridgegen.drivers.interface.Scene`; all are
+float64."""
 
 EGO = _record(
     "time", "x", "y", "h", "v", "a", "target_speed", "offset", "stop_distance", "light"
 )  # fmt: skip
-"""The ego, see `Observation`."""
+"""Record of the ego's state, see `Observation`."""
 
 ROUTE = _record("x", "y", "h", "curvature")
 """A point of the route ahead [m, rad, 1/m]; there are ``ROUTE_POINTS``, every ``ROUTE_STEP``."""
@@ -91,7 +92,8 @@ PIECE = np.dtype(
 """
 
 PLACE = np.dtype([("lane", np.int64), ("near", np.int64, (NEAR_PIECES,))])
-"""What of the map is near, see `bridgegen.drivers.interface.MapView`; one record."""
+"""Record of the ego's lane and the pieces of the map near it, see
+`bridgegen.drivers.interface.MapView`."""
 
 CONFLICT = _record("enter", "leave", "other_enter", "other_leave", "priority", "how")
 """One way of a participant across the route, see `bridgegen.drivers.interface.Conflicts`."""

@@ -29,9 +29,9 @@ class Origin(Enum):
     """Where a driver's code comes from."""
 
     SHIPPED = "shipped"
-    """With BridgeGen, compiled."""
+    """A driver that is installed with BridgeGen, compiled."""
     OWN = "own"
-    """From the user, or a planner that others wrote."""
+    """A driver from the user, or a planner that others wrote."""
     STORYBOARD = "storyboard"
     """No driver: the storyboard moves the ego."""
     GUEST = "guest"
@@ -46,7 +46,7 @@ SCRIPTED, ATTENTIVE, INSISTENT = 0, 1, 2
 """Codes of the drivers of participants other than the ego."""
 
 CODES = {"scripted": SCRIPTED, "attentive": ATTENTIVE, "insistent": INSISTENT}
-"""Those codes by name."""
+"""Codes of the drivers of participants other than the ego, by name."""
 
 OTHERS = {
     "attentive": "Follows its script unless another participant is in its way: keeps its distance, "

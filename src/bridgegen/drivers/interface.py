@@ -26,20 +26,20 @@ import numpy.typing as npt
 from bridgegen.base.arrays import Bool, Float, Int
 
 ROUTE_POINTS = 40
-"""P, how many points of the route ahead an observation has."""
+"""Number P of points of the route ahead in an observation."""
 
 ROUTE_STEP = 2.0
-"""Metres between two of them."""
+"""Distance between two points of the route ahead [m]."""
 
 HISTORY, HISTORY_STEP = 11, 0.1
-"""H, how many instants a history has; seconds between two of them."""
+"""Number H of instants of a history, and time between two of them [s]."""
 
 
 NEAR_PIECES = 128
-"""Q, how many of the nearest pieces of the map a `MapView` has at most."""
+"""Largest number Q of the nearest pieces of the map that a `MapView` has."""
 
 CONFLICT_WAYS = 6
-"""W, how many ways of a participant `Conflicts` has at most."""
+"""Largest number W of ways of a participant in `Conflicts`."""
 
 WANTS = {
     "lanes": "speed limit, width and the lanes beside along the route; the way to its end",
@@ -47,7 +47,7 @@ WANTS = {
     "conflicts": "where the ways of others meet the route, and who gives way there",
     "history": "the tracks of the last second",
 }
-"""What a driver may ask for, by its attribute ``wants``."""
+"""Inputs that a driver may ask for by its attribute ``wants``, with descriptions."""
 
 
 @dataclass(frozen=True)
@@ -287,14 +287,14 @@ class BatchDriver(Protocol):
 # --- The road network, for drivers that want "map" ------------------------------------------------
 
 CENTRE, BORDER, CROSSWALK, STOP_LINE = range(4)
-"""What a piece of the map is."""
+"""Kinds of the pieces of a map."""
 
 UNMARKED, BROKEN, SOLID = range(3)
-"""How a border is marked: by nothing, by what one may cross (from either side), or by a line that
-one may not cross, from one side at least."""
+"""Markings of a border: none, one that may be crossed (from either side), or a line that may not be
+crossed, from one side at least."""
 
 PIECE_POINTS = 11
-"""V, how many points a piece has at most, 2 m apart at most."""
+"""Largest number V of points of a piece, 2 m apart at most."""
 
 
 @dataclass(frozen=True)

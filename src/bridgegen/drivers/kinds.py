@@ -3,7 +3,7 @@
 from bridgegen.scenario.participants import OBJECT_CLASSES
 
 NAMES = tuple(one.name for one in OBJECT_CLASSES)
-"""In words, by number."""
+"""Names of the object classes, by code."""
 
 CAR, TRUCK, BUS, MOTORCYCLE, BICYCLE, PEDESTRIAN, ANIMAL, OTHER = (
     NAMES.index(name)
@@ -18,20 +18,20 @@ CAR, TRUCK, BUS, MOTORCYCLE, BICYCLE, PEDESTRIAN, ANIMAL, OTHER = (
 
 
 LEFT, RIGHT, BRAKE = 1, 2, 4
-"""What shows; both indicators are hazard lights, which tell of no change of lane."""
+"""Bits of the indicators and brake lights that are lit; both indicators are hazard lights, which
+announce no lane change."""
 
 SWITCHED = 8
-"""Besides ``BRAKE``: brake lights are as the storyboard has switched them."""
+"""Bit beside ``BRAKE``: brake lights are as the storyboard has switched them."""
 
 BLUE = 16
-"""The blue lights of an emergency vehicle on a call; drivers know of them by its siren."""
+"""Bit of the blue lights of an emergency vehicle on a call; drivers know of them by its siren."""
 
 HAZARD = LEFT | RIGHT
 
 BRAKE_LIGHTS_FROM = 1.3
-"""[m/s²] The deceleration from which brake lights must be lit.
-
-Source: UN R13-H, 5.2.22: not below 0.7 m/s², always above 1.3 m/s²."""
+"""Deceleration from which brake lights must be lit [m/s²]. Source: UN R13-H, 5.2.22: not below 0.7
+m/s², always above 1.3 m/s²."""
 
 
 # --- The columns of ``Rollout.detections``: how the ego's sensors detect an entity at an instant --
@@ -39,20 +39,21 @@ Source: UN R13-H, 5.2.22: not below 0.7 m/s², always above 1.3 m/s²."""
 
 
 SEEN_BY = 0
-"""`NO_FRAME`, `MISSED`, `CAMERA`, `LIDAR` or `BOTH`; other columns are valid from `CAMERA` on."""
+"""Sensors that saw the entity: `NO_FRAME`, `MISSED`, `CAMERA`, `LIDAR` or `BOTH`; other columns are
+valid from `CAMERA` on."""
 X, Y = 1, 2
 """The detected box's centre in the world [m]."""
 HEADING = 3
-"""[rad], counter-clockwise from +x."""
+"""The detected box's heading [rad], counter-clockwise from +x."""
 LENGTH, WIDTH = 4, 5
-"""[m], > 0."""
+"""The detected box's length and width [m], > 0."""
 CONFIDENCE = 6
-"""0 to 1."""
+"""The detection's confidence, 0 to 1."""
 KIND = 7
 """The class assigned to it, a code of `bridgegen.drivers.kinds`."""
 
 DETECTION = 8
-"""Number of columns."""
+"""Number of columns of a detection."""
 
 NO_FRAME, MISSED, CAMERA, LIDAR, BOTH = -1, 0, 1, 2, 3
 """No sensor took a frame at this instant; a frame missed the entity; the sensors that saw it."""
@@ -64,7 +65,7 @@ NO_FRAME, MISSED, CAMERA, LIDAR, BOTH = -1, 0, 1, 2, 3
 _CONDUCT = tuple(one.conduct for one in OBJECT_CLASSES)
 
 IS_VEHICLE = tuple(one == "vehicle" for one in _CONDUCT)
-"""Whether it is a motor vehicle."""
+"""Whether each kind is a motor vehicle, by code."""
 
 IS_CYCLE = tuple(one == "bicycle" for one in _CONDUCT)
 IS_PEDESTRIAN = tuple(one == "pedestrian" for one in _CONDUCT)
@@ -72,25 +73,27 @@ IS_ANIMAL = tuple(one == "animal" for one in _CONDUCT)
 IS_OBSTACLE = tuple(one == "obstacle" for one in _CONDUCT)
 
 USES_LANES = tuple(one in ("vehicle", "bicycle") for one in _CONDUCT)
-"""Whether it drives or rides."""
+"""Whether each kind drives or rides, by code."""
 
 IS_ON_FOOT = tuple(one in ("pedestrian", "animal") for one in _CONDUCT)
-"""Whether it walks."""
+"""Whether each kind walks, by code."""
 
 NEEDS_ROOM = tuple(one in ("bicycle", "pedestrian") for one in _CONDUCT)
-"""Whether it is passed with more room than a vehicle."""
+"""Whether each kind is passed with more room than a vehicle, by code."""
 
 IS_VULNERABLE = tuple(one in ("bicycle", "pedestrian", "animal") for one in _CONDUCT)
-"""Whether it is a vulnerable road user, or an animal."""
+"""Whether each kind is a vulnerable road user, or an animal, by code."""
 
 HIDES_PEOPLE = tuple(one.hides_people for one in OBJECT_CLASSES)
-"""Whether a person may step out from behind it."""
+"""Whether a person may step out from behind each kind, by code."""
 
 LAMPS = tuple(one.lamps for one in OBJECT_CLASSES)
-"""cd, of the lamps that each kind shows; UN R7 asks 4 of each of two rear lamps."""
+"""Luminous intensity of the lamps that each kind shows [cd]; UN R7 asks 4 of each of two rear
+lamps."""
 
 REFLECTANCE = tuple(one.reflectance for one in OBJECT_CLASSES)
-"""Of each kind at 905 nm: dark clothes 0.1; with plates and reflectors, vehicles more."""
+"""Reflectance of each kind at 905 nm: dark clothes 0.1; with plates and reflectors, vehicles
+more."""
 
 MISTAKEN_FOR = tuple(NAMES.index(one.mistaken_for) for one in OBJECT_CLASSES)
 """The class that each kind is mistaken for where its own is not recognised."""

@@ -22,14 +22,14 @@ from bridgegen.openx.opendrive.routes import Route
 LIMIT, WIDTH, JUNCTION, BESIDE = range(4)
 OFFSET, BESIDE_WIDTH, DIRECTION, MAY_CHANGE = range(4)
 LANE = BESIDE + 2 * 4
-"""Columns of the table; of what is beside, left and then right; and how many there are."""
+"""Number of columns of the lane table, with those of what is beside, left and then right."""
 
 PLACE, HEADING, LANES, EDGES, TOWN = slice(0, 2), 2, slice(3, 5), slice(5, 7), 7
 CORRIDOR = 8
-"""Columns of a corridor, and how many there are; see `corridor_along`."""
+"""Number of columns of a corridor; see `corridor_along`."""
 
 STRAYS = 0.2
-"""[m] A body that is no farther beside its route is in its lane, of whatever width. Ours."""
+"""Distance beside its route up to which a body is in its lane, of whatever width [m]. Ours."""
 
 PAVED = frozenset(("shoulder", "stop", "parking", "biking"))
 """Types of lanes beside the driving lanes on which a car has left its lane, but not the road."""

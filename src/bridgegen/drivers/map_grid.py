@@ -11,7 +11,7 @@ from bridgegen.drivers.compiled import PIECE
 from bridgegen.drivers.interface import CENTRE, PIECE_POINTS, RoadMap
 
 CELL = 30.0
-"""Width of a cell [m], at least."""
+"""Least width of a cell [m]."""
 
 COLUMNS = PIECE.itemsize // 8
 

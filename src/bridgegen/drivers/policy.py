@@ -30,7 +30,7 @@ NEAREST = 6
 """Number of other participants in an observation, the nearest first."""
 
 ROUTE_EVERY = 4
-"""Every how-many-th point of the route is in an observation."""
+"""Stride of the route's points in an observation: every how-many-th is in it."""
 
 SPEED, ACCELERATION, LENGTH, CURVATURE = 40.0, 10.0, 100.0, 0.2
 """Scales of an observation [m/s, m/s², m, 1/m]; values beyond are clipped to 1."""

@@ -23,7 +23,7 @@ Float32 = npt.NDArray[np.float32]
 
 KINDS, MARKINGS, LIGHTS = 4, 3, 5
 ATTRIBUTES = KINDS + MARKINGS + LIGHTS + 2
-"""How many attributes a polyline has."""
+"""Number of attributes of a polyline."""
 
 
 @dataclass(frozen=True)

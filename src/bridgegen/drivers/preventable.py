@@ -47,21 +47,23 @@ from bridgegen.drivers._fsm_kernels import (
 from bridgegen.drivers._un_r157_kernels import CRITICAL_TTC, RELEASE
 
 RATE = 10.0
-"""Hz, at which the driver decides; that of the Commission's code."""
+"""Rate at which the driver decides [Hz]; that of the Commission's code."""
 LONGEST = 35.0
-"""s, the duration of a run; that of the Commission's code."""
+"""Duration of a run [s]; that of the Commission's code."""
 LANE_GAP = 1.6
-"""m, across the way between two cars 1.9 m wide, in the middle of lanes 3.5 m wide."""
+"""Lateral gap between two cars 1.9 m wide, in the middle of lanes 3.5 m wide [m]."""
 SIZE = (4.3, 1.9)
-"""m, length and width of a car in the Commission's code."""
+"""Length and width of a car in the Commission's code [m]."""
 MODELS = ("un-r157", "fsm")
-"""The regulation's models."""
+"""Names of the regulation's driver models."""
 KNOWN = (*MODELS, "rss")
 """All models that drive here."""
 RSS_ACCELERATION, RSS_BRAKING = 3.0, 6.0
-"""m/s², by which RSS expects the ego to accelerate while it reacts, and both to brake at least."""
+"""Acceleration of the ego while it reacts, and least deceleration of both, that RSS expects
+[m/s²]."""
 RSS_LATERAL, RSS_MARGIN = 1.0, 0.3
-"""m/s² across the way, likewise, and the distance [m] that is left there."""
+"""Lateral acceleration and deceleration that RSS expects [m/s²], and the lateral distance that is
+left [m]."""
 
 
 class _Place(NamedTuple):

@@ -22,9 +22,9 @@ from bridgegen.openx.opendrive.routes import Route, Step
 
 
 BY_MAP, BY_SIGNS, FROM_THE_RIGHT, ONCOMING, SIREN, OFF_ROAD = 1, 2, 3, 4, 5, 6
-"""The junction's priorities, signs, priority to the right, the rule that a left turn waits for
-oncoming traffic, that all give way to an emergency vehicle on a call, or that who comes from off
-the road gives way to all on it."""
+"""Rules of right of way: the junction's priorities, signs, priority to the right, the rule that a
+left turn waits for oncoming traffic, that all give way to an emergency vehicle on a call, or that
+who comes from off the road gives way to all on it."""
 
 
 STOP_SIGN = "206"
@@ -39,7 +39,7 @@ OF_THE_ROAD = DRIVABLE | {"shoulder", "stop", "parking", "border", "biking", "me
 """Types of lanes from which one does not come onto the road, for one is on it."""
 
 AT_JUNCTION = 40.0
-"""A sign within this distance before a junction [m] is for that junction."""
+"""Distance before a junction within which a sign is for that junction [m]."""
 ASIDE = math.radians(45.0)
 """Largest angle between approaches of one direction; opposite ones differ by 180° less this."""
 

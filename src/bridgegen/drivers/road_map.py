@@ -39,13 +39,13 @@ from bridgegen.openx.opendrive.outline import outline_of, stop_lines
 from bridgegen.openx.opendrive.routes import Route, Stretch, next_stretches
 
 SPACING = 2.0
-"""Distance between two points of a lane or piece [m], at most."""
+"""Largest distance between two points of a lane or piece [m]."""
 
 ROUNDING = 1e-6
-"""By how much it may be more, in parts of it."""
+"""Relative tolerance of ``SPACING``."""
 
 MOST_CUTS = 10.0
-"""Cuts across a section per metre, at most."""
+"""Largest number of cuts across a section per metre."""
 
 UNUSED = frozenset(("none", "median", "curb", "rail", "tram"))
 """Types of lanes that neither vehicles nor cyclists nor pedestrians use."""

@@ -127,7 +127,7 @@ HEAD = (
     "weather", "car, camera", "car, LiDAR", "car, either",
     "walker, camera", "walker, LiDAR", "walker, either",
 )  # fmt: skip
-"""Of `table`'s columns; distances in metres, a walker is a pedestrian."""
+"""Column heads of `table`; distances in metres, a walker is a pedestrian."""
 
 
 def table() -> Iterator[tuple[str | float, ...]]:

@@ -13,17 +13,17 @@ from bridgegen.base.errors import InputError
 from bridgegen.drivers.interface import Observation, Trajectory
 
 MOST_STATES = 1000
-"""K, how many states a trajectory has at most."""
+"""Largest number K of states of a trajectory."""
 
 JUMP, TURN = 2.0, 1.0
-"""How far from the ego [m], and how far from its heading [rad], a trajectory may begin."""
+"""Largest distance of a trajectory's start from the ego [m], and from its heading [rad]."""
 
 ROUNDED, SLACK = 1.2, 0.5
-"""Two states may be this many times as far apart as their greater speed allows, and so much
-more [m]: planners round."""
+"""Tolerances of the distance between two states, as planners round: a factor of what their greater
+speed allows, and a distance [m]."""
 
 STILL = 0.01
-"""A negative speed up to this [m/s] is rounding, and taken for 0."""
+"""Size of a negative speed up to which it is rounding, and taken for 0 [m/s]."""
 
 SAME_TIME = 1e-6  # s
 

@@ -52,7 +52,7 @@ def _names_in(name: str) -> str:
 
 
 NAMES = ("wants", "period", "max_rows")
-"""What a driver may say; each may be left out."""
+"""Attributes that a user's driver may have; each may be left out."""
 
 PERIODS = (0.05, 0.5)
 """Least and greatest time [s] between two calls of a driver that states it."""

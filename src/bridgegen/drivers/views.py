@@ -29,10 +29,10 @@ Views = Mapping[str, npt.NDArray[Any]]
 13)``, the tracks of the instants since the last call, in which the driver was not asked."""
 
 MOST_PIECES = 200_000
-"""Pieces of road maps that are kept for later batches, at most."""
+"""Largest number of pieces of road maps that are kept for later batches."""
 
 HISTORY_BYTES = 2**26
-"""Size of the memory in which a history is kept, at most, if it has room for a second."""
+"""Largest size of the memory in which a history is kept [bytes], if it has room for a second."""
 
 
 class Viewer:

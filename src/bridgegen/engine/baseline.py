@@ -16,7 +16,7 @@ from bridgegen.engine.evaluation import Evaluation
 from bridgegen.engine.trials import Trials
 
 RECORDED = tuple(f"{OF_BASELINE}{name}" for name in ("harm", "severity", "d_min"))
-"""The baseline's quantities that a search records, after the ego's."""
+"""Names of the baseline's quantities that a search records, after the ego's."""
 
 _LOST = "with the baseline's driver"
 

@@ -17,11 +17,12 @@ if TYPE_CHECKING:
     from bridgegen.engine.runner import Runner
 
 CROSSES = math.radians(45.0)
-"""Ways through a junction whose directions differ by more cross or turn; those of a merge do
-not."""
+"""Difference of the directions of ways through a junction beyond which they cross or turn [rad];
+those of a merge do not."""
 
 AGAINST = math.radians(135.0)
-"""A participant whose heading at the start differs by more from the ego's comes towards it."""
+"""Difference of its heading at the start from the ego's beyond which a participant is oncoming
+[rad]."""
 
 VULNERABLE = frozenset({"pedestrian", "bicycle"})
 """Conduct of vulnerable participants."""

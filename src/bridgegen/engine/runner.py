@@ -39,7 +39,7 @@ if TYPE_CHECKING:
 
 
 MOST_SHOWN = 60
-"""Characters of what a parameter is used for, in a note."""
+"""Largest number of characters of what a parameter is used for, in a note."""
 
 
 @dataclass(frozen=True)
@@ -116,7 +116,7 @@ def nominal_of(source: Source, space: SearchSpace, values: Mapping[str, float]) 
 
 
 KEPT_VARIANTS = 64
-"""Storyboards that stay compiled."""
+"""Number of storyboards that stay compiled."""
 
 Roads = tuple[Any, Int]
 """P road networks that a simulator has made ready, and each row's network ``(N,)``."""

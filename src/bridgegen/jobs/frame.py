@@ -50,7 +50,7 @@ def _repeated(spelling: str, values: Sequence[Any]) -> list[str]:
 
 
 SCENARIO = Form(str, words=lambda spelling, value: [spelling, _named(value)])
-"""A name of the catalogue or of a pack, or the path of a file."""
+"""Form of a scenario: a name of the catalogue or of a pack, or the path of a file."""
 
 SCENARIOS = Form(
     list[str],
@@ -60,7 +60,7 @@ SCENARIOS = Form(
     valid=lambda values: all(isinstance(one, str | PathLike) for one in values),
     must="names or paths",
 )
-"""Several of these; in Python one may stand alone."""
+"""Form of several scenarios; in Python one may stand alone."""
 
 PATHS = Form(
     list[Path],
@@ -72,7 +72,7 @@ PATHS = Form(
     valid=lambda paths: all(isinstance(one, Path) for one in paths),
     must="paths",
 )
-"""Several files or folders; in Python one may stand alone."""
+"""Form of several files or folders; in Python one may stand alone."""
 
 DRIVERS = Form(
     list[str],
@@ -87,11 +87,11 @@ DRIVERS = Form(
     valid=lambda names: all(isinstance(one, str) for one in names),
     must="names",
 )
-"""Names, repeated or separated by commas, which a program's call may hold; in Python one may stand
-alone."""
+"""Form of drivers: names, repeated or separated by commas, which a program's call may hold; in
+Python one may stand alone."""
 
 ANY = Form(str, valid=lambda value: value is not None, must="given")
-"""A text, or what Python code gives in its place; the job checks it."""
+"""Form of a text, or of what Python code gives in its place; the job checks it."""
 
 
 @dataclass(frozen=True)

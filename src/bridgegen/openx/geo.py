@@ -12,7 +12,7 @@ from bridgegen.openx.openscenario.element import Element, rewritten, walk
 from bridgegen.openx.openscenario.values import Expr, ParameterRef, Value
 
 Project = Callable[[float, float], tuple[float, float]]
-"""Takes longitude and latitude [°] of WGS 84, returns x and y on the map [m]."""
+"""Function that takes longitude and latitude [°] of WGS 84, and returns x and y on the map [m]."""
 
 
 def on_plane(scenario: osc.OpenScenario, roads: OpenDrive, place: str) -> osc.OpenScenario:

@@ -24,10 +24,10 @@ from bridgegen.scenario.language.story import LaneChange
 from bridgegen.scenario.ontology.site import Site
 
 PLACE = "place"
-"""The parameter that says at which place on a map a scenario takes place."""
+"""Parameter that states at which place on a map a scenario takes place."""
 
 GENTLE = 1e-4
-"""A road with a smaller curvature is straight [1/m]."""
+"""Curvature below which a road is straight [1/m]."""
 
 _LIMIT, _SHARPEST = "place_speed_limit", "place_curvature"
 _NO_LIMIT = 1000.0  # m/s, where a road states none

@@ -63,10 +63,10 @@ def logic_file(scenario: OpenScenario, path: Path) -> str:
 
 
 LONGEST = 2000.0
-"""[m] A random route ends so far from its start: at 50 km/h two minutes and a half."""
+"""Length of a random route from its start on [m]: at 50 km/h two minutes and a half."""
 
 MARGIN = 0.1
-"""[m] Between a waypoint and the end of its lane."""
+"""Distance between a waypoint and the end of its lane [m]."""
 
 
 def with_random_routes(

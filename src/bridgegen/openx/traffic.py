@@ -26,15 +26,15 @@ from bridgegen.scenario.language.adversary import ATTENTIVE
 from bridgegen.scenario.participants import PARTICIPANTS, Body
 
 MOST = 100
-"""Vehicles that all traffic of a file may have."""
+"""Largest number of vehicles of all traffic of a file."""
 STEP = 5.0
-"""[m] Between two places on a lane at which a vehicle may start."""
+"""Distance between two places on a lane at which a vehicle may start [m]."""
 APART = 15.0
-"""[m] Between the reference points of two vehicles at the start; ours."""
+"""Least distance between the reference points of two vehicles at the start [m]; ours."""
 LASTS = 60.0
-"""[s] How long a source gives vehicles where the scenario does not end by time."""
+"""Time for which a source emits vehicles where the scenario does not end by time [s]."""
 FASTEST = 100.0
-"""[m/s]"""
+"""Largest speed of traffic [m/s]."""
 NAMED = "traffic"
 
 _CATEGORIES = {
@@ -44,7 +44,7 @@ _CATEGORIES = {
     "bus": "bus",
     "motorbike": "motorcycle",
 }
-"""The kinds of vehicles that traffic may be made of, and which of our bodies each has."""
+"""Kinds of bodies by the kind of vehicle that traffic may be made of."""
 
 Source = osc.TrafficSourceAction | osc.TrafficSwarmAction
 Made = tuple[osc.ScenarioObject, osc.Private, osc.GlobalAction | None, float]

@@ -224,7 +224,7 @@ class Point:
 
 
 MOST_NUMBERS = 6
-"""Points whose values are written beside them; more would overlap."""
+"""Largest number of points whose values are written beside them; more would overlap."""
 
 
 def trend(some: Sequence[Point], label: str) -> Markup:

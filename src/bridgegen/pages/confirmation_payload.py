@@ -116,7 +116,8 @@ OUTER = 0.05
 
 DIGITS = 5
 LEAST = 1e-9
-"""Margins nearer to 0 are shown as this, so that their sign, which is the verdict, is kept."""
+"""Least magnitude of a margin; nearer ones are shown as this, so that their sign, which is the
+verdict, is kept."""
 
 
 def criteria_payload(data: ReportData) -> dict[str, Any] | None:

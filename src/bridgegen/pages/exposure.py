@@ -11,7 +11,7 @@ from bridgegen.scenario.exposure.fit import Fit, ParameterFit
 
 GENERATOR = "BridgeGen fit"
 _DOTS = 200
-"""Of a quantile plot: more would hide each other."""
+"""Largest number of points of a quantile plot: more would hide each other."""
 
 
 def refuse_other_page(path: Path) -> None:

@@ -43,7 +43,7 @@ _MARGIN = 7.0  # m around the paths
 _FLAG = 1.0  # s, for which a contact is announced
 
 Draw = ImageDraw.ImageDraw | SvgDraw
-"""What a picture is drawn with: pixels, or SVG elements."""
+"""Canvas that a picture is drawn on: pixels, or SVG elements."""
 
 Point = tuple[float, float]
 Box = tuple[float, float, float, float]

@@ -21,7 +21,8 @@ tenth of the rows. Fewer where each has a road, or an adversary's course, of its
 times as long; none with a user's own driver, which may be slow."""
 
 AT_A_TIME = 40
-"""Scenarios that are simulated together for it: a long one with many participants takes 2 MB."""
+"""Number of further scenarios that are simulated together: a long one with many participants takes
+2 MB."""
 
 
 def further_playbacks(

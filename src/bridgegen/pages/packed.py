@@ -19,7 +19,7 @@ MOST_FILES = 200_000
 """Maximum number of characters of all files together."""
 
 OF_ROW = ("parameters", "metrics")
-"""What the page takes from a row instead of from its playback."""
+"""Fields that the page takes from a row instead of from its playback."""
 
 
 def deflated(data: bytes) -> str:

@@ -66,7 +66,8 @@ class Bindings:
 
 
 FEW = 4
-"""Lines of a box that are shown at first, unless more are searched parameters or phrases."""
+"""Number of lines of a box that are shown at first, unless more are searched parameters or
+phrases."""
 
 _IN_WORDS = ("Action", "Condition", "ConditionGroup", "Trigger")
 _OF_AN_EVENT = (bg("has_what"), bg("has_when"))

@@ -36,7 +36,7 @@ def road_payload(playback: Playback) -> list[dict[str, Any]]:
 
 
 ROAD_SCALE = 100
-"""Units to 1 m of what does not move; half a centimetre is nowhere seen."""
+"""Units to 1 m of the road and other fixed objects; half a centimetre is nowhere seen."""
 
 
 def _line(points: Float, scale: int) -> list[int]:

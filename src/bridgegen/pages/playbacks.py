@@ -28,14 +28,16 @@ from bridgegen.search.triage.record import Minimal
 from bridgegen.simulation.rollout import STATUS_MESSAGES, Rollout
 
 THIN = 0.01
-"""How far a way's line may be off where its points lie nearly straight [m]."""
+"""Tolerance of a simplified line: largest distance of a dropped point from it [m]."""
 
 
 PLAN_POINTS, PLANS_EVERY = 20, 0.2
-"""Points of a trajectory that are shown at most, and seconds between two of them at least."""
+"""Largest number of points of a trajectory that are shown, and least time between two trajectories
+[s]."""
 
 APART = 0.05
-"""How far apart an entity is with two drivers at least for the playback to show both [m]."""
+"""Least distance between an entity's positions with two drivers for the playback to show both
+[m]."""
 
 
 @dataclass(frozen=True)

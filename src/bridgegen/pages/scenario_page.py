@@ -167,7 +167,7 @@ def _parameter(one: Parameter) -> list[object]:
 
 
 GENERATOR = "bridgegen show"
-"""The generator that its pages name."""
+"""Generator that the pages of a scenario name."""
 
 
 def show_scenario(name_or_path: str, out: Path | None = None) -> Path:

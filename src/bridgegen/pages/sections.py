@@ -28,7 +28,8 @@ TRENDS = {"d_min": False, "v_d": True}
 """The metrics shown over iterations, and whether a larger one is worse."""
 
 TRENDS_OF_HARM = {"harm": True, "d_min": False}
-"""Likewise, where harm makes a scenario critical."""
+"""Metrics shown over iterations where harm makes a scenario critical, and whether a larger one is
+worse."""
 
 
 def batches_payload(e: Evaluations, trends_of: Mapping[str, bool] = TRENDS) -> dict[str, Any]:
@@ -131,7 +132,7 @@ def _evidence(one: Mapping[str, Any]) -> dict[str, Any]:
 
 
 IMPOSSIBLE = -1
-"""Replaces the number of rows in a bin that is not feasible."""
+"""Value in place of the number of rows in a bin that is not feasible."""
 
 
 def coverage_payload(found: CoverageMap) -> dict[str, Any]:

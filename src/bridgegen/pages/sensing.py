@@ -9,7 +9,7 @@ from bridgegen.pages.playback import Sensed
 from bridgegen.simulation.rollout import Rollout
 
 TOLERANCE = float(THRESHOLDS[0])
-"""[m] A detection farther off is no match at the strictest of nuScenes's thresholds."""
+"""Largest distance of a matching detection at the strictest of nuScenes's thresholds [m]."""
 
 
 def sensed(rollout: Rollout) -> list[Sensed]:

@@ -12,7 +12,7 @@ import numpy as np
 from bridgegen.base.arrays import Float, Int
 
 LARGEST = 2.0**50
-"""In units. Larger values count as missing: beyond, JavaScript's integers are not exact."""
+"""Largest value, in units; larger ones count as missing, as JavaScript's integers are not exact."""
 
 Runs = list[list[int]]
 
@@ -61,7 +61,7 @@ def unpacked(runs: Runs, n: int, scale: int) -> Float:
 
 
 DIGITS = 5
-"""Significant digits of the largest value of a column in bulk."""
+"""Number of significant digits of the largest value of a column in bulk."""
 
 
 def significant(values: Float, digits: int = DIGITS) -> list[float | None]:

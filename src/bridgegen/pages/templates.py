@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 ROOT = files("bridgegen")
 STYLES = ("pages/web/base.css", "pages/web/still.css")
-"""Of every page without scripts, before its own."""
+"""Style sheets of every page without scripts, before its own."""
 
 
 def write_page(path: Path, template: str, **values: Any) -> None:

@@ -26,10 +26,10 @@ CODECS = {
     ".webm": ("-c:v", "libvpx-vp9", "-b:v", "0", "-crf", "32", "-pix_fmt", "yuv420p",
               "-row-mt", "1"),
 }  # fmt: skip
-"""Options of ffmpeg by the ends of the names."""
+"""Options of ffmpeg by the ending of the film's name."""
 
 TIMEOUT = 600.0
-"""How long it may take [s]."""
+"""Time limit of making a film [s]."""
 
 
 def program() -> str:
@@ -108,13 +108,13 @@ HEADS = {
     ".gif": (0, b"GIF8"), ".webp": (0, b"RIFF"), ".mp4": (4, b"ftyp"),
     ".webm": (0, b"\x1a\x45\xdf\xa3"), ".png": (0, b"\x89PNG"), ".svg": (0, b"<svg"),
 }  # fmt: skip
-"""The formats by the ends of their names, with bytes of such a file and where they are."""
+"""Formats by the ending of the name, with bytes of such a file and where they are."""
 
 STILL = (".png", ".svg")
 
 SIZES, MAX_FPS = (160, 3840), 50
 BEFORE, AFTER = 8.0, 2.0
-"""What a film shows by default: so long before and after the decisive instant [s]."""
+"""Default duration of a film before and after the decisive instant [s]."""
 
 _COLOURS = 128
 

@@ -5,4 +5,4 @@
 """
 
 TIME_STEP = 0.05
-"""Recordings are resampled at, by default [s]."""
+"""Default time step to which recordings are resampled [s]."""

@@ -11,9 +11,9 @@ from bridgegen.recordings.readers.table import RecordedTraffic
 from bridgegen.simulation.rollout import Rollout
 
 LONG_ENOUGH = 1.0
-"""What is recorded for less [s] is a fragment."""
+"""Time for which a participant must be recorded [s]; with less it is a fragment."""
 REVERSES = 0.3
-"""Backwards at less than this [m/s] is noise of a body that stands."""
+"""Backward speed below which motion is noise of a body that stands [m/s]."""
 
 
 @dataclass(frozen=True)

@@ -22,10 +22,10 @@ from bridgegen.scenario.language.plain_yaml import MAX_BYTES, Document, read_pla
 from bridgegen.scenario.language.shape import ShapedSection, shape_problems
 
 FILE = "failures.yaml"
-"""Its name in the folder of a suite or a project."""
+"""File of known failures in the folder of a suite or a project."""
 
 OLD_FILE = "failure-modes.yaml"
-"""The dashboard's statuses before they were in `FILE`; read, and never written."""
+"""File of the dashboard's statuses before they were in `FILE`; read, and never written."""
 
 Status = Literal["new", "known", "accepted", "fixed"]
 
@@ -38,7 +38,7 @@ HEAD = """\
 """
 
 MOST_TEXT = 2000
-"""Characters of one text."""
+"""Largest number of characters of one text."""
 
 _Id = Annotated[str, Field(min_length=1, max_length=200)]
 _File = Annotated[str, Field(pattern=r"^[a-z0-9][a-z0-9-]{0,99}\.xosc$")]
@@ -58,47 +58,47 @@ class Failure(ShapedSection):
     """
 
     title: _OrNone = ""
-    """The failure in words."""
+    """Title: the failure in words."""
     status: Status = "new"
-    """Set by a person."""
+    """Status that a person sets."""
     comment: _OrNone = ""
-    """A person's."""
+    """Comment of a person."""
     scenario: _OrNone = ""
-    """The scenario in which it was found."""
+    """Scenario in which the failure was found."""
     conflict: _Text = ""
-    """"contact", "near miss", …"""
+    """Conflict: "contact", "near miss", …"""
     type: _Text = ""
-    """Of the conflict."""
+    """Type of the conflict."""
     responsible: _Text = ""
-    """The responsible party."""
+    """Party that is responsible for the conflict."""
     rule: _Text = ""
-    """That decides on the responsibility."""
+    """Rule that decides on the responsibility."""
     partner: _Text = ""
     """Kind of the other participant."""
     place: _Text = ""
-    """On the ego's route."""
+    """Place of the conflict on the ego's route."""
     cause: _Text = ""
-    """Of the failure."""
+    """Root cause of the failure."""
     minimal: _Text = ""
-    """What the minimal scenario needs."""
+    """Conditions that the minimal scenario needs, in words."""
     violates: list[CriterionSection] = Field(default_factory=list, max_length=1000)
-    """The pass criteria that it violates."""
+    """Pass criteria that the failure violates."""
     count: Literal["ego", "any"] = "ego"
-    """Whose conflicts count as harm."""
+    """Party whose conflicts count as harm: the ego alone, or any."""
     driver: _OrNone = ""
-    """That failed."""
+    """Driver that failed."""
     found: _Text = ""
-    """Where."""
+    """Where it was found."""
     seed: Annotated[int, Field(ge=0)] | None = None
-    """Of the search or the suite that found it."""
+    """Seed of the search or the suite that found it."""
     version: _Text = ""
-    """Of BridgeGen that verified it."""
+    """Version of BridgeGen that verified it."""
     harm: Annotated[float, Field(ge=0.0, le=1.0)] = 0.0
-    """How much it is a failure of the ego; all digits."""
+    """Harm: how much it is a failure of the ego, 0 to 1; all digits."""
     severity: Annotated[float, Field(ge=0.0, le=1.0)] = 0.0
     """Probability of MAIS3+; all digits."""
     files: list[_File] = Field(default_factory=list, min_length=1, max_length=2)
-    """Of a suite: the scenario, then its minimal form if there is one."""
+    """Files of a suite: the scenario, then its minimal form if there is one."""
 
     @property
     def criteria(self) -> list[dict[str, Any]]:

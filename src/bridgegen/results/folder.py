@@ -10,10 +10,11 @@ from bridgegen.base.errors import StorageError
 from bridgegen.base.records import parse_json, read_bytes
 
 MOST_SHOWN = 1000
-"""Characters of one setting in a message."""
+"""Largest number of characters of one setting in a message."""
 
 CHANGED = ("algorithm ", "scenario ", "map", "files of drivers")
-"""How the names of settings begin that are digests of files: they have changed, and no more."""
+"""Prefixes of the names of settings that are digests of files: only that they changed is
+reported."""
 
 
 def claim(

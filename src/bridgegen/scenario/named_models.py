@@ -88,7 +88,7 @@ _ALL = (
 )  # fmt: skip
 
 MODELS: Mapping[str, NamedModel] = MappingProxyType({one.name: one for one in _ALL})
-"""By name."""
+"""Named models of participants, by name."""
 
 
 def type_of(name: str) -> str:

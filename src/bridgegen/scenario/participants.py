@@ -11,7 +11,7 @@ from types import MappingProxyType
 from typing import Literal
 
 Conduct = Literal["vehicle", "bicycle", "pedestrian", "animal", "obstacle"]
-"""By which rules something moves: a motor vehicle's, a cyclist's, a person's on foot …"""
+"""Rules by which a participant moves: those of a motor vehicle, a cyclist, a person on foot …"""
 
 
 @dataclass(frozen=True)
@@ -309,10 +309,10 @@ _E_SCOOTER = ObjectClass(
 OBJECT_CLASSES = (
     _CAR, _TRUCK, _BUS, _MOTORCYCLE, _BICYCLE, _PEDESTRIAN, _ANIMAL, _OTHER, _TRAM, _E_SCOOTER,
 )  # fmt: skip
-"""By code, which files record and detectors answer: new ones come last.
+"""Object classes by code, which files record and detectors answer: new ones come last.
 
-CARLA 0.9.13 lacks some models that later ones have, and none has animals, for which a child stands.
-"""
+CARLA 0.9.13 lacks some models that later ones have, and none has animals, for which a child
+stands."""
 
 _ALL = (
     ParticipantKind(
@@ -476,20 +476,20 @@ _ALL = (
 )  # fmt: skip
 
 PARTICIPANTS: Mapping[str, ParticipantKind] = MappingProxyType({one.name: one for one in _ALL})
-"""By name. The dimensions are those of common models, rounded; accelerations are what such bodies
-reach on a dry road. Reference point: the rear axle's centre of a vehicle, the centre of anything
-else."""
+"""Kinds of participants by name. The dimensions are those of common models, rounded; accelerations
+are what such bodies reach on a dry road. Reference point: the rear axle's centre of a vehicle, the
+centre of anything else."""
 
 TYPES = tuple(one.name for one in _ALL if one.takes_part)
-"""What a participant may be."""
+"""Types of participants."""
 
 _NAMES = {alias: one.name for one in _ALL for alias in (one.name, *one.aliases)}
 
 TYPE_NAMES = tuple(alias for one in _ALL if one.takes_part for alias in (one.name, *one.aliases))
-"""The same, with all names that a scenario file may say."""
+"""Types of participants, with all names that a scenario file may give."""
 
 QUEUES = tuple(one.name for one in _ALL if one.queues)
-"""What a jam may consist of."""
+"""Types of vehicles that a jam may consist of."""
 
 
 def canonical(name: str) -> str:

@@ -22,13 +22,15 @@ from typing import Literal
 # -- laws ------------------------------------------------------------------------------------------
 
 DRIZZLE, CLOUDBURST = 0.1, 500.0
-"""[mm/h] Rain just above 0 %; and how many times more it is at 100 %: 50 mm/h."""
+"""Rain just above 0 % [mm/h], and the factor by which it is heavier at 100 %, where it is 50
+mm/h."""
 
 CLEAR_AIR, THICK_FOG = 1e4, 200.0
-"""[m] Visual range at 0 % of fog; and how many times less it is at 100 %: 50 m."""
+"""Visual range at 0 % of fog [m], and the factor by which it is shorter at 100 %, where it is 50
+m."""
 
 GALE = 20.0
-"""[m/s] Wind at 100 %: Beaufort 8."""
+"""Wind speed at 100 % [m/s]: Beaufort 8."""
 
 
 @dataclass(frozen=True)
@@ -62,27 +64,27 @@ def _fog_density(visual_range: float) -> float:
 
 
 RAIN = Law(rain_formula("x/100"), lambda rate: 100.0 * rain_share(rate))
-"""Intensity [mm/h] of precipitation [%]: 0.1·500^(p/100), from drizzle to a cloudburst; none at 0.
-Log-linear, as rain rates are distributed."""
+"""Law of the rain's intensity [mm/h] by precipitation [%]: 0.1·500^(p/100), from drizzle to a
+cloudburst; none at 0. Log-linear, as rain rates are distributed."""
 
 VISIBILITY = Law(f"{CLEAR_AIR:g}/pow({THICK_FOG:g},x/100)", _fog_density)
-"""Meteorological optical range [m] of fog density [%]: 10⁴·200^(−f/100), from clear air to thick
-fog, in the steps of WMO's visibility code."""
+"""Law of the meteorological optical range [m] by fog density [%]: 10⁴·200^(−f/100), from clear air
+to thick fog, in the steps of WMO's visibility code."""
 
 WIND = Law(f"{GALE / 100.0:g}*x", lambda speed: 100.0 * (speed / GALE))
-"""Speed [m/s] of wind intensity [%]."""
+"""Law of the wind's speed [m/s] by its intensity [%]."""
 
 SHARE = Law("x/100", lambda share: 100.0 * share)
-"""Share, 0 to 1, of a percentage."""
+"""Law of a share, 0 to 1, by a percentage."""
 
 ELEVATION = Law(f"x*{math.radians(1.0)!r}", math.degrees)
-"""Elevation [rad] of the sun's altitude angle [deg]."""
+"""Law of the sun's elevation [rad] by its altitude angle [deg]."""
 
 AZIMUTH = Law(f"(x/360-floor(x/360))*{math.tau!r}", math.degrees)
-"""Azimuth [rad], 0 to 2π, of an angle [deg]."""
+"""Law of the azimuth [rad], 0 to 2π, by an angle [deg]."""
 
 SAME = Law("x", lambda value: value)
-"""The parameter is the physical quantity."""
+"""Law of a parameter that is the physical quantity itself."""
 
 ILLUMINANCE = "ceil(x/91)*400000*x*(180-x)/(40500-x*(180-x))"
 """Formula of the illuminance on the ground [lx], in the sun's altitude angle [deg], without clouds:
@@ -134,10 +136,11 @@ _PHYSICAL = (
 )
 
 PHYSICAL: Mapping[str, Physical] = MappingProxyType({one.name: one for one in _PHYSICAL})
-"""By name, in the order of the elements in which files are read."""
+"""Physical quantities of the weather by name, in the order of the elements in which files are
+read."""
 
 COLUMNS = tuple(one for one in _PHYSICAL if one.is_simulated)
-"""What a storyboard states of the simulated weather, by column."""
+"""Physical quantities of the simulated weather that a storyboard states, by column."""
 
 
 def column(name: str) -> int:
@@ -230,7 +233,7 @@ _PARAMETERS = (
 )  # fmt: skip
 
 PARAMETERS: Mapping[str, Parameter] = MappingProxyType({one.name: one for one in _PARAMETERS})
-"""By name; parameters of one part follow each other."""
+"""Weather parameters by name; parameters of one part follow each other."""
 
 PARTS: Mapping[Part, tuple[Parameter, ...]] = MappingProxyType(
     {
@@ -243,7 +246,7 @@ PARTS: Mapping[Part, tuple[Parameter, ...]] = MappingProxyType(
 STATED_BY: Mapping[str, Parameter] = MappingProxyType(
     {one.stands_for: one for one in _PARAMETERS if one.stands_for}
 )
-"""By physical quantity, the parameter that stands for it."""
+"""Weather parameters by the physical quantity that they stand for."""
 
 # -- CARLA -----------------------------------------------------------------------------------------
 
@@ -281,7 +284,7 @@ CARLA_FIELDS: Mapping[str, CarlaField] = MappingProxyType(
         "dust_storm": CarlaField(0.0, 100.0, 0.0),
     }
 )
-"""By name."""
+"""Fields of CARLA's weather by name."""
 
 CARLA_NAMES: Mapping[str, str] = MappingProxyType(
     {name: name for name in CARLA_FIELDS}
@@ -323,7 +326,8 @@ PHRASES: Mapping[str, tuple[Phrase, ...]] = MappingProxyType(
         "friction_scale": (Phrase("friction {} % of dry", below=0.95, times=100.0),),
     }
 )  # fmt: skip
-"""By physical quantity, in the order of a sentence; of each the first that holds is said."""
+"""Phrases by physical quantity, in the order of a sentence; the first of each that holds is
+used."""
 
 
 def in_words(values: Mapping[str, float]) -> str:

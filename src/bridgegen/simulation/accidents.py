@@ -14,7 +14,7 @@ from bridgegen.simulation.boxes import box_distance
 from bridgegen.simulation.rollout import Rollout
 
 MERGE_WITHIN = 5.0
-"""Contacts of the same two within this time are one accident [s], as in the metric n_collision."""
+"""Time within which contacts of the same two are one accident [s], as in the metric n_collision."""
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,7 @@ if TYPE_CHECKING:  # it is part of the command line, which starts fast
     from bridgegen.simulation.simulator import Simulator
 
 Value = bool | int | float | str
-"""Of a setting."""
+"""Value of a simulator's setting."""
 
 
 @dataclass(frozen=True)
@@ -106,7 +106,8 @@ def _checked(found: object, name: str) -> Kind:
 
 
 SIMULATORS: MutableMapping[str, Kind] = Registry(_OURS, ADDED, _checked)
-"""Ours, then those found by entry points: CARLA (`adapters`), and those of other packages."""
+"""Simulators by name: ours, then those found by entry points: CARLA (`adapters`), and those of
+other packages."""
 
 
 @dataclass(frozen=True)

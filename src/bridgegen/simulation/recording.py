@@ -26,7 +26,8 @@ from bridgegen.simulation.trace import COLUMNS, MORE
 STATES = ("time", "x", "y", "h", "speed")
 MAX_PROBLEMS = 20
 MOST = 1e9
-"""Larger than any place on Earth, and than what may be squared without thinking."""
+"""Largest coordinate or other number [m]: larger than any place on Earth, and than what may be
+squared without thinking."""
 
 
 @dataclass
@@ -154,9 +155,10 @@ LOG_HEAD = "Index [-], TimeStamp [s], #1 Entity_Name [-]"
 LOG_FIELDS = {
     "speed": 2, "centre": 5, "length": 8, "width": 9, "x": 11, "y": 12, "h": 24,
 }  # fmt: skip
-"""Where each is among the fields of one entity; esmini's reference point is OpenSCENARIO's."""
+"""Index of each quantity among the fields of one entity; esmini's reference point is
+OpenSCENARIO's."""
 LOG_WIDTH = 31
-"""Fields of one entity."""
+"""Number of fields of one entity."""
 
 
 def _read_log(text: str, found: Tracks) -> None:
@@ -186,7 +188,7 @@ def _read_log(text: str, found: Tracks) -> None:
 
 MAX_INSTANTS = 100_000
 MAX_STATES = 2_000_000
-"""Entities times instants."""
+"""Largest number of states of a recording: entities times instants."""
 LEAST_STEP, MOST_STEP = 1e-4, 1.0  # s
 SAME = 1e-5  # s, two instants that are nearer than this are one
 ROUNDING = 1e-6  # s, of times that are written with six decimals …

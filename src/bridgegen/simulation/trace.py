@@ -8,11 +8,12 @@ from bridgegen.base.errors import InputError, StorageError
 from bridgegen.simulation.rollout import Rollout
 
 COLUMNS = ("time", "entity", "x", "y", "h", "speed")
-"""[s], name, [m], [m], [rad], [m/s]; positions are OpenSCENARIO's reference points."""
+"""Columns of a trace: [s], name, [m], [m], [rad], [m/s]; positions are OpenSCENARIO's reference
+points."""
 
 MORE = ("acceleration", "offset", "length", "width", "centre")
-"""What else the metrics need: [m/s²] along the heading, [m] from the lane's centre, and the box [m]
-with its centre's distance ahead of the reference point."""
+"""Further columns that the metrics need: [m/s²] along the heading, [m] from the lane's centre, and
+the box [m] with its centre's distance ahead of the reference point."""
 
 
 def write_trace(path: Path, rollout: Rollout, row: int = 0) -> None:

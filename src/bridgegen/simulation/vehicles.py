@@ -9,7 +9,7 @@ VEHICLES = {
     SINGLE_TRACK: "Tyres that slip, load transfer, and actuators that lag: of cars, trucks, buses.",
     MULTI_BODY: "Roll, pitch, heave, axles on springs and four wheels besides: of cars.",
 }
-"""By name: a description."""
+"""Descriptions of the vehicle models by name."""
 
 
 def require(name: str) -> None:

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 
 NEAR = 4.0
-"""A box is at most so far from whom it stands for, centre to centre [m]: nuScenes' widest."""
+"""Largest distance between the centres of a box and of whom it stands for [m]: nuScenes' widest."""
 
 ALIKE = 0.3
 """Intersection over union that a box in the image has at least with the one that it stands for."""
@@ -140,10 +140,10 @@ def _placed(truth: Truth, e: int, view: View, pixels: Float) -> tuple[float, flo
 
 WIDTH, HEIGHT, FIELD_OF_VIEW = 800, 600, 90.0  # pixels, degrees
 ABOVE = 0.3
-"""The camera and the LiDAR are so far above the ego's roof [m]."""
+"""Height of the camera and the LiDAR above the ego's roof [m]."""
 
 LATE = 2.0
-"""Seconds that a frame may take to arrive after the tick that it is of."""
+"""Time that a frame may take to arrive after the tick that it is of [s]."""
 
 
 class Eyes:

@@ -16,8 +16,8 @@ if TYPE_CHECKING:
     import carla
 
 REACH = 12.0
-"""A light of CARLA's at most so far from one of the map's [m] may be it, or be what it stands for:
-a Town's lights hang elsewhere than the map says, but hold back the same lane."""
+"""Largest distance of a light of CARLA's from one of the map's that it may be, or stand for [m]: a
+Town's lights hang elsewhere than the map says, but hold back the same lane."""
 
 STATES = ("Off", "Red", "Red", "Yellow", "Green")
 """CARLA's states for those of `Rollout.lights`; it has no red with yellow."""

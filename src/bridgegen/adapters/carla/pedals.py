@@ -14,22 +14,23 @@ if TYPE_CHECKING:
     import carla
 
 FULL_THROTTLE, FULL_BRAKE = 4.0, 9.0
-"""What a pedal pressed down gives, about [m/s²]: where the controller starts from, not what it
-relies on. A car's 0 to 100 km/h in 7 s is 4 on average; braking on a dry road 0.9 g."""
+"""Approximate acceleration at full throttle, and deceleration at full braking [m/s²], from which
+the controller starts: a car's 0 to 100 km/h in 7 s is 4 on average; braking on a dry road 0.9 g."""
 
 PROPORTIONAL, INTEGRAL = 0.5, 0.4
-"""Of the difference from the speed that the demands come to, pedal per m/s and per m/s·s."""
+"""Gains of the controller of the speed error: proportional [pedal per m/s], integral [pedal per
+m/s·s]."""
 
 LEAD = 1.5
-"""The speed that the demands come to is at most so far from the car's [m/s]: else a car that has no
-grip, or no power, would make up for it long afterwards."""
+"""Largest difference of the demanded speed from the car's [m/s]: else a car that has no grip, or no
+power, would make up for it long afterwards."""
 
 PEDAL_RATE, STEERING_RATE = 8.0, 2.5
 """Shares of full travel per second: a foot goes from throttle to brake in 0.25 s; a wheel is turned
 from straight to full lock in 0.4 s, as in an emergency."""
 
 STANDING = 0.1
-"""Slower [m/s], and not meant to go, it is held by the brake."""
+"""Speed below which the brake holds a car that is not meant to go [m/s]."""
 
 
 @dataclass(frozen=True)

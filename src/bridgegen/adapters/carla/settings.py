@@ -10,7 +10,7 @@ from bridgegen.base.errors import InputError
 Value = bool | int | float | str
 
 TIME_STEP = 0.05
-"""Time of a tick [s]: with CARLA's ten substeps, a physics step is at most 0.01 s."""
+"""Duration of a tick [s]: with CARLA's ten substeps, a physics step is at most 0.01 s."""
 
 MEANINGS: Mapping[str, str] = {
     "ego": "physics (CARLA's vehicle, pedals and steering by our driver), or kinematic (moved as "
@@ -32,7 +32,7 @@ OPTIONS: Mapping[str, str] = {
     "--record": "a new folder for images, LiDAR points, boxes and incidents",
     "--detector": "a detector of your own, whose boxes are measured",
 }
-"""Meanings of the options of access and outputs, which do not."""
+"""Meanings of the options of access and outputs, which do not affect results."""
 
 AGENTS = ("basic", "cautious", "normal", "aggressive")
 

@@ -45,7 +45,7 @@ if TYPE_CHECKING:
 
 
 LASTING = 20
-"""A contact with the same actor within so many instants (1 s) of another is the same one."""
+"""Number of instants (1 s) within which contacts with the same actor are one contact."""
 
 ASIDE = 2.0
 """A stop line applies to vehicles that cross it within this distance of its point [m]."""

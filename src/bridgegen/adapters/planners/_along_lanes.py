@@ -6,7 +6,8 @@ from bridgegen.base.arrays import Float
 from bridgegen.drivers.interface import RoadMap
 
 NEAR, ALIGNED = 2.0, np.pi / 6.0
-"""A track follows a lane whose centre is so near [m] and whose direction so close [rad]."""
+"""Largest distance of a track from the centre of a lane that it follows [m], and largest angle
+between their directions [rad]."""
 
 SLOW = 0.5  # m/s; slower ones stay on their line
 

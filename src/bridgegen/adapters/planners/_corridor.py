@@ -23,11 +23,12 @@ DRIVABLE = frozenset(
 """OpenDRIVE's types of the lanes that a corridor has."""
 
 BEFORE, BEYOND = 150.0, 300.0
-"""Metres of road that a corridor has before the route's begin and beyond its end, where the way
-is the only one."""
+"""Length of the road that a corridor has before the route's begin and beyond its end [m], where the
+way is the only one."""
 
 PARALLEL, PARALLEL_ANGLE = 1.0, np.radians(5.0)
-"""m and rad, by which the ends of lanes of a junction that run beside each other may differ."""
+"""Largest distance [m] and angle [rad] between the ends of lanes of a junction that run beside each
+other."""
 
 
 @dataclass(frozen=True)

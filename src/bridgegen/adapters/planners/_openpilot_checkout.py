@@ -32,7 +32,7 @@ VERSION = "0.11"
 """The series of openpilot that is supported; tested: 0.11.2 of 20 June 2026."""
 
 TESTED = "ad5151b38b540e08a01c87029c3ddb0979ba4fdf"
-"""The commit of it, as a fork has it: see its date, where this one is not found."""
+"""Commit of the tested version, as a fork has it: see its date, where this one is not found."""
 
 HOW_TO_GET = (
     "GIT_LFS_SKIP_SMUDGE=1 git clone https://github.com/commaai/openpilot, check out a commit of "
@@ -41,7 +41,7 @@ HOW_TO_GET = (
 )
 
 STEP = 0.05
-"""Seconds between two plans, openpilot's ``DT_MDL``."""
+"""Time between two plans [s]; openpilot's ``DT_MDL``."""
 
 _LIB = "openpilot.selfdrive.controls.lib"
 _MPC = f"{_LIB}.longitudinal_mpc_lib.long_mpc"
@@ -51,7 +51,7 @@ _NAMES_ONLY = (
     f"{_LIB}.longitudinal_mpc_lib.c_generated_code",
 )  # fmt: skip
 _LIMITS = {"ACCEL_MIN": -3.5, "ACCEL_MAX": 2.0}
-"""[m/s²]; opendbc's car/interfaces.py, after ISO 15622:2018."""
+"""Limits of the acceleration [m/s²], from opendbc's car/interfaces.py, after ISO 15622:2018."""
 
 _LIBRARIES = ("libblasfeo.so", "libhpipm.so", "libqpOASES_e.so.3.1", "libacados.so")
 

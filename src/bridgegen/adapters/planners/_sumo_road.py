@@ -19,16 +19,17 @@ from bridgegen.base.arrays import Bool, Float, Int
 from bridgegen.drivers.interface import Observation, Scene
 
 TAIL = 20_000.0
-"""m, how far the road goes on straight beyond the corridor."""
+"""Length by which the road goes on straight beyond the corridor [m]."""
 
 PARKED, PARKING_SPACE = 10_000.0, 100.0
-"""m, where on the tail vehicles that are not on the road stand, and from one to the next."""
+"""Position on the tail from which vehicles stand that are not on the road, and distance from one to
+the next [m]."""
 
 NO_LIMIT = 100.0
-"""m/s, where no speed limit is posted: no vehicle is faster."""
+"""Speed limit where none is posted [m/s]: no vehicle is faster."""
 
 SHORTEST = 0.1
-"""m, the length of an edge at least: SUMO has none shorter."""
+"""Least length of an edge [m]: SUMO has none shorter."""
 
 
 class StraightRoad:
@@ -165,13 +166,13 @@ RED, RED_YELLOW, YELLOW = 1, 2, 3
 """States of a light at which one stops, at yellow only if that can be done by `DECELERATION`."""
 
 REACH = 0.3
-"""m, how far a body must reach into a lane to be on it, too."""
+"""Distance by which a body must reach into a lane to be on it, too [m]."""
 
 BEFORE_LINE = 1.0
-"""m, how far before a stop line SUMO's vehicles stop."""
+"""Distance before a stop line at which SUMO's vehicles stop [m]."""
 
 DECELERATION = 4.5
-"""m/s², SUMO's ``decel`` of passenger cars."""
+"""Deceleration of passenger cars [m/s²]; SUMO's ``decel``."""
 
 
 class Eyes:

@@ -24,13 +24,13 @@ MODELS = {
     "CACC": "SUMO's cooperative ACC; as nobody ahead is a CACC vehicle, cruise control from a time "
     "gap of 1.5 to 2 s on, its ACC below",
 }
-"""The car-following models."""
+"""Descriptions of SUMO's car-following models by name."""
 
 MIN_GAP = 2.5
-"""m, SUMO's ``minGap`` of all vehicles."""
+"""Least gap between vehicles [m]; SUMO's ``minGap`` of all vehicles."""
 
 EMERGENCY = 9.0
-"""m/s², SUMO's ``emergencyDecel`` of passenger cars."""
+"""Largest deceleration of passenger cars [m/s²]; SUMO's ``emergencyDecel``."""
 
 
 class Simulation:

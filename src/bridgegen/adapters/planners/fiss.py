@@ -58,22 +58,23 @@ PLANNER = Planner(
 )
 
 PLAN_EVERY, CONTROL_STEP = 2, 0.05
-"""Instants between two plans, and seconds between two instants; as in the closed loop."""
+"""Number of instants between two plans, and time between two instants [s]; as in the closed
+loop."""
 
 RANGE, ENLARGED = 120.0, 0.2
-"""How far others are seen, by how much their boxes are larger [m]; as there."""
+"""Range within which other participants are seen, and enlargement of their boxes [m]; as there."""
 
 BEYOND = 0.5
-"""Seconds by which predictions are longer than plans; as there."""
+"""Time by which predictions are longer than plans [s]; as there."""
 
 PREDICTION_STEP = 0.1
-"""[s], as there."""
+"""Time step of predictions [s]; as there."""
 
 MOVING = 0.5
-"""[m/s], from which on a heading is that of the velocity; as there."""
+"""Speed from which on a heading is that of the velocity [m/s]; as there."""
 
 CURVATURE_FROM = 1.0
-"""[m/s], from which on the curvature of the path is measured; as there."""
+"""Speed from which on the curvature of the path is measured [m/s]; as there."""
 
 SEEN = 2
 """The state of a track from which on it is an obstacle: confirmed."""
@@ -84,7 +85,7 @@ STOPS = (1, 2, 3)
 FOR_VEHICLES = frozenset(
     {"driving", "entry", "exit", "onRamp", "offRamp", "connectingRamp", "slipLane", "bidirectional"}
 )
-"""OpenDRIVE's types of the lanes that it is told of."""
+"""OpenDRIVE's types of the lanes that the planner gets."""
 
 WALKS = (kinds.PEDESTRIAN, kinds.ANIMAL)
 """Kinds that are predicted at constant velocity wherever they are."""

@@ -115,16 +115,16 @@ PLANNER = Planner(
 )
 
 STRAIGHT, ARC, POINTS = range(3)
-"""Kinds of lanes."""
+"""Geometries of a lane: straight line, circular arc, polyline."""
 
 STRAIGHT_WITHIN, ARC_WITHIN = 1e-3, 1e-2
-"""How far from a straight line or an arc a lane's points may be [m]."""
+"""Largest deviation of a lane's points from a straight line, and from an arc [m]."""
 
 SHORT = 2.0
-"""m, between a lane's ends; highway-env's lanes by points need a metre or more."""
+"""Least distance between a lane's ends [m]; highway-env's lanes by points need a metre or more."""
 
 HALF_LENGTH = 2.5
-"""m, from the centre of highway-env's vehicle to each axle: its ``LENGTH / 2``."""
+"""Distance from the centre of highway-env's vehicle to each axle [m]: its ``LENGTH / 2``."""
 
 Arrays = dict[str, npt.NDArray[Any]]
 

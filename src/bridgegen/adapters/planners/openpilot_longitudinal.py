@@ -62,25 +62,25 @@ PLANNER = Planner(
 )
 
 AHEAD = 2.0
-"""Seconds from now to the second lead; openpilot's ``LEAD_T_OFFSETS[1]``."""
+"""Time from now to the second lead [s]; openpilot's ``LEAD_T_OFFSETS[1]``."""
 
 BEYOND = 110
-"""How many points the way has beyond those of the observation's route: along the map's lanes."""
+"""Number of points appended to the observation's route, along the map's lanes."""
 
 ON_THE_ROAD = 0.5
-"""The route's last point is on the map's way if it is nearer than so many metres."""
+"""Distance from the map's path below which the route's last point is on it [m]."""
 
 SAME_WAY = math.pi / 4
-"""A second lead's heading differs from the road's by less [rad]."""
+"""Largest difference of a second lead's heading from the road's [rad]."""
 
 SEEN = 2
 """The state of a track from which on it is a point of the radar: confirmed."""
 
 LEAST_TO_STOP = -0.5
-"""[m/s²], as openpilot's own plant brakes when the planner wants to stop."""
+"""Largest acceleration when the planner wants to stop [m/s²]; as in openpilot's own plant."""
 
 STANDSTILL = 0.01
-"""[m/s], as there."""
+"""Speed below which the car stands [m/s]; as in openpilot's own plant."""
 
 CAR = {"openpilotLongitudinalControl": True, "longitudinalActuatorDelay": 0.15, "vEgoStopping": 0.5}
 """opendbc's defaults of the car parameters that the planner reads (``car/interfaces.py``)."""

@@ -34,7 +34,7 @@ from bridgegen.assess.metrics._time_kernels import STANDSTILL, separation, time_
 from bridgegen.base.compiled import kernel
 
 CLEAR, COMES_NEAR, COLLIDES = range(3)
-"""Outcomes of braking."""
+"""Outcomes of braking: no conflict, a near miss, a collision."""
 
 
 @kernel

@@ -12,7 +12,7 @@ NO_CONFLICT, COURSE, NEAR_MISS, CONTACT, VIOLATION = range(5)
     NONE, REAR_END_STRIKING, REAR_END_STRUCK, CROSSING, TURNING, SIDE_SWIPE, HEAD_ON, EGO_STANDING,
     VRU_BY_FRONT, VRU_INTO_SIDE, OBJECT, LANE_DEPARTURE, ROAD_DEPARTURE, CLOSE_PASS,
 ) = range(14)  # fmt: skip
-"""Types of conflicts."""
+"""Codes of the types of conflicts."""
 
 (
     NO_ZONE, FRONT, FRONT_LEFT, LEFT, REAR_LEFT, REAR, REAR_RIGHT, RIGHT, FRONT_RIGHT,
@@ -20,7 +20,7 @@ NO_CONFLICT, COURSE, NEAR_MISS, CONTACT, VIOLATION = range(5)
 """Edges and corners of a body, counter-clockwise from its front."""
 
 NEITHER, EGO, OTHER, SHARED = range(4)
-"""Responsible parties."""
+"""Codes of the responsible parties."""
 
 (
     NO_RULE, STRUCK_STANDING, RED_LIGHT, REAR_DISTANCE, BRAKED_WITHOUT_REASON, CUT_IN,
@@ -38,11 +38,11 @@ who comes from off the road."""
     KIND, TYPE, RESPONSIBLE, RULE, INSTANT, DECIDED, ZONE_EGO, ZONE_OTHER, PREVENTABLE, LEADS_EGO,
 ) = range(10)  # fmt: skip
 INTEGERS = 10
-"""Columns of a pair's row of whole numbers, and their number."""
+"""Number of columns of a pair's row of whole numbers, after the columns themselves."""
 
 (
     TTC, NEEDED, ACROSS, ALONG, V_EGO, V_OTHER, STOOD_EGO, STOOD_OTHER, OVERLAP, NEARNESS,
     LEFT_TO_ACT,
 ) = range(11)  # fmt: skip
 FLOATS = 11
-"""Columns of a pair's row of floats, and their number."""
+"""Number of columns of a pair's row of floats, after the columns themselves."""

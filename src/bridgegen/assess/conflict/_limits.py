@@ -14,182 +14,189 @@ from bridgegen.base.physics import CAREFUL_BRAKING, CAREFUL_JERK, CAREFUL_REACTI
 # --- Collision course and near miss -------------------------------------------------------------
 
 HORIZON = 4.0
-"""[s] A collision course counts if it leads to contact within this time. Source: van der Horst and
-Hogema (1993), Time-to-collision and collision avoidance systems: 4 s separates drivers who find
-themselves in danger from those who are in control."""
+"""Longest time to contact of a collision course [s]. Source: van der Horst and Hogema (1993),
+Time-to-collision and collision avoidance systems: 4 s separates drivers who find themselves in
+danger from those who are in control."""
 SERIOUS_TTC = 1.5
-"""[s] Largest time to collision of a near miss. Source: van der Horst and Hogema (1993)."""
+"""Largest time to collision of a near miss [s]. Source: van der Horst and Hogema (1993)."""
 SERIOUS_DECELERATION = 3.35
-"""[m/s²] Least deceleration that a near miss needs. Source: Archer (2005), Indicators for traffic
-safety assessment and prediction, KTH: deceleration rate to avoid a crash (DRAC) above the
-3.35 m/s² (11 ft/s²) of AASHTO."""
+"""Least deceleration that a near miss needs [m/s²]. Source: Archer (2005), Indicators for traffic
+safety assessment and prediction, KTH: deceleration rate to avoid a crash (DRAC) above the 3.35 m/s²
+(11 ft/s²) of AASHTO."""
 BRISK_SLOW, BRISK_FAST = (5.0, 5.0), (20.0, 3.5)
-"""[m/s], [m/s²] Up to this deceleration at this speed of the ego, linear between the two, braking
-is no emergency. Source: ISO 15622:2018, the average over 2 s by which adaptive cruise control, a
+"""Speed of the ego [m/s], and deceleration up to which braking is no emergency [m/s²]; linear
+between the two. Source: ISO 15622:2018, the average over 2 s by which adaptive cruise control, a
 comfort function, may brake."""
 CLOSE_CALL = 0.5
-"""[m] Two bodies that come nearer after such braking was needed have a near miss all the same.
+"""Distance below which two bodies have a near miss even after emergency braking was needed [m].
 Ours."""
 MOVES = 0.5
-"""[m/s] A slower ego has no near miss: others pass it. Ours."""
+"""Least speed of an ego with a near miss [m/s]: others pass a slower one. Ours."""
 GUIDANCE = 6.0
-"""[s] Horizon of the closest encounter at constant velocity. Ours."""
+"""Horizon of the closest encounter at constant velocity [s]. Ours."""
 GUIDANCE_STEP = 5
-"""Every so many instants. Ours."""
+"""Number of instants from one closest encounter that is computed to the next. Ours."""
 NEAR, SOON = 5.0, 3.0
-"""[m], [s] Scales of nearness in space and time. Ours."""
+"""Scales of nearness in space [m] and time [s]. Ours."""
 FINEST = 0.05
-"""[s] The shortest step of a prediction along paths. Ours."""
+"""Shortest time step of a prediction along paths [s]. Ours."""
 HALVINGS = 10
-"""Times that the last step of a prediction is halved: 0.05 ms. Ours."""
+"""Number of times that the last step of a prediction is halved: to 0.05 ms. Ours."""
 JUMPS = 5.0
-"""[m/s] A body whose positions imply a motion faster than its speed by more was teleported: lane
-changes of scripted bodies reach 3 m/s sideways. Ours."""
+"""Difference between a body's motion by its positions and its speed beyond which it was teleported
+[m/s]: lane changes of scripted bodies reach 3 m/s sideways. Ours."""
 
 # --- Contact and type ---------------------------------------------------------------------------
 
 FLUSH = math.sin(math.radians(8.0))
-"""[1] Edges at a smaller angle meet flush; at a larger one a corner meets an edge. Ours."""
+"""Sine of the angle between two edges below which they meet flush [1]; at a larger one a corner
+meets an edge. Ours."""
 STANDS = 0.1
-"""[m/s] A slower body stands. Ours: below the resolution of recorded speeds, 0.36 km/h."""
+"""Speed below which a body stands [m/s]. Ours: below the resolution of recorded speeds, 0.36
+km/h."""
 CREEPS = 0.5
-"""[m/s] A body that brakes at ``COMFORT`` or harder and is slower has all but stopped: it does not
-drive into another one. Ours: it stops within 0.2 s and 4 cm.
-"""
+"""Speed below which a body that brakes at ``COMFORT`` or harder has all but stopped [m/s]: it does
+not drive into another one. Ours: it stops within 0.2 s and 4 cm."""
 STOOD = 0.5
-"""[s] A body that has stood for longer has not stopped because of the conflict. Ours."""
+"""Standing time from which on a body has not stopped because of the conflict [s]. Ours."""
 SAME_WAY = math.cos(math.radians(35.0))
-"""[1] Cosine of the angle between headings of bodies that go the same way; its negative: against
-each other. Ours: lane changes reach 25° at walking speed, turns begin at 60°."""
+"""Cosine of the angle between the headings of bodies that go the same way [1]; its negative:
+against each other. Ours: lane changes reach 25° at walking speed, turns begin at 60°."""
 TURNS = math.radians(10.0)
-"""[rad] A body whose heading has changed by more within ``TURN_TIME`` turns. Ours."""
+"""Change of heading within ``TURN_TIME`` beyond which a body turns [rad]. Ours."""
 TURN_BEGINS = math.radians(3.0)
-"""[rad] A body whose heading has changed by more, and will change by twice ``TURNS`` in all within
-half of ``TURN_TIME``, turns, too. Ours."""
+"""Change of heading beyond which a body turns if it changes by twice ``TURNS`` in all within half
+of ``TURN_TIME`` [rad]. Ours."""
 TURN_TIME = 4.0
-"""[s] A quarter turn of 8 m radius takes 4 s at 3 m/s. Ours."""
+"""Time over which a turn is recognised [s]: a quarter turn of 8 m radius takes 4 s at 3 m/s.
+Ours."""
 FRONT_PART = 0.15
-"""[1] Share of a body's length, from its leading end: one that is met there at its side is met with
+"""Share of a body's length from its leading end [1]: one that is met there at its side is met with
 its front. Ours: about the overhang of a car."""
 PUSHES = 0.3
-"""[m/s] A body that moves into another more slowly does not strike it. Ours."""
+"""Speed below which a body that moves into another does not strike it [m/s]. Ours."""
 
 # --- The careful driver -------------------------------------------------------------------------
 
 REACTION = CAREFUL_REACTION
-"""[s] From the risk until braking begins. Source: UN R157, Annex 3, performance model."""
+"""Reaction time, from the risk until braking begins [s]. Source: UN R157, Annex 3, performance
+model."""
 BRAKING = CAREFUL_BRAKING
-"""[m/s²] Source: UN R157, Annex 3, performance model: 0.774 g."""
+"""Deceleration of the careful driver [m/s²]. Source: UN R157, Annex 3, performance model: 0.774
+g."""
 JERK = CAREFUL_JERK
-"""[m/s³] 0.774 g in 0.6 s. Source: UN R157, Annex 3, performance model."""
+"""Jerk with which the careful driver's braking builds up [m/s³]: 0.774 g in 0.6 s. Source: UN R157,
+Annex 3, performance model."""
 COMFORT = 3.0
-"""[m/s²] Braking that one may ask of others. Source: UN R79, 5.6.4.7: a lane change must not force
-the vehicle behind to more than 3 m/s²."""
+"""Deceleration that one may ask of others [m/s²]. Source: UN R79, 5.6.4.7: a lane change must not
+force the vehicle behind to more than 3 m/s²."""
 HEADWAY, HEADWAY_RISE, MOST_HEADWAY = 1.0, 3.6 / 100.0, 2.0
-"""[s], [s/(m/s)], [s] The time gap that a careful driver keeps: 1 s, and 0.1 s more per 10 km/h, up
-to 2 s. Source: UN R157, 5.2.3.3 (1.2 s at 20 km/h, 1.6 s at 60 km/h)."""
+"""Time gap that a careful driver keeps [s], its increase with speed [s/(m/s)], and its largest
+value [s]: 1 s, and 0.1 s more per 10 km/h, up to 2 s. Source: UN R157, 5.2.3.3 (1.2 s at 20 km/h,
+1.6 s at 60 km/h)."""
 OPENING = 0.4
-"""[m/s²] How a careful driver opens a gap that is too short when a scenario begins, or when the
-other comes: with the foot off the accelerator. Source: European Commission, JRC-FSM."""
+"""Deceleration of a careful driver who opens a gap that is too short when a scenario begins, or
+when the other comes [m/s²]: with the foot off the accelerator. Source: European Commission,
+JRC-FSM."""
 OPENS_TO = 0.8
-"""[1] … until it drives at this share of the speed of the vehicle ahead. Ours."""
+"""Share of the speed of the vehicle ahead down to which a careful driver opens a gap [1]. Ours."""
 BEND_SHARE = 0.6
-"""[1] Of the grip, how much a careful driver uses in a bend; four fifths remain for braking (the
-friction circle). Ours: a wet road (5 m/s²) leaves 3 m/s² across, at which drivers take junctions.
-"""
+"""Share of the grip that a careful driver uses in a bend [1]; four fifths remain for braking (the
+friction circle). Ours: a wet road (5 m/s²) leaves 3 m/s² across, at which drivers take
+junctions."""
 EVIDENT_EVERY = 0.1
-"""[s] Between two instants at which it is asked whether two bodies are on a collision course. Ours.
-"""
+"""Interval between two checks whether two bodies are on a collision course [s]. Ours."""
 UNSURE = 0.5
-"""[s] For so long a collision course that grazes may seem none. Ours: a corner that would touch for
-less than a step of the prediction, or a body that speeds up.
-"""
+"""Longest interruption of a collision course that is ignored [s]. Ours: a corner that would touch
+for less than a step of the prediction, or a body that speeds up."""
 DOUBTS = 2.0
-"""[s] A careful driver does not trust that another stops if the two would meet within this
-time. Source: the careful
-driver of UN R157, Annex 3, who reacts to a time to collision below 2 s.
-"""
+"""Time to contact within which a careful driver does not trust that another stops [s]. Source: the
+careful driver of UN R157, Annex 3, who reacts to a time to collision below 2 s."""
 SYSTEM_REACTION, SYSTEM_BRAKING = 0.35, 6.0
-"""[s], [m/s²] By which an automated system must avoid a cut-in. Source: UN R157, 5.2.5.2."""
+"""Reaction time [s] and deceleration [m/s²] with which an automated system must avoid a cut-in.
+Source: UN R157, 5.2.5.2."""
 LATERAL_SEEN = 0.72
-"""[s] For so long a cutting-in vehicle's lateral motion must have been visible. Source: the same.
-"""
+"""Time for which a cutting-in vehicle's lateral motion must have been visible [s]. Source: UN R157,
+Annex 3."""
 LATERAL_MOVE, JUST_BEFORE = 0.01, 0.2
-"""[m], [s] It moves sideways if it comes nearer by more than 1 cm in the 0.2 s before. Ours."""
+"""Approach [m] within the time before [s] beyond which a body moves sideways: 1 cm in 0.2 s.
+Ours."""
 AHEAD_BY = 0.01
-"""[m] A body that brakes and is farther ahead than without braking, by more, has not avoided the
-other by braking. Ours: rounding."""
+"""Distance by which a braking body may be farther ahead than without braking, and still avoid the
+other by braking [m]. Ours: rounding."""
 BRAKES_FOR = 20.0
-"""[s] Longest braking that is computed: from 60 m/s at ``COMFORT``. Ours."""
+"""Longest braking that is computed [s]: from 60 m/s at ``COMFORT``. Ours."""
 
 # --- Obstruction ---------------------------------------------------------------------------------
 
 MARGIN = 0.5
-"""[m] A body that reaches so near to the strip that another sweeps is in its lane. A car of 1.9 m
+"""Distance to the strip that a body sweeps within which another is in its lane [m]. A car of 1.9 m
 on a lane of 3.5 m has 0.8 m to each side, and a cut-in counts from 0.3 m beyond the marking on.
 Source: UN R157, 5.2.5.2."""
 MARGIN_ON_FOOT = 1.0
-"""[m] Likewise of pedestrians, cyclists, animals. Source: StVO § 26, ECE pedestrian test protocols
-brake for persons about to step into the path; the metre is ours."""
+"""``MARGIN`` for pedestrians, cyclists and animals [m]. Source: StVO § 26, ECE pedestrian test
+protocols brake for persons about to step into the path; the metre is ours."""
 HARD = 6.0
-"""[m/s²] Braking that needs a reason. Source: UN R13-H, Annex 3: 6.43 m/s² is what the service
-brakes must give, so that no driver brakes so hard without a reason."""
+"""Deceleration from which on braking needs a reason [m/s²]. Source: UN R13-H, Annex 3: 6.43 m/s² is
+what the service brakes must give, so that no driver brakes so hard without a reason."""
 JUST_NOW = 3.0
-"""[s] Actions of a body within this time before a contact count. Ours: lane changes take 3 to 6 s.
-"""
+"""Time before a contact within which a body's actions count [s]. Ours: lane changes take 3 to 6
+s."""
 LATELY = 1.0
-"""[s] Of two bodies that changed course, the one that steered more in this time before they meet
-came into the way of the other. Ours."""
+"""Time before two bodies meet over which their steering is compared [s]: of two that changed
+course, the one that steered more came into the way of the other. Ours."""
 ASIDE = 0.7
-"""[m] A body that has moved farther across its route within ``JUST_NOW`` has changed its course.
-Ours: about the room to the marking."""
+"""Lateral movement within ``JUST_NOW`` from which on a body has changed its course [m]. Ours: about
+the room to the marking."""
 OFF_LANE = 1.75
-"""[m] A body whose reference point is farther from its route has left its lane: half of a lane of
-3.5 m. Ours."""
+"""Distance of the reference point from the route beyond which a body has left its lane [m]: half of
+a lane of 3.5 m. Ours."""
 ALIKE = 0.7
-"""[1] Least cosine, in size, between two approaches of the same road. Ours: 45°."""
+"""Least cosine, in size, of the angle between two approaches of the same road [1]. Ours: 45°."""
 AHEAD_TIME, AHEAD = 2.0, 10.0
-"""[s], [m] A participant that is nearer ahead than 2 s of travel and 10 m is a reason to brake.
-Source: StVO § 4; the 2 s are the usual rule of thumb of safe distance, the 10 m are ours."""
+"""Time of travel [s] and distance [m] within which a participant ahead is a reason to brake: 2 s
+and 10 m. Source: StVO § 4; the 2 s are the usual rule of thumb of safe distance, the 10 m are
+ours."""
 
 # --- Lights and crosswalks ----------------------------------------------------------------------
 
 LINE_REACH = 3.5
-"""[m] A body that passes a stop line's prolongation farther aside crosses another lane's line.
-Ours: a lane's width."""
+"""Largest lateral distance at which a body crosses its own stop line or its prolongation [m];
+farther aside it crosses another lane's. Ours: a lane's width."""
 SIGHT = 60.0
-"""[m] A light holds a body that is at most so far before its stop line. Ours."""
+"""Largest distance before its stop line at which a light holds a body [m]. Ours."""
 LOOKED_BACK = 10.0
-"""[s] Time before a conflict in which running a red light counts. Ours."""
+"""Time before a conflict in which running a red light counts [s]. Ours."""
 JUNCTION = 40.0
-"""[m] A light decides on conflicts up to so far behind its stop line. Ours: the size of a large
-junction."""
+"""Distance behind its stop line up to which a light decides on conflicts [m]. Ours: the size of a
+large junction."""
 CROSSWALK_MARGIN = 0.5
-"""[m] Extension of crosswalks along the route. Ours."""
+"""Extension of crosswalks along the route [m]. Ours."""
 KERB = 1.0
-"""[m] Extension of crosswalks across the route: pedestrians waiting at the kerb. Ours."""
+"""Extension of crosswalks across the route [m]: pedestrians waiting at the kerb. Ours."""
 
 # --- Lane and road, passing ----------------------------------------------------------------------
 
 LINE_MARGIN = 0.5
-"""[m] A wheel of the rear axle that is farther beyond the border of its lanes has left them."""
+"""Distance of a rear wheel beyond its lanes' border from which on a vehicle has left them [m]."""
 EDGE_MARGIN = 0.2
-"""[m] Likewise beyond the edge of the road."""
+"""Distance of a rear wheel beyond the road's edge from which on a vehicle has left the road [m]."""
 WALKING_PACE = 7.0 / 3.6
-"""[m/s] An ego that is slower may pass closer. Source: StVO § 5 (4) has no such speed; the case law
-on walking pace (Schrittgeschwindigkeit) says 4 to 7 km/h."""
+"""Speed below which an ego may pass closer [m/s]. Source: StVO § 5 (4) has no such speed; the case
+law on walking pace (Schrittgeschwindigkeit) says 4 to 7 km/h."""
 PASSES = 0.5
-"""[m/s] An ego that is faster by less does not pass. Ours."""
+"""Speed difference below which an ego does not pass [m/s]. Ours."""
 PASSED_AHEAD = 40.0
-"""[m] From so far on before what is in its lane, a driver moves aside to pass it. Ours: a lane
+"""Distance to what is in its lane below which a driver moves aside to pass it [m]. Ours: a lane
 change at 50 km/h takes 3 s."""
 PASSED_BESIDE = np.array([2.0, 1.5])
-"""[m] Least clearance to who is passed, outside towns and in them. Source: StVO § 5 (4)."""
+"""Least clearance to who is passed, outside towns and in them [m]. Source: StVO § 5 (4)."""
 PASSED_BESIDE.setflags(write=False)
 CLOSE, CLOSE_TIME = 0.5, 0.03
-"""[m], [s] A clearance of less than 0.5 m, and 0.03 m more per m/s by which the ego is faster, is
-a failure; up to ``PASSED_BESIDE``, it is noted only. 1 m at 60 km/h is what Queensland asks for up
-to there (Transport Operations (Road Use Management) Regulation, 144A); the 0.5 m are ours."""
+"""Clearance in passing below which it is a failure [m], and its increase with the speed difference
+[s]: 0.5 m, and 0.03 m more per m/s by which the ego is faster; up to ``PASSED_BESIDE``, it is noted
+only. 1 m at 60 km/h is what Queensland asks for up to there (Transport Operations (Road Use
+Management) Regulation, 144A); the 0.5 m are ours."""
 CLEAR_ZONE = 4.5
-"""[m] Beyond the edge of the road, at which a solid obstacle is taken to stand: what is nearer is
-protected (RPS 2009). A car brakes up to there. That there is one is ours."""
+"""Distance beyond the road's edge at which a solid obstacle is assumed [m]: what is nearer is
+protected (RPS 2009). A car brakes up to there. That there is an obstacle is ours."""

@@ -20,7 +20,7 @@ KINDS = {
     CONTACT: "contact",
     VIOLATION: "violation",
 }
-"""Labels of `Conflicts.kind`."""
+"""Labels of the kinds of conflicts by code, see `Conflicts.kind`."""
 
 
 UNSAFE = "no time to act from the start on"

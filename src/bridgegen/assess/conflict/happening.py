@@ -21,35 +21,35 @@ from bridgegen.drivers.kinds import IS_OBSTACLE, IS_ON_FOOT
 from bridgegen.simulation.rollout import Rollout
 
 NEAR, NEAR_TIME = 5.0, 2.0
-"""Another is near if the gap to it is at most 5 m and what the ego drives in 2 s: the distance that
-drivers are taught to keep."""
+"""Largest gap to another that is near: a distance [m], and time of the ego's travel [s]: the
+distance that drivers are taught to keep."""
 
 STANDS = 0.5
-"""[m/s] Below this the ego stands; people walk at 1.4 m/s."""
+"""Speed below which the ego stands [m/s]; people walk at 1.4 m/s."""
 
 WITHOUT_REASON = 5.0
-"""[s] that an ego may stand for no reason; the first driver at a green light takes about 2 s
-(Highway Capacity Manual, start-up lost time)."""
+"""Time that an ego may stand without a reason [s]; the first driver at a green light takes about 2
+s (Highway Capacity Manual, start-up lost time)."""
 
 SAMPLED = 0.25
-"""[s] between two instants at which reasons are looked for."""
+"""Interval between two instants at which reasons for standing are sought [s]."""
 
 GAP_TIME = 7.5
-"""[s] For what arrives within this time a driver may wait: the gap that cars accept for a left turn
-from a stop (AASHTO, A Policy on Geometric Design, case B1)."""
+"""Time to arrival of other traffic within which a driver may wait for it [s]: the gap that cars
+accept for a left turn from a stop (AASHTO, A Policy on Geometric Design, case B1)."""
 
 IN_THE_WAY = 10.0
-"""[m] Gap to what stands ahead, up to which the ego may stand because of it."""
+"""Gap to what stands ahead up to which the ego may stand because of it [m]."""
 
 OF_A_JAM = 15.0
-"""[m] between the centres of two vehicles that stand in a row: one is in traffic, not parked. A
-truck and a gap are about as long."""
+"""Largest distance between the centres of two vehicles that stand in a row [m]: the rear one is in
+traffic, not parked. A truck and a gap are about as long."""
 
 SIDE = 0.5
-"""[m] beside the ego's body, within which what is ahead is in its way."""
+"""Lateral margin beside the ego's body within which what is ahead is in its way [m]."""
 
 LIGHT_AHEAD = 20.0
-"""[m] to a stop line or a crosswalk ahead, up to which the ego may stand because of it."""
+"""Distance to a stop line or a crosswalk ahead up to which the ego may stand because of it [m]."""
 
 _GREEN = 4
 _OFF = 0

@@ -26,7 +26,7 @@ from bridgegen.assess.conflict.analysis import Conflicts
 from bridgegen.base.arrays import Float, Int
 
 Count = Literal["ego", "any"]
-"""Which conflicts count: those that the ego is responsible for or could prevent, or all."""
+"""Conflicts that count: those that the ego is responsible for or could prevent, or all."""
 
 COURSE, NEAR_MISS = 0.1, 0.3
 """The least harm of a collision course, and of a near miss or collision. Critical rows have

@@ -16,21 +16,18 @@ from bridgegen.scenario.participants import OBJECT_CLASSES
 from bridgegen.simulation.rollout import Rollout
 
 SLIP = float(np.tan(np.radians(10.0)))
-"""Motion across a wheeled body, as a share of its speed: tyres slide beyond 10° of slip.
-
+"""Largest motion across a wheeled body, as a share of its speed: tyres slide beyond 10° of slip.
 Source: lateral force of tyres peaks at slip angles of 4° to 10°: Wong, Theory of Ground Vehicles
-(4th edition, 2008), 1.4.
-"""
+(4th edition, 2008), 1.4."""
 
 WINDOW = 0.25
-"""[s] over which changes of speed and heading are judged.
+"""Time over which changes of speed and heading are judged [s].
 
 Brakes of cars take 0.2 s to 0.4 s to build up: Breuer and Bill, Bremsenhandbuch (2017). So a change
-that is done within less, as scripts do, differs little from one that a body can do.
-"""
+that is done within less, as scripts do, differs little from one that a body can do."""
 
 AFTER = 1.0
-"""[s] Motion that long after a near miss still belongs to it: its outcome. Ours."""
+"""Time after a near miss in which motion still belongs to it, as its outcome [s]. Ours."""
 
 LIMITS: Float = np.array(
     [

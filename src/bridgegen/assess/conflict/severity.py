@@ -30,7 +30,7 @@ FRONT, REAR, SIDE = range(3)
 """Direction of the force on a vehicle: the end or side that is struck."""
 
 DIRECTIONS = ("front", "rear", "side")
-"""In words, by number."""
+"""Directions of the force on an occupied vehicle, by code."""
 
 MASS: Float = np.array([one.mass for one in OBJECT_CLASSES])
 """Mass [kg] by `bridgegen.drivers.kinds`, as in exported storyboards.

@@ -12,7 +12,7 @@ from bridgegen.scenario.language.criteria import PREFIX
 from bridgegen.simulation.rollout import Rollout
 
 OF_BASELINE = "baseline:"
-"""Begins the name of a quantity of the same scenario with the baseline's driver."""
+"""Prefix of the name of a quantity of the same scenario with the baseline's driver."""
 
 
 def quantity(name: str) -> Quantity:

@@ -28,7 +28,8 @@ from bridgegen.scenario.stl import (
 from bridgegen.simulation.rollout import Rollout
 
 LARGEST = 1000.0
-"""Margins beyond this, in their units, count as this: an objective needs finite numbers."""
+"""Largest magnitude of a margin, in its unit; larger ones count as this: an objective needs finite
+numbers."""
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ from bridgegen.base.arrays import Float, Int
 from bridgegen.base.compiled import kernel
 
 TIE = 1e-9
-"""Distances that differ by no more are equal [m]."""
+"""Difference up to which distances are equal [m]."""
 
 
 @kernel

@@ -94,7 +94,8 @@ N_BRAKE = Metric(
 
 
 MOST = 20.0
-"""[m/s²] Twice what a tyre gives: anything harder counts as this, and so does a contact."""
+"""Largest deceleration that is counted [m/s²], twice what a tyre gives: anything harder counts as
+this, and so does a contact."""
 
 
 def drac(rollout: Rollout) -> Float:

@@ -13,8 +13,8 @@ from bridgegen.simulation.rollout import Rollout
 
 Derived = TypeVar("Derived")
 Need = Literal["detections", "lights", "offset"]
-"""What a rollout may lack: detections unless its ego perceives; traffic lights and the offset from
-the route if it is a recording from elsewhere, not a simulator's."""
+"""Data that a rollout may lack: detections unless its ego perceives; traffic lights and the offset
+from the route if it is a recording from elsewhere, not a simulator's."""
 
 
 @dataclass(frozen=True)
@@ -112,7 +112,7 @@ def without_failed(rollout: Rollout, values: Float) -> Float:
 
 
 STANDS = 0.05
-"""A body that is slower than this [m/s] stands, and does not turn round by the sign of noise."""
+"""Speed below which a body stands, and does not turn round by the sign of noise [m/s]."""
 
 
 @dataclass(frozen=True)

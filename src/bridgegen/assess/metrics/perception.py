@@ -19,10 +19,11 @@ CLASSES = ("car", "heavy vehicle", "two-wheeler", "pedestrian", "other")
 """Classes of detections and truth: kinds that sensors confuse are one class."""
 
 RANGES = np.array([50.0, 50.0, 40.0, 40.0, 30.0])
-"""[m] Per class: a box whose centre is nearer than this to the ego's reference point counts."""
+"""Largest distance from the ego's reference point to the centre of a box that counts, by class
+[m]."""
 
 THRESHOLDS = np.array([0.5, 1.0, 2.0, 4.0])
-"""[m] Thresholds: a detection whose centre is nearer than this to the truth's is a hit."""
+"""Distances between the centres of a detection and of the truth below which the two match [m]."""
 
 CLASS_OF_KIND = np.array([CLASSES.index(one.detection_class) for one in OBJECT_CLASSES])
 """The class of each of `bridgegen.drivers.kinds`, int64."""

@@ -81,10 +81,11 @@ def _checked(found: object, name: str) -> Metric:
 
 
 METRICS: Mapping[str, Metric] = Registry(_OURS, ADDED, _checked)
-"""In the order of Table I, then ours beyond it, then those of installed packages."""
+"""Metrics by name: those of the paper's Table I, then ours beyond it, then those of installed
+packages."""
 
 TABLE_I = tuple(one.name for one in _TABLE_I)
-"""The names of the paper's eleven, which every run records as far as its rollouts allow."""
+"""Names of the paper's eleven metrics, which every run records as far as its rollouts allow."""
 
 
 def get(name: str) -> Metric:

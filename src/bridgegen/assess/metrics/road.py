@@ -40,8 +40,8 @@ L_OFFSET = Metric(
 
 
 ASIDE = 3.5
-"""[m] A body that crosses a stop line's prolongation farther than a lane's width from the route
-crosses another lane's line, or none."""
+"""Largest lateral distance from the route at which a body crosses its stop line's prolongation [m];
+farther aside, a lane's width, it crosses another lane's line, or none."""
 
 
 def r_red(rollout: Rollout) -> Float:

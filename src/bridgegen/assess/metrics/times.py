@@ -82,7 +82,7 @@ TTC = Metric(
 
 
 TARGET = 3.0
-"""[s] A time to collision up to this is short (3 s in Autey et al. 2012; 1 to 5 s are in use)."""
+"""Largest short time to collision [s]: 3 s in Autey et al. 2012; 1 to 5 s are in use."""
 
 
 def tet(rollout: Rollout) -> Float:
@@ -196,7 +196,8 @@ THW = Metric(
 
 
 LONGEST = 10.0
-"""[s] Conflicts have 1 to 5 s."""
+"""Longest time between two bodies at a point that is an encroachment [s]; conflicts have 1 to 5
+s."""
 
 
 def pet(rollout: Rollout) -> Float:

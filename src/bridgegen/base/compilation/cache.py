@@ -16,10 +16,11 @@ from bridgegen.base.compilation.folder import PACKAGE, cache_folder, digest, shi
 from bridgegen.base.compilation.library import CodeStore, KernelLibrary, is_for_kernel
 
 MAIN = PACKAGE / "simulation" / "embedded" / "_rollout_kernels.py"
-"""What every search calls."""
+"""Source file of the kernel that every search calls."""
 
 OF_A_SEARCH = 230
-"""About how many kernels the first search compiles: files ``code/*.bc`` after crossroads-s4."""
+"""Approximate number of kernels that the first search compiles: files ``code/*.bc`` after
+crossroads-s4."""
 
 
 def is_compiled() -> bool:

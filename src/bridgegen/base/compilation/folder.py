@@ -21,7 +21,7 @@ import numpy as np
 from llvmlite import binding as llvm
 
 KEPT = "kernels-"
-"""The names of folders begin so that later processes use, too."""
+"""Prefix of the folders that later processes use, too."""
 
 
 @cache
@@ -90,7 +90,7 @@ def _is_owned(folder: Path) -> bool:
 PACKAGE = Path(__file__).parents[2]
 
 IMPORTED = re.compile(r"^ *from bridgegen\.([\w.]+) import (\([^)]*\)|[^\n]*)", re.MULTILINE)
-"""A module of ours, and the names that another one imports from it."""
+"""Regular expression of an import of a module of BridgeGen, and of the imported names."""
 
 
 @cache
@@ -139,13 +139,15 @@ def _imports(text: str) -> Iterator[Path]:
 
 FOLDER = PACKAGE / "_kernels"
 BASELINE = "x86-64-v3"
-"""The processors of 2013 (Intel Haswell) and 2015 (AMD Excavator), and later ones."""
+"""Processors that code is compiled for: those of 2013 (Intel Haswell) and 2015 (AMD Excavator), and
+later ones."""
 
 FEATURES = (
     "avx", "avx2", "bmi", "bmi2", "cmov", "crc32", "cx16", "cx8", "f16c", "fma", "fxsr", "lzcnt",
     "mmx", "movbe", "popcnt", "sahf", "sse", "sse2", "sse3", "sse4.1", "sse4.2", "ssse3", "xsave",
 )  # fmt: skip
-"""Its instructions, as LLVM names them. Source: x86-64 psABI, micro-architecture levels."""
+"""Instructions of ``BASELINE``, as LLVM names them. Source: x86-64 psABI, micro-architecture
+levels."""
 
 
 @dataclass(frozen=True)

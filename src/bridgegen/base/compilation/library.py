@@ -30,7 +30,7 @@ LARGE = 12_000
 """Bytes of bitcode from which on a kernel is called rather than linked."""
 
 WRAPPER = "_ZN7cpython"
-"""How the name of a function begins by which Python calls a kernel."""
+"""Prefix of the name of the function by which Python calls a kernel."""
 
 
 class CodeStore:
@@ -89,7 +89,7 @@ class KernelLibrary(JITCodeLibrary):  # type: ignore[misc]
 
     store: ClassVar[CodeStore]
     by_symbol: ClassVar[dict[str, "KernelLibrary"]] = {}
-    """Of this process."""
+    """Libraries of this process by the symbol that they define."""
 
     def __init__(self, codegen: Any, name: str) -> None:
         super().__init__(codegen, name)

@@ -22,12 +22,12 @@ from pathlib import Path
 from typing import IO, Any, NoReturn
 
 Say = Callable[..., None]
-"""Sends a message to the parent process; may be called by any thread."""
+"""Function that sends a message to the parent process; may be called by any thread."""
 
 SUPERVISOR = Path(__file__).with_name("supervisor.py")
 
 END_SECONDS = 10.0
-"""A process that has been asked to end is killed after so long [s]."""
+"""Time after which a process that has been asked to end is killed [s]."""
 
 ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
 """Environment of a process whose libraries use one thread."""

@@ -13,7 +13,7 @@ from typing import Any
 from bridgegen.base.processes.child import Child, Say, connect, leave
 
 Answer = Callable[..., Any]
-"""Answers a request, in the isolated process."""
+"""Function that answers a request, in the isolated process."""
 
 
 class CallError(Exception):

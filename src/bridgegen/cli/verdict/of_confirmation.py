@@ -22,7 +22,7 @@ FIGURES = {
 """The figures of a confirmation that ``--fail-if`` accepts."""
 
 _OF_THE_LOST = ("confirmed", "lost")
-"""Scenarios that are not confirmed fail these; those that failed there fail ``not_run``."""
+"""Figures that scenarios fail which are not confirmed; those that failed there fail ``not_run``."""
 
 
 class ConfirmationCriteria(Conditions):

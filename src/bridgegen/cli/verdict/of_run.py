@@ -28,7 +28,7 @@ from bridgegen.search.triage.record import NOT_JUDGED
 from bridgegen.search.triage.words import mode_in_words
 
 _CAUSES = {one.label.replace(" ", "_"): one.label for one in CAUSES}
-"""Figures, by the cause's label."""
+"""Labels of root causes by the figure's name."""
 
 _TRIAGE = {
     "modes": "failure modes",

@@ -18,16 +18,17 @@ PROTOCOL = 1
 """The version of the protocol."""
 
 MAX_FRAME = 64 * 2**20
-"""Most bytes of a message."""
+"""Largest size of a message [bytes]."""
 
 DTYPES = ("float64", "float32", "int64", "int32", "int8", "bool")
-"""What the elements of an array may be."""
+"""Types that the elements of an array may have."""
 
 _SENT = {name: np.dtype("uint8" if name == "bool" else name).newbyteorder("<") for name in DTYPES}
 """Types of elements as they are in messages."""
 
 MAX_ITEMS, MAX_DEPTH, MAX_DIMENSIONS = 5_000_000, 16, 8
-"""Most elements of the lists and maps of a message, how deep they are, dimensions of an array."""
+"""Largest number of elements of the lists and maps of a message, their largest depth, and largest
+number of dimensions of an array."""
 
 RAISED, NONSENSE = "raised", "answered nonsense"
 """Kinds of errors: the driver's own, or an answer that is none."""

@@ -25,13 +25,13 @@ from bridgegen.drivers.user_drivers import NAMES, Traits
 from bridgegen.drivers.views import MapSender
 
 AGAIN_SECONDS = 10.0
-"""For so long [s] a server is tried again that has been there: it may be starting again."""
+"""Time for which a server that has answered before is tried again [s]: it may be starting again."""
 
 MAX_ITEMS = 1024
-"""Most elements of the lists and maps of an answer."""
+"""Largest number of elements of the lists and maps of an answer."""
 
 MAX_MESSAGE = 500
-"""Most characters of an error message that are passed on."""
+"""Largest number of characters of an error message that is passed on."""
 
 _PAUSE = 0.1
 _TRAJECTORY = ("time", "x", "y", "h", "v")

@@ -17,7 +17,7 @@ if TYPE_CHECKING:  # criteria take a third of a second to import: only a run tha
     from bridgegen.scenario.language.criteria import Criterion
 
 Words = Callable[[str, Any], list[str]]
-"""Of an option's spelling and its value: the words of a command line."""
+"""Function that writes an option, given its spelling and value, as words of a command line."""
 
 
 def _repeated(texts: Callable[[Any], list[str]]) -> Words:
@@ -253,7 +253,7 @@ FLAG = Form(
     valid=lambda value: isinstance(value, bool),
     must="True or False",
 )
-"""On or off: ``--name``, ``--no-name``."""
+"""Form of a switch: ``--name``, ``--no-name``."""
 
 NAMES = Form(
     str,
@@ -264,7 +264,7 @@ NAMES = Form(
     lambda names: isinstance(names, tuple) and all(isinstance(one, str) for one in names),
     "names",
 )
-"""``name,name``."""
+"""Form of a list of names: ``name,name``."""
 
 FIXED = Form(
     list[str],
@@ -275,7 +275,7 @@ FIXED = Form(
     lambda values: _is_mapping(values, Real, str),
     "values by name",
 )
-"""``name=number`` or ``name=name``, repeated."""
+"""Form of fixed values: ``name=number`` or ``name=name``, repeated."""
 
 SETTINGS = Form(
     list[str],
@@ -286,7 +286,7 @@ SETTINGS = Form(
     lambda values: _is_mapping(values, Real, str),
     "values by name",
 )
-"""``name=value``, repeated."""
+"""Form of settings: ``name=value``, repeated."""
 
 TERMS = Form(
     str,
@@ -297,7 +297,7 @@ TERMS = Form(
     lambda terms: _is_mapping(terms, Real, type(None)),
     "a name, or metrics and their weights",
 )
-"""``metric=weight,metric``."""
+"""Form of weighted metrics: ``metric=weight,metric``."""
 
 CRITERIA = Form(
     list[str],
@@ -308,7 +308,7 @@ CRITERIA = Form(
     lambda given: isinstance(given, tuple),
     "criteria",
 )
-"""``ID: FORMULA``, a mapping in braces, or the path of a file; repeated."""
+"""Form of criteria: ``ID: FORMULA``, a mapping in braces, or the path of a file; repeated."""
 
 SIMULATOR = Form(
     None,
@@ -317,7 +317,7 @@ SIMULATOR = Form(
     valid=lambda choice: isinstance(choice, SimulatorChoice),
     must="a simulator",
 )
-"""Its name and its settings. Where it is on this machine belongs to no run's command."""
+"""Form of a simulator: name and settings. Its place on this machine belongs to no run's command."""
 
 SCREEN = Form(
     None,
@@ -326,7 +326,7 @@ SCREEN = Form(
     valid=lambda choice: isinstance(choice, SimulatorChoice),
     must="a simulator",
 )
-"""Likewise, or none."""
+"""Form of the low-fidelity simulator, or none; like `SIMULATOR`."""
 
 ANOTHER_SIMULATOR = replace(SCREEN, words=_simulator_words)
-"""Likewise, as an option ``--simulator``."""
+"""Form of another simulator, or none, as an option ``--simulator``."""

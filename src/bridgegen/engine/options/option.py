@@ -21,7 +21,7 @@ WHAT, SEARCH, OBJECTIVE, DRIVER, SIMULATOR, OUTPUT = GROUPS = (
 """The groups in which the help of a command lists its options."""
 
 ALWAYS: Final = object()
-"""The ``before`` of an option that every run records."""
+"""Value of ``before`` of an option that every run records."""
 
 
 @dataclass(frozen=True)

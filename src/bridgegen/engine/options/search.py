@@ -328,7 +328,7 @@ class SearchOptions(CommonOptions):
         default_factory=dict,
         metadata=option(
             SETTINGS,
-            "Settings of the algorithm, where they are not to be its defaults.",
+            "Override a setting of the algorithm.",
             spelling="--set",
             hint="NAME=VALUE; may be repeated.",
             group=SEARCH,
@@ -359,8 +359,8 @@ class SearchOptions(CommonOptions):
         default=None,
         metadata=option(
             WHOLE,
-            "Number of evaluations whose results the algorithm need not have when it is asked for "
-            "more: no worker then waits for the slowest one.",
+            "Evaluations in flight: propose new points before the last N results arrive, so that "
+            "no worker waits for the slowest one.",
             hint="For slow simulators; the result depends on it.",
             shown="0",
             limits=(0, MAX_AHEAD),

@@ -23,8 +23,8 @@ from bridgegen.engine.workers.recipe import Recipe
 from bridgegen.engine.workers.workers import Args, Evaluator, Lost, Part, Result, Work, cut
 
 MAX_START_FAILURES = 3
-"""`WorkersError` is raised after so many workers in a row, or as many as the pool has if that is
-more, ended before they were ready."""
+"""Number of workers in a row that end before they are ready, after which `WorkersError` is raised;
+or as many as the pool has if that is more."""
 
 WorkerHandle = TypeVar("WorkerHandle")
 """Identifies a worker to its pool: a process, or a number."""

@@ -25,7 +25,7 @@ from bridgegen.engine.workers.workers import Work
 
 
 IDLE_SECONDS = 60.0
-"""An actor that has been idle for so long [s] ends and frees its core."""
+"""Idle time after which an actor ends and frees its core [s]."""
 
 
 class RayActor:

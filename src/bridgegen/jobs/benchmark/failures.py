@@ -120,7 +120,7 @@ RESPONSIBLE = frozenset({"ego", "shared"})
 """Labels of who is responsible where the ego is."""
 
 JSON_FILE = "careful.json"
-"""In a run's folder: a `Judgement`."""
+"""File of a `Judgement` in a run's folder."""
 
 Count = Annotated[int, Field(ge=0, le=10**8)]
 
@@ -230,7 +230,7 @@ def read_judgement(folder: Path) -> Judgement | None:
 
 
 OBSERVATIONS, SCRIPT = "-observations.npz", "-reproduce.py"
-"""Ends of the names of the files, beside ``0001.xosc``."""
+"""Endings of the names of files beside ``0001.xosc``."""
 
 
 def write_reproductions(run: Run, rows: Rows) -> dict[str, str]:

@@ -25,22 +25,23 @@ from bridgegen.jobs.search.scenarios import is_file, load
 from bridgegen.scenario.language.reader import names
 
 FILE = "benchmark.json"
-"""In a benchmark's folder: what is equal in all its runs."""
+"""File in a benchmark's folder with the settings that are equal in all its runs."""
 
 PERFECT, SENSED = "perfect", "sensed"
 COLUMNS = {PERFECT: "perfect perception", SENSED: "with perception"}
-"""Whether a driver is told the truth, or what sensors track."""
+"""Names of the columns: a driver is told the truth, or what sensors track."""
 
 KEEP = 3
 """Scenarios that each run exports: each is tested on its neighbours, which takes time."""
 
 QUICK_SCENARIOS = ("cut-in", "lead-brakes", "left-across-path", "pedestrian-behind-parked")
-"""One of each part of the domain."""
+"""Scenarios of a quick benchmark: one of each part of the domain."""
 
 QUICK_DRIVERS = ("reference", "un-r157")
 QUICK_BUDGET, QUICK_SEEDS, QUICK_KEEP = 40, 1, 1
 TRIAGE, QUICK_TRIAGE = "short", "none"
-"""How much of the findings is simulated again, of `bridgegen.search.triage.effort.EFFORTS`."""
+"""Triage efforts of a full and of a quick benchmark, of
+`bridgegen.search.triage.effort.EFFORTS`."""
 
 
 @dataclass(frozen=True)
@@ -297,14 +298,15 @@ FEW, MANY = 4, 32
 """Random rows in the two batches that measure a driver's speed."""
 
 SLOW = 10.0
-"""Seconds beyond which the larger batch is not driven: the smaller one says enough."""
+"""Time beyond which the larger batch is not driven [s]: the smaller one says enough."""
 
 TESTED = {"full": 2000, "short": 800, "none": 0}
-"""Rows that a triage simulates again, about: neighbours, causes, minimal scenarios. Measured: 260
-to 3,800 a run if full, 0 to 1,200 if short."""
+"""Approximate number of rows that a triage simulates again, by effort: neighbours, causes, minimal
+scenarios. Measured: 260 to 3,800 a run if full, 0 to 1,200 if short."""
 
 BESIDE = 8.0
-"""Seconds that a run takes besides: to begin, export and report. Measured on one core."""
+"""Time that a run takes besides evaluations [s]: to begin, export and report. Measured on one
+core."""
 
 
 @dataclass(frozen=True)

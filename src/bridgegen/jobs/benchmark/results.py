@@ -306,22 +306,22 @@ DRIVERS_HEAD = (
     "first_failure", "severity", "failures", "evaluations", "failed_rows", "causes",
     *(f"avoided_by_{name}" for name in CAREFUL),
 )  # fmt: skip
-"""``first_failure``: median of the runs, inf where most runs have none; ``avoided_by_…``: share of
-the failures."""
+"""Columns of the table of drivers. ``first_failure``: median of the runs, inf where most runs have
+none; ``avoided_by_…``: share of the failures."""
 
 OUTCOMES_HEAD = (
     "driver", "scenario", "perception", "state", "why", "runs", "evaluations", "failed_rows",
     "failures", "preventable", "first_failure", "severity", "modes", "robust",
     *(f"avoided_by_{name}" for name in CAREFUL),
 )  # fmt: skip
-"""``preventable``: evaluations in which others are responsible, and the driver could have prevented
-the conflict; they are no failures here."""
+"""Columns of the table of runs. ``preventable``: evaluations in which others are responsible, and
+the driver could have prevented the conflict; they are no failures here."""
 
 MODES_HEAD = (
     "driver", "scenario", "perception", "mode", "robust", "harm", "severity", "causes", "minimal",
     "scenario_file", "minimal_file", "script", "playback",
 )  # fmt: skip
-"""``robust``: empty where it was not tested."""
+"""Columns of the table of failure modes. ``robust``: empty where it was not tested."""
 
 
 def write_tables(plan: Plan, found: Sequence[Outcome], standings: Sequence[Standing]) -> None:

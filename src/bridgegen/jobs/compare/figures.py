@@ -18,7 +18,8 @@ if TYPE_CHECKING:
 
 
 WIDTH = 5.4
-"""[inches]: text of nine points can be read where a phone shows the figure at 350 pixels."""
+"""Width of a figure [inches]: text of nine points can be read where a phone shows it at 350
+pixels."""
 
 DPI = 180
 
@@ -46,13 +47,14 @@ LIGHT = Theme(
     "#ffffff", "#17202c", "#566273", "#e4e9f0",
     ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9"),
 )  # fmt: skip
-"""Okabe and Ito's colours (2008), without black and yellow, which is invisible on white paper."""
+"""Theme on white paper: Okabe and Ito's colours (2008), without black, and yellow, which is
+invisible there."""
 
 DARK = Theme(
     "#171e27", "#e7ecf3", "#9ba8b8", "#2c3643",
     ("#3d9fe0", "#ff7f3f", "#1fc796", "#e39ac6", "#f2b73a", "#a5d8f5"),
 )  # fmt: skip
-"""The same hues, lighter."""
+"""Theme on a dark page: the hues of `LIGHT`, lighter."""
 
 
 def canvas(height: float, theme: Theme) -> "tuple[Figure, Axes]":

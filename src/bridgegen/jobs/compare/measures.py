@@ -13,7 +13,7 @@ from bridgegen.jobs.compare.plan import Cell
 from bridgegen.jobs.compare.record import DISTINCT, MODES, Record
 
 SHARE = 0.05
-"""T_critic counts evaluations until this share of the budget is critical: 50 of 1000."""
+"""Share of the budget that must be critical for T_critic: 50 evaluations of 1000."""
 
 
 @dataclass(frozen=True)

@@ -14,8 +14,8 @@ from bridgegen.jobs.frame import ANY, SCENARIOS, Job, SimulatingOptions
 from bridgegen.simulation.choice import Value
 
 APART = 0.1
-"""Two scenarios are different if their searched parameters differ by this share of their ranges or
-more, in root mean square; two random ones differ by 0.41."""
+"""Least distance of two scenarios that are different: root mean square over the searched
+parameters, as shares of their ranges; two random ones differ by 0.41."""
 
 
 def _read_settings(texts: Sequence[str], spelling: str) -> dict[str, dict[str, Value]]:
@@ -94,7 +94,7 @@ class CompareOptions(CommonOptions, SimulatingOptions):
         default_factory=dict,
         metadata=option(
             SETTINGS,
-            "Settings of algorithms, where they are not to be their defaults.",
+            "Override a setting of an algorithm.",
             spelling="--set",
             hint="ALGORITHM.NAME=VALUE, of your own CLASS.NAME=VALUE; may be repeated.",
             group=SEARCH,
@@ -122,7 +122,9 @@ class CompareOptions(CommonOptions, SimulatingOptions):
     )
     seeds: int = field(
         default=10,
-        metadata=option(WHOLE, "Runs of each, with the seeds 0, 1, 2 …", group=SEARCH),
+        metadata=option(
+            WHOLE, "Runs of each algorithm in each scenario, with the seeds 0, 1, 2 …", group=SEARCH
+        ),
     )
     budget: int = field(
         default=1000, metadata=option(WHOLE, "Evaluations of each run, exactly.", group=SEARCH)

@@ -23,7 +23,7 @@ from bridgegen.pages.templates import counted
 FIGURES = "figures"
 
 FIGURE_NAMES = ("distinct", "r_critic", "critical", "hypervolume")
-"""The ends of the files' names, in the page's order."""
+"""Endings of the names of the figures' files, in the page's order."""
 
 
 def write_page(comparison: Comparison) -> None:

@@ -20,10 +20,10 @@ from bridgegen.search import algorithms as toolkit
 from bridgegen.search.algorithms.algorithm import Problem, Value, resolve
 
 FILE = "compare.json"
-"""In a comparison's folder: the settings of all its runs."""
+"""File in a comparison's folder with the settings of all its runs."""
 
 RUNS = "runs"
-"""In a comparison's folder: the folders of its runs."""
+"""Folder in a comparison's folder that holds the folders of its runs."""
 
 RUN_PATTERN = f"*/{RUN_FILE}"
 """Path of a run's file in that folder, as a pattern."""

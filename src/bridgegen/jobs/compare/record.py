@@ -94,7 +94,7 @@ def distinct(
 
 
 POINTS = 50
-"""Of a curve over the evaluations."""
+"""Number of points of a curve over the evaluations."""
 
 
 @dataclass(frozen=True)
@@ -155,7 +155,7 @@ MODE = ("conflict_type", "responsible", "rule", "partner")
 
 
 DISTINCT, MODES = 5, 2
-"""The k of the times to the k-th different critical scenario, and to the k-th conflict."""
+"""Numbers k of the times to the k-th different critical scenario, and to the k-th conflict."""
 
 
 def points(budget: int) -> Int:

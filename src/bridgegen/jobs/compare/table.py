@@ -125,8 +125,9 @@ RUNS_HEAD = (
     "scenario", "algorithm", "seed", "measure", "value", "evaluations", "critical", "failed",
     "ended", "folder", "command",
 )  # fmt: skip
-"""``value``: inf where the event never occurred in so many evaluations (censored), empty where the
-measure is not defined; ``ended``: budget, exhausted or converged, or why the run failed."""
+"""Columns of the table of runs. ``value``: inf where the event never occurred in so many
+evaluations (censored), empty where the measure is not defined; ``ended``: budget, exhausted or
+converged, or why the run failed."""
 
 SUMMARY_HEAD = (
     "scenario", "algorithm", "measure", "runs", "never", "q1", "median", "q3", "p", "p_holm", "a12",

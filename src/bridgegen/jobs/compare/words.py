@@ -13,7 +13,7 @@ from bridgegen.jobs.compare.table import Line
 from bridgegen.jobs.frame import Table
 
 SURE = 0.05
-"""A corrected p below this is called a difference."""
+"""Corrected p value below which a difference is stated."""
 
 SENTENCE_STARTS = {
     "modes": "The largest number of failure modes is that of",
@@ -21,7 +21,7 @@ SENTENCE_STARTS = {
     "r_critic": "The largest share of critical scenarios, R_critic, is that of",
     "hypervolume": "The largest hypervolume, many bad outcomes at once, is that of",
 }
-"""The beginning of the sentence about a measure; larger is better in each."""
+"""Beginnings of the sentence about each measure; larger is better in each."""
 
 
 def number(value: float, digits: int) -> str:
@@ -66,7 +66,7 @@ def runs_that_find(line: Line) -> str:
 
 
 _TEXTS = 1
-"""The algorithm's column of a table."""
+"""Index of the algorithm's column of a table."""
 
 
 def lines(comparison: Comparison) -> Iterator[str | Table]:

@@ -37,7 +37,7 @@ PAGE = "dashboard.html"
 GENERATOR = "bridgegen dashboard"
 
 MOST_LINES = 12
-"""Failure modes, problems and notes that the terminal shows, of each."""
+"""Largest number of failure modes, of problems and of notes that the terminal shows."""
 
 
 @dataclass(frozen=True)

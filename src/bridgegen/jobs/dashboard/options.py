@@ -24,7 +24,9 @@ class DashboardOptions(JobOptions):
     )
     out: Path | str | None = field(
         default=None,
-        metadata=option(PATH, "The page.", shown="dashboard.html in the folder", group=OUTPUT),
+        metadata=option(
+            PATH, "The page (.html) to write.", shown="dashboard.html in the folder", group=OUTPUT
+        ),
     )
     criteria: Sequence[Mapping[str, str | Sequence[str]]] = field(
         default=(),

@@ -22,21 +22,21 @@ from bridgegen.pages.templates import Cell, counted, joined, when
 from bridgegen.results.failures import FILE
 
 MOST_MODES = 500
-"""Failure modes of a table; the others are counted."""
+"""Largest number of failure modes of a table; the others are counted."""
 MOST_RESULTS = 5
-"""Results of a failure mode that are linked."""
+"""Largest number of results of a failure mode that are linked."""
 MOST_REQUIREMENTS, MOST_SCENARIOS = 40, 200
-"""Columns and rows of a matrix; the gravest requirements."""
+"""Largest numbers of columns and rows of a matrix; the gravest requirements."""
 MOST_CELLS = 10_000
-"""Of all matrices; the first is always there."""
+"""Largest number of cells of all matrices; the first matrix is always shown."""
 MOST_CHARTS = 48
-"""Those that grew the most, then those with the largest share."""
+"""Largest number of charts: those that grew the most, then those with the largest share."""
 MOST_ROWS = 2000
-"""Rows of a table."""
+"""Largest number of rows of a table."""
 MOST_PARAMETERS, MOST_BIN_ROWS = 60, 1000
-"""Parameters of a scenario, and of all scenarios."""
+"""Largest numbers of parameters of a scenario, and of all scenarios."""
 OPEN_MATRICES, OPEN = 40, 12
-"""Matrices, and other tables, with more rows are folded."""
+"""Numbers of rows beyond which matrices, and other tables, are folded."""
 
 Row = Sequence[object]
 Table = dict[str, Any]

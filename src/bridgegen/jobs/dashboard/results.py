@@ -103,7 +103,8 @@ def place_of(text: str, project: Path) -> str:
 
 
 Kind = Literal["run", "difference", "suite"]
-"""A run that counts only what another driver avoids (``--worse-than``) is a difference."""
+"""Kind of a result; a run that counts only what another driver avoids (``--worse-than``) is a
+difference."""
 
 
 @dataclass(frozen=True, order=True)

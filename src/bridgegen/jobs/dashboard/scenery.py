@@ -22,7 +22,8 @@ from bridgegen.scenario.participants import PARTICIPANTS
 from bridgegen.scenario.weather import CLEAR_AIR, CLOUDBURST, DRIZZLE, GALE, THICK_FOG
 
 BINS = 10
-"""Bins of a declared range; a parameter of whole numbers has one for each, up to ``MOST_BINS``."""
+"""Number of bins of a declared range; a parameter of whole numbers has one for each, up to
+``MOST_BINS``."""
 
 MOST_BINS = 40
 
@@ -293,7 +294,8 @@ def _facts_of_lanes(road: Road) -> set[str]:
 
 
 Source = tuple[str, str, str, bool]
-"""Path or name, distribution, reading of empty triggers ("" for none), whether it is on a map."""
+"""Source of a scenario: path or name, distribution, reading of empty triggers ("" for none),
+whether it is on a map."""
 
 
 class Sceneries:

@@ -44,7 +44,7 @@ QUANTITIES = {
     "roundabout_diameter": Quantity("m", (28.0, 36.0, 100.0, inf)),
     "ego_speed": Quantity("km/h", (10.0, 30.0, 60.0, 100.0, 130.0, inf)),
 }
-"""By name."""
+"""Quantities of the operational design domain by name."""
 
 
 @dataclass(frozen=True)
@@ -281,7 +281,8 @@ _GROUPS: Mapping[str, Mapping[str, str]] = {
         "above 130 km/h": "ego_speed:5",
     },
 }
-"""By group each attribute with its evidence: a fact, ``quantity:band``, or nothing; ``# note``."""
+"""Attributes by group, each with its evidence: a fact, ``quantity:band``, or nothing; ``#
+note``."""
 
 
 def _read(groups: Mapping[str, Mapping[str, str]]) -> Iterator[Attribute]:

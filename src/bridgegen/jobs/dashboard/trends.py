@@ -11,7 +11,7 @@ from bridgegen.pages.templates import counted
 Measure = Literal["harmful share", "failed variations"]
 
 MOST_POINTS = 40
-"""Points of a chart; the latest."""
+"""Largest number of points of a chart; the latest."""
 
 
 @dataclass(frozen=True)

@@ -39,11 +39,11 @@ from bridgegen.recordings.scenarios.update import Update, refuse_same_names, wri
 
 PATHS_SHOWN = 300
 POINTS_SHOWN = 40
-"""Of a path in the picture."""
+"""Number of points of a path in the picture."""
 MARGIN = 10.0
-"""Around the paths in the picture [m]."""
+"""Margin around the paths in the picture [m]."""
 CRITICAL, SUFFIXES = "critical", (".xosc", ".xodr", ".owl")
-"""The folder of these, as of a run, and what its files end in."""
+"""Folder of the critical scenarios, as of a run, and endings of its files."""
 
 
 @dataclass(frozen=True)

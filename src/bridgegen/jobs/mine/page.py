@@ -40,7 +40,7 @@ LANES_HEAD = (
 )  # fmt: skip
 QUALITY_HEAD = ("recording", "file", "rule", "participants", "count", "examples")
 SPACE = 3.0
-"""Around the paths [m]."""
+"""Margin around the paths in the picture [m]."""
 CARRIAGEWAYS_SHOWN = 12
 SOURCES = {
     "map": "of the map", "lanelets": "of the recording's lanelets",

@@ -18,12 +18,13 @@ from bridgegen.scenario.language.space import SearchSpace
 
 PREFIX = "computed:"
 NAMES = tuple(PREFIX + name for name in KNOWN)
-"""What they are called beside drivers."""
+"""Names of the computed models, which set them apart from drivers."""
 
 SIDE = 0.375
-"""m beside the middle of the way, beyond which the vehicle ahead cuts out (UN R157, annex 3)."""
+"""Lateral offset from the middle of the lane beyond which the vehicle ahead cuts out [m] (UN R157,
+annex 3)."""
 LENGTH, LANE = 4.3, 3.5
-"""m, of a car and across a lane, in the scenarios of the pack ``r157``."""
+"""Length of a car and width of a lane in the scenarios of the pack ``r157`` [m]."""
 
 
 def outcomes(name: str, scenario: str, space: SearchSpace, X: Float) -> Codes:

@@ -26,7 +26,7 @@ class Outcome(IntEnum):
     AVOIDED = 0
     """The ego's box overlaps no other participant's by more than `TOUCH`."""
     COLLIDED = 1
-    """It does."""
+    """The ego's box overlaps another participant's by more than `TOUCH`."""
     FAILED = 2
     """No result: the driver or the simulation failed."""
     NOT_APPLICABLE = 3

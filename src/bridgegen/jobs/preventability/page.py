@@ -45,9 +45,9 @@ def data_uri(codes: Codes) -> str:
 
 
 PANELS = 8
-"""Values of the third axis that are drawn beside each other at most."""
+"""Largest number of values of the third axis that are drawn beside each other."""
 BLOCKS = 12
-"""Combinations of values of further axes that are drawn at most."""
+"""Largest number of combinations of values of further axes that are drawn."""
 
 
 def write_page(path: Path, result: PreventabilityMap) -> None:

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 ARRAYS, TABLE, SUMMARY, PAGE = "map.npz", "map.parquet", "summary.json", "preventability.html"
 
 GROUP = 1_048_576
-"""Rows of a row group of the table."""
+"""Number of rows of a row group of the table."""
 
 
 @dataclass(frozen=True)
@@ -196,7 +196,8 @@ def simulated(drivers: Sequence[str], models: Sequence[str]) -> tuple[str, ...]:
 
 
 CHUNK = 16_384
-"""Cells of a chunk: what is lost at most when a map is stopped. No result depends on it."""
+"""Number of cells of a chunk: what is lost at most when a map is stopped. No result depends on
+it."""
 
 SETTINGS = "map.json"
 CHUNKS = "chunks"

@@ -31,8 +31,8 @@ from bridgegen.jobs.risk.outcomes import Column, Outcomes
 from bridgegen.simulation.choice import SimulatorChoice
 
 CLOSE = 3.0
-"""Of the rows that are not the event here, the closest ones are looked at: as many as weigh so
-often what the event weighs."""
+"""Largest weight of the rows examined that are closest to the event, as a multiple of the
+event's."""
 HERE = 16_384  # rows that are simulated here
 AT_A_TIME = 32  # rows there, between two entries of the ledger
 MOST_FAILED = 0.2  # of the rows there: the others may be a biased choice

@@ -127,7 +127,7 @@ METHODS: Mapping[str, str] = {
     "importance": "Rows drawn where subset simulation, or a search, found harm, and weighted.",
     "stratified": "More rows from the rare ends of the distribution; in few dimensions.",
 }
-"""By name: a description."""
+"""Descriptions of the estimation methods by name."""
 
 
 @dataclass(frozen=True)

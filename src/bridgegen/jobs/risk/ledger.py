@@ -25,12 +25,12 @@ RESULTS = ("risk.json", "risk.html", "harmful.csv")
 MOST_LIKELY = "most-likely-"
 """Prefix of the names of scenario files; a number follows."""
 ELSEWHERE = "elsewhere-"
-"""The folder of what another simulator says begins so, and goes on with the simulator's name."""
+"""Prefix of the folder with another simulator's results; the simulator's name follows."""
 _LONGEST_MODE = 400
 _DAMAGED = (
     ValueError, TypeError, LookupError, EOFError, MemoryError, RuntimeError, zipfile.BadZipFile,
 )  # fmt: skip
-"""What reading a damaged or hostile batch may raise."""
+"""Exceptions that reading a damaged or hostile batch may raise."""
 
 
 class Ledger:

@@ -18,7 +18,7 @@ WORDS = {
     "collision": "a collision",
     "mais3": "a collision with a serious injury (MAIS3+)",
 }
-"""All whose probability is stated, in words: the events, and a serious injury."""
+"""Quantities whose probability is stated, in words: the events, and a serious injury."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -43,7 +43,8 @@ class RiskOptions(DriveOptions, SimulatingOptions):
         ),
     )
     event: str = field(
-        default="collision", metadata=option(TEXT, "Aimed at: conflict or collision.")
+        default="collision",
+        metadata=option(TEXT, "Event whose probability is estimated: conflict or collision."),
     )
     count: str = field(
         default="ego",
@@ -52,23 +53,26 @@ class RiskOptions(DriveOptions, SimulatingOptions):
         ),
     )
     method: str = field(
-        default="auto", metadata=option(TEXT, "auto, mc, subset, importance or stratified.")
+        default="auto",
+        metadata=option(TEXT, "Method of estimation: auto, mc, subset, importance or stratified."),
     )
     precision: float = field(
         default=0.2,
         metadata=option(
-            NUMBER, "Stop when half of the 95 % interval is this part of the estimate; 0: never."
+            NUMBER,
+            "Stop when the 95 % interval's half-width is below this fraction of the estimate; "
+            "0: never.",
         ),
     )
     budget: int = field(
         default=200_000,
         metadata=option(
             WHOLE,
-            "Simulations of the estimate, at most; a tenth more look for the most likely harmful "
-            "ones.",
+            "Maximum number of simulations of the estimate; a tenth more search for the most "
+            "likely harmful ones.",
         ),
     )
-    seed: int = field(default=0, metadata=option(WHOLE, "Of all random numbers."))
+    seed: int = field(default=0, metadata=option(WHOLE, "Seed of the random number generator."))
     start: str | Path | None = field(
         default=None,
         metadata=option(
@@ -79,7 +83,7 @@ class RiskOptions(DriveOptions, SimulatingOptions):
     check: int = field(
         default=0,
         metadata=option(
-            WHOLE, "Also estimate by so many plain Monte Carlo simulations, to compare.",
+            WHOLE, "Number of plain Monte Carlo simulations for a second estimate, to compare.",
             shown="none",
         ),
     )  # fmt: skip
@@ -87,7 +91,8 @@ class RiskOptions(DriveOptions, SimulatingOptions):
         default=None,
         metadata=option(
             ANY,
-            "The table (.csv) that the exposure was fitted to: says how much few data leave open.",
+            "Table (.csv) that the exposure was fitted to: adds the sampling uncertainty of the "
+            "fitted exposure (bootstrap).",
             shown="none",
         ),
     )
@@ -95,15 +100,16 @@ class RiskOptions(DriveOptions, SimulatingOptions):
         default=None,
         metadata=option(
             ANOTHER_SIMULATOR,
-            "Also simulate rows around the harmful ones in this simulator, and say by which "
-            "factor the event is more or less likely there.",
+            "Also simulate rows around the harmful ones in this simulator, and state the factor by "
+            "which the event is more or less likely there.",
             shown="none",
             group=SIMULATOR,
             names="simulator",
         ),
     )
     simulator_rows: int = field(
-        default=200, metadata=option(WHOLE, "How many rows there.", group=SIMULATOR)
+        default=200,
+        metadata=option(WHOLE, "Number of rows simulated in the other simulator.", group=SIMULATOR),
     )
     out: Path | str | None = field(
         default=None,

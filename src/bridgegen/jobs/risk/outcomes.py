@@ -28,16 +28,14 @@ class Column(IntEnum):
     """The columns of an outcome; the first is what `estimators` call the score."""
 
     SCORE = 0
-    """`conflict.harm.closeness_of_pairs` of the worst pair, from a near miss on; below, how near
-    the row comes to any conflict, whether it counts or not. 0 of a row without a result.
-    """
+    """Score of the worst pair, `conflict.harm.closeness_of_pairs`, from a near miss on; below, how
+    near the row comes to any conflict, whether it counts or not. 0 of a row without a result."""
     OWN = 1
-    """Likewise, where only conflicts count that the ego is responsible for or could prevent.
-    """
+    """Score where only conflicts count that the ego is responsible for or could prevent."""
     SEVERITY = 2
     """Probability of a MAIS3+ injury in the ego's collision."""
     RESULT = 3
-    """1; 0 where the simulation failed; −1 where the traffic is implausible."""
+    """Status of the row: 1; 0 where the simulation failed; −1 where the traffic is implausible."""
     MODE = 4
     """Number of the failure mode among `Outcomes.modes`; −1 of a harmless row."""
 
@@ -122,7 +120,8 @@ LEAST = NEAR_MISS
 """The score from which outcomes are kept."""
 
 INJURY = "mais3"
-"""A serious injury: the mean probability of MAIS3+ in collisions, and no event of its own."""
+"""Name of a serious injury: the mean probability of MAIS3+ in collisions, and no event of its
+own."""
 
 
 @dataclass(frozen=True)
@@ -142,7 +141,7 @@ EVENTS: Mapping[str, Event] = {
     "conflict": Event(NEAR_MISS, WORDS["conflict"]),
     "collision": Event(2.0 * NEAR_MISS, WORDS["collision"]),
 }
-"""By name; the last one is the default aim."""
+"""Events by name; the last one is the default."""
 
 
 def require(name: str) -> Event:
@@ -160,7 +159,7 @@ def require(name: str) -> Event:
 
 
 FEWEST = 10.0
-"""Effective hits that a resampled exposure must leave, or its weights say too little."""
+"""Effective number of hits that a resampled exposure must leave for its weights to be believed."""
 MOST_LEFT_OUT = 0.1  # of the exposures
 MOST_ROWS = 5000  # outcomes that are weighted
 

@@ -12,7 +12,7 @@ from bridgegen.pages import charts, templates
 from bridgegen.pages.templates import number
 
 MOST_DRAWN = 6
-"""Failure modes in the picture of all intervals; the table has all."""
+"""Largest number of failure modes in the picture of all intervals; the table has all."""
 
 
 def write_page(path: Path, risk: Risk) -> None:

@@ -142,7 +142,7 @@ MOST_PRECISION = 0.999
 MOST_ELSEWHERE = 10**6  # rows in another simulator
 OTHER_ROWS = 2  # added to the seed: no method counts rows of that one
 FAR = 4.0
-"""Normal scores beyond which a row of a search is moved: those of a range's ends are infinite."""
+"""Normal score beyond which a row of a search is moved: those of a range's ends are infinite."""
 
 
 @called_with(RiskOptions)

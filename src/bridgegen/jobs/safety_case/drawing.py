@@ -19,11 +19,11 @@ LINE, PAD, CHARACTER = 14.5, 8.0, 6.1
 """Height of a line, margin of a text, and width of a character [pixels]."""
 GAP, INDENT, TRUNK = 12.0, 15.0, 6.0
 BADGE = 48.0
-"""Width of a solution, assumption or justification whose text stands beside it."""
+"""Width of a solution, assumption or justification whose text stands beside it [pixels]."""
 WIDTH, LEAST, MOST = 1356.0, 140.0, 340.0
-"""Width of a drawing, if its columns are neither narrower nor wider than this."""
+"""Width of a drawing, and least and greatest width of its columns [pixels]."""
 HEAD, SIDE = 330.0, 380.0
-"""Width of the elements in the middle of the head, and of those beside them."""
+"""Width of the elements in the middle of the head, and of those beside them [pixels]."""
 MOST_LINES = 9
 """Maximum number of lines of a text; the table has all of it."""
 ROUND = ("Solution", "CounterSolution", "Assumption", "Justification")
@@ -210,7 +210,7 @@ def wrapped(text: str, width: float) -> tuple[str, ...]:
 
 
 SLANT = 12.0
-"""By how much a strategy's sides lean [pixels]."""
+"""Horizontal inclination of a strategy's sides [pixels]."""
 
 _CLASS = {
     "supported": "ok",

@@ -26,7 +26,7 @@ from bridgegen.scenario.language.space import SearchSpace
 from bridgegen.search.triage.record import JSON_FILE, Triage
 
 BINS, STRENGTH = 5, 2
-"""Bins of a parameter, and parameters of a combination, that the coverage counts."""
+"""Number of bins of a parameter, and of parameters of a combination, that the coverage counts."""
 
 
 @dataclass(frozen=True)
@@ -164,7 +164,7 @@ def _triage(run: Run) -> Triage:
 
 
 MOST_SHOWN = 10
-"""Failure modes that are counter goals of their own, with their files."""
+"""Largest number of failure modes that are counter goals of their own, with their files."""
 
 
 class Files:

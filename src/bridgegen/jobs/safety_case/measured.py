@@ -13,7 +13,7 @@ from bridgegen.results.confirmation.summary import summarise
 from bridgegen.search.triage.record import Mode
 
 Way = tuple[str, str, str, str]
-"""Conflict, its type, the responsible participant and the rule, as they are recorded."""
+"""Way of failing: conflict, its type, the responsible participant and the rule, as recorded."""
 
 
 def way_of(mode: Mode) -> Way:

@@ -20,15 +20,15 @@ Kind = Literal[
 RelationKind = Literal["SupportedBy", "InContextOf", "Challenges"]
 
 Status = Literal["supported", "not supported", "incomplete", "undeveloped", ""]
-"""Of a goal; "incomplete": nothing speaks against it, and a goal below it is undeveloped; "" of
-elements that are no goals."""
+"""Status of a goal; "incomplete": nothing speaks against it, and a goal below it is undeveloped; ""
+of elements that are no goals."""
 
 Declaration = Literal["asserted", "needsSupport", "assumed", "axiomatic", "defeated", ""]
 """SACM's assertionDeclaration of a claim; "" of what is no claim."""
 
 Form = Literal["count", "percent", "percent_up", "percent_down", "number", "text"]
-"""How a number is written: shares in per cent, rounded to 3 digits, bounds away from the share;
-"text": a sentence that is quoted from a file."""
+"""Format of a number: shares in per cent, rounded to 3 digits, bounds away from the share; "text":
+a sentence that is quoted from a file."""
 
 SACM: dict[Kind, str] = {
     "Goal": "Claim",
@@ -43,7 +43,7 @@ SACM: dict[Kind, str] = {
 """The element of SACM 2 that each kind of GSN's corresponds to."""
 
 PLACE = re.compile(r"\{([\w.:-]+)\}")
-"""A number's place in a template, by its id."""
+"""Regular expression of a number's place in a template, by its id."""
 
 Text = Annotated[str, Field(max_length=20_000)]
 Id = Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9_.:-]{0,199}$")]

@@ -9,7 +9,7 @@ from bridgegen.pages import templates
 PAGE = "safety-case.html"
 
 SITE = "docs/"
-"""Where the documentation's pages are in the repository."""
+"""Folder of the documentation's pages in the repository."""
 
 _STATES = {
     "supported": "ok",

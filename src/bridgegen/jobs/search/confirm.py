@@ -32,13 +32,13 @@ from bridgegen.search.triage.record import read_record as read_triage
 from bridgegen.simulation.choice import SimulatorChoice
 
 SECONDS = 1.0
-"""Results may wait so long before they are written [s]."""
+"""Time that results may wait before they are written [s]."""
 
 Tally = Counter[bool | None]
-"""How many scenarios are confirmed (True), are not (False), and failed (None)."""
+"""Numbers of scenarios that are confirmed (True), not confirmed (False), and failed (None)."""
 
 MOST_TRACKS = 100
-"""Scenarios whose tracks are recorded: some ten kilobytes each."""
+"""Largest number of scenarios whose tracks are recorded: some ten kilobytes each."""
 
 
 @dataclass(frozen=True)

@@ -20,23 +20,24 @@ from bridgegen.simulation.embedded.own_drivers import OwnDriver
 from bridgegen.simulation.rollout import FAILURES, STATUS_MESSAGES, Rollout
 
 SCENARIOS = ("crossroads-s1", "cut-in", "red-light-runner", "pedestrian-behind-parked")
-"""Crossing traffic, a motorway, a traffic light, a pedestrian between parked cars."""
+"""Scenarios of the check: crossing traffic, a motorway, a traffic light, a pedestrian between
+parked cars."""
 
 ROWS = 16
-"""Rows per scenario: few, since each is driven several times."""
+"""Number of rows per scenario: few, since each is driven several times."""
 
 MANY, SECONDS = 512, 1.0
-"""Rows in the batch that measures the driver's speed, at most; fewer if they would take longer than
-so many seconds."""
+"""Largest number of rows in the batch that measures the driver's speed, and its longest duration
+[s], for which it has fewer."""
 
 FIXED_BATCH = (
     "so little is rounding: networks and matrix products round differently by the size of the "
     "batch, unless they are called through bridgegen.drivers.batches.FixedBatch"
 )
-"""What to do about a driver that differs by rounding only."""
+"""Advice for a driver whose answers differ by rounding only."""
 
 ROUNDING = 1e-5
-"""A difference, relative or in the unit, up to which rounding explains that a motion differs."""
+"""Difference of a motion, relative or in the unit, up to which rounding explains it."""
 
 _STATES = {
     "a": "acceleration [m/s²]",
@@ -45,7 +46,8 @@ _STATES = {
     "y": "y [m]",
     "h": "h [rad]",
 }
-"""What is compared, that which a driver decides first: an acceleration acts from its instant on."""
+"""States that are compared; first those that a driver decides first: an acceleration acts from its
+instant on."""
 
 DRIVEN = "every row is driven to its end"
 AGAIN = "the same row again gives the same motion"
@@ -59,7 +61,7 @@ IN_SHORT = {
     "deterministic": (AGAIN, ANEW),
     "free of cross-talk": (ORDER, ALONE, BEFORE),
 }
-"""What the rules come to."""
+"""Rules of the contract by the word that summarises them."""
 
 
 @dataclass(frozen=True)

@@ -32,13 +32,13 @@ from bridgegen.scenario.language.criteria import PREFIX
 from bridgegen.simulation.rollout import STATUS_MESSAGES, WORKER_ENDED, Rollout
 
 AT_A_TIME = 32
-"""Scenarios that are simulated before their results are yielded, at most."""
+"""Largest number of scenarios that are simulated before their results are yielded."""
 
 FOUND = ("conflict", "conflict_type", "responsible", "partner")
 """The fields of a record on the decisive conflict."""
 
 SECONDS = 0.5
-"""Batches grow while one takes less than this [s], so that little is lost at an interruption."""
+"""Duration of a batch below which batches grow [s], so that little is lost at an interruption."""
 
 
 @dataclass(frozen=True)

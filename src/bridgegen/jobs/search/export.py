@@ -265,7 +265,7 @@ def _control() -> bytes:
 
 CARLA, RECORDED = "carla", "recorded"
 _BESIDE: Mapping[str, Mapping[str, Callable[[], bytes]]] = {CARLA: {CONTROL: _control}}
-"""What a flavour needs beside its files."""
+"""Further files that a flavour needs: functions that return the contents, by file name."""
 _LEVEL = re.compile(r"\w+")
 _TOWN = re.compile(r"Town\d\d(HD)?(_Opt)?")
 
@@ -275,5 +275,5 @@ FLAVOURS: dict[str, Flavour] = {
     RECORDED: _recorded,
     CARLA: _carla,
 }
-"""What can be written: a version of the standard with parameters; 1.2 without; the motion as the
+"""Formats of an export: a version of the standard with parameters; 1.2 without; the motion as the
 embedded simulator recorded it, in 1.2; or 1.0 for CARLA's ScenarioRunner."""

@@ -17,11 +17,11 @@ from bridgegen.scenario.ontology.check import check
 from bridgegen.simulation.rollout import STATUS_MESSAGES
 
 CHECKED, CHECKED_BY_VALIDATE = 3, 6
-"""Rows that are validated against the ontology (SHACL), some 80 ms each: the defaults, the lowest
-and the highest values; and some ends of single parameters."""
+"""Number of rows that are validated against the ontology (SHACL), some 80 ms each: the defaults,
+the lowest and the highest values; and some ends of single parameters."""
 
 MOST_CORNERS = 64
-"""Searched parameters whose two ends are simulated, at most."""
+"""Largest number of searched parameters whose two ends are simulated."""
 
 FAULTS_OF_THE_SCENARIO = range(2, 7)
 """Statuses of a row whose places or ways do not exist."""

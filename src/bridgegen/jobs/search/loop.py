@@ -22,7 +22,7 @@ from bridgegen.results.store import Checkpoint, Evaluated, Rows, Store
 from bridgegen.search.algorithms import Algorithm, Restorable, TakesNotes
 
 PATIENCE = 100
-"""Batches in a row without a new row, after which a search has converged."""
+"""Number of batches in a row without a new row, after which a search has converged."""
 
 
 class Reason(StrEnum):

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 MOST_PROBLEMS = 10
-"""Rows whose broken constraints one error lists."""
+"""Largest number of rows whose broken constraints one error lists."""
 
 
 @dataclass(frozen=True, kw_only=True)

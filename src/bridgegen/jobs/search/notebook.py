@@ -122,7 +122,7 @@ def _draw_worst(rollout: Rollout, name: str, axes: "Axes") -> None:
 
 MOST_FRAMES = 300
 MOST_ENTITIES = 30
-"""Of a playback, so that a notebook stays small."""
+"""Largest number of entities of a playback, so that a notebook stays small."""
 
 _PLAYER = """<!doctype html><meta charset="utf-8"><style>
 body{margin:0;font:13px system-ui,sans-serif;color:#17202c;background:#fff}

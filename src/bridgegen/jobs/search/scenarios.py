@@ -136,7 +136,7 @@ PAPER = "paper"
 """The name in ``--objective`` of the paper's objective and criticality rule."""
 
 BESIDE_HARM = "d_min"
-"""The second objective of a search of many whose only term is harm."""
+"""Second objective of a multi-objective search whose only term is harm."""
 
 
 def columns_of(method: type[Algorithm], objectives: str | None) -> Objectives:

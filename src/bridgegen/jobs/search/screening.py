@@ -12,10 +12,10 @@ from bridgegen.search.algorithms import Results
 from bridgegen.simulation.choice import SimulatorChoice
 
 BATCH = 8
-"""Rows of the run's simulator that are chosen at a time, unless the user says otherwise."""
+"""Default number of rows of the run's simulator that are chosen at a time."""
 
 EACH = 20
-"""Rows of the screen for each of the run's simulator, unless the user says otherwise."""
+"""Default number of rows of the screen for each row of the run's simulator."""
 
 
 def require_screen(given: SearchOptions, budget: int) -> None:

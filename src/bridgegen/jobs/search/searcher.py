@@ -86,7 +86,8 @@ def _algorithm(pipeline: Pipeline, settings: Settings) -> toolkit.Algorithm:
 
 
 LEAST = 20
-"""Scenarios in which a driver must have failed before the search ends; the budget if smaller."""
+"""Number of scenarios in which a driver must have failed before the search ends; the budget if
+smaller."""
 
 
 class FailingDriver:

@@ -29,10 +29,10 @@ RECORDED_AS: Mapping[str, str] = {
     "road_map": "map",
     "optimised": "objective",
 }
-"""The keys that are not the names of their fields."""
+"""Keys in a record of the settings that differ from the names of their fields."""
 
 MAX_TEXT = 4096
-"""Characters of one text."""
+"""Largest number of characters of one text."""
 
 Part = Value | None | list[Value] | Mapping[str, Value]
 

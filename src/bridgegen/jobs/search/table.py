@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     import pyarrow as pa
 
 CHUNK = 65_536
-"""Rows that are written at a time: a row group of the file."""
+"""Number of rows that are written at a time: a row group of the file."""
 
 RUN = ("run", "scenario", "algorithm", "seed", "ego", "simulator")
 """Columns of the run: the name of its folder, and its settings."""

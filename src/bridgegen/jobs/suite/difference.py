@@ -150,10 +150,11 @@ def _change(
 
 
 FOLDER = "worse"
-"""In a suite's folder, that of the searches, a run each."""
+"""Folder in a suite's folder that holds the searches, a run each."""
 
 ALGORITHM = "es"
-"""It finds the most failure modes with few evaluations; see docs/decisions/search.md."""
+"""Algorithm of the searches: it finds the most failure modes with few evaluations; see
+docs/decisions/search.md."""
 
 
 @dataclass(frozen=True)

@@ -16,13 +16,13 @@ from bridgegen.scenario.language.reader import load, pack_names
 from bridgegen.scenario.language.reader import names as catalogue_names
 
 MOST_FILES = 100_000
-"""Files that are looked at in all folders together."""
+"""Largest number of files that are looked at in all folders together."""
 
 RESULTS = "results.jsonl"
-"""The file of a suite's results, in their folder."""
+"""File of a suite's results, in the suite's folder."""
 
 VARIATIONS = "variations"
-"""The folder beside it of variations that were run again."""
+"""Folder beside `RESULTS` of variations that were run again."""
 
 _YAML = (".yaml", ".yml")
 _STORYBOARD = ".xosc"

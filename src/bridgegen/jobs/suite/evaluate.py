@@ -70,7 +70,7 @@ def _digest_of_file(path: Path, modified: int, size: int) -> bytes:
 
 
 AT_ONCE = 512
-"""Rows that are evaluated together; no result depends on it."""
+"""Number of rows that are evaluated together; no result depends on it."""
 
 IMPACT = ("impact_speed", "relative_impact_speed", "speed_reduction")
 

@@ -36,7 +36,7 @@ from bridgegen.simulation.rollout import STATUS_MESSAGES
 
 
 NO_KEY = Key("", "", "", "", "")
-"""Of a scenario that is no failure by its conflict, but violates pass criteria."""
+"""Key of a scenario that is no failure by its conflict, but violates pass criteria."""
 
 
 @dataclass(frozen=True)

@@ -37,7 +37,7 @@ from bridgegen.simulation.choice import EMBEDDED
 Outcome = Literal["added", "replaced", "known", "worse", "refused"]
 
 MINIMAL = "-minimal"
-"""The end of the name of a minimal form."""
+"""Ending of the name of a minimal form."""
 
 _STAGING = ".adding"
 _CAUSES = tuple(one.label for one in CAUSES)

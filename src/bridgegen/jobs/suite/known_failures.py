@@ -10,8 +10,8 @@ from bridgegen.jobs.suite.results import EntryResult, RowResult
 from bridgegen.results.failures import Failure, FailureFile, Status, failure_of
 
 Standing = Literal["passed", "not run", "not judged", "new", "known", "accepted", "regression"]
-"""Of a variation: known and accepted failures do not fail a suite; new ones do, and regressions:
-failures that were fixed, and are there again."""
+"""Status of a variation: known and accepted failures do not fail a suite; new ones do, and
+regressions: failures that were fixed and are there again."""
 
 EXCUSED: tuple[Standing, ...] = ("known", "accepted")
 

@@ -18,13 +18,13 @@ from bridgegen.jobs.suite.suite import SuiteRun
 from bridgegen.scenario.language.scenario import LogicalScenario
 
 MOST_CELLS = 20_000
-"""Cells of a map."""
+"""Largest number of cells of a map."""
 
 BESIDE = ("un-r157", "fsm", "computed:rss", "reference")
 """The drivers that a map compares the egos with."""
 
 COLUMNS = 3
-"""Pictures of each driver in the suite's page."""
+"""Number of pictures of each driver in the suite's page."""
 
 FOLDER = "maps"
 

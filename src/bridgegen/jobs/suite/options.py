@@ -14,7 +14,7 @@ from bridgegen.jobs.frame import DRIVERS, SCENARIOS, Job, SimulatingOptions
 from bridgegen.simulation.choice import EMBEDDED, SimulatorChoice
 
 BUDGET = 300
-"""Evaluations of a search for where one driver is worse than another, each with both."""
+"""Number of evaluations of a search for where one driver is worse than another, each with both."""
 
 SAMPLES, MAX_SAMPLES = 100, 10**7
 
@@ -80,7 +80,7 @@ class ScenariosOptions(SimulatingOptions):
             group=SEARCH,
         ),
     )
-    seed: int = field(default=0, metadata=option(WHOLE, "Seed of these variations.", group=SEARCH))
+    seed: int = field(default=0, metadata=option(WHOLE, "Seed of the variations.", group=SEARCH))
     workers: int | None = field(
         default=None,
         metadata=option(

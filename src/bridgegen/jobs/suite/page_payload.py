@@ -36,7 +36,7 @@ MOTIONS = 1_200_000
 """Maximum number of characters of all playbacks."""
 
 MOST_MODES = 10
-"""Failure modes that the page names of each search."""
+"""Largest number of failure modes of each search that the page names."""
 
 MOST_ROWS = 1000
 """Maximum number of variations that the page holds of an entry with an ego."""

@@ -17,16 +17,16 @@ Outcome = Literal["avoided", "mitigated", "not avoided"]
 OUTCOMES: tuple[Outcome, ...] = ("avoided", "mitigated", "not avoided")
 
 STANDS = 0.1 / 3.6
-"""[m/s] Up to which the ego counts as standing. Euro NCAP measures speeds to 0.1 km/h (Crash
+"""Speed up to which the ego counts as standing [m/s]. Euro NCAP measures speeds to 0.1 km/h (Crash
 Avoidance protocol, Frontal Collisions, 1.1, section 1.5.2)."""
 
 REDUCED = 1.0 / 3.6
-"""[m/s] More than which the ego must be slower at its impact than at the start. It is the tolerance
-of the test speed in that protocol (section 4.3.2)."""
+"""Speed reduction that the ego's speed at its impact must exceed [m/s]. It is the tolerance of the
+test speed in that protocol (section 4.3.2)."""
 
 PASSED, FAILED, EXCUSED, NOT_RUN, NOT_APPLICABLE = "pfunx"
-"""What a variation means for a clause: it passes, or fails; passes although the ego collides, for
-the models do, too; has no result; or says nothing, as its traffic could not happen, say."""
+"""Results of a variation for a clause: it passes; fails; passes although the ego collides, since
+the models do, too; has no result; or says nothing, e.g. as its traffic could not happen."""
 
 
 class Strict(BaseModel):

@@ -20,13 +20,13 @@ from bridgegen.scenario.language.scenario import LogicalScenario, SearchedScenar
 from bridgegen.scenario.language.space import SearchSpace
 
 MOST_ROWS = 100_000
-"""Variations of one entry."""
+"""Largest number of variations of one entry."""
 
 _DRAWS = 31  # a stream of random numbers of its own
 
 
 NO_MATRIX = "none"
-"""In place of an edition: evenly spread rows, of scenarios with a matrix too."""
+"""Name in place of an edition for evenly spread rows, also of scenarios with a matrix."""
 
 
 @dataclass(frozen=True)

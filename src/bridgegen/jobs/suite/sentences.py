@@ -28,22 +28,23 @@ Colour = Literal["green", "yellow", "orange", "brown", "red"]
 SUB_SCORES: dict[Colour, float] = {
     "green": 1.0, "yellow": 0.75, "orange": 0.5, "brown": 0.25, "red": 0.0,
 }  # fmt: skip
-"""Section 5.3.1."""
+"""Sub-scores by colour. Source: section 5.3.1."""
 
 KMH = 3.6
 
 _ROUNDING = 1e-6
-"""[km/h] By which a speed may exceed a limit and be within it."""
+"""Tolerance by which a speed may exceed a limit and be within it [km/h]."""
 
 _BANDS: tuple[tuple[float, tuple[tuple[float, Colour], ...]], ...] = (
     (50.0, ((10.0, "yellow"), (20.0, "orange"), (30.0, "brown"))),
     (40.0, ((10.0, "orange"), (20.0, "brown"))),
     (30.0, ((10.0, "brown"),)),
 )
-"""From which test speed on [km/h]: up to which relative impact speed [km/h] which colour."""
+"""Colours by test speed [km/h] from which, and relative impact speed [km/h] up to which they
+hold."""
 
 _REDUCTIONS: tuple[tuple[float, Colour], ...] = ((10.0, "red"), (20.0, "orange"))
-"""Up to which reduction of the ego's speed [km/h] which colour; above, green."""
+"""Colours by reduction of the ego's speed [km/h] up to which they hold; above, green."""
 
 
 def colour_of(row: RowResult, score: str) -> Colour | None:
@@ -129,7 +130,7 @@ def _sub_score(colour: Colour | None, grid: GridResult) -> float:
 
 
 MOST_DIFFERENCES = 4
-"""Kinds of differences that a sentence names."""
+"""Largest number of kinds of differences that a sentence names."""
 
 _WORD: dict[Verdict, str] = {
     "failed": "fails", "passed": "passes", "not judged": "is not judged", "not run": "did not run",

@@ -14,10 +14,10 @@ from bridgegen.jobs.suite.sentences import clause_in_words, outcomes, points, po
 from bridgegen.jobs.suite.suite import SuiteRun
 
 MOST_MODES = 3
-"""Failure modes of a search that are named."""
+"""Largest number of failure modes of a search that are named."""
 
 MOST_ROWS = 40
-"""Entries of the table; those that pass are left out first."""
+"""Largest number of entries of the table; those that pass are left out first."""
 
 
 def json_of_suite(suite: SuiteRun) -> dict[str, Any]:

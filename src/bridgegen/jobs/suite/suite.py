@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 
 LOCK = "suite.lock"
 MOST_BYTES = 2**30
-"""Of a file of results."""
+"""Largest size of a file of results [bytes]."""
 
 
 @dataclass(frozen=True)

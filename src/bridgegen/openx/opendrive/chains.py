@@ -22,7 +22,7 @@ ROAD_TYPES = ("town", "rural", "motorway")
 _STRIPS: dict[str, LaneType] = {
     "shoulder": "shoulder", "stop": "shoulder", "parking": "shoulder", "sidewalk": "sidewalk"
 }  # fmt: skip
-"""What a lane beside the driving lanes is to a scenario, by OpenDRIVE's type."""
+"""Types that lanes beside the driving lanes have in a scenario, by OpenDRIVE's type."""
 
 _STEP = 2.0  # m, between places at which curvatures and widths are looked at
 

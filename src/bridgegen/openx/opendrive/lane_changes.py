@@ -31,10 +31,10 @@ from bridgegen.openx.opendrive.routes import (
 )
 
 USUAL = 60.0
-"""How long a lane change takes [m], where there is room; ours: 4 to 5 s at 50 km/h."""
+"""Length of a lane change where there is room [m]; ours: 4 to 5 s at 50 km/h."""
 
 SHORTEST = 15.0
-"""With less room [m] one does not change lane; ours."""
+"""Shortest length of a lane change [m]; with less room there is none; ours."""
 
 _COST = 200.0  # m of detour that a lane change is worth
 _SLOPE = 0.1  # m, over which the slope of a lane's centre is taken

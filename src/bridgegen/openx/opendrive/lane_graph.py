@@ -19,7 +19,7 @@ from bridgegen.openx.opendrive.model import OpenDrive
 from bridgegen.openx.opendrive.routes import Route, Step, Stretch, next_stretches, route_along
 
 ONWARD = 1000.0
-"""How far a way without a destination is planned [m]; where it ends, the next one begins."""
+"""Length of a planned path without a destination [m]; where it ends, the next one begins."""
 GROUND_STEP = 1.0  # m, between two points of the ground
 
 

@@ -19,7 +19,7 @@ Coefficients = tuple[float, float, float, float]
 ZERO: Coefficients = (0.0, 0.0, 0.0, 0.0)
 
 SLACK = 1e-6
-"""By how much a place may lie beyond its road's end [m]: the rounding of a file."""
+"""Largest distance of a place beyond its road's end [m]: the rounding of a file."""
 
 
 class LanePose(NamedTuple):

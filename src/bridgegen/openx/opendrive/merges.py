@@ -12,7 +12,7 @@ from bridgegen.openx.opendrive.site import map_stem
 from bridgegen.scenario.ontology.site import Leg, Site
 
 ASIDE = 45.0
-"""Who joins a carriageway comes from a direction that differs from its own by less [deg]; ours."""
+"""Largest angle between the directions of a carriageway and of who joins it [deg]; ours."""
 
 MAIN, RAMP, AFTER = "main", "ramp", "after"
 """The legs of a merge."""

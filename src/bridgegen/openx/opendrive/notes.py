@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 
 SHOWN = 20
-"""How many kinds of thing are spelled out."""
+"""Largest number of kinds of warnings that are listed."""
 
 
 class Notes:

@@ -119,7 +119,7 @@ Shape = tuple[str, Float]
 
 _WAIT = ("205", "206")  # signs: give way, stop (VzKat)
 _NEAR = 15.0
-"""A stop line of the map's own this near a road's end [m] is the one there."""
+"""Distance from a road's end within which a stop line of the map's own is the one there [m]."""
 
 _BESIDE = {
     "shoulder": "shoulder",
@@ -130,7 +130,8 @@ _BESIDE = {
     "curb": "sidewalk",
     "median": "median",
 }
-"""How lanes are drawn that cars do not travel on; others are left out."""
+"""Drawing styles of lanes that cars do not travel on, by OpenDRIVE's type; other lanes are left
+out."""
 
 
 def outline(

@@ -35,7 +35,7 @@ from bridgegen.openx.opendrive.model import Lane, LaneSection, Road
 from bridgegen.openx.opendrive.plan_view import Arc, Geometry, Line
 
 SHORTEST = 1e-9
-"""Pieces shorter than this [m] are left out."""
+"""Length below which pieces are left out [m]."""
 MOST_SAMPLES = 2_000_000
 
 

@@ -15,7 +15,7 @@ LENGTH_LIMIT = 1e6
 CURVATURE_LIMIT = 1e4
 """Largest curvature [1/m]."""
 SHARP_CURVATURE = 10.0
-"""Above this curvature [1/m] a reader warns: no vehicle turns on 0.1 m."""
+"""Curvature above which a reader warns [1/m]: no vehicle turns on 0.1 m."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -33,7 +33,7 @@ NUMBER_LIMIT = 1e9
 """Largest absolute value of any number in a file."""
 
 SHOWN = 20
-"""How many problems of a file are spelled out."""
+"""Largest number of problems of a file that are listed."""
 
 _Tree = dict[str, "Field | _Tree"]
 

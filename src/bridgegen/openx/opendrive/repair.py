@@ -22,10 +22,10 @@ from bridgegen.openx.opendrive.repair_links import Lines, repair_links
 __all__ = ["Lines", "Notes", "repair", "repair_section"]
 
 MISSING_LANES = 10
-"""How many numbers may be missing in the count of a section's lanes."""
+"""Largest number of missing lane numbers in a section that are filled in."""
 
 SLACK = 1e-3
-"""By how much a length may be off [m]."""
+"""Tolerance of lengths [m]."""
 
 
 def repair(model: OpenDrive, lines: Lines, notes: Notes) -> OpenDrive:

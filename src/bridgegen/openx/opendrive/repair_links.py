@@ -16,7 +16,7 @@ from bridgegen.openx.opendrive.model import (
 from bridgegen.openx.opendrive.notes import Notes
 
 Lines = dict[int, int]
-"""The lines of roads, junctions and connections, by ``id()`` of the record."""
+"""Line numbers of roads, junctions and connections in the file, by ``id()`` of the record."""
 
 
 def repair_links(model: OpenDrive, lines: Lines, notes: Notes) -> OpenDrive:

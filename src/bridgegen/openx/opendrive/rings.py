@@ -11,7 +11,7 @@ from bridgegen.openx.opendrive.model import OpenDrive, Road
 from bridgegen.openx.opendrive.routes import Stretch, next_stretches
 
 LONGEST = 400.0
-"""A ring is no longer [m]; ours: a diameter of 127 m."""
+"""Largest length of a ring [m]; ours: a diameter of 127 m."""
 
 _MOST_ROADS = 40  # of a ring
 _SLACK = 0.35  # rad, by which the turning around a ring may differ from a whole turn

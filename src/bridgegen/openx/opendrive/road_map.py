@@ -26,7 +26,7 @@ _PLACES = (
     "*/Content/Carla/Maps/OpenDrive/{name}.xodr",
     "*/Content/Carla/Maps/{name}/OpenDrive/{name}.xodr",
 )
-"""Where a map lies below the root: in a folder of maps; packaged, a large map's in its own."""
+"""Places of a map below the root: in a folder of maps; packaged, a large map's in its own."""
 
 
 def map_path(path: Path) -> Path:

@@ -148,7 +148,7 @@ def unlikeness(headings: Mapping[str, float], site: Site) -> float:
 
 
 _SHAPE = 100.0
-"""How much more an angle between legs counts than a direction: 90° of these, 9° of those."""
+"""Weight of the angles between legs, relative to their direction: 9° of them count as 90° of it."""
 
 
 def _default_junction(model: OpenDrive, stem: str, count: int) -> str:
@@ -195,10 +195,10 @@ def _arm(model: OpenDrive, road: Road, end: str) -> tuple[ArmRoad, ...]:
 
 
 SHORTEST = 20.0
-"""Shorter stretches are left out [m]: the shortest road of a scenario file."""
+"""Length below which stretches are left out [m]: the shortest road of a scenario file."""
 
 MAIN = "main"
-"""What the only leg of a scenario of a road is called."""
+"""Name of the only leg of a scenario of a road."""
 
 
 def stretches(model: OpenDrive, map_name: str | None = None) -> Iterator[Site]:

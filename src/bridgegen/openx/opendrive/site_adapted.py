@@ -26,7 +26,7 @@ from bridgegen.scenario.ontology.site import Facility, Leg, Site
 from bridgegen.scenario.ontology.templates import phases_of
 
 END_MARGIN = 1.0
-"""How far before the end of its leg a shortened route ends [m]."""
+"""Distance between the end of a shortened route and the end of its leg [m]."""
 
 
 _BOTH_WAYS: tuple[tuple[str, Way], ...] = (("main", "in"), ("main", "out"))
@@ -224,7 +224,7 @@ def _shortened(one: Participant, site: Site, notes: list[str]) -> Participant:
 
 
 NEAR = 40.0
-"""A light or a sign within this distance before a junction [m] is for that junction."""
+"""Distance before a junction within which a light or a sign is for that junction [m]."""
 
 
 def furnished(model: OpenDrive, site: Site, roads: RoadsSpec) -> Site:

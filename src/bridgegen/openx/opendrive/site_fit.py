@@ -17,16 +17,16 @@ from bridgegen.scenario.ontology.site import Site
 
 
 TURN_TOLERANCE = 60.0
-"""How far a turn may differ from the scenario's [deg]: half a T-junction's, and more."""
+"""Largest difference of a turn from the scenario's [deg]: half a T-junction's, and more."""
 
 NARROWEST_LANE = 2.0
-"""What participants drive on is nowhere narrower [m]; ours, for lanes begin and end at 0 m."""
+"""Least width of what participants drive on [m]; ours, for lanes begin and end at 0 m."""
 
 OVERHANG = 0.5
-"""By how much a participant may be wider than the strip that it starts on [m]; ours."""
+"""Width by which a participant may exceed the strip that it starts on [m]; ours."""
 
 SHARE_OF_TURN = 0.5
-"""How much of the turning of a scenario's road a map's road must have at least; ours."""
+"""Least turning of a map's road, as a share of that of the scenario's road; ours."""
 
 
 def missing(scenario: LogicalScenario, model: OpenDrive, site: Site) -> list[str]:

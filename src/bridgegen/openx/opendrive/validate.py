@@ -108,11 +108,11 @@ def _connection(
 
 
 GAP = 0.05
-"""How far two ends that should meet may be apart [m]."""
+"""Largest gap between two ends that should meet [m]."""
 KINK = 0.02
-"""By how much the heading may jump where they meet [rad]."""
+"""Largest jump of the heading between two ends that should meet [rad]."""
 SLACK = 1e-3
-"""By how much an s may be off [m]."""
+"""Tolerance of s coordinates [m]."""
 
 
 def problems(model: OpenDrive) -> list[str]:

@@ -121,7 +121,8 @@ def _axle(max_steering: float, body_width: float, x: float) -> osc.Axle:
 
 
 Resolve = Callable[[str | osc.ParameterRef], str | None]
-"""Returns the text of an attribute, at its parameter's value; None where that is unknown."""
+"""Function that returns the text of an attribute, at its parameter's value; None where that is
+unknown."""
 
 _EMERGENCY = PARTICIPANTS["emergency"]
 _EMERGENCY_ROLES = (osc.Role.AMBULANCE, osc.Role.FIRE, osc.Role.POLICE)

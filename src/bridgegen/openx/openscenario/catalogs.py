@@ -24,7 +24,7 @@ from bridgegen.openx.openscenario.storyboard import Maneuver
 from bridgegen.openx.xml import MAX_BYTES, parse_xml, read_bytes
 
 MAX_FILES = 1000
-"""Files in a catalogue's folder, of any kind."""
+"""Largest number of files in a catalogue's folder, of any kind."""
 
 _LOCATIONS: dict[type[Element], str] = {
     Vehicle: "vehicles",

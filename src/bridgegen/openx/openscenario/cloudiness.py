@@ -10,7 +10,7 @@ OF_STATE: Mapping[osc.CloudState, float] = {
     osc.CloudState.OVERCAST: 100.0,
     osc.CloudState.RAINY: 100.0,
 }
-"""By the state of 1.0 and 1.1; of one that is not here nothing is known."""
+"""Cloudiness [%] by the cloud state of 1.0 and 1.1; unknown for states that are not listed."""
 
 
 def of_cover(cover: osc.FractionalCloudCover) -> float:

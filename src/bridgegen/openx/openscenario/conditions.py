@@ -345,7 +345,7 @@ class EntityCondition(Element):
 
 
 CRITERIA = "criteria_"
-"""What the names of ScenarioRunner's criteria begin with."""
+"""Prefix of the names of ScenarioRunner's criteria."""
 
 
 @dataclass(frozen=True)

@@ -27,7 +27,7 @@ TIME_STEP = "time_step"
 """The header's property for the step [s] of the evaluation: the standard has no place for it."""
 
 DEFAULT_TIME_STEP = 0.05
-"""[s], the default without the header's value."""
+"""Time step where the header states none [s]."""
 
 CAUSE = "cause"
 """The header's property for what a critical scenario's harm is put down to."""
@@ -43,7 +43,8 @@ RESPONSIBLE = "responsible"
 """The header's property for the responsible party: ego, other, shared or none."""
 
 SEVERITY = "severity"
-"""The header's property for its severity, the probability of a MAIS3+ injury."""
+"""The header's property for the decisive conflict's severity, the probability of a MAIS3+
+injury."""
 
 KIND = "participant_kind"
 """Property of a body: its kind, where its category is only the nearest that the standard has."""

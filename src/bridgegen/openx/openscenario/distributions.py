@@ -27,7 +27,7 @@ from bridgegen.scenario.language.distributions import Histogram as Bins
 VERSIONS = ("1.1", "1.2", "1.3")
 
 MOST_VALUES = 100_000
-"""Of a DistributionRange."""
+"""Largest number of values of a DistributionRange."""
 
 _Double = Annotated[float, Kind.DOUBLE]  # a distribution file declares no parameters to refer to
 _UnsignedInt = Annotated[int, Kind.UNSIGNED_INT]

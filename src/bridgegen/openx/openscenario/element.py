@@ -70,7 +70,7 @@ class Range:
 
 
 FINITE = sys.float_info.max
-"""The end of a range that leaves out what is infinite: of sizes, places and target speeds."""
+"""End of a range that excludes infinite values: of sizes, places and target speeds."""
 
 
 FiniteDouble = Annotated[float | ParameterRef | Expr, Kind.DOUBLE, Range(-FINITE, FINITE)]

@@ -160,7 +160,7 @@ def _uncoupled(one: ScenarioObject, taken: set[str]) -> Iterator[ScenarioObject]
 
 
 MAX_ELEMENTS = 200_000
-"""Elements from catalogues, counted wherever they are put."""
+"""Largest number of elements from catalogues, counted wherever they are put."""
 
 _DECLARED = "parameter_declarations"
 

@@ -20,7 +20,7 @@ from bridgegen.scenario.language.distributions import Discrete, Uniform
 from bridgegen.scenario.language.parameters import Parameter
 
 BINS = 100
-"""Of a histogram, of equal width."""
+"""Number of bins of a histogram, of equal width."""
 
 
 def distribution_xml(exposure: Exposure, *, runs: int = 1000, date: str) -> bytes:

@@ -29,7 +29,8 @@ from bridgegen.scenario.language.kinds import FLOAT, INTEGER, Category
 from bridgegen.scenario.language.parameters import Axis, Bound, Derived, Parameter, nearest
 
 MOST_VARIANTS = 200
-"""Combinations of texts, each of which is read, checked and compiled by itself."""
+"""Largest number of combinations of texts, each of which is read, checked and compiled by
+itself."""
 
 UNIT = "?"
 """The unit of a parameter whose file states none."""

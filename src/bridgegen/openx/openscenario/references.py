@@ -13,7 +13,7 @@ from bridgegen.openx.openscenario.element import ROAD, Element, children_of, val
 
 Problem = tuple[int, str]
 ValueOf = Callable[[Any], Any]
-"""What a value is at the parameters' declared values."""
+"""Function that returns a value at the declared values of the parameters."""
 
 PARTS = ("Story", "Act", "ManeuverGroup", "Maneuver", "Event", "Action")
 """The storyboard's parts, by their tags."""

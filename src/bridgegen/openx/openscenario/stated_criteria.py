@@ -18,7 +18,8 @@ _FORMULAS: dict[str, tuple[str, Callable[[float], str]]] = {
         lambda value: f"last(ego.travelled) >= {value:g} m",
     ),
 }
-"""What ScenarioRunner's criteria require, and our formula for a condition's value."""
+"""Descriptions of ScenarioRunner's criteria, and functions from a condition's value to our
+formula."""
 
 
 def stated_criteria(scenario: osc.OpenScenario) -> tuple[tuple[Criterion, ...], tuple[str, ...]]:

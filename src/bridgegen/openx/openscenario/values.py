@@ -36,7 +36,8 @@ _WORDS = RESERVED | {"not", "and", "or", *_TRUTHS}  # of an expression besides p
 
 
 MAX_LENGTH, MAX_DEPTH = 20_000, 100
-"""Characters of an expression, and how deep it nests, with what its parameters stand for."""
+"""Largest number of characters and largest nesting depth of an expression, with what its parameters
+stand for."""
 
 
 class Kind(Enum):

@@ -24,21 +24,22 @@ from bridgegen.recordings.readers.table import RecordedTraffic
 EGOS = (CAR, TRUCK, BUS, MOTORCYCLE)
 """Kinds that may be the ego."""
 MOVES = 1.0
-"""What has never been farther than this [m] from where it began does not move: it is parked."""
+"""Distance from where it began beyond which a participant moves [m]; else it is parked."""
 HORIZON = 4.0
-"""[s]; the analysis predicts as far."""
+"""Prediction horizon of candidate pairs [s], as of the conflict analysis."""
 FARTHEST = 150.0
-"""Between two participants [m] that may meet within the horizon: 2 · 67 km/h, or 135 km/h."""
+"""Largest distance between two participants that may meet within the horizon [m]: 2 · 67 km/h, or
+135 km/h."""
 MARGIN = 0.5
-"""By which bodies may miss each other by constant velocity [m] and yet be looked at."""
+"""Distance by which two bodies may miss each other at constant velocity and be analysed [m]."""
 BLOCK = 2000
-"""Instants whose pairs are looked for at once: a pair is found anew at each."""
+"""Number of instants whose pairs are sought at once: a pair is found anew at each."""
 SPAN = 60.0
-"""Of an ego's way that is analysed at once [s]."""
+"""Duration of an ego's path that is analysed at once [s]."""
 CONTEXT = 15.0
-"""Before and after it, that tells how a conflict arose and where paths lead [s]."""
+"""Time before and after `SPAN` that tells how a conflict arose and where paths lead [s]."""
 AROUND = 2.0
-"""Before and after a conflict [s], in which its motion has to be plausible."""
+"""Time before and after a conflict in which its motion has to be plausible [s]."""
 
 
 @dataclass(frozen=True)

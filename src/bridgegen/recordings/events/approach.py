@@ -8,13 +8,13 @@ from bridgegen.recordings.events.scene import Scene
 from bridgegen.recordings.events.steps import least_of, runs_of
 
 LEAST_CLOSING = 2.0
-"""[m/s]."""
+"""Least closing speed of an approach [m/s]."""
 HORIZON = 10.0
-"""Time to collision at present speeds [s]."""
+"""Largest time to collision at present speeds of an approach [s]."""
 LEAST_TIME = 0.5
-"""[s]."""
+"""Least duration of an approach [s]."""
 STEADY = 1.0
-"""Of the leader's acceleration and deceleration at the beginning [m/s²]."""
+"""Largest acceleration and deceleration of the leader at the beginning [m/s²]."""
 
 
 def find(scene: Scene, changes: LaneChanges) -> Events:

@@ -19,17 +19,19 @@ from bridgegen.recordings.lanes.model import RecordedLanes
 from bridgegen.recordings.readers.states import centre_ahead
 
 SHORTEST, LONGEST = 1.0, 13.3
-"""Of a lane change [s]."""
+"""Least and greatest duration of a lane change [s]."""
 BACK = 1.0
-"""Who crosses the line back within this time touches it, and changes no lane [s]."""
+"""Time within which who crosses the line back only touches it, and does not change lane [s]."""
 CUT = 0.5
-"""Of a change that may lie outside of what is recorded [s]."""
+"""Duration of a lane change that may lie outside of what is recorded [s]."""
 LEAST_MOVE = 0.6
-"""Of the distance between the lanes' middles."""
+"""Least lateral movement of a lane change, as a share of the distance between the lanes'
+middles."""
 ONWARD, ELSEWHERE = 2, 0
-"""Steps from one lane to another that are none to the side."""
+"""Codes of steps from one lane to another that are none to the side."""
 WORST_FIT = 0.15
-"""RMS of what remains of the offset, as a share of that distance."""
+"""Largest root mean square of the residual offset, as a share of the distance between the lanes'
+middles."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -15,7 +15,7 @@ from bridgegen.recordings.events.event import (
 from bridgegen.recordings.events.scene import Scene
 
 FARTHEST = 150.0
-"""Ahead of the ego when it crosses the line [m]."""
+"""Largest distance ahead of the ego at which the other crosses the line [m]."""
 
 
 def find(scene: Scene, changes: LaneChanges) -> Events:

@@ -43,7 +43,8 @@ DETECTORS: dict[str, Callable[[Scene, LaneChanges], Events]] = {
     "right-turn-with-bicycle": right_turn.find,
     "bicycle-swings-out": swing_out.find,
 }
-"""By kind; each returns what `bridgegen.scenario.language.event_kinds.EVENT_KINDS` declares."""
+"""Detectors by kind of event; each returns what
+`bridgegen.scenario.language.event_kinds.EVENT_KINDS` declares."""
 
 
 @dataclass(frozen=True, eq=False)

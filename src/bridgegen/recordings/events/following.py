@@ -8,13 +8,13 @@ from bridgegen.recordings.events.scene import Scene
 from bridgegen.recordings.events.steps import least_of, mean_of, runs_of
 
 LONGEST_HEADWAY = 4.0
-"""[s]."""
+"""Largest headway that counts as following [s]."""
 LEAST_SPEED = 1.0
-"""[m/s]; a slower vehicle stands and does not follow."""
+"""Speed below which a vehicle stands and does not follow [m/s]."""
 LARGEST_DIFFERENCE = 2.0
-"""Of the speeds [m/s]."""
+"""Largest speed difference that counts as following [m/s]."""
 LEAST_TIME = 3.0
-"""[s]."""
+"""Least duration of following [s]."""
 
 
 def find(scene: Scene, changes: LaneChanges) -> Events:

@@ -14,15 +14,15 @@ from bridgegen.recordings.lanes.model import NONE, RecordedLanes
 from bridgegen.recordings.readers.table import wrap
 
 LOOK_BACK = 5.0
-"""Before they join, where courses are compared [m]."""
+"""Distance before two paths join at which courses are compared [m]."""
 LEAST_SHARED = 10.0
-"""Length of the way that both go then [m]."""
+"""Least length of the path that both share after they join [m]."""
 MOST_SHARED = 15.0
-"""Of it, from which its bend is taken [m]."""
+"""Greatest length of the shared path from which its bend is taken [m]."""
 ANGLES = (20.0, 150.0)
-"""Between the courses before, of paths that join [deg]."""
+"""Angles between the courses before paths join [deg]."""
 CROSSES = 30.0
-"""Paths that cross at this angle or more do not join [deg]."""
+"""Angle from which on paths cross rather than join [deg]."""
 
 
 @dataclass(frozen=True)
@@ -130,7 +130,7 @@ def _degrees(angle: float) -> float:
 
 
 FARTHEST_END = 400.0
-"""Who leaves a lane that ends farther ahead than this changes lane, and does not merge [m]."""
+"""Distance to a lane's end beyond which who leaves it changes lane, and does not merge [m]."""
 
 
 def lane_joins(scene: Scene, changes: LaneChanges) -> Iterator[Join]:

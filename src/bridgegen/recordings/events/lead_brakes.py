@@ -11,13 +11,13 @@ from bridgegen.recordings.lanes.model import NONE
 from bridgegen.recordings.readers.states import usual
 
 ONSET = 1.0
-"""Deceleration over 2 s from which it may brake [m/s²]."""
+"""Deceleration over 2 s from which on the leader may brake [m/s²]."""
 LEAST_DECELERATION = 2.0
-"""Of the ramp [m/s²]."""
+"""Least mean deceleration of the leader's braking [m/s²]."""
 LEAST_DROP = 2.0
-"""Of its speed [m/s]."""
+"""Least decrease of the leader's speed [m/s]."""
 CUT = 0.5
-"""Of the ramp that may lie outside of what is recorded [s]."""
+"""Duration of the braking that may lie outside of what is recorded [s]."""
 
 
 def find(scene: Scene, changes: LaneChanges) -> Events:

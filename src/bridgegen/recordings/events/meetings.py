@@ -16,21 +16,22 @@ from bridgegen.recordings.readers.table import wrap
 from bridgegen.scenario.language.event_kinds import EVENT_KINDS
 
 AHEAD = 6.0
-"""A meeting begins so long before the first of both passes, or once both are recorded [s]."""
+"""Time before the first of both passes at which a meeting begins, unless both are recorded later
+[s]."""
 LEAST_SEEN = 1.0
-"""Both are recorded for so long before the first passes [s]."""
+"""Least time for which both are recorded before the first passes [s]."""
 AFTER = 1.0
-"""The bodies are looked at until so long after the second passes [s]."""
+"""Time after the second passes until which the bodies are compared [s]."""
 AVERAGED = 1.0
-"""Before and after the crossing point, over which a speed is averaged [s]."""
+"""Time before and after the crossing point over which a speed is averaged [s]."""
 LEAST_PACE = 0.5
-"""By which the other changes its pace, at least [m/s]."""
+"""Least change of the other participant's speed that counts as a change of pace [m/s]."""
 STRAIGHT = 30.0
-"""Who turns less than this goes straight on [deg]."""
+"""Turn angle below which a participant goes straight on [deg]."""
 CROSSING = (30.0, 150.0)
 """Angles at which paths cross [deg]."""
 OPPOSITE = 145.0
-"""From this angle between their courses before, two come from opposite directions [deg]."""
+"""Angle between their courses before, from which on two come from opposite directions [deg]."""
 TOUCH = "bodies touch"
 
 

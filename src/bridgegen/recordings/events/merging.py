@@ -18,9 +18,9 @@ from bridgegen.recordings.events.pace import pace_changes
 from bridgegen.recordings.events.scene import Scene
 
 AT_ONCE = 2.0
-"""Joins of one vehicle within this time are at one place [s]."""
+"""Time within which joins of one vehicle are at one place [s]."""
 LEAST_SPEEDING = 1.0
-"""Of a speed before joining that counts as speeding up [m/s]."""
+"""Least increase of a speed before joining that counts as speeding up [m/s]."""
 
 
 @dataclass(frozen=True)

@@ -10,11 +10,12 @@ from bridgegen.recordings.events.scene import Scene
 from bridgegen.recordings.lanes.placing import WALKS
 
 FARTHEST = 50.0
-"""Ahead [m]."""
+"""Largest distance of an obstacle ahead [m]."""
 CLEAR = 0.5
-"""Who would have passed it by less than this has it in the way [m]."""
+"""Lateral clearance below which an obstacle is in the way [m]."""
 BEFORE = 4.0
-"""The course that counts is that so far before [m], which a move that begins does not bend."""
+"""Distance before an instant at which the course is taken [m], which a move that begins does not
+bend."""
 
 
 @dataclass(frozen=True)

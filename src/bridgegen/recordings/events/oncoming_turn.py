@@ -13,7 +13,8 @@ from bridgegen.recordings.events.meetings import (
 from bridgegen.recordings.events.scene import Scene
 
 TURNS = 20.0
-"""Who turns by more than this, and more than the other, turns [deg]: the rest may be cut off."""
+"""Least turn angle of the one that turns off, which turns more than the other [deg]: the rest may
+be cut off."""
 
 
 def find(scene: Scene, changes: LaneChanges) -> Events:

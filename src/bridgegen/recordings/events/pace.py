@@ -11,15 +11,16 @@ from bridgegen.recordings.events.steps import fit_steps
 from bridgegen.recordings.readers.states import centre_ahead
 
 LEAST_RATE = 0.3
-"""Of a change of pace [m/s²]."""
+"""Least acceleration or deceleration of a change of pace [m/s²]."""
 WORST_FIT = 0.15
-"""RMS of what remains of the speed, as a share of the change."""
+"""Largest root mean square of the residual speed, as a share of the change."""
 LEAST_RMS = 0.6
-"""That is allowed whatever the change: noise of recorded speeds [m/s]."""
+"""Root mean square of the residual speed that is accepted for any change [m/s]: noise of
+recordings."""
 KNOWN = 0.5
-"""For how long the speed before is recorded, at least [s]."""
+"""Least time for which the speed before a change is recorded [s]."""
 AFTER = 4.0
-"""How far after an instant a change that has begun before it is looked at [s]."""
+"""Time after an instant up to which a change that began before it is fitted [s]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,13 +104,13 @@ def _run(scene: Scene, who: int, until: float) -> tuple[int, int, int, int] | No
 
 
 STANDS = 0.3
-"""It has moved by less than this [m] within `STANDS_TIME`."""
+"""Distance moved within `STANDS_TIME` below which a participant stands [m]."""
 STANDS_TIME = 1.0
-"""[s]."""
+"""Time for which a participant must have stood before it sets off [s]."""
 STILL = 0.3
-"""Speed before the ramp at most [m/s]."""
+"""Largest speed before the ramp [m/s]."""
 RAMP = 0.6
-"""First guess [s]."""
+"""Duration of the speed ramp with which its fit begins [s]."""
 
 
 def stands(scene: Scene, who: int, begin: int, end: int) -> bool:

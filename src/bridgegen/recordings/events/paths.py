@@ -17,22 +17,22 @@ from bridgegen.recordings.excerpt import Clock
 from bridgegen.recordings.readers.table import RecordedTraffic, wrap
 
 VERTEX = 1.0
-"""Between two points of a path at least [m]."""
+"""Least distance between two points of a path [m]."""
 WINDOW = 6.0
-"""Between two that pass the point at which their paths cross, at most [s]."""
+"""Largest time between two that pass the point at which their paths cross [s]."""
 LEAST_ANGLE = np.radians(15.0)
-"""Between pieces of paths that cross; detectors ask for more."""
+"""Least angle between pieces of paths that cross [rad]; detectors ask for more."""
 CELL = 4.0
-"""Of the grid in which pieces are looked up, at least [m]."""
+"""Least cell size of the grid in which pieces of paths are looked up [m]."""
 AROUND = 2.0
-"""Before and after a point of a path, between which its course is taken [m]."""
+"""Distance before and after a point of a path between which its course is taken [m]."""
 BEFORE, AFTER = 30.0, 15.0
-"""Of a crossing: from there to there a path turns [m]."""
+"""Path length before and after a crossing over which the turn angle is measured [m]."""
 
 NEAR = 2.0
-"""Paths that are nearer than this are one [m]: a car is 1.8 m wide."""
+"""Distance below which two paths are one [m]: a car is 1.8 m wide."""
 ONE_WAY = np.radians(20.0)
-"""Between the courses of paths that are one, at most."""
+"""Largest angle between the courses of paths that are one [rad]."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -16,19 +16,20 @@ from bridgegen.scenario.language.event_kinds import EVENT_KINDS
 from bridgegen.simulation.rollout import Rollout
 
 SHOWN = 3
-"""Of each kind."""
+"""Number of events of each kind that are shown."""
 AROUND = 2.0
-"""Before and after an event [s]."""
+"""Time before and after an event that is shown [s]."""
 LONGEST = 15.0
-"""Of a picture [s]."""
+"""Longest duration of a moving picture [s]."""
 MOST_OTHERS = 12
-"""Participants besides the ego."""
+"""Largest number of participants besides the ego."""
 GAPS = {"cut-in": "crossing_gap"}
-"""The gap that counts, by kind; of the others their gap at the beginning."""
+"""Gaps that rank the events, by kind; events of other kinds are ranked by their gap at the
+beginning."""
 MEETING = "pet"
-"""Who meets on crossing paths has this time instead."""
+"""Quantity that ranks the events of crossing paths instead of a gap: post-encroachment time."""
 LEAST_SPEED = 1.0
-"""Slower egos count as so fast [m/s]."""
+"""Speed that slower egos count as [m/s]."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,15 +11,15 @@ from bridgegen.recordings.events.stop_lines import LEAST_FOLLOWED, Passing
 from bridgegen.recordings.readers.table import wrap
 
 RED_FOR = 0.3
-"""Who passes less than this after the light has turned red is not counted [s]."""
+"""Time after the light has turned red within which who passes is not counted [s]."""
 TURNS = 45.0
-"""To the right, from which on a turn counts as one [deg]."""
+"""Least angle of a right turn [deg]."""
 BEFORE, BEYOND = 5.0, 25.0
-"""Of the stop line: from there to there a vehicle turns [m], or as far as is recorded."""
+"""Path length before and after the stop line over which the turn angle is measured [m]."""
 HALTS = 0.5
-"""Who was slower than this within `AHEAD` before the line has stopped there [m/s]."""
+"""Speed below which who was slower within `AHEAD` before the line has stopped there [m/s]."""
 JUNCTION = 60.0
-"""From a stop line to where paths cross, at most [m]."""
+"""Greatest path length from a stop line to where paths cross [m]."""
 RIGHT_ON_RED = "it turns right after a stop, which is legal in places"
 
 

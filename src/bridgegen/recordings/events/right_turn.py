@@ -15,11 +15,11 @@ from bridgegen.recordings.events.meetings import (
 from bridgegen.recordings.events.scene import Scene
 
 TURNS = 45.0
-"""The ego turns to the right by more than this [deg]."""
+"""Least angle of the ego's right turn [deg]."""
 SAME_WAY = 45.0
-"""Between their courses before, at most [deg]."""
+"""Largest angle between their courses before [deg]."""
 ANGLES = (15.0, 160.0)
-"""Between their courses where they cross [deg]; flat where the turn has just begun."""
+"""Angles between their courses where they cross [deg]; flat where the turn has just begun."""
 
 
 def find(scene: Scene, changes: LaneChanges) -> Events:

@@ -19,11 +19,11 @@ from bridgegen.recordings.lanes.placing import WALKS
 from bridgegen.recordings.readers.table import RecordedTraffic
 
 AVERAGED = 0.5
-"""Before and after an instant, over which a speed is averaged [s]."""
+"""Time before and after an instant over which a speed is averaged [s]."""
 SLOPE = 1.0
-"""Before and after an instant, over which an acceleration is measured [s]."""
+"""Time before and after an instant over which an acceleration is measured [s]."""
 LONGEST_LEAD = 30.0
-"""That is said of the time before an event [s]."""
+"""Longest time before an event that is stated [s]."""
 
 
 class Scene:

@@ -13,13 +13,14 @@ from bridgegen.base.arrays import Bool, Float, Int
 from bridgegen.recordings.events.scene import Scene
 
 SPAN = 20.0
-"""Longest window [s]."""
+"""Longest window of a fit [s]."""
 MARGIN = 1.5
-"""Of the window before and after the step [s]."""
+"""Time of the window before and after the step [s]."""
 ROUNDS, ITERATIONS = 4, 10
 AT_ONCE = 512
 LANES = 16
-"""NumPy may compute the rest of a row otherwise than whole SIMD registers; rows have whole ones."""
+"""Number to a multiple of which rows are padded: NumPy may compute the rest of a row otherwise than
+whole SIMD registers."""
 DAMPING = 1e-9
 Shape = Literal["cosine", "ramp"]
 

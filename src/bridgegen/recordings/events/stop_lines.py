@@ -11,19 +11,21 @@ from bridgegen.recordings.events.paths import Paths
 from bridgegen.recordings.readers.table import RecordedLight
 
 BESIDE = 1.75
-"""Of a lane's middle, within which a vehicle's front passes the stop line [m]."""
+"""Lateral distance from a lane's middle within which a vehicle's front passes the stop line [m]."""
 ASKEW = np.radians(45.0)
-"""Between its heading and the lane's direction there, at most."""
+"""Largest angle between a vehicle's heading and the lane's direction at the stop line [rad]."""
 LOOKED = 12.0
-"""Around a stop line, in which a path must come to pass it [m]."""
+"""Distance from a stop line within which a path must come to pass it [m]."""
 FOLLOWED = 20.0
-"""Of a lane beyond its stop line, along which a vehicle's path is compared with it [m]."""
+"""Length of a lane beyond its stop line along which a vehicle's path is compared with it [m]."""
 LEAST_FOLLOWED = 10.0
-"""Of it that must be recorded [m]."""
+"""Least recorded path length beyond a stop line [m]."""
 OFF_LANE = 2.0
-"""Who is farther off the lane's middle than this beyond the line takes another one [m]."""
+"""Distance from the lane's middle beyond the line from which on a vehicle takes another lane
+[m]."""
 SAME_LINE = 2.0
-"""Between two passings of one vehicle over the lines of several lights that are one [s]."""
+"""Largest time between two passings of one vehicle over the lines of several lights that are one
+[s]."""
 
 
 @dataclass(frozen=True)

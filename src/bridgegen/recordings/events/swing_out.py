@@ -19,33 +19,34 @@ from bridgegen.recordings.readers.states import centre_ahead
 from bridgegen.recordings.readers.table import wrap
 
 FARTHEST = 90.0
-"""Ahead of the ego [m]."""
+"""Largest distance of the bicycle ahead of the ego [m]."""
 EVERY = 0.5
-"""Between the instants at which it is looked who is near whom [s]."""
+"""Interval between the instants at which pairs near each other are sought [s]."""
 ALONG = 30.0
-"""Between the courses of both, at most [deg]."""
+"""Largest angle between the courses of ego and bicycle [deg]."""
 SMOOTHED = 40.0
-"""Before and after a point of the ego's path, to which a parabola is fitted there [m]."""
+"""Distance before and after a point of the ego's path over which a parabola is fitted there [m]."""
 SHORTEST_PATH = 20.0
-"""Of an ego [m]."""
+"""Least length of an ego's path [m]."""
 STRAIGHT = 30.0
-"""By which the ego's path bends at most until `BEYOND_IT` the bicycle [deg]."""
+"""Largest bend of the ego's path until it has passed the bicycle [deg]."""
 BEYOND_IT = 10.0
-"""[m]."""
+"""Distance beyond the bicycle at which passing ends [m]."""
 BEYOND = 60.0
-"""By which an ego's path is continued straight on, should it end [m]."""
+"""Length by which an ego's path is continued straight on at both ends [m]."""
 BEFORE = 1.0
-"""Where the ego was so long ago, it did not evade yet [s]."""
+"""Time before an instant until which the ego's lateral position is the reference [s]: no evasion
+yet."""
 SPAN = 4.0
-"""Before that, over which its place is averaged [s]."""
+"""Time until `BEFORE` over which the ego's lateral position is averaged [s]."""
 LEAST_MOVE = 0.5
-"""To the side [m]."""
+"""Least lateral movement of the bicycle [m]."""
 SHORTEST = 0.5
-"""Of a move [s]."""
+"""Least duration of the bicycle's lateral movement [s]."""
 WORST_FIT = 0.15
-"""RMS of what remains of the offset, as a share of the move."""
+"""Largest root mean square of the residual offset, as a share of the lateral movement."""
 LEAST_SPEED = 1.0
-"""Slower egos count as so fast [m/s]."""
+"""Speed that slower egos count as [m/s]."""
 
 
 @dataclass(frozen=True)

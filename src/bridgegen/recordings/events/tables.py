@@ -18,7 +18,7 @@ from bridgegen.scenario.language.event_kinds import EVENT_KINDS
 
 TABLE, FOLDER = "events.csv", "events"
 NAMES_SHOWN = 3
-"""Of events that break a constraint."""
+"""Number of events that break a constraint and are named."""
 QUANTITIES = tuple(dict.fromkeys(name for one in EVENT_KINDS.values() for name in one.quantities))
 ROLES = tuple(dict.fromkeys(role for one in EVENT_KINDS.values() for role in one.roles))
 HEAD = ("name", "recording", "file", "event", "ego", *ROLES, "begin", "end", *QUANTITIES)

@@ -21,9 +21,9 @@ from bridgegen.recordings.lanes.placing import WALKS
 
 
 LATELY = 2.0
-"""Before somebody crosses the ego's path [s]."""
+"""Time before somebody crosses the ego's path in which an occlusion counts [s]."""
 BESIDE = 10.0
-"""Bodies farther off the line of sight than this hide nobody [m]."""
+"""Distance from the line of sight beyond which bodies hide nobody [m]."""
 
 
 class Bodies(NamedTuple):
@@ -113,7 +113,8 @@ def _gap(bodies: Bodies, course: float) -> float:
 WALKING = (45.0, 135.0)
 """Angles at which the path of a pedestrian crosses the ego's [deg]."""
 RIDING = (20.0, 160.0)
-"""Likewise of a bicycle: who turns off crosses its path before having turned far."""
+"""Angles at which the path of a bicycle crosses the ego's [deg]: who turns off crosses its path
+before having turned far."""
 
 
 def find(scene: Scene, changes: LaneChanges) -> Events:

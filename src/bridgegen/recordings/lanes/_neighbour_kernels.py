@@ -8,7 +8,7 @@ from bridgegen.base.arrays import Float, Int
 from bridgegen.base.compiled import inlined_kernel, kernel
 
 MOST_VISITS = 64
-"""Lanes that are looked along for one neighbour."""
+"""Largest number of lanes that are searched for one neighbour."""
 
 
 @inlined_kernel

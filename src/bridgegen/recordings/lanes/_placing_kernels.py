@@ -8,9 +8,9 @@ from bridgegen.base.arrays import Bool, Float, Int
 from bridgegen.base.compiled import inlined_kernel, kernel
 
 MOST = 8
-"""Lanes that a state may be on at once, where they overlap."""
+"""Largest number of lanes that a state may be on at once, where they overlap."""
 ASIDE, AGAINST = math.radians(50.0), math.radians(130.0)
-"""Differences of heading between which a vehicle crosses a lane and is not on it."""
+"""Differences of heading between which a vehicle crosses a lane and is not on it [rad]."""
 OVERHANG = 0.5  # m, beyond the ends of a lane
 TURN = 0.3  # rad, a difference of heading that weighs as much as half a lane's width
 COST_AGAINST, COST_BACK, COST_OTHER, COST_BEYOND = 8.0, 5.0, 20.0, 2.0

@@ -9,7 +9,7 @@ from bridgegen.recordings.lanes.find import Located
 
 LANES_DRAWN = 600
 POINTS_DRAWN = 60
-"""Of a lane's border."""
+"""Number of points of a lane's border that are drawn."""
 
 
 @dataclass(frozen=True)

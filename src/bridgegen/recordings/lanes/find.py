@@ -21,10 +21,10 @@ from bridgegen.recordings.readers.table import RecordedTraffic, wrap
 
 
 BIN = 0.01
-"""Of offsets, from which the percentiles are taken [m]."""
+"""Bin width of offsets, from which the percentiles are taken [m]."""
 BINS = 1000
 DRIVES = 5.0
-"""How far a vehicle gets that is not parked [m]; more than the noise of trackers."""
+"""Distance that a vehicle covers if it is not parked [m]; more than the noise of trackers."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,9 +89,9 @@ def _drive(traffic: RecordedTraffic) -> Bool:
 
 
 LEAST_SHARE = 0.5
-"""Of the states of vehicles that drive; less are not on the lanes of their map or lanelets."""
+"""Least share of driving vehicles' states that are on lanes of a map; with less it is refused."""
 USUAL_SHARE = 0.9
-"""With less there is a warning."""
+"""Share of driving vehicles' states on lanes of a map below which there is a warning."""
 
 
 @dataclass(frozen=True, eq=False)

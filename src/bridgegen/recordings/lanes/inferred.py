@@ -32,20 +32,20 @@ from bridgegen.recordings.lanes.paths import (
 from bridgegen.recordings.readers.table import RecordedTraffic, wrap
 
 NARROWEST, WIDEST, USUAL = 2.5, 4.5, 3.5
-"""Widths of lanes [m]."""
+"""Least, greatest and usual width of a lane [m]."""
 SPREAD = 0.35  # m, of the kernel density of distances
 BIN = 0.05  # m
 VALLEY = 0.7
-"""Density between two lanes at most, as a share of the lesser one's highest."""
+"""Largest density between two lanes, as a share of the lesser one's highest."""
 LEAST_IN_LANE, LEAST_ON_AVERAGE = 3, 6
-"""Vehicles in a lane."""
+"""Least number of vehicles in each lane, and on average per lane."""
 SHORTEST = 50.0  # m, a lane
 STRETCH, GAP = 20.0, 3  # m; stretches in a row without a vehicle that do not end a lane
 MOST_RMS, MOST_IN_LANE = 0.19, 0.22
-"""Of distances from the middles of lanes, in widths, of all lanes and of each: 0.29 if paths are
-spread evenly."""
+"""Largest root mean square of distances from the middles of lanes, of all lanes and of each [lane
+widths]: 0.29 if paths are spread evenly."""
 LEAST_SHARE = 0.85
-"""Of the paths' length that is on the lanes."""
+"""Least share of the paths' length that is on the lanes."""
 SKEW = np.radians(30.0)
 MOST_CARRIAGEWAYS = 200
 

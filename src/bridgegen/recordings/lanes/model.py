@@ -97,7 +97,7 @@ Source = Literal["map", "lanelets", "markings", "inferred", "none"]
 Kind = Literal["driving", "bicycle", "sidewalk"]
 NONE = -1
 STEP = 1.0
-"""Between two points of a centre line at most, where its source allows [m]."""
+"""Largest distance between two points of a centre line, where its source allows [m]."""
 
 
 @dataclass(frozen=True, eq=False)

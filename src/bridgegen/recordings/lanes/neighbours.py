@@ -13,7 +13,7 @@ from bridgegen.recordings.lanes.placing import Placed, flattened
 from bridgegen.recordings.readers.table import RecordedTraffic
 
 HORIZON = 200.0
-"""How far is looked [m]."""
+"""Distance within which neighbours are sought [m]."""
 Side = Literal["left", "own", "right"]
 
 

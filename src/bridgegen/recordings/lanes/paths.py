@@ -22,13 +22,13 @@ from bridgegen.recordings.lanes.model import STEP, along, headings_along
 from bridgegen.recordings.readers.table import RecordedTraffic, wrap
 
 PIECE = 5.0
-"""Length of the pieces of paths, and between two points of a reference line [m]."""
+"""Length of the pieces of paths, and distance between two points of a reference line [m]."""
 CELL = PIECE
 SECTORS = 24
 CROSSING = math.radians(40.0)
-"""Paths within 8 m that differ by more than this, and less than its supplement, cross."""
+"""Angle from which on paths within 8 m cross, up to its supplement [rad]."""
 REACH = 20.0
-"""To either side of a reference line [m]."""
+"""Lateral distance from a reference line within which points are located along it [m]."""
 MOST_PIECES = 200_000
 LEAST_VEHICLES = 10
 

@@ -22,7 +22,7 @@ from bridgegen.recordings.readers.table import RecordedTraffic
 
 
 EDGE = 4.0
-"""Of a square [m]."""
+"""Edge of a square of the grid in which lanes are looked up [m]."""
 MOST_ENTRIES = 50_000_000
 
 
@@ -96,7 +96,7 @@ def grid_of(lanes: RecordedLanes, margin: float) -> Grid:
 
 
 WALKS = (PEDESTRIAN, ANIMAL, OTHER)
-"""What may be on a lane in any direction; a vehicle that crosses a lane is not on it."""
+"""Kinds that may be on a lane in any direction; a vehicle that crosses a lane is not on it."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -16,7 +16,7 @@ KINDS: dict[str, Kind] = {
     **dict.fromkeys(DRIVABLE, "driving"), "biking": "bicycle", "sidewalk": "sidewalk",
     "walking": "sidewalk",
 }  # fmt: skip
-"""What a lane is for, by OpenDRIVE's type; lanes of other types are left out."""
+"""Kinds of lanes by OpenDRIVE's type; lanes of other types are left out."""
 MOST_POINTS = 5_000_000
 SHORTEST = 1e-3  # m; shorter lane sections are passed over
 

@@ -11,7 +11,7 @@ from bridgegen.base.compiled import inlined_kernel, kernel
 VARINT, FIXED64, LENGTH, FIXED32 = 0, 1, 2, 5
 CUT_OFF, BAD_TAG, WRONG_TYPE = 1, 2, 3
 DEEPEST = 16
-"""Levels of messages in messages that a shape may have."""
+"""Largest number of levels of messages in messages that a shape may have."""
 
 
 @inlined_kernel

@@ -27,7 +27,7 @@ from bridgegen.recordings.readers.table import (
 )
 
 TIME_STEP = 0.1
-"""Of the data set [s]."""
+"""Time step of the data set [s]."""
 KINDS = {
     "vehicle": CAR, "bus": BUS, "motorcyclist": MOTORCYCLE, "cyclist": BICYCLE,
     "pedestrian": PEDESTRIAN, "riderless_bicycle": OTHER, "static": OTHER, "construction": OTHER,

@@ -28,7 +28,8 @@ from bridgegen.recordings.readers.road_lines import (
 from bridgegen.recordings.readers.table import FARTHEST, Lanelet
 
 JOINED = 1.0
-"""How far a centre line may begin from where another one ends, to follow it [m]."""
+"""Largest distance between the end of a centre line and the start of the one that follows it
+[m]."""
 MOST_POINTS = 1_000_000
 SHORTEST = 0.5  # m
 

@@ -23,7 +23,7 @@ SAME = 1e-6  # s
 COLUMNS = ("time", "x", "y", "heading", "vx", "vy", "acceleration")
 
 TWO_WHEELER = (2.6, 1.1)
-"""Length and width at most [m], and of a person on foot:"""
+"""Largest length and width of a two-wheeler, and in ``PERSON`` of a person on foot [m]."""
 PERSON = (1.2, 1.2)
 FASTEST_BICYCLE = 10.0  # m/s
 SHORTEST_TRUCK = 7.0  # m

@@ -36,7 +36,7 @@ VERSIONS = ("2020a", "2018b")
 MOST_STEPS = 1_000_000
 
 State = tuple[float, float, float, float, float, float]
-"""Step, x, y, heading, speed, acceleration; NaN where the file does not say."""
+"""State: step, x, y, heading, speed, acceleration; NaN where the file does not say."""
 
 
 def _recognises(head: Head) -> bool:

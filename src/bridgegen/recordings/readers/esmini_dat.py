@@ -28,7 +28,7 @@ from bridgegen.recordings.readers.table import (
 )
 
 VERSION = (5, 3)
-"""Written by esmini 3.2 to 3.6."""
+"""Version of the format, written by esmini 3.2 to 3.6."""
 MOST_BYTES = 512 * 2**20
 LONGEST_NAME = 200
 _ENTITY, _TYPE, _CATEGORY, _TIME, _NAME, _SPEED = 0, 2, 3, 5, 6, 7
@@ -44,7 +44,7 @@ KINDS = {
     ))},
     (_PEDESTRIAN, 0): PEDESTRIAN, (_PEDESTRIAN, 1): PEDESTRIAN, (_PEDESTRIAN, 2): ANIMAL,
 }  # fmt: skip
-"""By type and category; a trailer is an entity of its own."""
+"""Kinds by esmini's type and category of an entity; a trailer is an entity of its own."""
 
 
 def _recognises(head: Head) -> bool:

@@ -35,7 +35,7 @@ FORMATS: tuple[Format, ...] = (
     osi.FORMAT,
     esmini_dat.FORMAT,
 )
-"""No file is of more than one of them."""
+"""Formats of recordings; no file is of more than one of them."""
 
 ARCHIVES = {
     b"PK\x03\x04": "zip", b"\x1f\x8b": "gzip", b"BZh": "bzip2", b"\xfd7zXZ\x00": "xz",

@@ -45,7 +45,7 @@ CLASSES = {
     "car": CAR, "van": CAR, "truck": TRUCK, "truck_bus": TRUCK, "bus": BUS, "trailer": TRUCK,
     "motorcycle": MOTORCYCLE, "bicycle": BICYCLE, "pedestrian": PEDESTRIAN,
 }  # fmt: skip
-"""The recordings' classes; a trailer is a track of its own."""
+"""Kinds by the recordings' classes; a trailer is a track of its own."""
 
 META, RECORDING_META = "_tracksMeta.csv", "_recordingMeta.csv"
 LEFTWARDS = 1

@@ -17,7 +17,7 @@ from bridgegen.base.extras import require
 
 MAGIC = b"\x89MCAP0\r\n"
 MOST_RECORD = 256 * 2**20
-"""Bytes that a record may have, and a chunk when it is decompressed."""
+"""Largest size of a record, and of a chunk when it is decompressed [bytes]."""
 MOST_CHANNELS = 2**16
 _FOOTER, _SCHEMA, _CHANNEL, _MESSAGE, _CHUNK = 2, 3, 4, 5, 6
 

@@ -45,7 +45,7 @@ TEXT_FILE = (
     "Following", "Space_Headway", "Time_Headway",
 )  # fmt: skip
 EPOCH = (1.0e12, 2.0e12)
-"""Global_Time [ms] of the years 2001 to 2033."""
+"""Range of Global_Time [ms]: the years 2001 to 2033."""
 
 
 def _is_text_file(head: Head) -> bool:

@@ -108,9 +108,10 @@ def _texts(ids: Iterable[int]) -> tuple[str, ...]:
 
 
 MOST_MESSAGE = 256 * 2**20
-"""Bytes of a message of a trace."""
+"""Largest size of a message of a trace [bytes]."""
 LONGEST_CLOCK = 10**8
-"""Seconds from which on a clock is taken to count from 1970, and not from the recording's start."""
+"""Time from which on a clock is taken to count from 1970, and not from the recording's start
+[s]."""
 _TIMESTAMP, _MOVING_OBJECT, _TRAFFIC_LIGHT, _GROUND_TRUTH = 2, 5, 7, 7
 _PROJECTION, _MAP = 14, 15
 
@@ -126,13 +127,13 @@ OBJECT = Shape({
 LIGHT = Shape({1: {1: "id"}, 3: {1: "color", 3: "mode"}})
 
 TYPES = {3: PEDESTRIAN, 4: ANIMAL, 1: OTHER}
-"""Of moving objects that are no vehicles."""
+"""Kinds by OSI's type of moving objects that are no vehicles."""
 VEHICLE_TYPES = {
     2: CAR, 3: CAR, 4: CAR, 5: CAR, 6: CAR, 7: TRUCK, 8: TRUCK, 9: TRUCK, 10: MOTORCYCLE,
     11: BICYCLE, 12: BUS, 13: OTHER, 14: OTHER, 15: PEDESTRIAN, 16: TRUCK, 17: BICYCLE, 18: OTHER,
     19: OTHER, 20: OTHER, 21: OTHER,
 }  # fmt: skip
-"""A trailer is an object of its own."""
+"""Kinds by OSI's type of vehicle; a trailer is an object of its own."""
 COLORS = {2: "red", 3: "yellow", 4: "green", 5: "blue", 6: "white"}
 MODES = {2: "off", 4: "flashing"}
 

@@ -82,15 +82,15 @@ class Quality:
 
 
 FASTEST = 100.0
-"""Faster than any traffic [m/s]."""
+"""Speed beyond that of any traffic [m/s]."""
 LARGEST_SHARE = 0.05
-"""Of the states that may be faster: ids jump, but not so often."""
+"""Largest share of states that may be faster than `FASTEST`: ids jump, but not so often."""
 WIDEST = 200_000.0
-"""The extent of a recording at most [m]."""
+"""Largest extent of a recording [m]."""
 CARS = (2.0, 9.0)
-"""Within these the median length of cars must lie [m]."""
+"""Range of the median length of cars [m]."""
 AGREEMENT = 1.25
-"""Speeds given, and those of the positions, may differ by this factor (median)."""
+"""Largest factor between the given speeds and those of the positions (median)."""
 OVER = 1.0
 """Time over which positions are compared, so that their noise counts little [s]."""
 LEAST_MOVING = 20  # states
@@ -99,7 +99,7 @@ UNITS = {
     "km/h": 3.6, "mph": 2.23694, "ft/s": 3.28084, "positions in km": 1000.0,
     "positions in feet": 0.3048, "positions in cm": 0.01,
 }  # fmt: skip
-"""Speeds over those of the positions, if one of both is in these units."""
+"""Ratios of the given speeds to those of the positions, by the wrong unit of one of both."""
 
 
 def check(traffic: RecordedTraffic) -> None:

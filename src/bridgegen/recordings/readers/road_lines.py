@@ -12,19 +12,19 @@ from bridgegen.base.arrays import Float
 from bridgegen.base.errors import FileFormatError
 
 STEP = 1.0
-"""Between points of centre lines [m]; half of it between points of the road's lines."""
+"""Distance between points of centre lines [m]; half of it between points of the road's lines."""
 NARROWEST, WIDEST = 2.5, 4.5
-"""Widths that a lane may get [m]."""
+"""Least and greatest width that a lane may get [m]."""
 USUAL = 3.5
-"""Width where nothing says more [m]."""
+"""Width of a lane where nothing says more [m]."""
 NEIGHBOURS = (2.0, 6.0)
 """Distance of the centre lines of lanes side by side [m]."""
 NEAREST_LINE = 0.5  # m
 PARALLEL = np.cos(np.radians(30.0))
 SAME_PLACE = 3.0
-"""How far the ends of neighbours may be apart along the lanes [m]."""
+"""Largest distance between the ends of neighbouring lanes along them [m]."""
 MOST_PAIRS = 20_000_000
-"""Of points within reach of each other."""
+"""Largest number of pairs of points within reach of each other."""
 
 
 @dataclass(frozen=True, eq=False)

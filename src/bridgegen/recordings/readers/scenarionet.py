@@ -39,9 +39,9 @@ LIGHTS = {
     "LANE_STATE_ARROW_GO": "green", "LANE_STATE_FLASHING_STOP": "flashing red",
     "LANE_STATE_FLASHING_CAUTION": "flashing yellow",
 }  # fmt: skip
-"""Any other state is unknown."""
+"""States of traffic lights by ScenarioNet's; any other state is unknown."""
 BESIDE_LANE = 5.0
-"""A stop point that is farther from its lane is none [m]: unknown ones are at the origin."""
+"""Largest distance of a stop point from its lane [m]: unknown ones are at the origin."""
 _PROTOCOLS = (b"\x80\x02", b"\x80\x03", b"\x80\x04", b"\x80\x05")
 
 

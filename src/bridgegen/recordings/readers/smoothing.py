@@ -16,17 +16,17 @@ from scipy.signal import savgol_filter
 from bridgegen.base.arrays import Bool, Float, Int
 
 NOISE = 0.02
-"""Positions that scatter by more than this [m] are smoothed."""
+"""Scatter of positions beyond which they are smoothed [m]."""
 MISFIT = 0.1
-"""Velocities that differ by more than this [m/s] from how fast the positions change are not
-theirs."""
+"""Difference of velocities from the positions' rate of change beyond which they are not theirs
+[m/s]."""
 LAG = 0.4
-"""Time over which positions change [s]."""
+"""Time over which the positions' rate of change is measured [s]."""
 WINDOW = 1.0
-"""Of the filter [s]."""
+"""Window of the smoothing filter [s]."""
 DEGREE = 3
 COARSEST = 0.2
-"""Time step [s] up to which a window holds enough states."""
+"""Largest time step at which a window holds enough states [s]."""
 LEAST_STATES = 8
 
 
@@ -108,16 +108,16 @@ def hermite_slopes(at: Float, time: Float, values: Float, slopes: Float) -> Floa
 
 
 JUMP = 2.0
-"""A track jumps if it is farther than this [m] from where its motion takes it …"""
+"""Distance from where its motion takes it beyond which a track jumps [m], with `STRONGEST`."""
 STRONGEST = 10.0
-"""… and what this acceleration [m/s²] explains."""
+"""Acceleration that explains a deviation of a track, which is then no jump [m/s²]."""
 NEIGHBOURS = 3
-"""Steps before and after, of which the median is the motion."""
+"""Number of steps before and after, of which the median is the motion."""
 BRIDGED = 0.5
-"""Gaps up to this [s], and up to `BRIDGED_STEPS`, are bridged."""
+"""Longest gap that is bridged [s], if it has at most `BRIDGED_STEPS` steps."""
 BRIDGED_STEPS = 3.0
 GAP = 1.5
-"""More than so many time steps between two states are a gap."""
+"""Number of time steps between two states beyond which there is a gap."""
 
 
 def bridged_up_to(time_step: float) -> float:

@@ -77,9 +77,9 @@ FORMAT = Format(
 STANDING = 0.5
 """Speed [m/s] below which a body's motion says nothing of its heading."""
 SHORTEST_ARM = 0.1
-"""From a rear axle to a point ahead of it, where a body has less or is not known [m]."""
+"""Least distance from a rear axle to the point ahead of it whose path gives the heading [m]."""
 AWAY = 1.0
-"""The first direction of a track is that to the first state this far away [m]."""
+"""Distance of the state that gives the first direction of a track [m]."""
 
 
 def velocities(time: Float, x: Float, y: Float) -> tuple[Float, Float]:

@@ -33,7 +33,7 @@ WORDS = {
     "moped": MOTORCYCLE, "bicycle": BICYCLE, "bike": BICYCLE, "pedestrian": PEDESTRIAN,
     "ped": PEDESTRIAN,
 }  # fmt: skip
-"""Words in names of types; a vehicle with none of them is a car."""
+"""Kinds by words in names of types; a vehicle with none of them is a car."""
 MOST_BYTES = 8 * 2**30
 
 

@@ -24,10 +24,10 @@ from bridgegen.recordings.readers.road_lines import CentreLine
 from bridgegen.recordings.readers.table import UNKNOWN_KIND, Facts, Lanelet, RecordedTraffic, build
 
 TIME_STEP = 0.1
-"""Of the Waymo Open Motion Dataset [s]; the file does not repeat it."""
+"""Time step of the Waymo Open Motion Dataset [s]; the file does not repeat it."""
 KINDS = {"vehicle": CAR, "pedestrian": PEDESTRIAN, "cyclist": BICYCLE}
 BICYCLE_LANE = 3
-"""Waymo's number of this kind of lane."""
+"""Waymo's number of bicycle lanes."""
 MOST_BYTES = 256 * 2**20
 
 

@@ -35,7 +35,7 @@ STANDS = 0.05  # m; steps that are shorter have no direction
 _SAMPLES = 33
 
 Knot = tuple[float, float, float]
-"""x, y [m] and direction [rad]."""
+"""Knot of a path: x, y [m] and direction [rad]."""
 
 
 def along(x: Float, y: Float, h: Float) -> tuple[OpenDrive, float]:
@@ -113,16 +113,16 @@ def _simpson(n: int) -> Float:
 
 EGO = "ego"
 DATE = "2025-01-01T00:00:00"
-"""Of all files, so that the same recording gives the same bytes."""
+"""Date of all files, so that the same recording gives the same bytes."""
 AROUND = 80.0
-"""Who comes nearer to the ego [m] is there."""
+"""Distance from the ego below which a participant is in the replay [m]."""
 MOST_OTHERS = 60
-"""Participants besides the ego; of more, the nearest."""
+"""Largest number of participants besides the ego; of more, the nearest."""
 FASTER = 1.0
-"""A driver is told of the highest speed of the recorded ego if that is so much [m/s] above its
-first one."""
+"""Increase of the recorded ego's speed above its first one from which on a driver is told of the
+highest [m/s]."""
 RATE = 2.0
-"""How fast it is to get there [m/s²]."""
+"""Acceleration to the recorded ego's highest speed [m/s²]."""
 
 
 def others_near(

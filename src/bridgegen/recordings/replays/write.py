@@ -26,7 +26,7 @@ from bridgegen.recordings.replays.scenario import along, driven, others_near, re
 from bridgegen.simulation.rollout import Rollout
 
 BEFORE, AFTER = 5.0, 3.0
-"""Of an event [s], as far as the ego was recorded."""
+"""Time before and after an event that a replay covers [s], as far as the ego was recorded."""
 
 
 @dataclass(frozen=True, eq=False)

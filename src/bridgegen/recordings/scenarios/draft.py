@@ -32,9 +32,9 @@ from bridgegen.scenario.language.reader import build
 from bridgegen.scenario.language.scenario import LogicalScenario
 
 EVENTS_SOURCE = "The recorded events."
-"""Of constraints that they tighten."""
+"""Source that constraints state which are tightened to the events."""
 _DIGITS = 5
-"""Of defaults."""
+"""Number of significant digits of defaults."""
 
 
 @dataclass(frozen=True)

@@ -23,7 +23,7 @@ from bridgegen.scenario.ontology.graph import Individuals
 
 FILE = "mined.owl"
 QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
-"""Of the values that were fitted."""
+"""Quantiles of the fitted values that are stated."""
 
 
 def mined_individuals(mined: Sequence[MinedScenario]) -> Individuals:
@@ -66,9 +66,10 @@ def _statistics(one: MinedScenario) -> Iterator[tuple[str, str, float]]:
 
 FOLDER = "scenarios"
 ENDINGS = (".yaml", ".html", "-distribution.xosc")
-"""Of a scenario's files: it, the page of its fit, and the distribution for OpenSCENARIO."""
+"""Endings of a scenario's files: the scenario, the page of its fit, and the distribution for
+OpenSCENARIO."""
 DATE = "2025-01-01T00:00:00"
-"""Of all distributions, so that the same recordings give the same bytes."""
+"""Date of all distributions, so that the same recordings give the same bytes."""
 
 
 def write_mined(

@@ -16,9 +16,9 @@ from bridgegen.scenario.exposure.fit import LEAST_ROWS, Fit, Progress, fit_expos
 from bridgegen.scenario.language.scenario import LogicalScenario
 
 REPLICATES = 100
-"""Resampled fits, for bands and p values."""
+"""Number of resampled fits, for bands and p values."""
 NAMES_SHOWN = 5
-"""Of recordings."""
+"""Number of recordings that are named."""
 HEAD = "# Mined by 'bridgegen mine'. A later call replaces this file: change a copy of it."
 
 

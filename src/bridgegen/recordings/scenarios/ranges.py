@@ -18,7 +18,7 @@ from bridgegen.scenario.language.scenario import LogicalScenario
 from bridgegen.scenario.language.space import probes
 
 DIGITS = 2
-"""Of ends of ranges: a hundredth of the width's power of ten."""
+"""Digits of the ends of ranges: a hundredth of the width's power of ten."""
 _ROUNDS = 8
 _FACTOR = "speed_factor"
 _SEEN = "No event has a {name} beyond it."

@@ -31,10 +31,10 @@ from bridgegen.results.confirmation.differences import (
 from bridgegen.simulation.rollout import Rollout
 
 SAME_BOX = 1e-3
-"""Boxes that differ by less are equal [m]."""
+"""Difference below which boxes are equal [m]."""
 
 STANDS = 1e-3
-"""An entity that moves less in a step has no direction of travel [m]."""
+"""Movement in a step below which an entity has no direction of travel [m]."""
 
 _EPSILON = 1e-6  # of times [s]: they are multiples of a step
 

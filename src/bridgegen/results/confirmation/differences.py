@@ -7,13 +7,13 @@ from pydantic import ConfigDict
 from bridgegen.base.arrays import Float
 
 PARTED = 0.5
-"""An entity diverges if its reference points are farther apart than this [m]."""
+"""Distance between an entity's reference points beyond which it diverges [m]."""
 
 TRACE = 0.05
-"""A larger deviation [m] is the beginning of a divergence."""
+"""Deviation beyond which a divergence begins [m]."""
 
 SLIGHT = 0.01
-"""A larger deviation [m] may change a driver's decision."""
+"""Deviation beyond which a driver's decision may change [m]."""
 
 
 class _Checked:

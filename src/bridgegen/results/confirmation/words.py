@@ -22,14 +22,14 @@ from bridgegen.results.confirmation.summary import ConfirmationSummary, Spread, 
 from bridgegen.scenario.language.thresholds import Thresholds
 
 NARROW = (0.25, 0.25)
-"""A scenario that misses a threshold of d_min [m] or v_d [m/s] by at most this much misses it
+"""Largest difference from a threshold of d_min [m] and of v_d [m/s] with which a scenario misses it
 narrowly."""
 
 NARROW_HARM = 0.02
-"""Likewise for harm."""
+"""Largest difference of harm from the threshold with which a scenario misses it narrowly."""
 
 TURNED = math.radians(10.0)
-"""A larger difference of the direction of travel is reported."""
+"""Difference of the direction of travel beyond which it is reported [rad]."""
 
 MOST_OFF = 3
 """Maximum number of entities with small deviations that are named."""

@@ -23,7 +23,7 @@ LAST_OF_SCHEMA = {1: LAST[:2], 2: LAST[:3], 3: LAST[:-1], 4: LAST}
 """The last columns by the schema of the store."""
 
 DIGESTED = 4096
-"""Rows that are digested at a time."""
+"""Number of rows that are digested at a time."""
 
 
 class Evaluated(Protocol):

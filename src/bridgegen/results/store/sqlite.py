@@ -12,7 +12,7 @@ from urllib.parse import quote
 from bridgegen.base.errors import InputError, StorageError
 
 LOCK_SECONDS = 5.0
-"""How long a writer waits for another: a killed process's workers end moments after it."""
+"""Time that a writer waits for another [s]: a killed process's workers end moments after it."""
 
 CAUSES = {
     sqlite3.SQLITE_FULL: "the disk is full",

@@ -42,10 +42,10 @@ if TYPE_CHECKING:
 
 
 CHUNK = 4096
-"""Rows that are read from SQL at a time."""
+"""Number of rows that are read from SQL at a time."""
 
 MARKS = 900
-"""Rows that are asked for by their ids at a time; SQLite takes at least 999."""
+"""Number of rows that are asked for by their ids at a time; SQLite takes at least 999."""
 
 
 class Store:

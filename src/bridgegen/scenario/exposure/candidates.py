@@ -28,7 +28,7 @@ from bridgegen.scenario.exposure.marginals import Polygon
 
 
 LEAST, MOST = 64, 8192
-"""Intervals of the grid."""
+"""Least and greatest number of intervals of the grid."""
 
 _PER_BANDWIDTH, _REACH = 8, 6.0
 _ROOT = math.sqrt(2.0 * math.pi)
@@ -101,13 +101,14 @@ def left_out_log_densities(values: Float, density: Polygon, bandwidth: float) ->
 
 
 LEAST_EXCEEDANCES = 50
-"""Values beyond the threshold of a tail: the standard error of its shape is 1/√50 = 0.14 then."""
+"""Least number of values beyond the threshold of a tail: the standard error of its shape is 1/√50 =
+0.14 then."""
 
 SUPPORT = 4.0
-"""A form whose criterion is worse by this has considerably less support."""
+"""Difference of the criterion beyond which a form has considerably less support."""
 
 TAIL_SHARE = 0.1
-"""Of the values, those that are a tail of their own."""
+"""Share of the values that form a tail of their own."""
 
 _DIGITS = 6
 _BODIES = ("uniform", "normal", "lognormal", "exponential", "gamma", "weibull", "beta", "kde")
@@ -394,7 +395,7 @@ _LIMITS: dict[str, Callable[[Float, float, float], Limits]] = {
     "weibull": _weibull, "beta": _beta, "pareto": _pareto,
 }  # fmt: skip
 _KEYS = {name: FAMILIES[name].keys for name in _LIMITS} | {"pareto": ("shape", "scale")}
-"""By family: the numbers that are fitted."""
+"""Names of the fitted numbers by family."""
 
 
 def _rounded(value: float, digits: int = _DIGITS) -> float:

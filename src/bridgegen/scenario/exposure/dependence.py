@@ -14,7 +14,7 @@ from bridgegen.base.arrays import Float
 from bridgegen.base.errors import InputError
 
 LEAST_EIGENVALUE = 1e-10
-"""Of a correlation matrix."""
+"""Least eigenvalue of a correlation matrix."""
 
 
 @dataclass(frozen=True)

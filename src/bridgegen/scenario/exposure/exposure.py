@@ -35,10 +35,10 @@ from bridgegen.scenario.language.space import SearchSpace
 
 
 LEVEL = 0.95
-"""Of intervals."""
+"""Level of confidence of intervals."""
 
 MOST = 10**12
-"""Encounters that may have been counted."""
+"""Largest number of encounters that may have been counted."""
 
 
 @dataclass(frozen=True)
@@ -126,7 +126,8 @@ class Encounters:
 
 
 LEAST_SHARE = 1e-4
-"""Of the distribution that must be feasible; below, the exposure contradicts the constraints."""
+"""Least share of the distribution that is feasible; below, the exposure contradicts the
+constraints."""
 
 _BLOCK = 4096  # rows that are proposed at once, each block from random numbers of its own
 _TRIED, _MOST_TRIED, _ENOUGH = 2**16, 2**20, 100

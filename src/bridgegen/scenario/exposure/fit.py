@@ -34,13 +34,14 @@ from bridgegen.scenario.language.plain_yaml import read_plain_yaml
 from bridgegen.scenario.language.scenario import LogicalScenario
 
 WIDEST = 0.2
-"""How far the distribution function of the data may be from the true one, at 95 %."""
+"""Largest error of the data's distribution function, with 95 % confidence."""
 
 LEAST_ROWS = math.ceil(math.log(2.0 / 0.05) / (2.0 * WIDEST**2))
-"""Rows that a fit needs, 47, by the inequality of Dvoretzky, Kiefer, Wolfowitz and Massart."""
+"""Least number of rows of a fit, 47, by the inequality of Dvoretzky, Kiefer, Wolfowitz and
+Massart."""
 
 GRID = 201
-"""Points at which a density and its band are known."""
+"""Number of points at which a density and its band are known."""
 
 Progress = Callable[[int, int], None]
 

@@ -40,7 +40,7 @@ _KEYS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "kde": (("file", "bandwidth"), ("column", *_RANGE, *_TAILS)),
     "mixture": (("parts",), ()),
 }
-"""By form: the keys that it needs, and those that it may have."""
+"""Keys that a form needs, and keys that it may have, by form."""
 
 _ALWAYS = ("distribution", "source", "weight")
 _MOST_WHOLE = 10_000

@@ -227,9 +227,10 @@ def _copula(
 
 
 UNIFORM = "uniform"
-"""Names the exposure in which each parameter is uniform over its range: no road is like that."""
+"""Name of the exposure in which each parameter is uniform over its range: no road is like that."""
 ROWS = 200_000
-"""Of an exposure, always the same ones, that show how likely parts of a search space are."""
+"""Number of rows of an exposure, always the same ones, that show how likely parts of a search space
+are."""
 
 _UNIFORM_BLOCK = b"source: Uniform over the ranges, which no road is like.\nothers: uniform\n"
 

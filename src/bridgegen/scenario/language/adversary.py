@@ -22,10 +22,12 @@ from bridgegen.scenario.participants import PARTICIPANTS
 
 
 PERIOD = 0.5
-"""Seconds between two decisions: less than an alert driver's reaction, more than a controller's."""
+"""Time between two decisions [s]: less than an alert driver's reaction, more than a
+controller's."""
 
 MARGIN = 0.1
-"""Metres that its body keeps to the edges of its lane: it overshoots by a centimetre at times."""
+"""Distance that its body keeps to the edges of its lane [m]: it overshoots by a centimetre at
+times."""
 
 
 def first_speed(adversary: Adversary, values: Mapping[str, float]) -> float:
@@ -206,14 +208,14 @@ def _value(quantity: Quantity, values: Mapping[str, float]) -> float:
 ATTENTIVE, INSISTENT, SCRIPTED = "attentive", "insistent", "scripted"
 
 LOOKING = (ATTENTIVE, INSISTENT)
-"""Those that limit the script by what is in the way."""
+"""Drivers that limit the script by what is in the way."""
 
 DRIVERS = (*LOOKING, SCRIPTED)
-"""What a participant other than the ego may have as its driver."""
+"""Drivers that a participant other than the ego may have."""
 
 EGO = "ego"
 ABLE = ("vehicle", "bicycle", "pedestrian")
-"""How participants move that get the driver which a scenario states for all."""
+"""Conduct of participants that get the driver which a scenario states for all."""
 
 
 def require(name: str) -> str:

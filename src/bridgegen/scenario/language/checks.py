@@ -28,14 +28,14 @@ MAX_STEPS = 100_000
 NEEDED = {one.name: one.unit for one in PARAMETERS.values() if one.is_declared} | {
     "speed_factor": "1"
 }
-"""What the weather is made of, and its effect on speeds: every scenario has these, in these units.
-"""
+"""Units of the weather's parameters and of its effect on speeds, by name: every scenario has
+these."""
 
 _CLEARANCE = 0.4
-"""Between the boxes of two that start in one lane [m]."""
+"""Least distance between the boxes of two that start in one lane [m]."""
 
 _ASIDE = 0.25
-"""Between the sides of two that start beside each other in one lane [m]."""
+"""Least distance between the sides of two that start beside each other in one lane [m]."""
 
 
 def use_problems(

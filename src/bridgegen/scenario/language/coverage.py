@@ -182,7 +182,8 @@ MAX_STRENGTH = 3
 MAX_BINS = 1000
 
 MAX_GRID = 2_500
-"""Pairs of bins of two parameters that are counted one by one; whole numbers may have more."""
+"""Largest number of pairs of bins of two parameters that are counted one by one; whole numbers may
+have more."""
 
 
 @dataclass(frozen=True)

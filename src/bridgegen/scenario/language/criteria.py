@@ -20,10 +20,10 @@ Severity = Literal["minor", "major", "critical"]
 ADDED = PlugIns("criterion", "bridgegen.criteria")
 
 ANY = "any"
-"""In a formula, any other participant: the least value of all."""
+"""Name in a formula of any other participant: the least value of all."""
 
 PREFIX = "criterion:"
-"""Before its id, the name of a criterion's margin as a quantity: ``criterion:R-12``."""
+"""Prefix of a criterion's margin as a quantity, followed by its id: ``criterion:R-12``."""
 
 
 @dataclass(frozen=True)
@@ -79,22 +79,22 @@ class CriterionSection(ShapedSection):
     """One entry of ``criteria``: a requirement, and the formula that decides whether it is met."""
 
     id: Annotated[str, Field(strict=True, pattern=f"^{ID}$")]
-    """Of the requirement: letters, digits, '.', '_' and '-'."""
+    """Id of the requirement: letters, digits, '.', '_' and '-'."""
     formula: Text
-    """What must hold; see docs/criteria.md."""
+    """Formula that must hold; see docs/criteria.md."""
     text: Text | None = None
-    """The requirement in words."""
+    """Requirement in words."""
     severity: Severity = "major"
-    """Of a violation."""
+    """Severity of a violation."""
     tags: Annotated[list[Tag], Field(default=[])]
-    """Words to group criteria by."""
+    """Tags by which criteria are grouped."""
 
 
 class CriteriaFile(ShapedSection):
     """A file of criteria, for ``--criterion FILE``."""
 
     criteria: list[CriterionSection]
-    """The pass criteria."""
+    """Pass criteria, each with an id."""
 
 
 def read_sections(

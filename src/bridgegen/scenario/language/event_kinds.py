@@ -12,4 +12,4 @@ from bridgegen.scenario.language.path_event_kinds import PATH_KINDS
 __all__ = ["EVENT_KINDS", "EventKind", "EventQuantity"]
 
 EVENT_KINDS = {one.name: one for one in (*LANE_KINDS, *PATH_KINDS)}
-"""By name."""
+"""Kinds of recorded events by name."""

@@ -24,128 +24,130 @@ class TailSection(ShapedSection):
     """A generalised Pareto tail beyond a threshold, in place of the form's own."""
 
     threshold: Formula
-    """Where it begins, in the parameter's unit."""
+    """Value at which the tail begins, in the parameter's unit."""
     share: Number
-    """The probability beyond the threshold."""
+    """Probability beyond the threshold."""
     scale: Formula
-    """Of the excess, in the parameter's unit."""
+    """Scale of the excess over the threshold, in the parameter's unit."""
     shape: Number
-    """0: exponential; above: heavier; below: it ends."""
+    """Shape of the tail: exponential at 0, heavier above 0, of finite length below 0."""
 
 
 class FormSection(ShapedSection):
     """A form and its numbers; which of them it needs depends on the form."""
 
     distribution: FormName
-    """The form, cut off at ``low`` and ``high``."""
+    """Form of the distribution, which is truncated at ``low`` and ``high``."""
     low: Formula | None = None
-    """Smallest value; of the parameter's range by default."""
+    """Smallest value; that of the parameter's range by default."""
     high: Formula | None = None
-    """Largest value; of the parameter's range by default."""
+    """Largest value; that of the parameter's range by default."""
     mean: Formula | None = None
-    """normal, exponential: of the whole distribution, before it is cut off."""
+    """Mean before truncation, of normal and exponential."""
     deviation: Formula | None = None
-    """normal: standard deviation before it is cut off."""
+    """Standard deviation before truncation, of normal."""
     median: Formula | None = None
-    """lognormal: before it is cut off."""
+    """Median before truncation, of lognormal."""
     log_deviation: Formula | None = None
-    """lognormal: standard deviation of the natural logarithm."""
+    """Standard deviation of the natural logarithm, of lognormal."""
     shape: Formula | None = None
-    """gamma, weibull, pareto."""
+    """Shape parameter of gamma, weibull and pareto."""
     scale: Formula | None = None
-    """gamma, weibull, pareto: in the parameter's unit."""
+    """Scale parameter of gamma, weibull and pareto, in the parameter's unit."""
     threshold: Formula | None = None
-    """pareto: where it begins."""
+    """Value at which pareto begins."""
     alpha: Formula | None = None
-    """beta, from ``low`` to ``high``."""
+    """First shape parameter of beta, which reaches from ``low`` to ``high``."""
     beta: Formula | None = None
-    """beta, from ``low`` to ``high``."""
+    """Second shape parameter of beta, which reaches from ``low`` to ``high``."""
     edges: Annotated[list[Formula], Field(min_length=2, max_length=10_001)] | None = None
-    """histogram: ends of the bins, ascending."""
+    """Edges of the bins of histogram, ascending."""
     values: Annotated[list[NumberOrName], Field(min_length=1, max_length=10_000)] | None = None
-    """discrete: numbers, or names of a category."""
+    """Values of discrete: numbers, or names of a category."""
     weights: Annotated[list[Number], Field(min_length=1, max_length=10_000)] | None = None
-    """histogram, discrete: of the bins or values, of any sum; equal by default."""
+    """Weights of histogram's bins or discrete's values, of any sum; equal by default."""
     at: Annotated[list[Formula], Field(min_length=2, max_length=10_000)] | None = None
-    """polygon: places of its corners, ascending."""
+    """Positions of polygon's corners, ascending."""
     density: Annotated[list[Number], Field(min_length=2, max_length=10_000)] | None = None
-    """polygon: density at its corners, linear between them, of any integral."""
+    """Density at polygon's corners, linear between them, of any integral."""
     file: Text | None = None
-    """kde: a table (.csv) beside this file."""
+    """Table (.csv) beside this file with the data of kde."""
     column: Text | None = None
-    """kde: the table's column; the parameter's name by default."""
+    """Column of kde's table; the parameter's name by default."""
     bandwidth: Formula | None = None
-    """kde: standard deviation of the kernels, in the parameter's unit."""
+    """Standard deviation of kde's kernels, in the parameter's unit."""
 
 
 class PartSection(FormSection):
     """A part of a mixture."""
 
     weight: Number
-    """Its share of the mixture, of any sum."""
+    """Share of this part in the mixture; the shares may have any sum."""
 
 
 class MarginalSection(FormSection):
     """How one parameter is distributed."""
 
     parts: Annotated[list[PartSection], Field(min_length=1, max_length=100)] | None = None
-    """mixture: its parts."""
+    """Parts of mixture."""
     upper_tail: TailSection | None = None
-    """Above a threshold: peaks over it."""
+    """Generalised Pareto tail above a threshold."""
     lower_tail: TailSection | None = None
-    """Below a threshold: how far values fall short of it."""
+    """Generalised Pareto tail below a threshold."""
     source: Text | None = None
-    """Where these numbers come from, if not from the block's source."""
+    """Source of these numbers, if other than the block's source."""
 
 
 class CorrelationSection(ShapedSection):
     """The correlation of two parameters."""
 
     between: Annotated[list[Text], Field(min_length=2, max_length=2)]
-    """Two parameters."""
+    """Names of the two parameters."""
     value: Number
-    """Of their normal scores, above -1 and below 1."""
+    """Correlation of the parameters' normal scores, above -1 and below 1."""
 
 
 class DependenceSection(ShapedSection):
     """How parameters depend on each other, besides formulas."""
 
     correlation: list[CorrelationSection] = []
-    """A Gaussian copula: pairs that are not named have 0."""
+    """Correlations of a Gaussian copula; pairs that are not named have 0."""
 
 
 class EncountersSection(ShapedSection):
     """How often the scenario was met, and in how much driving."""
 
     count: Annotated[int, Field(strict=True)]
-    """Encounters that were counted."""
+    """Number of encounters that were counted."""
     hours: Number | None = None
-    """Of driving in which they were counted [h]."""
+    """Duration of the driving in which encounters were counted [h]."""
     km: Number | None = None
-    """Of driving in which they were counted [km]."""
+    """Distance of the driving in which encounters were counted [km]."""
     source: Text
-    """Where the numbers come from."""
+    """Source of the numbers."""
 
 
 class ExposureSection(ShapedSection):
     """How often a scenario is met, and with which values of its parameters."""
 
     source: Text
-    """Where the numbers come from."""
+    """Source of the numbers."""
     parameters: dict[str, MarginalSection] = {}
-    """By name: how it is distributed. Constraints of the scenario cut the joint distribution."""
+    """Distributions of the parameters, by name. Constraints of the scenario truncate the joint
+    distribution."""
     others: Literal["uniform", "default"] | None = None
-    """Searched parameters that are not named: spread evenly over their range, or at default."""
+    """Treatment of searched parameters that are not named: uniform over their range, or at their
+    default."""
     dependence: DependenceSection = DependenceSection()
-    """How they depend on each other; independent by default."""
+    """Dependence between the parameters; independent by default."""
     encounters: EncountersSection | None = None
-    """How often the scenario is met."""
+    """Frequency with which the scenario is met."""
 
 
 class ExposureFile(ShapedSection):
     """A file with the exposure of a scenario."""
 
     exposure_of: ScenarioName
-    """The scenario's name."""
+    """Name of the scenario."""
     exposure: ExposureSection
-    """The same block as in a scenario file."""
+    """Exposure of the scenario: the same block as in a scenario file."""

@@ -24,7 +24,7 @@ from bridgegen.scenario.language.story import CONDITIONS
 from bridgegen.scenario.language.story_schema import ACTIONS
 
 FILE = "bridgegen.schema.json"
-"""What `bridgegen new` calls it."""
+"""File of the JSON Schema that ``bridgegen new`` writes."""
 
 Kind = Literal["scenario", "fragment", "exposure"]
 _MODELS: dict[Kind, type[ShapedSection]] = {

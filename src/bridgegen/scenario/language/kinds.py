@@ -36,7 +36,7 @@ from bridgegen.scenario.language.expression import RESERVED
 TOLERANCE = 1e-4
 
 TURN = 360.0
-"""Degrees."""
+"""Full turn [deg]."""
 
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,63}")
 MOST_NAMES = 100
@@ -559,10 +559,10 @@ FLOAT, INTEGER = Number(), Whole()
 KINDS: Mapping[str, type[Kind]] = MappingProxyType(
     {one.name: one for one in (Number, Whole, Category, Angle)}
 )
-"""By the name that a scenario file gives."""
+"""Kinds of parameters by the name that a scenario file gives."""
 
 KEYS = ("unit", "low", "high", "values")
-"""Of a parameter in a scenario file: those that some kinds have and others not."""
+"""Keys of a parameter in a scenario file that only some kinds have."""
 
 
 def _divided(below: Float, width: Float) -> Float:

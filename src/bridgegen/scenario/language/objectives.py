@@ -13,7 +13,8 @@ PAPERS = ObjectiveSpec((Term("d_min", 0.8297), Term("v_d", 0.1703)), "fixed", "r
 """The paper's objective and thresholds (Section V, Table III), which count implausible traffic."""
 
 HARM = ObjectiveSpec((Term("harm", 1.0),), "fixed", "raw", rule="harm")
-"""The default: how much a scenario is a failure of the ego; see ``assess/conflict/harm.py``."""
+"""Default objective: how much a scenario is a failure of the ego; see
+``assess/conflict/harm.py``."""
 
 _CRITICAL: Path = ("objective", "critical")
 

@@ -186,7 +186,7 @@ class Places:
 
 
 _BESIDE = 0.75
-"""How far from the carriageway's edge a sign stands [m]; source: RSA 21, 0.5 to 1.5 m."""
+"""Distance of a sign from the carriageway's edge [m]; source: RSA 21, 0.5 to 1.5 m."""
 _MOST_CONES = 60
 
 

@@ -22,10 +22,10 @@ from bridgegen.scenario.language.shape import ID, Number, NumberOrName, ShapedSe
 
 
 MOST_ROWS = 100_000
-"""Combinations of all grids of a file together."""
+"""Largest number of combinations of all grids of a file together."""
 
 Score = Literal["relative impact speed", "impact speed", "speed reduction", "avoidance"]
-"""How a row is rated."""
+"""Quantity by which a row is rated."""
 
 Some = Annotated[list[NumberOrName], Field(min_length=1, max_length=1000)]
 
@@ -34,21 +34,21 @@ class GridSection(ShapedSection):
     """One grid of ``matrix``: all combinations of some values."""
 
     edition: Annotated[str, Field(strict=True, pattern=r"^[A-Za-z0-9][A-Za-z0-9_.-]{0,31}$")]
-    """Of the protocol, such as "2026" (in quotes); see --matrix."""
+    """Edition of the protocol, such as "2026" (in quotes); see --matrix."""
     name: Annotated[str, Field(strict=True, max_length=60)] = ""
-    """Which part of the edition it is."""
+    """Part of the edition that this grid is."""
     source: Text
-    """Where the protocol says so."""
+    """Place in the protocol that states the grid."""
     values: dict[str, Some] = Field(default={})
-    """By parameter: its values, each combined with all of the others."""
+    """Values of parameters, by name; each is combined with all of the others."""
     sets: Annotated[list[dict[str, NumberOrName]], Field(max_length=1000)] = Field(default=[])
     """Values of several parameters that go together: each set is combined with all values."""
     score: Score | None = None
-    """How its rows are rated; see docs/suites.md."""
+    """Quantity by which the grid's rows are rated; see docs/suites.md."""
     points: Annotated[Number, Field(gt=0.0, le=1000.0)] | None = None
-    """What all of its rows are worth together, if they are rated."""
+    """Points of all rows of the grid together, if they are rated."""
     graded: Annotated[bool, Field(strict=True)] = True
-    """Whether colours count in part; if not, any colour but red counts fully (extended ranges)."""
+    """Whether colours score in part; if not, any colour but red scores fully (extended ranges)."""
 
 
 @dataclass(frozen=True)
@@ -236,13 +236,14 @@ class ClauseSection(ShapedSection):
     """One entry of ``clauses``: a requirement of a regulation, and what violates it."""
 
     id: Annotated[str, Field(strict=True, pattern=f"^{ID}$")]
-    """Of the clause: letters, digits, '.', '_' and '-'."""
+    """Id of the clause: letters, digits, '.', '_' and '-'."""
     text: Text
-    """The requirement in words."""
+    """Requirement in words."""
     collisions: Collisions | None = None
-    """Which collisions of the ego violate it: any, or those that a model of UN R157 avoids."""
+    """Collisions of the ego that violate the clause: any, or those that a model of UN R157
+    avoids."""
     criteria: Annotated[list[Tag], Field(default=[])]
-    """Ids of criteria of this file: one that is violated violates the clause."""
+    """Ids of criteria of this file; a violated one violates the clause."""
 
 
 def read_clause(given: Mapping[str, Any]) -> Clause:

@@ -89,7 +89,7 @@ KNOBS: Mapping[Template, Mapping[str, Knob]] = MappingProxyType(
         },
     }
 )
-"""The measures of each template."""
+"""Parameters of each template of a road network."""
 
 HEADINGS: Mapping[str, Mapping[str, float]] = MappingProxyType(
     {
@@ -108,10 +108,11 @@ LEG_NAMES: Mapping[str, tuple[str, ...]] = MappingProxyType(
 """The legs of a template that has no headings."""
 
 CROSSWALK_GAP = 1.0
-"""From the junction's edge to a leg's crosswalk, and from that to the stop line [m]; ours."""
+"""Distance from the junction's edge to a leg's crosswalk, and from there to the stop line [m];
+ours."""
 
 LETTERS = "ABCDE"
-"""Legs with a heading are called so; the paper numbers their points P1, P2 (A) to P9, P10 (E)."""
+"""Names of legs with a heading; the paper numbers their points P1, P2 (A) to P9, P10 (E)."""
 
 
 @dataclass(frozen=True)

@@ -21,7 +21,7 @@ from bridgegen.scenario.language.roads import (
 from bridgegen.scenario.language.schema import LegSection, RoadsSection
 
 LEAST_ANGLE = 45.0
-"""Between two legs of a junction [deg]."""
+"""Least angle between two legs of a junction [deg]."""
 
 _FEWEST = {"crossroads": 2, "t-junction": 3, "roundabout": 3}
 _MOST = {"crossroads": 5, "t-junction": 3, "roundabout": 5}

@@ -16,7 +16,7 @@ GRIP_FORMULA = f"{DRY_FRICTION}*{GRAVITY}"
 """Greatest lateral acceleration of a tyre on a dry road [m/s²], as a part of a formula."""
 
 STRAIGHT = 45.0
-"""A route that turns by less goes straight on [deg]."""
+"""Turn angle below which a route goes straight on [deg]."""
 
 _SPEED_WHY = "Nobody drives faster than the road allows, less in rain, in fog and by night."
 _SPEED_SOURCE = (

@@ -52,45 +52,46 @@ class LegSection(ShapedSection):
     """One leg of a junction or roundabout."""
 
     heading: Degrees | None = None
-    """Outwards [deg], counter-clockwise from east; legs are 45° apart at least."""
+    """Direction of the leg outwards [deg], counter-clockwise from east; legs are 45° apart at
+    least."""
     lanes_in: Annotated[Number, Field(ge=0, le=6, multiple_of=1)] | None = None
     """Number of lanes towards the junction."""
     lanes_out: Annotated[Number, Field(ge=0, le=6, multiple_of=1)] | None = None
     """Number of lanes away from the junction."""
     turns: list[list[Literal["left", "straight", "right"]]] = []
-    """Where each lane towards the junction leads, innermost first, e.g. [[left], [straight]]."""
+    """Turns from each lane towards the junction, innermost first, e.g. [[left], [straight]]."""
     sign: Literal["stop", "yield"] | None = None
-    """What stands at its stop line."""
+    """Traffic sign at the leg's stop line."""
     crosswalk: Annotated[bool, Field(strict=True)] | None = None
-    """Whether it has a crosswalk at the junction; that of ``crosswalks`` by default."""
+    """Whether the leg has a crosswalk at the junction; the value of ``crosswalks`` by default."""
 
 
 class SegmentSection(ShapedSection):
     """One stretch of a road."""
 
     length: Length
-    """[m]"""
+    """Length of the segment [m]."""
     curvature: Curvature = 0.0
-    """At its start [1/m], left positive."""
+    """Curvature at the segment's start [1/m], left positive."""
     end_curvature: Curvature | None = None
-    """At its end [1/m]; the same by default."""
+    """Curvature at the segment's end [1/m]; that at its start by default."""
 
 
 class RoadsSection(ShapedSection):
     """The road network: its legs and its template parameters (see ``roads.KNOBS``)."""
 
     legs: dict[str, LegSection] = {}
-    """Of a junction or roundabout, by letter, A to E."""
+    """Legs of a junction or roundabout, by letter, A to E."""
     segments: list[SegmentSection] = []
-    """Of a road, one after the other; straight by default."""
+    """Segments of a road, one after the other; straight by default."""
     crosswalk_at: Metres | None = None
-    """Of a road: where its crosswalk's centre lies [m]."""
+    """Distance of a crosswalk's centre from the start of a road without junction [m]."""
     crosswalks: Annotated[bool, Field(strict=True)] = False
     """Whether there are crosswalks on all legs."""
     signals: Literal["none", "two-phase"] = "none"
-    """Traffic lights at a junction: none, or a phase for each pair of opposite legs."""
+    """Traffic lights of a junction: none, or a phase for each pair of opposite legs."""
     road_type: Literal["town", "rural", "motorway"] | None = None
-    """What kind of road it is."""
+    """Type of the road."""
     lane_width: Length | None = None
     speed_limit: Speed | None = None
     sidewalk_width: Length | None = None
@@ -120,23 +121,23 @@ class ParameterSection(ShapedSection):
     """One entry of ``parameters``."""
 
     axis: AxisName
-    """The part of the search space that it belongs to."""
+    """Axis: the part of the search space that the parameter belongs to."""
     kind: KindName = "float"
-    """What it takes: any number, whole ones, one of some names, or angles."""
+    """Kind of the parameter's values: numbers, whole numbers, names of a category, or angles."""
     unit: Text | None = None
-    """SI; see the list of units. A category has none."""
+    """SI unit; see the list of units. A category has none."""
     low: Measured | None = None
-    """The smallest value."""
+    """Smallest value, in the parameter's unit."""
     high: Measured | None = None
-    """The largest value; of an angle, that may be less than the smallest."""
+    """Largest value, in the parameter's unit; of an angle, it may be less than the smallest."""
     values: Annotated[list[Text], Field(min_length=2)] | None = None
-    """The names of a category's values."""
+    """Names of a category's values."""
     default: NumberOrName
-    """The value while its axis is not searched."""
+    """Value of the parameter while its axis is not searched."""
     description: Text
-    """What it is."""
+    """Quantity that the parameter states, in words."""
     source: Text
-    """Where its range comes from."""
+    """Source of the range."""
 
     @field_validator("low", "high", "default", mode="before")
     @classmethod
@@ -148,150 +149,152 @@ class BoundSection(ShapedSection):
     """One entry of ``bounds``."""
 
     target: Text
-    """The parameter that is limited."""
+    """Parameter that is limited."""
     lo: Formula | None = None
-    """It is at least this: a formula of other parameters."""
+    """Lower limit: a formula of other parameters."""
     hi: Formula | None = None
-    """It is at most this: a formula of other parameters."""
+    """Upper limit: a formula of other parameters."""
     why: Text
-    """The reason."""
+    """Reason of the limit."""
     source: Text
-    """Source of the rule."""
+    """Source of the limit."""
 
 
 class DerivedSection(ShapedSection):
     """One entry of ``derived``."""
 
     axis: AxisName
-    """The axis that it belongs to."""
+    """Axis that the derived quantity belongs to."""
     unit: Text
-    """SI; see the list of units."""
+    """SI unit; see the list of units."""
     value: Formula
-    """A formula of parameters."""
+    """Formula of parameters that gives the value."""
     why: Text
-    """The reason."""
+    """Reason of the formula."""
     source: Text
-    """Source of the rule."""
+    """Source of the formula."""
     description: Text
-    """What it is."""
+    """Quantity that is derived, in words."""
 
 
 class FragmentFile(ShapedSection):
     """A file that scenarios include: parameters and their constraints."""
 
     fragment: Word
-    """Its name."""
+    """Name of the fragment."""
     description: Text
-    """What it is."""
+    """Content of the fragment, in a sentence or two."""
     parameters: dict[str, ParameterSection] = {}
-    """By name: what may vary."""
+    """Parameters that may vary, by name."""
     bounds: list[BoundSection] = []
     """Limits that depend on other parameters; the search never leaves them."""
     derived: dict[str, DerivedSection] = {}
-    """By name: what follows from parameters."""
+    """Quantities that follow from parameters, by name."""
 
 
 class EffectSection(ShapedSection):
     """One entry of ``effects``: a function of the user's that adds to each scenario."""
 
     function: Text
-    """FILE.py:FUNCTION beside the scenario, or the name of an entry point."""
+    """Function: FILE.py:FUNCTION beside the scenario, or the name of an entry point."""
 
 
 class TermSection(ShapedSection):
     """One metric of the objective."""
 
     metric: QuantityName
-    """See 'bridgegen list metrics'; or the margin of a criterion, criterion:ID."""
+    """Metric: see 'bridgegen list metrics'; or the margin of a criterion, criterion:ID."""
     weight: Number | None = None
-    """With ``weights: fixed``."""
+    """Weight of the metric, with ``weights: fixed``."""
 
 
 class CriticalSection(ShapedSection):
     """What makes a scenario critical."""
 
     n_collision_above: Number = 0.0
-    """More collisions than this are critical."""
+    """Number of collisions above which a scenario is critical."""
     d_min_below: Metres = 2.0
-    """Nearer than this [m] is critical, if v_d is large enough."""
+    """Minimum distance below which a scenario is critical [m], if v_d is large enough."""
     v_d_at_least: MetresPerSecond = 1.0
-    """How fast the ego must be at d_min for that [m/s]."""
+    """Least speed of the ego at the minimum distance for ``d_min_below`` to apply [m/s]."""
 
 
 class ObjectiveSection(ShapedSection):
     """What is optimised."""
 
     terms: Annotated[list[TermSection], Field(min_length=1)]
-    """What is minimised or maximised."""
+    """Metrics that are optimised."""
     weights: Literal["fixed", "entropy"]
-    """Of the terms, or by the entropy of a random sample."""
+    """Weights of the terms: those that they state, or by the entropy of a random sample."""
     scale: Literal["raw", "standardised"]
-    """In the units of the metrics, or standardised by a random sample."""
+    """Scale of the terms: in the metrics' units, or standardised by a random sample."""
     critical: Annotated[
         CriticalSection | Literal["harm", "criteria"], OrWord(CriticalSection, "harm", "criteria")
     ] = CriticalSection()
-    """What makes a scenario critical: thresholds, harm, or criteria: one that is violated."""
+    """Rule by which a scenario is critical: thresholds; harm; or criteria, of which one is
+    violated."""
 
 
 class ScenarioFile(ShapedSection):
     """A logical scenario."""
 
     scenario: Word
-    """Its name; the file's name is NAME.yaml."""
+    """Name of the scenario; the file's name is NAME.yaml."""
     title: Text
-    """A few words."""
+    """Title in a few words."""
     description: Text
-    """What happens, in a sentence or two."""
+    """Description of what happens, in a sentence or two."""
     source: Text
-    """Where it comes from: a standard, an accident database, a drive."""
+    """Source of the scenario: a standard, an accident database, a drive."""
     template: Literal["crossroads", "t-junction", "roundabout", "merge", "road"]
-    """The kind of road network (layers 1 and 2)."""
+    """Kind of road network (layers 1 and 2)."""
     roads: RoadsSection = RoadsSection()
-    """Its measures."""
+    """Dimensions and rules of the road network."""
     driver: Word = "route-follower"
     """Default driver of the ego (see --ego and 'bridgegen list drivers')."""
     others: Literal["attentive", "insistent", "scripted"] = "scripted"
     """Default driver of the other participants (see --others, and their ``driver``)."""
     duration: Seconds
-    """Of the simulation [s]."""
+    """Duration of the simulation [s]."""
     time_step: Seconds
-    """Of the simulation [s]."""
+    """Time step of the simulation [s]."""
     road_end: Literal["leave", "stand"] = "leave"
-    """What participants other than the ego do where their road ends: leave, or stand."""
+    """Behaviour of participants other than the ego where their road ends: leave, or stand."""
     axes: Annotated[list[AxisName], Field(min_length=1)]
     """Axes that are searched by default (see --axes)."""
     include: list[Text] = []
-    """Fragments: of the catalogue, or files beside this one; "NAME as PREFIX_" again."""
+    """Fragments to include: of the catalogue, or files beside this one; "NAME as PREFIX_" again."""
     participants: dict[str, ParticipantSection]
-    """By name (layer 4); one is ``ego``."""
+    """Participants by name (layer 4); one is ``ego``."""
     events: dict[str, EventSection] = {}
-    """By name: what happens, and when."""
+    """Events by name: what happens, and when."""
     jams: dict[str, JamSection] = {}
-    """By name (layer 3)."""
+    """Queues of standing vehicles by name (layer 3)."""
     road_works: dict[str, WorksSection] = {}
-    """By name (layer 3)."""
+    """Lanes closed by cones, by name (layer 3)."""
     effects: list[EffectSection] = []
-    """Functions of yours that add to each scenario."""
+    """Functions of your own that add to each scenario."""
     parameters: dict[str, ParameterSection] = {}
-    """By name: what may vary."""
+    """Parameters that may vary, by name."""
     defaults: dict[str, NumberOrName] = {}
-    """Changes of included parameters."""
+    """New default values of included parameters, by name."""
     bounds: list[BoundSection] = []
     """Limits that depend on other parameters; the search never leaves them."""
     derived: dict[str, DerivedSection] = {}
-    """By name: what follows from parameters."""
+    """Quantities that follow from parameters, by name."""
     criteria: list[CriterionSection] = []
-    """Pass criteria: formulas that a scenario must keep, each with an id."""
+    """Pass criteria: formulas that must hold, each with an id."""
     matrix: list[GridSection] = []
     """Values to test instead of a sample of the ranges: what 'bridgegen suite' runs."""
     clauses: list[ClauseSection] = []
     """Clauses of a regulation or protocol, which a suite judges."""
     recorded: RecordedSection | None = None
-    """Which recorded events are this scenario, and its parameters in them: 'bridgegen mine'."""
+    """Recorded events that are this scenario, and its parameters in them: see 'bridgegen mine'."""
     objective: Annotated[
         ObjectiveSection | Literal["harm", "paper"], OrWord(ObjectiveSection, "harm", "paper")
     ] = "harm"
-    """What is optimised, and what counts as critical; harm: see docs/conflicts.md; paper: the
+    """Objective, and rule by which a scenario is critical; harm: see docs/conflicts.md; paper: the
     fitness and the thresholds of the paper."""
     exposure: ExposureSection | None = None
-    """How often it is met, and with which values; no part of a search."""
+    """Frequency of the scenario on the road, and distributions of its parameters; not used by a
+    search."""

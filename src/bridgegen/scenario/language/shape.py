@@ -115,7 +115,7 @@ Seconds = Annotated[Number, _number_in("s"), _MEASURED]
 MetresPerSecond = Annotated[Number, _number_in("m/s"), _MEASURED]
 Degrees = Annotated[Number, _number_in("deg"), _MEASURED]
 Measured = Annotated[Number, _MEASURED]
-"""In the unit that another key says, which a validator converts it to."""
+"""Number in the unit that another key states; a validator converts it."""
 
 # The same, or the name of a parameter in that unit.
 QuantityField = Annotated[float | str, _quantity_in(""), _QUANTITY]
@@ -200,7 +200,7 @@ _WORDS = {
     f"^{ID}$": "must be a word of letters, digits, '.', '_' and '-', at most 64 characters, the "
     "first a letter or digit",
 }
-"""By the pattern of a text: what it must be."""
+"""Rules for a text in words, by its regular expression."""
 
 
 def section(model: type[Section], data: object) -> Section | None:

@@ -11,7 +11,7 @@ from bridgegen.scenario.participants import PARTICIPANTS, Body, Conduct
 
 Way = Literal["in", "out"]
 STRIPS = ("sidewalk", "shoulder")
-"""What a waypoint may lie on besides driving lanes."""
+"""Strips besides driving lanes on which a waypoint may lie."""
 
 
 def in_words(value: Quantity, unit: str) -> str:
@@ -328,7 +328,7 @@ CONDITIONS: Mapping[str, ConditionKind] = MappingProxyType(
         "began": ConditionKind("s", "≥", False, "time since another event began"),
     }
 )
-"""What an event may wait for."""
+"""Kinds of conditions of an event, by name."""
 
 
 @dataclass(frozen=True)

@@ -36,79 +36,81 @@ class WaypointSection(ShapedSection):
     """A place on a leg."""
 
     point: Annotated[str, Field(strict=True, pattern=r"^P([1-9]|10)$")] | None = None
-    """Of the paper's crossroads: P1 inbound on leg A, P2 outbound, P3 inbound on B …"""
+    """Point of the paper's crossroads: P1 inbound on leg A, P2 outbound, P3 inbound on B …"""
     leg: Word | None = None
-    """A to E of a junction; main, ramp or after of a merge; a road needs none."""
+    """Leg: A to E of a junction; main, ramp or after of a merge; a road needs none."""
     way: Literal["in", "out"] | None = None
-    """Towards the junction, or away from it; of a road ``out`` is its direction."""
+    """Direction of travel: towards the junction, or away from it; along a road it is ``out``."""
     distance: Length
-    """[m] along the leg from the junction's edge; of a road from its start."""
+    """Distance along the leg from the junction's edge, or along a road from its start [m]."""
     lane: LaneField = 1
-    """1 is the innermost lane of its direction; or sidewalk, or shoulder."""
+    """Lane number from the inside of its direction, 1 is the innermost; or sidewalk, or
+    shoulder."""
     offset: Length = 0.0
-    """To the left of the lane's centre [m], kept while driving."""
+    """Lateral offset from the lane's centre [m], left positive; it is kept while driving."""
 
 
 class BodySection(ShapedSection):
     """A body of one's own; what is not said is the type's."""
 
     length: Annotated[Metres | None, Field(gt=0.0, le=60.0)] = None
-    """[m]"""
+    """Length of the body [m]."""
     width: Annotated[Metres | None, Field(gt=0.0, le=60.0)] = None
-    """[m]"""
+    """Width of the body [m]."""
     height: Annotated[Metres | None, Field(gt=0.0, le=60.0)] = None
-    """[m]"""
+    """Height of the body [m]."""
     mass: Annotated[Number | None, Field(gt=0.0, le=1e6)] = None
-    """[kg]"""
+    """Mass of the body [kg]."""
     max_speed: Annotated[MetresPerSecond | None, Field(gt=0.0, le=150.0)] = None
-    """[m/s]"""
+    """Largest speed [m/s]."""
     max_acceleration: Annotated[Number | None, Field(gt=0.0, le=30.0)] = None
-    """[m/s²]"""
+    """Largest acceleration [m/s²]."""
     max_deceleration: Annotated[Number | None, Field(gt=0.0, le=30.0)] = None
-    """[m/s²]"""
+    """Largest deceleration [m/s²]."""
 
 
 class PlaceSection(ShapedSection):
     """Where a participant starts and goes, where a category chooses one of several."""
 
     start: WaypointSection
-    """Where it stands at time 0."""
+    """Position at time 0."""
     end: WaypointSection | None = None
-    """Where its route ends; the ego's must."""
+    """End of the route; required for the ego."""
 
 
 class ParticipantSection(ShapedSection):
     """One road user; the one that is called ``ego`` is under test."""
 
     type: Annotated[TypeName, AfterValidator(canonical)]
-    """What it is."""
+    """Type of the participant."""
     type_by: Word | None = None
-    """A category that gives type or model instead, in each evaluation; its default is said, too."""
+    """Category that gives type or model instead, in each evaluation; its default is stated as
+    well."""
     model: ModelName | None = None
-    """Which one of its type: a test target or a design vehicle, whose body it has."""
+    """Model of the type, with its body: a test target or a design vehicle."""
     body: BodySection | None = None
-    """Its dimensions and what it can do, where they are not the type's."""
+    """Dimensions and limits of motion where they differ from the type's."""
     start: WaypointSection | None = None
-    """Where it stands at time 0."""
+    """Position at time 0."""
     end: WaypointSection | None = None
-    """Where its route ends; the ego's must."""
+    """End of the route; required for the ego."""
     place_by: Word | None = None
-    """A category that chooses one of ``places`` in each evaluation."""
+    """Category that chooses one of ``places`` in each evaluation."""
     places: dict[Word, PlaceSection] = {}
-    """Instead of start and end: several, by the category's values."""
+    """Starts and ends to choose from, by the category's values, instead of start and end."""
     path: list[WaypointSection] = []
-    """Instead of start and end: straight lines through places; of a vehicle a smooth curve from the
-    first to the last, which the others bend."""
+    """Waypoints of a path, instead of start and end: straight lines; of a vehicle a smooth curve
+    from the first to the last, which the others bend."""
     speed: Speed = 0.0
-    """At time 0 [m/s]; of the ego also its target; a vehicle reverses below 0."""
+    """Speed at time 0 [m/s], and target speed of the ego; a vehicle reverses below 0."""
     heading: Angle = 0.0
-    """Turned from its lane's direction [deg], left positive; at 180 it faces the traffic."""
+    """Heading relative to the lane's direction [deg], left positive; 180 faces the traffic."""
     exceeds_limit: Annotated[str, Field(strict=True, min_length=1, max_length=200)] | None = None
-    """Why it may be faster than road and weather allow: an emergency vehicle on a call, say."""
+    """Reason why it may be faster than road and weather allow, such as an emergency call."""
     siren: Annotated[bool, Field(strict=True)] = False
-    """Of an emergency vehicle: blue light and siren are on, and all give way to it."""
+    """Whether an emergency vehicle has its blue light and siren on, so that all give way to it."""
     driver: Word | None = None
-    """attentive, insistent or scripted, instead of ``others``; not of the ego."""
+    """Driver: attentive, insistent or scripted, instead of ``others``; not of the ego."""
 
 
 class ConditionSection(ShapedSection):
@@ -130,15 +132,15 @@ class ConditionSection(ShapedSection):
         ]
         | None
     ) = None
-    """What is compared with the value."""
+    """Kind of quantity that is compared with ``value``."""
     value: QuantityField = 0.0
-    """In the kind's unit; of ``after`` and ``began`` a constant; none of ``contact``."""
+    """Threshold in the kind's unit; of ``after`` and ``began`` a constant; none of ``contact``."""
     to: Word | None = None
-    """The other participant, of distance, gap, ttc, headway and contact."""
+    """Other participant, for distance, gap, ttc, headway and contact."""
     of: Word | None = None
-    """Whose state is looked at; the event's own participant by default."""
+    """Participant whose state is evaluated; the event's own by default."""
     event: Word | None = None
-    """The event that must have ended, of ``after``, or begun, of ``began``."""
+    """Event that must have ended, for ``after``, or begun, for ``began``."""
     all: "list[ConditionSection]" = []
     """Conditions that must hold together."""
 
@@ -153,114 +155,114 @@ class LaneChangeSection(ShapedSection):
     """A lane change of an event."""
 
     lanes: Annotated[Number, Field(ge=-5, le=5, multiple_of=1)]
-    """How many, to the left of its direction of travel positive."""
+    """Number of lanes to change, to the left of its direction of travel positive."""
     time: Duration | None = None
-    """It takes so long [s]."""
+    """Duration of the lane change [s]."""
     distance: Length | None = None
-    """It takes so far [m]."""
+    """Length of the lane change [m]."""
     shape: Literal["linear", "cubic", "sinusoidal"] = "sinusoidal"
-    """Of the way aside over time, or distance."""
+    """Profile of the lateral movement over time, or distance."""
 
 
 class LaneOffsetSection(ShapedSection):
     """A way aside: within its lane, or over its edge."""
 
     offset: Length
-    """Where to, left of its lane's centre positive [m]."""
+    """Target offset from the lane's centre [m], left positive."""
     acceleration: Acceleration = 1.0
-    """Across the lane at most [m/s²]."""
+    """Largest lateral acceleration [m/s²]."""
     shape: Literal["linear", "cubic", "sinusoidal"] = "sinusoidal"
-    """Of the way aside over time."""
+    """Profile of the lateral movement over time."""
 
 
 class KeepDistanceSection(ShapedSection):
     """A distance that it keeps behind another one, bumper to bumper, from then on."""
 
     to: Word
-    """The other participant."""
+    """Other participant that is followed."""
     distance: Length | None = None
-    """So far [m]."""
+    """Distance to keep, bumper to bumper [m]."""
     time: Duration | None = None
-    """Or so long, at its own speed [s]."""
+    """Time gap to keep instead of a distance, at its own speed [s]."""
     acceleration: Acceleration = 2.0
-    """At most, to get there [m/s²]; ISO 15622 allows an adaptive cruise control as much."""
+    """Largest acceleration [m/s²]; ISO 15622 allows an adaptive cruise control as much."""
     braking: Acceleration = 3.5
-    """At most [m/s²]; ISO 15622 again."""
+    """Largest deceleration [m/s²]; ISO 15622 allows an adaptive cruise control as much."""
     max_speed: Speed | None = None
-    """At most [m/s], while it catches up."""
+    """Largest speed while it catches up [m/s]."""
 
 
 class ArrivalSection(ShapedSection):
     """It chooses its speed so that it arrives as another one does."""
 
     at: WaypointSection
-    """Where it arrives."""
+    """Position at which the event's participant arrives."""
     other: Word
-    """The other participant."""
+    """Other participant whose arrival it matches."""
     place: WaypointSection
-    """Where that one arrives."""
+    """Position at which the other participant arrives."""
 
 
 ACTIONS = (
     "speed", "lane_change", "lane_offset", "keep_distance", "arrive", "indicate", "weather",
 )  # fmt: skip
-"""The keys of an event that are actions; it has one of them at least."""
+"""Keys of an event that are actions; it has one of them at least."""
 
 
 class EventSection(ShapedSection):
     """Something that happens."""
 
     participant: Word | None = None
-    """The participant that acts; none where the weather changes."""
+    """Participant that acts; none where the weather changes."""
     speed: Speed | None = None
-    """It takes up this speed [m/s]; a vehicle reverses below 0."""
+    """Target speed [m/s]; a vehicle reverses below 0."""
     rate: Acceleration | None = None
-    """At this rate [m/s²]."""
+    """Acceleration or deceleration of the speed change [m/s²]."""
     jerk: Number | None = None
-    """The acceleration, at most the rate, builds up and is released so fast [m/s³]."""
+    """Rate at which the acceleration, up to ``rate``, builds up and is released [m/s³]."""
     time: Duration | None = None
-    """Within so long [s]."""
+    """Duration of the speed change [s]."""
     distance: Length | None = None
-    """Within so far [m]."""
+    """Distance covered during the speed change [m]."""
     shape: Literal["linear", "cubic", "sinusoidal"] = "linear"
-    """Of the speed over time, or distance."""
+    """Profile of the speed over time, or distance."""
     lane_change: LaneChangeSection | None = None
-    """It changes lane."""
+    """Lane change of the participant."""
     lane_offset: LaneOffsetSection | None = None
-    """It moves aside."""
+    """Lateral movement of the participant in its lane, or over its edge."""
     keep_distance: KeepDistanceSection | None = None
-    """It follows another one."""
+    """Distance that the participant keeps behind another one."""
     arrive: ArrivalSection | None = None
-    """It arrives somewhere as another one does elsewhere."""
+    """Arrival of the participant at the same time as that of another one elsewhere."""
     indicate: Literal["left", "right", "hazard", "off"] | None = None
-    """It indicates, or switches its hazard lights on, or all of these off."""
+    """Indicator or hazard lights that the participant switches on, or off."""
     weather: Word | None = None
-    """The weather becomes that of the parameters with this prefix."""
+    """Prefix of the parameters that state the new weather."""
     when: Annotated[list[ConditionSection], Field(min_length=1)]
-    """Alternatives; the first to hold starts the event."""
+    """Alternative conditions; the first to hold starts the event."""
 
 
 class JamSection(ShapedSection):
     """A queue of standing vehicles."""
 
     tail: WaypointSection
-    """Where the last of them stands."""
+    """Position of the last vehicle."""
     vehicles: Annotated[list[QueueName], Field(min_length=1)]
-    """Their types, the last first."""
+    """Types of the vehicles, the last first."""
     gap: Length = 3.0
-    """Between two of them [m]."""
+    """Gap between two vehicles [m]."""
 
 
 class WorksSection(ShapedSection):
     """A lane that is closed by cones."""
 
     start: WaypointSection
-    """On the lane that is closed."""
+    """Position on the closed lane at which the road works begin."""
     length: Metres
-    """[m]"""
+    """Length of the road works [m]."""
     taper: Metres
-    """Over which the cones cross the lane [m]."""
+    """Length over which the cones cross the lane [m]."""
     spacing: Metres = 5.0
-    """Of the cones [m]."""
+    """Distance between two cones [m]."""
     sign_before: Metres = 40.0
-    """How far before them the sign stands [m]."""
+    """Distance of the sign before the road works [m]."""

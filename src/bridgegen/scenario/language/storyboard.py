@@ -45,10 +45,10 @@ from bridgegen.scenario.participants import PARTICIPANTS, TYPES, Body
 EGO = "ego"
 
 MOST_ASIDE = 4.0
-"""From the lane's centre [m]: a lane and a shoulder are seldom wider."""
+"""Largest offset from the lane's centre [m]: a lane and a shoulder are seldom wider."""
 
 FASTEST_REVERSE = -5.0
-"""[m/s]; 18 km/h is about what a reverse gear does."""
+"""Fastest speed in reverse [m/s]; 18 km/h is about what a reverse gear does."""
 
 _OF_EVENTS = ("after", "began")
 
@@ -607,11 +607,11 @@ class RecordedSection(ShapedSection):
     """The recorded events that are this scenario, and its parameters in them."""
 
     event: Text
-    """The kind of event; see docs/recordings.md."""
+    """Kind of the recorded event; see docs/recordings.md."""
     parameters: dict[str, Formula]
-    """By parameter of the scenario: a formula of the event's quantities."""
+    """Formulas of the event's quantities, by parameter of the scenario."""
     where: Text | None = None
-    """Which events count: a condition on their quantities."""
+    """Condition on the quantities of the events that count."""
 
 
 def read_recorded(

@@ -19,7 +19,7 @@ from bridgegen.base.arrays import Bool, Float, as_float
 from bridgegen.scenario.language.space import SearchSpace
 
 MOST = 2**21
-"""Rows that are proposed for one box, at most."""
+"""Largest number of rows that are proposed for one box."""
 
 _LEAST = 2**14  # rows that are proposed at least: so many look for the largest chance
 _AT_ONCE = 4096

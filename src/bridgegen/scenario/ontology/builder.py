@@ -168,7 +168,7 @@ class Builder:
 
 
 DIGITS = 9
-"""Decimals of a course's metres and degrees: with them it is written, read and run as it was."""
+"""Decimals of a course's metres and degrees: enough to write, read and run it unchanged."""
 
 
 def rounded(course: Float) -> Float:

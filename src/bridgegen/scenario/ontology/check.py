@@ -28,7 +28,7 @@ __all__ = ["Violation", "check", "constraints_in_words"]
 
 _SH = "http://www.w3.org/ns/shacl#"
 _KEPT = 8
-"""Compiled scenarios that are remembered, and for each, individuals that conform to it."""
+"""Number of compiled scenarios that are kept, and for each, of individuals that conform to it."""
 
 
 def check(individuals: Individuals, scenario: "LogicalScenario | None" = None) -> list[Violation]:

@@ -349,11 +349,11 @@ def _conflicts() -> Iterator[Rule]:
 
 
 FARTHEST_BESIDE = 5.0
-"""How far from the road's edge what stands beside it may be [m], to be still seen as this road's;
-ours (signs stand 0.5 to 1.5 m from it, RSA 21)."""
+"""Largest distance from the road's edge of what stands beside it to belong to this road [m]; ours
+(signs stand 0.5 to 1.5 m from it, RSA 21)."""
 
 _OURS = "FILTER NOT EXISTS { ?value bg:has_s ?s }"
-"""Places on an imported map are left to it."""
+"""SPARQL filter that leaves places on an imported map to the map."""
 
 
 def placement_rules() -> Iterator[Rule]:

@@ -31,7 +31,8 @@ from bridgegen.scenario.ontology.vocabulary import (
 
 MAX_BYTES = 100 * 2**20
 MAX_DEPTH = 256
-"""Of XML elements, and of anonymous nodes that are compared with the ontology's own."""
+"""Largest nesting depth of XML elements, and of anonymous nodes that are compared with the
+ontology's own."""
 
 _IMPORTS = ox.NamedNode(OWL + "imports")
 _ONTOLOGY = ox.NamedNode(ONTOLOGY)

@@ -22,9 +22,9 @@ _RULES = {
 }  # fmt: skip
 _UNSAID = frozenset({TYPE, bg("has_name"), bg("has_parameter"), bg("binds_property")})
 _DEEP = 8
-"""Individuals within individuals; a circle in an edited file ends there."""
+"""Largest depth of individuals within individuals; a circle in an edited file ends there."""
 _MOST_PLACES = 12
-"""Maximum of a trajectory that is listed; of a longer one, its two ends are."""
+"""Largest number of places of a trajectory that are listed; of a longer one, its two ends are."""
 
 
 @dataclass

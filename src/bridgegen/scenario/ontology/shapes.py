@@ -39,7 +39,7 @@ WEATHER_PATHS = {
     for link, _, names in WEATHER
     for name in names
 }
-"""From a ``bg:Weather`` to the value of each of its parameters."""
+"""Property paths from a ``bg:Weather`` to the values of its parameters, by name."""
 
 _HEADER = f"""\
 @prefix bg: <{BG}> .

@@ -14,7 +14,7 @@ import math
 from bridgegen.scenario.language.expression import Expression
 
 UNDEFINED = "?undefined"
-"""Never bound: using it is SPARQL's error, the counterpart of NaN."""
+"""Variable that is never bound: using it is SPARQL's error, the counterpart of NaN."""
 
 _ARITHMETIC: dict[type[ast.operator], str] = {
     ast.Add: "+",
@@ -32,7 +32,7 @@ _COMPARE: dict[type[ast.cmpop], str] = {
 _LN2 = math.log(2.0)
 _LARGEST_POWER = 64
 _BITS = (512, 256, 128, 64, 32, 16, 8, 4, 2, 1)
-"""Of the exponents of 2 that a double can have."""
+"""Binary digits of the exponent of 2 that a double can have, as numbers."""
 _NATIVE = {"abs": "ABS", "ceil": "CEIL", "floor": "FLOOR", "round": "ROUND"}
 
 

@@ -34,7 +34,7 @@ _SURELY = {
     XSD + "integer": re.compile(r"[+-]?[0-9]+"),
     XSD + "string": re.compile(r".*", re.DOTALL),
 }
-"""What is surely in a datatype's lexical space, if not all of it."""
+"""Regular expressions of texts that are certainly in a datatype's lexical space, if not of all."""
 
 
 @dataclass(frozen=True)

@@ -30,13 +30,14 @@ from bridgegen.scenario.ontology.site import (
 JUNCTION_ID = "100"
 
 BESIDE = 0.75
-"""How far beside the road's edge signs, lights and lamps stand [m]; source: RSA 21, 0.5 to 1.5."""
+"""Distance of signs, lights and lamps from the road's edge [m]; source: RSA 21, 0.5 to 1.5."""
 
 RAMP_HEADING = 190.0
-"""A ramp joins a carriageway that runs along +x at 10° from its right [deg]; ours."""
+"""Heading of a ramp that joins a carriageway along +x at 10° from its right [deg]; ours."""
 
 OPPOSITE = 45.0
-"""Legs whose directions differ from a straight line by less are opposite [deg]; ours."""
+"""Largest deviation from a straight line of the directions of legs that are opposite [deg];
+ours."""
 
 _KINDS = {"roundabout": "Roundabout", "merge": "Merge"}
 _BY_LEGS = {3: "TJunction", 4: "Crossroads"}

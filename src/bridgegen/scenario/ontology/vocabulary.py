@@ -13,7 +13,7 @@ import pyoxigraph as ox
 ONTOLOGY = "https://w3id.org/bridgegen"
 BG = ONTOLOGY + "#"
 SCENARIOS = ONTOLOGY + "/scenarios/"
-"""Each scenario's individuals live in a namespace of their own below this."""
+"""Namespace below which each scenario's individuals have one of their own."""
 
 OWL = "http://www.w3.org/2002/07/owl#"
 RDF = "http://www.w3.org/1999/02/22-rdf-syntax-ns#"
@@ -26,10 +26,9 @@ VOCABULARIES = {
     "auto": ("A.U.T.O.", "http://purl.org/auto/"),
     "openlabel": ("ASAM OpenLABEL", "https://openlabel.asam.net/V1-0-0/ontologies/"),
 }
-"""Those that classes are aligned with by ``rdfs:seeAlso``: per prefix, name and namespace.
+"""Vocabularies that classes are aligned with by ``rdfs:seeAlso``: name and namespace by prefix.
 
-Every term is taken from the vocabulary itself; ``docs/decisions.md`` names the sources.
-"""
+Every term is taken from the vocabulary itself; ``docs/decisions.md`` names the sources."""
 PREFIXES = {"bg": BG, "dcterms": DCTERMS, "owl": OWL, "rdfs": RDFS, "xsd": XSD}
 
 Subject = ox.NamedNode | ox.BlankNode

@@ -77,7 +77,7 @@ SYMBOLS = {
     for unit in ("m", "m/s", "m/s²", "s", "deg", "deg/s", "kg", "1/m", "1")
     for symbol, (factor, _) in WRITTEN[unit].items()
 } | {"rad": ("rad", 1.0), "rad/s": ("rad/s", 1.0), "m/s³": ("m/s³", 1.0), "m/s^3": ("m/s³", 1.0)}
-"""What may stand behind a number: its unit, and the factor that takes it there."""
+"""Units that may stand behind a number, by symbol: the unit it is converted to, and the factor."""
 
 
 def _power(unit: str, exponent: int) -> str:

@@ -18,16 +18,16 @@ from bridgegen.scenario.stl.dimensions import NONE, SYMBOLS, Dimension, in_si
 from bridgegen.scenario.stl.formula import Formula, Interval, Reading, Term
 
 MAX_TEXT = 2000
-"""Characters of a formula."""
+"""Largest number of characters of a formula."""
 
 MAX_TOKENS = 500
-"""Names, numbers and signs of a formula."""
+"""Largest number of names, numbers and signs of a formula."""
 
 MAX_DEPTH = 60
-"""Parentheses and operators inside one another."""
+"""Largest depth of parentheses and operators inside one another."""
 
 MAX_NUMBER = 1e30
-"""Of a formula, as written."""
+"""Largest number in a formula, as written."""
 
 _TEMPORAL = ("always", "eventually", "historically", "once")
 _BINARY = ("until", "since")

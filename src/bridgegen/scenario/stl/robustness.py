@@ -10,12 +10,13 @@ from bridgegen.base.arrays import Bool, Float, Int
 from bridgegen.scenario.stl import formula as f
 
 TINY = float(np.finfo(np.float64).tiny)
-"""Stands for 0 in a margin: > 0 where a comparison of equal sides holds, < 0 where it does not. So
-the sign of a margin says exactly whether a formula holds, strict comparisons and negations
+"""Value in place of 0 in a margin: > 0 where a comparison of equal sides holds, < 0 where it does
+not. So the sign of a margin says exactly whether a formula holds, strict comparisons and negations
 included."""
 
 _ROUNDING = 1e-9
-"""Of an instant's number [steps]: 0.15 s are three steps of 0.05 s, despite binary fractions."""
+"""Rounding tolerance of an instant's number [steps]: 0.15 s are three steps of 0.05 s, despite
+binary fractions."""
 
 
 def robustness(

@@ -44,7 +44,7 @@ RESTART_WITHIN = Setting(
     0.0,
     1.0,
 )
-"""The setting of an algorithm whose population converges."""
+"""Setting that restarts an algorithm whose population converges."""
 
 
 class Arena(Protocol):
@@ -139,7 +139,7 @@ class Results:
 
 
 Arity = Literal["one", "many", "any"]
-"""How many columns of F an algorithm takes: exactly one; one or more; or it ignores them."""
+"""Number of columns of F that an algorithm takes: exactly one; one or more; or it ignores them."""
 
 
 class Algorithm(Protocol):

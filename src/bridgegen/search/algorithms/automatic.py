@@ -1,12 +1,12 @@
 """Which search algorithm `auto` is: the one that found most in its place, by measurement."""
 
 AUTO = "auto"
-"""Names no algorithm, but the choice of one."""
+"""Name of the automatic choice of an algorithm."""
 
 MOST_MODELLED = 100_000
-"""Rows up to which models of the space are known to be worth their time."""
+"""Largest number of rows for which models of the space are known to be worth their time."""
 MOST_PARAMETERS = 40
-"""Beyond, a Gaussian process of some hundred rows says little."""
+"""Number of parameters beyond which a Gaussian process of some hundred rows says little."""
 
 
 def automatic(rows: int, parameters: int, *, many: bool, closed_loop: bool) -> str:

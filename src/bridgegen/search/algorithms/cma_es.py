@@ -17,7 +17,8 @@ from bridgegen.search.algorithms.algorithm import (
 )
 
 LEAST = 4
-"""Rows of a generation at least: with fewer, a single row would make the next distribution."""
+"""Least number of rows of a generation: with fewer, a single row would make the next
+distribution."""
 
 
 class CMAES:

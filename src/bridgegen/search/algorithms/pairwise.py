@@ -10,7 +10,7 @@ from bridgegen.base.arrays import Float
 from bridgegen.search.algorithms.algorithm import Arity, Problem, Results, Setting, Value, resolve
 
 BATCH = 40
-"""Rows per batch; the results do not depend on it."""
+"""Number of rows per batch; the results do not depend on it."""
 
 
 class Pairwise:

@@ -9,7 +9,7 @@ from bridgegen.base.plugins import PlugIns, class_of, is_own
 from bridgegen.search.algorithms.algorithm import Algorithm
 
 PARTS = ("name", "description", "source", "settings", "objectives", "ask", "tell")
-"""Of the protocol."""
+"""Attributes of the algorithm protocol."""
 
 ADDED = PlugIns("algorithm", "bridgegen.algorithms")
 
@@ -34,7 +34,7 @@ _PLACES = {
     "ppo": "bridgegen.search.algorithms.reinforcement:PPO",
     "ppo-adversary": "bridgegen.search.algorithms.ppo_adversary:PPOAdversary",
 }
-"""Where each of ours is."""
+"""Modules and classes of the shipped algorithms, by name."""
 
 
 class _Ours(MutableMapping[str, type[Algorithm]]):

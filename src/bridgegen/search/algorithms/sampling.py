@@ -83,7 +83,7 @@ class Sobol:
 
 
 BATCH = 40
-"""Rows per batch; the results do not depend on it."""
+"""Number of rows per batch; the results do not depend on it."""
 
 _ROUNDS = 8
 

@@ -17,20 +17,21 @@ if TYPE_CHECKING:
     from bridgegen.search.surrogates.gaussian_process import GaussianProcess
 
 CANDIDATES = 512
-"""Rows anywhere that a model chooses from, and as many near good rows; a power of two."""
+"""Number of rows anywhere that a model chooses from, and as many near good rows; a power of two."""
 
 MODEL_ROWS = 300
 """Maximum number of rows that a process is fitted to."""
 
 BEST, FOUND = 20, 40
-"""Rows that candidates are near: the best ones, and the distinct critical ones found last."""
+"""Numbers of rows that candidates are near: the best ones, and the distinct critical ones found
+last."""
 
 REACH = 0.5
-"""Greatest standard deviation of a candidate's step from such a row, per parameter; the least is an
+"""Greatest standard deviation of a candidate's step from a good row, per parameter; the least is an
 eighth of it."""
 
 CAUTION = 0.5
-"""Standard deviations by which an uncertain row counts as more likely critical."""
+"""Number of standard deviations by which an uncertain row counts as more likely critical."""
 
 
 class Surrogate(Saved):

@@ -21,7 +21,8 @@ MODEL_ROWS = 256
 """Maximum number of rows of a region's model: those nearest to its centre."""
 
 CANDIDATES = 512
-"""Rows of a region that its sample paths choose from; a power of two, as Sobol sequences like."""
+"""Number of rows of a region that its sample paths choose from; a power of two, as Sobol sequences
+like."""
 
 LONGEST = 1.6
 """Length of a region beyond which it does not grow: its box is the whole cube, or nearly."""

@@ -156,7 +156,7 @@ COMMON = {
     "gamma": Setting(0.99, "discount of future rewards", 0.0, 1.0),
     "width": Setting(64, "units in each of the networks' two hidden layers", 1, 4096),
 }
-"""Settings of all of them."""
+"""Settings of all reinforcement-learning algorithms."""
 
 STEP = Setting(0.1, "size of a step, as a share of each parameter's range", 1e-4, 1.0)
 MEMORY = Setting(2000, "size of the replay buffer, in transitions", 1, 1_000_000)

@@ -19,7 +19,7 @@ SIGNIFICANT = 0.01
 """Probability of an unequal distribution of the differences by chance, for all parameters."""
 
 PARTS = 3
-"""Equal intervals of a parameter that are compared."""
+"""Number of equal intervals of a parameter that are compared."""
 
 
 @dataclass(frozen=True)
@@ -235,7 +235,7 @@ APART = 0.1
 """Root mean square distance in the unit cube within which a row is nearly the same."""
 
 OF_OBJECTIVE = 0.3
-"""What the best objective counts, against certainty that a row is critical."""
+"""Weight of the best objective, relative to certainty that a row is critical."""
 
 
 class Pool:

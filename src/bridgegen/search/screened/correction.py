@@ -14,7 +14,7 @@ OF_OBJECTIVE = 0.5
 """Distance of two rows between whose objectives lies the whole range of the compared rows."""
 
 PRIOR = 1.0
-"""Rows that the assumption counts as, that the screen is right."""
+"""Number of rows that the assumption counts as, that the screen is right."""
 
 CONFIRMED, MISSED, ROWS_OF_PRIOR = 0.8, 0.02, 2.0
 """Share of the rows critical, that the screen calls critical and that it does not; and the rows

@@ -33,23 +33,25 @@ NEAR = 0.25
 """Share of the screen's later evaluations that lie near the best rows of the run's simulator."""
 
 PARENTS, STEPS, MOVED = 10, (0.02, 0.2), 0.5
-"""How many of the best rows others lie near; least and greatest standard deviation of the steps to
-them; share of the parameters that change."""
+"""Number of the best rows that others lie near; least and greatest standard deviation of the steps
+to them; share of the parameters that change."""
 
 CHECKS = 8
-"""One row in so many is random: it shows what the screen does not, and how far both agree."""
+"""Number of rows of which one is random: it shows what the screen does not, and how far both
+agree."""
 
 LEAST = 24
-"""Compared rows before a screen is judged."""
+"""Number of compared rows before a screen is judged."""
 
 FEW = 0.2
 """Share of the screen's critical rows that must be critical, where the objectives disagree."""
 
 PATIENCE = 100
-"""Batches in a row without a row that is new to the screen, after which a search has converged."""
+"""Number of batches in a row without a row that is new to the screen, after which a search has
+converged."""
 
 TRIES = 8
-"""Random rows that are drawn for one that is new to the screen."""
+"""Number of random rows that are drawn for one that is new to the screen."""
 
 
 class Screen(Protocol):

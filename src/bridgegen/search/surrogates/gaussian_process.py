@@ -60,10 +60,11 @@ LEARN_FROM = 128
 """Maximum number of rows of which the likelihood is computed."""
 
 FIRST_STEPS, NEXT_STEPS = 30, 5
-"""Steps of the likelihood's maximisation: from the prior, and from the parameters of before."""
+"""Numbers of steps of the likelihood's maximisation: from the prior, and from the previous
+parameters."""
 
 FEATURES = 512
-"""Random features of a sample path."""
+"""Number of random features of a sample path."""
 
 
 def learnt(points: Float, values: Float, parameters: Parameters | None) -> Parameters:

@@ -87,7 +87,7 @@ def compressed(F: Float) -> Float:
 
 
 FEW = 100_000
-"""Different rows up to which all are enumerated in search of a new one."""
+"""Number of different rows up to which all are enumerated in search of a new one."""
 
 
 class Known:

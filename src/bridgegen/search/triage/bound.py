@@ -20,7 +20,8 @@ from bridgegen.search.regions.box import percent
 from bridgegen.search.triage.record import NOT_JUDGED, Bound, Drawn, Estimate, Least, Verdict
 
 Avoids = Callable[[Int], Bool]
-"""Says of rows ``(K,)`` whether a careful driver has no collision in them, ``(J,)``, J <= K."""
+"""Function that says of rows ``(K,)`` whether a careful driver has no collision in them, ``(J,)``,
+J <= K."""
 
 UNBIASED = ("random", "sobol")
 """The algorithms whose rows do not depend on results."""

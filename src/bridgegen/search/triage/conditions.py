@@ -31,7 +31,7 @@ from bridgegen.search.triage.moves import nearest, searched
 from bridgegen.search.triage.record import Condition, Probes
 
 INSIDE, OUTSIDE = 40, 20
-"""Random probes inside all conditions, and outside each one."""
+"""Numbers of random probes inside all conditions, and outside each one."""
 
 SURE = 0.95
 """Least share of random probes outside that are not harmful."""

@@ -10,16 +10,16 @@ from bridgegen.search.triage.moves import searched
 from bridgegen.search.triage.record import Influence
 
 END = 0.025
-"""The end of a range: this share of it."""
+"""Share of a range that is its end."""
 
 AT_END = 0.25
-"""Failures are said to lie at an end if at least this share of them does …"""
+"""Least share of failures at an end of a range to be stated."""
 
 LEAST_ROWS = 5
-"""… and at least so many rows fail, and so many do not."""
+"""Least number of rows that fail, and of rows that do not, for an influence to be stated."""
 
 MOST_OTHERS = 50_000
-"""Other rows that are compared; of more, evenly chosen ones."""
+"""Largest number of other rows that are compared; of more, evenly chosen ones."""
 
 SIGNIFICANT = 0.01
 """Probability of a distance by chance, times the number of parameters, below which it counts."""

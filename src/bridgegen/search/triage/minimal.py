@@ -35,10 +35,11 @@ SHARES, MOST_ROUNDS = (1, 2, 4, 8, 10_000_000), 40
 """Jumps: by all remaining steps of a ladder, a half, …, one step; maximum number of rounds."""
 
 ROBUST_SHARES, MOST_ROBUST_ROUNDS = (1, 2), 6
-"""The same if each jump must leave the scenario robust."""
+"""Jumps and maximum number of rounds if each jump must leave the scenario robust."""
 
 Holds = Callable[[Sequence["Ladder"], Sequence[Key], Sequence[Int]], list[Bool]]
-"""From ladders and keys of modes and rungs ``(n, n_var)`` of each: where harm persists."""
+"""Function that evaluates where harm persists, given ladders and keys of modes, and rungs ``(n,
+n_var)`` of each."""
 
 
 @dataclass(frozen=True, eq=False)

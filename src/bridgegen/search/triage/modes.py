@@ -18,16 +18,19 @@ from bridgegen.assess.conflict.types import RULES, ConflictType, Rule
 from bridgegen.base.arrays import Float, Int
 
 APART = 0.25
-"""Clusters are apart by at least this: root mean square over the searched parameters, 0 to 1 …"""
+"""Least distance between clusters: root mean square over the searched parameters, 0 to 1."""
 
 GAPS = 3.0
-"""… and by at least so many times the median distance of a row to the nearest one …"""
+"""Least distance between clusters, as a multiple of the median distance of a row to the nearest
+one."""
 
 LEAST_ROWS, LEAST_SHARE = 5, 0.05
-"""… and hold at least so many rows, and this share of the group's; fewer join the nearest."""
+"""Least number of rows of a cluster, and least share of its group's; fewer join the nearest
+cluster."""
 
 MOST_CLUSTERED = 500
-"""Rows of a group whose distances are compared; the others join the nearest of these."""
+"""Largest number of rows of a group whose distances are compared; the others join the nearest of
+these."""
 
 
 class Key(NamedTuple):

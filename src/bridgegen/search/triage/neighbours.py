@@ -23,7 +23,7 @@ RADIUS = 0.025
 """Maximum move of each searched parameter, a share of its range."""
 
 ROBUST = 0.5
-"""A finding with a lower share of harmful neighbours is knife-edge."""
+"""Share of harmful neighbours below which a finding is knife-edge."""
 
 PLACEBO = "random move"
 UNKNOWN = "not known"
@@ -32,11 +32,11 @@ UNKNOWN = "not known"
 _AS_IS, _MOVED = -1, -2
 
 ENOUGH = NEIGHBOURS // 2
-"""So many neighbours must have a result with each fix to say that no fix helps."""
+"""Number of neighbours that must have a result with each fix to say that no fix helps."""
 
 AsIs = dict[int, tuple[Bool, Bool, Float]]
-"""By evaluation: which unchanged neighbours are harmful, which have a result, and up to when each
-is known to be harmless [s]."""
+"""Results of unchanged neighbours, by evaluation: which are harmful, which have a result, and up to
+when each is known to be harmless [s]."""
 
 
 def neighbourhoods(

@@ -14,13 +14,13 @@ from bridgegen.base.errors import FileFormatError
 from bridgegen.base.records import read_model
 
 JSON_FILE = "triage.json"
-"""Its name in a run's folder."""
+"""File of the triage's record in a run's folder."""
 
 MOST_MODES = 50
-"""Failure modes that are recorded; those that hold the most harmful rows."""
+"""Largest number of failure modes that are recorded; those that hold the most harmful rows."""
 
 MOST_EXAMPLES = 20
-"""Evaluations that are named of a mode, worst first."""
+"""Largest number of evaluations that are named of a mode, worst first."""
 
 MOST_NEIGHBOURHOODS = 2000
 
@@ -30,11 +30,11 @@ Change = Annotated[float, Field(ge=-1.0, le=1.0)]
 Count = Annotated[int, Field(ge=0, le=10**8)]
 Text = Annotated[str, Field(max_length=2000)]
 Drawn = Literal["random", "sobol", "fresh", ""]
-"""Where rows come from whose share is an estimate: the run's own, drawn at random or from a Sobol
-sequence; fresh random ones; "" where there are none and nothing is estimated."""
+"""Origin of the rows from which a share is estimated: the run's own, drawn at random or from a
+Sobol sequence; fresh random ones; "" where there are none and nothing is estimated."""
 
 Verdict = Literal["fails", "no failure found", "not judged"]
-"""What a run says of its driver."""
+"""Verdict of a run on its driver."""
 NOT_JUDGED: Verdict = "not judged"
 
 CauseLabel = Literal[

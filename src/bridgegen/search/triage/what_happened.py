@@ -64,12 +64,12 @@ def _coordinates(numbers: Float, least: Float, labels: Sequence[npt.NDArray[np.g
 
 
 DISTINCT = (0.2, 0.1)
-"""Two kept scenarios differ by at least this much: root mean square over what happened in them, or
-over the searched parameters, each scaled to 0..1. The second distance counts where too few differ
-by the first."""
+"""Least distances between two kept scenarios: root mean square over what happened in them, or over
+the searched parameters, each scaled to 0..1. The second distance counts where too few differ by the
+first."""
 
 COPY = 1e-3
-"""Rows that are nearer to each other are the same."""
+"""Distance below which rows are the same."""
 
 
 def apart(U: Float, u: Float) -> Float:

@@ -22,16 +22,17 @@ OBSERVED = (
     "ego's speed", "ego's acceleration", "distance from the ego",
     "way to the conflict", "ego's way to it", "time to the conflict", "ego's time to it",
 )  # fmt: skip
-"""What an adversary sees at each decision, each scaled to about -1 .. 1 and cut at -3 and 3.
+"""Observations of an adversary at each decision, each scaled to about -1 .. 1 and cut at -3 and 3.
 
-Ways lead to where its route and the ego's meet, times are at present speeds; 3 where they never do.
-"""
+Ways lead to where its route and the ego's meet, times are at present speeds; 3 where they never
+do."""
 
 FAR, LONG, FAST, HARD = 30.0, 5.0, 10.0, 5.0  # m, s, m/s, m/s²: what counts as 1
 
 Act = Callable[[Float, Bool], Float]
-"""``(N, len(OBSERVED))`` observations and ``(N,)`` whether a row still runs → ``(N, 2)`` decisions
-in [0, 1]: the speed that it makes for, up to its highest; its place, from right to left."""
+"""Function that decides: ``(N, len(OBSERVED))`` observations and ``(N,)`` whether a row still runs
+→ ``(N, 2)`` decisions in [0, 1]: the speed that it makes for, up to its highest; its place, from
+right to left."""
 
 
 class Arena:

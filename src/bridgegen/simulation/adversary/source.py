@@ -21,7 +21,8 @@ from bridgegen.simulation.embedded.simulator import EmbeddedSimulator
 
 
 BEYOND = 2.0
-"""Metres, and one second, between the vertices of the way that is left at the scenario's end."""
+"""Distance between the vertices of the way that is left at the scenario's end [m]; they are one
+second apart."""
 
 
 @dataclass(frozen=True)

@@ -9,8 +9,8 @@ from bridgegen.base.compiled import kernel
 from bridgegen.drivers._emergency_kernels import boxes_meet
 
 SHRUNK = 0.01
-"""m, by which half lengths and widths of boxes are smaller here: two that meet all the same overlap
-by 2 cm at least, which is no touch by rounding."""
+"""Length by which half lengths and widths of boxes are smaller here [m]: two that meet all the same
+overlap by 2 cm at least, which is no touch by rounding."""
 
 
 @kernel

@@ -16,7 +16,8 @@ from bridgegen.simulation.embedded.batch import Batch
 from bridgegen.simulation.rollout import Rollout
 
 Demand = Callable[[int], tuple[Float, Float]]
-"""What an ego's driver demands at an instant: ``(1,)`` [m/s²] and ``(1,)`` [1/m]."""
+"""Function that returns the demands of an ego's driver at an instant: ``(1,)`` [m/s²] and ``(1,)``
+[1/m]."""
 
 
 class CoSimulation:

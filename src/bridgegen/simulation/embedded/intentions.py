@@ -17,10 +17,10 @@ from bridgegen.simulation.embedded.program import Program
 from bridgegen.simulation.rollout import Rollout
 
 EVERY = 0.2
-"""Seconds between two instants that are looked at; the reference driver plans twice as often."""
+"""Time between two instants that are looked at [s]; the reference driver plans twice as often."""
 
 NEAR = 6.0
-"""A driver that keeps its plans to itself follows its route while it is so near to it [m]."""
+"""Distance from its route within which a driver that keeps its plans to itself follows it [m]."""
 
 
 @dataclass(frozen=True)

@@ -80,14 +80,15 @@ def weathers(
 
 
 CHUNK = 128
-"""Rows that one thread rolls out at a time at most: enough to keep it busy."""
+"""Largest number of rows that one thread rolls out at a time: enough to keep it busy."""
 
 CHUNK_BYTES, INSTANT_BYTES, VERTEX_BYTES = 16 * 2**20, 112, 80
-"""What they may record between them, and what an entity's instant takes, and a vertex of what it
-follows: little to go through."""
+"""Largest size of the records of a chunk of rows, size of an entity's instant, and of a vertex of
+its path [bytes]; a small chunk is traversed quickly."""
 
 LOCK_STEP_ROWS = 1024
-"""Rows that a driver in Python drives at a time: a thousand take it little longer than one."""
+"""Number of rows that a driver in Python drives at a time: a thousand take it little longer than
+one."""
 
 
 class EmbeddedSimulator:

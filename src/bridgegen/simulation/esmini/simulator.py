@@ -29,7 +29,7 @@ LIBRARY = "ESMINI_LIB"
 """Environment variable with the path of the library, if no option names it."""
 
 ROWS = 16
-"""Rows of a chunk: they share their preparation."""
+"""Number of rows of a chunk: they share their preparation."""
 
 SECONDS = 30.0
 """Time limit for a step of esmini, and for loading a scenario with its map [s]."""

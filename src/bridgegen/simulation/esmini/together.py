@@ -19,7 +19,7 @@ from bridgegen.simulation.embedded.co_simulation import CoSimulation
 from bridgegen.simulation.esmini.library import Library
 
 SAME = 1e-3
-"""Sizes that differ by less are equal [m]."""
+"""Difference below which sizes are equal [m]."""
 
 SOON = 1e-6
 """Tolerance of a time as a share of a step, for rounding."""

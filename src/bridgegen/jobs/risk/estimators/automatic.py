@@ -14,7 +14,7 @@ from bridgegen.jobs.risk.estimators.problem import Aim, Problem
 from bridgegen.jobs.risk.estimators.weighted import Weighted
 
 LOOK = 2000
-"""Rows that decide, or a twentieth of the budget."""
+"""Number of rows that decide, or a twentieth of the budget."""
 FEWEST = 10  # harmful rows among them, to know roughly how many it takes
 FIRST_SHARE = 0.7  # of the budget, for importance sampling
 SECOND_SHARE = 0.6  # of what is left then, for subset simulation

@@ -13,7 +13,7 @@ from bridgegen.jobs.risk.estimators.weighted import Weighted
 
 MOST = 20_000  # points
 FEWEST = 5.0
-"""Effective points of the event, of those that are spread, below which it is not known well."""
+"""Effective number of spread points of the event below which it is not known well."""
 _STREAM = 5  # of random numbers
 
 
@@ -54,7 +54,7 @@ def explore(problem: Problem, aim: Aim, seed: int) -> Weighted:
 
 STARTS, CHILDREN = 8, 8
 EVALUATIONS = 2048
-"""At most: 32 rounds."""
+"""Largest number of evaluations of a search for the most likely point: 32 rounds."""
 _STEP, _GROW, _SHRINK = 0.3, 1.3, 0.8  # standard deviation of moves, and its factors
 _TOWARDS = 0.5  # chance of a coordinate to move towards the middle
 _CENTRAL = 1e-6  # of equally likely points the most central one
@@ -122,13 +122,13 @@ def find(
 TRIED, COPIES = 128, 8
 """Points of the event around which copies are evaluated, and how many of each."""
 OF_BUDGET = 10
-"""The first copies take at most this part of the budget: a tenth."""
+"""Part of the budget that the first copies take at most: a tenth."""
 BESIDE, CLOSE = 0.01, 1e-4
 """Distance of copies in the first and in the second test, as a share of the kernels' width."""
 AGAIN = 16
 """Maximum number of points that are tested again."""
 ROUGH = 0.02
-"""The share of single points beyond which an estimate is in doubt."""
+"""Share of single points beyond which an estimate is in doubt."""
 _STREAM_OF_COPIES = 3  # of random numbers
 
 

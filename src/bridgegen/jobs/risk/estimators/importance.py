@@ -141,11 +141,11 @@ def _heaviest(result: Weighted, aim: Aim) -> float:
 
 
 OF_ROUND, FEWEST_ROWS = 2000, 100
-"""Rows of a round at most, and at least."""
+"""Largest and least number of rows of a round."""
 ROUNDS, MOST_ROUNDS = 10, 20
 """Number of rounds that a small budget is divided into, and maximum number of rounds."""
 OF_BUDGET = 4
-"""All rounds together take at most this part of the budget: a quarter."""
+"""Part of the budget that all rounds take together at most: a quarter."""
 ENOUGH = 400.0
 """Effective number of points of the event at which learning ends."""
 
@@ -190,9 +190,10 @@ PREPARED, FOUND = 0.6, 0.5
 EXPLORED, CHECKED = 0.5, 0.1
 """The share of what is left that exploration may take, if subset simulation is in doubt or not."""
 STRANGE = 0.25
-"""Of the first proposals at most are around spread points, beside those of levels."""
+"""Largest share of the first proposals that are around spread points rather than those of
+levels."""
 FEW = 50
-"""Spread points at most that rows are drawn around where they are too few for more."""
+"""Largest number of spread points that rows are drawn around where they are too few for more."""
 BLOCK, FIRST = 16_384, 1024
 
 

@@ -8,7 +8,8 @@ import numpy as np
 from bridgegen.base.arrays import Bool, Float
 
 SCORE = 0
-"""The column of an outcome that says how near a row is to the event: it happens from the aim on."""
+"""Column of an outcome with the score: how near a row is to the event, which happens from the aim
+on."""
 
 
 class Problem(Protocol):

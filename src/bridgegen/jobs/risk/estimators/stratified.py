@@ -15,7 +15,7 @@ from bridgegen.jobs.risk.estimators.problem import SCORE, Aim, Problem, block_of
 from bridgegen.jobs.risk.estimators.weighted import Weighted
 
 SHELLS = 8
-"""The outermost begins where 1e-7 of the distribution is further out."""
+"""Number of shells; the outermost begins where 1e-7 of the distribution is further out."""
 FIRST = 0.2  # of the budget, to learn where the event is
 
 

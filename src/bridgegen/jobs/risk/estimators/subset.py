@@ -32,7 +32,8 @@ POINTS, FEWEST_POINTS = 250, 25  # of a repetition; all have the same number
 FEWEST_ROUNDS = 2  # so that the first one says what repetitions cost
 MARGIN = 1.3  # of evaluations: repetitions take more or fewer
 FEWEST_REPETITIONS, MOST_ERROR, LEAST_ACCEPTED = 10, 0.5, 0.03
-"""What repetitions must keep for the interval to be believed."""
+"""Fewest repetitions that reach the event, largest relative standard error, and least share of
+accepted moves for the interval to be believed."""
 EXPLODES = "repetitions take far more evaluations than the pilot run: the levels do not mix"
 
 

@@ -31,11 +31,11 @@ LEAST_RADIUS = 2.0
 """Tightest curve that is built [m]; below it even a small car must reverse."""
 
 _SHORTEST = 1e-4
-"""Lines shorter than this [m] are left out."""
+"""Length below which lines are left out [m]."""
 _STRAIGHT = 1e-9
 _ASIDE = 1e-3
-"""[m] A way that leads less to one side is straight: an arc of so large a radius that CARLA, which
-computes in single precision, would put it up to 0.4 m aside."""
+"""Lateral offset below which a path is straight [m]: it would be an arc of so large a radius that
+CARLA, which computes in single precision, would put it up to 0.4 m aside."""
 _ALMOST_PARALLEL = math.radians(1.0)
 _LINE = Line()
 

@@ -17,7 +17,7 @@ from bridgegen.scenario.ontology.graph import Individuals
 from bridgegen.scenario.ontology.vocabulary import Subject
 
 Reach = tuple[tuple[float, float], ...]
-"""How far a road reaches to its left and to its right [m]: its driving lanes, all of it."""
+"""Extent of a road to its left and right [m]: of its driving lanes, and of all its lanes."""
 
 SIGNS = {"StopSign": "206", "YieldSign": "205", "SpeedLimitSign": "274", "ConstructionCard": "123"}
 """Types of signs in the German catalogue (VzKat), which readers know best."""
@@ -34,10 +34,10 @@ STOP_LINE = "stopLine"
 STATES = {
     "gives_green_to": "green", "gives_yellow_to": "yellow", "gives_red_yellow_to": "red_yellow"
 }  # fmt: skip
-"""What a phase shows to a light that it names; to others it shows red."""
+"""States that a phase shows to a light that it names, by property; to other lights it shows red."""
 
 STOP_LINE_WIDTH = 0.5
-"""Along the road [m]; source: RMS-1, 50 cm."""
+"""Width of a stop line along the road [m]; source: RMS-1, 50 cm."""
 
 _HEIGHT = {"light": 5.0, "sign": 2.2, "lamp": 6.0}  # m, of the lower edge or the top; ours
 _SLACK = 1e-6

@@ -29,10 +29,10 @@ from bridgegen.openx.opendrive.user_data import UserData
 
 Turn = Literal["left", "straight", "right"]
 TURNS: tuple[Turn, ...] = ("right", "straight", "left")
-"""From a leg of four to the next ones, counter-clockwise: traffic keeps right."""
+"""Turns from a leg of four to the next ones, counter-clockwise: traffic keeps right."""
 
 _STRAIGHT = 30.0
-"""With other than four legs, what turns by less than this goes straight on [deg]."""
+"""Turn angle below which a path goes straight on, at junctions of other than four legs [deg]."""
 
 
 @dataclass(frozen=True, slots=True)

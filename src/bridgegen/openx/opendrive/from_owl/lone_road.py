@@ -9,10 +9,10 @@ from bridgegen.openx.opendrive.model import Header, OpenDrive
 from bridgegen.openx.opendrive.plan_view import Arc, Geometry, Line, Spiral
 
 Bend = tuple[float, float, float]
-"""Length [m], curvature at the start and at the end [1/m]."""
+"""A bend: length [m], curvature at the start and at the end [1/m]."""
 
 _LEAST_MARGIN = 1.0
-"""Between a bend's centre and the nearest edge of the road [m]."""
+"""Least distance between a bend's centre and the nearest edge of the road [m]."""
 
 
 def build(name: str, arm: Arm, bends: tuple[Bend, ...]) -> OpenDrive:

@@ -19,14 +19,14 @@ from bridgegen.scenario.ontology.vocabulary import Subject
 
 MOST_LEGS = 5
 KINDS = ("Crossroads", "TJunction", "Roundabout", "Merge", "Intersection")
-"""What a junction may be; the most general one last."""
+"""Classes of junctions; the most general one last."""
 
 MEASURES = ("has_size", "has_radius", "has_ring_lane_width", "has_merge_length", "has_taper_length")
-"""Of junctions [m]."""
+"""Properties that state the dimensions of a junction [m]."""
 
 _SLACK = 1e-9
 _LEAST_GAP = 45.0
-"""Between two legs of an intersection [deg]."""
+"""Least angle between two legs of an intersection [deg]."""
 
 
 def opendrive_from_owl(individuals: Individuals) -> OpenDrive:

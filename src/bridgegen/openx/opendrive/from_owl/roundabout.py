@@ -35,11 +35,12 @@ from bridgegen.openx.opendrive.plan_view import Cubic, Geometry
 from bridgegen.openx.opendrive.user_data import UserData, user_datum
 
 APPROACH = 14.0
-"""From the ring's centre line to where a leg begins [m]: room for the curves in and out; ours."""
+"""Distance from the ring's centre line to where a leg begins [m]: room for the curves in and out;
+ours."""
 
 _WIDEST = math.radians(35.0)
 _SHARE = 0.36
-"""Of the angle between two legs that the junction of one takes up on each side."""
+"""Share of the angle between two legs that the junction of one takes up on each side."""
 
 
 def build(

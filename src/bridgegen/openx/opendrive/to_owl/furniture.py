@@ -28,7 +28,7 @@ _STOP_LINE_SIGN = "294"
 """The German catalogue's stop line, which some maps have as a signal."""
 
 Box = tuple[float, float, float, float]
-"""How far an object reaches in road coordinates [m]: s from, to, t from, to."""
+"""Extent of an object in road coordinates [m]: s from, to, t from, to."""
 
 
 def class_of(item: Object) -> str | None:

@@ -19,7 +19,7 @@ MAX_SPEED = "max_speed"
 """Property of a pedestrian: the greatest speed [m/s]; the standard has it for vehicles."""
 
 LIFTED = {"has_reason_to_exceed": "exceeds_limit", "has_siren": SIREN}
-"""Properties of individuals of vehicles, and what they are called in files."""
+"""Names in files of properties of vehicles' individuals."""
 
 _ESMINI_CONTROLLER = "ExternalController"
 
@@ -149,7 +149,7 @@ def plain_text(individuals: Individuals, node: Subject, name: str) -> str:
 
 
 RADIANS = repr(math.pi / 180.0)
-"""In a degree, as a part of a formula."""
+"""Radians per degree, as a part of a formula."""
 
 _ALONG_LANE = osc.Orientation(osc.ReferenceContext.RELATIVE, h=0.0)
 

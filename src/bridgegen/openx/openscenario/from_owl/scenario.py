@@ -27,7 +27,7 @@ DATE = "2025-01-01T00:00:00"
 """The header's date unless another is given: the same individuals give the same bytes."""
 
 ARRIVAL = 2.0
-"""The ego has arrived within this distance of its destination [m]."""
+"""Distance of its destination within which the ego has arrived [m]."""
 
 
 def openscenario_from_owl(

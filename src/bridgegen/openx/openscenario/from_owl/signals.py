@@ -179,7 +179,8 @@ _ELEMENTS: Mapping[str, Callable[..., Any]] = {
     "precipitation": osc.Precipitation,
     "wind": partial(osc.Wind, direction=0.0),
 }
-"""Of the standard's Weather, made of their attributes; the ontology knows no direction of wind."""
+"""Constructors of the elements of the standard's Weather, called with their attributes; the
+ontology knows no direction of wind."""
 
 CLOUD_COVER = "fractional_cloud_cover"
 ROAD_WETNESS = "road_wetness"

@@ -66,7 +66,7 @@ SIZES: Sizes = {
     "static.prop.trafficcone02": (0.46, 0.39, 1.18),
     "static.prop.warningconstruction": (1.31, 1.06, 1.86),
 }
-"""Of all models that stand for something."""
+"""Length, width and height [m] of all models that stand for something."""
 
 SERVICE: Mapping[osc.Role, tuple[str, ...]] = {
     osc.Role.AMBULANCE: PARTICIPANTS["emergency"].carla,

@@ -27,10 +27,10 @@ from srunner.scenariomanager.carla_data_provider import CarlaDataProvider
 from srunner.scenariomanager.timer import GameTime
 
 LET_GO = 2.0
-"""Whoever is farther [m] from where they should be has been pushed, and is steered no more."""
+"""Deviation beyond which a participant has been pushed, and is steered no more [m]."""
 
 PULL = 0.5
-"""Share of a deviation that is made good in one step."""
+"""Share of a deviation that is corrected in one step."""
 
 _WEATHER = "weather."
 _USUAL_STEP = 0.05  # [s], before the first step is known

@@ -44,7 +44,8 @@ _IN_THE_GROUND = frozenset(
         osc.MiscObjectCategory.RAILING,
     }
 )
-"""What stands fast: beside a generated map's lanes there is no ground that would hold it."""
+"""Categories of objects that are fixed to the ground: beside a generated map's lanes there is none
+that would hold them."""
 
 
 def for_scenario_runner(

@@ -28,7 +28,7 @@ CLEAR = osc.Environment(
     ),
     osc.RoadCondition(1.0),
 )
-"""A clear noon, for what a scenario leaves open."""
+"""Environment of a clear noon, for what a scenario leaves open."""
 
 _SECONDS = len("2025-06-21T12:00:00")
 _FREE, _OVERCAST = 12.5, 87.5  # [%], an eighth, and all but one

@@ -138,10 +138,10 @@ HERO = "hero"
 """The ego's name, which CARLA's agents look for."""
 
 STATES = ("off", "red", "red", "yellow", "green")
-"""What a light's state is to CARLA, which has no red with yellow: by `Rollout.lights`' number."""
+"""States of a light in CARLA, by the code in `Rollout.lights`; CARLA has no red with yellow."""
 
 LIGHT_REACH = 2.0
-"""A light is the first that stands nearer than this to its ``pos=x,y`` [m]."""
+"""Largest distance of a light from its ``pos=x,y`` [m]; the first that is nearer is taken."""
 
 _STOP_SIGN = "206"  # VzKat; CARLA makes a traffic.stop of it
 

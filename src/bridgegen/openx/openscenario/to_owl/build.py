@@ -297,7 +297,7 @@ ACTION, CONDITION, POSITION = (
     "OpenScenarioCondition",
     "OpenScenarioPosition",
 )
-"""The ontology's classes of what is kept in these words."""
+"""Ontology's classes of elements that are kept as text."""
 
 _REFERRING = (
     osc.ParameterCondition
@@ -306,7 +306,7 @@ _REFERRING = (
     | osc.ParameterAction
     | osc.SetMonitorAction
 )
-"""They name parts of the file that are not kept under their names."""
+"""Elements that name parts of the file which are not kept under their names."""
 
 
 T = TypeVar("T")

@@ -141,7 +141,7 @@ def _add_controller(
 
 
 DURATION = 60.0
-"""The duration [s] of a file whose stop trigger names no time, if that is put up with."""
+"""Duration of a file whose stop trigger names no time, if that is accepted [s]."""
 
 MAX_PROBLEMS = 50
 _SHOWN = 6  # details that are named

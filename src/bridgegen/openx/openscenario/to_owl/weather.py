@@ -29,7 +29,7 @@ _STATED = {
     for element in dict.fromkeys(one.element for one in PHYSICAL.values())
     if element not in ("", "road_condition")
 }
-"""By element of the standard's Weather, the parameters that stand for its attributes."""
+"""Parameters that stand for attributes of an element of the standard's Weather, by element."""
 
 _WETNESS = {
     osc.Wetness.DRY: 0.0,

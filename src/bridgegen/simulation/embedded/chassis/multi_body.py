@@ -159,7 +159,7 @@ CARS = {
         ),
     ),
 }  # fmt: skip
-"""By name."""
+"""Parameters of the cars by name."""
 
 MOTIONS = {
     KINEMATIC: 0, SINGLE_TRACK: common.MOTION, MULTI_BODY: columns.MOTION_OF_BODIES,

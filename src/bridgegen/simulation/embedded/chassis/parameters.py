@@ -120,7 +120,8 @@ CLASSES = {
         brake_lag=0.43, drive_lag=0.4, drive_front=0.0,
     ),
 }  # fmt: skip
-"""By the name of an object class, see `bridgegen.scenario.participants.OBJECT_CLASSES`."""
+"""Chassis parameters by the name of an object class, see
+`bridgegen.scenario.participants.OBJECT_CLASSES`."""
 
 
 def chassis_of(name: str, wheelbase: float, body: Float) -> Float:

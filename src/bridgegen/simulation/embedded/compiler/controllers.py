@@ -29,7 +29,7 @@ from bridgegen.simulation.embedded.compiler.tables import Tables
 UNSAID = -1
 
 Part = osc.AssignControllerAction | osc.ActivateControllerAction | osc.OverrideControllerValueAction
-"""What an action does to controllers."""
+"""Action that assigns, activates or overrides controllers."""
 
 Switching = osc.AssignControllerAction | osc.ActivateControllerAction
 
@@ -191,10 +191,10 @@ def _names_driver(one: osc.Controller) -> bool:
 
 
 AT_ONCE = 1e9
-"""[1/s] How fast what has no ``maxRate`` gets where it is held."""
+"""Rate at which what has no ``maxRate`` reaches where it is held [1/s]."""
 
 DISENGAGED = 0.5
-"""[1] From this position of the clutch on, the engine drives nothing."""
+"""Position of the clutch from which on the engine drives nothing [1]."""
 
 Row = tuple[int, ...]
 

@@ -34,7 +34,7 @@ _ALONG = (
 LONGITUDINAL = (
     osc.SpeedAction, osc.SpeedProfileAction, osc.LongitudinalDistanceAction, osc.SynchronizeAction,
 )  # fmt: skip
-"""What moves an entity along its path."""
+"""Actions that move an entity along its path."""
 
 Row = tuple[int, ...]
 

@@ -28,8 +28,8 @@ UNTIMED = -1
 SAMPLE = 1.0  # m, between the vertices of a clothoid that is laid: 1 mm off in a bend of 125 m
 LEAST_SAMPLES, SAMPLES_PER_POINT = 64, 32  # vertices of a spline that is laid
 MOST_VERTICES, MOST_POINTS, MOST_ORDER = 5_000, 500, 20
-"""How many vertices a trajectory that is laid may have, how many control points a spline, and its
-order: what rows keep, and how long the weights take, is bounded."""
+"""Largest numbers of vertices of a trajectory that is laid and of control points of a spline, and
+the spline's largest order: they bound what rows keep, and how long the weights take."""
 
 
 def is_laid(action: osc.FollowTrajectoryAction) -> bool:

@@ -333,10 +333,10 @@ _EDGES = {
     osc.ConditionEdge.FALLING: codes.FALLING, osc.ConditionEdge.RISING_OR_FALLING: codes.EITHER,
 }  # fmt: skip
 SAME_STEP = 1e-6
-"""Steps that a delay may be off by rounding."""
+"""Tolerance of a delay for rounding [steps]."""
 
 MAX_STEPS = 100_000
-"""Instants that a run may have."""
+"""Largest number of instants of a run."""
 
 _QUANTITIES = {
     osc.TriggeringEntitiesRule.ANY: codes.ANY, osc.TriggeringEntitiesRule.ALL: codes.ALL,

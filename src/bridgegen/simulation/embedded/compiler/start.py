@@ -23,7 +23,7 @@ from bridgegen.simulation.embedded.program import (
 )
 
 Way = osc.AssignRouteAction | osc.AcquirePositionAction
-"""What gives an entity a route."""
+"""Action that gives an entity a route."""
 
 
 class Start:

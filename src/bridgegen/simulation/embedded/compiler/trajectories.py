@@ -18,7 +18,7 @@ from bridgegen.simulation.embedded.compiler.tables import Tables
 from bridgegen.simulation.embedded.program import AlongTrajectory, Bend, LanePoint, Point
 
 STEP = 0.2
-"""Between two samples of a path [m]: 0.6 mm from the arc in a bend of 8 m radius."""
+"""Distance between two samples of a path [m]: 0.6 mm from the arc in a bend of 8 m radius."""
 
 LONGEST = 100_000.0  # m, a trajectory
 

@@ -83,7 +83,8 @@ BEGINS: dict[int, Callable[..., Any]] = {
     FOLLOW: begin_follow,
     FOLLOW_LAID: begin_laid,
 }
-"""How each kind of action begins; compiled where a storyboard has one, see `addresses`."""
+"""Kernels that begin an action, by its kind; compiled where a storyboard has one, see
+`addresses`."""
 
 
 @kernel

@@ -28,7 +28,8 @@ from bridgegen.simulation.embedded.places._place_kernels import (
 )
 
 BEGINS, ENDS_AT, X, Y, X_END, Y_END, H, H_END, PASSED, PASSED_END = range(10)
-"""When a segment begins and ends [s]; x, y [m] of both; the headings [rad]; metres travelled."""
+"""Columns of a segment: begin and end [s]; x, y [m] of both; the headings [rad]; metres
+travelled."""
 
 ABREAST = 5.0  # m, a position is passed so far aside at most
 NEAR = 0.1  # m, within which an entity has reached a position

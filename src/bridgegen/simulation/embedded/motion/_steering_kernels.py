@@ -14,8 +14,8 @@ from bridgegen.drivers._path_kernels import locate, pose
 from bridgegen.simulation.embedded._motion_kernels import shifted
 
 STATION, ASIDE, SPEED, SLIDE, TURN = range(5)
-"""Metres along the path and to its left; speed [m/s], its part across the lane; turn of the nose
-[rad] from the path's direction."""
+"""Columns of a motion along a path: metres along the path and to its left; speed [m/s], its part
+across the lane; turn of the nose [rad] from the path's direction."""
 
 REACH = 1.0  # s, in which it reaches its commanded position
 SLOPE = 0.15  # most of its speed that leads across the lane: it turns its nose by 9 degrees at most

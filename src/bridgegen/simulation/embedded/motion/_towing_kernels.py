@@ -25,7 +25,7 @@ from bridgegen.simulation.embedded.places._place_kernels import (
 )
 
 HITCH, COUPLER = 0, 1
-"""Columns of ``plan.couplings``."""
+"""Columns of ``plan.couplings`` for a tractor's hitch and a trailer's coupler."""
 
 
 @kernel

@@ -30,7 +30,7 @@ from bridgegen.simulation.embedded.program import Program
 from bridgegen.simulation.rollout import FAILURES, Rollout, joined
 
 Note = Callable[[int, Plans, Bool], None]
-"""Takes the instant at which plans were made, these, and ``(N,)`` which rows ran."""
+"""Function that takes the instant at which plans were made, these, and ``(N,)`` which rows ran."""
 
 
 def drive_in_lock_step(

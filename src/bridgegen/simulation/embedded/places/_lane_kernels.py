@@ -14,8 +14,9 @@ import math
 from bridgegen.base.compiled import kernel
 
 ROAD, FIRST, PAST, LANE, WAY, STRAIGHT, TRAFFIC = 0, 1, 2, 3, 4, 5, 6
-"""Number of its road; first and past-the-last node of its section; lane id; its direction of
-travel along the reference line, 1 or -1; the node straight on, -1 if none; the traffic's way."""
+"""Columns of a node: number of its road; first and past-the-last node of its section; lane id; its
+direction of travel along the reference line, 1 or -1; the node straight on, -1 if none; the
+traffic's way."""
 
 STATION, LEAVE, S, S_LEAVE, NODE, T, T_LEAVE, LEFT, LEFT_LEAVE, RIGHT, RIGHT_LEAVE = range(11)
 """Columns of a span of a path: station and s where it is entered and left [m], its node, and in

@@ -59,7 +59,8 @@ from bridgegen.simulation.embedded.places._lane_kernels import (
 )
 
 LANES, GROUND = -1, -2
-"""What is asked for instead of a node: the lanes of the road network; and where they all are."""
+"""Codes that are asked for instead of a node: the lanes of the road network, and the places of all
+of them."""
 
 
 @kernel

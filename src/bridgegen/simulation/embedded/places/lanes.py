@@ -29,7 +29,7 @@ from bridgegen.simulation.embedded.program import (
 )
 
 STEP = 0.2
-"""Between two samples of a path [m]: 0.6 mm from the arc in a bend of 8 m radius."""
+"""Distance between two samples of a path [m]: 0.6 mm from the arc in a bend of 8 m radius."""
 DETOUR = 50.0  # m, by which a way on the very lane may be longer than one on a lane beside it
 AHEAD = 4  # nodes of its route among which one looks for those that one's own lane leads to
 SPAN = 5.0  # m, the longest span: what changes along a lane is taken as linear within it
