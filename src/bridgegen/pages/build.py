@@ -12,7 +12,7 @@ from bridgegen.assess.conflict.happening import Happening
 from bridgegen.assess.conflict.harm import NEAR_MISS, Count
 from bridgegen.assess.criteria import by_gravity, quantity, summarise_criteria
 from bridgegen.assess.objective import Objective, Rule
-from bridgegen.base.arrays import Taken
+from bridgegen.base.arrays import Float, Taken
 from bridgegen.base.errors import ScenarioError
 from bridgegen.engine.pipeline import Pipeline
 from bridgegen.engine.replays import Replays
@@ -28,8 +28,14 @@ from bridgegen.pages.data import (
 from bridgegen.pages.findings_payload import MOST_MODES
 from bridgegen.pages.further import further_playbacks
 from bridgegen.pages.notes import tables
-from bridgegen.pages.playback import Playback
-from bridgegen.pages.playbacks import minimal_playbacks, playbacks
+from bridgegen.pages.playback import NO_ROW, Playback
+from bridgegen.pages.playbacks import (
+    beside_others,
+    measured_playbacks,
+    minimal_playbacks,
+    others_of,
+    playbacks,
+)
 from bridgegen.pages.screened_payload import screened_payload
 from bridgegen.results.confirmation.record import Record
 from bridgegen.results.store import Recorded, Rows
@@ -73,7 +79,8 @@ def build_report(
     files: Mapping[str, bytes] | None = None,
     more: bool = True,
     triage: Triage | None = None,
-    minimal_files: Sequence[str] = (),
+    drawn: Mapping[str, Float] | None = None,
+    further_files: Sequence[str] = (),
     happening: Happening | None = None,
 ) -> ReportData:
     """Return all that the page shows.
@@ -100,7 +107,8 @@ def build_report(
         files: those of ``kept``, by their paths relative to the page, if the page includes them.
         more: whether the page includes the motion of more scenarios than ``kept``.
         triage: failure modes and bound of the run, if they are known.
-        minimal_files: of the minimal scenarios, by their paths relative to the page.
+        drawn: failing fresh random draws, the worst first, by name.
+        further_files: of these and of the minimal scenarios, by their paths relative to the page.
         happening: which events began, and who came near the ego, if it is known.
     """
     scenario, limits = pipeline.scenario, pipeline.objective.thresholds
@@ -171,7 +179,8 @@ def build_report(
         files=files or {},
         confirmations=confirmations,
         triage=triage,
-        minimal=_minimal(pipeline, modes, minimal_files),
+        minimal=_minimal(pipeline, modes, further_files),
+        drawn=_drawn(pipeline, drawn or {}, further_files),
         criteria=judged,
         screened=screened_payload(notes, pipeline.space),
         happening=happening,
@@ -269,13 +278,31 @@ def _minimal(
         (
             one.minimal.name or f"minimal form of mode {one.number}",
             one.shown,
-            tuple(name for name in files if Path(name).stem == one.minimal.name),
+            _of(one.minimal.name, files),
             one.minimal,
         )
         for one in modes
         if one.minimal is not None
     ]
     return () if pipeline.driver.is_own else minimal_playbacks(pipeline, wanted)
+
+
+def _drawn(
+    pipeline: Pipeline, drawn: Mapping[str, Float], files: Sequence[str]
+) -> tuple[Playback, ...]:
+    """Return the playbacks of fresh random draws."""
+    if not drawn:
+        return ()
+    X = np.stack([*drawn.values()])
+    wanted = [(name, NO_ROW, _of(name, files)) for name in drawn]
+    played = measured_playbacks(pipeline, wanted, X, brief=False)
+    played = beside_others(played, X, others_of(pipeline))
+    # A driver of the user's own need not do the same again.
+    return tuple(one for one in played if one.metrics[pipeline.objective.harm] >= NEAR_MISS)
+
+
+def _of(name: str, files: Sequence[str]) -> tuple[str, ...]:
+    return tuple(file for file in files if Path(file).stem == name)
 
 
 def _coverage(pipeline: Pipeline, rows: Rows | Recorded) -> CoverageMap:

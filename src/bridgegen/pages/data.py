@@ -254,6 +254,7 @@ class ReportData:
         confirmations: of its scenarios in other simulators, one each.
         triage: the failure modes and the bound of the harmful share, once the run has finished.
         minimal: the minimal scenarios of failure modes; ``evaluation`` is the mode's ``shown``.
+        drawn: the failing fresh random draws, the worst first, which are no rows.
         criteria: how the evaluations meet the pass criteria, whose margins are metrics.
         screened: how far the run's screen agrees, as `screened_payload` returns it.
         happening: which events began, and who came near the ego, if the run recorded it.
@@ -270,6 +271,7 @@ class ReportData:
     confirmations: Sequence[Record] = ()
     triage: Triage | None = None
     minimal: tuple[Playback, ...] = ()
+    drawn: tuple[Playback, ...] = ()
     criteria: tuple[CriterionSummary, ...] = ()
     screened: Mapping[str, Any] | None = None
     happening: Happening | None = None

@@ -61,12 +61,13 @@ def payload(data: ReportData, code: int = 0) -> dict[str, Any]:
         data: of the report.
         code: characters that the page has besides its data.
     """
-    drawn = [playback for playback in data.kept if playback.picture is not None]
-    number = {playback.name: k for k, playback in enumerate(drawn)}
+    played = (*data.drawn, *data.kept)
+    pictured = [playback for playback in played if playback.picture is not None]
+    number = {playback.name: k for k, playback in enumerate(pictured)}
     roads: list[list[dict[str, Any]]] = []
     index: dict[tuple[tuple[str, bytes], ...], int] = {}
     kept = []
-    for playback in data.kept:
+    for playback in played:
         key = road_key(playback)
         if key not in index:
             index[key] = len(roads)
@@ -88,7 +89,7 @@ def payload(data: ReportData, code: int = 0) -> dict[str, Any]:
         "roads": roads,
         "kept": kept,
         "files": packed_files(data.files),
-        "pictures": pictures_payload([p.picture for p in drawn if p.picture]),
+        "pictures": pictures_payload([p.picture for p in pictured if p.picture]),
     }
     most = SIZE + SIZE_OF_ROW * max(0, data.evaluations.status.size - 1000)
     room = max(0, most - code - len(script_json(page)))

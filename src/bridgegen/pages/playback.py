@@ -17,6 +17,9 @@ from bridgegen.pages.picture import Picture
 AREA_KINDS = frozenset({"driving", "junction", "shoulder", "sidewalk", "median", "stripe"})
 LINE_KINDS = frozenset({"edge", "solid", "broken", "centre", "stop", "route", "sign"})
 
+NO_ROW = -1
+"""The evaluation of a playback that is no row of the run."""
+
 
 @dataclass(frozen=True)
 class Entity:
@@ -224,7 +227,7 @@ class Playback:
     Attributes:
         name: its name in the run folder ("0001").
         rank: 1 for the most critical.
-        evaluation: its row in ``Evaluations``, from 0.
+        evaluation: its row in ``Evaluations``, from 0; `NO_ROW` of a fresh random draw.
         parameters: all parameters' values, in the units of the columns of the same name.
         metrics: all metrics' values, likewise.
         critical: whether it counts as critical.

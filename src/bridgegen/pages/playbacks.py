@@ -46,7 +46,8 @@ class Shown:
 
     Attributes:
         name: of its files, or for people.
-        evaluation: its row in the store, from 0; of a minimal scenario, what that was made from.
+        evaluation: its row in the store, from 0; of a minimal scenario, what that was made from;
+            `NO_ROW` of a fresh random draw.
         files: paths relative to the page.
         x: ``(len(space.names),)``.
         metrics: ``(M,)``.
@@ -119,16 +120,19 @@ def measured_playbacks(
     wanted: Sequence[tuple[str, int, tuple[str, ...]]],
     X: Float,
     noise: npt.NDArray[np.uint64] | None = None,
+    *,
+    brief: bool = True,
 ) -> tuple[Playback, ...]:
-    """Return the playbacks of rows, without picture and planned course; they are measured anew.
+    """Return the playbacks of rows; they are measured anew.
 
     Args:
         pipeline: what evaluates them.
         wanted: name, evaluation and files of each.
         X: the rows, ``(N, len(space.names))``.
         noise: keys of the sensors' noise, ``(N,)``; by default each row's own.
+        brief: without picture and planned course.
     """
-    replays = pipeline.replays(X, plans=False, noise=noise)
+    replays = pipeline.replays(X, plans=not brief, noise=noise)
     metrics = np.empty((len(X), len(pipeline.metrics)))
     for at, replay in replays.parts:
         metrics[at] = pipeline.measure(replay.rollout)
@@ -137,7 +141,7 @@ def measured_playbacks(
         Shown(name, evaluation, files, X[k], metrics[k], bool(critical[k]), "")
         for k, (name, evaluation, files) in enumerate(wanted)
     ]
-    return _all_played(pipeline, shown, replays, brief=True)
+    return _all_played(pipeline, shown, replays, brief=brief)
 
 
 def others_of(pipeline: Pipeline) -> Mapping[str, Pipeline]:

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from bridgegen.base.arrays import Float, Int
+from bridgegen.base.arrays import Int
 from bridgegen.base.errors import InputError, Interrupted, StorageError, WorkersError
 from bridgegen.drivers import STORYBOARD
 from bridgegen.engine.domain import outside
@@ -48,6 +48,7 @@ from bridgegen.search import algorithms as toolkit
 from bridgegen.search.algorithms.algorithm import Problem, resolve
 from bridgegen.search.algorithms.automatic import AUTO, automatic
 from bridgegen.search.triage.effort import effort
+from bridgegen.search.triage.fresh import failing_draws
 from bridgegen.search.triage.record import write_record
 from bridgegen.search.triage.triage import triage
 from bridgegen.simulation.choice import SimulatorChoice
@@ -325,7 +326,6 @@ def _finish(
     callbacks.stage("triage")
     rows, record = Recorded(store, whole=(*WHOLE, *pipeline.monitor.names)), None
     best, rule = np.zeros(0, dtype=np.int64), pipeline.objective.rule
-    fresh: Float | None = None
     records_harm = pipeline.objective.harm in pipeline.metrics  # not in runs of earlier versions
     if rule == "criteria" or not records_harm:
         best = _critical_by_objective(rows, settings.keep)
@@ -335,7 +335,7 @@ def _finish(
             chosen=best.tolist() if rule == "criteria" else None, effort=effort(settings.triage),
             domain=store.domain,
         )  # fmt: skip
-        record, fresh = triaged.record, triaged.fresh
+        record = triaged.record
         if rule != "criteria":
             best = np.array(triaged.exports, dtype=np.int64)
         write_record(store.folder, record)
@@ -343,8 +343,9 @@ def _finish(
     chosen = rows.take(best)
     # One simulation, for the files and the playback.
     replays = pipeline.replays(chosen.X) if len(best) else None
+    drawn = failing_draws(pipeline.space, record, settings.keep)
     exported = export_critical(
-        pipeline, chosen, replays, store.folder, callbacks.exported, record, fresh
+        pipeline, chosen, replays, store.folder, callbacks.exported, record, drawn
     )
     callbacks.stage("report")
     run = Run.of(store, rows)

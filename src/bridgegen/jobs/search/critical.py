@@ -17,7 +17,7 @@ from bridgegen.base.arrays import Bool, Float, Int
 from bridgegen.base.errors import OntologyError, StorageError
 from bridgegen.engine.pipeline import Pipeline
 from bridgegen.engine.replays import Replays
-from bridgegen.jobs.search.exported import FOLDER, FRESH, NOT_EXPORTED, Exported, Refused
+from bridgegen.jobs.search.exported import FOLDER, NOT_EXPORTED, Exported, Refused
 from bridgegen.jobs.search.scenario_files import write_scenario
 from bridgegen.results.store import Rows
 from bridgegen.search.algorithms.dominance import by_merit
@@ -49,7 +49,7 @@ def export_critical(
     folder: Path,
     progress: Callable[[int], None] | None = None,
     triage: Triage | None = None,
-    drawn: Float | None = None,
+    drawn: Mapping[str, Float] | None = None,
 ) -> tuple[Exported, ...]:
     """Write each row's ``.owl``, ``.xodr``, ``.xosc`` and ``.json`` into ``folder/critical``.
 
@@ -65,7 +65,7 @@ def export_critical(
         folder: the run's.
         progress: called with the number of rows written, after each.
         triage: the run's, if there is one.
-        drawn: ``(K, len(space.names))`` fresh random draws to export, too.
+        drawn: fresh random draws to export, too, by name.
 
     Raises:
         StorageError: the folder cannot be written.
@@ -117,9 +117,8 @@ def export_critical(
                     problems = error.problems
                 if problems:
                     refused.append(Refused(mode.minimal.name, mode.worst, problems))
-        for k, x in enumerate(() if drawn is None else drawn):
+        for name, x in (drawn or {}).items():
             with suppress(OntologyError):  # the verdict counts it all the same
-                name = f"{FRESH}{k + 1:02d}"
                 _write_alone(pipeline, x, None, fresh, name, {"drawn": "fresh"})
         shutil.rmtree(target, ignore_errors=True)
         fresh.rename(target)

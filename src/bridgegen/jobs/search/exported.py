@@ -15,9 +15,6 @@ FOLDER = "critical"
 MINIMAL = "minimal-"
 """Prefix of the files of minimal scenarios, in the same folder."""
 
-FRESH = "fresh-"
-"""Prefix of the files of failures among the fresh random draws, where no evaluation fails."""
-
 NOT_EXPORTED = "not-exported.json"
 """The file of a run's folder that names the scenarios whose export was refused; none without."""
 

@@ -5,6 +5,7 @@ import html
 import io
 import json
 from collections.abc import Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -44,13 +45,18 @@ class ShownFigure(Figure):
 
 def draw(run: "Run") -> ShownFigure:
     """Return the figure of a run; see `bridgegen.Run.plot`."""
-    worst = worst_rollout(run)
+    path, worst = _worst(run), worst_rollout(run)
     figure = ShownFigure(figsize=(9.0 if worst else 5.0, 3.8), layout="constrained")
     axes = figure.subplots(1, 2 if worst else 1, squeeze=False)[0]
     _draw_space(run, axes[0])
-    if worst is not None:
-        _draw_worst(worst, run.scenarios[0].stem, axes[1])
+    if path is not None and worst is not None:
+        _draw_worst(worst, path.stem, axes[1])
     return figure
+
+
+def _worst(run: "Run") -> Path | None:
+    """Return the file of the most critical exported scenario: a draw where these alone fail."""
+    return next(iter((*run.fresh_scenarios, *run.scenarios)), None)
 
 
 def worst_rollout(run: "Run") -> Rollout | None:
@@ -59,10 +65,11 @@ def worst_rollout(run: "Run") -> Rollout | None:
     None where there is none, where another simulator ran it, or where a driver of the user's own
     would have to be imported, which happens only if it is asked for.
     """
-    if not run.scenarios or is_spec(run.settings.ego) or run.settings.simulator != EMBEDDED:
+    path = _worst(run)
+    if not path or is_spec(run.settings.ego) or run.settings.simulator != EMBEDDED:
         return None
     try:
-        return simulate_file(run.scenarios[0]).rollout
+        return simulate_file(path).rollout
     except BridgeGenError:
         return None  # files that were edited or moved: the rest of the figure stands
 

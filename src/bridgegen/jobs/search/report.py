@@ -16,6 +16,7 @@ from bridgegen.pages.page import write_report
 from bridgegen.results.confirmation.record import read_records
 from bridgegen.results.store import Recorded, Rows, Store
 from bridgegen.search.regions.record import JSON_FILE, read_record
+from bridgegen.search.triage.fresh import FRESH, failing_draws
 from bridgegen.search.triage.record import JSON_FILE as TRIAGE_FILE
 from bridgegen.search.triage.record import Triage
 from bridgegen.search.triage.record import read_record as read_triage
@@ -60,7 +61,7 @@ def write_run_report(
         StorageError: the page cannot be written.
         FileFormatError: the regions' file, or a confirmation's, is damaged, or another run's.
     """
-    names = [*(name for one in exported for name in one.files), *minimal_files(run.folder)]
+    names = [*(name for one in exported for name in one.files), *further_files(run.folder)]
     files = {name: read_inside(run.folder, name) for name in names}
     data = run_data(pipeline, run, rows, exported, files=files, more=True, replays=replays)
     write_report(run.report, data)
@@ -98,6 +99,7 @@ def run_data(
     # The results of a run that is being searched change before they are read; digesting is slow.
     known = run.finished or (folder / TRIAGE_FILE).is_file()
     results = rows.digest() if known else None
+    triage = _triage(folder, results)
     return build_report(
         pipeline, rows, run.summary,
         kept=[(one.name, one.evaluation, one.files) for one in exported], replays=replays,
@@ -106,15 +108,16 @@ def run_data(
         version=run.version, notes=run.notes, view=view_command(folder),
         regions=read_record(folder / JSON_FILE),
         confirmations=read_records(folder, rows.X, rows.metrics), coverage=coverage,
-        hashes=_hashes(settings, results), triage=_triage(folder, results),
-        minimal_files=minimal_files(folder),
+        hashes=_hashes(settings, results), triage=triage,
+        drawn=failing_draws(pipeline.space, triage, max(settings.keep, 1)),
+        further_files=further_files(folder),
         files=files, more=more, happening=run.happening,
     )  # fmt: skip
 
 
-def minimal_files(folder: Path) -> tuple[str, ...]:
-    """Return the files of a run's minimal scenarios, relative to its folder."""
-    found = {one.name for one in (folder / FOLDER).glob(f"{MINIMAL}*.*")}
+def further_files(folder: Path) -> tuple[str, ...]:
+    """Return the files of a run's minimal scenarios and fresh draws, relative to its folder."""
+    found = {one.name for kind in (MINIMAL, FRESH) for one in (folder / FOLDER).glob(f"{kind}*.*")}
     stems = sorted({name.partition(".")[0] for name in found})
     names = [f"{stem}.{kind}" for stem in stems for kind in ("owl", "xodr", "xosc", "json")]
     return tuple(f"{FOLDER}/{name}" for name in names if name in found)

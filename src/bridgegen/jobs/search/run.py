@@ -13,7 +13,6 @@ from bridgegen.assess.criteria import CriterionSummary, summarise_criteria
 from bridgegen.base.errors import StorageError
 from bridgegen.jobs.search.exported import (
     FOLDER,
-    FRESH,
     MINIMAL,
     Exported,
     Refused,
@@ -25,6 +24,7 @@ from bridgegen.results.store import Recorded, Rows, Store
 from bridgegen.results.store.summary import Summary, summarise
 from bridgegen.scenario.language.criteria import read_criterion
 from bridgegen.search.screened import Agreement
+from bridgegen.search.triage.fresh import FRESH
 from bridgegen.search.triage.record import JSON_FILE, NOT_JUDGED, Mode, Triage, Verdict, read_record
 from bridgegen.simulation.rollout import STATUS_MESSAGES
 

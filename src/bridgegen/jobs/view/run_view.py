@@ -8,7 +8,7 @@ from typing import Any
 from bridgegen.base.disk import read_inside
 from bridgegen.base.errors import InputError
 from bridgegen.jobs.search.regions import OWL_FILE
-from bridgegen.jobs.search.report import minimal_files, run_data
+from bridgegen.jobs.search.report import further_files, run_data
 from bridgegen.jobs.search.restored import pipeline_of
 from bridgegen.jobs.search.run import Run
 from bridgegen.pages.data import WHOLE
@@ -79,7 +79,7 @@ class RunView:
             rows = self._read(store)
             state = {
                 "finished": store.finished is not None,
-                "kept": len(self._run.exported()),
+                "kept": len(self._run.exported()) + len(self._run.fresh_scenarios),
                 "elsewhere": sum(len(one.scenarios) for one in self._elsewhere(rows)),
             }
             if len(rows) == after:
@@ -100,7 +100,7 @@ class RunView:
         """Return an exported file, or a record of a later command; None for any other name."""
         names = {name for one in self._run.exported() for name in one.files} | {JSON_FILE, OWL_FILE}
         names |= {file_name(name) for name in SIMULATORS}
-        names |= {TRIAGE_FILE, *minimal_files(self.folder)}
+        names |= {TRIAGE_FILE, *further_files(self.folder)}
         try:
             return read_inside(self.folder, name) if name in names else None
         except FileNotFoundError:

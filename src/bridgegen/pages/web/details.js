@@ -32,8 +32,8 @@ export function fillDetails(kept) {
     return box;
   };
   const lines = (values) => Object.entries(values).map(([name, value]) => line(name, value, columns.get(name)));
-  const heading = kept.minimal ? `Scenario ${kept.name}, simplest form of evaluation` : `${kept.files.length ? `Scenario ${kept.name}, evaluation` : "Evaluation"}`;
-  const name = element("h3", {}, `${heading} ${number(kept.evaluation + 1)}`);
+  const heading = kept.minimal ? `Scenario ${kept.name}, simplest form of evaluation ${number(kept.evaluation + 1)}` : kept.evaluation < 0 ? `Scenario ${kept.name}, a fresh random draw` : `${kept.files.length ? `Scenario ${kept.name}, evaluation` : "Evaluation"} ${number(kept.evaluation + 1)}`;
+  const name = element("h3", {}, heading);
   const cause = kept.cause ? [element("div", { title: `Quick label, of one replay: ${CAUSE_HELP[data.causes.labels.indexOf(kept.cause)]}` }, element("span", { class: "name" }, "cause (quick label)"), element("b", {}, kept.cause))] : [];
   const metrics = kept.conflict || data.criteria ? [element("h3", {}, "Its metrics")] : [];
   const others = Object.fromEntries(Object.entries(kept.metrics).filter(([one]) => !criterionOf(one)));

@@ -1,10 +1,11 @@
 // The decisive conflict of each row, and the failure mode that it belongs to.
 
 import { data, rows } from "./data.js";
+import { drawn } from "./playbacks.js";
 
-// The evaluation that came nearest to harm where no failure was found and the page holds its motion; else null.
+// The evaluation that came nearest to harm where no failure is played and the page holds its motion; else null.
 export function nearestToHarm() {
-  if (!data.triage || data.triage.modes.length) return null;
+  if (!data.triage || data.triage.modes.length || drawn.length) return null;
   const found = data.triage.bound.least.find(({ evaluation }) => evaluation !== null && rows.evaluation.includes(evaluation));
   return found && (data.live || data.packed.evaluations.includes(found.evaluation)) ? found.evaluation : null;
 }

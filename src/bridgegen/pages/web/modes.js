@@ -7,7 +7,7 @@ import { filters } from "./filters.js";
 import { nearestToHarm } from "./findings.js";
 import { hook } from "./hook.js";
 import { number, shareText } from "./numbers.js";
-import { minimals } from "./playbacks.js";
+import { drawn, minimals } from "./playbacks.js";
 import { addSection } from "./sections.js";
 
 const CAUSES_SAID = {
@@ -31,8 +31,8 @@ class Modes {
     $("modes-title").textContent = n ? `${number(n)} ${n === 1 ? "way" : "ways"} in which ${found.ego} fails${found.baseline ? ` and ${found.baseline} does not` : ""}` : found.bound.failures ? `${capital(found.ego)} fails in fresh random draws alone` : found.bound.judged === false ? "Not judged" : data.criteria ? "No harm found" : "No failure found";
     $("modes-lead").textContent = capital(found.bound.sentence.replace(n ? /^[^:]*: / : /^(Not judged: |No (failure found|scenario in which .*? was found) in )/, "")); // the title says the rest
     this.buttons = [];
-    $("modes-list").replaceChildren(...found.modes.map((mode) => this.card(mode)));
-    $("modes-list").hidden = !n;
+    $("modes-list").replaceChildren(...found.modes.map((mode) => this.card(mode)), ...drawn.map((kept, k) => this.draw(kept, k)));
+    $("modes-list").hidden = !n && !drawn.length;
     const notes = [], nearest = nearestToHarm();
     if (nearest !== null && !anyViolated()) notes.push(`Evaluation ${number(nearest + 1)}, which came nearest to harm, is shown below.`);
     if (n) notes.push(found.untested || `Robustness: share of ${number(found.neighbours)} neighbours, each parameter moved by at most ${number(100 * found.radius, 2)}${NARROW}% of its range, that are harmful, too.`);
@@ -79,6 +79,24 @@ class Modes {
         element("p", { class: "mode-buttons" }, play, fold),
       ),
       more,
+    );
+  }
+
+  // A fresh random draw that fails; the player has the whole sentence.
+  draw({ name, conflict, metrics: { severity } }, k) {
+    const facts = severity > 0 ? [element("li", { title: "probability of a MAIS3+ injury" }, element("b", {}, shareText(severity)), " severity (MAIS3+)")] : [];
+    if (conflict?.responsible) facts.push(element("li", { title: conflict.rule_says ?? "" }, "responsible: ", element("b", {}, conflict.responsible), conflict.rule ? ` (${conflict.rule})` : ""));
+    const play = element("button", { type: "button", class: "primary", "aria-label": `Play ${name}` }, `▶ ${name}`);
+    play.addEventListener("click", () => hook.select?.(k, true));
+    return element(
+      "li", { class: "card mode" },
+      element(
+        "div", { class: "mode-head" },
+        element("span", { class: "mode-number", "aria-hidden": "true" }, `${k + 1}`),
+        element("h3", { title: conflict?.sentence ?? "" }, conflict?.sentence.split(";")[0] ?? name),
+        element("ul", { class: "mode-facts" }, ...facts),
+        element("p", { class: "mode-buttons" }, play),
+      ),
     );
   }
 

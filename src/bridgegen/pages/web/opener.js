@@ -24,7 +24,7 @@ export class Opener {
     this.wanted = null;
     /** @type {Player | null} */
     this.made = null;
-    hook.select = (k) => this.kept(k);
+    hook.select = (k, play) => this.kept(k, play);
     hook.open = (evaluation) => this.row(rows.evaluation.indexOf(evaluation));
     hook.show = (evaluation, seconds, play) => this.moment(evaluation, seconds, play);
     hook.showMinimal = (evaluation) => this.minimal(evaluation);

@@ -10,6 +10,7 @@ import { nearestToHarm } from "./findings.js";
 import { foldSections } from "./fold.js";
 import { hook } from "./hook.js";
 import { Opener } from "./opener.js";
+import { drawn } from "./playbacks.js";
 import { drawSections } from "./sections.js";
 import "./summary.js";
 import { Table } from "./table.js";
@@ -18,7 +19,7 @@ import { TableTools } from "./table_tools.js";
 hook.filter = (name, low, high) => filters.set(name, low, high);
 drawSections();
 foldSections();
-if (rows.critical.includes(1) || data.kept.length || anyViolated()) listScenarios();
+if (rows.critical.includes(1) || data.kept.length > drawn.length || anyViolated()) listScenarios();
 else playNearest();
 
 function listScenarios() {
@@ -28,13 +29,13 @@ function listScenarios() {
 }
 
 function playNearest() {
-  const nearest = nearestToHarm();
-  hideScenario(nearest === null);
-  $("no-scenarios").hidden = nearest !== null; // the verdict says it
+  const plays = drawn.length > 0 || nearestToHarm() !== null;
+  hideScenario(!plays);
+  $("no-scenarios").hidden = plays; // the verdict says it
   $("no-scenarios").textContent = `No scenario is critical${data.summary.finished ? "" : " yet"}.`;
   $("kept").classList.add("alone");
   $("list").hidden = true;
-  if (nearest !== null) return void begin(new Opener(hook));
+  if (plays) return void begin(new Opener(hook));
   hook.show = (...asked) => { // a point of the scatter plot was chosen
     hideScenario(false);
     begin(new Opener(hook));

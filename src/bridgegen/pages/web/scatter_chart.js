@@ -10,7 +10,7 @@ import { frontSeries } from "./front.js";
 import { hook } from "./hook.js";
 import { Stamp, drawMarker } from "./markers.js";
 import { number, quantity, titled, turned, worded } from "./numbers.js";
-import { playbacks } from "./playbacks.js";
+import { drawn, playbacks } from "./playbacks.js";
 import { drawnRegions } from "./regions.js";
 import { pointColours } from "./point_colours.js";
 import { FONT } from "./view.js";
@@ -60,7 +60,7 @@ export class ScatterChart extends Chart {
       { name: "plain", text: "not critical", items: seen.filter((i) => !rows.critical[i]), alpha: 0.35 + 0.35 * crowd, marker: { shape: "disc", radius: 1.6 + 1.4 * crowd, colour: palette.plain } },
       ...pointColours(colours, seen.filter((i) => rows.critical[i])).map((one) => ({ ...one, alpha: 0.5 + 0.35 * crowd, marker: { ...one.marker, radius: 2.4 + 1.4 * crowd, edge: palette.card } })),
       ...frontSeries(nameX, nameY, seen, this.values),
-      ...(data.kept.length ? [{ name: "kept", text: "exported", items: kept, ranks: true, marker: { shape: "disc", radius: 7, colour: palette.ink, open: true } }] : []),
+      ...(data.kept.length > drawn.length ? [{ name: "kept", text: "exported", items: kept, ranks: true, marker: { shape: "disc", radius: 7, colour: palette.ink, open: true } }] : []),
     ].map((one) => ({ ...one, label: `${one.text} (${number(one.items.length)})` }));
     this.names = [nameX, nameY];
     const text = `Scatter plot, ${titled(nameY)} over ${titled(nameX)}: ${series.map(({ label }) => label).join(", ")}. Arrow keys lead from point to point, Enter plays one.`;

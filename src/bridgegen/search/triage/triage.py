@@ -26,6 +26,7 @@ from bridgegen.search.triage.bound import (
     least_margins,
 )
 from bridgegen.search.triage.effort import FULL, Effort
+from bridgegen.search.triage.fresh import draw
 from bridgegen.search.triage.influence import influences
 from bridgegen.search.triage.judgement import judgement
 from bridgegen.search.triage.minimal import Minimiser
@@ -55,7 +56,7 @@ from bridgegen.search.triage.record import (
 )
 from bridgegen.search.triage.what_happened import COPY, apart, distinct, of_events, of_results
 
-_SAMPLE, _FRESH = 18, 19  # streams of random numbers, apart from others of the same seed
+_SAMPLE = 18  # stream of random numbers, apart from others of the same seed
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,13 +66,10 @@ class Triaged:
     Attributes:
         record: the findings, without names of files.
         exports: positions of the rows to export, best first.
-        fresh: ``(K, len(space.names))`` harmful ones of the fresh random draws, the worst first,
-            where no row is harmful.
     """
 
     record: Triage
     exports: tuple[int, ...]
-    fresh: Float
 
 
 def triage(
@@ -158,7 +156,6 @@ class _Triage:
         self._unrecorded = 0
         self._preventable: dict[int, bool | None] = {}
         self._event: Float = np.zeros((0, len(EVENT)))
-        self._fresh: Float = np.zeros((0, len(self._space.names)))
 
     def run(self) -> Triaged:
         """Run the stages."""
@@ -185,7 +182,7 @@ class _Triage:
         groups, shown = [groups[k] for k in order], [shown[k] for k in order]
         minimal = self._minimal(groups, shown) if tests else [None] * len(groups)
         record = self._record(groups, shown, exports, tested, sample, minimal)
-        return Triaged(record, tuple(self._at[exports].tolist()), self._fresh)
+        return Triaged(record, tuple(self._at[exports].tolist()))
 
     # Stages; positions are those among the harmful rows.
 
@@ -327,13 +324,8 @@ class _Triage:
         is_possible = self._tests and self._pipeline.cause is None
         if not (n and is_possible and self._space.n_var):
             return estimate("", 0, 0), [estimate("", 0, 0) for _ in groups], None
-        random = np.random.Generator(np.random.PCG64([self._seed, _FRESH]))
-        U = random.random((n, self._space.n_var))
-        X = self._space.decode(U) + 0.0
+        U, X = draw(self._space, self._seed, n)
         results = self._pipeline.try_all(X)
-        if not len(self._at):
-            worst = np.argsort(-results.harm, kind="stable")
-            self._fresh = X[worst[results.harmful[worst]][: self._keep]]
         kinds = self._pipeline.runner.kinds
         keys = keys_of(results.findings, kinds, results.place.tolist(), [""] * n)
         mode = [0] * n
