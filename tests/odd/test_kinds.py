@@ -17,7 +17,7 @@ from bridgegen.scenario.language.kinds import FLOAT, INTEGER, KINDS, Angle, Cate
 from bridgegen.scenario.language.parameters import Axis, Parameter
 from bridgegen.scenario.language.reader import load
 from bridgegen.search.triage.minimal import Ladder
-from bridgegen.search.triage.neighbours import around, nearest
+from bridgegen.search.triage.moves import around, nearest
 
 EXAMPLE = Path(__file__).parents[2] / "docs/examples/braking-manner.yaml"
 MANNER = """    kind: category
