@@ -10,7 +10,7 @@ from typing import IO
 from bridgegen.base.errors import InputError, StorageError
 
 _HEAD = 1000
-"""Bytes of a page within which its generator is named."""
+"""Length of a page's beginning within which its generator is named [bytes]."""
 
 
 def write_whole(path: Path, chunks: Iterable[bytes]) -> None:

@@ -28,7 +28,7 @@ Values = Mapping[str, Any]
 SCENARIO, SAVE = "scenario", "save"
 _HEADS = {"run", "runs"}
 MOST_SEARCHED = 10_000
-"""Bytes of a damaged file in which its first key is looked for."""
+"""Length of a damaged file's beginning in which its first key is sought [bytes]."""
 
 DATABASE = "run.sqlite"
 """The file that makes a folder a run's."""

@@ -29,10 +29,12 @@ from bridgegen.base.arrays import Bool, Int
 from bridgegen.base.errors import InputError
 
 SIZE = 64
-"""Rows of a block: with a multiple of it, no vector of up to 64 numbers is cut at the end."""
+"""Number of rows of a block: with a multiple of it, no vector of up to 64 numbers is cut at the
+end."""
 
 PROBES = 64
-"""Rows by which equal places are found; a rounding need not show in the result of each."""
+"""Number of rows by which equal places are found; a rounding need not show in the result of
+each."""
 
 INPUTS, OUTPUTS = (5, 17, 89, 256, 512), (2, 17, 64, 100, 256)
 """Sizes of the matrix products by which NumPy's library is probed."""

@@ -56,7 +56,8 @@ DETECTION = 8
 """Number of columns of a detection."""
 
 NO_FRAME, MISSED, CAMERA, LIDAR, BOTH = -1, 0, 1, 2, 3
-"""No sensor took a frame at this instant; a frame missed the entity; the sensors that saw it."""
+"""Codes of `SEEN_BY`: no sensor took a frame at this instant; a frame missed the entity; the
+sensors that saw it."""
 
 
 # --- Properties of each kind for compiled code, by its code in `bridgegen.drivers.kinds` ---

@@ -45,7 +45,7 @@ from bridgegen.simulation.rollout import WORKER_ENDED, Rollout, joined
 from bridgegen.simulation.vehicles import KINEMATIC
 
 FAR_ROWS = 8
-"""Rows per chunk if only the workers' machines have the simulator."""
+"""Number of rows per chunk if only the workers' machines have the simulator."""
 
 SAMPLE = 400
 """Random scenarios that set an objective's weights and scales where it needs a sample."""

@@ -86,9 +86,9 @@ class Failure(ShapedSection):
     count: Literal["ego", "any"] = "ego"
     """Party whose conflicts count as harm: the ego alone, or any."""
     driver: _OrNone = ""
-    """Driver that failed."""
+    """Driver of the ego that failed."""
     found: _Text = ""
-    """Where it was found."""
+    """Search or suite that found the failure, in words."""
     seed: Annotated[int, Field(ge=0)] | None = None
     """Seed of the search or the suite that found it."""
     version: _Text = ""

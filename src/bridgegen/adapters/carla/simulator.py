@@ -48,7 +48,8 @@ LASTING = 20
 """Number of instants (1 s) within which contacts with the same actor are one contact."""
 
 ASIDE = 2.0
-"""A stop line applies to vehicles that cross it within this distance of its point [m]."""
+"""Largest distance of a stop line's point from a vehicle's path at which it applies to the vehicle
+[m]."""
 
 COLLISION, LANE_INVASION, RED_LIGHT = "collision", "lane invasion", "red light"
 RED, RED_AND_YELLOW = 1, 2  # of Rollout.lights
@@ -180,7 +181,7 @@ def refuse_used(folder: Path) -> None:
 
 
 ROWS = 8
-"""Rows between which the server is left stepping, and the measures of which come together."""
+"""Number of rows between which the server is left stepping, and whose measures come together."""
 
 TRIES = 2
 """Maximum number of attempts for a row that fails because of the server."""

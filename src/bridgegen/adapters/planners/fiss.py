@@ -58,23 +58,24 @@ PLANNER = Planner(
 )
 
 PLAN_EVERY, CONTROL_STEP = 2, 0.05
-"""Number of instants between two plans, and time between two instants [s]; as in the closed
+"""Number of instants between two plans, and time between two instants [s]; as in the authors'
 loop."""
 
 RANGE, ENLARGED = 120.0, 0.2
-"""Range within which other participants are seen, and enlargement of their boxes [m]; as there."""
+"""Range within which others are seen, and enlargement of their boxes [m]; as in the authors'
+loop."""
 
 BEYOND = 0.5
-"""Time by which predictions are longer than plans [s]; as there."""
+"""Time by which predictions are longer than plans [s]; as in the authors' closed loop."""
 
 PREDICTION_STEP = 0.1
-"""Time step of predictions [s]; as there."""
+"""Time step of predictions [s]; as in the authors' closed loop."""
 
 MOVING = 0.5
-"""Speed from which on a heading is that of the velocity [m/s]; as there."""
+"""Speed from which on a heading is that of the velocity [m/s]; as in the authors' closed loop."""
 
 CURVATURE_FROM = 1.0
-"""Speed from which on the curvature of the path is measured [m/s]; as there."""
+"""Speed from which on the path's curvature is measured [m/s]; as in the authors' closed loop."""
 
 SEEN = 2
 """The state of a track from which on it is an obstacle: confirmed."""

@@ -27,7 +27,7 @@ from bridgegen.base.disk import write_whole
 from bridgegen.base.errors import StorageError
 
 LARGE = 12_000
-"""Bytes of bitcode from which on a kernel is called rather than linked."""
+"""Size of bitcode from which on a kernel is called rather than linked [bytes]."""
 
 WRAPPER = "_ZN7cpython"
 """Prefix of the name of the function by which Python calls a kernel."""

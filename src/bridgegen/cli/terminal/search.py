@@ -148,7 +148,7 @@ WORDS = {"fails": "FAILS", "no failure found": "NO FAILURE FOUND", "not judged":
 """The verdicts on the terminal."""
 
 WIDTH, BAR = 100, 5
-"""Characters of a mode's line at most, and of its bar."""
+"""Largest length of a mode's line, and length of its bar [characters]."""
 
 
 def verdict_lines(run: "Run", seconds: float) -> list[str]:

@@ -26,7 +26,7 @@ _PROBLEMS: Mapping[str, Problem | None] = {
     "unknown": "error",
 }
 _HEAD = 1000
-"""Bytes of a file within which JUnit XML has its first element."""
+"""Length of a file's beginning within which JUnit XML has its first element [bytes]."""
 
 
 @dataclass(frozen=True)

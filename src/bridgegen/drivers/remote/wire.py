@@ -15,7 +15,7 @@ from bridgegen.drivers.address import Address, Command, Tcp, Unix
 from bridgegen.drivers.remote.messages import length
 
 BUFFER = 2**20
-"""Bytes that pipes and sockets are asked to hold: an observation of some hundred rows."""
+"""Size of the buffers of pipes and sockets [bytes]: an observation of some hundred rows."""
 
 CONNECT_SECONDS = 10.0
 """Time limit for a server to accept a connection [s]."""

@@ -11,9 +11,9 @@ from typing import ClassVar
 from bridgegen.openx.opendrive.declaration import attribute, choice
 
 LENGTH_LIMIT = 1e6
-"""Longest road [m]."""
+"""Largest length of a road [m]."""
 CURVATURE_LIMIT = 1e4
-"""Largest curvature [1/m]."""
+"""Largest curvature of a road [1/m]."""
 SHARP_CURVATURE = 10.0
 """Curvature above which a reader warns [1/m]: no vehicle turns on 0.1 m."""
 

@@ -253,7 +253,7 @@ class _Reader:
 
 
 _LEFT_OUT = object()
-"""Stands for a piece of decoration that could not be read."""
+"""Placeholder for a piece of decoration that could not be read."""
 
 
 def _curvatures(geometry: Geometry) -> tuple[float, ...]:

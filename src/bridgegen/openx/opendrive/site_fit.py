@@ -245,10 +245,10 @@ MERGE = "merge"
 """The template whose scenarios take place at an entry of a map."""
 
 BEST = "best"
-"""Stands for the place on a map that fits and is most like the scenario's."""
+"""Name of the place on a map that fits and is most like the scenario's."""
 
 ALL = "all"
-"""Stands for every place that fits, at every rotation at which it does."""
+"""Name of all places that fit, at every rotation at which they do."""
 
 
 def site_for(

@@ -250,4 +250,4 @@ class CatalogReference(Element):
 
 
 CATALOG = OrInFiles(CatalogReference)
-"""Marks a child for which a file may name a catalogue's entry."""
+"""Marker of a child for which a file may name a catalogue's entry."""

@@ -89,7 +89,7 @@ class MarginalSection(FormSection):
     """How one parameter is distributed."""
 
     parts: Annotated[list[PartSection], Field(min_length=1, max_length=100)] | None = None
-    """Parts of mixture."""
+    """Parts of the distribution ``mixture``."""
     upper_tail: TailSection | None = None
     """Generalised Pareto tail above a threshold."""
     lower_tail: TailSection | None = None
