@@ -115,8 +115,8 @@ def judge(results: Results, measured: Mapping[str, Mapping[str, Float]]) -> tupl
 
 def can_show(seeds: int) -> bool:
     """Return whether so many runs of each method could show anything, did they differ entirely."""
-    one = np.arange(float(seeds))
-    return mann_whitney(one, one + seeds) * len(CLAIMS) < SURE
+    array = np.arange(float(seeds))
+    return mann_whitney(array, array + seeds) * len(CLAIMS) < SURE
 
 
 def _verdict(claim: Claim, x: Float, y: Float, p: float) -> Verdict:
@@ -159,7 +159,7 @@ def table_claims(verdicts: Mapping[str, Sequence[Verdict]], seeds: int) -> Table
          "median_ahead", "median_behind", "p_holm", "a12", "verdict")
     ]  # fmt: skip
     for k, claim in enumerate(CLAIMS):
-        one, printed = verdicts[paper.MAIN][k], _printed(claim)
+        verdict, printed = verdicts[paper.MAIN][k], _printed(claim)
         told = (
             " : ".join(number(value, claim.digits) for value in printed) if printed else "a curve"
         )
@@ -167,8 +167,8 @@ def table_claims(verdicts: Mapping[str, Sequence[Verdict]], seeds: int) -> Table
             (
                 f"{paper.TITLES[claim.ahead]} ahead of {paper.TITLES[claim.behind]}: {claim.title}",
                 told,
-                f"{number(one.ahead, claim.digits)} : {number(one.behind, claim.digits)}",
-                p_value(one.p), number(one.a12, 2), one.word,
+                f"{number(verdict.ahead, claim.digits)} : {number(verdict.behind, claim.digits)}",
+                p_value(verdict.p), number(verdict.a12, 2), verdict.word,
                 *(verdicts[name][k].word for name in others),
             )
         )  # fmt: skip

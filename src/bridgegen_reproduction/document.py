@@ -107,7 +107,7 @@ def markdown(document: Document) -> str:
     parts = [f"# {document.title}", " · ".join(document.facts)]
     for section in document.sections:
         parts.append(f"## {section.title}")
-        parts += [_block(one) for one in section.blocks]
+        parts += [_block(block) for block in section.blocks]
     return "\n\n".join(part.rstrip() for part in parts) + "\n"
 
 

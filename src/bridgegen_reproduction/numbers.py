@@ -17,12 +17,12 @@ def number(value: float, digits: int) -> str:
     return text.replace("-", "−")
 
 
-def spread(one: Quartiles, digits: int, *, several: bool) -> str:
+def spread(quartiles: Quartiles, digits: int, *, several: bool) -> str:
     """Return a median, and the quartiles where there are several values."""
-    middle = number(one.median, digits)
-    if not several or isnan(one.median) or isinf(one.low):
+    middle = number(quartiles.median, digits)
+    if not several or isnan(quartiles.median) or isinf(quartiles.low):
         return middle
-    return f"{middle} ({number(one.low, digits)} to {number(one.high, digits)})"
+    return f"{middle} ({number(quartiles.low, digits)} to {number(quartiles.high, digits)})"
 
 
 def share(part: int, whole: int) -> str:

@@ -28,11 +28,12 @@ def html(document: Document) -> str:
     fill = {
         "title": escape(document.title),
         "css": style() + _own("page.css"),
-        "facts": "".join(f"<li>{escape(one)}</li>" for one in document.facts),
+        "facts": "".join(f"<li>{escape(fact)}</li>" for fact in document.facts),
         "nav": "".join(
-            f'<a href="#{_anchor(one)}">{escape(one.title)}</a>' for one in document.sections
+            f'<a href="#{_anchor(section)}">{escape(section.title)}</a>'
+            for section in document.sections
         ),
-        "sections": "\n".join(_section(one) for one in document.sections),
+        "sections": "\n".join(_section(section) for section in document.sections),
         "version": escape(version("bridgegen")),
     }
     parts = re.split(r"\{\{(\w+)\}\}", _own("page.html"))
@@ -44,7 +45,7 @@ def _anchor(section: Section) -> str:
 
 
 def _section(section: Section) -> str:
-    blocks = "\n".join(_block(one) for one in section.blocks)
+    blocks = "\n".join(_block(block) for block in section.blocks)
     return (
         f'<section><h2 id="{_anchor(section)}">{escape(section.title)}</h2>\n{blocks}\n</section>'
     )
@@ -83,7 +84,7 @@ def _block(block: Block) -> str:
 
 
 def _folded(block: Folded) -> str:
-    head = "".join(f'<th scope="col">{escape(one)}</th>' for one in block.table.head)
+    head = "".join(f'<th scope="col">{escape(name)}</th>' for name in block.table.head)
     rows = "".join(
         f'<tr><th scope="row">{escape(row[0])}</th>'
         + "".join(f"<td>{escape(cell)}</td>" for cell in row[1:-2])

@@ -91,7 +91,7 @@ GROUPS: Mapping[str, tuple[Method, ...]] = {"single": (RS, PPO, PSO), "many": (R
 
 METHODS = (RS, PPO, PSO, NSGA2DT)
 
-TITLES = {one.algorithm: one.title for one in METHODS}
+TITLES = {method.algorithm: method.title for method in METHODS}
 
 HYPERPARAMETERS: Mapping[str, Mapping[str, float]] = {
     "ppo": {"epochs": 32, "gamma": 0.99, "lr_actor": 0.0003, "lr_critic": 0.001},

@@ -18,7 +18,7 @@ from bridgegen_reproduction.protocol import IDEAL, PERCEIVING, Protocol
 from bridgegen_reproduction.runs import Runs, of
 from bridgegen_reproduction.table import Table
 
-CAUSES = tuple(one for one in cause.CAUSES if one is not Cause.VEHICLE_DYNAMICS)
+CAUSES = tuple(item for item in cause.CAUSES if item is not Cause.VEHICLE_DYNAMICS)
 """The causes that there can be: the paper's vehicle is kinematic."""
 
 
@@ -72,22 +72,31 @@ def causes_of(protocol: Protocol, runs: Runs) -> tuple[Causes, ...]:
 def table_causes(found: Sequence[Causes]) -> Table:
     """Return how many critical scenarios vanish with ideal perception, and what the rest is."""
     rows, data = [], []
-    names = [one.label for one in CAUSES]
-    for one in found:
-        title = f"S{one.scenario[-1]}"
-        middle = quartiles(np.array(one.r_critic))
+    names = [item.label for item in CAUSES]
+    for causes in found:
+        title = f"S{causes.scenario[-1]}"
+        middle = quartiles(np.array(causes.r_critic))
         rows.append(
             (
-                title, TITLES[one.algorithm],
-                spread(middle, 3, several=len(one.r_critic) > 1), f"{one.critical:,}",
-                f"{one.vanish:,}", share(one.vanish, one.critical),
-                *(f"{count:,}" for count in one.by_cause[1:]),
+                title, TITLES[causes.algorithm],
+                spread(middle, 3, several=len(causes.r_critic) > 1), f"{causes.critical:,}",
+                f"{causes.vanish:,}", share(causes.vanish, causes.critical),
+                *(f"{count:,}" for count in causes.by_cause[1:]),
             )
         )  # fmt: skip
         data.append(
-            (one.scenario, one.algorithm, len(one.r_critic), one.evaluations, one.critical,
-             middle.low, middle.median, middle.high, *one.by_cause)
-        )  # fmt: skip
+            (
+                causes.scenario,
+                causes.algorithm,
+                len(causes.r_critic),
+                causes.evaluations,
+                causes.critical,
+                middle.low,
+                middle.median,
+                middle.high,
+                *causes.by_cause,
+            )
+        )
     head = ("scenario", "algorithm", "runs", "evaluations", "critical", "r_critic_q1",
             "r_critic_median", "r_critic_q3", *names)  # fmt: skip
     return Table(
@@ -157,12 +166,18 @@ def table_paired(found: Sequence[Paired]) -> Table:
     """Return what ideal perception takes away of the random scenarios' harm, and what it adds."""
     rows = tuple(
         (
-            f"S{one.scenario[-1]}", f"{one.evaluations:,}",
-            f"{one.real:,}", f"{one.ideal:,}", f"{one.vanish:,}", f"{one.appear:,}",
-            number(100.0 * (one.ideal - one.real) / one.real, 0) + " %" if one.real else "–",
+            f"S{paired.scenario[-1]}",
+            f"{paired.evaluations:,}",
+            f"{paired.real:,}",
+            f"{paired.ideal:,}",
+            f"{paired.vanish:,}",
+            f"{paired.appear:,}",
+            number(100.0 * (paired.ideal - paired.real) / paired.real, 0) + " %"
+            if paired.real
+            else "–",
         )
-        for one in found
-    )  # fmt: skip
+        for paired in found
+    )
     return Table(
         "perception-paired",
         "The same random scenarios, once with sensors and once with ideal perception",
@@ -175,6 +190,6 @@ def table_paired(found: Sequence[Paired]) -> Table:
         ),
         (
             ("scenario", "scenarios", "critical_sensors", "critical_ideal", "vanish", "appear"),
-            *(astuple(one) for one in found),
+            *(astuple(paired) for paired in found),
         ),
     )  # fmt: skip

@@ -71,7 +71,7 @@ def _drawings(found: Found, printed: Comparison) -> Iterator[tuple[str, str, Dra
             partial(violins, columns),
         )
     yield from _fronts(found, printed)
-    if any(one.critical for one in found.causes):
+    if any(cause.critical for cause in found.causes):
         yield (
             "causes",
             "With the reference driver: why critical scenarios are critical, by scenario and "
@@ -94,7 +94,7 @@ def _violin(group: str, algorithm: str, quantity: str, runs: Sequence[Run]) -> V
 def _fronts(found: Found, printed: Comparison) -> Iterator[tuple[str, str, Draw]]:
     if paper.MAIN not in printed.measured:
         return
-    names = [one.algorithm for one in paper.GROUPS["many"]]
+    names = [group.algorithm for group in paper.GROUPS["many"]]
     curves = curves_of(printed.records, printed.measured[paper.MAIN], names)
     at = points(found.protocol.budget).tolist()
     yield (

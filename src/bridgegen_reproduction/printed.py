@@ -24,7 +24,10 @@ def table_2(scenarios: Sequence[str]) -> Table:
     rows = []
     for name in sorted(scenarios):
         printed, ours = paper.DESIGNS[name], load(paper.shipped(name))
-        ego, bv = ours.ego, next(one for one in ours.participants if one is not ours.ego)
+        ego, bv = (
+            ours.ego,
+            next(participant for participant in ours.participants if participant is not ours.ego),
+        )
         ego_speed, bv_speed = ours.parameters["ego_speed"], ours.parameters["bv_speed"]
         title = f"S{name[-1]}"
         rows.append(
@@ -55,11 +58,11 @@ def table_2(scenarios: Sequence[str]) -> Table:
     )
 
 
-def _ends(one: Participant) -> tuple[str, str]:
-    assert one.end is not None
+def _ends(participant: Participant) -> tuple[str, str]:
+    assert participant.end is not None
     return (
-        paper.POINTS[one.start.leg, one.start.way],
-        paper.POINTS[one.end.leg, one.end.way],
+        paper.POINTS[participant.start.leg, participant.start.way],
+        paper.POINTS[participant.end.leg, participant.end.way],
     )
 
 
@@ -78,7 +81,7 @@ def table_3(runs: Runs) -> Table:
     weights = {term.metric: term.weight for term in PAPERS.terms}
     entropy = entropy_weights(runs)
     for name, symbol, column in (("d_min", "a1", 0), ("v_d", "a2", 1)):
-        found = [one[column] for one in entropy]
+        found = [pair[column] for pair in entropy]
         middle = number(float(np.median(found)), 4) if found else "–"
         reach = f" ({number(min(found), 4)} to {number(max(found), 4)})" if len(found) > 1 else ""
         ours = weights[name]
@@ -135,7 +138,9 @@ def _hyperparameters(name: str, title: str, group: str, runs: Runs, protocol: Pr
         made = of(runs, PRINTED, paper.MAIN, method.algorithm)
         declared = toolkit.get(method.algorithm).settings
         ours: Mapping[str, object] = (
-            made[0].settings if made else {key: one.default for key, one in declared.items()}
+            made[0].settings
+            if made
+            else {key: setting.default for key, setting in declared.items()}
         )
         printed = {"population": paper.POPULATION, **paper.HYPERPARAMETERS.get(
             method.algorithm, {})}  # fmt: skip
@@ -207,9 +212,9 @@ def _results(
     title: str,
     notes: tuple[str, ...],
 ) -> Table:
-    columns = [(group, one) for group, methods in paper.GROUPS.items() for one in methods]
-    head = ["", *(part for group, one in columns for part in (
-        f"{one.title}{_MARK[group]}, ours", "paper"))]  # fmt: skip
+    columns = [(group, item) for group, methods in paper.GROUPS.items() for item in methods]
+    head = ["", *(part for group, column in columns for part in (
+        f"{column.title}{_MARK[group]}, ours", "paper"))]  # fmt: skip
     data: list[tuple[object, ...]] = [
         ("quantity", "unit", "objectives", "method", "paper", "runs", "never", "q1", "median",
          "q3")
@@ -223,14 +228,14 @@ def _results(
                 cells += ["/", "/"]
                 continue
             values = results.values(group, method.algorithm, quantity.name)
-            one = results.quartiles(group, method.algorithm, quantity.name)
+            quartiles = results.quartiles(group, method.algorithm, quantity.name)
             runs = int(np.count_nonzero(~np.isnan(values)))
             never = int(np.count_nonzero(np.isinf(values)))
-            cells.append(spread(one, quantity.digits, several=runs > 1))
+            cells.append(spread(quartiles, quantity.digits, several=runs > 1))
             cells.append(number(printed, quantity.digits))
             data.append(
                 (quantity.name, quantity.unit, group, method.algorithm, printed, runs, never,
-                 one.low, one.median, one.high)
+                 quartiles.low, quartiles.median, quartiles.high)
             )  # fmt: skip
         rows.append(tuple(cells))
     return Table(name, title, tuple(head), tuple(rows), notes, tuple(data))
@@ -241,7 +246,7 @@ _MARK = {"single": "", "many": " (many)"}
 
 def table_6_others(found: Sequence[Results], protocol: Protocol) -> Table:
     """Return the results of the other scenarios, of which the paper prints none."""
-    shown = [one for one in QUANTITIES if one.name in _OTHERS]
+    shown = [item for item in QUANTITIES if item.name in _OTHERS]
     head = ("scenario", "method", "objectives",
             *(f"{q.title}{f' [{q.unit}]' if q.unit else ''}" for q in shown))  # fmt: skip
     rows = []
@@ -254,11 +259,11 @@ def table_6_others(found: Sequence[Results], protocol: Protocol) -> Table:
                 cells = [f"S{results.scenario[-1]}", method.title, group]
                 for quantity in shown:
                     values = results.values(group, method.algorithm, quantity.name)
-                    one = results.quartiles(group, method.algorithm, quantity.name)
+                    quartiles = results.quartiles(group, method.algorithm, quantity.name)
                     runs = int(np.count_nonzero(~np.isnan(values)))
-                    cells.append(spread(one, quantity.digits, several=runs > 1))
+                    cells.append(spread(quartiles, quantity.digits, several=runs > 1))
                     data.append((results.scenario, group, method.algorithm, quantity.name, runs,
-                                 one.low, one.median, one.high))  # fmt: skip
+                                 quartiles.low, quartiles.median, quartiles.high))  # fmt: skip
                 rows.append(tuple(cells))
     return Table(
         "table-6-others", "The same for the other scenarios, of which the paper prints no numbers",

@@ -217,7 +217,7 @@ def _read(protocol: Protocol, comparisons: Mapping[str, Comparison]) -> Found:
         verdicts={name: judge(results[name], fronts[name]) for name in protocol.scenarios},
         causes=causes_of(protocol, runs),
         paired=paired_of(protocol, runs),
-        commands={name: one.plan.command() for name, one in comparisons.items()},
+        commands={name: comparison.plan.command() for name, comparison in comparisons.items()},
     )
 
 

@@ -86,7 +86,7 @@ def sample(runs: Sequence[Run], k: int) -> dict[str, Float]:
     """Return the numbers of several runs by quantity, ``(n,)`` each."""
     each = [of_run(run, k) for run in runs]
     names = list(each[0]) if each else []
-    return {name: np.array([one[name] for one in each]) for name in names}
+    return {name: np.array([record[name] for record in each]) for name in names}
 
 
 @dataclass(frozen=True)
@@ -123,19 +123,22 @@ def results_of(protocol: Protocol, runs: Runs, scenario: str) -> Results:
     samples: dict[tuple[str, str], dict[str, Float]] = {}
     for group, methods in GROUPS.items():
         found = {
-            one.algorithm: sample(these, k)
-            for one in methods
-            if (these := of(runs, PRINTED, scenario, one.algorithm))
+            method.algorithm: sample(these, k)
+            for method in methods
+            if (these := of(runs, PRINTED, scenario, method.algorithm))
         }
         for name, source in (
             ("t_critic", "evaluations_to_k"),
             ("t_critic_seconds", "seconds_to_k"),
         ):
             best = min(
-                (quartiles(one[source]).median for one in found.values()), default=float("inf")
+                (quartiles(record[source]).median for record in found.values()),
+                default=float("inf"),
             )
             is_defined = 0.0 < best < float("inf")
-            for one in found.values():
-                one[name] = one[source] / best if is_defined else np.full(len(one[source]), np.nan)
-        samples |= {(group, algorithm): one for algorithm, one in found.items()}
+            for record in found.values():
+                record[name] = (
+                    record[source] / best if is_defined else np.full(len(record[source]), np.nan)
+                )
+        samples |= {(group, algorithm): record for algorithm, record in found.items()}
     return Results(scenario, samples, k)

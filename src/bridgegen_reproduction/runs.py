@@ -109,4 +109,4 @@ def of(runs: Runs, part: Part, scenario: str, algorithm: str) -> list[Run]:
         for (name, cell), run in runs.items()
         if (name, cell.scenario, cell.algorithm) == (part.name, scenario, algorithm)
     ]
-    return [run for _, run in sorted(found, key=lambda one: one[0])]
+    return [run for _, run in sorted(found, key=lambda pair: pair[0])]

@@ -83,7 +83,7 @@ def tell(found: Found, pictures: Mapping[str, Picture]) -> Document:
     def drawn(*names: str) -> list[Block]:
         return [pictures[name] for name in names if name in pictures]
 
-    others = [one for name, one in found.results.items() if name != paper.MAIN]
+    others = [result for name, result in found.results.items() if name != paper.MAIN]
     results: list[Block] = [Shown(table_6(found.main, protocol))]
     if others:
         results.append(Shown(table_6_others(others, protocol)))
@@ -126,7 +126,7 @@ def _facts(found: Found) -> list[str]:
         "Section V, Tables II to VI",
         f"{protocol.seeds} seed{'s' if protocol.seeds > 1 else ''}",
         f"{protocol.iterations} iterations × {paper.POPULATION}",
-        f"{len(found.runs):,} runs, {sum(len(one.critical) for one in found.runs.values()):,} "
+        f"{len(found.runs):,} runs, {sum(len(run.critical) for run in found.runs.values()):,} "
         "evaluations",
     ]
     if protocol.road_map:
@@ -158,7 +158,7 @@ def in_short(found: Found) -> list[tuple[str, str]]:
 
 def _orders(found: Found) -> str:
     verdicts = found.verdicts[paper.MAIN]
-    count = Counter(one.word for one in verdicts)
+    count = Counter(verdict.word for verdict in verdicts)
     asked = len(verdicts) - count["–"]
     told = []
     if count["holds"] or count["opposite"] or count["not shown"]:
@@ -186,12 +186,12 @@ def _orders(found: Found) -> str:
 def _shares(found: Found) -> str:
     parts = []
     for group, methods in paper.GROUPS.items():
-        for one in methods:
-            if group == "many" and one is paper.RS:
+        for method in methods:
+            if group == "many" and method is paper.RS:
                 continue
-            ours = found.main.quartiles(group, one.algorithm, "r_critic").median
-            printed = paper.RESULTS[group, one.algorithm]["r_critic"]
-            parts.append(f"{one.title} {number(ours, 3)} (paper: {number(printed, 3)})")
+            ours = found.main.quartiles(group, method.algorithm, "r_critic").median
+            printed = paper.RESULTS[group, method.algorithm]["r_critic"]
+            parts.append(f"{method.title} {number(ours, 3)} (paper: {number(printed, 3)})")
     text = ", ".join(parts) + "."
     random = found.main.quartiles("single", "random", "r_critic").median
     printed = paper.RESULTS["single", "random"]["r_critic"]
@@ -205,8 +205,8 @@ def _shares(found: Found) -> str:
 
 
 def _perception(found: Found) -> str:
-    total = sum(one.critical for one in found.causes)
-    gone = sum(one.vanish for one in found.causes)
+    total = sum(cause.critical for cause in found.causes)
+    gone = sum(cause.vanish for cause in found.causes)
     text = (
         f"With the reference driver, who perceives by camera and LiDAR, {gone:,} of {total:,} "
         f"critical scenarios ({share(gone, total)}) vanish with ideal perception, all scenarios "
@@ -214,28 +214,32 @@ def _perception(found: Found) -> str:
     )
     by_method = []
     for method in paper.METHODS:
-        these = [one for one in found.causes if one.algorithm == method.algorithm]
-        critical, vanish = sum(one.critical for one in these), sum(one.vanish for one in these)
+        these = [cause for cause in found.causes if cause.algorithm == method.algorithm]
+        critical, vanish = (
+            sum(causes.critical for causes in these),
+            sum(causes.vanish for causes in these),
+        )
         if critical:
             by_method.append(f"{method.title} {share(vanish, critical)} of {critical:,}")
     text += f". By method: {', '.join(by_method)}." if by_method else "."
-    here = [one for one in found.causes if one.scenario == paper.MAIN]
-    critical = sum(one.critical for one in here)
-    evaluations = sum(one.evaluations for one in here)
+    here = [cause for cause in found.causes if cause.scenario == paper.MAIN]
+    critical = sum(causes.critical for causes in here)
+    evaluations = sum(causes.evaluations for causes in here)
     if here:
         text += (
             f" On S4 it comes to harm in {critical:,} of {evaluations:,} evaluations, of which "
-            f"{sum(one.vanish for one in here):,} vanish"
+            f"{sum(causes.vanish for causes in here):,} vanish"
             + (": too few to go by, so look at the others." if critical < FEW else ".")
         )
     return text
 
 
 def _pairs(paired: Sequence[Paired]) -> str:
-    real, ideal = sum(one.real for one in paired), sum(one.ideal for one in paired)
-    vanish, appear = sum(one.vanish for one in paired), sum(one.appear for one in paired)
+    real, ideal = sum(item.real for item in paired), sum(item.ideal for item in paired)
+    vanish, appear = sum(item.vanish for item in paired), sum(item.appear for item in paired)
     return (
-        f"The same {sum(one.evaluations for one in paired):,} random scenarios were run once more "
+        f"The same {sum(item.evaluations for item in paired):,} random scenarios were run once "
+        "more "
         f"with ideal perception: {vanish:,} of {real:,} critical ones vanish, and {appear:,} "
         f"others become critical, which leaves {ideal:,}."
     )

@@ -72,8 +72,8 @@ def _markdown(text: str) -> str:
 def to_html(table: Table) -> str:
     """Return a table and its notes as HTML; the title is its caption."""
     head = "".join(
-        f'<th scope="col"{" class=text" if k < table.texts else ""}>{escape(one)}</th>'
-        for k, one in enumerate(table.head)
+        f'<th scope="col"{" class=text" if k < table.texts else ""}>{escape(name)}</th>'
+        for k, name in enumerate(table.head)
     )
     rows = "".join(
         f'<tr><th scope="row">{escape(row[0])}</th>'
@@ -113,7 +113,7 @@ _LATEX = {
 
 def latex(text: str) -> str:
     """Return plain text as LaTeX shows it, in any of its engines."""
-    return "".join(_LATEX.get(one, one) for one in text)
+    return "".join(_LATEX.get(name, name) for name in text)
 
 
 def to_latex(table: Table) -> str:

@@ -57,10 +57,10 @@ class Cause(IntEnum):
         Raises:
             UnknownNameError: there is none.
         """
-        for one in CAUSES:
-            if one.label == label:
-                return one
-        raise UnknownNameError("cause", label, [one.label for one in CAUSES])
+        for cause in CAUSES:
+            if cause.label == label:
+                return cause
+        raise UnknownNameError("cause", label, [cause.label for cause in CAUSES])
 
 
 CAUSES = (
@@ -106,10 +106,10 @@ def counterfactuals(driver: Driver, vehicle: str = KINEMATIC) -> tuple[Counterfa
     dynamics = vehicle != KINEMATIC
     others = [egos.get(name) for name in CAREFUL if name != driver.name]
     return (
-        *(Counterfactual(Cause.PERCEPTION, one) for one in ideal("perception")),
+        *(Counterfactual(Cause.PERCEPTION, item) for item in ideal("perception")),
         *([Counterfactual(Cause.VEHICLE_DYNAMICS, driver, kinematic=True)] if dynamics else []),
-        *(Counterfactual(Cause.PLANNING, one) for one in others),
-        *(Counterfactual(Cause.CONTROL, one) for one in ideal("control")),
+        *(Counterfactual(Cause.PLANNING, other) for other in others),
+        *(Counterfactual(Cause.CONTROL, item) for item in ideal("control")),
         Counterfactual(Cause.CONTROL, driver, dry=True),
     )
 
@@ -121,13 +121,13 @@ def require(cause: Cause, driver: Driver, vehicle: str = KINEMATIC) -> None:
         InputError: it cannot: the stage is ideal, or missing; or the ego has no driver.
     """
     replays = counterfactuals(driver, vehicle)
-    known = [one for one in CAUSES if one in {replay.cause for replay in replays}]
+    known = [item for item in CAUSES if item in {replay.cause for replay in replays}]
     if not replays:
         raise InputError(
             f"cause '{cause.label}': the ego has no driver, the file's own actions move it"
         )
     if cause not in (*known, Cause.UNAVOIDABLE):
-        others = ", ".join(one.label for one in (*known, Cause.UNAVOIDABLE))
+        others = ", ".join(item.label for item in (*known, Cause.UNAVOIDABLE))
         raise InputError(
             f"cause '{cause.label}': no harm of the driver '{driver.label}' in a vehicle that is "
             f"{vehicle} can have it, only {others}"
@@ -154,11 +154,11 @@ def causes(
     """
     found = np.full(len(critical), Cause.NONE, dtype=np.int8)
     left = np.flatnonzero(critical)
-    for one in replays:
+    for replay in replays:
         if not len(left):
             return found
-        gone = harmless(left, one)
-        found[left[gone]] = one.cause
+        gone = harmless(left, replay)
+        found[left[gone]] = replay.cause
         left = left[~gone]
     if replays:
         found[left] = Cause.UNAVOIDABLE

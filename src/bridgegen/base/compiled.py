@@ -304,23 +304,23 @@ def row_type(rows: Any, axes: int = 1) -> Any:
         return None
     key = (type(rows), axes, *map(_look_of, rows))
     if key not in _ROW_TYPES:
-        _ROW_TYPES[key] = Bundle(_row_tuple([numba.typeof(one) for one in rows], type(rows), axes))
+        _ROW_TYPES[key] = Bundle(_row_tuple([numba.typeof(row) for row in rows], type(rows), axes))
     return _ROW_TYPES[key]
 
 
 _ROW_TYPES: dict[tuple[Any, ...], Bundle] = {}
 
 
-def _look_of(one: Any) -> Any:
+def _look_of(value: Any) -> Any:
     """Return all that Numba's type of an array or a number depends on."""
-    if isinstance(one, np.ndarray):
-        return one.dtype, one.ndim, one.flags.num
-    return type(one)
+    if isinstance(value, np.ndarray):
+        return value.dtype, value.ndim, value.flags.num
+    return type(value)
 
 
 def _row_tuple(kinds: Sequence[Any], named: type, axes: int) -> Any:
     arrays = numba.types.Array
-    row = (one.copy(ndim=one.ndim - axes) if isinstance(one, arrays) else one for one in kinds)
+    row = (kind.copy(ndim=kind.ndim - axes) if isinstance(kind, arrays) else kind for kind in kinds)
     return numba.types.NamedTuple(tuple(row), named)
 
 
@@ -337,13 +337,13 @@ def _itself(value: Any) -> Any:
 
 
 def _row(rows: Any, i: int) -> Any:
-    return type(rows)(*(one[i] if isinstance(one, np.ndarray) else one for one in rows))
+    return type(rows)(*(row[i] if isinstance(row, np.ndarray) else row for row in rows))
 
 
 def call_from_python(address: int, arrays: tuple[np.ndarray, ...]) -> None:
     """Do in Python what ``call_at`` does in a kernel."""
     kinds = [ctypes.c_void_p, ctypes.c_ssize_t] * len(arrays)
-    given = (one for array in arrays for one in (array.ctypes.data, len(array)))
+    given = (number for array in arrays for number in (array.ctypes.data, len(array)))
     ctypes.CFUNCTYPE(None, *kinds)(address)(*given)
 
 

@@ -49,7 +49,7 @@ class PlugIns:
         """
         added = self._points().get(name, [])
         if len(added) > (0 if name in ours else 1):
-            places = [*(["bridgegen"] if name in ours else []), *(one.value for one in added)]
+            places = [*(["bridgegen"] if name in ours else []), *(point.value for point in added)]
             raise InputError(
                 f"{self.kind} '{name}' is declared more than once: {', '.join(places)}"
             )
@@ -66,7 +66,7 @@ class PlugIns:
 
     def place(self, name: str) -> str:
         """Return what a plug-in is and where it is declared, for messages."""
-        values = ", ".join(one.value for one in self._points().get(name, []))
+        values = ", ".join(point.value for point in self._points().get(name, []))
         return f"{self.kind} '{name}' ({values}, entry point of '{self.group}')"
 
     def _points(self) -> dict[str, list["EntryPoint"]]:
@@ -129,8 +129,8 @@ class Registry(MutableMapping[str, Kind]):
             self._loaded[name] = self._check(self._added.load(name, self._ours), name)
         return self._loaded[name]
 
-    def __setitem__(self, name: str, one: Kind) -> None:
-        self._ours[name] = one
+    def __setitem__(self, name: str, kind: Kind) -> None:
+        self._ours[name] = kind
 
     def __delitem__(self, name: str) -> None:
         del self._ours[name]

@@ -46,7 +46,7 @@ _SYMBOLS = sorted({symbol for symbols in WRITTEN.values() for symbol in symbols}
 _NUMBER = r"[-+]?(?:\.[0-9]+|[0-9]+(?:\.[0-9]*)?)(?:[eE][-+]?[0-9]{1,2})?"
 _UNIT = r"[A-Za-z°%][\w°%/²^]{0,15}"
 _FORM = re.compile(rf"\s*({_NUMBER})(?:\s*({_UNIT})|\s+(1/k?m))\s*")
-PATTERN = rf"^{_NUMBER} ?({'|'.join(re.escape(one) for one in _SYMBOLS)})$"
+PATTERN = rf"^{_NUMBER} ?({'|'.join(re.escape(name) for name in _SYMBOLS)})$"
 """Regular expression of a number with a unit, for JSON Schema."""
 
 

@@ -44,7 +44,11 @@ def _scenarios_of_suite(ctx: typer.Context) -> Iterable[str]:
     """Return scenarios; before the first, what else one may do with a suite."""
     from bridgegen.cli.app import suites
 
-    others = [one.name for one in suites.registered_commands if one.name not in (None, DEFAULT)]
+    others = [
+        command.name
+        for command in suites.registered_commands
+        if command.name not in (None, DEFAULT)
+    ]
     return (*_scenarios(ctx), *(() if ctx.params.get("files") else map(str, others)))
 
 
@@ -126,7 +130,7 @@ def _vehicles(_: typer.Context) -> Iterable[str]:
 def _causes(_: typer.Context) -> Iterable[str]:
     from bridgegen.assess.cause import CAUSES
 
-    return [one.label for one in CAUSES]
+    return [cause.label for cause in CAUSES]
 
 
 def _triages(_: typer.Context) -> Iterable[str]:

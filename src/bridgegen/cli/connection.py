@@ -104,7 +104,11 @@ def with_connection_options(command: Callable[..., None]) -> Callable[..., None]
 
 def read_access(connection: Connection) -> SimulatorChoice | None:
     """Return the choice of the simulator that a connection is for; None for no connection."""
-    owners = [one.name for one in SIMULATORS.values() if {*connection} & one.access.keys()]
+    owners = [
+        simulator.name
+        for simulator in SIMULATORS.values()
+        if {*connection} & simulator.access.keys()
+    ]
     return SimulatorChoice(owners[0], access=connection) if owners else None
 
 
@@ -137,12 +141,12 @@ def with_map_folder(
             with _root(maps):
                 command(**values)
 
-        one = inspect.Parameter(
+        parameter = inspect.Parameter(
             "maps", inspect.Parameter.KEYWORD_ONLY, default=None, annotation=option
         )
-        made = [*signature.parameters.values(), one]
+        made = [*signature.parameters.values(), parameter]
         wrapper.__signature__ = signature.replace(parameters=made)  # type: ignore[attr-defined]
-        wrapper.__annotations__ = {one.name: one.annotation for one in made}
+        wrapper.__annotations__ = {item.name: item.annotation for item in made}
         return wrapper
 
     return decorate

@@ -32,12 +32,12 @@ def expand(
     """
     signature = inspect.signature(command)
     parameters = []
-    for one in signature.parameters.values():
-        if one.name != parameter:
-            parameters.append(one)
+    for item in signature.parameters.values():
+        if item.name != parameter:
+            parameters.append(item)
             continue
         for name, (annotation, default) in options.items():
-            parameters.append(one.replace(name=name, annotation=annotation, default=default))
+            parameters.append(item.replace(name=name, annotation=annotation, default=default))
 
     @wraps(command)
     def wrapper(**values: Any) -> None:
@@ -45,7 +45,7 @@ def expand(
         command(**values, **{parameter: folded})
 
     wrapper.__signature__ = signature.replace(parameters=parameters)  # type: ignore[attr-defined]
-    wrapper.__annotations__ = {one.name: one.annotation for one in parameters}
+    wrapper.__annotations__ = {item.name: item.annotation for item in parameters}
     return wrapper
 
 
@@ -68,23 +68,23 @@ def with_options(*names: str) -> Callable[[Callable[..., None]], Callable[..., N
 
 def _names(command: Callable[..., None]) -> list[str]:
     kind: type[PipelineOptions] = signature(command).parameters["options"].annotation
-    return [one.name for one in options_of(kind) if one.form.kind is not None]
+    return [option.name for option in options_of(kind) if option.form.kind is not None]
 
 
 def _with(command: Callable[..., None], names: Collection[str]) -> Callable[..., None]:
     kind: type[PipelineOptions] = signature(command).parameters["options"].annotation
-    declared = {one.name: one for one in options_of(kind) if one.name in names}
+    declared = {option.name: option for option in options_of(kind) if option.name in names}
 
     def fold(values: dict[str, Any]) -> PipelineOptions:
         given = {name: value for name, value in values.items() if value is not None}
-        needed = {name: one.spelling for name, one in declared.items() if one.is_required}
+        needed = {name: option.spelling for name, option in declared.items() if option.is_required}
         if missing := [needed[name] for name in needed if name not in given]:
             raise InputError(f"missing: {', '.join(missing)}")
         return kind(**{n: declared[n].form.read(v, declared[n].spelling) for n, v in given.items()})
 
     # Python wants parameters without a default first, and arguments are the only ones.
     places = sorted(declared.items(), key=lambda of: not of[1].is_argument)
-    made = {name: (_annotation(one), _default(one)) for name, one in places}
+    made = {name: (_annotation(place), _default(place)) for name, place in places}
     return expand(command, "options", made, fold)
 
 
@@ -95,34 +95,36 @@ def declaration(name: str, *, shown: str | None = None) -> Any:
         name: of the field of `SearchOptions`.
         shown: the command's default in words, where it is not the search's.
     """
-    (one,) = (one for one in options_of(SearchOptions) if one.name == name)
-    return declare(one if shown is None else replace(one, shown=shown))
+    (option,) = (item for item in options_of(SearchOptions) if item.name == name)
+    return declare(option if shown is None else replace(option, shown=shown))
 
 
-def _annotation(one: Option) -> Any:
-    kind = one.form.kind
-    if one.is_argument:
-        return Annotated[kind, typer.Argument(help=one.help, autocompletion=completing(one.names))]
-    return Annotated[kind if kind is bool else kind | None, declare(one)]
+def _annotation(option: Option) -> Any:
+    kind = option.form.kind
+    if option.is_argument:
+        return Annotated[
+            kind, typer.Argument(help=option.help, autocompletion=completing(option.names))
+        ]
+    return Annotated[kind if kind is bool else kind | None, declare(option)]
 
 
-def declare(one: Option) -> Any:
+def declare(option: Option) -> Any:
     """Return the typer declaration of an option."""
-    spelling = one.spelling
-    if one.form.kind is bool:
+    spelling = option.spelling
+    if option.form.kind is bool:
         spelling = f"{spelling}/--no-{spelling.removeprefix('--')}"
-    text = f"{one.help} {one.hint}".rstrip()
+    text = f"{option.help} {option.hint}".rstrip()
     return typer.Option(
-        *filter(None, (spelling, one.also)),
+        *filter(None, (spelling, option.also)),
         help=text,
-        show_default="required" if one.is_required else one.shown or True,
-        rich_help_panel=one.group,
-        autocompletion=completing(one.names),
+        show_default="required" if option.is_required else option.shown or True,
+        rich_help_panel=option.group,
+        autocompletion=completing(option.names),
     )
 
 
-def _default(one: Option) -> Any:
+def _default(option: Option) -> Any:
     """Return the parser's default; None where only the options' class knows it."""
-    if one.is_argument:
+    if option.is_argument:
         return inspect.Parameter.empty
-    return one.default if isinstance(one.default, bool | int | float | str) else None
+    return option.default if isinstance(option.default, bool | int | float | str) else None

@@ -30,7 +30,7 @@ def demo(
     from bridgegen.cli.terminal.search import SearchScreen, print_summary
     from bridgegen.jobs import search as campaign
 
-    folder = next(one for one in _folders(Path("runs")) if not one.exists())
+    folder = next(path for path in _folders(Path("runs")) if not path.exists())
     print(
         f"A car turns right while a cyclist goes straight on. Which of {BUDGET} such scenarios "
         f"make the driver '{DRIVER}' fail?\nbridgegen search {SCENARIO} --ego {DRIVER} --algorithm "

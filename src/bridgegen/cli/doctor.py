@@ -17,7 +17,7 @@ def doctor(as_json: options.Json = False) -> None:
     from bridgegen.cli.terminal.tables import print_table
 
     found = list(examine())
-    rows = [(one.subject, one.value, one.advice) for one in found]
+    rows = [(finding.subject, finding.value, finding.advice) for finding in found]
     print_table(("subject", "value", "advice"), rows, as_json=as_json)
-    if any(one.is_problem for one in found):
+    if any(finding.is_problem for finding in found):
         raise typer.Exit(2)

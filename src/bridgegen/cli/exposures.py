@@ -83,5 +83,5 @@ def list_exposures(as_json: common.Json = False) -> None:
     from bridgegen.scenario.exposure import example_names, read_exposure
 
     made = [(name, read_exposure(name)) for name in example_names()]
-    rows = [(name, f"of {one.scenario.name}", one.source) for name, one in made]
+    rows = [(name, f"of {exposure.scenario.name}", exposure.source) for name, exposure in made]
     print_entries(("exposure", "description", "source"), rows, as_json=as_json)

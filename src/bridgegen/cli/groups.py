@@ -35,9 +35,9 @@ class PanelledGroup(TyperGroup):
         width = max(len(name) for name in commands)
         for panel in PANELS:
             rows = [
-                (name.ljust(width), one.get_short_help_str(formatter.width - width - 4))
-                for name, one in commands.items()
-                if getattr(one, "rich_help_panel", "") == panel
+                (name.ljust(width), command.get_short_help_str(formatter.width - width - 4))
+                for name, command in commands.items()
+                if getattr(command, "rich_help_panel", "") == panel
             ]
             with formatter.section(panel):
                 formatter.write_dl(rows)
@@ -53,12 +53,12 @@ class GroupedCommand(TyperCommand):
             InputError: one is given again.
         """
         single = {
-            spelling: one
-            for one in self.params
-            if one.param_type_name == "option"
-            and not one.multiple
-            and not getattr(one, "is_flag", False)
-            for spelling in one.opts
+            spelling: param
+            for param in self.params
+            if param.param_type_name == "option"
+            and not param.multiple
+            and not getattr(param, "is_flag", False)
+            for spelling in param.opts
         }
         values: dict[str, list[str]] = {}
         words = iter(args)
@@ -81,14 +81,14 @@ class GroupedCommand(TyperCommand):
         """Write the arguments, then the groups that the command has options of."""
         arguments: list[tuple[str, str]] = []
         groups: dict[str, list[tuple[str, str]]] = {group: [] for group in (*GROUPS, OTHER)}
-        for one in self.get_params(ctx):
-            record = one.get_help_record(ctx)
+        for param in self.get_params(ctx):
+            record = param.get_help_record(ctx)
             if record is None:
                 continue
-            if one.param_type_name == "argument":
+            if param.param_type_name == "argument":
                 arguments.append(record)
             else:
-                groups[getattr(one, "rich_help_panel", None) or OTHER].append(record)
+                groups[getattr(param, "rich_help_panel", None) or OTHER].append(record)
         for title, rows in {"Arguments": arguments, **groups}.items():
             if rows:
                 with formatter.section(title):
@@ -122,9 +122,9 @@ class DefaultCommand(GroupedCommand):
         super().format_options(ctx, formatter)
         group = ctx.meta.get(_BESIDE)
         rows = [
-            (f"{ctx.info_name} {name}", one.get_short_help_str(formatter.width - 20))
-            for name, one in (group.commands if group else {}).items()
-            if one is not self
+            (f"{ctx.info_name} {name}", command.get_short_help_str(formatter.width - 20))
+            for name, command in (group.commands if group else {}).items()
+            if command is not self
         ]
         if rows:
             with formatter.section("Commands"):

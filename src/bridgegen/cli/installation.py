@@ -68,7 +68,7 @@ def _libraries() -> Iterator[Finding]:
 
 def _requirement(name: str) -> str:
     """Return what BridgeGen requires of a package."""
-    found = [one for one in requires("bridgegen") or [] if re.match(rf"{name}\b", one)]
+    found = [require for require in requires("bridgegen") or [] if re.match(rf"{name}\b", require)]
     return found[0].partition(";")[0].strip() if found else name
 
 

@@ -52,7 +52,7 @@ _OF_SIMULATOR = ("simulator", "simulator_set", "connection")
 def command_of(job: Job) -> Any:
     """Return the function of a job's command, with the options that it declares."""
     kind: Any = job.options
-    simulators = [one for one in options_of(kind) if one.name == "simulator"]
+    simulators = [option for option in options_of(kind) if option.name == "simulator"]
 
     def command(
         options: kind,
@@ -88,7 +88,7 @@ def command_of(job: Job) -> Any:
             raise typer.Exit(FAILED)
 
     signature = inspect.signature(command)
-    named = {one.name: one for one in signature.parameters.values()}
+    named = {parameter.name: parameter for parameter in signature.parameters.values()}
     for name in _OF_SIMULATOR if not simulators else ():
         del named[name]
     if not argument_of(job):
@@ -122,11 +122,11 @@ def _print(result: JobResult, seconds: float, *, as_json: bool) -> None:
     if as_json:
         print(json.dumps(result.to_json(), indent=1))
         return
-    for one in result.shown():
-        if isinstance(one, str):
-            print(one)
+    for name in result.shown():
+        if isinstance(name, str):
+            print(name)
         else:
-            print_table(one.head, one.rows, as_json=False, texts=one.texts)
+            print_table(name.head, name.rows, as_json=False, texts=name.texts)
     print(f"{'wall time':<12}{seconds:.1f} s, {result.work}")
 
 
@@ -138,17 +138,17 @@ def run_all(
     One that fails does not keep the others from running; the exit status is then 2.
     """
     status = 0
-    for one in runs:
-        print(f"\n{one.name}", flush=True)
+    for run in runs:
+        print(f"\n{run.name}", flush=True)
         try:
-            command({"out": Path(job) / path.stem / one.name, **one.values})
+            command({"out": Path(job) / path.stem / run.name, **run.values})
         except typer.Exit as ended:
             status = max(status, ended.exit_code)
         except Interrupted:
             raise
         except BridgeGenError as error:
             for problem in error.problems:
-                print(f"bridgegen: error: {one.name}: {problem}", file=sys.stderr)
+                print(f"bridgegen: error: {run.name}: {problem}", file=sys.stderr)
             status = 2
     if status:
         raise typer.Exit(status)
@@ -156,7 +156,7 @@ def run_all(
 
 def argument_of(job: Job) -> str:
     """Return the name of what a job's command takes without a spelling; "" if there is none."""
-    return next((one.name for one in options_of(job.options) if one.is_argument), "")
+    return next((option.name for option in options_of(job.options) if option.is_argument), "")
 
 
 def _add(job: Job) -> None:

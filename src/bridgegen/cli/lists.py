@@ -37,9 +37,9 @@ def list_algorithms(as_json: options.Json = False) -> None:
     from bridgegen.search import algorithms as toolkit
 
     rows = []
-    for one in (toolkit.get(name) for name in toolkit.names()):
-        settings = ", ".join(f"{name}={json.dumps(s.default)}" for name, s in one.settings.items())
-        rows.append((one.name, one.description, settings, one.source))
+    for kind in (toolkit.get(name) for name in toolkit.names()):
+        settings = ", ".join(f"{name}={json.dumps(s.default)}" for name, s in kind.settings.items())
+        rows.append((kind.name, kind.description, settings, kind.source))
     print_table(("algorithm", "description", "settings", "source"), rows, as_json=as_json)
 
 
@@ -63,10 +63,10 @@ def list_simulators(as_json: options.Json = False) -> None:
 
     rows = [
         (
-            one.name, one.description, ", ".join(one.access),
-            "; ".join(f"{name}: {what}" for name, what in one.settings.items()),
+            simulator.name, simulator.description, ", ".join(simulator.access),
+            "; ".join(f"{name}: {what}" for name, what in simulator.settings.items()),
         )
-        for one in SIMULATORS.values()
+        for simulator in SIMULATORS.values()
     ]  # fmt: skip
     print_table(("simulator", "description", "options", "settings"), rows, as_json=as_json)
 

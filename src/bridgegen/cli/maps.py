@@ -58,21 +58,21 @@ def places(
         print_table(
             ("place", "what there is", "fits", "where, or what is missing"),
             [
-                (one.id, one.size, _fits(one), one.placed or one.lacks)
-                for one in sorted(found, key=lambda one: not one.rotations)
+                (fit.id, fit.size, _fits(fit), fit.placed or fit.lacks)
+                for fit in sorted(found, key=lambda fit: not fit.rotations)
             ],
             as_json=as_json,
         )
     else:
         print_table(
             ("place", "kind", "what there is", "roads"),
-            [(one.id, one.kind, one.size, ", ".join(one.legs)) for one in found],
+            [(fit.id, fit.kind, fit.size, ", ".join(fit.legs)) for fit in found],
             as_json=as_json,
         )
     if picture is not None:
-        fits = [one for one in found if one.rotations]
-        junctions = {one.id for one in fits if one.kind == "junction"} if scenario else None
-        roads = {one.id: one.legs[0] for one in fits if one.kind != "junction"}
+        fits = [fit for fit in found if fit.rotations]
+        junctions = {fit.id for fit in fits if fit.kind == "junction"} if scenario else None
+        roads = {fit.id: fit.legs[0] for fit in fits if fit.kind != "junction"}
         write_map_picture(picture, model, junctions, roads)
         print(picture, file=sys.stderr if as_json else sys.stdout)
 

@@ -91,7 +91,7 @@ def keys_of(command: Callable[..., Any], kind: type[Any] = SearchOptions) -> dic
         command: that makes it.
         kind: the class of its declared options.
     """
-    declared = {one.name: one for one in options_of(kind)}
+    declared = {item.name: item for item in options_of(kind)}
     found = {}
     for name, parameter in inspect.signature(command).parameters.items():
         if name == SAVE or get_origin(parameter.annotation) is not Annotated:
@@ -105,7 +105,9 @@ def keys_of(command: Callable[..., Any], kind: type[Any] = SearchOptions) -> dic
         elif option is not None and option.form.kind is not None:
             form = option.form.in_file
         # In Annotated, typer takes the first argument of Option for a spelling.
-        words = [one for one in (info.default, *(info.param_decls or ())) if isinstance(one, str)]
+        words = [
+            decl for decl in (info.default, *(info.param_decls or ())) if isinstance(decl, str)
+        ]
         spelling = words[0].partition("/")[0][2:] if words else name.replace("_", "-")
         limits = option.limits if option else None
         found[spelling] = Key(name, form, info.help or "", bool(types & {Path, list[Path]}), limits)
@@ -168,7 +170,7 @@ def read_runs(path: Path, keys: Mapping[str, Key], argument: str = SCENARIO) -> 
     elif not isinstance(data["runs"], dict) or not data["runs"]:
         problems.append(f"runs must be a mapping, NAME: OPTIONS ({document.at(('runs',))})")
     else:
-        for name, one in data["runs"].items():
+        for name, item in data["runs"].items():
             if not name.replace("-", "").replace("_", "").replace(".", "").isalnum() or (
                 name.startswith(".")
             ):
@@ -177,7 +179,7 @@ def read_runs(path: Path, keys: Mapping[str, Key], argument: str = SCENARIO) -> 
                     f"'{name}' ({document.at(('runs', name))})"
                 )
             place = ("runs", name)
-            found.append(FiledRun(name, _read_run(document, place, one, keys, argument, problems)))
+            found.append(FiledRun(name, _read_run(document, place, item, keys, argument, problems)))
     if problems:
         raise InputError(*problems)
     return found
@@ -221,9 +223,9 @@ def _read_run(
 def _moved(key: Key, value: Any, move: Callable[[str], object]) -> Any:
     """Return a value with its path, if it holds one, moved to or from the file's folder."""
     if key.name == _CRITERIA:
-        return [str(move(one)) if one.lower().endswith(_YAML) else one for one in value]
+        return [str(move(item)) if item.lower().endswith(_YAML) else item for item in value]
     if isinstance(value, list):
-        return [_moved(key, one, move) for one in value]
+        return [_moved(key, item, move) for item in value]
     if key.is_path:
         return Path(str(move(str(value))))
     if not isinstance(value, str):
@@ -296,7 +298,7 @@ def _text(path: Path, values: Values, keys: Mapping[str, Key]) -> str:
     data = {}
     for spelling, key in keys.items():
         if key.name in values:
-            value = _moved(key, values[key.name], lambda one: os.path.relpath(one, folder))
+            value = _moved(key, values[key.name], lambda name: os.path.relpath(name, folder))
             data[spelling] = key.form.plain(value)
     text: str = yaml.safe_dump({"run": data}, sort_keys=False, allow_unicode=True)
     return text
@@ -368,13 +370,13 @@ def with_run_files(
             if filed:
                 del given[argument]
                 read = read_runs(path, keys, argument)
-                runs = [FiledRun(one.name, _over(one.values, given)) for one in read]
+                runs = [FiledRun(run.name, _over(run.values, given)) for run in read]
             if save is not None:
                 if len(runs) > 1 or runs[0].name:
                     raise InputError("--save writes one run, and this file has several")
                 save_run(save, runs[0].values, keys)
             if filed and runs[0].name:
-                several(path, runs, keys, lambda one: command(**{**values, **one}))
+                several(path, runs, keys, lambda record: command(**{**values, **record}))
             else:
                 command(**{**values, **runs[0].values})
 
@@ -385,7 +387,7 @@ def with_run_files(
         wrapper.__signature__ = signature.replace(  # type: ignore[attr-defined]
             parameters=parameters
         )
-        wrapper.__annotations__ = {one.name: one.annotation for one in parameters}
+        wrapper.__annotations__ = {parameter.name: parameter.annotation for parameter in parameters}
         return wrapper
 
     return decorate

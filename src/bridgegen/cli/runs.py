@@ -61,10 +61,10 @@ def search_all(
 
     ends: dict[str, str] = {}
     status = 0
-    for one in runs:
-        out = Path(one.values.get("out") or Path("runs") / path.stem / one.name)
-        values = {**one.values, "out": out}
-        print(f"\n{one.name}", flush=True)
+    for filed_run in runs:
+        out = Path(filed_run.values.get("out") or Path("runs") / path.stem / filed_run.name)
+        values = {**filed_run.values, "out": out}
+        print(f"\n{filed_run.name}", flush=True)
         try:
             if not is_recorded(out, values, keys):
                 command(values)
@@ -88,10 +88,10 @@ def search_all(
             status = max(status, ended.exit_code)
         except BridgeGenError as error:
             for problem in error.problems:
-                print(f"bridgegen: error: {one.name}: {problem}", file=sys.stderr)
-            status, ends[one.name] = 2, f"failed: {error.problems[0]}"
+                print(f"bridgegen: error: {filed_run.name}: {problem}", file=sys.stderr)
+            status, ends[filed_run.name] = 2, f"failed: {error.problems[0]}"
             continue
-        ends[one.name] = f"{conclusion(Run(out))} ({out})"
+        ends[filed_run.name] = f"{conclusion(Run(out))} ({out})"
     print()
     for name, end in ends.items():
         print(f"{name:<{max(map(len, ends)) + 2}}{end}")
@@ -362,8 +362,8 @@ def simulate(
         simulator=common.read_simulator(simulator, simulator_set, connection) or EMBEDDED,
         criteria=criteria.criteria,
     )
-    for one in skipped or ():
-        print(f"bridgegen: warning: left out: {one}", file=sys.stderr)
+    for name in skipped or ():
+        print(f"bridgegen: warning: left out: {name}", file=sys.stderr)
     for note in result.notes:
         print(f"bridgegen: note: {note}", file=sys.stderr)
     if trace is not None:
@@ -381,8 +381,8 @@ def simulate(
         if result.incidents:
             step = result.rollout.time_step
             facts["incidents"] = [
-                {"time": one.step * step, "kind": one.kind, "what": one.what}
-                for one in result.incidents
+                {"time": incident.step * step, "kind": incident.kind, "what": incident.what}
+                for incident in result.incidents
             ]
         print(json.dumps(facts, indent=2))
     else:

@@ -180,9 +180,9 @@ def keep_to_leaders(
             continue  # beside: braking would not separate them
         if not walks:
             gain = seen[GAIN, o] if moves and parallel > 0.0 else 0.0
-            one = follow(gap, v, w * parallel if moves else 0.0, gain)
-            if one < CONCERNS:
-                asked = min(asked, one)
+            item = follow(gap, v, w * parallel if moves else 0.0, gain)
+            if item < CONCERNS:
+                asked = min(asked, item)
         elif not moves:
             asked = min(asked, stop_for(gap + STOP_MARGIN - ON_FOOT_GAP, v))
     return asked
@@ -231,13 +231,13 @@ def look(
                 asked = min(asked, follows)
             if v * v <= 2.0 * COMMITTED * grip * (stops_at - front - s):
                 stop = min(stop, stops_at)
-        one, light = stop_at_lights(
+        item, light = stop_at_lights(
             stops, lights, s, front, v, math.inf, int(mind[STOPS_FOR]) - 1
         )  # fmt: skip
         mind[STOPS_FOR] = light + 1.0
-        asked = min(asked, one)
-        one, mind[HALTED] = stop_at_signs(halts, s, front, v, mind[HALTED])
-        asked = min(asked, one)
+        asked = min(asked, item)
+        item, mind[HALTED] = stop_at_signs(halts, s, front, v, mind[HALTED])
+        asked = min(asked, item)
     if stop < math.inf:
         asked = min(asked, stop_for(stop - front - s, v))
     return asked

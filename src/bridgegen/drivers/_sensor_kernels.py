@@ -82,14 +82,14 @@ def draw(memory, e, key, frame, renew, keep):
     if fresh or unit(v) < renew:
         memory[e, BY_CLASS] = unit(w)
     add = math.sqrt(1.0 - keep * keep)
-    one, other = normal_pair(p, q)
-    memory[e, CAMERA_ALONG] = keep * memory[e, CAMERA_ALONG] + add * one
+    item, other = normal_pair(p, q)
+    memory[e, CAMERA_ALONG] = keep * memory[e, CAMERA_ALONG] + add * item
     memory[e, CAMERA_ACROSS] = keep * memory[e, CAMERA_ACROSS] + add * other
-    one, other = normal_pair(r, s)
-    memory[e, LIDAR_ALONG] = keep * memory[e, LIDAR_ALONG] + add * one
+    item, other = normal_pair(r, s)
+    memory[e, LIDAR_ALONG] = keep * memory[e, LIDAR_ALONG] + add * item
     memory[e, LIDAR_ACROSS] = keep * memory[e, LIDAR_ACROSS] + add * other
-    one, other = normal_pair(t, u)
-    memory[e, SIZE] = keep * memory[e, SIZE] + add * one
+    item, other = normal_pair(t, u)
+    memory[e, SIZE] = keep * memory[e, SIZE] + add * item
     memory[e, TURN] = keep * memory[e, TURN] + add * other
 
 

@@ -17,7 +17,7 @@ CLOUD = column("cloud")  # share of the sky
 FRICTION_SCALE = column("friction_scale")  # of dry friction
 STATED = len(COLUMNS)
 
-CLEAR_DAY = tuple(one.clear for one in COLUMNS)
+CLEAR_DAY = tuple(physical.clear for physical in COLUMNS)
 """Values of the weather where a file states none: WMO's clear air, the sun in the south at 45°."""
 
 # What follows, see ``_weather_kernels``.

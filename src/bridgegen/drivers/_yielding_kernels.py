@@ -216,13 +216,23 @@ def yield_to_all(s, v, pace, front, rear, shift, friction_limit, passages, count
     """
     asked, stop = math.inf, math.inf
     for i in range(count):
-        one = passages[i]
-        if is_left(shift, s, one):
+        passage = passages[i]
+        if is_left(shift, s, passage):
             continue
         follows, stops = give_way(
-            s, v, pace, front, rear, one, one[STATION], one[SPEED], one[GAIN], one[RANK],
-            one[FRONT], one[REAR],
-        )  # fmt: skip
+            s,
+            v,
+            pace,
+            front,
+            rear,
+            passage,
+            passage[STATION],
+            passage[SPEED],
+            passage[GAIN],
+            passage[RANK],
+            passage[FRONT],
+            passage[REAR],
+        )
         asked = min(asked, follows)
         if v * v <= 2.0 * COMMITTED * friction_limit * (stops - front - s):
             stop = min(stop, stops)
@@ -231,11 +241,19 @@ def yield_to_all(s, v, pace, front, rear, shift, friction_limit, passages, count
     for _ in range(KEEP_CLEAR_ROUNDS):
         before = stop
         for i in range(count):
-            one = passages[i]
-            if is_left(shift, s, one):
+            passage = passages[i]
+            if is_left(shift, s, passage):
                 continue
             stop = keep_clear(
-                s, front, rear, front + rear, one, one[STATION], one[SPEED], one[REAR], stop
+                s,
+                front,
+                rear,
+                front + rear,
+                passage,
+                passage[STATION],
+                passage[SPEED],
+                passage[REAR],
+                stop,
             )
         if stop == before:
             break

@@ -83,7 +83,7 @@ class FixedBatch:
         for rows, block in blocks(*whole, size=self._size, places=self._places):
             found, several = self._parts(block)
             at = self._places[: rows.stop - rows.start]
-            parts.append([one[at] for one in found])
+            parts.append([array[at] for array in found])
         joined = tuple(np.concatenate(column) for column in zip(*parts, strict=True))
         return joined if several else joined[0]
 
@@ -91,7 +91,7 @@ class FixedBatch:
         """Return what the function returns for a block, and whether that is a tuple."""
         found = self._function(*block)
         several = isinstance(found, tuple)
-        return [self._of_block(one) for one in (found if several else (found,))], several
+        return [self._of_block(item) for item in (found if several else (found,))], several
 
     def _of_block(self, found: Any) -> npt.NDArray[Any]:
         array = np.array(found)  # a copy: the function may use its memory again
@@ -177,14 +177,14 @@ def _equal_to_first(
     rng = np.random.default_rng(0)
     equal = np.ones(size, dtype=np.bool_)
     for _ in range(PROBES if size > 1 else 0):
-        one = [
+        group = [
             (rng.normal(size=shape) if array.dtype.kind == "f" else np.zeros(shape)).astype(
                 array.dtype
             )
             for array in like
             for shape in [(1, *array.shape[1:])]
         ]
-        for found in function([_placed(row, size, np.arange(size)) for row in one]):
+        for found in function([_placed(row, size, np.arange(size)) for row in group]):
             bits = np.ascontiguousarray(found).reshape(size, -1).view(np.uint8)
             equal &= (bits == bits[0]).all(axis=1)
     return equal

@@ -197,7 +197,7 @@ def _compile(function: Callable[..., Any], wants: Sequence[str]) -> Any:
         returned = code.nopython_signatures[0].return_type
         numbers = getattr(returned, "types", ())
         real = (numba.types.Integer, numba.types.Float)
-        if len(numbers) != 2 or not all(isinstance(one, real) for one in numbers):
+        if len(numbers) != 2 or not all(isinstance(number, real) for number in numbers):
             raise InputError(
                 f"{_place(function)}: {function.__name__} must return (acceleration, curvature), "
                 f"returns {returned}"
@@ -279,7 +279,7 @@ def _with_wanted(code: Any, wants: Sequence[str]) -> Any:
         return code(*given)
 
     names = [name for arguments in WANTED.values() for name, *_ in arguments]
-    for name, kind, shape in reversed([one for word in wants for one in WANTED[word]]):
+    for name, kind, shape in reversed([pair for word in wants for pair in WANTED[word]]):
         found = call(found, names.index(name), kind, shape)
     return found
 

@@ -103,7 +103,7 @@ def load(spec: str) -> Detector:
         InputError: there is no such detector, or it lacks a method.
     """
     found = class_of(spec, "--detector")
-    lacking = [one for one in ("reset", "detect") if not callable(getattr(found, one, None))]
+    lacking = [name for name in ("reset", "detect") if not callable(getattr(found, name, None))]
     if lacking:
         raise InputError(
             f"--detector: {found.__name__} must have the methods reset and detect, "

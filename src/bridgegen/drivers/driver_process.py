@@ -195,7 +195,7 @@ def make(spec: str) -> BatchDriver | CompiledDriver:
         return found
     if not isinstance(found, type):
         raise InputError(f"{where} must have a class, or a compiled driver, '{name}'")
-    lacking = [one for one in ("reset", "act") if not callable(getattr(found, one, None))]
+    lacking = [item for item in ("reset", "act") if not callable(getattr(found, item, None))]
     if lacking:
         raise InputError(f"{name} must have the methods reset and act, lacks {', '.join(lacking)}")
     driver: BatchDriver = found()
@@ -222,7 +222,7 @@ def checked(answer: Any, seen: Observation, period: float) -> tuple[Float, Float
     pair = (answer.acceleration, answer.curvature) if isinstance(answer, Control) else answer
     try:
         acceleration, curvature = pair
-        arrays = [np.asarray(one, dtype=np.float64) for one in (acceleration, curvature)]
+        arrays = [np.asarray(buffer, dtype=np.float64) for buffer in (acceleration, curvature)]
     except (TypeError, ValueError) as error:
         text = f"act must return a Control, (acceleration, curvature) or a Trajectory: {error}"
         raise DriverError("answered nonsense", text) from None

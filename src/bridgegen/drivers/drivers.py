@@ -275,19 +275,19 @@ def listed() -> list[tuple[str, ...]]:
     """Return a row of `HEAD` for each driver; texts that say nothing are empty."""
     blank = ("", "", "")  # licence, domain, source
     rows: list[tuple[str, ...]] = [
-        (one.name, one.description, join(one.stages), "ships", "", in_order(one.domain), "")
-        for one in DRIVERS.values()
+        (item.name, item.description, join(item.stages), "ships", "", in_order(item.domain), "")
+        for item in DRIVERS.values()
     ]
     rows += [
-        (one.name, one.description, join(one.stages), f"in {one.home}", *blank)
-        for one in GUESTS.values()
+        (guest.name, guest.description, join(guest.stages), f"in {guest.home}", *blank)
+        for guest in GUESTS.values()
     ]
     rows += [
         (
-            one.name, one.description, "perception", available(one), one.licence,
-            in_order(one.domain), one.source,
+            planner.name, planner.description, "perception", available(planner), planner.licence,
+            in_order(planner.domain), planner.source,
         )
-        for one in planners().values()
+        for planner in planners().values()
     ]  # fmt: skip
     rows += [
         (name, f"Of other participants: {what}", "", "ships", *blank)
@@ -312,7 +312,7 @@ def in_order(domain: frozenset[str]) -> str:
 
 def planner_findings() -> Iterator[tuple[str, str, str]]:
     """Yield each planner's name, whether it is installed, and how to get it where it is not."""
-    for one in planners().values():
-        problem = missing(one)
-        state = "not installed" if problem else available(one)
-        yield one.name, state, how_to_get(one) if problem else ""
+    for planner in planners().values():
+        problem = missing(planner)
+        state = "not installed" if problem else available(planner)
+        yield planner.name, state, how_to_get(planner) if problem else ""

@@ -64,12 +64,14 @@ class FmuDriver:
                 f"{about.fmiVersion}{'' if about.coSimulation else ' without co-simulation'}"
             )
         self._inputs = {
-            one.name: one.valueReference for one in about.modelVariables if one.causality == "input"
+            variable.name: variable.valueReference
+            for variable in about.modelVariables
+            if variable.causality == "input"
         }
         outputs = {
-            one.name: one.valueReference
-            for one in about.modelVariables
-            if one.causality == "output" and one.name in _OUTPUTS
+            variable.name: variable.valueReference
+            for variable in about.modelVariables
+            if variable.causality == "output" and variable.name in _OUTPUTS
         }
         self._outputs = outputs
         unknown = [name for name in self._inputs if not _is_known(name)]

@@ -148,13 +148,13 @@ Part = TypeVar("Part")
 def _taken(part: Part, rows: Int | slice) -> Part:
     """Return some of the rows of an observation, or of a part of one."""
     found = {}
-    for one in fields(part):  # type: ignore[arg-type]
-        value = getattr(part, one.name)
+    for item in fields(part):  # type: ignore[arg-type]
+        value = getattr(part, item.name)
         if isinstance(value, np.ndarray):
             value = value[rows]
         elif is_dataclass(value):
             value = _taken(value, rows)
-        found[one.name] = value
+        found[item.name] = value
     return type(part)(**found)
 
 

@@ -2,7 +2,7 @@
 
 from bridgegen.scenario.participants import OBJECT_CLASSES
 
-NAMES = tuple(one.name for one in OBJECT_CLASSES)
+NAMES = tuple(object_class.name for object_class in OBJECT_CLASSES)
 """Names of the object classes, by code."""
 
 CAR, TRUCK, BUS, MOTORCYCLE, BICYCLE, PEDESTRIAN, ANIMAL, OTHER = (
@@ -63,38 +63,38 @@ sensors that saw it."""
 # --- Properties of each kind for compiled code, by its code in `bridgegen.drivers.kinds` ---
 
 
-_CONDUCT = tuple(one.conduct for one in OBJECT_CLASSES)
+_CONDUCT = tuple(object_class.conduct for object_class in OBJECT_CLASSES)
 
-IS_VEHICLE = tuple(one == "vehicle" for one in _CONDUCT)
+IS_VEHICLE = tuple(item == "vehicle" for item in _CONDUCT)
 """Whether each kind is a motor vehicle, by code."""
 
-IS_CYCLE = tuple(one == "bicycle" for one in _CONDUCT)
-IS_PEDESTRIAN = tuple(one == "pedestrian" for one in _CONDUCT)
-IS_ANIMAL = tuple(one == "animal" for one in _CONDUCT)
-IS_OBSTACLE = tuple(one == "obstacle" for one in _CONDUCT)
+IS_CYCLE = tuple(item == "bicycle" for item in _CONDUCT)
+IS_PEDESTRIAN = tuple(item == "pedestrian" for item in _CONDUCT)
+IS_ANIMAL = tuple(item == "animal" for item in _CONDUCT)
+IS_OBSTACLE = tuple(item == "obstacle" for item in _CONDUCT)
 
-USES_LANES = tuple(one in ("vehicle", "bicycle") for one in _CONDUCT)
+USES_LANES = tuple(item in ("vehicle", "bicycle") for item in _CONDUCT)
 """Whether each kind drives or rides, by code."""
 
-IS_ON_FOOT = tuple(one in ("pedestrian", "animal") for one in _CONDUCT)
+IS_ON_FOOT = tuple(item in ("pedestrian", "animal") for item in _CONDUCT)
 """Whether each kind walks, by code."""
 
-NEEDS_ROOM = tuple(one in ("bicycle", "pedestrian") for one in _CONDUCT)
+NEEDS_ROOM = tuple(item in ("bicycle", "pedestrian") for item in _CONDUCT)
 """Whether each kind is passed with more room than a vehicle, by code."""
 
-IS_VULNERABLE = tuple(one in ("bicycle", "pedestrian", "animal") for one in _CONDUCT)
+IS_VULNERABLE = tuple(item in ("bicycle", "pedestrian", "animal") for item in _CONDUCT)
 """Whether each kind is a vulnerable road user, or an animal, by code."""
 
-HIDES_PEOPLE = tuple(one.hides_people for one in OBJECT_CLASSES)
+HIDES_PEOPLE = tuple(object_class.hides_people for object_class in OBJECT_CLASSES)
 """Whether a person may step out from behind each kind, by code."""
 
-LAMPS = tuple(one.lamps for one in OBJECT_CLASSES)
+LAMPS = tuple(object_class.lamps for object_class in OBJECT_CLASSES)
 """Luminous intensity of the lamps that each kind shows [cd]; UN R7 asks 4 of each of two rear
 lamps."""
 
-REFLECTANCE = tuple(one.reflectance for one in OBJECT_CLASSES)
+REFLECTANCE = tuple(object_class.reflectance for object_class in OBJECT_CLASSES)
 """Reflectance of each kind at 905 nm: dark clothes 0.1; with plates and reflectors, vehicles
 more."""
 
-MISTAKEN_FOR = tuple(NAMES.index(one.mistaken_for) for one in OBJECT_CLASSES)
+MISTAKEN_FOR = tuple(NAMES.index(object_class.mistaken_for) for object_class in OBJECT_CLASSES)
 """The class that each kind is mistaken for where its own is not recognised."""

@@ -49,17 +49,17 @@ def no_grid(n: int) -> Grid:
 
 def grid_of(maps: Sequence[RoadMap]) -> Grid:
     """Return maps as one grid each."""
-    grids = [_grid(one) for one in maps]
-    k = max(len(one.pieces[0]) for one in grids)
-    c = max(one.starts.shape[1] for one in grids)
+    grids = [_grid(map_) for map_ in maps]
+    k = max(len(grid.pieces[0]) for grid in grids)
+    c = max(grid.starts.shape[1] for grid in grids)
     found = Grid(
         np.zeros((len(maps), k, COLUMNS)), np.full((len(maps), k, 2), np.inf),
-        np.concatenate([one.box for one in grids]), np.zeros((len(maps), c), dtype=np.int64),
+        np.concatenate([grid.box for grid in grids]), np.zeros((len(maps), c), dtype=np.int64),
         np.zeros((len(maps), k), dtype=np.int64),
     )  # fmt: skip
     found.pieces[:, :, 3 * PIECE_POINTS + PIECE_POINTS + 1] = -1.0
-    for p, one in enumerate(grids):
-        for whole, part in zip(found, one, strict=True):
+    for p, grid in enumerate(grids):
+        for whole, part in zip(found, grid, strict=True):
             if whole is not found.box:
                 whole[p, : part.shape[1]] = part[0]
     return found

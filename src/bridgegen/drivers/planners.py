@@ -75,13 +75,17 @@ def missing(planner: Planner) -> str:
             continue
         if not wanted.specifier.contains(found, prereleases=True):
             problems.append(f"{wanted.name} must be {wanted.specifier}, is {found}")
-    problems += [f"{one} is not set" for one in planner.variables if not os.environ.get(one)]
+    problems += [
+        f"{variable} is not set" for variable in planner.variables if not os.environ.get(variable)
+    ]
     return "; ".join(problems)
 
 
 def installed(planner: Planner) -> str:
     """Return the packages that a planner drives by, with their versions; none may be missing."""
-    return ", ".join(f"{one.name} {version(one.name)}" for one in _requirements(planner))
+    return ", ".join(
+        f"{requirement.name} {version(requirement.name)}" for requirement in _requirements(planner)
+    )
 
 
 def how_to_get(planner: Planner) -> str:

@@ -49,16 +49,16 @@ class _Tables:
     """The pieces of all maps of a scene, one after the other; the last one is none."""
 
     def __init__(self, maps: Sequence[RoadMap]) -> None:
-        pieces = [one.pieces for one in maps]
+        pieces = [map_.pieces for map_ in maps]
         self.first: Int = np.cumsum([0, *map(len, pieces)])
         self.pieces = np.concatenate([*pieces, np.zeros((1, PIECE_POINTS, 3))])
         h = self.pieces[:, :, 2]
         self.directions = np.stack((np.cos(h), np.sin(h)), axis=-1)
-        self.counts: Int = np.concatenate([*(one.piece_points for one in maps), [0]])
-        self.light: Int = np.concatenate([*(one.piece_light for one in maps), [-1]])
+        self.counts: Int = np.concatenate([*(map_.piece_points for map_ in maps), [0]])
+        self.light: Int = np.concatenate([*(map_.piece_light for map_ in maps), [-1]])
         self.attributes = np.zeros((len(self.pieces), ATTRIBUTES), dtype=np.float32)
-        for one, first in zip(maps, self.first, strict=False):
-            _fill(one, self.attributes[first : first + len(one.pieces)])
+        for map_, first in zip(maps, self.first, strict=False):
+            _fill(map_, self.attributes[first : first + len(map_.pieces)])
 
 
 def _fill(roads: RoadMap, attributes: Float32) -> None:
@@ -66,9 +66,9 @@ def _fill(roads: RoadMap, attributes: Float32) -> None:
     attributes[rows, roads.piece_kind] = 1.0
     attributes[rows, KINDS + roads.piece_marking] = 1.0
     owned = roads.piece_lane >= 0
-    limits = np.array([one.speed_limit[0] for one in roads.lanes])
+    limits = np.array([lane.speed_limit[0] for lane in roads.lanes])
     route = set(roads.route)
-    on_route = np.array([one.id in route for one in roads.lanes])
+    on_route = np.array([lane.id in route for lane in roads.lanes])
     if owned.any():
         limit = limits[roads.piece_lane[owned]]
         attributes[owned, -2] = np.where(np.isfinite(limit), limit, 0.0)

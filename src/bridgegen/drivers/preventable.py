@@ -222,7 +222,7 @@ def _arrays(**values: npt.ArrayLike) -> list[Float]:
         bad = ~(np.isfinite(array) & (array >= 0.0))
         if bad.any():
             raise InputError(f"{name} must be finite and >= 0, got {array[bad].flat[0]:g}")
-    return [one.ravel() for one in np.broadcast_arrays(*arrays)]
+    return [item.ravel() for item in np.broadcast_arrays(*arrays)]
 
 
 def _shaped(avoids: Bool, *values: npt.ArrayLike) -> Bool:

@@ -66,7 +66,7 @@ def right_of_way(
         other: another one.
         lights: ids of the traffic lights that are switched; others are off. None: all of the map's.
     """
-    theirs = {one.junction: one for one in reversed(list(crossings(model, other)))}
+    theirs = {crossing.junction: crossing for crossing in reversed(list(crossings(model, other)))}
     for ours in crossings(model, own):
         if ours.junction in theirs:
             return _waiting(model, ours, theirs[ours.junction], lights)
@@ -90,7 +90,7 @@ def claim(model: OpenDrive, own: Route, other: Route, lights: Collection[str] | 
         > 0: the other route gives way; < 0: this one does; 0: no rule applies. The absolute value
         is the reason: ``BY_MAP``, ``BY_SIGNS``, ``FROM_THE_RIGHT`` or ``ONCOMING``.
     """
-    theirs = {one.junction: one for one in reversed(list(crossings(model, other)))}
+    theirs = {crossing.junction: crossing for crossing in reversed(list(crossings(model, other)))}
     for ours in crossings(model, own):
         if ours.junction in theirs:
             they = theirs[ours.junction]
@@ -167,7 +167,7 @@ def _claim(
     """Return the reason why the other gives way at a junction, 0 if there is none."""
     if ours.before.road_id == theirs.before.road_id:
         return 0
-    pairs = {(one.high, one.low) for one in model.junction(ours.junction).priorities}
+    pairs = {(priority.high, priority.low) for priority in model.junction(ours.junction).priorities}
     inside = ours.inside.road_id, theirs.inside.road_id
     if inside in pairs or inside[::-1] in pairs:
         return BY_MAP if inside in pairs else 0
@@ -188,10 +188,10 @@ def _waiting(
 ) -> int:
     if ours.before.road_id == theirs.before.road_id:
         return NO_RULE
-    for one in model.junction(ours.junction).priorities:
-        if (one.high, one.low) == (ours.inside.road_id, theirs.inside.road_id):
+    for priority in model.junction(ours.junction).priorities:
+        if (priority.high, priority.low) == (ours.inside.road_id, theirs.inside.road_id):
             return THEY_WAIT
-        if (one.low, one.high) == (ours.inside.road_id, theirs.inside.road_id):
+        if (priority.low, priority.high) == (ours.inside.road_id, theirs.inside.road_id):
             return WE_WAIT
     our_signs, their_signs = _signs(model, ours.before), _signs(model, theirs.before)
     if _is_lit(model, ours, lights) or _is_lit(model, theirs, lights):
@@ -211,11 +211,11 @@ def _signs(model: OpenDrive, step: Step) -> list[Signal]:
     road = model.road(step.road_id)
     by_id = {signal.id: signal for each in model.roads for signal in each.signals}
     return [
-        by_id[one.id]
-        for one in signals_on(road)
-        if one.id in by_id
-        and governs(road, one, step.lane_id)
-        and abs(one.s - step.s_end) <= AT_JUNCTION
+        by_id[item.id]
+        for item in signals_on(road)
+        if item.id in by_id
+        and governs(road, item, step.lane_id)
+        and abs(item.s - step.s_end) <= AT_JUNCTION
     ]
 
 
@@ -225,14 +225,16 @@ def _is_lit(model: OpenDrive, crossing: Crossing, lights: Collection[str] | None
     It stands before the junction or on the way itself.
     """
     way = model.road(crossing.inside.road_id)
-    within = [one.id for one in signals_on(way) if governs(way, one, crossing.inside.lane_id)]
-    ids = {one.id for one in _signs(model, crossing.before) if one.dynamic == "yes"}
+    within = [
+        signal.id for signal in signals_on(way) if governs(way, signal, crossing.inside.lane_id)
+    ]
+    ids = {sign.id for sign in _signs(model, crossing.before) if sign.dynamic == "yes"}
     if within:
         ids |= {
-            one.id
+            signal.id
             for road in model.roads
-            for one in road.signals
-            if one.dynamic == "yes" and one.id in within
+            for signal in road.signals
+            if signal.dynamic == "yes" and signal.id in within
         }
     return bool(ids if lights is None else ids.intersection(lights))
 
@@ -253,5 +255,5 @@ def _turn(a: float, b: float) -> float:
     return math.remainder(b - a, 2.0 * math.pi)
 
 
-def _turns_left(model: OpenDrive, one: Crossing) -> bool:
-    return _turn(_heading(model, one.before), _heading(model, one.inside)) > ASIDE
+def _turns_left(model: OpenDrive, crossing: Crossing) -> bool:
+    return _turn(_heading(model, crossing.before), _heading(model, crossing.inside)) > ASIDE

@@ -96,21 +96,21 @@ def road_map(model: OpenDrive, route: Route | None, lights: Sequence[str]) -> Ro
     """
     sections = [_cut(road, number) for road in model.roads for number in range(len(road.sections))]
     stretches = [
-        Stretch(one.road.id, one.number, lane.id)
-        for one in sections
-        for lane in one.road.sections[one.number].lanes
+        Stretch(item.road.id, item.number, lane.id)
+        for item in sections
+        for lane in item.road.sections[item.number].lanes
         if lane.type not in UNUSED
     ]
     numbers = {stretch: number for number, stretch in enumerate(stretches)}
     onward = {
-        stretch: tuple(_id(one) for one in dict.fromkeys(next_stretches(model, stretch))
-                       if one in numbers)
+        stretch: tuple(_id(item) for item in dict.fromkeys(next_stretches(model, stretch))
+                       if item in numbers)
         for stretch in stretches
     }  # fmt: skip
     back: dict[str, list[str]] = {}
     for stretch, following in onward.items():
-        for one in following:
-            back.setdefault(one, []).append(_id(stretch))
+        for name in following:
+            back.setdefault(name, []).append(_id(stretch))
     lanes: list[Lane] = []
     lines: list[Line] = []
     for section in sections:
@@ -123,13 +123,17 @@ def road_map(model: OpenDrive, route: Route | None, lights: Sequence[str]) -> Ro
                 lines.append(_centre(lanes[-1], len(lanes) - 1))
         lines += _borders(section, numbers)
     by_id = {lane.id: number for number, lane in enumerate(lanes)}
-    signals = tuple(_light(model, one, by_id) for one in lights)
+    signals = tuple(_light(model, light, by_id) for light in lights)
     light_of = np.full(len(lanes), -1)
     for number in reversed(range(len(signals))):
-        light_of[[by_id[one] for one in signals[number].lanes]] = number
-    lines = [one._replace(light=int(light_of[one.lane])) if one.lane >= 0 else one for one in lines]
+        light_of[[by_id[name] for name in signals[number].lanes]] = number
+    lines = [
+        line._replace(light=int(light_of[line.lane])) if line.lane >= 0 else line for line in lines
+    ]
     crosswalks = tuple(_crosswalks(model))
-    lines += [Line(np.concatenate((one, one[:1])), CROSSWALK) for one in crosswalks]
+    lines += [
+        Line(np.concatenate((crosswalk, crosswalk[:1])), CROSSWALK) for crosswalk in crosswalks
+    ]
     lines += _stop_lines(model, signals)
     return RoadMap(tuple(lanes), _route(model, route, by_id), crosswalks, signals, **_pieces(lines))
 
@@ -144,7 +148,7 @@ def _cut(road: Road, number: int) -> _Section:
     while True:
         s = np.linspace(low, high, n + 1)
         found = _Section(road, number, s, reference_line(road, s), borders(road, number, s))
-        edges = (np.diff(found.points(found.t[one]), axis=0) for one in found.t)
+        edges = (np.diff(found.points(found.t[item]), axis=0) for item in found.t)
         longest = max(float(np.hypot(*edge.T).max()) for edge in edges)
         if longest <= SPACING * (1.0 + ROUNDING) or n >= MOST_CUTS * (high - low):
             return found
@@ -221,8 +225,8 @@ def _borders(section: _Section, numbers: dict[Stretch, int]) -> Iterator[Line]:
     road, number = section.road, section.number
     for border in sorted(section.t):
         lanes = (border, -1, 1) if border == 0 else (border, _outer(border))
-        owners = (numbers.get(Stretch(road.id, number, one)) for one in lanes)
-        owner = next((one for one in owners if one is not None), None)
+        owners = (numbers.get(Stretch(road.id, number, lane)) for lane in lanes)
+        owner = next((item for item in owners if item is not None), None)
         if owner is not None:
             mark = _mark(section, border)
             yield Line(section.points(section.t[border]), BORDER, owner, marking=_code(mark))
@@ -237,13 +241,13 @@ def _code(mark: RoadMark | None) -> int:
     if mark is None or mark.type == NONE:
         return UNMARKED
     lines = [mark.type] if mark.type in CROSSED else mark.type.split()
-    return BROKEN if all(one in CROSSED for one in lines) else SOLID
+    return BROKEN if all(line in CROSSED for line in lines) else SOLID
 
 
 def _crosswalks(model: OpenDrive) -> Iterator[Float]:
     for road in model.roads:
-        for one in road.objects:
-            corners = outline_of(road, one) if (one.type or "").lower() == "crosswalk" else None
+        for obj in road.objects:
+            corners = outline_of(road, obj) if (obj.type or "").lower() == "crosswalk" else None
             if corners is not None and len(corners) >= 3:
                 yield corners
 
@@ -262,8 +266,8 @@ def _light(model: OpenDrive, light: str, by_id: dict[str, int]) -> Light:
                 for lane in road.sections[number].lanes
                 if lane.drivable and governs(road, signal, lane.id)
             ]
-            ids = [_id(Stretch(road.id, number, one)) for one in governed]
-            lanes |= dict.fromkeys(one for one in ids if one in by_id)
+            ids = [_id(Stretch(road.id, number, item)) for item in governed]
+            lanes |= dict.fromkeys(name for name in ids if name in by_id)
             if governed and np.isnan(stop).all():
                 stop = _across(road, number, governed, signal.s)
     return Light(light, tuple(lanes), stop)
@@ -277,7 +281,7 @@ def _across(road: Road, number: int, lanes: Sequence[int], s: float) -> Float:
     at = min(max(at, 0.0), road.length)
     number = section_index(road, at) if not road.is_connecting else number
     t = borders(road, number, np.array([at]))
-    edges = [float(t[one][0]) for lane in lanes if lane in t for one in (lane, inner(lane))]
+    edges = [float(t[item][0]) for lane in lanes if lane in t for item in (lane, inner(lane))]
     line = reference_line(road, np.array([at, at]))
     ends = np.array([min(edges, default=0.0), max(edges, default=0.0)])
     return np.stack((line.x - ends * np.sin(line.h), line.y + ends * np.cos(line.h)), axis=1)
@@ -299,7 +303,7 @@ def _route(model: OpenDrive, route: Route | None, by_id: dict[str, int]) -> tupl
         road = model.road(step.road_id)
         number = section_index(road, 0.5 * (step.s + step.s_end))
         found[_id(Stretch(step.road_id, number, step.lane_id))] = None
-    return tuple(one for one in found if one in by_id)
+    return tuple(name for name in found if name in by_id)
 
 
 def _pieces(lines: Sequence[Line]) -> dict[str, Any]:

@@ -154,9 +154,9 @@ def survey(
                     WE_WAIT
                     if ranks[e] > 0
                     else NO_RULE
-                    if one is None or route is None
-                    else right_of_way(model, route, one, lights)
-                    for e, one in enumerate(routes)
+                    if item is None or route is None
+                    else right_of_way(model, route, item, lights)
+                    for e, item in enumerate(routes)
                 ]
             ]
         ),
@@ -247,14 +247,14 @@ def stop_lines(model: OpenDrive, route: Route, lights: Sequence[str]) -> list[St
             if low <= s <= high:
                 a, b = route.station(road.id, s)
                 found.append(StopLine(signal.id, a + b * s))
-    return sorted(found, key=lambda one: one.station)
+    return sorted(found, key=lambda line: line.station)
 
 
 def stop_signs(model: OpenDrive, route: Route) -> list[float]:
     """Return where a route crosses the lines of stop signs [m], in its order."""
     found: list[float] = []
-    for one in crossings(model, route):
-        road, lane = model.road(one.before.road_id), one.before.lane_id
+    for crossing in crossings(model, route):
+        road, lane = model.road(crossing.before.road_id), crossing.before.lane_id
         for signal in road.signals:
             if signal.type == STOP_SIGN and governs(road, signal, lane):
                 s = line_of(road, signal.s, lane)
@@ -277,8 +277,8 @@ def crosswalks(model: OpenDrive, path: Float, step: float) -> Float:
     """
     found: list[tuple[float, ...]] = []
     for road in model.roads:
-        for one in road.objects:
-            corners = outline_of(road, one) if (one.type or "").lower() == "crosswalk" else None
+        for obj in road.objects:
+            corners = outline_of(road, obj) if (obj.type or "").lower() == "crosswalk" else None
             if corners is None or len(corners) < 3:
                 continue
             inside = np.flatnonzero(_inside(path[:, :2], corners))
@@ -324,22 +324,24 @@ def _chains(model: OpenDrive, start: Stretch, s: float) -> Iterator[tuple[Stretc
     open_: list[tuple[tuple[Stretch, ...], float]] = [((start,), rest)]
     while open_:
         chain, length = open_.pop(0)
-        following = [one for one in next_stretches(model, chain[-1]) if one not in chain]
+        following = [
+            stretch for stretch in next_stretches(model, chain[-1]) if stretch not in chain
+        ]
         if length >= WAY_LENGTH or not following or len(chain) > 50:
             yield chain
             continue
-        for one in following:
-            road = model.road(one.road_id)
-            span = section_end(road, one.section) - road.sections[one.section].s
-            open_.append(((*chain, one), length + span))
+        for stretch in following:
+            road = model.road(stretch.road_id)
+            span = section_end(road, stretch.section) - road.sections[stretch.section].s
+            open_.append(((*chain, stretch), length + span))
 
 
 def _route(model: OpenDrive, chain: Sequence[Stretch], s: float) -> Route:
     first, last = chain[0], chain[-1]
     end = Place(last.road_id, last.lane_id, _inner(model, last, _exit(model, last)))
     via = [
-        Place(one.road_id, one.lane_id, _inner(model, one, _middle(model, one)))
-        for one in chain[1:-1]
+        Place(stretch.road_id, stretch.lane_id, _inner(model, stretch, _middle(model, stretch)))
+        for stretch in chain[1:-1]
     ]
     road = model.road(first.road_id)
     entry = road.sections[first.section].s
@@ -384,9 +386,9 @@ def lane_of(steps: Sequence[Step], road_id: str, s: float, s_end: float) -> int:
 def speed_limits(road: Road, number: int, lane_id: int, s: Float) -> Float:
     """Return the speed limits [m/s] that hold on a lane."""
     limits = np.full(len(s), np.inf)
-    for one in sorted(road.types, key=lambda each: each.s):
-        speed = one.speed.metres_per_second if one.speed else None
-        limits[s >= one.s] = np.inf if speed is None else speed
+    for kind in sorted(road.types, key=lambda each: each.s):
+        speed = kind.speed.metres_per_second if kind.speed else None
+        limits[s >= kind.s] = np.inf if speed is None else speed
     section = road.sections[number]
     lane = section.lane(lane_id)
     for each in sorted(lane.speeds if lane else (), key=lambda each: each.s):
@@ -399,8 +401,8 @@ def _beside(road: Road, number: int, lane_id: int, s: Float) -> tuple[Float, Flo
     section, way = road.sections[number], road.direction(lane_id)
     border = borders(road, number, s)
 
-    def centre(one: int) -> Float:
-        middle: Float = 0.5 * (border[one] + border[one - (1 if one > 0 else -1)])
+    def centre(item: int) -> Float:
+        middle: Float = 0.5 * (border[item] + border[item - (1 if item > 0 else -1)])
         return middle
 
     found = []
@@ -418,13 +420,13 @@ def _beside(road: Road, number: int, lane_id: int, s: Float) -> tuple[Float, Flo
 def line_of(road: Road, s: float, lane_id: int) -> float:
     """Return where the stop line of a light at ``s`` is [m along the road]: there, if none is."""
     lines = [
-        one.s
-        for one in road.objects
-        if (one.subtype or "").lower() == STOP_LINE
-        and abs(one.s - s) <= LINE_REACH
+        obj.s
+        for obj in road.objects
+        if (obj.subtype or "").lower() == STOP_LINE
+        and abs(obj.s - s) <= LINE_REACH
         and (
-            not one.validity
-            or any(each.from_lane <= lane_id <= each.to_lane for each in one.validity)
+            not obj.validity
+            or any(each.from_lane <= lane_id <= each.to_lane for each in obj.validity)
         )
     ]
     return min(lines, key=lambda at: abs(at - s), default=s)

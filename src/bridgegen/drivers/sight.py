@@ -145,4 +145,11 @@ def table() -> Iterator[tuple[str | float, ...]]:
     skies += [(f"night, fog {m} m", Sky(m, sun_altitude=night)) for m in (500, 200, 50)]
     for name, sky in skies:
         ranges = [detection_range(sky, kind) for kind in (CAR, PEDESTRIAN)]
-        yield name, *(round(d, 1) for one in ranges for d in (one.camera, one.lidar, one.fused))
+        yield (
+            name,
+            *(
+                round(d, 1)
+                for range_ in ranges
+                for d in (range_.camera, range_.lidar, range_.fused)
+            ),
+        )

@@ -58,7 +58,7 @@ def checked_plans(planned: Trajectory, seen: Observation, period: float) -> Plan
     """
     running = np.flatnonzero(seen.running)
     columns = _columns(planned, len(seen.x))[:, running]
-    now = np.stack([one[running] for one in (seen.x, seen.y, seen.h, seen.v)])
+    now = np.stack([array[running] for array in (seen.x, seen.y, seen.h, seen.v)])
     _refuse_values(columns)
     _refuse_times(columns[0], period)
     columns[4] = np.maximum(columns[4], 0.0)

@@ -42,10 +42,10 @@ def _names_in(name: str) -> str:
     except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
         return f"the file is no Python: {error}"
     kinds = (ast.ClassDef, ast.FunctionDef)
-    found = [one for one in body if isinstance(one, kinds) and not one.name.startswith("_")]
+    found = [stmt for stmt in body if isinstance(stmt, kinds) and not stmt.name.startswith("_")]
     if not found:
         return "it defines no class and no function"
-    return "it defines " + ", ".join(f"{name}:{one.name}" for one in found)
+    return "it defines " + ", ".join(f"{name}:{def_.name}" for def_ in found)
 
 
 # --- What a driver of the user's says of itself, by attributes of its class or by a message ---

@@ -105,14 +105,14 @@ class MapSender:
 
     def send(self, maps: Sequence[RoadMap]) -> SentMaps:
         """Return what to send for a scene with some maps."""
-        if sum(len(one.pieces) for one in self._maps) > MOST_PIECES:
+        if sum(len(map_.pieces) for map_ in self._maps) > MOST_PIECES:
             self._known, self._maps = {}, []
         kept = len(self._maps)
-        for one in maps:
-            if id(one) not in self._known:
-                self._known[id(one)] = len(self._maps)
-                self._maps.append(one)
-        return SentMaps(kept, self._maps[kept:], [self._known[id(one)] for one in maps])
+        for map_ in maps:
+            if id(map_) not in self._known:
+                self._known[id(map_)] = len(self._maps)
+                self._maps.append(map_)
+        return SentMaps(kept, self._maps[kept:], [self._known[id(map_)] for map_ in maps])
 
 
 class History:
@@ -141,7 +141,7 @@ class History:
         if self._back == [j * step for j in range(HISTORY)]:
             found = self._frames[:, :, at : at + self._back[-1] + 1 : max(step, 1)]
         else:
-            found = self._frames[:, :, [at + one for one in self._back]]
+            found = self._frames[:, :, [at + number for number in self._back]]
         found.flags.writeable = False
         return found
 

@@ -51,7 +51,7 @@ def difference(
     metrics[lost | (found.status != 0)] = np.nan
     findings = found.findings
     if lost.any():
-        blank = {name: np.where(lost, "", one) for name, one in findings.columns().items()}
+        blank = {name: np.where(lost, "", array) for name, array in findings.columns().items()}
         findings = replace(findings, **blank)
     why = {
         row: ": ".join(text for text in (_LOST, baseline.messages.get(row, "")) if text)
@@ -76,8 +76,8 @@ def difference_of_trials(found: Trials, baseline: Trials) -> Trials:
     return replace(found, harm=harm, ok=ok, harmless_until=until)
 
 
-def _usable(one: Evaluation, gated: bool) -> Bool:
-    usable: Bool = one.status == 0
+def _usable(evaluation: Evaluation, gated: bool) -> Bool:
+    usable: Bool = evaluation.status == 0
     if gated:
-        usable = usable & np.array(one.findings.implausible == "", dtype=np.bool_)
+        usable = usable & np.array(evaluation.findings.implausible == "", dtype=np.bool_)
     return usable

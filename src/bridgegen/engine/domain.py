@@ -66,11 +66,11 @@ def needed_by(runner: "Runner") -> tuple[frozenset[str], bool]:
     cyclist takes part.
     """
     nominal = runner.space.row({})[np.newaxis]
-    _, one = next(runner.by_variant(nominal))
-    model = one.source.roads(one.space.values(nominal[0]))
-    embedded = one.embedded
+    _, item = next(runner.by_variant(nominal))
+    model = item.source.roads(item.space.values(nominal[0]))
+    embedded = item.embedded
     roads = embedded.roads([model])
-    columns = {name: x for name, x in one.columns(nominal).items() if name not in embedded.fixed}
+    columns = {name: x for name, x in item.columns(nominal).items() if name not in embedded.fixed}
     batch = embedded.batch(roads, np.zeros(1, np.int64), columns)
     batch.start()
     headings = batch.record.h[0, :, 0]
@@ -90,16 +90,17 @@ def needed(
         headings: ``(E,)`` [rad] at the start, the ego first.
         kinds: of the other participants, see `PARTICIPANTS`.
     """
-    roads = {one.id: one for one in model.roads}
-    own = [roads[one] for one in ahead]
+    roads = {road.id: road for road in model.roads}
+    own = [roads[name] for name in ahead]
     known = [PARTICIPANTS[kind] for kind in kinds if kind in PARTICIPANTS]
-    beside = any(one.seen_as.conduct in VULNERABLE for one in known)
+    beside = any(participant_kind.seen_as.conduct in VULNERABLE for participant_kind in known)
     needs = {"vulnerable"} if beside else set()
     if any(
-        _crosses(model, junction) for junction in {one.junction for one in own if one.is_connecting}
+        _crosses(model, junction)
+        for junction in {road.junction for road in own if road.is_connecting}
     ):
         return frozenset(needs | {"junction"})
-    if any(_has_opposite_lanes(one) for one in own):
+    if any(_has_opposite_lanes(road) for road in own):
         return frozenset(needs | {"road"})
     if against_ego(headings).any():
         needs.add("oncoming")
@@ -130,7 +131,9 @@ def against_ego(headings: Float) -> Bool:
 
 
 def _has_opposite_lanes(road: Road) -> bool:
-    ways = {road.direction(one.id) for part in road.sections for one in part.lanes if one.drivable}
+    ways = {
+        road.direction(lane.id) for part in road.sections for lane in part.lanes if lane.drivable
+    }
     return len(ways) > 1
 
 

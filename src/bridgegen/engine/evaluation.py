@@ -36,19 +36,19 @@ class Evaluation:
     @classmethod
     def join(cls, parts: Sequence["Evaluation"]) -> "Evaluation":
         """Return the evaluations of several parts, at least one, in their order."""
-        starts = np.cumsum([0, *(len(one.status) for one in parts)]).tolist()
+        starts = np.cumsum([0, *(len(part.status) for part in parts)]).tolist()
         messages = {
             start + row: text
-            for start, one in zip(starts, parts, strict=False)
-            for row, text in one.messages.items()
+            for start, part in zip(starts, parts, strict=False)
+            for row, text in part.messages.items()
         }
-        sought = [one.cause for one in parts if one.cause is not None]
+        sought = [part.cause for part in parts if part.cause is not None]
         return cls(
-            np.concatenate([one.metrics for one in parts]),
-            np.concatenate([one.F for one in parts]),
-            np.concatenate([one.critical for one in parts]),
-            np.concatenate([one.status for one in parts]),
-            Findings.join([one.findings for one in parts]),
+            np.concatenate([part.metrics for part in parts]),
+            np.concatenate([part.F for part in parts]),
+            np.concatenate([part.critical for part in parts]),
+            np.concatenate([part.status for part in parts]),
+            Findings.join([part.findings for part in parts]),
             messages,
             np.concatenate(sought) if sought else None,
         )
@@ -63,7 +63,7 @@ class Evaluation:
         if len(parts) == 1:
             return parts[0][1]
         rows = np.concatenate([at for at, _ in parts])
-        order, whole = np.argsort(rows), cls.join([one for _, one in parts])
+        order, whole = np.argsort(rows), cls.join([part for _, part in parts])
         return cls(
             whole.metrics[order], whole.F[order], whole.critical[order], whole.status[order],
             whole.findings.take(order),

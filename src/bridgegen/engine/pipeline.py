@@ -130,9 +130,14 @@ class Pipeline:
         held = measures.held_by(self.driver, detects=sees)
         named = f"the driver '{self.driver.name}'"
         self.monitor = Monitor(
-            joined_criteria(scenario.criteria, [read_criterion(one) for one in options.criteria]),
-            embedded.program.names, held, embedded.duration, named,
-        )  # fmt: skip
+            joined_criteria(
+                scenario.criteria, [read_criterion(criterion) for criterion in options.criteria]
+            ),
+            embedded.program.names,
+            held,
+            embedded.duration,
+            named,
+        )
         if recorded is None:
             also = (*options.metrics, *self.monitor.metrics)
             recorded = metrics_of(scenario, self.driver, also, detects=sees)
@@ -161,12 +166,13 @@ class Pipeline:
         alone = replace(
             options, ego=options.worse_than, worse_than=None, metrics=(), causes=False, cause=None
         )
-        one = Pipeline(options=alone, workers=self._workers, **self._made_with)
-        if one.driver == self.driver:
+        pipeline = Pipeline(options=alone, workers=self._workers, **self._made_with)
+        if pipeline.driver == self.driver:
             raise InputError(
-                f"a baseline must be another driver than the ego's, both are {one.driver.label}"
+                "a baseline must be another driver than the ego's, both are "
+                f"{pipeline.driver.label}"
             )
-        return one
+        return pipeline
 
     def elsewhere(self, simulator: SimulatorChoice) -> "Pipeline":
         """Return the same with another simulator, which seeks no causes unless one counts.
@@ -175,12 +181,12 @@ class Pipeline:
             InputError: see ``__init__``.
         """
         here = self._workers if self._workers.are_here else Threads()
-        one = Pipeline(
+        pipeline = Pipeline(
             options=replace(self._options, causes=False), recorded=self.metrics, workers=here,
             **self._made_with | {"simulator": simulator},
         )  # fmt: skip
-        one.choose_objective(self.objective)
-        return one
+        pipeline.choose_objective(self.objective)
+        return pipeline
 
     @cached_property
     def recipe(self) -> Recipe:
@@ -252,7 +258,7 @@ class Pipeline:
         """
         if objective is None:
             spec = self.scenario.objective
-            if margins := [one.metric for one in spec.terms if one.metric.startswith(PREFIX)]:
+            if margins := [item.metric for item in spec.terms if item.metric.startswith(PREFIX)]:
                 self._margins_that_count(margins)
             sample = None
             if needs_sample(spec.weights, spec.scale, objectives):
@@ -260,7 +266,7 @@ class Pipeline:
                 U = rng.random((SAMPLE, self.space.n_var))
                 parts = self._map(type(self)._measure_rows, self.space.decode(U))
                 lost = np.full((1, len(self.metrics)), np.nan)
-                rows = [lost if isinstance(one.result, Lost) else one.result for one in parts]
+                rows = [lost if isinstance(part.result, Lost) else part.result for part in parts]
                 sample = (np.concatenate(rows), self.metrics)
             objective = Objective.build(
                 [(term.metric, term.weight) for term in spec.terms],
@@ -316,7 +322,7 @@ class Pipeline:
         batch.compile_start()
         standing = batch.standing()
         apart = (*quantities.MEASURED, *self.monitor.names)
-        quantities.evaluate(standing, [one for one in self.metrics if one not in apart])
+        quantities.evaluate(standing, [metric for metric in self.metrics if metric not in apart])
         plausibility(standing)
         for fix in self.runner.fixes:
             self.runner.nominal_batch(fix).take_addresses()
@@ -344,15 +350,18 @@ class Pipeline:
         """Return the evaluation of consecutive rows from the workers' results."""
         return Evaluation.join(
             [
-                self._lost(one.rows, one.result) if isinstance(one.result, Lost) else one.result
-                for one in parts
+                self._lost(part.rows, part.result) if isinstance(part.result, Lost) else part.result
+                for part in parts
             ]
         )
 
     def evaluate_rows(self, X: Float, objective: Objective) -> Evaluation:
         """Evaluate N rows at once, in this thread; ``evaluate`` shares them among workers."""
         return Evaluation.gathered(
-            [(at, self._evaluate(one, X[at], objective)) for at, one in self.runner.by_variant(X)]
+            [
+                (at, self._evaluate(runner, X[at], objective))
+                for at, runner in self.runner.by_variant(X)
+            ]
         )
 
     def _evaluate(self, runner: Runner, X: Float, objective: Objective) -> Evaluation:
@@ -431,8 +440,9 @@ class Pipeline:
             type(self)._try_rows, rows[order], self.objective.harm, self.objective.count
         )
         trials = [
-            Trials.none(one.rows) if isinstance(one.result, Lost) else one.result for one in parts
-        ]  # fmt: skip
+            Trials.none(part.rows) if isinstance(part.result, Lost) else part.result
+            for part in parts
+        ]
         return Trials.join(trials).take(np.argsort(order))
 
     def _try_rows(self, rows: Float, harm: str, count: Count) -> Trials:
@@ -464,7 +474,7 @@ class Pipeline:
 
     def rollouts(self, X: Float) -> list[Rollout | Lost]:
         """Roll out N rows in the workers; return the rollouts of consecutive parts of them."""
-        return [one.result for one in self._map(type(self).rollout, X)]
+        return [part.result for part in self._map(type(self).rollout, X)]
 
     def replays(
         self, X: Float, *, plans: bool = True, noise: npt.NDArray[np.uint64] | None = None
@@ -479,12 +489,12 @@ class Pipeline:
                 by default.
         """
         parts = []
-        for at, one in self.runner.by_variant(X):
+        for at, runner in self.runner.by_variant(X):
             if noise is None:
-                rollout = self.rollout(X[at]) if self._is_far else one.run(X[at])
+                rollout = self.rollout(X[at]) if self._is_far else runner.run(X[at])
             else:
-                rollout = one.run(X[at], noise=noise[at])
-            parts.append((at, replay_of(one, X[at], rollout, plans=plans and not self._is_far)))
+                rollout = runner.run(X[at], noise=noise[at])
+            parts.append((at, replay_of(runner, X[at], rollout, plans=plans and not self._is_far)))
         return Replays(tuple(parts))
 
     def _measure_rows(self, X: Float) -> Float:
@@ -557,7 +567,7 @@ Carried = tuple[CarriedDriver | None, CarriedDriver | None]
 
 def _remade(carried: Carried, options: PipelineOptions, **made_with: Any) -> Pipeline:
     """Return a pipeline for a worker, in one thread, with its kernels compiled."""
-    ego, baseline = (one.here() if one else None for one in carried)
+    ego, baseline = (driver.here() if driver else None for driver in carried)
     options = replace(options, ego=ego, worse_than=baseline)
     pipeline = Pipeline(options=options, **made_with, workers=Threads(1))
     pipeline.warm_up()

@@ -54,10 +54,10 @@ class Replays:
     def take(self, at: Int) -> "Replays":
         """Return some of the rows, in the order of their numbers ``at``."""
         found = []
-        for rows, one in self.parts:
+        for rows, part in self.parts:
             mine = np.flatnonzero(np.isin(at, rows))
             if mine.size:
-                found.append((mine, one.take(np.searchsorted(rows, at[mine]))))
+                found.append((mine, part.take(np.searchsorted(rows, at[mine]))))
         return Replays(tuple(found))
 
 

@@ -79,15 +79,15 @@ class Variants:
             InputError: see `EmbeddedSimulator`.
         """
         moving = {*space.variables}
-        moving |= {one.name for one in scenario.derived if one.names & moving}
+        moving |= {derived.name for derived in scenario.derived if derived.names & moving}
         texts, programs = moving & {*source.variant_names}, [nominal.program]
         for key in source.variants if texts else ():  # all, so that what is wrong is found now
             values = dict(zip(source.variant_names, key, strict=True))
             storyboard = nominal_of(source, space, values).storyboard
             programs.append(EmbeddedSimulator(storyboard, scenario.name, driver=driver).program)
-        fixed = {name: use for one in programs for name, use in one.fixed.items()}
+        fixed = {name: use for program in programs for name, use in program.fixed.items()}
         varied = texts | (moving & fixed.keys())
-        notes = [note for one in programs for note in one.notes]
+        notes = [note for program in programs for note in program.notes]
         notes += [
             f"{scenario.place}: parameter '{name}' is used for {_short(fixed[name])}: each of its "
             "values is compiled by itself, which takes longer than its simulation"
@@ -95,8 +95,8 @@ class Variants:
             if name in varied - texts
         ]
         kinds: dict[str, dict[str, None]] = {}
-        for one in programs:
-            for name, kind in zip(one.names, one.kinds.tolist(), strict=True):
+        for program in programs:
+            for name, kind in zip(program.names, program.kinds.tolist(), strict=True):
                 kinds.setdefault(name, {})[NAMES[kind]] = None
         return cls(
             tuple(name for name in space.names if name in varied),
@@ -235,9 +235,9 @@ class Runner:
         if roads is not None:
             return self._run(X, fix, noise, roads, until_collision=until_collision)
         parts = []
-        for at, one in self.by_variant(X):
+        for at, runner in self.by_variant(X):
             keys = None if noise is None else noise[at]
-            parts.append((at, one._run(X[at], fix, keys, until_collision=until_collision)))
+            parts.append((at, runner._run(X[at], fix, keys, until_collision=until_collision)))
         return joined(parts)
 
     def _run(
@@ -267,7 +267,7 @@ class Runner:
     def _failed(self, X: Float) -> Rollout:
         """Return the rollout of N rows whose values make no scenario."""
         fixed = self.embedded.fixed
-        columns = {name: one for name, one in self.columns(X).items() if name not in fixed}
+        columns = {name: column for name, column in self.columns(X).items() if name not in fixed}
         batch = self.embedded.batch(*self.roads_of(X), columns)
         batch.start()
         batch.fail(NO_SCENARIO, self.refused)
@@ -296,15 +296,15 @@ class Runner:
             if wrong.any():
                 right = np.flatnonzero(~wrong)
                 if right.size:
-                    yield from ((right[at], one) for at, one in self._by_key(X[right]))
+                    yield from ((right[at], runner) for at, runner in self._by_key(X[right]))
                 return
         yield from self._by_key(X)
 
     def _refusing(self, rule: str) -> "Runner":
         """Return a runner in which every row fails, for it breaks a rule."""
-        one = copy(self)
-        one._variants, one.refused = replace(self._variants, names=()), rule
-        return one
+        runner = copy(self)
+        runner._variants, runner.refused = replace(self._variants, names=()), rule
+        return runner
 
     def _by_key(self, X: Float) -> "Iterator[tuple[Int, Runner]]":
         """Yield rows that keep all checks, see ``by_variant``."""
@@ -319,17 +319,17 @@ class Runner:
 
     def _make_variant(self, key: tuple[float, ...]) -> "Runner":
         """Return the runner of the rows that have these values of what storyboards differ in."""
-        one = copy(self)
-        one._variants = replace(self._variants, names=())
+        runner = copy(self)
+        runner._variants = replace(self._variants, names=())
         try:
             values = dict(zip(self._variants.names, key, strict=True))
             nominal = nominal_of(self.source, self.space, values)
-            one._take_storyboard(nominal)
-            one._roads = one._static_roads(nominal)
+            runner._take_storyboard(nominal)
+            runner._roads = runner._static_roads(nominal)
         except InputError as error:  # it is a result of these rows; the others go on
-            one.embedded, one.simulator = self.embedded, self.simulator
-            one.refused = "; ".join(error.problems)
-        return one
+            runner.embedded, runner.simulator = self.embedded, self.simulator
+            runner.refused = "; ".join(error.problems)
+        return runner
 
     @property
     def has_one_network(self) -> bool:
@@ -345,7 +345,7 @@ class Runner:
         distinct, rows = np.unique(X[:, columns], axis=0, return_inverse=True)
         values = [dict(zip(names, row, strict=True)) for row in distinct.tolist()]
         roads = self.simulator.roads(
-            [source.roads(one) for one in values], [source.courses(one) for one in values]
+            [source.roads(value) for value in values], [source.courses(value) for value in values]
         )
         return roads, rows.reshape(-1).astype(np.int64)
 
@@ -368,7 +368,7 @@ class Runner:
         Without an adversary's decisions, which the scenario contains as a course.
         """
         unused = {*self.source.unused_names, *self.space.decisions}
-        return {name: one for name, one in self.space.values(x).items() if name not in unused}
+        return {name: value for name, value in self.space.values(x).items() if name not in unused}
 
     def concrete(self, x: Float, road_file: str = "") -> ConcreteScenario:
         """Return the concrete scenario of one row.

@@ -155,7 +155,7 @@ def simulate_file(
     names = (*measures.existing(tuple(measures.METRICS), held), *quantities.MEASURED)
     asked = tuple(dict.fromkeys((*(metrics or names), *also)))
     names = quantities.require(asked, held, f"the driver '{embedded.driver}'")
-    changes = any(one is not None for one in (ego, ideal, vehicle, others))
+    changes = any(iterable is not None for iterable in (ego, ideal, vehicle, others))
     stated, unknown = stated_criteria(scenario)
     monitor = Monitor(
         joined(stated, criteria), embedded.program.names, held, embedded.duration,
@@ -176,7 +176,7 @@ def simulate_file(
         conflicts=conflicts,
         criteria=monitor.results(rollout, 0),
         cause=None if changes else _stated_cause(scenario),
-        notes=(*warnings, *(f"{path}: {one}" for one in unknown), *embedded.program.notes),
+        notes=(*warnings, *(f"{path}: {name}" for name in unknown), *embedded.program.notes),
         unjudged=_unjudged(rollout, conflicts, may_stop=bool(stated))
         or _outside(embedded, roads, network, rollout, path.stem),
     )

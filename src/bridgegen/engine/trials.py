@@ -64,7 +64,7 @@ class Trials:
     def avoidable(self) -> list[bool | None]:
         """``preventable`` of N rows; None of a violation, of which it is not asked."""
         pairs = zip(self.preventable.tolist(), self.findings.conflict, strict=True)
-        return [None if conflict == KINDS[VIOLATION] else one for one, conflict in pairs]
+        return [None if conflict == KINDS[VIOLATION] else pair for pair, conflict in pairs]
 
     @classmethod
     def of(cls, rollout: Rollout, roads: Network, which: Int, harm: str, count: Count) -> "Trials":
@@ -118,14 +118,14 @@ class Trials:
     def join(cls, parts: Sequence["Trials"]) -> "Trials":
         """Return those of several parts, at least one, in their order."""
         return cls(
-            np.concatenate([one.harm for one in parts]),
-            np.concatenate([one.severity for one in parts]),
-            np.concatenate([one.ok for one in parts]),
-            Findings.join([one.findings for one in parts]),
-            np.concatenate([one.place for one in parts]),
-            np.concatenate([one.event for one in parts]),
-            np.concatenate([one.preventable for one in parts]),
-            np.concatenate([one.harmless_until for one in parts]),
+            np.concatenate([part.harm for part in parts]),
+            np.concatenate([part.severity for part in parts]),
+            np.concatenate([part.ok for part in parts]),
+            Findings.join([part.findings for part in parts]),
+            np.concatenate([part.place for part in parts]),
+            np.concatenate([part.event for part in parts]),
+            np.concatenate([part.preventable for part in parts]),
+            np.concatenate([part.harmless_until for part in parts]),
         )
 
     def take(self, at: Int | Bool) -> "Trials":
@@ -156,8 +156,8 @@ def try_rows(runner: Runner, rows: Float, harm: str, count: Count) -> Trials:
         harm: the quantity that is measured.
         count: the conflicts that count.
     """
-    parts = [(at, _try(one, rows[at], harm, count)) for at, one in runner.by_variant(rows)]
-    return Trials.join([one for _, one in parts]).take(
+    parts = [(at, _try(item, rows[at], harm, count)) for at, item in runner.by_variant(rows)]
+    return Trials.join([part for _, part in parts]).take(
         np.argsort(np.concatenate([at for at, _ in parts]))
     )
 

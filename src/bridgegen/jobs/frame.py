@@ -57,7 +57,7 @@ SCENARIOS = Form(
     words=_repeated,
     keep=_names,
     in_file=file_forms.TEXTS,
-    valid=lambda values: all(isinstance(one, str | PathLike) for one in values),
+    valid=lambda values: all(isinstance(value, str | PathLike) for value in values),
     must="names or paths",
 )
 """Form of several scenarios; in Python one may stand alone."""
@@ -69,7 +69,7 @@ PATHS = Form(
     ],
     keep=lambda paths: tuple(map(Path, _names(paths))),
     in_file=file_forms.PATHS,
-    valid=lambda paths: all(isinstance(one, Path) for one in paths),
+    valid=lambda paths: all(isinstance(item, Path) for item in paths),
     must="paths",
 )
 """Form of several files or folders; in Python one may stand alone."""
@@ -84,7 +84,7 @@ DRIVERS = Form(
     words=_repeated,
     keep=_names,
     in_file=file_forms.TEXTS,
-    valid=lambda names: all(isinstance(one, str) for one in names),
+    valid=lambda names: all(isinstance(item, str) for item in names),
     must="names",
 )
 """Form of drivers: names, repeated or separated by commas, which a program's call may hold; in
@@ -197,7 +197,7 @@ def require_ranges(options: object, limits: Mapping[str, tuple[float, float]]) -
     Raises:
         InputError: one is out of its range; all that are.
     """
-    spelling = {one.name: one.spelling for one in options_of(type(options))}
+    spelling = {item.name: item.spelling for item in options_of(type(options))}
     if problems := [
         f"{spelling[name]} must be {_range(low, high)}, got {value:,g}"
         for name, (low, high) in limits.items()
@@ -220,9 +220,9 @@ def command_of(name: str, options: JobOptions, out: Path, **resolved: Any) -> st
         resolved: options that it has resolved, by name.
     """
     values = {**vars(options), "workers": None, "out": None, **resolved}
-    of_places = [one for one in options_of(type(options)) if one.is_argument]
-    rest = [one for one in options_of(type(options)) if not one.is_argument]
-    words = [word for one in (*of_places, *rest) for word in one.words(values[one.name])]
+    of_places = [item for item in options_of(type(options)) if item.is_argument]
+    rest = [item for item in options_of(type(options)) if not item.is_argument]
+    words = [word for place in (*of_places, *rest) for word in place.words(values[place.name])]
     return shlex.join(["bridgegen", *name.split(), *words, "--out", str(out)])
 
 

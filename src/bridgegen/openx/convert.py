@@ -55,7 +55,7 @@ def convert_file(owl: Path, folder: Path | None = None) -> tuple[list[Path], lis
         scenario.write_bytes(storyboard)
     except OSError as error:
         raise StorageError(f"{folder}: cannot be written: {error.strerror}") from None
-    return [road, scenario], [str(one) for one in check(individuals)]
+    return [road, scenario], [str(violation) for violation in check(individuals)]
 
 
 def road_bytes(individuals: Individuals, beside: Path) -> bytes:
@@ -155,8 +155,8 @@ def _seen_from(out: Path, file: Path) -> str:
 
 def scenario_of(individuals: Individuals) -> LogicalScenario | None:
     """Return the scenario of the catalogue or of a pack that individuals refer to; None if none."""
-    said = {name for one in individuals.of_class("Scenario")
-            for name in individuals.texts(one, "has_name")}  # fmt: skip
+    said = {name for node in individuals.of_class("Scenario")
+            for name in individuals.texts(node, "has_name")}  # fmt: skip
     shipped = {name: name for name in scenario_names()}
     shipped |= {name.replace("/", "-"): name for name in pack_names()}
     known = said.intersection(shipped)

@@ -144,7 +144,9 @@ def load_file_scenario(path: Path, distribution: Path | None = None) -> FileScen
         chosen = {name: ranges.texts[name][int(code)] for name, code in codes}
         variants[combination] = _variant(path, texts | chosen, chosen, known)
     bounds, checks = _kept(ranges)
-    varied = {one.axis for one in ranges.parameters.values() if one.low < one.high}
+    varied = {
+        parameter.axis for parameter in ranges.parameters.values() if parameter.low < parameter.high
+    }
     description = str(storyboard.file_header.description).strip()
     criteria, unknown = stated_criteria(storyboard)
     return FileScenario(
@@ -167,8 +169,8 @@ def load_file_scenario(path: Path, distribution: Path | None = None) -> FileScen
         texts=ranges.texts,
         notes=(
             *ranges.notes,
-            *(f"{path}: {one}" for one in unknown),
-            *(f"{path}: {one}, or an evaluation fails ({one.place})" for one in checks),
+            *(f"{path}: {item}" for item in unknown),
+            *(f"{path}: {check}, or an evaluation fails ({check.place})" for check in checks),
         ),
         variant_names=ranges.variants,
         variants=variants,
@@ -183,15 +185,15 @@ def _kept(ranges: Ranges) -> tuple[tuple[Bound, ...], tuple[Bound, ...]]:
     parameters = ranges.parameters
     even = {
         name
-        for name, one in parameters.items()
-        if not isinstance(one, FileParameter) or one.distribution is None
+        for name, parameter in parameters.items()
+        if not isinstance(parameter, FileParameter) or parameter.distribution is None
     }
-    shape = tuple(one for one in ranges.bounds if one.target in even)
+    shape = tuple(bound for bound in ranges.bounds if bound.target in even)
     try:
         SearchSpace(Constraints(parameters, shape, ranges.derived, tuple(Axis)))
     except ScenarioError:
         shape = ()
-    return shape, tuple(one for one in ranges.bounds if one not in shape)
+    return shape, tuple(bound for bound in ranges.bounds if bound not in shape)
 
 
 def _roads_of(path: Path, storyboard: osc.OpenScenario, known: dict[Path, RoadFile]) -> RoadFile:
@@ -299,7 +301,7 @@ class FileSource:
     def bodies(self, values: Mapping[str, float]) -> Mapping[str, str]:
         """See `Source`."""
         objects = self._scenario.variant(values).storyboard.entities.scenario_objects
-        return {str(one.name): _type_of(one.entity_object) for one in objects}
+        return {str(obj.name): _type_of(obj.entity_object) for obj in objects}
 
     def roads(self, values: Mapping[str, float]) -> OpenDrive:
         """See `Source`."""
@@ -364,17 +366,22 @@ def with_values(
     if declared is None:
         return storyboard
     changed = []
-    for one in declared.parameters:
-        if one.name in values:
-            one = replace(one, value=_literal(one, values[one.name], texts.get(one.name)))
-        changed.append(one)
+    for parameter in declared.parameters:
+        if parameter.name in values:
+            parameter = replace(
+                parameter,
+                value=_literal(parameter, values[parameter.name], texts.get(parameter.name)),
+            )
+        changed.append(parameter)
     return replace(storyboard, parameter_declarations=osc.ParameterDeclarations(tuple(changed)))
 
 
-def _literal(one: osc.ParameterDeclaration, value: float, texts: tuple[str, ...] | None) -> str:
+def _literal(
+    declaration: osc.ParameterDeclaration, value: float, texts: tuple[str, ...] | None
+) -> str:
     if texts is not None:
         return texts[int(value)]
-    whole = parameters.kind_of(one.parameter_type) is not Kind.DOUBLE
+    whole = parameters.kind_of(declaration.parameter_type) is not Kind.DOUBLE
     return str(int(value)) if whole else format_double(value)
 
 
@@ -398,13 +405,13 @@ def with_others(scenario: FileScenario, drivers: Mapping[str, str]) -> FileScena
         drivers: by the names of participants other than the ego; the rest has none.
     """
     ego, found = ego_of(scenario.storyboard), {}
-    for one in scenario.storyboard.entities.scenario_objects:
-        name = str(one.name)
+    for obj in scenario.storyboard.entities.scenario_objects:
+        name = str(obj.name)
         driver = drivers.get(name)
         named = any(
             each.controller.properties is not None
             and each.controller.properties.get(DRIVER) is not None
-            for each in one.object_controllers
+            for each in obj.object_controllers
         )
         if name != ego and (driver is not None or named):
             found[name] = (osc.Property(DRIVER, driver),) if driver is not None else ()
@@ -428,8 +435,8 @@ def _changed(
         scenario,
         storyboard=change(scenario.storyboard),
         variants={
-            key: replace(one, storyboard=change(one.storyboard))
-            for key, one in scenario.variants.items()
+            key: replace(variant, storyboard=change(variant.storyboard))
+            for key, variant in scenario.variants.items()
         },
     )
 
@@ -441,9 +448,9 @@ def _with_drivers(
     if not drivers:
         return storyboard
     objects = []
-    for one in storyboard.entities.scenario_objects:
-        if (said := drivers.get(str(one.name))) is not None:
-            controllers = one.object_controllers or (
+    for obj in storyboard.entities.scenario_objects:
+        if (said := drivers.get(str(obj.name))) is not None:
+            controllers = obj.object_controllers or (
                 osc.ObjectController(osc.Controller("driver", osc.Properties())),
             )
             first = controllers[0].controller
@@ -451,8 +458,8 @@ def _with_drivers(
             others = tuple(o for o in properties.properties if o.name not in (DRIVER, IDEAL))
             first = replace(first, properties=replace(properties, properties=(*said, *others)))
             controllers = (replace(controllers[0], controller=first), *controllers[1:])
-            one = replace(one, object_controllers=controllers)
-        objects.append(one)
+            obj = replace(obj, object_controllers=controllers)
+        objects.append(obj)
     entities = replace(storyboard.entities, scenario_objects=tuple(objects))
     return replace(storyboard, entities=entities)
 

@@ -28,7 +28,7 @@ def on_plane(scenario: osc.OpenScenario, roads: OpenDrive, place: str) -> osc.Op
         FileFormatError: the map states no projection, or a position is not a constant, or cannot be
             projected; by line.
     """
-    if not any(isinstance(one, osc.GeoPosition) for one in walk(scenario)):
+    if not any(isinstance(node, osc.GeoPosition) for node in walk(scenario)):
         return scenario
     project = projection(roads.header, place)
     is_new = scenario.file_header.rev_minor not in (0, 1, 2)
@@ -40,7 +40,7 @@ def on_plane(scenario: osc.OpenScenario, roads: OpenDrive, place: str) -> osc.Op
                 where = _projected(element.position, project, roads.header, is_new=is_new)
             except FileFormatError as error:
                 line = element.position.line
-                problems.extend(f"{place}: {one} (line {line})" for one in error.problems)
+                problems.extend(f"{place}: {problem} (line {line})" for problem in error.problems)
             else:
                 return replace(element, position=where)
         return element

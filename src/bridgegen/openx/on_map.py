@@ -48,13 +48,24 @@ def on_map(scenario: LogicalScenario, road_map: RoadMap) -> LogicalScenario:
     if road_map.sites:
         return _on_sites(scenario, road_map)
     scenario, _ = adapted(scenario, road_map.model, road_map.site)
-    moving = [one.start for one in scenario.participants if isinstance(one.start.distance, str)]
-    static = [one for one in scenario.parameters.values() if one.axis is Axis.STATIC]
+    moving = [
+        participant.start
+        for participant in scenario.participants
+        if isinstance(participant.start.distance, str)
+    ]
+    static = [
+        parameter for parameter in scenario.parameters.values() if parameter.axis is Axis.STATIC
+    ]
     usual = scenario.usual_values()
-    found = road_map.site.measures([(one.leg, usual[str(one.distance)]) for one in moving])
+    found = road_map.site.measures(
+        [(waypoint.leg, usual[str(waypoint.distance)]) for waypoint in moving]
+    )
     knobs = {name: knob for knob, name in scenario.roads.knobs.items() if isinstance(name, str)}
     here = scenario.measured(
-        {one.name: found.get(knobs.get(one.name, one.name), one.default) for one in static}
+        {
+            parameter.name: found.get(knobs.get(parameter.name, parameter.name), parameter.default)
+            for parameter in static
+        }
     )
     slower = _slower(here, _lowest_limit(road_map.site), _sharpest(road_map.site))
     return replace(here, bounds=(*here.bounds, *slower))
@@ -69,9 +80,13 @@ def _slower(
         yield from speed_bounds(limit, story, parameters, story.later_weathers, place)
     if isinstance(curvature, str) or (curvature or 0.0) > GENTLE:
         radius = f"1 / max({curvature}, {GENTLE})"
-        for one in story.participants:
-            if one.conduct == "vehicle" and one.name != "ego":  # see `bounds_between_layers`
-                yield from bend_bounds(radius, one, story, parameters, story.later_weathers, place)
+        for participant in story.participants:
+            if (
+                participant.conduct == "vehicle" and participant.name != "ego"
+            ):  # see `bounds_between_layers`
+                yield from bend_bounds(
+                    radius, participant, story, parameters, story.later_weathers, place
+                )
 
 
 def _sharpest(site: Site) -> float:
@@ -94,21 +109,22 @@ def _require_room(scenario: LogicalScenario, road_map: RoadMap) -> None:
     X = space.decode(probes(space.n_var))
     queued = {name: jam.participants for jam in here.story.jams for name in jam.participants}
     ranges: dict[str, tuple[float, float]] = {}
-    for one in here.participants:
-        at = one.start.distance
+    for participant in here.participants:
+        at = participant.start.distance
         column = _column(at, space, X)
-        ranges[one.name] = float(column.min()), float(column.max())
-    for one in here.participants:
-        leg = road_map.site.leg(one.start.leg)
-        if leg is None or not isinstance(one.start.distance, str):
+        ranges[participant.name] = float(column.min()), float(column.max())
+    for participant in here.participants:
+        leg = road_map.site.leg(participant.start.leg)
+        if leg is None or not isinstance(participant.start.distance, str):
             continue
-        together = [ranges[name] for name in queued.get(one.name, (one.name,))]
+        together = [ranges[name] for name in queued.get(participant.name, (participant.name,))]
         nearest, farthest = min(low for low, _ in together), max(high for _, high in together)
         end = leg.road_end(nearest)
         if farthest > end + slack(end):
             road = leg.roads[leg.road_at(nearest)]
             raise InputError(
-                f"{one.name} starts {nearest:.4g} m to {farthest:.4g} m along its leg; road "
+                f"{participant.name} starts {nearest:.4g} m to {farthest:.4g} m along its leg; "
+                "road "
                 f"{road.road_id} ends at {end:.4g} m (a start that is searched stays on one road)"
             )
     if road_map.site.kind == "Merge":
@@ -123,12 +139,16 @@ def _require_acceleration_lane(
     Of an event that begins after a distance travelled.
     """
     room = through(road_map.model, road_map.site) + road_map.site.legs[2].roads[0].length
-    starts = {one.name: one.start for one in scenario.participants if one.start.leg == RAMP}
+    starts = {
+        participant.name: participant.start
+        for participant in scenario.participants
+        if participant.start.leg == RAMP
+    }
     for event in scenario.story.events:
         start = starts.get(event.participant or "")
-        if start is None or not any(isinstance(one, LaneChange) for one in event.actions):
+        if start is None or not any(isinstance(action, LaneChange) for action in event.actions):
             continue
-        for condition in (one for group in event.when for one in group):
+        for condition in (spec for group in event.when for spec in group):
             if condition.kind == "travelled":
                 beyond = _column(condition.value, space, X) - _column(start.distance, space, X)
                 if float(beyond.max()) > room:
@@ -201,7 +221,7 @@ def _turned(scenario: LogicalScenario, road_map: RoadMap) -> RoadMap:
 
 def _on_sites(scenario: LogicalScenario, road_map: RoadMap) -> LogicalScenario:
     """Return a scenario that takes place at one of several junctions; see `on_map`."""
-    taken = {*scenario.parameters, *(one.name for one in scenario.derived)} & {
+    taken = {*scenario.parameters, *(derived.name for derived in scenario.derived)} & {
         PLACE,
         _LIMIT,
         _SHARPEST,
@@ -215,7 +235,9 @@ def _on_sites(scenario: LogicalScenario, road_map: RoadMap) -> LogicalScenario:
         )
     here = [on_map(scenario, road_map.at(site)) for site in road_map.sites]
     found, source = road_map.site.name, f"the map {road_map.path.name}"
-    static = {name for name, one in scenario.parameters.items() if one.axis is Axis.STATIC}
+    static = {
+        name for name, parameter in scenario.parameters.items() if parameter.axis is Axis.STATIC
+    }
     names = site_names(road_map)
     index = Parameter(
         PLACE, Axis.STATIC, "1", 0.0, len(names) - 1.0, 0.0, Category(names),
@@ -224,11 +246,11 @@ def _on_sites(scenario: LogicalScenario, road_map: RoadMap) -> LogicalScenario:
     why = "The map has it."
     measured = [
         Derived(
-            name, Axis.STATIC, one.unit,
+            name, Axis.STATIC, parameter.unit,
             lookup(PLACE, [part.parameters[name].default for part in here]), why, source,
-            one.description,
+            parameter.description,
         )
-        for name, one in scenario.parameters.items()
+        for name, parameter in scenario.parameters.items()
         if name in static
     ]  # fmt: skip
     limits = [_lowest_limit(site) or _NO_LIMIT for site in road_map.sites]
@@ -250,18 +272,22 @@ def _on_sites(scenario: LogicalScenario, road_map: RoadMap) -> LogicalScenario:
             replace(
                 scenario,
                 parameters={
-                    name: one for name, one in scenario.parameters.items() if name not in static
+                    name: parameter
+                    for name, parameter in scenario.parameters.items()
+                    if name not in static
                 },
             ),
             limit,
             curvature,
         )
     )
-    kept = {name: one for name, one in scenario.parameters.items() if name not in static}
+    kept = {
+        name: parameter for name, parameter in scenario.parameters.items() if name not in static
+    }
     return replace(
         scenario,
         parameters={PLACE: index} | kept,
-        bounds=(*(one for one in scenario.bounds if one.target not in static), *slower),
+        bounds=(*(bound for bound in scenario.bounds if bound.target not in static), *slower),
         derived=(*measured, *scenario.derived),
         axes=tuple(axis for axis in Axis if axis in {Axis.STATIC, *scenario.axes}),
     )
@@ -288,16 +314,20 @@ def at_site(
     """Return what `_on_sites` made, as it is at one of the junctions."""
     scenario, _ = adapted(scenario, model, site)
     parameters, derived, helpers = {}, [], {_LIMIT, _SHARPEST}
-    for one in scenario.derived:
-        if isinstance(one.value, Lookup) and one.value.names == {PLACE} and one.name not in helpers:
-            value = one.value.values[number]
-            parameters[one.name] = Parameter(
-                one.name, one.axis, one.unit, value, value, value, description=one.description
+    for item in scenario.derived:
+        if (
+            isinstance(item.value, Lookup)
+            and item.value.names == {PLACE}
+            and item.name not in helpers
+        ):
+            value = item.value.values[number]
+            parameters[item.name] = Parameter(
+                item.name, item.axis, item.unit, value, value, value, description=item.description
             )
-        elif one.name not in helpers:
-            derived.append(one)
-    kept = {name: one for name, one in scenario.parameters.items() if name != PLACE}
-    bounds = tuple(one for one in scenario.bounds if helpers.isdisjoint(one.names))
+        elif item.name not in helpers:
+            derived.append(item)
+    kept = {name: parameter for name, parameter in scenario.parameters.items() if name != PLACE}
+    bounds = tuple(bound for bound in scenario.bounds if helpers.isdisjoint(bound.names))
     return replace(scenario, parameters=parameters | kept, bounds=bounds, derived=tuple(derived))
 
 

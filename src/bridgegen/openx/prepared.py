@@ -86,16 +86,16 @@ def with_random_routes(
         FileFormatError: an entity with a random route that does not start on a lane, or several
             that share one; by line.
     """
-    if not any(isinstance(one, osc.RandomRouteAction) for one in walk(scenario)):
+    if not any(isinstance(node, osc.RandomRouteAction) for node in walk(scenario)):
         return scenario
     init = scenario.storyboard.init.actions
     starts = Starts(scenario, init, roads)
     positions: dict[str, osc.Position] = {}
     for private in init.privates:
-        for one in private.private_actions:
-            if isinstance(one.action, osc.TeleportAction):
+        for action in private.private_actions:
+            if isinstance(action.action, osc.TeleportAction):
                 name = starts.text(private.entity_ref)
-                positions.setdefault(name, one.action.position)
+                positions.setdefault(name, action.action.position)
     problems: list[str] = []
     change = _changer(roads, starts, positions, place, problems)
     made = rewritten(scenario, change)
@@ -115,10 +115,10 @@ def _changer(
         if isinstance(element, osc.Private):
             names = [starts.text(element.entity_ref)]
         elif isinstance(element, osc.ManeuverGroup):
-            names = [starts.text(one.entity_ref) for one in element.actors.entity_refs]
+            names = [starts.text(ref.entity_ref) for ref in element.actors.entity_refs]
         else:
             return element
-        drawn = [one for one in walk(element) if isinstance(one, osc.RandomRouteAction)]
+        drawn = [node for node in walk(element) if isinstance(node, osc.RandomRouteAction)]
         if not drawn:
             return element
         try:
@@ -167,7 +167,7 @@ def _route(roads: OpenDrive, starts: Starts, name: str, position: osc.Position |
     if places[-1] != (last := _at_its_end(roads, here)):
         places.append(last)
     shortest = osc.RouteStrategy.SHORTEST
-    waypoints = tuple(osc.Waypoint(shortest, osc.Position(one)) for one in places)
+    waypoints = tuple(osc.Waypoint(shortest, osc.Position(place)) for place in places)
     return osc.Route(f"random_{name}", False, waypoints)
 
 

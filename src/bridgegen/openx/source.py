@@ -144,16 +144,26 @@ class OntologySource:
     ) -> None:
         self.constraints = self._scenario = scenario
         self._driver, self._ideal, self._map = driver, ideal, road_map
-        static = tuple(name for name, one in scenario.parameters.items() if one.axis is Axis.STATIC)
+        static = tuple(
+            name for name, parameter in scenario.parameters.items() if parameter.axis is Axis.STATIC
+        )
         self.static_names = () if road_map else static
         self.unused_names = static if road_map and not road_map.sites else ()
-        types = {one.type_by: one.types for one in scenario.participants if one.type_by}
-        ways = {one.place_by: one.ways for one in scenario.participants if one.place_by}
+        types = {
+            participant.type_by: participant.types
+            for participant in scenario.participants
+            if participant.type_by
+        }
+        ways = {
+            participant.place_by: participant.ways
+            for participant in scenario.participants
+            if participant.place_by
+        }
         choices: dict[str, Sequence[object]] = {**types, **ways}
         if road_map and road_map.sites:
             choices = {PLACE: road_map.sites} | choices
         self.variant_names = tuple(choices)
-        counts = (range(len(one)) for one in choices.values())
+        counts = (range(len(choice)) for choice in choices.values())
         self.variants = tuple(tuple(map(float, key)) for key in product(*counts)) if choices else ()
         if len(self.variants) > MOST_VARIANTS:
             together = ", ".join(choices)
@@ -183,7 +193,10 @@ class OntologySource:
 
     def bodies(self, values: Mapping[str, float]) -> Mapping[str, str]:
         """See `Source`."""
-        types = {one.name: str(one.type) for one in self._settled(values).participants}
+        types = {
+            participant.name: str(participant.type)
+            for participant in self._settled(values).participants
+        }
         for works in self._scenario.story.works:
             types |= {f"{works.name}_cone_{k}": "cone" for k in range(1, len(works.cones) + 1)}
             types[f"{works.name}_sign"] = "sign"
@@ -231,17 +244,21 @@ class OntologySource:
         """Return the scenario with the types and places that a row gives its participants."""
         if not self.variant_names:
             return self._scenario
-        chosen = tuple(_chosen(one, values) for one in self._scenario.participants)
+        chosen = tuple(_chosen(participant, values) for participant in self._scenario.participants)
         story = replace(self._scenario.story, participants=chosen)
         return replace(self._scenario, story=story)
 
 
-def _chosen(one: Participant, values: Mapping[str, float]) -> Participant:
+def _chosen(participant: Participant, values: Mapping[str, float]) -> Participant:
     """Return a participant with the type or model, and at the place, that a row chooses."""
-    if one.type_by:
-        name = one.types[int(values[one.type_by])]
-        one = replace(one, type=type_of(name), model=name if name in MODELS else "")
-    return one.at_each_place[int(values[one.place_by])] if one.place_by else one
+    if participant.type_by:
+        name = participant.types[int(values[participant.type_by])]
+        participant = replace(participant, type=type_of(name), model=name if name in MODELS else "")
+    return (
+        participant.at_each_place[int(values[participant.place_by])]
+        if participant.place_by
+        else participant
+    )
 
 
 @dataclass(frozen=True)

@@ -72,15 +72,18 @@ def populated(scenario: osc.OpenScenario, roads: OpenDrive, place: str) -> osc.O
     """
     actions = scenario.storyboard.init.actions
     if not any(
-        isinstance(_asked(one), Source | osc.TrafficSinkAction) for one in actions.global_actions
+        isinstance(_asked(action), Source | osc.TrafficSinkAction)
+        for action in actions.global_actions
     ):
         return scenario
     return _Populated(scenario, roads, place).scenario
 
 
-def _asked(one: osc.GlobalAction) -> Element | None:
+def _asked(global_action: osc.GlobalAction) -> Element | None:
     """Return what traffic an action asks for; None if it is about something else."""
-    return one.action.action if isinstance(one.action, osc.TrafficAction) else None
+    return (
+        global_action.action.action if isinstance(global_action.action, osc.TrafficAction) else None
+    )
 
 
 class _Populated:
@@ -98,25 +101,27 @@ class _Populated:
         kept: list[osc.GlobalAction] = []
         made: list[Made] = []
         sinks: list[osc.TrafficSinkAction] = []
-        for number, one in enumerate(actions.global_actions):
-            action = _asked(one)
+        for number, global_action in enumerate(actions.global_actions):
+            action = _asked(global_action)
             if isinstance(action, osc.TrafficSinkAction):
                 sinks.append(action)
-            elif isinstance(one.action, osc.TrafficAction) and isinstance(action, Source):
-                name = self._starts.text(one.action.traffic_name or f"{NAMED}_{number + 1}")
+            elif isinstance(global_action.action, osc.TrafficAction) and isinstance(action, Source):
+                name = self._starts.text(
+                    global_action.action.traffic_name or f"{NAMED}_{number + 1}"
+                )
                 try:
                     _check_constant(action)
                     made += self._vehicles(name, action, actions)
                 except (InputError, ValueError) as error:
                     self._problems.append(f"{place}: {error} (line {action.line})")
             else:
-                kept.append(one)
+                kept.append(global_action)
         if len(made) > MOST:
             self._problems.append(
                 f"{place}: all traffic may have {MOST} vehicles, got {len(made)}: lower rates, "
                 "numbers, or an earlier end"
             )
-        names = [str(one[0].name) for one in made]
+        names = [str(pair[0].name) for pair in made]
         events = [*_arrivals(made), *(e for sink in sinks for e in self._departures(sink, names))]
         if self._problems:
             raise FileFormatError(*self._problems)
@@ -125,11 +130,11 @@ class _Populated:
     def _pose(self, name: str, actions: osc.InitActions) -> tuple[float, float, float] | None:
         """Return where an entity starts: x, y [m], heading [rad]; None where it is not known."""
         for private in actions.privates:
-            for one in private.private_actions:
-                if isinstance(one.action, osc.TeleportAction) and (
+            for action in private.private_actions:
+                if isinstance(action.action, osc.TeleportAction) and (
                     self._starts.text(private.entity_ref) == name
                 ):
-                    return self._starts.pose(one.action.position)
+                    return self._starts.pose(action.action.position)
         return None
 
     def _vehicles(self, name: str, action: Source, actions: osc.InitActions) -> Iterator[Made]:
@@ -146,7 +151,7 @@ class _Populated:
         kinds: "_Kinds",
     ) -> Iterator[Made]:  # fmt: skip
         """Yield the vehicles that come at a place, one after the other."""
-        rate, radius = (self._starts.number(one) for one in (action.rate, action.radius))
+        rate, radius = (self._starts.number(value) for value in (action.rate, action.radius))
         said = action.speed if action.speed is not None else action.velocity
         speed = 0.0 if said is None else self._starts.number(said)
         _check_speed(speed)
@@ -197,8 +202,8 @@ class _Populated:
         if action.initial_speed_range is not None:
             ends = action.initial_speed_range
             low, high = number(ends.lower_limit), number(ends.upper_limit)
-        for one in (low, high):
-            _check_speed(one)
+        for value in (low, high):
+            _check_speed(value)
         wanted, made = number(action.number_of_vehicles), 0
         if wanted > MOST:
             raise InputError(f"a swarm may have {MOST} vehicles, got {wanted:g}")
@@ -209,7 +214,7 @@ class _Populated:
             if made == wanted:
                 return
             here = float(self._places.x[i]), float(self._places.y[i])
-            if any(math.dist(here, one) < APART for one in self._taken):
+            if any(math.dist(here, pair) < APART for pair in self._taken):
                 continue
             self._taken.append(here)
             made += 1
@@ -284,8 +289,8 @@ def _shares(weights: Sequence[float]) -> list[float]:
     most = max(weights)
     if not 0.0 < most < math.inf:
         raise InputError("the weights of a distribution of traffic must not all be 0")
-    scaled = [one / most for one in weights]
-    return [one / sum(scaled) for one in scaled]
+    scaled = [weight / most for weight in weights]
+    return [value / sum(scaled) for value in scaled]
 
 
 class _Kinds:
@@ -306,25 +311,25 @@ def _kinds(action: Source, starts: Starts) -> _Kinds:
     """
     if action.traffic_definition is not None:
         entries = action.traffic_definition.vehicle_category_distribution.entries
-        kinds = [starts.text(one.category) for one in entries]
+        kinds = [starts.text(entry.category) for entry in entries]
         for kind in kinds:
             if kind not in _CATEGORIES:
                 known = ", ".join(_CATEGORIES)
                 raise InputError(f"vehicles of traffic must be of {known}, got {kind}")
         return _Kinds(
-            [_vehicle(one) for one in kinds], [starts.number(one.weight) for one in entries]
+            [_vehicle(name) for name in kinds], [starts.number(entry.weight) for entry in entries]
         )
     if action.traffic_distribution is None:
         return _Kinds([_vehicle("car")], [1.0])
     bodies: list[osc.Vehicle] = []
     weights = []
     for group in action.traffic_distribution.entries:
-        for one in group.entity_distribution.entries:
-            body = one.template.entity_object
+        for entry in group.entity_distribution.entries:
+            body = entry.template.entity_object
             if not isinstance(body, osc.Vehicle):
                 raise InputError(f"traffic is made of vehicles here, got {type(body).__name__}")
             bodies.append(body)
-            weights.append(starts.number(group.weight) * starts.number(one.weight))
+            weights.append(starts.number(group.weight) * starts.number(entry.weight))
     return _Kinds(bodies, weights)
 
 
@@ -372,7 +377,7 @@ def _places(roads: OpenDrive) -> _Places:
                 back = 0.0 if road.direction(lane.id) > 0 else math.pi
                 x, y = line.x - t * np.sin(line.h), line.y + t * np.cos(line.h)
                 found.append(np.stack((x, y, line.h + back)))
-                on += [osc.LanePosition(road.id, str(lane.id), float(one)) for one in s]
+                on += [osc.LanePosition(road.id, str(lane.id), float(item)) for item in s]
     x, y, h = np.concatenate(found, axis=1) if found else np.empty((3, 0))
     return _Places(x, y, h, on)
 
@@ -382,8 +387,8 @@ def _end(scenario: osc.OpenScenario, starts: Starts) -> float:
     stop = scenario.storyboard.stop_trigger
     found = [0.0]
     for group in () if stop is None else stop.condition_groups:
-        for one in group.conditions:
-            clock = getattr(one.condition, "condition", None)
+        for condition in group.conditions:
+            clock = getattr(condition.condition, "condition", None)
             if isinstance(clock, osc.SimulationTimeCondition):
                 found.append(starts.number(clock.value))
     return max(found)

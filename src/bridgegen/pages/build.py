@@ -156,22 +156,22 @@ def build_report(
         },
     )
     modes = triage.modes[:MOST_MODES] if triage else ()
-    first = [one.shown for one in modes]
+    first = [mode.shown for mode in modes]
     if triage and not modes:  # the scenarios nearest to harm
-        nearest = [one.evaluation for one in triage.bound.least if one.evaluation is not None]
+        nearest = [item.evaluation for item in triage.bound.least if item.evaluation is not None]
         first = nearest[:1]
     judged = summarise_criteria(
-        [one for one in pipeline.monitor if one.quantity in pipeline.metrics],
+        [item for item in pipeline.monitor if item.quantity in pipeline.metrics],
         rows.metrics, pipeline.metrics,
     )  # fmt: skip
-    worst = [one.at for one in (*by_gravity(judged), *judged)]
+    worst = [item.at for item in (*by_gravity(judged), *judged)]
     first += [at - 1 for at in worst if at is not None]
     return ReportData(
         head,
         _evaluations(pipeline, rows),
         playbacks(pipeline, rows, kept, replays=replays),
         _coverage(pipeline, rows) if coverage else None,
-        tables({key: one for key, one in notes.items() if key != NOTE}, pipeline.space),
+        tables({key: note for key, note in notes.items() if key != NOTE}, pipeline.space),
         regions,
         more=further_playbacks(pipeline, rows, {evaluation for _, evaluation, _ in kept}, first)
         if more
@@ -260,8 +260,8 @@ def _evaluations(pipeline: Pipeline, rows: Rows | Recorded) -> Evaluations:
         )
         for j, name in enumerate(pipeline.metrics)
     )
-    one = pipeline.objective.objectives == "one"
-    names = ("F",) if one else tuple(f"F of {name}" for name in pipeline.objective.names)
+    item = pipeline.objective.objectives == "one"
+    names = ("F",) if item else tuple(f"F of {name}" for name in pipeline.objective.names)
     objectives = tuple(Column(name, "1", rows.F[:, j]) for j, name in enumerate(names))
     cause = rows.cause if rows.cause.any() else None
     return Evaluations(
@@ -276,13 +276,13 @@ def _minimal(
     """Return the playbacks of the minimal scenarios of failure modes."""
     wanted = [
         (
-            one.minimal.name or f"minimal form of mode {one.number}",
-            one.shown,
-            _of(one.minimal.name, files),
-            one.minimal,
+            mode.minimal.name or f"minimal form of mode {mode.number}",
+            mode.shown,
+            _of(mode.minimal.name, files),
+            mode.minimal,
         )
-        for one in modes
-        if one.minimal is not None
+        for mode in modes
+        if mode.minimal is not None
     ]
     return () if pipeline.driver.is_own else minimal_playbacks(pipeline, wanted)
 
@@ -298,7 +298,7 @@ def _drawn(
     played = measured_playbacks(pipeline, wanted, X, brief=False)
     played = beside_others(played, X, others_of(pipeline))
     # A driver of the user's own need not do the same again.
-    return tuple(one for one in played if one.metrics[pipeline.objective.harm] >= NEAR_MISS)
+    return tuple(item for item in played if item.metrics[pipeline.objective.harm] >= NEAR_MISS)
 
 
 def _of(name: str, files: Sequence[str]) -> tuple[str, ...]:

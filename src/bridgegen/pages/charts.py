@@ -140,7 +140,7 @@ def ticks(low: float, high: float, most: int = 7) -> list[float]:
     if low == high:
         return [low]
     step = 10.0 ** np.floor(np.log10((high - low) / (most - 2.0)))
-    step *= next(one for one in (1.0, 2.0, 5.0, 10.0) if (high - low) / (step * one) <= most)
+    step *= next(value for value in (1.0, 2.0, 5.0, 10.0) if (high - low) / (step * value) <= most)
     first = np.ceil(low / step - 1e-9)
     return [
         float(f"{k * step:.10g}") + 0.0
@@ -167,24 +167,24 @@ def intervals(lines: Sequence[Interval], label: str, longest: int = 48) -> Marku
         label: of the picture.
         longest: characters of a line's words that are shown.
     """
-    least = min(one.low if one.low > 0.0 else one.estimate / 10.0 for one in lines)
+    least = min(line.low if line.low > 0.0 else line.estimate / 10.0 for line in lines)
     first = math.floor(math.log10(least))
-    last = max(math.ceil(math.log10(max(one.high for one in lines))), first + 1)
+    last = max(math.ceil(math.log10(max(line.high for line in lines))), first + 1)
     height = 44.0 * len(lines) + 34.0
     plot = Plot((480.0, height), (first, last), (0.0, 1.0), (20.0, 20.0, 6.0, 28.0))
     for power in range(first, last + 1):
         plot.add("path", class_="grid", d=f"M{plot.at(power):.1f} 6V{plot.base:g}")
         plot.text(plot.at(power), height - 10.0, f"1e{power}")
-    for row, one in enumerate(lines):
-        y, short = 34.0 + 44.0 * row, one.words[: longest - 2] + "…"
-        words = one.words if len(one.words) < longest else short
+    for row, line in enumerate(lines):
+        y, short = 34.0 + 44.0 * row, line.words[: longest - 2] + "…"
+        words = line.words if len(line.words) < longest else short
         low, middle, high = (
             plot.at(math.log10(max(value, 10.0**first)))
-            for value in (one.low, one.estimate, one.high)
+            for value in (line.low, line.estimate, line.high)
         )
-        plot.text(20.0, y - 14.0, words, "start", one.kind)
-        plot.add("path", class_=f"interval {one.kind}", d=f"M{low:.1f} {y:g}H{high:.1f}")
-        plot.add("circle", class_=one.kind, cx=middle, cy=y, r=4.5)
+        plot.text(20.0, y - 14.0, words, "start", line.kind)
+        plot.add("path", class_=f"interval {line.kind}", d=f"M{low:.1f} {y:g}H{high:.1f}")
+        plot.add("circle", class_=line.kind, cx=middle, cy=y, r=4.5)
     return plot.svg(label, "chart intervals")
 
 
@@ -234,15 +234,15 @@ def trend(some: Sequence[Point], label: str) -> Markup:
         some: at least one, in the order of time.
         label: of the picture.
     """
-    n, most = len(some), max(one.high for one in some)
-    top = next((one for one in (0.01, 0.02, 0.05, 0.1, 0.2, 0.5) if most <= one), 1.0)
+    n, most = len(some), max(point.high for point in some)
+    top = next((item for item in (0.01, 0.02, 0.05, 0.1, 0.2, 0.5) if most <= item), 1.0)
     plot = Plot((340.0, 150.0), (0.0, n), (0.0, top), (44.0, 12.0, 18.0, 34.0))
     for value in (0.0, 0.5 * top, top):
         y = plot.height(value)
         plot.add("path", class_="grid", d=f"M{plot.left:g} {y:.1f}H{plot.right:g}")
         text = f"{100.0 * value:g}\N{NARROW NO-BREAK SPACE}%"
         plot.text(plot.left - 5.0, y + 4.0, text, "end")
-    starts = [i for i, one in enumerate(some) if not i or one.group != some[i - 1].group]
+    starts = [i for i, point in enumerate(some) if not i or point.group != some[i - 1].group]
     for start, end in zip(starts, [*starts[1:], n], strict=True):
         left, right = plot.at(start), plot.at(end)
         room, (name, words) = max(3, int((right - left) / 6.0)), some[start].group
@@ -251,21 +251,21 @@ def trend(some: Sequence[Point], label: str) -> Markup:
         short = name if len(name) <= room else f"…{name[-(room - 1) :]}"
         plot.add("text", short, element("title", words), x=0.5 * (left + right),
                  y=plot.base + 20.0, text_anchor="middle")  # fmt: skip
-    plot.line(np.arange(0.5, n), np.array([one.share for one in some]))
-    for i, one in enumerate(some):
-        x, y = plot.at(i + 0.5), plot.height(one.share)
-        low, high = plot.height(one.low), plot.height(one.high)
-        parts = [element("title", one.words)]
-        if one.low != one.high:
+    plot.line(np.arange(0.5, n), np.array([point.share for point in some]))
+    for i, point in enumerate(some):
+        x, y = plot.at(i + 0.5), plot.height(point.share)
+        low, high = plot.height(point.low), plot.height(point.high)
+        parts = [element("title", point.words)]
+        if point.low != point.high:
             parts.append(element("path", class_="range", d=f"M{x:.1f} {low:.1f}V{high:.1f}"))
-        kind = "dot some" if one.is_some else "dot"
+        kind = "dot some" if point.is_some else "dot"
         parts.append(element("circle", class_=kind, cx=x, cy=y, r=4.0))
-        if one.href:
-            plot.add("a", element("g", *parts), href=one.href)
+        if point.href:
+            plot.add("a", element("g", *parts), href=point.href)
         else:
             plot.add("g", *parts)
         if n <= MOST_NUMBERS or i == n - 1:
-            plot.text(x, max(high - 5.0, 10.0), one.text)
+            plot.text(x, max(high - 5.0, 10.0), point.text)
     return plot.svg(label)
 
 

@@ -32,17 +32,17 @@ def confirmations_payload(records: Sequence[Record]) -> list[dict[str, Any]]:
         records: one for each simulator.
     """
     simulators = [_simulator(record) for record in records]
-    tracks = [[_tracks(record, one) for one in record.scenarios] for record in records]
+    tracks = [[_tracks(record, scenario) for scenario in record.scenarios] for record in records]
     room = MOST_NUMBERS
     for rank in range(max(map(len, tracks), default=0)):
-        for one, each in zip(simulators, tracks, strict=True):
+        for simulator, each in zip(simulators, tracks, strict=True):
             if rank >= len(each) or not each[rank]:
                 continue
             room -= _size(each[rank])
             if room < 0:
-                one["without_tracks"] += 1
+                simulator["without_tracks"] += 1
             else:
-                one["scenarios"][rank]["tracks"] = each[rank]
+                simulator["scenarios"][rank]["tracks"] = each[rank]
     return simulators
 
 
@@ -56,35 +56,35 @@ def _simulator(record: Record) -> dict[str, Any]:
         "parted_at": record.parted_at,
         "scale": dict(record.scale),
         "without_tracks": 0,
-        "scenarios": [_scenario(one) for one in record.scenarios],
+        "scenarios": [_scenario(scenario) for scenario in record.scenarios],
     }
 
 
-def _scenario(one: Scenario) -> dict[str, Any]:
-    found = one.differences
+def _scenario(scenario: Scenario) -> dict[str, Any]:
+    found = scenario.differences
     first = found.partings[0] if found and found.partings else None
     return {
-        "evaluation": one.evaluation,
-        "name": name_of(one),
-        "confirmed": one.confirmed,
-        "here": _outcome(one.here),
-        "there": None if one.there is None else _outcome(one.there),
+        "evaluation": scenario.evaluation,
+        "name": name_of(scenario),
+        "confirmed": scenario.confirmed,
+        "here": _outcome(scenario.here),
+        "there": None if scenario.there is None else _outcome(scenario.there),
         "parts": None if first is None else {"entity": first.entity, "time": first.time},
-        "text": one.explanation or one.failure,
+        "text": scenario.explanation or scenario.failure,
         "tracks": [],
     }
 
 
-def _outcome(one: Outcome) -> dict[str, Any]:
-    contact = None if one.contact is None else one.contact.time
-    margins = {name: shown.value for name, shown in one.margins.items()}
+def _outcome(outcome: Outcome) -> dict[str, Any]:
+    contact = None if outcome.contact is None else outcome.contact.time
+    margins = {name: shown.value for name, shown in outcome.margins.items()}
     return {
-        "harm": one.harm, "d_min": one.d_min, "v_d": one.v_d, "contact": contact,
+        "harm": outcome.harm, "d_min": outcome.d_min, "v_d": outcome.v_d, "contact": contact,
         "margins": margins,
     }  # fmt: skip
 
 
-def _tracks(record: Record, one: Scenario) -> list[dict[str, Any]]:
+def _tracks(record: Record, scenario: Scenario) -> list[dict[str, Any]]:
     return [
         {
             "entity": each.entity,
@@ -92,17 +92,17 @@ def _tracks(record: Record, one: Scenario) -> list[dict[str, Any]]:
             "n": each.first + len(each.x),
             **{name: packed(_values(each, name), 1) for name in record.scale},
         }
-        for each in one.tracks
+        for each in scenario.tracks
     ]
 
 
-def _values(one: Course, name: str) -> Float:
-    values = [np.nan if value is None else float(value) for value in getattr(one, name)]
-    return np.concatenate([np.full(one.first, np.nan), np.array(values)])
+def _values(course: Course, name: str) -> Float:
+    values = [np.nan if value is None else float(value) for value in getattr(course, name)]
+    return np.concatenate([np.full(course.first, np.nan), np.array(values)])
 
 
 def _size(tracks: Sequence[Mapping[str, Any]]) -> int:
-    return sum(len(run) for one in tracks for name in ("x", "y", "h") for run in one[name])
+    return sum(len(run) for track in tracks for name in ("x", "y", "h") for run in track[name])
 
 
 # --- Pass criteria as the plain data that the page shows: verdicts, and the spread of margins ---
@@ -127,29 +127,32 @@ def criteria_payload(data: ReportData) -> dict[str, Any] | None:
     """
     if not data.criteria:
         return None
-    columns = {one.name: one for one in data.evaluations.metrics}
+    columns = {metric.name: metric for metric in data.evaluations.metrics}
     return {
         "headline": headline(data.summary.ego, data.criteria),
-        "violated": any(one.violated for one in data.criteria),
+        "violated": any(criterion.violated for criterion in data.criteria),
         "critical": list(data.summary.criteria),
-        "list": [_criterion(one, columns[one.criterion.quantity].whole) for one in data.criteria],
+        "list": [
+            _criterion(criterion, columns[criterion.criterion.quantity].whole)
+            for criterion in data.criteria
+        ],
     }
 
 
-def _criterion(one: CriterionSummary, margins: Float) -> dict[str, Any]:
+def _criterion(criterion_summary: CriterionSummary, margins: Float) -> dict[str, Any]:
     return {
-        "id": one.criterion.id,
-        "quantity": one.criterion.quantity,
-        "text": one.criterion.text,
-        "formula": one.criterion.states,
-        "severity": one.criterion.severity,
-        "tags": list(one.criterion.tags),
-        "met": one.met,
-        "violated": one.violated,
-        "failed": one.unknown,
-        "unit": one.unit,
-        "worst": number(one.worst),
-        "at": None if one.at is None else one.at - 1,
+        "id": criterion_summary.criterion.id,
+        "quantity": criterion_summary.criterion.quantity,
+        "text": criterion_summary.criterion.text,
+        "formula": criterion_summary.criterion.states,
+        "severity": criterion_summary.criterion.severity,
+        "tags": list(criterion_summary.criterion.tags),
+        "met": criterion_summary.met,
+        "violated": criterion_summary.violated,
+        "failed": criterion_summary.unknown,
+        "unit": criterion_summary.unit,
+        "worst": number(criterion_summary.worst),
+        "at": None if criterion_summary.at is None else criterion_summary.at - 1,
         "histogram": histogram(margins),
     }
 
@@ -179,7 +182,7 @@ def histogram(margins: Float) -> dict[str, Any] | None:
 
 def margins_shown(margins: Float) -> list[float | None]:
     """Return margins rounded to what a page can show, none of them to 0; None for NaN."""
-    return [None if np.isnan(one) else _rounded(one) for one in margins.tolist()]
+    return [None if np.isnan(item) else _rounded(item) for item in margins.tolist()]
 
 
 def _rounded(margin: float) -> float:
@@ -192,4 +195,4 @@ def _step(least: float) -> float:
     """Return the least of 1, 2 and 5 times a power of ten that is not below a number > 0."""
     power = 10.0 ** floor(log10(least))
     steps: Sequence[float] = (1.0, 2.0, 5.0, 10.0)
-    return next(one * power for one in steps if one * power >= least * (1.0 - 1e-9))
+    return next(step * power for step in steps if step * power >= least * (1.0 - 1e-9))

@@ -36,21 +36,21 @@ def implausible_payload(findings: Findings | None) -> dict[str, Any]:
     """Return the number of implausible rows, and the reasons, the most frequent first."""
     if findings is None:
         return {"count": 0, "reasons": []}
-    reasons = Counter(one for one in findings.implausible.tolist() if one)
+    reasons = Counter(item for item in findings.implausible.tolist() if item)
     return {
         "count": sum(reasons.values()),
         "reasons": [[text, n] for text, n in reasons.most_common(MOST_REASONS)],
     }
 
 
-def conflict_payload(one: Conflict, cause: str = "") -> dict[str, Any]:
+def conflict_payload(conflict: Conflict, cause: str = "") -> dict[str, Any]:
     """Return a scenario's conflict; numbers are rounded to what a page can show.
 
     Args:
-        one: the conflict.
+        conflict: the conflict.
         cause: the quick label of its cause, with which its sentence is reconciled.
     """
-    said = one.summary
+    said = conflict.summary
     if said.happened:
         said = said.reconciled(
             judgement(cause, None, preventable=said.preventable, responsible=said.responsible)
@@ -59,15 +59,15 @@ def conflict_payload(one: Conflict, cause: str = "") -> dict[str, Any]:
     numbers = {name: value for name, value in facts.items() if isinstance(value, dict)}
     return {
         **{name: value for name, value in facts.items() if name not in numbers},
-        "bare": one.summary.bare,
+        "bare": conflict.summary.bare,
         "numbers": {
             name: [None if v["value"] is None else float(f"{v['value']:.4g}"), v["unit"]]
             for name, v in numbers.items()
         },
-        "partner_number": one.partner,
-        "instant": one.instant,
-        "decided": one.decided,
-        "zones": list(one.zones),
+        "partner_number": conflict.partner,
+        "instant": conflict.instant,
+        "decided": conflict.decided,
+        "zones": list(conflict.zones),
     }
 
 
@@ -76,14 +76,20 @@ def triage_payload(found: Triage) -> dict[str, Any]:
     return {
         "ego": found.ego,
         "baseline": found.baseline,
-        "modes": [_mode(one, found.neighbourhood(one.shown)) for one in found.modes[:MOST_MODES]],
+        "modes": [
+            _mode(mode, found.neighbourhood(mode.shown)) for mode in found.modes[:MOST_MODES]
+        ],
         "more": max(0, len(found.modes) - MOST_MODES) + found.unrecorded_modes,
         "robust": found.robust,
         "neighbours": found.neighbours,
         "radius": found.radius,
         "untested": found.untested,
         "matters": parameters_in_words(found),
-        "judged": {one.evaluation: one.judgement for one in found.neighbourhoods if one.judgement},
+        "judged": {
+            neighbourhood.evaluation: neighbourhood.judgement
+            for neighbourhood in found.neighbourhoods
+            if neighbourhood.judgement
+        },
         "bound": {
             "sentence": found.bound.in_full,
             "judged": found.bound.judged,
@@ -91,13 +97,13 @@ def triage_payload(found: Triage) -> dict[str, Any]:
             "evaluations": found.bound.evaluations,
             "failed": found.bound.failed,
             "implausible": found.bound.implausible,
-            "least": [one.model_dump() for one in found.bound.least],
+            "least": [least.model_dump() for least in found.bound.least],
         },
     }
 
 
-def _mode(one: Mode, tested: Neighbourhood | None) -> dict[str, Any]:
-    facts = one.model_dump(
+def _mode(mode: Mode, tested: Neighbourhood | None) -> dict[str, Any]:
+    facts = mode.model_dump(
         include={
             "number", "title", "conflict", "conflict_type", "responsible", "rule", "partner",
             "place", "cause", "judgement", "tested", "count", "harm", "severity", "shown", "worst",
@@ -105,24 +111,28 @@ def _mode(one: Mode, tested: Neighbourhood | None) -> dict[str, Any]:
         }
     )  # fmt: skip
     return facts | {
-        "knife_edge": one.knife_edge,
-        "exports": list(one.exports[:5]),
-        "rules": [rule for rule, _ in one.rules] or [one.rule],
+        "knife_edge": mode.knife_edge,
+        "exports": list(mode.exports[:5]),
+        "rules": [rule for rule, _ in mode.rules] or [mode.rule],
         "rows": tested.rows if tested else 0,
         "harmful": tested.harmful if tested else 0,
         "fix": _fix(tested.fix) if tested else None,
         "placebo": _fix(tested.placebo) if tested else None,
-        "minimal": _minimal(one.minimal),
+        "minimal": _minimal(mode.minimal),
     }
 
 
-def _fix(one: Treatment | None) -> dict[str, Any] | None:
-    return None if one is None else one.model_dump(include={"name", "drop", "low", "high", "rows"})
+def _fix(treatment: Treatment | None) -> dict[str, Any] | None:
+    return (
+        None
+        if treatment is None
+        else treatment.model_dump(include={"name", "drop", "low", "high", "rows"})
+    )
 
 
-def _minimal(one: Minimal | None) -> dict[str, Any] | None:
-    if one is None:
+def _minimal(minimal: Minimal | None) -> dict[str, Any] | None:
+    if minimal is None:
         return None
-    return one.model_dump(
+    return minimal.model_dump(
         include={"name", "sentence", "rows", "harmful", "robustness", "harm", "severity"}
-    ) | {"knife_edge": one.knife_edge}
+    ) | {"knife_edge": minimal.knife_edge}

@@ -94,7 +94,7 @@ class Film:
     def centres(self) -> Float:
         """``(E, T, 2)`` the middle of each body [m]."""
         p = self.playback
-        ahead = np.array([[one.center_ahead] for one in p.entities])
+        ahead = np.array([[entity.center_ahead] for entity in p.entities])
         return np.stack([p.x + ahead * np.cos(p.h), p.y + ahead * np.sin(p.h)], axis=-1)
 
     @cached_property
@@ -185,13 +185,13 @@ class Film:
         self._draw_labels(draw, camera, k, taken)
 
     def _draw_road(self, draw: Draw, camera: _Camera) -> None:
-        for one in self.playback.lanes:
-            if one.kind in AREA_KINDS:
-                draw.polygon(camera.of(one.points), fill=_AREAS[one.kind])
+        for lane in self.playback.lanes:
+            if lane.kind in AREA_KINDS:
+                draw.polygon(camera.of(lane.points), fill=_AREAS[lane.kind])
                 continue
-            colour, metres, dash = _LINES[one.kind]
+            colour, metres, dash = _LINES[lane.kind]
             width = max(round(metres * camera.scale), FINE)
-            for part in _dashes(one.points, dash):
+            for part in _dashes(lane.points, dash):
                 draw.line(camera.of(part), fill=colour, width=width, joint="curve")
 
     def _draw_lamps(self, draw: Draw, camera: _Camera, k: int) -> None:
@@ -299,7 +299,7 @@ class Film:
             words.append("collision")
         boxes = [self._pill(draw, "   ".join(words), (10 * u, 10 * u),
                             HIT if len(words) > 1 else INK)]  # fmt: skip
-        now = [one for one in p.weather if one.step <= k]
+        now = [weather for weather in p.weather if weather.step <= k]
         if now:
             text = in_words(now[-1].stated)
             boxes.append(self._pill(draw, text, (10 * u, self._big[1] - 32 * u), INK))
@@ -337,8 +337,8 @@ class Film:
             text = f"{p.entities[e].name}  {p.v[e, k]:.1f} m/s"
             w, h = self._wide(text), 22 * self._unit
             box = min(_places(bodies[e], w, h, 6 * self._unit),
-                      key=lambda one: sum(_overlap(one, other) for other in taken)
-                      + 3.0 * (w * h - _overlap(one, frame)))  # fmt: skip
+                      key=lambda place: sum(_overlap(place, other) for other in taken)
+                      + 3.0 * (w * h - _overlap(place, frame)))  # fmt: skip
             taken.append(box)
             self._pill(draw, text, box[:2], self._colour(e))
 

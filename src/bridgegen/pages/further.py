@@ -43,8 +43,8 @@ def further_playbacks(
     best = best[:most]
     rest = np.setdiff1d(np.flatnonzero(rows.status == 0), [*kept, *best[: most // 2]])
     spread = rest[spread_evenly(rest.size, most)]
-    turns = [one for pair in zip_longest(best.tolist(), spread.tolist()) for one in pair]
-    order = [one for one in dict.fromkeys([*first, *turns]) if one is not None][:most]
+    turns = [item for pair in zip_longest(best.tolist(), spread.tolist()) for item in pair]
+    order = [turn for turn in dict.fromkeys([*first, *turns]) if turn is not None][:most]
     if pipeline.driver.is_own:
         order = []
     return _Further(pipeline, rows, order)
@@ -113,9 +113,11 @@ def motion_payload(
         exported: its name and files, if it was exported.
     """
     name = exported.name if exported else f"evaluation {evaluation + 1}"
-    (one,) = playbacks(pipeline, rows, [(name, evaluation, exported.files if exported else ())])
+    (playback,) = playbacks(
+        pipeline, rows, [(name, evaluation, exported.files if exported else ())]
+    )
     return {
-        "roads": [road_payload(one)],
-        "pictures": pictures_payload([one.picture]) if one.picture else None,
-        "playback": playback_payload(one, -1, 0 if one.picture else None),
+        "roads": [road_payload(playback)],
+        "pictures": pictures_payload([playback.picture]) if playback.picture else None,
+        "playback": playback_payload(playback, -1, 0 if playback.picture else None),
     }

@@ -95,7 +95,7 @@ def map_picture(
 
 
 def _areas(shapes: list[tuple[str, Float]], pixels: _Pixels) -> Iterator[str]:
-    for kind, line in sorted(shapes, key=lambda one: one[0] in ("driving", "junction")):
+    for kind, line in sorted(shapes, key=lambda shape: shape[0] in ("driving", "junction")):
         name = "area" if kind in ("driving", "junction") else "beside"
         yield element("polygon", class_=name, points=points_of(pixels(line).tolist()))
 

@@ -63,9 +63,10 @@ def _is_table(value: Any) -> bool:
 def _cells(
     records: Sequence[Mapping[str, Any]], space: SearchSpace
 ) -> tuple[tuple[str, ...], tuple[tuple[str, ...], ...], int]:
-    columns = tuple(dict.fromkeys(key for one in records for key in one))
+    columns = tuple(dict.fromkeys(key for record in records for key in record))
     rows = tuple(
-        tuple(_cell(key, one.get(key, ""), space) for key in columns) for one in records[:MOST]
+        tuple(_cell(key, record.get(key, ""), space) for key in columns)
+        for record in records[:MOST]
     )
     return columns, rows, max(0, len(records) - MOST)
 
@@ -75,7 +76,7 @@ def _cell(key: str, value: Any, space: SearchSpace) -> str:
     if (
         key == "box"
         and isinstance(value, dict)
-        and all(_is_side(*one, space) for one in value.items())
+        and all(_is_side(*pair, space) for pair in value.items())
     ):
         return box_in_words(value, space)
     return _text(value)
@@ -132,5 +133,5 @@ def _text(value: Any) -> str:
     if isinstance(value, list):
         return ", ".join(map(_text, value))
     if isinstance(value, dict):
-        return "; ".join(f"{key}: {_text(one)}" for key, one in value.items())
+        return "; ".join(f"{key}: {_text(item)}" for key, item in value.items())
     return str(value)

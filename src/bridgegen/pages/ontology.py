@@ -81,25 +81,29 @@ class Terms:
         level = list(self.ontology.parents.get(name, ()))
         while level:
             found += dict.fromkeys(level)
-            above = [up for one in level for up in self.ontology.parents.get(one, ())]
-            level = [one for one in above if one not in found]
+            above = [up for item in level for up in self.ontology.parents.get(item, ())]
+            level = [item for item in above if item not in found]
         return found
 
     def disjoint(self, name: str) -> list[str]:
         """Return the classes that a class is disjoint with."""
         groups = (group for group in self.ontology.disjoint if name in group)
-        return [one for group in groups for one in group if one != name]
+        return [item for group in groups for item in group if item != name]
 
     def pointing(self, name: str) -> list[str]:
         """Return the object properties whose values are of a class."""
         ranges = self.ontology.ranges
-        return [one for one in self.of_kind("ObjectProperty") if local_name(ranges[one]) == name]
+        return [item for item in self.of_kind("ObjectProperty") if local_name(ranges[item]) == name]
 
     def from_superclasses(
         self, name: str, properties: Mapping[str, Sequence[str]]
     ) -> list[tuple[str, Sequence[str]]]:
         """Return each superclass of a class that has properties, with these."""
-        return [(one, properties[one]) for one in self.ancestors(name) if properties.get(one)]
+        return [
+            (ancestor, properties[ancestor])
+            for ancestor in self.ancestors(name)
+            if properties.get(ancestor)
+        ]
 
     def requiring(self, name: str) -> list[str]:
         """Return the classes that require a property."""
@@ -108,7 +112,7 @@ class Terms:
     def same(self, name: str) -> list[str]:
         """Return the properties that are equivalent to one."""
         others = map(local_name, self.ontology.equivalents.get(name, ()))
-        return [one for one in others if one != name]
+        return [other for other in others if other != name]
 
     def values(self, name: str) -> dict[str, Any]:
         """Return what the values of a property may be: range, unit, limits, how many."""
@@ -148,7 +152,7 @@ class Terms:
     @property
     def tree(self) -> Tree:
         """All classes, each below what it is a kind of."""
-        tops = [one for one in self.classes if not self.ontology.parents.get(one)]
+        tops = [kind for kind in self.classes if not self.ontology.parents.get(kind)]
         return self._tree(tops, set(), set(self.classes))
 
     def tree_of(self, layer: int | None) -> Tree:
@@ -168,7 +172,7 @@ class Terms:
         """
         found: Tree = []
         for name in names:
-            below = [one for one in self.children.get(name, ()) if one in inside]
+            below = [item for item in self.children.get(name, ()) if item in inside]
             again = bool(below) and name in shown
             if below:
                 shown.add(name)

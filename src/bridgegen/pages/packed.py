@@ -47,12 +47,12 @@ def packed_motions(
     while some := tuple(islice(left, CHUNK)):
         own: dict[Any, int] = {}
         motions, drawn = [], []
-        for one in some:
-            key = road_key(one)
+        for playback in some:
+            key = road_key(playback)
             if key not in roads and key not in own:
                 own[key] = -1 - len(own)
-                drawn.append(road_payload(one))
-            motion = playback_payload(one, roads[key] if key in roads else own[key], None)
+                drawn.append(road_payload(playback))
+            motion = playback_payload(playback, roads[key] if key in roads else own[key], None)
             without = OF_ROW if of_rows else ()
             motions.append({name: value for name, value in motion.items() if name not in without})
         chunk = {"playbacks": motions, "roads": drawn}
@@ -61,7 +61,7 @@ def packed_motions(
         if room < 0:
             break
         texts.append(text)
-        evaluations += [one.evaluation for one in some]
+        evaluations += [playback.evaluation for playback in some]
     return {"chunk": CHUNK, "evaluations": evaluations, "texts": texts}
 
 

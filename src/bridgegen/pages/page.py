@@ -56,10 +56,10 @@ class Module:
         """
         found: dict[str, tuple[str, ...]] = {}
         for names, module in IMPORT.findall(self.text):
-            listed = [one.strip() for one in names.split(",") if one.strip()]
-            for one in listed:
-                if not NAME.fullmatch(one):
-                    raise ModuleError(f"{self.name}: `{one}` is not a name that can be imported")
+            listed = [part.strip() for part in names.split(",") if part.strip()]
+            for item in listed:
+                if not NAME.fullmatch(item):
+                    raise ModuleError(f"{self.name}: `{item}` is not a name that can be imported")
             found[module] = (*found.get(module, ()), *listed)
         return found
 
@@ -108,9 +108,9 @@ class _Graph:
         self.open.append(name)
         for other, names in module.imports.items():
             exported = self.add(other, name).exported
-            for one in names:
-                if one not in exported:
-                    raise ModuleError(f"{name} imports `{one}`, which {other} does not export")
+            for item in names:
+                if item not in exported:
+                    raise ModuleError(f"{name} imports `{item}`, which {other} does not export")
         self.open.pop()
         self.done[name] = module
         return module

@@ -39,11 +39,11 @@ class Bindings:
         """Return the name of the parameter that gives a property's value, or nothing."""
         if node in self.parameters:
             return self.parameters[node].name
-        for one in self._members.values(node).get(bg("has_parameter"), ()):
-            if isinstance(one, Subject) and one in self.parameters:
-                binds = texts(self._members.values(one).get(bg("binds_property"), ()))
+        for item in self._members.values(node).get(bg("has_parameter"), ()):
+            if isinstance(item, Subject) and item in self.parameters:
+                binds = texts(self._members.values(item).get(bg("binds_property"), ()))
                 if local_name(term) in binds:
-                    return self.parameters[one].name
+                    return self.parameters[item].name
         return ""
 
     def bound(self, phrase: Phrase) -> list[tuple[str, float]]:
@@ -131,17 +131,19 @@ class _Painter:
             if (phrase := self._carried_by_itself(node, parameter)) is not None
         ]
         boxes = self._boxes()
-        tops = scenarios or [one for one in self.sketches if members.is_a(one, "RoadNetwork")]
+        tops = scenarios or [
+            sketch for sketch in self.sketches if members.is_a(sketch, "RoadNetwork")
+        ]
         shown = [
             *facts,
-            *(fact for box in boxes for one in (box, *box.inside) for fact in one.facts),
+            *(fact for box in boxes for item in (box, *box.inside) for fact in item.facts),
         ]
         used = {name for fact in shown for name, _ in fact.bound}
         return Picture(
             name=", ".join(map(members.name, tops)),
             facts=tuple(facts),
             boxes=boxes,
-            parameters={one.name: one for one in self.parameters.values() if one.name in used},
+            parameters={item.name: item for item in self.parameters.values() if item.name in used},
             violations=tuple(
                 Reason(": ".join(filter(None, (v.individual, v.parameter or v.property))), str(v))
                 for v in self.violations
@@ -173,11 +175,11 @@ class _Painter:
 
     def _left_out(self, scenarios: list[Subject]) -> tuple[str, ...]:
         in_phrases = {
-            one for sketch in self.sketches.values() for _, p in sketch.lines for one in p.nodes
+            node for sketch in self.sketches.values() for _, p in sketch.lines for node in p.nodes
         }
         shown = in_phrases | set(scenarios) | self.sketches.keys() | self.parameters.keys()
         return tuple(
-            sorted(self.members.name(one) for one in self.members.nodes if one not in shown)
+            sorted(self.members.name(node) for node in self.members.nodes if node not in shown)
         )
 
     # -- what is in it -------------------------------------------------------------------------
@@ -186,7 +188,7 @@ class _Painter:
         values = {term: found for term, found in self.members.values(node).items()
                 if term not in _UNSAID}  # fmt: skip
         targets = {
-            term: [one for one in found if isinstance(one, Subject)]
+            term: [node for node in found if isinstance(node, Subject)]
             for term, found in values.items()
         }
         for term, others in targets.items():
@@ -203,7 +205,7 @@ class _Painter:
         last = len(order)
         # Quantities before ids and kinds.
         for term in sorted(
-            values, key=lambda one: (not unit_of(one), order.get(local_name(one), last))
+            values, key=lambda value: (not unit_of(value), order.get(local_name(value), last))
         ):
             shown = self._shown(node, term)
             if shown:
@@ -216,7 +218,7 @@ class _Painter:
 
     def _shown(self, node: Subject, term: ox.NamedNode) -> list[str]:
         found = self.members.values(node).get(term, ())
-        return [value_text(one, unit_of(term)) for one in found if isinstance(one, ox.Literal)]
+        return [value_text(item, unit_of(term)) for item in found if isinstance(item, ox.Literal)]
 
     def _follow(
         self, box: Subject, node: Subject, path: tuple[ox.NamedNode, ...], seen: set[Subject]
@@ -231,19 +233,19 @@ class _Painter:
             return
         seen.add(node)
         for term, found in self.members.values(node).items():
-            for one in found:
-                if isinstance(one, Subject) and term != TYPE:
-                    self._follow(box, one, (*path, term), seen)
+            for item in found:
+                if isinstance(item, Subject) and term != TYPE:
+                    self._follow(box, item, (*path, term), seen)
 
     def _fact(self, label: str, phrase: Phrase, broken: Sequence[int]) -> Fact:
         bound = self.bindings.bound(phrase)
         names = {name for name, _ in bound}
         values = {(node.value, local_name(term)) for node, term in phrase.bound}
         wrong = any(
-            one.parameter in names
-            if one.parameter
-            else any((iri, one.property) in values for iri in one.nodes)
-            for one in (self.violations[number] for number in broken)
+            violation.parameter in names
+            if violation.parameter
+            else any((iri, violation.property) in values for iri in violation.nodes)
+            for violation in (self.violations[number] for number in broken)
         )
         return Fact(label, phrase.text, tuple(bound), wrong)
 
@@ -257,7 +259,9 @@ class _Painter:
             about = {box} | {node for _, phrase in sketch.lines for node in phrase.nodes}
             # A parameter's violations are shown wherever it gives a value.
             named = {name for _, phrase in sketch.lines for name, _ in self.bindings.bound(phrase)}
-            about |= {node for node, one in self.parameters.items() if one.name in named}
+            about |= {
+                node for node, parameter in self.parameters.items() if parameter.name in named
+            }
             for node in about:
                 owners.setdefault(node.value, []).append(box)
         found: dict[Subject, list[int]] = {}
@@ -294,9 +298,9 @@ class _Painter:
         """Return the participant whose box holds an event that has no layer of its own."""
         if self.members.layer(node) is not None:
             return None
-        for one in self.members.values(node).get(bg("has_who"), ()):
-            if isinstance(one, Subject) and self.members.layer(one) == _EVENTS_LAYER:
-                return one
+        for item in self.members.values(node).get(bg("has_who"), ()):
+            if isinstance(item, Subject) and self.members.layer(item) == _EVENTS_LAYER:
+                return item
         return None
 
     def _box(self, node: Subject, sketch: _Sketch) -> Box:

@@ -73,11 +73,11 @@ def payload(data: ReportData, code: int = 0) -> dict[str, Any]:
             index[key] = len(roads)
             roads.append(road_payload(playback))
         kept.append(playback_payload(playback, index[key], number.get(playback.name)))
-    wanted = [one.evaluation for one in data.kept]
-    wanted += [one.evaluation for each in data.confirmations for one in each.scenarios]
+    wanted = [item.evaluation for item in data.kept]
+    wanted += [scenario.evaluation for each in data.confirmations for scenario in each.scenarios]
     modes = data.triage.modes if data.triage else ()
-    wanted += [one.shown for one in modes]
-    wanted += [one.at - 1 for one in data.criteria if one.at is not None]
+    wanted += [mode.shown for mode in modes]
+    wanted += [criterion.at - 1 for criterion in data.criteria if criterion.at is not None]
     shown = _shown(data.evaluations, wanted)
     page = {
         "live": False,

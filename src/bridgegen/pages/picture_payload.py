@@ -31,10 +31,10 @@ def pictures_payload(pictures: Sequence[Picture]) -> dict[str, Any]:
     """
     columns: dict[str, int] = {}
     sent = []
-    for one in pictures:
+    for picture in pictures:
         places = []
         for layer in LAYERS:
-            boxes = [box for box in one.boxes if box.layer == layer]
+            boxes = [box for box in picture.boxes if box.layer == layer]
             groups = [
                 group
                 for cls, found in groupby(boxes, lambda box: box.cls)
@@ -44,15 +44,15 @@ def pictures_payload(pictures: Sequence[Picture]) -> dict[str, Any]:
             places.append(columns.setdefault(text, len(columns)))
         sent.append(
             {
-                "name": one.name,
-                "checked": one.checked,
-                "facts": [_fact(fact) for fact in one.facts],
+                "name": picture.name,
+                "checked": picture.checked,
+                "facts": [_fact(fact) for fact in picture.facts],
                 "parameters": {
-                    name: _parameter(parameter) for name, parameter in one.parameters.items()
+                    name: _parameter(parameter) for name, parameter in picture.parameters.items()
                 },
-                "violations": [[reason.about, reason.text] for reason in one.violations],
-                "homeless": list(one.homeless),
-                "left_out": list(one.left_out),
+                "violations": [[reason.about, reason.text] for reason in picture.violations],
+                "homeless": list(picture.homeless),
+                "left_out": list(picture.left_out),
                 "columns": places,
             }
         )
@@ -65,7 +65,7 @@ def pictures_payload(pictures: Sequence[Picture]) -> dict[str, Any]:
 
 def _groups(cls: str, boxes: list[Box]) -> Iterator[dict[str, Any]]:
     """Yield the boxes of a class; many fold, but not those that violate a constraint."""
-    broken = [box for box in boxes if box.broken or any(one.broken for one in box.inside)]
+    broken = [box for box in boxes if box.broken or any(item.broken for item in box.inside)]
     kept = [box for box in boxes if box not in broken]
     if len(kept) <= FOLD:
         yield {"class": cls, "boxes": [_box(box) for box in boxes]}
@@ -91,7 +91,7 @@ def _box(box: Box, common: Sequence[Fact] = ()) -> dict[str, Any]:
     if box.broken:
         sent["broken"] = list(box.broken)
     if box.inside:
-        sent["inside"] = [{"class": one.cls, **_box(one)} for one in box.inside]
+        sent["inside"] = [{"class": item.cls, **_box(item)} for item in box.inside]
     return sent
 
 
@@ -102,13 +102,13 @@ def _fact(fact: Fact) -> list[Any]:
     return whole if fact.wrong else whole[:3] if bound else whole[:2]
 
 
-def _parameter(one: Parameter) -> dict[str, Any]:
+def _parameter(parameter: Parameter) -> dict[str, Any]:
     """Return a parameter's range in words, and its ends where it has any."""
-    if one.low is None or one.high is None:
-        return {"text": f"= {one.formula}" if one.formula else "no range"}
-    unit = _PLAIN.get(one.unit, one.unit)
+    if parameter.low is None or parameter.high is None:
+        return {"text": f"= {parameter.formula}" if parameter.formula else "no range"}
+    unit = _PLAIN.get(parameter.unit, parameter.unit)
     return {
-        "text": f"{quantity(one.low, '')} to {quantity(one.high, unit)}",
-        "low": one.low,
-        "high": one.high,
+        "text": f"{quantity(parameter.low, '')} to {quantity(parameter.high, unit)}",
+        "low": parameter.low,
+        "high": parameter.high,
     }

@@ -90,9 +90,9 @@ def playback_payload(p: Playback, road: int, picture: int | None) -> dict[str, A
         "contacts": begins.tolist(),
         "sensed": None if p.sensed is None else _sensed(p.sensed, p),
         "course": None if p.course is None else _course(p.course, p.n_steps),
-        "plans": [_planned(one) for one in p.plans if one.step < p.n_steps],
-        "beside": [_beside(one, p.n_steps) for one in p.beside if one.entities],
-        "weather": [_weather(one) for one in p.weather if one.step < p.n_steps],
+        "plans": [_planned(plan) for plan in p.plans if plan.step < p.n_steps],
+        "beside": [_beside(beside, p.n_steps) for beside in p.beside if beside.entities],
+        "weather": [_weather(weather) for weather in p.weather if weather.step < p.n_steps],
         "street_lights": lights,
     }
 
@@ -110,13 +110,13 @@ def _series(p: Playback) -> dict[str, Any]:
     return found
 
 
-def _beside(one: Beside, n_steps: int) -> dict[str, Any]:
-    x = one.x[:, :n_steps]
-    y, h = (np.where(np.isnan(x), np.nan, row[:, :n_steps]) for row in (one.y, one.h))
+def _beside(beside: Beside, n_steps: int) -> dict[str, Any]:
+    x = beside.x[:, :n_steps]
+    y, h = (np.where(np.isnan(x), np.nan, row[:, :n_steps]) for row in (beside.y, beside.h))
     series = {"x": x, "y": y, "h": h}
     return {
-        "label": one.label,
-        "entities": list(one.entities),
+        "label": beside.label,
+        "entities": list(beside.entities),
         **{name: [packed(row, SCALE[name]) for row in rows] for name, rows in series.items()},
     }
 
@@ -134,11 +134,11 @@ def _lamp(lamp: Lamp, n_steps: int) -> dict[str, Any]:
     }
 
 
-def _weather(one: Weather) -> dict[str, Any]:
-    numbers = {**one.stated, "sight": one.sight, "background": one.background}
+def _weather(weather: Weather) -> dict[str, Any]:
+    numbers = {**weather.stated, "sight": weather.sight, "background": weather.background}
     return {
-        "step": one.step,
-        "words": in_words(one.stated),
+        "step": weather.step,
+        "words": in_words(weather.stated),
         **{name: number(_digits(value, 4)) for name, value in numbers.items()},
     }
 
@@ -177,7 +177,7 @@ def _sensed(s: Sensed, p: Playback) -> dict[str, Any]:
         entities.append(
             {
                 "seen": "".join(letters),
-                "numbers": [np.round(one).astype(np.int64).tolist() for one in columns],
+                "numbers": [np.round(column).astype(np.int64).tolist() for column in columns],
                 "taken_for": [[int(i), int(kind[i])] for i in wrong],
             }
         )
@@ -209,11 +209,11 @@ def _course(c: Course, n_steps: int) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _planned(one: Planned) -> dict[str, Any]:
+def _planned(planned: Planned) -> dict[str, Any]:
     return {
-        "step": one.step,
-        "seconds": round(one.seconds, 2),
-        "points": _line(one.points, ROAD_SCALE),
+        "step": planned.step,
+        "seconds": round(planned.seconds, 2),
+        "points": _line(planned.points, ROAD_SCALE),
     }
 
 

@@ -108,8 +108,8 @@ def minimal_playbacks(
     """
     if not wanted:
         return ()
-    X = np.array([one.x for *_, one in wanted])
-    noise = np.array([one.noise_key for *_, one in wanted], dtype=np.uint64)
+    X = np.array([minimal.x for *_, minimal in wanted])
+    noise = np.array([minimal.noise_key for *_, minimal in wanted], dtype=np.uint64)
     names = [(name, evaluation, files) for name, evaluation, files, _ in wanted]
     played = measured_playbacks(pipeline, names, X, noise)
     return beside_others(played, X, others_of(pipeline), noise)
@@ -146,8 +146,8 @@ def measured_playbacks(
 
 def others_of(pipeline: Pipeline) -> Mapping[str, Pipeline]:
     """Return the pipelines of the drivers that the ego's is compared with, by their labels."""
-    one = pipeline.baseline
-    return {} if one is None else {one.driver.label: one}
+    baseline = pipeline.baseline
+    return {} if baseline is None else {baseline.driver.label: baseline}
 
 
 def beside_others(
@@ -167,11 +167,12 @@ def beside_others(
     found: list[list[Beside]] = [[] for _ in played]
     for label, pipeline in others.items() if played else ():
         rollout = pipeline.rollout(X) if noise is None else pipeline.runner.run(X, noise=noise)
-        for k, one in enumerate(played):
+        for k, playback in enumerate(played):
             if rollout.status[k] == 0:
-                found[k].append(_beside(label, one, rollout, k))
+                found[k].append(_beside(label, playback, rollout, k))
     return tuple(
-        replace(one, beside=tuple(other)) for one, other in zip(played, found, strict=True)
+        replace(playback, beside=tuple(other))
+        for playback, other in zip(played, found, strict=True)
     )
 
 
@@ -232,24 +233,24 @@ def _played(
     shows = vehicle_lamps(rollout, pipeline.runner.embedded.program.sirens)
     checked = constraints_in_words(pipeline.runner.source.constraints)
     found = []
-    for k, one in enumerate(shown):
-        concrete = pipeline.runner.concrete(one.x) if not brief else None
+    for k, item in enumerate(shown):
+        concrete = pipeline.runner.concrete(item.x) if not brief else None
         motion = {name: getattr(rollout, name)[k] for name in "xyhva"}
         if rollout.present.size:  # who is not there has no place and no speed
             motion |= {name: np.where(rollout.present[k], motion[name], np.nan) for name in "xyva"}
-        road = scenery.road(one.x)
+        road = scenery.road(item.x)
         picture = None
         if concrete is not None and concrete.individuals is not None:
             whole = with_outcomes(concrete.individuals, rollout, concrete.roads, k)
             picture = paint(whole, (), checked)
         found.append(
             Playback(
-                name=one.name,
+                name=item.name,
                 rank=k + 1,
-                evaluation=one.evaluation,
-                parameters=pipeline.runner.facts(one.x),
-                metrics=dict(zip(pipeline.metrics, one.metrics.tolist(), strict=True)),
-                critical=one.critical,
+                evaluation=item.evaluation,
+                parameters=pipeline.runner.facts(item.x),
+                metrics=dict(zip(pipeline.metrics, item.metrics.tolist(), strict=True)),
+                critical=item.critical,
                 time_step=rollout.time_step,
                 entities=entities,
                 **motion,
@@ -257,14 +258,14 @@ def _played(
                 ttc=ttc[k],
                 lanes=road.outlines,
                 n_steps=int(rollout.n_steps[k]),
-                files=one.files,
+                files=item.files,
                 picture=picture,
                 lamps=lamps(rollout, k, road.lights),
-                cause=one.cause,
+                cause=item.cause,
                 sensed=detections[k] if detections else None,
                 course=_course(replay, k),
                 plans=_plans(replay, k),
-                weather=tuple(_weather(step, one) for step, one in replay.weathers[k]),
+                weather=tuple(_weather(step, weather) for step, weather in replay.weathers[k]),
                 street_lights=road.street_lights,
                 conflict=_conflict(conflicts, k, count),
                 shows=shows[k],
@@ -352,7 +353,7 @@ def _weather(step: int, felt: Float) -> Weather:
 
     return Weather(
         step=step,
-        stated={one.name: float(felt[i]) for i, one in enumerate(COLUMNS)},
+        stated={physical.name: float(felt[i]) for i, physical in enumerate(COLUMNS)},
         sight=float(KOSCHMIEDER / felt[column.EXTINCTION]),
         background=float(felt[column.BACKGROUND]),
     )

@@ -39,46 +39,49 @@ from bridgegen.scenario.ontology.files import load
 def story_lines(scenario: LogicalScenario) -> Iterator[str]:
     """Yield the participants, then the events."""
     jammed = {name for jam in scenario.story.jams for name in jam.participants}
-    for one in scenario.participants:
-        if one.name not in jammed:
-            yield _participant(one, scenario)
+    for participant in scenario.participants:
+        if participant.name not in jammed:
+            yield _participant(participant, scenario)
     yield from (_jam(jam, scenario) for jam in scenario.story.jams)
     yield from (_works(works) for works in scenario.story.works)
     yield from (_event(event) for event in scenario.events)
 
 
-def _participant(one: Participant, scenario: LogicalScenario) -> str:
-    who, speed = f"{one.name}, {_kind(one)}", in_words(one.speed, "m/s")
-    extra = ", with blue light and siren on" if one.siren else ""
-    if one.exceeds_limit:
-        extra += f", faster than allowed if need be ({one.exceeds_limit})"
-    if one.path:
-        start, *between, end = map(_place, one.path)
-        past, how = ("past", ", a smooth curve,") if one.conduct == "vehicle" else ("via", "")
+def _participant(participant: Participant, scenario: LogicalScenario) -> str:
+    who, speed = f"{participant.name}, {_kind(participant)}", in_words(participant.speed, "m/s")
+    extra = ", with blue light and siren on" if participant.siren else ""
+    if participant.exceeds_limit:
+        extra += f", faster than allowed if need be ({participant.exceeds_limit})"
+    if participant.path:
+        start, *between, end = map(_place, participant.path)
+        past, how = (
+            ("past", ", a smooth curve,") if participant.conduct == "vehicle" else ("via", "")
+        )
         way = "".join(f"; {past} {place}" for place in between) + (";" if between else "")
         path = f"its path{how} leads from {start}{way} to {end}"
         return f"{who}, starts at {speed}{extra}; {path}."
-    if one.ways:
-        names = scenario.parameters[one.place_by].kind.names
+    if participant.ways:
+        names = scenario.parameters[participant.place_by].kind.names
         at = [f"from {_place(start)}{f' to {_place(end)}' if end else ''} ({name})"
-              for name, (start, end) in zip(names, one.ways, strict=True)]  # fmt: skip
+              for name, (start, end) in zip(names, participant.ways, strict=True)]  # fmt: skip
         return (
-            f"{who}, starts at {speed}{extra}; {one.place_by} chooses its place: {'; '.join(at)}."
+            f"{who}, starts at {speed}{extra}; {participant.place_by} chooses its place: "
+            f"{'; '.join(at)}."
         )
     turned = ""
-    if one.heading in (180.0, -180.0):
+    if participant.heading in (180.0, -180.0):
         turned = ", against the traffic"
-    elif one.heading != 0.0:
-        turned = f", turned by {in_words(one.heading, 'deg')}"
-    if one.conduct == "obstacle" or (one.speed == 0.0 and one.end is None):
-        return f"{who}, stands at {_place(one.start)}{turned}{extra}."
-    goes = "" if one.end is None else f" and goes to {_place(one.end)}"
-    return f"{who}, starts at {_place(one.start)} at {speed}{turned}{extra}{goes}."
+    elif participant.heading != 0.0:
+        turned = f", turned by {in_words(participant.heading, 'deg')}"
+    if participant.conduct == "obstacle" or (participant.speed == 0.0 and participant.end is None):
+        return f"{who}, stands at {_place(participant.start)}{turned}{extra}."
+    goes = "" if participant.end is None else f" and goes to {_place(participant.end)}"
+    return f"{who}, starts at {_place(participant.start)} at {speed}{turned}{extra}{goes}."
 
 
-def _kind(one: Participant) -> str:
+def _kind(participant: Participant) -> str:
     """Return what it is, with its article: all that it may be."""
-    return " or ".join(map(_noun, one.types or (one.model or one.type,)))
+    return " or ".join(map(_noun, participant.types or (participant.model or participant.type,)))
 
 
 def _noun(name: str) -> str:
@@ -104,24 +107,26 @@ def _works(works: RoadWorks) -> str:
 def _event(event: EventSpec) -> str:
     what = " and ".join(map(str, event.actions))
     when = ", or ".join(
-        " and ".join(_condition(one, event) for one in alternative) for alternative in event.when
+        " and ".join(_condition(spec, event) for spec in alternative) for alternative in event.when
     )
     return f"{event.name}: {event.participant or 'the weather'} {what} when {when}."
 
 
-def _condition(one: ConditionSpec, event: EventSpec) -> str:
-    kind = CONDITIONS[one.kind]
-    whose = one.of or event.participant
-    subject = f"the {kind.meaning}" if one.kind == "time" else f"{kind.meaning} of {whose}"
-    if one.kind == "after":
-        subject = f"the time since {one.event} ended"
-    if one.kind == "began":
-        subject = f"the time since {one.event} began"
-    if one.kind == "contact":
-        return f"{whose} has touched {one.to}"
-    if one.to is not None:
-        subject = f"the {one.kind} ({kind.meaning}) from {whose} to {one.to}"
-    return f"{subject} is {kind.rule} {in_words(one.value, kind.unit)}"
+def _condition(condition_spec: ConditionSpec, event: EventSpec) -> str:
+    kind = CONDITIONS[condition_spec.kind]
+    whose = condition_spec.of or event.participant
+    subject = (
+        f"the {kind.meaning}" if condition_spec.kind == "time" else f"{kind.meaning} of {whose}"
+    )
+    if condition_spec.kind == "after":
+        subject = f"the time since {condition_spec.event} ended"
+    if condition_spec.kind == "began":
+        subject = f"the time since {condition_spec.event} began"
+    if condition_spec.kind == "contact":
+        return f"{whose} has touched {condition_spec.to}"
+    if condition_spec.to is not None:
+        subject = f"the {condition_spec.kind} ({kind.meaning}) from {whose} to {condition_spec.to}"
+    return f"{subject} is {kind.rule} {in_words(condition_spec.value, kind.unit)}"
 
 
 def _place(at: Waypoint) -> str:
@@ -150,17 +155,20 @@ def write_scenario_page(path: Path, scenario: LogicalScenario) -> None:
         ],
         picture=Markup(sketch(pipeline.runner)),
         story=[*story_lines(scenario)],
-        parameters=[_parameter(one) for one in scenario.parameters.values()],
+        parameters=[_parameter(parameter) for parameter in scenario.parameters.values()],
         rules=(*scenario.bounds, *scenario.derived),
     )  # fmt: skip
 
 
-def _parameter(one: Parameter) -> list[object]:
-    unit = "" if one.unit in ("1", "count") else f" {one.unit}"
+def _parameter(parameter: Parameter) -> list[object]:
+    unit = "" if parameter.unit in ("1", "count") else f" {parameter.unit}"
     return [
-        one.name, one.axis, one.kind.span_text(one.low, one.high, "{:g}".format, unit),
-        f"{one.kind.text(one.default, '{:g}'.format)}{unit}", (one.description, one.source),
-    ]  # fmt: skip
+        parameter.name,
+        parameter.axis,
+        parameter.kind.span_text(parameter.low, parameter.high, "{:g}".format, unit),
+        f"{parameter.kind.text(parameter.default, '{:g}'.format)}{unit}",
+        (parameter.description, parameter.source),
+    ]
 
 
 # --- Pages of their own: an ontology file with violated constraints in red, a logical scenario ---
@@ -217,7 +225,7 @@ def show_file(owl: Path, out: Path | None = None) -> tuple[Path, int]:
     individuals = load(owl)
     scenario = scenario_of(individuals)
     violations = check(individuals, scenario)
-    one = paint(individuals, violations, constraints_in_words(scenario))
-    title = f"{owl.name}: {one.name}" if one.name else owl.name
-    write_page(out, "show.js", title, script_json(pictures_payload([one])))
+    picture = paint(individuals, violations, constraints_in_words(scenario))
+    title = f"{owl.name}: {picture.name}" if picture.name else owl.name
+    write_page(out, "show.js", title, script_json(pictures_payload([picture])))
     return out, len(violations)

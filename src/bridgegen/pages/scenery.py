@@ -51,7 +51,7 @@ class Scenery:
         key = x[[space.index(name) for name in names]].tobytes()
         if key not in self._known:
             model = self._runner.concrete(x).roads
-            found = tuple(Outline(*one) for one in _outline(model, source.place(space.values(x))))
+            found = tuple(Outline(*pair) for pair in _outline(model, source.place(space.values(x))))
             self._known[key] = RoadPicture(found, lights(model), street_lights(model))
         return self._known[key]
 
@@ -68,10 +68,10 @@ def _outline(model: OpenDrive, site: Site | None) -> list[Shape]:
 def street_lights(model: OpenDrive) -> Float:
     """Return where the street lights of a road network stand, ``(n, 2)`` float64 [m]."""
     found = [
-        points(road, np.array([min(one.s, road.length)]), np.array([one.t]))[0]
+        points(road, np.array([min(obj.s, road.length)]), np.array([obj.t]))[0]
         for road in model.roads
-        for one in road.objects
-        if class_of(one) == "StreetLight"
+        for obj in road.objects
+        if class_of(obj) == "StreetLight"
     ]
     return np.array(found, dtype=np.float64).reshape(-1, 2)
 
@@ -88,9 +88,9 @@ def lamps(rollout: Rollout, row: int, found: list[Light]) -> tuple[Lamp, ...]:
     """Return the lights that change in one scenario of a rollout, with their states."""
     shown = {name: number for number, name in enumerate(rollout.light_names)}
     return tuple(
-        Lamp(one.x, one.y, one.h, rollout.lights[row, shown[one.id]], one.id)
-        for one in found
-        if one.id in shown
+        Lamp(light.x, light.y, light.h, rollout.lights[row, shown[light.id]], light.id)
+        for light in found
+        if light.id in shown
     )
 
 

@@ -73,10 +73,10 @@ def causes_payload(e: Evaluations) -> dict[str, Any] | None:
     """
     if e.cause is None:
         return None
-    counts = [int(np.count_nonzero(e.cause == one)) for one in Cause]
+    counts = [int(np.count_nonzero(e.cause == cause)) for cause in Cause]
     shown = len(counts) if counts[Cause.VEHICLE_DYNAMICS] else int(Cause.VEHICLE_DYNAMICS)
     return {
-        "labels": ["none", *(one.label for one in Cause if one)][:shown],
+        "labels": ["none", *(cause.label for cause in Cause if cause)][:shown],
         "counts": counts[:shown],
     }
 
@@ -95,24 +95,24 @@ def regions_payload(
         shown: ``(N,)``, the rows that the page holds; a region names the rows in it by their
             indices among these.
     """
-    columns = {one.name: one.values for one in evaluations.parameters}
+    columns = {parameter.name: parameter.values for parameter in evaluations.parameters}
     keys = ("evaluations", "critical", "critical_held", "space_share", "confidence", "at_least")
     regions = []
-    for one in record["regions"]:
-        box = {name: one["box"][name] for name in one["named"]}
+    for item in record["regions"]:
+        box = {name: item["box"][name] for name in item["named"]}
         inside = np.ones(int(shown.sum()), np.bool_)
         for name, ends in box.items():
             x = columns[name][shown] if name in columns else np.full(inside.size, np.nan)
             inside &= (ends["low"] <= x) & (x <= ends["high"])
         regions.append(
             {
-                **{key: one[key] for key in ("number", "confirmed", "rule", "sentence")},
-                "narrowed": bool(one.get("narrowed")),
-                "space_share": one["space_share"],
+                **{key: item[key] for key in ("number", "confirmed", "rule", "sentence")},
+                "narrowed": bool(item.get("narrowed")),
+                "space_share": item["space_share"],
                 "box": {name: [ends["low"], ends["high"]] for name, ends in box.items()},
-                "fresh": _evidence(one["fresh"]),
-                "search": _evidence(one["search"]),
-                "exposure": one.get("exposure"),
+                "fresh": _evidence(item["fresh"]),
+                "search": _evidence(item["search"]),
+                "exposure": item.get("exposure"),
                 "rows": np.flatnonzero(inside).tolist(),
             }
         )
@@ -124,8 +124,8 @@ def regions_payload(
     }
 
 
-def _evidence(one: Mapping[str, Any]) -> dict[str, Any]:
-    return {"rows": one["rows"], "critical": one["critical"], "interval": one["interval"]}
+def _evidence(record: Mapping[str, Any]) -> dict[str, Any]:
+    return {"rows": record["rows"], "critical": record["critical"], "interval": record["interval"]}
 
 
 # --- Coverage as the plain data that the page draws ---
@@ -143,29 +143,29 @@ def coverage_payload(found: CoverageMap) -> dict[str, Any]:
     second parameter's bins running fastest, and one of the critical rows; None where there are
     too many to be drawn.
     """
-    axes = list(dict.fromkeys(one.axis for one in found.total.parameters))
-    parameters = sorted(found.total.parameters, key=lambda one: axes.index(one.axis))
-    number = {one.name: k for k, one in enumerate(parameters)}
+    axes = list(dict.fromkeys(parameter.axis for parameter in found.total.parameters))
+    parameters = sorted(found.total.parameters, key=lambda parameter: axes.index(parameter.axis))
+    number = {parameter.name: k for k, parameter in enumerate(parameters)}
     return {
         "evaluations": found.total.evaluations,
         "critical": found.total.critical,
         "sample": found.total.sample,
-        "ways": [{"strength": one.strength, **_ways(one)} for one in found.total.ways],
-        "parameters": [_parameter(one) for one in parameters],
-        "pairs": [_pair(one, number) for one in found.pairs],
+        "ways": [{"strength": way.strength, **_ways(way)} for way in found.total.ways],
+        "parameters": [_parameter(parameter) for parameter in parameters],
+        "pairs": [_pair(pair, number) for pair in found.pairs],
     }
 
 
-def _parameter(one: ParameterBins) -> dict[str, Any]:
+def _parameter(parameter_bins: ParameterBins) -> dict[str, Any]:
     return {
-        "name": one.name,
-        "unit": one.unit,
-        "axis": one.axis,
-        "integer": one.integer,
-        **one.labels,
-        "edges": [float(f"{edge:.6g}") for edge in one.edges.tolist()],
-        "evaluated": _counts(one.evaluated, one.feasible),
-        "critical": one.critical.tolist(),
+        "name": parameter_bins.name,
+        "unit": parameter_bins.unit,
+        "axis": parameter_bins.axis,
+        "integer": parameter_bins.integer,
+        **parameter_bins.labels,
+        "edges": [float(f"{edge:.6g}") for edge in parameter_bins.edges.tolist()],
+        "evaluated": _counts(parameter_bins.evaluated, parameter_bins.feasible),
+        "critical": parameter_bins.critical.tolist(),
     }
 
 
@@ -184,7 +184,7 @@ def _pair(pair: PairBins, number: dict[str, int]) -> dict[str, Any]:
     cells = None
     if pair.evaluated is not None and pair.critical is not None and pair.feasible is not None:
         grids = (_counts(pair.evaluated, pair.feasible), pair.critical.tolist())
-        evaluated, critical = (np.transpose(one) if turned else np.array(one) for one in grids)
+        evaluated, critical = (np.transpose(grid) if turned else np.array(grid) for grid in grids)
         cells = {"evaluated": evaluated.ravel().tolist(), "critical": critical.ravel().tolist()}
     return {"of": sorted((first, second)), **_ways(pair.ways), "cells": cells}
 
@@ -251,9 +251,9 @@ def _happening(data: ReportData, _shown: Bool) -> Any:
         groups.append(("What the ego reached", whole))
         groups.append(("Stuck", (Share("the ego stands for no reason", found.stuck, found.rows),)))
     return {
-        "lead": [one for one in (_verdict(found), found.stuck_in_words, found.domain) if one],
+        "lead": [name for name in (_verdict(found), found.stuck_in_words, found.domain) if name],
         "groups": [
-            {"title": title, "shares": [vars(one) for one in shares]}
+            {"title": title, "shares": [vars(share) for share in shares]}
             for title, shares in groups
             if shares
         ],
@@ -299,7 +299,7 @@ def sections_payload(data: ReportData, shown: Bool, *, grown: bool = False) -> d
         grown: only those of the sections that a served page updates.
     """
     return {
-        one.key: one.payload(data, shown)
-        for one in SECTIONS
-        if one.payload is not None and (one.grows or not grown)
+        section.key: section.payload(data, shown)
+        for section in SECTIONS
+        if section.payload is not None and (section.grows or not grown)
     }

@@ -62,7 +62,10 @@ def _sentences(data: ReportData) -> list[str]:
         if s.fiftieth_critical is not None:
             found += f", the 50th at {s.fiftieth_critical:,}"
     words.append(found + ".")
-    confirmed = [verdicts(one.label, one.scenarios)[0] for one in data.confirmations]
+    confirmed = [
+        verdicts(confirmation.label, confirmation.scenarios)[0]
+        for confirmation in data.confirmations
+    ]
     worst = _worst_harm(data) if s.harm else _worst(data)
     findings = filter(None, (_modes(data), _causes(data), worst))
     return [*words, *findings, *_not_exported(data), *confirmed]
@@ -196,7 +199,7 @@ def _modes(data: ReportData) -> str:
     if data.triage is None or not data.triage.modes:
         return ""
     n = len(data.triage.modes) + data.triage.unrecorded_modes
-    titles = [f"{one.title} ({one.count:,})" for one in data.triage.modes[:MOST_TITLES]]
+    titles = [f"{mode.title} ({mode.count:,})" for mode in data.triage.modes[:MOST_TITLES]]
     more = ", …" if n > MOST_TITLES else ""
     other = f" and {data.summary.baseline} does not" if data.summary.baseline else ""
     return f"{_ways(n)} in which {data.summary.ego} fails{other}: {'; '.join(titles)}{more}."
@@ -236,7 +239,7 @@ def _worst_harm(data: ReportData) -> str:
     if not n_contact:
         return f"{'It is a near miss' if n_near == 1 else 'All are near misses'}; no collision."
     text = f"{counted(n_contact, 'collision')}"
-    severity = next((one.whole for one in e.metrics if one.name == "severity"), None)
+    severity = next((metric.whole for metric in e.metrics if metric.name == "severity"), None)
     if severity is not None:
         worst = float(severity[contact].max())
         text += f", the most severe with a probability of {share(worst)} of a MAIS3+ injury"
@@ -250,7 +253,9 @@ def _violates(findings: Findings) -> Bool:
 
 def _worst(data: ReportData) -> str:
     e = data.evaluations
-    columns = {one.name: one.whole for one in e.metrics if one.name in ("n_collision", "v_d")}
+    columns = {
+        metric.name: metric.whole for metric in e.metrics if metric.name in ("n_collision", "v_d")
+    }
     ok = e.status == 0
     hits = columns.get("n_collision")
     n_hits = 0 if hits is None else int(np.count_nonzero(hits[ok] > 0))

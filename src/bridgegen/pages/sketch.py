@@ -127,15 +127,15 @@ def _view(where: Float, ego: Float) -> _View:
 
 
 def _roads(road: Sequence[Outline], view: _View) -> Iterator[str]:
-    for one in road:
-        if not view.sees(one.points):
+    for outline in road:
+        if not view.sees(outline.points):
             continue
-        line = view.line(one.points)
-        if one.kind in AREA_KINDS:
-            fill = _AREAS[one.kind]
+        line = view.line(outline.points)
+        if outline.kind in AREA_KINDS:
+            fill = _AREAS[outline.kind]
             yield f'<polygon points="{line}" fill="{fill}" stroke="{fill}" stroke-width="0.6"/>'
             continue
-        colour, metres, dashes = _LINES[one.kind]
+        colour, metres, dashes = _LINES[outline.kind]
         width = max(metres * view.scale, 0.8)
         dashed = " ".join(f"{float(part) * view.scale:.1f}" for part in dashes.split())
         more = f' stroke-dasharray="{dashed}"' if dashed else ""
@@ -234,7 +234,9 @@ def _labels(labels: list[tuple[str, str, tuple[float, float]]]) -> Iterator[str]
             for dx, dy in ((0, -1), (0, 1), (1, 0), (-1, 0), (1, -1), (-1, 1), (1, 1), (-1, -1))
         ]
         boxes = [(px - w / 2, py - h / 2, px + w / 2, py + h / 2) for px, py in places]
-        box = min(boxes, key=lambda one: sum(_overlap(one, other) for other in taken) + _out(one))
+        box = min(
+            boxes, key=lambda pair: sum(_overlap(pair, other) for other in taken) + _out(pair)
+        )
         taken.append(box)
         text = html.escape(name)
         yield (

@@ -51,7 +51,7 @@ def page(template: str, **values: Any) -> bytes:
 def style(own: str = "") -> str:
     """Return the style of a page without scripts: the common one, and its own if there is one."""
     found = (ROOT.joinpath(name) for name in (*STYLES, own) if name)
-    return "".join(one.read_text("utf-8") for one in found if one.is_file())
+    return "".join(traversable.read_text("utf-8") for traversable in found if traversable.is_file())
 
 
 @cache

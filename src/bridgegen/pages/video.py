@@ -87,8 +87,8 @@ def encode(frames: Iterable[Image.Image], size: tuple[int, int], fps: int, kind:
             try:
                 assert process.stdin is not None
                 with suppress(BrokenPipeError), process.stdin as pipe:
-                    for one in frames:
-                        pipe.write(one.tobytes())
+                    for frame in frames:
+                        pipe.write(frame.tobytes())
                 process.wait()
             finally:
                 limit.cancel()
@@ -150,7 +150,7 @@ def check_look(size: tuple[int, int], fps: int) -> None:
         InputError: one is out of bounds.
     """
     low, high = SIZES
-    if not all(low <= one <= high for one in size):
+    if not all(low <= number <= high for number in size):
         raise InputError(
             f"{low} <= width, height <= {high} must hold for --size [pixels], got "
             f"{size[0]}x{size[1]}"
@@ -238,7 +238,7 @@ def _animated(frames: Sequence[Image.Image], fps: int, kind: str) -> bytes:
         both.paste(frames[0])
         both.paste(frames[-1], (0, height))
         palette = both.quantize(_COLOURS, dither=Image.Dither.NONE)
-        few = [one.quantize(palette=palette, dither=Image.Dither.NONE) for one in frames]
+        few = [frame.quantize(palette=palette, dither=Image.Dither.NONE) for frame in frames]
         few[0].save(file, "GIF", save_all=True, append_images=few[1:], duration=delay, loop=0,
                     optimize=False)  # fmt: skip
     return file.getvalue()

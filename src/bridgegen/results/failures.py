@@ -103,8 +103,8 @@ class Failure(ShapedSection):
     @property
     def criteria(self) -> list[dict[str, Any]]:
         """The pass criteria that it violates, as `Criterion.to_dict` gives them."""
-        return [read_criterion(one.model_dump(exclude_defaults=True)).to_dict()
-                for one in self.violates]  # fmt: skip
+        return [read_criterion(criterion.model_dump(exclude_defaults=True)).to_dict()
+                for criterion in self.violates]  # fmt: skip
 
 
 class _Failures(ShapedSection):
@@ -142,7 +142,9 @@ class FailureFile:
 
     def of_file(self, name: str) -> tuple[str, Failure] | None:
         """Return id and failure that a scenario of the folder belongs to."""
-        return next(((id, one) for id, one in self.failures.items() if name in one.files), None)
+        return next(
+            ((id, failure) for id, failure in self.failures.items() if name in failure.files), None
+        )
 
 
 def read_failures(folder: Path) -> FailureFile:
@@ -170,12 +172,12 @@ def read_old_file(folder: Path) -> dict[str, Failure]:
         return {}
     document = read_plain_yaml(data, str(path))
     found: dict[str, Failure] = {}
-    for number, one in enumerate(_shaped(_OldFile, document, "modes").modes):
-        if one.id in found:
+    for number, mode in enumerate(_shaped(_OldFile, document, "modes").modes):
+        if mode.id in found:
             where = document.at(("modes", number))
-            raise FileFormatError(f"the failure mode '{one.id}' is there twice ({where})")
-        texts = one.model_dump(exclude={"id", "note"})
-        found[one.id] = Failure(comment=one.note, **texts)
+            raise FileFormatError(f"the failure mode '{mode.id}' is there twice ({where})")
+        texts = mode.model_dump(exclude={"id", "note"})
+        found[mode.id] = Failure(comment=mode.note, **texts)
     return found
 
 
@@ -263,18 +265,18 @@ def _parsed(data: bytes, path: Path) -> FailureFile:
     document = read_plain_yaml(data, str(path))
     failures = _shaped(_Failures, document, "failures").failures
     problems, names = list[str](), set[str]()
-    for id, one in failures.items():
+    for id, failure in failures.items():
         where = document.at(("failures", id))
         try:
-            _ = one.criteria
+            _ = failure.criteria
         except InputError as error:
             problems += [f"{text} ({where})" for text in error.problems]
-        required = Failure.model_fields.keys() - {*_OPTIONAL} if one.files else set()
+        required = Failure.model_fields.keys() - {*_OPTIONAL} if failure.files else set()
         problems += [
             f"failures.{id} must have the key '{name}' ({where})"
-            for name in sorted(required - one.model_fields_set)
+            for name in sorted(required - failure.model_fields_set)
         ]
-        for name in one.files:
+        for name in failure.files:
             if name in names:
                 problems.append(f"two failures have the file {name} ({where})")
             names.add(name)
@@ -299,7 +301,7 @@ def _edited(file: FailureFile, changed: Mapping[str, Failure]) -> str:
     for id, failure in changed.items():
         values = _values(failure)
         if id not in blocks:
-            at = next((start for one, (start, _) in blocks.items() if one > id), len(lines))
+            at = next((start for item, (start, _) in blocks.items() if item > id), len(lines))
             text = "".join(_entry(name, value, indent + 2) for name, value in values.items())
             edits.append((at, at, id, f"{' ' * indent}{_flow(id)}:\n{text}"))
             continue
@@ -308,9 +310,9 @@ def _edited(file: FailureFile, changed: Mapping[str, Failure]) -> str:
         for number, name in enumerate(names := [*Failure.model_fields]):
             if old.get(name) == values.get(name):
                 continue
-            later = (keys[one][0] for one in names[number:] if one in keys)
+            later = (keys[item][0] for item in names[number:] if item in keys)
             start, end = keys.get(name) or (next(later, blocks[id][1]),) * 2
-            text = "".join(one for one in lines[start:end] if one.lstrip().startswith("#"))
+            text = "".join(line for line in lines[start:end] if line.lstrip().startswith("#"))
             text += _entry(name, values[name], inner) if name in values else ""
             edits.append((start, end, f"{number:02}", text))
     for start, end, _, text in sorted(edits, reverse=True):
@@ -322,7 +324,7 @@ def _spans(
     file: FailureFile, lines: list[str], path: tuple[str, ...], end: int
 ) -> tuple[dict[str, tuple[int, int]], int]:
     """Return the lines of each entry of a mapping, with the comments above it, and the indent."""
-    keys = {str(one[-1]): line - 1 for one, line in file.lines.items() if one[:-1] == path}
+    keys = {str(name[-1]): line - 1 for name, line in file.lines.items() if name[:-1] == path}
     starts = []
     for key in keys.values():
         start = key
@@ -344,14 +346,16 @@ def _values(failure: Failure) -> dict[str, Any]:
     defaults = Failure().model_dump()
     required = {*_OWN, *(defaults.keys() - {*_OPTIONAL} if failure.files else ())}
     found = {**failure.model_dump(), "violates": failure.criteria}
-    return {name: one for name, one in found.items() if name in required or one != defaults[name]}
+    return {
+        name: item for name, item in found.items() if name in required or item != defaults[name]
+    }
 
 
 def _entry(name: str, value: Any, indent: int) -> str:
     """Return a key with its value as YAML; pass criteria on lines of their own."""
     before = " " * indent
     if name == "violates":
-        return f"{before}violates:\n" + "".join(f"{before}  - {_flow(one)}\n" for one in value)
+        return f"{before}violates:\n" + "".join(f"{before}  - {_flow(item)}\n" for item in value)
     return f"{before}{name}: {_flow(value)}\n"
 
 
@@ -365,7 +369,7 @@ def _flow(value: Any) -> str:
     if isinstance(value, str) and _PLAIN.fullmatch(value) and value.lower() not in _WORDS:
         return value
     if isinstance(value, Mapping):
-        return "{" + ", ".join(f"{key}: {_quoted(one)}" for key, one in value.items()) + "}"
+        return "{" + ", ".join(f"{key}: {_quoted(item)}" for key, item in value.items()) + "}"
     if isinstance(value, Iterable) and not isinstance(value, str):
         return "[" + ", ".join(map(_flow, value)) + "]"
     return _quoted(value)
@@ -374,4 +378,4 @@ def _flow(value: Any) -> str:
 def _quoted(value: Any) -> str:
     """Return a value as JSON that is YAML, too: characters that YAML has not are escaped."""
     text = json.dumps(value, ensure_ascii=False)
-    return _UNPRINTABLE.sub(lambda one: f"\\u{ord(one[0]):04x}", text)
+    return _UNPRINTABLE.sub(lambda item: f"\\u{ord(item[0]):04x}", text)

@@ -51,7 +51,7 @@ def claim(
         before = parse_json(read_bytes(path)) if path.exists() else None
         if before is not None and not isinstance(before, dict):
             raise ValueError("it must hold an object")
-        names = [one.name for one in folder.iterdir()] if folder.exists() else []
+        names = [item.name for item in folder.iterdir()] if folder.exists() else []
         has_results = any((folder / pieces).glob(kept))
         others = any(name != pieces and not belongs(name) for name in names)
         if before is None and (has_results or others):
@@ -73,7 +73,7 @@ def claim(
         if known and compared.get(name) != made.get(name) and (name in compared or not grows)
     ]
     if differ:
-        words = ", ".join(_difference(one, compared.get(one), made.get(one)) for one in differ)
+        words = ", ".join(_difference(item, compared.get(item), made.get(item)) for item in differ)
         raise StorageError(
             f"{folder}: holds a {what} with other settings, and the results of both cannot be one: "
             f"{words}; choose another folder (--out), or remove it"
@@ -87,7 +87,7 @@ def _difference(name: str, before: Any, now: Any) -> str:
         return f"{name} has changed"
     if isinstance(before, dict) and isinstance(now, dict):
         keys = [key for key in {**before, **now} if before.get(key) != now.get(key)]
-        before, now = ({key: one.get(key) for key in keys} for one in (before, now))
+        before, now = ({key: record.get(key) for key in keys} for record in (before, now))
     return f"{name} was {_shown(before)}, is {_shown(now)}"
 
 

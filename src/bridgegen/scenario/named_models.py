@@ -87,7 +87,7 @@ _ALL = (
     ),
 )  # fmt: skip
 
-MODELS: Mapping[str, NamedModel] = MappingProxyType({one.name: one for one in _ALL})
+MODELS: Mapping[str, NamedModel] = MappingProxyType({model.name: model for model in _ALL})
 """Named models of participants, by name."""
 
 

@@ -475,20 +475,22 @@ _ALL = (
     ),
 )  # fmt: skip
 
-PARTICIPANTS: Mapping[str, ParticipantKind] = MappingProxyType({one.name: one for one in _ALL})
+PARTICIPANTS: Mapping[str, ParticipantKind] = MappingProxyType({kind.name: kind for kind in _ALL})
 """Kinds of participants by name. The dimensions are those of common models, rounded; accelerations
 are what such bodies reach on a dry road. Reference point: the rear axle's centre of a vehicle, the
 centre of anything else."""
 
-TYPES = tuple(one.name for one in _ALL if one.takes_part)
+TYPES = tuple(kind.name for kind in _ALL if kind.takes_part)
 """Types of participants."""
 
-_NAMES = {alias: one.name for one in _ALL for alias in (one.name, *one.aliases)}
+_NAMES = {alias: kind.name for kind in _ALL for alias in (kind.name, *kind.aliases)}
 
-TYPE_NAMES = tuple(alias for one in _ALL if one.takes_part for alias in (one.name, *one.aliases))
+TYPE_NAMES = tuple(
+    alias for kind in _ALL if kind.takes_part for alias in (kind.name, *kind.aliases)
+)
 """Types of participants, with all names that a scenario file may give."""
 
-QUEUES = tuple(one.name for one in _ALL if one.queues)
+QUEUES = tuple(kind.name for kind in _ALL if kind.queues)
 """Types of vehicles that a jam may consist of."""
 
 

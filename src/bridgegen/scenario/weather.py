@@ -135,11 +135,13 @@ _PHYSICAL = (
     Physical("friction_scale", "1", 1.0, "road_condition", "friction_scale_factor"),
 )
 
-PHYSICAL: Mapping[str, Physical] = MappingProxyType({one.name: one for one in _PHYSICAL})
+PHYSICAL: Mapping[str, Physical] = MappingProxyType(
+    {physical.name: physical for physical in _PHYSICAL}
+)
 """Physical quantities of the weather by name, in the order of the elements in which files are
 read."""
 
-COLUMNS = tuple(one for one in _PHYSICAL if one.is_simulated)
+COLUMNS = tuple(physical for physical in _PHYSICAL if physical.is_simulated)
 """Physical quantities of the simulated weather that a storyboard states, by column."""
 
 
@@ -232,19 +234,21 @@ _PARAMETERS = (
     Parameter("snowfall", "mm/h", _SNOW, "snow", is_declared=False),
 )  # fmt: skip
 
-PARAMETERS: Mapping[str, Parameter] = MappingProxyType({one.name: one for one in _PARAMETERS})
+PARAMETERS: Mapping[str, Parameter] = MappingProxyType(
+    {parameter.name: parameter for parameter in _PARAMETERS}
+)
 """Weather parameters by name; parameters of one part follow each other."""
 
 PARTS: Mapping[Part, tuple[Parameter, ...]] = MappingProxyType(
     {
-        part: tuple(one for one in _PARAMETERS if one.part == part)
-        for part in dict.fromkeys(one.part for one in _PARAMETERS)
+        part: tuple(parameter for parameter in _PARAMETERS if parameter.part == part)
+        for part in dict.fromkeys(parameter.part for parameter in _PARAMETERS)
     }
 )
 """The parts of the weather, with their parameters."""
 
 STATED_BY: Mapping[str, Parameter] = MappingProxyType(
-    {one.stands_for: one for one in _PARAMETERS if one.stands_for}
+    {parameter.stands_for: parameter for parameter in _PARAMETERS if parameter.stands_for}
 )
 """Weather parameters by the physical quantity that they stand for."""
 
@@ -288,7 +292,7 @@ CARLA_FIELDS: Mapping[str, CarlaField] = MappingProxyType(
 
 CARLA_NAMES: Mapping[str, str] = MappingProxyType(
     {name: name for name in CARLA_FIELDS}
-    | {one.name: one.carla for one in _PARAMETERS if one.carla}
+    | {parameter.name: parameter.carla for parameter in _PARAMETERS if parameter.carla}
 )
 """CARLA's field by the name of a property of our files."""
 
@@ -339,9 +343,9 @@ def in_words(values: Mapping[str, float]) -> str:
     said = []
     for name, phrases in PHRASES.items():
         value = values[name]
-        for one in phrases:
-            if one.above < value < one.below:
-                said.append(one.text.format(_rounded(value * one.times)))
+        for phrase in phrases:
+            if phrase.above < value < phrase.below:
+                said.append(phrase.text.format(_rounded(value * phrase.times)))
                 break
     return ", ".join(said)
 

@@ -51,7 +51,7 @@ def accidents(rollout: Rollout, row: int, standing: Iterable[str] = ()) -> tuple
     found: list[Accident] = []
     for k in range(min(moving, e - 1)):
         rest = order[k:]
-        x, y, h = (one[[row]][:, rest, :steps] for one in (rollout.x, rollout.y, rollout.h))
+        x, y, h = (array[[row]][:, rest, :steps] for array in (rollout.x, rollout.y, rollout.h))
         gaps = box_distance(rollout.box[rest], x, y, h, np.array([steps]))[0, 1:]
         contact = gaps <= 0.0
         for i, other in enumerate(rest[1:]):
@@ -65,7 +65,7 @@ def accidents(rollout: Rollout, row: int, standing: Iterable[str] = ()) -> tuple
             px, py = _middle(_corners(rollout, row, a, first), _corners(rollout, row, b, first))
             who = (rollout.names[a], rollout.names[b])
             found.append(Accident(round(first * rollout.time_step, 9), px, py, who))
-    return tuple(sorted(found, key=lambda one: (one.time, one.who)))
+    return tuple(sorted(found, key=lambda accident: (accident.time, accident.who)))
 
 
 def _beginnings(contact: Bool, within: int) -> list[tuple[int, int]]:
@@ -94,14 +94,14 @@ def _corners(rollout: Rollout, row: int, entity: int, step: int) -> Float:
     return np.column_stack([x, y])
 
 
-def _middle(one: Float, other: Float) -> tuple[float, float]:
+def _middle(array: Float, other: Float) -> tuple[float, float]:
     """Return the mean corner of where two boxes overlap; of boxes that touch, of where they do."""
-    overlap = [tuple(point) for point in one.tolist()]
+    overlap = [tuple(point) for point in array.tolist()]
     for a, b in zip(other.tolist(), np.roll(other, -1, axis=0).tolist(), strict=True):
         overlap = list(_left_of(overlap, a, b))
     # where they touch along a side, its ends come twice
     overlap = list({(round(x, 6), round(y, 6)): (x, y) for x, y in overlap}.values())
-    corners = np.array(overlap) if overlap else np.array([one.mean(axis=0), other.mean(axis=0)])
+    corners = np.array(overlap) if overlap else np.array([array.mean(axis=0), other.mean(axis=0)])
     x, y = corners.mean(axis=0).tolist()
     return x, y
 

@@ -67,8 +67,8 @@ def _esmini(
 
 
 _OURS = {
-    one.name: one
-    for one in (
+    kind.name: kind
+    for kind in (
         Kind(
             "embedded",
             "Ours, compiled to machine code: thousands of scenarios a second.",
@@ -138,7 +138,9 @@ class SimulatorChoice:
                 raise UnknownNameError(f"setting of the simulator {self.name}", name, kind.settings)
         for name in self.access:
             if name not in kind.access:
-                owners = [one.name for one in SIMULATORS.values() if name in one.access]
+                owners = [
+                    simulator.name for simulator in SIMULATORS.values() if name in simulator.access
+                ]
                 raise InputError(
                     f"{name} is for the simulator {' or '.join(owners) or '(none)'}, got it for "
                     f"{self.name}"

@@ -81,12 +81,14 @@ def queues(
     x = rollout.x[row, who, :steps] + ahead * np.cos(h)
     y = rollout.y[row, who, :steps] + ahead * np.sin(h)
     known = sorted(lanes)
-    lane, station = _on_lanes(x, y, slow, [_line(model.road(road), one) for road, one in known])
+    lane, station = _on_lanes(
+        x, y, slow, [_line(model.road(road), number) for road, number in known]
+    )
     found = []
     for index, members, first, metres in find_queues(lane, station, length, rollout.time_step):
         names = tuple(rollout.names[who[k]] for k in members)
         found.append(Queue(round(first * rollout.time_step, 9), *known[index], metres, names))
-    return tuple(sorted(found, key=lambda one: (one.time, one.who)))
+    return tuple(sorted(found, key=lambda queue: (queue.time, queue.who)))
 
 
 def find_queues(
@@ -102,8 +104,8 @@ def find_queues(
     """
     span = math.ceil(QUEUE_TIME / time_step - 1e-9)
     found = []
-    for one in np.unique(lane[lane >= 0]).tolist():
-        on = lane == one
+    for item in np.unique(lane[lane >= 0]).tolist():
+        on = lane == item
         held = _held(_together(on, station, length), span)
         size = held.sum(axis=1)
         open_: list[tuple[int, set[int], int]] = []  # last step, members when most, first step
@@ -125,7 +127,7 @@ def find_queues(
             at = int(together[0]) if len(together) else last
             rear = station[inside, at] - 0.5 * length[inside]
             front = station[inside, at] + 0.5 * length[inside]
-            found.append((one, tuple(sorted(most)), first, float(front.max() - rear.min())))
+            found.append((item, tuple(sorted(most)), first, float(front.max() - rear.min())))
     return found
 
 

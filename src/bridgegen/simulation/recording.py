@@ -218,11 +218,11 @@ def boxes_of(path: Path) -> dict[str, tuple[float, float, float]]:
     """
     scenario = resolved(read_scenario(path), str(path))
     boxes = {}
-    for one in scenario.entities.scenario_objects:
-        body = one.entity_object
+    for obj in scenario.entities.scenario_objects:
+        body = obj.entity_object
         if isinstance(body, osc.Vehicle | osc.Pedestrian | osc.MiscObject):
             size, centre = body.bounding_box.dimensions, body.bounding_box.center
-            boxes[str(one.name)] = (_plain(size.length), _plain(size.width), _plain(centre.x))
+            boxes[str(obj.name)] = (_plain(size.length), _plain(size.width), _plain(centre.x))
     return boxes
 
 
@@ -236,9 +236,9 @@ def kinds_of(path: Path) -> dict[str, int]:
 
     scenario = resolved(read_scenario(path), str(path))
     return {
-        str(one.name): kind(one.entity_object)
-        for one in scenario.entities.scenario_objects
-        if isinstance(one.entity_object, osc.Vehicle | osc.Pedestrian | osc.MiscObject)
+        str(obj.name): kind(obj.entity_object)
+        for obj in scenario.entities.scenario_objects
+        if isinstance(obj.entity_object, osc.Vehicle | osc.Pedestrian | osc.MiscObject)
     }
 
 
@@ -364,7 +364,9 @@ def _clock(
     steps = np.diff(times)
     if time_step is None:
         mean = (times[-1] - times[0]) / len(steps)
-        step = next((one for one in (float(steps[0]), float(mean)) if _fits(times, one)), None)
+        step = next(
+            (value for value in (float(steps[0]), float(mean)) if _fits(times, value)), None
+        )
         if step is None:
             raise InputError(
                 f"{found.place}: the steps between the instants of '{ego}' must be equal, they are "

@@ -243,24 +243,26 @@ def joined(parts: Sequence[tuple[Int, Rollout]]) -> Rollout:
     first = parts[0][1]
     if len(parts) == 1:
         return first
-    if any(not np.array_equal(one.box, first.box) for _, one in parts):
+    if any(not np.array_equal(part.box, first.box) for _, part in parts):
         raise ValueError("rollouts of bodies of different sizes are no one rollout")
-    most = max(one.shape[2] for _, one in parts)
-    parts = [(each, _lengthened(one, most)) for each, one in parts]
+    most = max(part.shape[2] for _, part in parts)
+    parts = [(each, _lengthened(part, most)) for each, part in parts]
     rows = np.concatenate([each for each, _ in parts])
     order = np.argsort(rows)
     parts, whole = _with_corridors(parts)
     for name in _BY_ROW:
-        arrays = [getattr(one, name) for _, one in parts]
+        arrays = [getattr(part, name) for _, part in parts]
         if name == "present" and any(len(array) for array in arrays):
             arrays = [
-                array if len(array) else np.ones(one.shape, np.bool_)
-                for array, (_, one) in zip(arrays, parts, strict=True)
+                array if len(array) else np.ones(rollout.shape, np.bool_)
+                for array, (_, rollout) in zip(arrays, parts, strict=True)
             ]
         if len(arrays[0]):  # else it is not recorded
             whole[name] = np.concatenate(arrays)[order]
-    messages = {int(each[row]): text for each, one in parts for row, text in one.messages.items()}
-    incidents = {int(each[row]): what for each, one in parts for row, what in one.incidents.items()}
+    messages = {int(each[row]): text for each, part in parts for row, text in part.messages.items()}
+    incidents = {
+        int(each[row]): what for each, part in parts for row, what in part.incidents.items()
+    }
     return replace(parts[0][1], **whole, messages=messages, incidents=incidents)
 
 
@@ -268,14 +270,14 @@ def _with_corridors(
     parts: Sequence[tuple[Int, Rollout]],
 ) -> tuple[list[tuple[Int, Rollout]], dict[str, Any]]:
     """Return parts whose ``corridor_of`` counts through the corridors of all, and these."""
-    shape = np.max([one.corridors.shape for _, one in parts], axis=0)
+    shape = np.max([part.corridors.shape for _, part in parts], axis=0)
     found, tables = list[tuple[Int, Rollout]](), list[Float]()
-    for each, one in parts:
-        of = one.corridor_of if len(one.corridor_of) else np.full(one.shape[0], -1)
+    for each, part in parts:
+        of = part.corridor_of if len(part.corridor_of) else np.full(part.shape[0], -1)
         first = sum(map(len, tables))
-        found.append((each, replace(one, corridor_of=np.where(of < 0, -1, of + first))))
-        table = np.full((len(one.corridors), *shape[1:]), np.inf)
-        table[:, : one.corridors.shape[1]] = one.corridors
+        found.append((each, replace(part, corridor_of=np.where(of < 0, -1, of + first))))
+        table = np.full((len(part.corridors), *shape[1:]), np.inf)
+        table[:, : part.corridors.shape[1]] = part.corridors
         tables.append(table)
     return found, {"corridors": np.concatenate(tables)}
 

@@ -22,20 +22,20 @@ def causes(found: Sequence[Causes], theme: Theme) -> "Figure":
     colours = (theme.colours[0], theme.colours[4], theme.colours[5], theme.grid)
     place, places, names = 0.0, [], []
     last = None
-    for one in found:
-        if last is not None and one.scenario != last:
+    for item in found:
+        if last is not None and item.scenario != last:
             place += 0.6
-        last, left = one.scenario, 0.0
-        for count, colour, hatch in zip(one.by_cause, colours, _HATCHES, strict=True):
+        last, left = item.scenario, 0.0
+        for count, colour, hatch in zip(item.by_cause, colours, _HATCHES, strict=True):
             if count:
-                width = 100.0 * count / one.critical
+                width = 100.0 * count / item.critical
                 axes.barh(place, width, left=left, height=0.74, color=colour, hatch=hatch,
                           edgecolor=theme.muted, linewidth=0.6)  # fmt: skip
                 left += width
-        axes.text(101.5, place, f"{one.critical:,} of {one.evaluations:,}", va="center",
+        axes.text(101.5, place, f"{item.critical:,} of {item.evaluations:,}", va="center",
                   fontsize=SIZE - 0.5, color=theme.ink)  # fmt: skip
         places.append(place)
-        names.append(f"S{one.scenario[-1]}  {title_of(one.algorithm)}")
+        names.append(f"S{item.scenario[-1]}  {title_of(item.algorithm)}")
         place += 1.0
     axes.set_yticks(places, names, color=theme.ink)
     axes.set_ylim(max(place - 0.4, 0.6), -0.6)

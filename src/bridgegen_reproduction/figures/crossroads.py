@@ -72,8 +72,12 @@ def crossing_of(folder: Path, runs: Sequence[Run]) -> Crossing:
     if len(chosen):
         rollout = pipeline.rollout(chosen)
         for row in range(len(chosen)):
-            found = [one for one in accidents(rollout, row) if one.who[0] == rollout.names[0]]
-            places += [(one.x, one.y) for one in found[:1]]
+            found = [
+                accident
+                for accident in accidents(rollout, row)
+                if accident.who[0] == rollout.names[0]
+            ]
+            places += [(accident.x, accident.y) for accident in found[:1]]
     x = pipeline.space.row({})
     # How they drive while the other is not in the way: each gets as far as it can.
     limits = scenario.parameters
@@ -85,11 +89,11 @@ def crossing_of(folder: Path, runs: Sequence[Run]) -> Crossing:
     ]
     nominal = pipeline.rollout(np.stack([pipeline.space.row(values) for values in alone]))
     ways = tuple(
-        np.column_stack([one[e, e, : nominal.n_steps[e]] for one in (nominal.x, nominal.y)])
+        np.column_stack([array[e, e, : nominal.n_steps[e]] for array in (nominal.x, nominal.y)])
         for e in (0, 1)
     )
     road = Scenery(pipeline.runner).road(x).outlines
-    junction = [one.points for one in road if one.kind == "junction"]
+    junction = [outline.points for outline in road if outline.kind == "junction"]
     middle = np.concatenate(junction).mean(axis=0) if junction else ways[0].mean(axis=0)
     ends = tuple(_points(scenario, name) for name in nominal.names[:2])
     return Crossing(
@@ -99,9 +103,11 @@ def crossing_of(folder: Path, runs: Sequence[Run]) -> Crossing:
 
 
 def _points(scenario: LogicalScenario, name: str) -> tuple[str, str]:
-    one = scenario.participant(name)
-    assert one.end is not None
-    return POINTS[one.start.leg, one.start.way], POINTS[one.end.leg, one.end.way]
+    participant = scenario.participant(name)
+    assert participant.end is not None
+    return POINTS[participant.start.leg, participant.start.way], POINTS[
+        participant.end.leg, participant.end.way
+    ]
 
 
 def collision_points(crossings: Mapping[str, Crossing], theme: Theme) -> "Figure":
@@ -131,16 +137,16 @@ def collision_points(crossings: Mapping[str, Crossing], theme: Theme) -> "Figure
     return figure
 
 
-def _panel(axes: "Axes", one: Crossing, theme: Theme) -> None:
-    design = DESIGNS[one.scenario]
+def _panel(axes: "Axes", crossing: Crossing, theme: Theme) -> None:
+    design = DESIGNS[crossing.scenario]
     axes.set_facecolor(theme.paper)
-    _road(axes, one, theme)
+    _road(axes, crossing, theme)
     colours, lines = (theme.colours[0], theme.colours[4]), ("-", (0, (4, 1.5)))
     edges = (2.5, 7.0)  # m; the names of points on neighbouring lanes do not hide each other
     for way, colour, line, ends, edge in zip(
-        one.ways, colours, lines, one.ends, edges, strict=True
+        crossing.ways, colours, lines, crossing.ends, edges, strict=True
     ):
-        x, y = (way - one.middle).T
+        x, y = (way - crossing.middle).T
         axes.plot(x, y, color=colour, linestyle=line, linewidth=2)
         inside = np.flatnonzero((np.abs(x) < HALF - edge) & (np.abs(y) < HALF - edge))
         if len(inside):
@@ -151,8 +157,8 @@ def _panel(axes: "Axes", one: Crossing, theme: Theme) -> None:
                     bbox={"boxstyle": "round,pad=0.25", "facecolor": colour, "edgecolor": "none"},
                 )  # fmt: skip
     told = "no collision"
-    if len(one.collisions):
-        x, y = (one.collisions - one.middle).T
+    if len(crossing.collisions):
+        x, y = (crossing.collisions - crossing.middle).T
         axes.plot(x, y, "o", color=theme.colours[1], markersize=3.4, alpha=0.5,
                   markeredgewidth=0, zorder=4)  # fmt: skip
         cx, cy = np.median(x), np.median(y)
@@ -164,8 +170,8 @@ def _panel(axes: "Axes", one: Crossing, theme: Theme) -> None:
             bbox={"boxstyle": "round,pad=0.15", "facecolor": theme.paper, "alpha": 0.8,
                   "edgecolor": "none"},
         )  # fmt: skip
-        told = f"{len(one.collisions):,} of {one.of:,} collisions"
-    axes.set_title(f"S{one.scenario[-1]}: {told}", fontsize=SIZE + 1, color=theme.ink)
+        told = f"{len(crossing.collisions):,} of {crossing.of:,} collisions"
+    axes.set_title(f"S{crossing.scenario[-1]}: {told}", fontsize=SIZE + 1, color=theme.ink)
     axes.set_xlim(-HALF, HALF)
     axes.set_ylim(-HALF, HALF)
     axes.set_aspect("equal")
@@ -176,9 +182,9 @@ def _panel(axes: "Axes", one: Crossing, theme: Theme) -> None:
         spine.set_color(theme.muted)
 
 
-def _road(axes: "Axes", one: Crossing, theme: Theme) -> None:
-    for shape in one.road:
-        x, y = (shape.points - one.middle).T
+def _road(axes: "Axes", crossing: Crossing, theme: Theme) -> None:
+    for shape in crossing.road:
+        x, y = (shape.points - crossing.middle).T
         if shape.kind in AREA_KINDS:
             if shape.kind in ("driving", "junction", "shoulder"):
                 axes.fill(x, y, color=theme.grid, linewidth=0.5, zorder=0)

@@ -37,7 +37,7 @@ def by_iteration(runs: Sequence[Run], quantity: str) -> list[Quartiles]:
             if k // POPULATION == len(batches):
                 batches.append([])
             batches[k // POPULATION].append(values[k : k + POPULATION])
-    return [quartiles(np.concatenate(one)) for one in batches]
+    return [quartiles(np.concatenate(batch)) for batch in batches]
 
 
 def iterations(
@@ -48,7 +48,7 @@ def iterations(
 
     figure, axes = panels(len(quantities), 2.75, theme)
     styles = looks(theme)
-    for one, quantity in zip(axes, quantities, strict=True):
+    for axis, quantity in zip(axes, quantities, strict=True):
         for name, these in runs.items():
             spans = by_iteration(these, quantity)
             if not spans:
@@ -58,16 +58,16 @@ def iterations(
                 np.array([getattr(s, part) for s in spans]) for part in ("low", "median", "high")
             )
             look = styles[name]
-            one.fill_between(x, low, high, color=look.colour, alpha=0.15, linewidth=0)
-            one.plot(
+            axis.fill_between(x, low, high, color=look.colour, alpha=0.15, linewidth=0)
+            axis.plot(
                 x, median, color=look.colour, linestyle=look.line, linewidth=1.6,
                 marker=look.mark, markersize=3.2, markevery=max(1, len(x) // 6),
             )  # fmt: skip
-            one.set_xlim(1, max(len(spans), 2))
-        one.set_xlabel(f"iteration, {POPULATION} evaluations each")
-        one.set_ylabel(LABELS[quantity])
+            axis.set_xlim(1, max(len(spans), 2))
+        axis.set_xlabel(f"iteration, {POPULATION} evaluations each")
+        axis.set_ylabel(LABELS[quantity])
         if quantity != "fitness":
-            one.set_ylim(bottom=0)
+            axis.set_ylim(bottom=0)
     legend(
         figure,
         [
@@ -106,13 +106,13 @@ def violins(columns: Mapping[str, Mapping[str, Violin]], theme: Theme) -> "Figur
 
     figure, axes = panels(len(columns), 3.0, theme)
     styles = looks(theme)
-    for one, (quantity, violins_) in zip(axes, columns.items(), strict=True):
-        one.grid(visible=False, axis="x")
+    for axis, (quantity, violins_) in zip(axes, columns.items(), strict=True):
+        axis.grid(visible=False, axis="x")
         for place, (name, violin) in enumerate(violins_.items()):
-            _violin(one, place, violin, styles[name].colour, theme)
-        one.set_xticks(range(len(violins_)), [v.name for v in violins_.values()], color=theme.ink)
-        one.set_xlim(-0.6, len(violins_) - 0.4)
-        one.set_ylabel(LABELS[quantity])
+            _violin(axis, place, violin, styles[name].colour, theme)
+        axis.set_xticks(range(len(violins_)), [v.name for v in violins_.values()], color=theme.ink)
+        axis.set_xlim(-0.6, len(violins_) - 0.4)
+        axis.set_ylabel(LABELS[quantity])
     mark: dict[str, Any] = {"linestyle": "none", "color": theme.ink, "markersize": 5.5}
     legend(
         figure,
@@ -143,8 +143,8 @@ def _violin(axes: "Axes", place: int, violin: Violin, colour: str, theme: Theme)
         )  # fmt: skip
         for body in drawn["bodies"]:
             body.set(facecolor=colour, edgecolor=colour, alpha=0.35, linewidth=0.9)
-    one = quartiles(values)
-    axes.plot([place, place], [one.low, one.high], color=colour, linewidth=4,
+    item = quartiles(values)
+    axes.plot([place, place], [item.low, item.high], color=colour, linewidth=4,
               solid_capstyle="butt")  # fmt: skip
-    axes.plot(place, one.median, "o", color=theme.paper, markeredgecolor=theme.ink,
+    axes.plot(place, item.median, "o", color=theme.paper, markeredgecolor=theme.ink,
               markersize=SIZE - 2.5)  # fmt: skip

@@ -22,10 +22,10 @@ def spread_curve(record: Record, measured: Measured) -> Float:
     """Return a run's spread by each point of its curve, ``(c,)``; NaN where it is not defined."""
     values: list[float] = []
     last = None
-    for one in record.fronts:
-        if last is None or one is not last:
-            value = spread(measured.scale.objectives(one), measured.reference)
-        last = one
+    for front in record.fronts:
+        if last is None or front is not last:
+            value = spread(measured.scale.objectives(front), measured.reference)
+        last = front
         values.append(value)
     return np.array(values)
 
@@ -65,18 +65,18 @@ def hypervolume_and_spread(
 
     figure, axes = panels(2, 2.75, theme)
     styles = looks(theme)
-    for one, (quantity, found) in zip(axes, curves.items(), strict=True):
+    for axis, (quantity, found) in zip(axes, curves.items(), strict=True):
         for name, values in found.items():
             spans = [quartiles(column) for column in values.T]
             low, median, high = (
                 np.array([getattr(s, part) for s in spans]) for part in ("low", "median", "high")
             )
             look = styles[name]
-            one.fill_between(points, low, high, color=look.colour, alpha=0.15, linewidth=0)
-            one.plot(points, median, color=look.colour, linestyle=look.line, linewidth=1.6)
-        one.set_xlim(0, points[-1])
-        one.set_xlabel("evaluations")
-        one.set_ylabel(_LABELS[quantity])
+            axis.fill_between(points, low, high, color=look.colour, alpha=0.15, linewidth=0)
+            axis.plot(points, median, color=look.colour, linestyle=look.line, linewidth=1.6)
+        axis.set_xlim(0, points[-1])
+        axis.set_xlabel("evaluations")
+        axis.set_ylabel(_LABELS[quantity])
     legend(
         figure,
         [

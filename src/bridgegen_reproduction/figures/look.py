@@ -37,8 +37,8 @@ def looks(theme: Theme) -> dict[str, Look]:
     colours = (theme.ink, *theme.colours[:3])
     lines: tuple[Any, ...] = ((0, (4, 1.5)), "-", (0, (1, 1)), (0, (6, 1.5, 1, 1.5)))
     return {
-        one.algorithm: Look(colour, line, mark)
-        for one, colour, line, mark in zip(METHODS, colours, lines, "os^D", strict=True)
+        method.algorithm: Look(colour, line, mark)
+        for method, colour, line, mark in zip(METHODS, colours, lines, "os^D", strict=True)
     }
 
 
@@ -46,9 +46,9 @@ def panels(count: int, height: float, theme: Theme) -> "tuple[Figure, list[Axes]
     """Return a figure of so many axes beside each other."""
     figure = blank(WIDE, height, theme)
     axes = [figure.add_subplot(1, count, k + 1) for k in range(count)]
-    for one in axes:
-        dress(one, theme, size=SIZE)
-        one.grid(color=theme.grid, linewidth=0.7)
+    for axis in axes:
+        dress(axis, theme, size=SIZE)
+        axis.grid(color=theme.grid, linewidth=0.7)
     return figure, axes
 
 

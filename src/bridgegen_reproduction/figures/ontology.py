@@ -105,12 +105,12 @@ def _blocks(group: Mapping[str, Any], letters: int) -> Iterator[Block]:
         for fact in box["facts"][: box.get("shown", len(box["facts"]))]:
             lines += _fact(fact, letters)
         ids, links = [box["id"]], [tuple(link) for link in box.get("links", ())]
-        for one in box.get("inside", ()):
-            lines += [Line(f"{one['class']}: {one['name']}", "name")]
-            for fact in one["facts"][: one.get("shown", len(one["facts"]))]:
+        for item in box.get("inside", ()):
+            lines += [Line(f"{item['class']}: {item['name']}", "name")]
+            for fact in item["facts"][: item.get("shown", len(item["facts"]))]:
                 lines += _fact(fact, letters)
-            ids.append(one["id"])
-            links += [tuple(link) for link in one.get("links", ())]
+            ids.append(item["id"])
+            links += [tuple(link) for link in item.get("links", ())]
         own = set(ids)
         kept = tuple(link for link in links if link[1] not in own)
         yield Block(group["class"], tuple(ids), tuple(lines), kept)
@@ -209,7 +209,7 @@ def _block(axes: "Axes", block: Block, theme: Theme, scale: float) -> None:
 
 
 def _links(axes: "Axes", columns: Sequence[Sequence[Block]], theme: Theme, scale: float) -> None:
-    home = {one: block for column in columns for block in column for one in block.ids}
+    home = {name: block for column in columns for block in column for name in block.ids}
     for column in columns:
         lane = 0
         for block in column:
@@ -234,13 +234,13 @@ def _bus(axes: "Axes", block: Block, others: Sequence[Block], lane: int, theme: 
     """Draw links within a column: a line beside it, and a short one to each."""
     x = block.x - 0.04 - 0.035 * lane
     start = block.y + _PAD + 0.4 * LINE + 0.03 * lane
-    ends = [one.y + _PAD + 0.4 * LINE + 0.03 * lane for one in others]
+    ends = [other.y + _PAD + 0.4 * LINE + 0.03 * lane for other in others]
     axes.plot([block.x, x, x], [start, start, ends[0]], color=theme.muted, linewidth=0.7, zorder=2)
     axes.plot([x, x], [min(start, *ends), max(start, *ends)], color=theme.muted, linewidth=0.7,
               zorder=2)  # fmt: skip
-    for one, end in zip(others, ends, strict=True):
+    for other, end in zip(others, ends, strict=True):
         axes.annotate(
-            "", (one.x, end), (x, end), zorder=2,
+            "", (other.x, end), (x, end), zorder=2,
             arrowprops={"arrowstyle": "-|>", "color": theme.muted, "linewidth": 0.7,
                         "mutation_scale": 4, "shrinkA": 0, "shrinkB": 0},
         )  # fmt: skip

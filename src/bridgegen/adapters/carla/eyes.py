@@ -176,7 +176,7 @@ class Eyes:
         self._program, self._joint, self._detector, self._folder = program, joint, detector, folder
         self._ticks, self._first, self._last, self._seen_at = round(period / TIME_STEP), 0, 0, -1
         extents = [body.box.extent for body in stage.bodies]
-        self._models = 2.0 * np.array([(one.x, one.y, one.z) for one in extents])
+        self._models = 2.0 * np.array([(extent.x, extent.y, extent.z) for extent in extents])
         ego = stage.bodies[0]
         height = 2.0 * ego.box.extent.z + ABOVE
         above_origin = height - ego.box.extent.z + ego.box.location.z

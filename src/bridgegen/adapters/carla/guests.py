@@ -133,7 +133,7 @@ class Agent:
             self._agent = BehaviorAgent(stage.ego, behavior=settings.agent)
         self._asked = TargetSpeed(joint, self._agent.set_target_speed)
         found = (server.worlds.map.get_waypoint(frame.location(x, y)) for x, y in spaced(way))
-        self._plan = [(one, RoadOption.LANEFOLLOW) for one in found if one is not None]
+        self._plan = [(item, RoadOption.LANEFOLLOW) for item in found if item is not None]
 
     def begin(self, server: Server) -> None:
         """See `EgoController`."""
@@ -226,7 +226,10 @@ def spaced(way: Float) -> Sequence[tuple[float, float]]:
     return points if points[-1] == end else [*points, end]
 
 
-def _alike(one: "carla.VehicleControl", other: "carla.VehicleControl") -> bool:
-    return (one.throttle, one.brake, one.steer, one.hand_brake) == (
-        other.throttle, other.brake, other.steer, other.hand_brake
-    )  # fmt: skip
+def _alike(vehicle_control: "carla.VehicleControl", other: "carla.VehicleControl") -> bool:
+    return (
+        vehicle_control.throttle,
+        vehicle_control.brake,
+        vehicle_control.steer,
+        vehicle_control.hand_brake,
+    ) == (other.throttle, other.brake, other.steer, other.hand_brake)

@@ -47,7 +47,7 @@ def matched(
         InputError: lights that none is near, all at once.
     """
     pairs = sorted(
-        (min(math.dist(spot, one) for one in spots), name, i)
+        (min(math.dist(spot, pair) for pair in spots), name, i)
         for name, spot in wanted.items()
         for i, spots in enumerate(known)
     )
@@ -82,9 +82,9 @@ class Lights:
     def __init__(self, world: "carla.World", model: OpenDrive, names: Sequence[str]) -> None:
         import carla
 
-        self._states = [getattr(carla.TrafficLightState, one) for one in STATES]
+        self._states = [getattr(carla.TrafficLightState, state) for state in STATES]
         self._actors: list[Any] = list(world.get_actors().filter("traffic.traffic_light*"))
-        known = [_spots(one) for one in self._actors]
+        known = [_spots(actor) for actor in self._actors]
         found = matched(positions(model, names), known) if names else {}
         self._numbers = [found[name] for name in names]
         self._world = world
@@ -114,5 +114,5 @@ def _spots(light: Any) -> list[tuple[float, float]]:
     stops = light.get_stop_waypoints()
     return [
         frame.point(light.get_transform().location),
-        *(frame.point(one.transform.location) for one in stops),
+        *(frame.point(stop.transform.location) for stop in stops),
     ]

@@ -51,13 +51,13 @@ class Car:
     def of(cls, control: "carla.VehiclePhysicsControl") -> "Car":
         """Return it from a vehicle's physics; its wheels' positions are in centimetres."""
         wheels = list(control.wheels)
-        steered = [one for one in wheels if one.max_steer_angle > 0.0]
-        others = [one for one in wheels if one.max_steer_angle <= 0.0]
+        steered = [wheel for wheel in wheels if wheel.max_steer_angle > 0.0]
+        others = [wheel for wheel in wheels if wheel.max_steer_angle <= 0.0]
         if not (steered and others):  # as a bicycle's may be listed
             return cls(2.8, math.radians(35.0))
         wheelbase = math.dist(_middle(steered), _middle(others)) / 100.0
-        curve = tuple((one.x, one.y) for one in control.steering_curve) or ((0.0, 1.0),)
-        return cls(wheelbase, math.radians(max(one.max_steer_angle for one in steered)), curve)
+        curve = tuple((item.x, item.y) for item in control.steering_curve) or ((0.0, 1.0),)
+        return cls(wheelbase, math.radians(max(item.max_steer_angle for item in steered)), curve)
 
     def share(self, curvature: float, v: float) -> float:
         """Return the share of full lock, −1 to 1, left positive, for a curvature [1/m]."""
@@ -114,6 +114,6 @@ def _towards(now: float, wanted: float, most: float) -> float:
 
 
 def _middle(wheels: "Sequence[carla.WheelPhysicsControl]") -> tuple[float, float, float]:
-    places = [(one.position.x, one.position.y, one.position.z) for one in wheels]
+    places = [(wheel.position.x, wheel.position.y, wheel.position.z) for wheel in wheels]
     x, y, z = np.mean(places, axis=0).tolist()
     return x, y, z

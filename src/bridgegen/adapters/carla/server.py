@@ -39,7 +39,7 @@ class Turn:
     def __init__(self, name: str) -> None:
         self._lock, self._depth = threading.RLock(), 0
         user = os.getuid() if hasattr(os, "getuid") else 0
-        plain = "".join(one if one.isalnum() else "-" for one in name)
+        plain = "".join(item if item.isalnum() else "-" for item in name)
         self._path = Path(tempfile.gettempdir()) / f"bridgegen-{user}-carla-{plain}.lock"
         self._file: IO[str] | None = None
 
@@ -85,7 +85,7 @@ START_SECONDS = 180.0
 LOAD_SECONDS = 180.0
 """Time limit for loading a world [s]."""
 
-ERROR, DIED, HUNG = (SIMULATOR_FAILURES[one] for one in ("raised", "died", "timed out"))
+ERROR, DIED, HUNG = (SIMULATOR_FAILURES[name] for name in ("raised", "died", "timed out"))
 """Statuses of rows that failed because of the server."""
 
 MINE = "bridgegen"
@@ -314,10 +314,12 @@ def sweep(client: "carla.Client", world: "carla.World") -> None:
     Its ego differs from another client's ``hero`` by BridgeGen's sensors on it.
     """
     mine = [
-        one for one in world.get_actors() if one.attributes.get("role_name", "").startswith(MINE)
+        actor
+        for actor in world.get_actors()
+        if actor.attributes.get("role_name", "").startswith(MINE)
     ]
-    egos = {one.parent.id for one in mine if one.parent is not None}
-    destroy(client, [*(one.id for one in mine), *egos])
+    egos = {item.parent.id for item in mine if item.parent is not None}
+    destroy(client, [*(item.id for item in mine), *egos])
 
 
 def destroy(client: "carla.Client", actors: list[int]) -> None:
@@ -325,17 +327,19 @@ def destroy(client: "carla.Client", actors: list[int]) -> None:
     import carla
 
     if actors:
-        client.apply_batch_sync([carla.command.DestroyActor(one) for one in actors], False)
+        client.apply_batch_sync([carla.command.DestroyActor(actor) for actor in actors], False)
 
 
 def _end(process: "subprocess.Popen[bytes]") -> None:
     """End a process and its descendants."""
-    for one in (signal.SIGTERM, signal.SIGKILL) if sys.platform != "win32" else (signal.SIGTERM,):
+    for number in (
+        (signal.SIGTERM, signal.SIGKILL) if sys.platform != "win32" else (signal.SIGTERM,)
+    ):
         with suppress(ProcessLookupError, PermissionError):
             if sys.platform == "win32":
                 process.terminate()
             else:
-                os.killpg(process.pid, one)
+                os.killpg(process.pid, number)
         with suppress(subprocess.TimeoutExpired):
             process.wait(10.0)
             return

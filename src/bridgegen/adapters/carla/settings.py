@@ -78,8 +78,8 @@ class CarlaSettings:
             must(name, "a name", isinstance(chosen.get(name), str) and chosen.get(name) != "")
         if problems:
             raise InputError(*problems)
-        known = {one.name for one in fields(cls)}
-        given: dict[str, Any] = {name: one for name, one in chosen.items() if name in known}
+        known = {field.name for field in fields(cls)}
+        given: dict[str, Any] = {name: flag for name, flag in chosen.items() if name in known}
         return cls(**given)
 
 

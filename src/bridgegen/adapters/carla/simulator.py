@@ -85,7 +85,7 @@ class Incidents:
         self._told.append((event.frame, COLLISION, self._who.get(other.id, other.type_id)))
 
     def _invaded(self, event: Any) -> None:
-        kinds = {str(one.type) for one in event.crossed_lane_markings}
+        kinds = {str(marking.type) for marking in event.crossed_lane_markings}
         self._told.append((event.frame, LANE_INVASION, ", ".join(sorted(kinds))))
 
     def all(self, rollout: Rollout) -> tuple[Incident, ...]:
@@ -104,7 +104,7 @@ class Incidents:
                 found.append(Incident(k, kind, what))
             if kind == COLLISION:
                 last[what] = k
-        return tuple(sorted(found, key=lambda one: one.step))
+        return tuple(sorted(found, key=lambda incident: incident.step))
 
 
 def red_lights(rollout: Rollout) -> list[Incident]:
@@ -133,7 +133,8 @@ def write_incidents(folder: Path, incidents: Sequence[Incident], time_step: floa
         writer = csv.writer(file)
         writer.writerow(("frame", "time", "kind", "what"))
         writer.writerows(
-            (one.step, round(one.step * time_step, 6), one.kind, one.what) for one in incidents
+            (incident.step, round(incident.step * time_step, 6), incident.kind, incident.what)
+            for incident in incidents
         )
 
 
@@ -261,7 +262,7 @@ class CarlaSimulator:
         file = self._storyboard.road_network.logic_file
         name = str(file.filepath) if file else ""
         wanted = self._settings.map
-        worlds = tuple(loader(one, name, wanted, self._server.maps) for one in models)
+        worlds = tuple(loader(model, name, wanted, self._server.maps) for model in models)
         return CarlaRoads(network, tuple(models), worlds)
 
     def run(

@@ -44,9 +44,9 @@ def choose(
         else []
     )
     spare = OBJECT_CLASSES[kind].carla
-    for one in (named, *alike, *spare):
-        if one in known:
-            return one
+    for name in (named, *alike, *spare):
+        if name in known:
+            return name
     raise InputError(
         f"carla: the server must have a blueprint for a {NAMES[kind]}, and has none of "
         f"{', '.join(dict.fromkeys((*alike, *spare)))}"
@@ -119,7 +119,7 @@ class Stage:
     ) -> None:
         self._server, self._program = server, program
         self._objects = {
-            one.name: one.entity_object for one in storyboard.entities.scenario_objects
+            obj.name: obj.entity_object for obj in storyboard.entities.scenario_objects
         }
         self._ego_model = ego_model
         self._ego_is_moved = ego_is_moved
@@ -146,7 +146,7 @@ class Stage:
         for sensor in self._sensors:
             with suppress(RuntimeError):
                 sensor.stop()
-        ids = [one.id for one in (*self._sensors, *self.bodies)]
+        ids = [item.id for item in (*self._sensors, *self.bodies)]
         self._sensors, self.bodies = [], []
         with suppress(RuntimeError, ServerError):  # a server that is gone has no actors
             destroy(self._server.client, ids)
@@ -155,7 +155,7 @@ class Stage:
         import carla
 
         library = self._server.world.get_blueprint_library()
-        known = {one.id for one in library}
+        known = {item.id for item in library}
         for e, name in enumerate(self._program.names):
             blueprint = library.find(self._model(e, name, known))
             dressed(blueprint, HERO if e == 0 else f"{MINE}.{name}")
@@ -167,13 +167,13 @@ class Stage:
             if e == 0:
                 self.ego: Any = actor
         moved = self.bodies if self._ego_is_moved else self.bodies[1:]
-        self.do([carla.command.SetSimulatePhysics(one.id, False) for one in moved])
+        self.do([carla.command.SetSimulatePhysics(body.id, False) for body in moved])
 
     def _model(self, e: int, name: str, known: set[str]) -> str:
         """Return the blueprint of an entity."""
         if e == 0 and self._ego_model:
             if self._ego_model not in known:
-                vehicles = sorted(one for one in known if one.startswith("vehicle."))
+                vehicles = sorted(item for item in known if item.startswith("vehicle."))
                 raise UnknownNameError(
                     "blueprint of the server (ego_model)", self._ego_model, vehicles
                 )
@@ -283,9 +283,9 @@ class Stage:
         if not commands:
             return
         responses = self._server.client.apply_batch_sync(commands, False)
-        for one in responses:
-            if one.has_error():
-                raise ServerError(ERROR, one.error)
+        for response in responses:
+            if response.has_error():
+                raise ServerError(ERROR, response.error)
 
     def ego_state(self, snapshot: "carla.WorldSnapshot") -> Float:
         """Return the ego's state, ``(4,)``, see `CoSimulation.impose`.

@@ -71,10 +71,10 @@ class View:
         return self.place[0] + ahead, self.place[1] + aside
 
 
-def overlap(one: Float, other: Float) -> float:
+def overlap(array: Float, other: Float) -> float:
     """Return the intersection over union of two boxes in the image."""
-    low, high = np.maximum(one[:2], other[:2]), np.minimum(one[2:], other[2:])
+    low, high = np.maximum(array[:2], other[:2]), np.minimum(array[2:], other[2:])
     common = float(np.prod(np.maximum(high - low, 0.0)))
-    areas = (float(np.prod(box[2:] - box[:2])) for box in (one, other))
+    areas = (float(np.prod(box[2:] - box[:2])) for box in (array, other))
     union = sum(areas) - common
     return common / union if union > 0.0 else 0.0

@@ -67,7 +67,7 @@ class Weather:
         self._values = {**program.parameters, **values}
         found = _environments(storyboard)
         self._said = self._properties(found[0])
-        self._later = [self._properties(one) for one in found[1:]]
+        self._later = [self._properties(group) for group in found[1:]]
         self._changes = _changes(program)
         self._stated: tuple[float, ...] = ()
         self._sky = Sky({}, 1.0)
@@ -100,9 +100,9 @@ class Weather:
         said: dict[str, float] = {}
         for environment in environments:
             road = environment.road_condition
-            for one in road.properties.properties if road and road.properties else ():
-                field = CARLA_NAMES.get(str(one.name))
-                if field is not None and (value := self._number(one.value)) is not None:
+            for property_ in road.properties.properties if road and road.properties else ():
+                field = CARLA_NAMES.get(str(property_.name))
+                if field is not None and (value := self._number(property_.value)) is not None:
                     said[field] = value
         return said
 
@@ -119,7 +119,7 @@ def of_quantities(physical: Float) -> dict[str, float]:
     Args:
         physical: ``(STATED,)`` or more, see ``bridgegen.drivers._weather_columns``.
     """
-    found = {name: one.preset for name, one in CARLA_FIELDS.items() if one.preset is not None}
+    found = {name: field.preset for name, field in CARLA_FIELDS.items() if field.preset is not None}
     for index, column in enumerate(COLUMNS):
         parameter = STATED_BY.get(column.name)
         if parameter is None or not parameter.carla:
@@ -155,9 +155,9 @@ def _environments(storyboard: osc.OpenScenario) -> list[list[osc.Environment]]:
     board = storyboard.storyboard
 
     def brought(part: Element) -> list[osc.Environment]:
-        return [one.environment for one in walk(part) if isinstance(one, osc.EnvironmentAction)]
+        return [node.environment for node in walk(part) if isinstance(node, osc.EnvironmentAction)]
 
-    later = [[one] for story in board.stories for one in brought(story)]
+    later = [[environment] for story in board.stories for environment in brought(story)]
     return [brought(board.init.actions), *later]
 
 

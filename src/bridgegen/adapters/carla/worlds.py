@@ -129,7 +129,7 @@ def loader(model: OpenDrive, file: str, wanted: str, known: list[str]) -> Town |
     Raises:
         UnknownNameError: a map by name that the server has not.
     """
-    names = {PurePosixPath(one).name for one in known}
+    names = {PurePosixPath(item).name for item in known}
     if wanted not in ("auto", "opendrive"):
         if wanted not in names:
             raise UnknownNameError("map of the server", wanted, sorted(names))

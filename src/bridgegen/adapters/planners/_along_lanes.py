@@ -23,13 +23,13 @@ class AlongLanes:
     """
 
     def __init__(self, road_map: RoadMap, kinds: frozenset[str]) -> None:
-        lanes = [one for one in road_map.lanes if one.kind in kinds and len(one.centre) > 1]
+        lanes = [item for item in road_map.lanes if item.kind in kinds and len(item.centre) > 1]
         at = {lane.id: k for k, lane in enumerate(lanes)}
         self._centres = [lane.centre for lane in lanes]
-        self._next = [[at[one] for one in lane.next if one in at] for lane in lanes]
+        self._next = [[at[name] for name in lane.next if name in at] for lane in lanes]
         none = np.zeros((0, 3))
         self._points = np.concatenate([none, *self._centres])
-        sizes = [len(one) for one in self._centres]
+        sizes = [len(centre) for centre in self._centres]
         self._lane = np.repeat(np.arange(len(lanes)), sizes)
         self._first = np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64)
 
@@ -71,10 +71,10 @@ class AlongLanes:
         found, seen = _length(parts[0]), {lane}
         while found < length:
             end = parts[-1][-1, 2]
-            ahead = [one for one in self._next[lane] if one not in seen]
+            ahead = [number for number in self._next[lane] if number not in seen]
             if not ahead:
                 break
-            lane = min(ahead, key=lambda one: -np.cos(self._centres[one][-1, 2] - end))
+            lane = min(ahead, key=lambda number: -np.cos(self._centres[number][-1, 2] - end))
             seen.add(lane)
             parts.append(self._centres[lane])
             found += _length(parts[-1])
@@ -101,7 +101,7 @@ def _along(path: Float, x: float, y: float, h: float, s: Float) -> Float:
 
     def pose(found: Float) -> tuple[Float, Float, Float]:
         beyond = np.maximum(found - at[-1], 0.0)
-        px, py, ph = (np.interp(found, at, one) for one in (path[:, 0], path[:, 1], heading))
+        px, py, ph = (np.interp(found, at, array) for array in (path[:, 0], path[:, 1], heading))
         return px + beyond * np.cos(ph), py + beyond * np.sin(ph), ph
 
     (x0,), (y0,), (h0,) = pose(np.array([start]))

@@ -49,7 +49,7 @@ class Reactive:
         config.planning.dt, config.planning.time_steps_computation = STEP, N_STEPS
         config.debug.multiproc, config.debug.logging_level = False, "ERROR"
         vehicle = config.vehicle
-        vehicle.length, vehicle.width, vehicle.wb_rear_axle = (float(one) for one in body[:3])
+        vehicle.length, vehicle.width, vehicle.wb_rear_axle = (float(item) for item in body[:3])
         vehicle.wb_front_axle = FRONT_AXLE
         vehicle.wheelbase = vehicle.wb_front_axle + vehicle.wb_rear_axle
         vehicle.a_max = min(GREATEST_ACCELERATION, float(body[3]))
@@ -78,7 +78,7 @@ class Reactive:
         """
         from commonroad_rp.state import ReactivePlannerState
 
-        x, y, h, v, a, curvature = (float(one) for one in state)
+        x, y, h, v, a, curvature = (float(item) for item in state)
         planner, limit = self._planner, self._vehicle.a_max
         start = ReactivePlannerState(
             time_step=0,
@@ -108,13 +108,13 @@ class Reactive:
         plan = np.array(
             [
                 (
-                    *one.position,
-                    one.orientation,
-                    one.velocity,
-                    one.acceleration,
-                    math.tan(one.steering_angle) / self._vehicle.wheelbase,
+                    *item.position,
+                    item.orientation,
+                    item.velocity,
+                    item.acceleration,
+                    math.tan(item.steering_angle) / self._vehicle.wheelbase,
                 )
-                for one in found[0].state_list
+                for item in found[0].state_list
             ]
         )
         lacking = N_STEPS + 1 - len(plan)  # the one at standstill is shorter

@@ -72,7 +72,7 @@ class CorridorLane:
     @cached_property
     def _columns(self) -> tuple[list[float], ...]:
         arrays = (self.station, self.offset, self.width, self.speed_limit)
-        return tuple(one.tolist() for one in arrays)  # lists: a number of an array takes longer
+        return tuple(array.tolist() for array in arrays)  # lists: a number of an array takes longer
 
 
 @dataclass(frozen=True)
@@ -105,7 +105,7 @@ class Corridor:
 
     def __init__(self, road: RoadMap) -> None:
         lanes = {lane.id: lane for lane in road.lanes}
-        route = [lanes[one] for one in road.route if one in lanes]
+        route = [lanes[name] for name in road.route if name in lanes]
         if not route:
             raise InputError("a planner that drives on lanes needs a route on them, got none")
         chain = _extended(route, lanes)
@@ -121,18 +121,18 @@ class Corridor:
         all_stations = np.interp(
             np.cumsum(distinct) - 1, np.arange(len(self._station)), self._station
         )
-        ends = np.cumsum([len(one) for one in pieces])
+        ends = np.cumsum([len(piece) for piece in pieces])
         rows = _rows(chain, lanes)
         sections = []
         for k, row in enumerate(rows):
             first, last = ends[k] - len(pieces[k]), ends[k] - 1
-            following = [one.id for one in rows[k + 1]] if k + 1 < len(rows) else []
+            following = [item.id for item in rows[k + 1]] if k + 1 < len(rows) else []
             begin, end = float(all_stations[first]), float(all_stations[last])
             sections.append(
-                Section(begin, end, tuple(self._lane(one, following, begin, end) for one in row))
+                Section(begin, end, tuple(self._lane(item, following, begin, end) for item in row))
             )
         self.sections = tuple(sections)
-        self._starts = np.array([one.start for one in sections])
+        self._starts = np.array([section.start for section in sections])
 
     @property
     def length(self) -> float:
@@ -193,7 +193,7 @@ class Corridor:
         if kept.sum() < 2:
             kept[:] = True
         width = np.hypot(*(lane.left - lane.right).T)
-        leads = [following.index(one) for one in lane.next if one in following]
+        leads = [following.index(name) for name in lane.next if name in following]
         return CorridorLane(
             lane.centre[kept, :2],
             np.clip(station[kept], begin, end),
@@ -213,7 +213,7 @@ def _extended(route: list[Lane], lanes: dict[str, Lane]) -> list[Lane]:
         length = 0.0
         while length < limit:
             edge = chain[-1] if ahead else chain[0]
-            ways = [one for one in (edge.next if ahead else edge.previous) if one in lanes]
+            ways = [name for name in (edge.next if ahead else edge.previous) if name in lanes]
             if len(ways) != 1 or ways[0] in known:
                 break
             lane = lanes[ways[0]]
@@ -233,15 +233,15 @@ def _rows(chain: list[Lane], lanes: dict[str, Lane]) -> list[list[Lane]]:
     for k in range(1, len(chain)):
         if not chain[k].junction:
             continue
-        known = {one.id for one in rows[k]}
-        ways = [lanes[name] for one in rows[k - 1] for name in one.next if name in lanes]
-        others = [one for one in ways if one.id not in known and one.kind in DRIVABLE]
-        sides = [(_side(chain[k], one), one) for one in others]
+        known = {row.id for row in rows[k]}
+        ways = [lanes[name] for row in rows[k - 1] for name in row.next if name in lanes]
+        others = [way for way in ways if way.id not in known and way.kind in DRIVABLE]
+        sides = [(_side(chain[k], other), other) for other in others]
         sides.sort(key=itemgetter(0), reverse=True)
         rows[k] = [
-            *(one for left, one in sides if left > 0.0),
+            *(side for left, side in sides if left > 0.0),
             *rows[k],
-            *(one for left, one in sides if left < 0.0),
+            *(side for left, side in sides if left < 0.0),
         ]
     return rows
 

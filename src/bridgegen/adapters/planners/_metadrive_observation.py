@@ -255,9 +255,9 @@ def _cast(x: Float, y: Float, h: Float, boxes: Float) -> Float:
         (dy * c - dx * s, np.sin(angle), boxes[:, 7] / 2),
     ):
         direction = np.where(np.abs(direction) < 1e-12, 1e-12, direction)
-        one = (-half - start)[:, None] / direction
+        array = (-half - start)[:, None] / direction
         other = (half - start)[:, None] / direction
-        enters = np.maximum(enters, np.minimum(one, other))
-        leaves = np.minimum(leaves, np.maximum(one, other))
+        enters = np.maximum(enters, np.minimum(array, other))
+        leaves = np.minimum(leaves, np.maximum(array, other))
     hits = (enters <= leaves) & (enters >= 0.0)
     return np.where(hits, np.minimum(enters / REACH, 1.0), 1.0)

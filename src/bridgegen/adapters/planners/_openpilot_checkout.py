@@ -147,7 +147,7 @@ def imported_from(checkout: Path) -> Iterator[None]:
 
 
 def _is_names_only(name: str) -> bool:
-    return any(name == one or name.startswith(f"{one}.") for one in _NAMES_ONLY)
+    return any(name == item or name.startswith(f"{item}.") for item in _NAMES_ONLY)
 
 
 class _Name:
@@ -242,7 +242,7 @@ def _link(acados: Any, tree: Path) -> None:
     template = tree / "interfaces" / "acados_template" / "acados_template"
     links = {template: acados.TEMPLATE_DIR, tree / "lib": acados.LIB_DIR}
     include = Path(acados.INCLUDE_DIR)  # "include/.." must be the tree, so its parts are links
-    links |= {tree / "include" / one.name: str(one) for one in include.iterdir()}
+    links |= {tree / "include" / path.name: str(path) for path in include.iterdir()}
     for link, target in links.items():
         link.parent.mkdir(parents=True, exist_ok=True)
         link.unlink(missing_ok=True)

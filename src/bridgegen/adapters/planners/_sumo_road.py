@@ -45,11 +45,11 @@ class StraightRoad:
     def __init__(self, corridor: Corridor) -> None:
         self.corridor = corridor
         sections = (*corridor.sections, corridor.sections[-1])
-        spans = [one.end - one.start for one in corridor.sections]
-        self.lengths: Float = np.array([*(max(one, SHORTEST) for one in spans), TAIL])
-        self.lanes: Int = np.array([len(one.lanes) for one in sections])
+        spans = [item.end - item.start for item in corridor.sections]
+        self.lengths: Float = np.array([*(max(span, SHORTEST) for span in spans), TAIL])
+        self.lanes: Int = np.array([len(item.lanes) for item in sections])
         # Lists: a number of an array takes longer.
-        self._starts = [*(one.start for one in corridor.sections), corridor.length]
+        self._starts = [*(item.start for item in corridor.sections), corridor.length]
         self._ends: list[float] = self.lengths.tolist()
         self.next: Int = np.full((len(sections), int(self.lanes.max())), -1, dtype=np.int64)
         for k, section in enumerate(sections[:-1]):
@@ -227,10 +227,10 @@ class Eyes:
                 others[j] = [1.0, k, at, lane, speed, change, length]
             if place <= station:
                 continue
-            for found, one in covered:
+            for found, corridor_lane in covered:
                 if gap >= found[3] and gap >= found[0]:
                     continue
-                here = one.at(place)
+                here = corridor_lane.at(place)
                 if _reach(here, offset, width) <= REACH:
                     continue
                 if gap < found[0]:

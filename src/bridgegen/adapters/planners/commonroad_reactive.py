@@ -179,7 +179,7 @@ def road_of(road_map: RoadMap, route: Float) -> Arrays:
         )
         for lane in lanes
     ]
-    follows = [(k, at[one]) for k, lane in enumerate(lanes) for one in lane.next if one in at]
+    follows = [(k, at[name]) for k, lane in enumerate(lanes) for name in lane.next if name in at]
     return {
         "lane_points": np.array([len(lane.centre) for lane in lanes], dtype=np.int64),
         "lane_centre": _joined([lane.centre[:, :2] for lane in lanes]),
@@ -199,7 +199,7 @@ def reference(road_map: RoadMap, route: Float) -> Float:
         route: ``(P, 4)``, used if no lane is on the route.
     """
     by_id: dict[str, Lane] = {lane.id: lane for lane in road_map.lanes}
-    centres = [by_id[one].centre for one in road_map.route if one in by_id]
+    centres = [by_id[name].centre for name in road_map.route if name in by_id]
     points = np.concatenate(centres) if centres else route[:, :3]
     (x, y, h), (u, w, g) = points[0, :3], points[-1, :3]
     back, on = np.arange(-BEHIND, 0.0, 1.0), np.arange(1.0, BEYOND, 1.0)

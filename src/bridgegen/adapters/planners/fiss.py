@@ -125,8 +125,8 @@ class Fiss:
             )
         self._scene = scene
         self._vehicle = vehicle(scene, self._fiss.VehicleParams())
-        self._tables = [map_tables(one) for one in scene.maps]
-        self._roads = [_road(self._fiss, one) for one in self._tables]
+        self._tables = [map_tables(map_) for map_ in scene.maps]
+        self._roads = [_road(self._fiss, table) for table in self._tables]
         self._rows: list[_Row | None] = [None] * n
         self._before = np.full(n, np.nan)
 
@@ -144,8 +144,8 @@ class Fiss:
                     self._fiss, self._vehicle, self._roads[which], tables["route"].tolist()
                 )
             active = stop_lines_active(o, int(i), tables)
-            one = {name: values[i] for name, values in told.items()}
-            acceleration[i], curvature[i] = row.drive(o.time, one, active)
+            record = {name: values[i] for name, values in told.items()}
+            acceleration[i], curvature[i] = row.drive(o.time, record, active)
         return Control(acceleration, curvature)
 
 
@@ -213,7 +213,7 @@ def stop_lines_active(observation: Observation, row: int, tables: Inputs) -> npt
 
 def map_tables(road: RoadMap) -> Inputs:
     """Return a road network as the arrays that `export` writes of it."""
-    lanes = [one for one in road.lanes if one.kind in FOR_VEHICLES and len(one.centre) > 1]
+    lanes = [item for item in road.lanes if item.kind in FOR_VEHICLES and len(item.centre) > 1]
     numbers = {lane.id: i for i, lane in enumerate(lanes)}
 
     def neighbour(lane: Lane, side: str) -> tuple[int, bool]:
@@ -222,7 +222,7 @@ def map_tables(road: RoadMap) -> Inputs:
         return found, found >= 0 and getattr(lane, f"may_change_{side}")
 
     def known(ids: Sequence[str]) -> list[int]:
-        return [numbers[one] for one in ids if one in numbers]
+        return [numbers[name] for name in ids if name in numbers]
 
     rows = []
     for lane in lanes:
@@ -295,7 +295,7 @@ class _Row:
         self._horizon = config.planner.sampling.max_t + BEYOND
         self._wheelbase = body.wheelbase
         self._planner = fiss.LocalPlanner(config, body)
-        self._planner.set_map(road, [one + 1 for one in route])
+        self._planner.set_map(road, [number + 1 for number in route])
         self._controller = fiss.make_controller("mpc", body)
         self._calls, self._plan, self._planned_at = 0, None, 0.0
 
@@ -346,16 +346,25 @@ def export(observations: Sequence[Observation], scene: Scene) -> Inputs:
     Raises:
         InputError: the planner is not installed: the vehicle's values are its defaults.
     """
-    headings = [np.full(1, np.nan), *(one.h for one in observations)]
-    told = [inputs(one, scene, h) for one, h in zip(observations, headings, strict=False)]
+    headings = [np.full(1, np.nan), *(observation.h for observation in observations)]
+    told = [
+        inputs(observation, scene, h)
+        for observation, h in zip(observations, headings, strict=False)
+    ]
     road = scene.maps[int(scene.map_of[0])]
     tables = map_tables(road)
-    joined = {name: np.concatenate([one[name] for one in told]) for name in told[0]}
-    return tables | joined | {
-        "time": np.array([one.time for one in observations]),
-        "active": np.stack([stop_lines_active(one, 0, tables) for one in observations]),
-        "vehicle": vehicle(scene, _imported().VehicleParams()),
-    }  # fmt: skip
+    joined = {name: np.concatenate([record[name] for record in told]) for name in told[0]}
+    return (
+        tables
+        | joined
+        | {
+            "time": np.array([observation.time for observation in observations]),
+            "active": np.stack(
+                [stop_lines_active(observation, 0, tables) for observation in observations]
+            ),
+            "vehicle": vehicle(scene, _imported().VehicleParams()),
+        }
+    )
 
 
 def reproduction(observations_path: str) -> str:

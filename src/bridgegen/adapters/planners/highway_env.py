@@ -180,7 +180,9 @@ def export(observations: Sequence[Observation], scene: Scene) -> Arrays:
         scene: of the batch that they are of.
     """
     inputs = _Inputs(scene, Corridor(scene.maps[scene.map_of[0]]))
-    limits, forbidden, egos, others = zip(*(inputs.of(one, 0) for one in observations), strict=True)
+    limits, forbidden, egos, others = zip(
+        *(inputs.of(observation, 0) for observation in observations), strict=True
+    )
     return inputs.road | {
         "time_step": np.array(scene.time_step),
         "speed_limit": np.stack(limits),
@@ -211,15 +213,15 @@ class _Inputs:
         self._corridor = corridor
         self._lanes = [
             (k, i, lane)
-            for k, one in enumerate(corridor.sections)
-            for i, lane in enumerate(one.lanes)
+            for k, section in enumerate(corridor.sections)
+            for i, lane in enumerate(section.lanes)
         ]
 
     def of(self, o: Observation, i: int) -> tuple[Float, Bool, Float, Float]:
         """Return speed limits, forbidden lanes, the ego and the others of row i, see above."""
         x = o.x[i] + self._centre * np.cos(o.h[i])
         y = o.y[i] + self._centre * np.sin(o.h[i])
-        s, d, _ = (float(one[0]) for one in self._corridor.places(np.array([x]), np.array([y])))
+        s, d, _ = (float(place[0]) for place in self._corridor.places(np.array([x]), np.array([y])))
         section = int(self._corridor.section_at(np.array([s]))[0])
         on, _ = self._corridor.lane_at(section, s, d)
         mine = self._corridor.sections[section].lanes[on]
@@ -261,7 +263,7 @@ def road_arrays(corridor: Corridor) -> Arrays:
         "lane_ends": np.array(ends),
         "lane_arc": np.array(arcs),
         "points": np.concatenate(points),
-        "points_of": np.repeat(np.arange(len(points)), [len(one) for one in points]),
+        "points_of": np.repeat(np.arange(len(points)), [len(point) for point in points]),
     }
 
 

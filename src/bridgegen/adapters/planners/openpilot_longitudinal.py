@@ -119,11 +119,11 @@ class OpenpilotLongitudinal:
         told = inputs(observation, self._scene, self._roads)
         acceleration = np.zeros(len(observation.x))
         for i in np.flatnonzero(observation.running):
-            one = {name: values[i] for name, values in told.items()}
+            record = {name: values[i] for name, values in told.items()}
             row = self._rows[i]
             if row is None:
-                row = self._rows[i] = _Row(self._openpilot, float(one["v"]))
-            acceleration[i] = row.accelerate(one)
+                row = self._rows[i] = _Row(self._openpilot, float(record["v"]))
+            acceleration[i] = row.accelerate(record)
         return Control(acceleration, told["curvature"])
 
 
@@ -133,9 +133,9 @@ class OpenpilotLongitudinal:
 def roads_of(scene: Scene) -> list[Corridor | None]:
     """Return the road along the ego's route on each map; None where that is on no lane."""
     found: list[Corridor | None] = []
-    for one in scene.maps:
+    for map_ in scene.maps:
         try:
-            found.append(Corridor(one))
+            found.append(Corridor(map_))
         except InputError:
             found.append(None)
     return found
@@ -206,7 +206,7 @@ def _along(route: Float, x: Float, y: Float) -> tuple[Float, Float, npt.NDArray[
     dx, dy = x[:, :, None] - route[:, None, :, 0], y[:, :, None] - route[:, None, :, 1]
     at = np.argmin(dx * dx + dy * dy, axis=2)
     chosen = at[:, :, None]
-    dx, dy = (np.take_along_axis(one, chosen, axis=2)[:, :, 0] for one in (dx, dy))
+    dx, dy = (np.take_along_axis(array, chosen, axis=2)[:, :, 0] for array in (dx, dy))
     h = np.take_along_axis(route[:, :, 2], at, axis=1)
     along = dx * np.cos(h) + dy * np.sin(h)
     return ROUTE_STEP * at + along, dy * np.cos(h) - dx * np.sin(h), at
@@ -304,7 +304,7 @@ def _camera(offset: float, point: Float | None) -> SimpleNamespace:
     """
     if point is None:
         return SimpleNamespace(prob=0.0)
-    _, distance, left, speed = (float(one) for one in point)
+    _, distance, left, speed = (float(item) for item in point)
     return SimpleNamespace(
         prob=1.0, x=[distance + offset], y=[-left], v=[speed], a=[0.0],
         xStd=[1.0], yStd=[1.0], vStd=[1.0],
@@ -325,8 +325,8 @@ def export(observations: Sequence[Observation], scene: Scene) -> Inputs:
         Arrays by name, see the module.
     """
     roads = roads_of(scene)
-    told = [inputs(one, scene, roads) for one in observations]
-    return {name: np.concatenate([one[name] for one in told]) for name in told[0]}
+    told = [inputs(observation, scene, roads) for observation in observations]
+    return {name: np.concatenate([record[name] for record in told]) for name in told[0]}
 
 
 def reproduction(observations_path: str) -> str:

@@ -75,7 +75,7 @@ class SumoDriver:
     model: str
 
     def __init__(self) -> None:
-        planner = next(one for one in PLANNERS if one.name == f"sumo:{self.model}")
+        planner = next(item for item in PLANNERS if item.name == f"sumo:{self.model}")
         require(planner)
         import_module("libsumo")  # seconds that no call's limit has
 
@@ -90,7 +90,7 @@ class SumoDriver:
         self._roads = [roads[k] for k in scene.map_of[:n]]
         self._eyes = [Eyes(road, scene) for road in self._roads]
         self._simulation = Simulation(
-            self.model, network_text(self._roads), [len(one.lanes) for one in self._roads], scene
+            self.model, network_text(self._roads), [len(item.lanes) for item in self._roads], scene
         )
         self._rows = [Row(road) for road in self._roads]
 
@@ -190,7 +190,7 @@ def export(observations: Sequence[Observation], scene: Scene) -> Arrays:
     """
     road = StraightRoad(Corridor(scene.maps[scene.map_of[0]]))
     eyes = Eyes(road, scene)
-    seen = [eyes.see(one, 0) for one in observations]
+    seen = [eyes.see(observation, 0) for observation in observations]
     return {
         "network": np.array(network_text([road])),
         "types": np.array(types_text(scene.length, scene.width)),
@@ -198,10 +198,10 @@ def export(observations: Sequence[Observation], scene: Scene) -> Arrays:
         "time_step": np.array(scene.time_step),
         "lanes": road.lanes,
         "next": road.next,
-        "ego": np.stack([one.ego for one in seen]),
-        "others": np.stack([one.others for one in seen]),
-        "ahead": np.stack([one.ahead for one in seen]),
-        "stop": np.array([one.stop for one in seen]),
+        "ego": np.stack([item.ego for item in seen]),
+        "others": np.stack([item.others for item in seen]),
+        "ahead": np.stack([item.ahead for item in seen]),
+        "stop": np.array([item.stop for item in seen]),
     }
 
 

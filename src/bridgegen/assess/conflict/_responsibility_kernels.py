@@ -341,8 +341,8 @@ def of_vulnerable(scene, e, k, kind, own, since, avoidable, whole):
         mine, its = turns(scene.c, scene.s, e, scene.first, scene.n, k, scene.dt)
         if mine and not its and claim == 0 and same_road(scene, e, k):
             return EGO, TURNING_GIVES_WAY
-        one, other = steering(scene, e, k, JUST_NOW)
-        if kind == VRU_INTO_SIDE and claim == 0 and one > ASIDE and one > other:
+        item, other = steering(scene, e, k, JUST_NOW)
+        if kind == VRU_INTO_SIDE and claim == 0 and item > ASIDE and item > other:
             return EGO, LEFT_ITS_LANE
         if claim > 0 and not avoidable:
             return OTHER, rule_of(claim)

@@ -60,15 +60,15 @@ def turns(c, s, e, first, n, k, dt):
     now = c[0, k] * c[e, k] + s[0, k] * s[e, k]
     before = c[0, j] * c[e, j] + s[0, j] * s[e, j]
     if now >= SAME_WAY and before >= SAME_WAY:
-        one = c[0, later] * c[e, k] + s[0, later] * s[e, k] < SAME_WAY
+        item = c[0, later] * c[e, k] + s[0, later] * s[e, k] < SAME_WAY
         other = c[e, later] * c[0, k] + s[e, later] * s[0, k] < SAME_WAY
-        return one and not other, other and not one
+        return item and not other, other and not item
     mine, my_all = turning_of(c[0], s[0], first, n, k, dt)
     its, its_all = turning_of(c[e], s[e], first, n, k, dt)
-    one, other = is_turning(mine, my_all, TURNS), is_turning(its, its_all, TURNS)
-    if now <= -SAME_WAY and before <= -SAME_WAY and one and other and mine * its < 0.0:
+    item, other = is_turning(mine, my_all, TURNS), is_turning(its, its_all, TURNS)
+    if now <= -SAME_WAY and before <= -SAME_WAY and item and other and mine * its < 0.0:
         return False, False
-    return one, other
+    return item, other
 
 
 @kernel

@@ -178,7 +178,7 @@ def _seen_from(rollout: Rollout, e: int, own: list[int]) -> Rollout:
     there = np.ones(rollout.shape, np.bool_)
     if rollout.present.size:
         there = rollout.present.copy()
-    there[:, [one for one in own if one != e]] = False
+    there[:, [number for number in own if number != e]] = False
     order = np.arange(rollout.shape[1])
     order[[0, e]] = e, 0
     swapped = {

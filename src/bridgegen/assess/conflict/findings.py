@@ -103,9 +103,13 @@ class Findings:
         names = np.array(["", *conflicts.names[1:]], dtype=object)
         return cls(
             words(conflicts.kind, [KINDS.get(kind, "") for kind in range(VIOLATION + 1)]),
-            words(conflicts.type, [one.label for one in ConflictType]),
-            np.where(serious, words(conflicts.responsible, [one.label for one in Responsible]), ""),
-            words(conflicts.rule, [one.label for one in Rule]),
+            words(conflicts.type, [type_.label for type_ in ConflictType]),
+            np.where(
+                serious,
+                words(conflicts.responsible, [responsible.label for responsible in Responsible]),
+                "",
+            ),
+            words(conflicts.rule, [rule.label for rule in Rule]),
             np.where(conflicts.kind[rows, other] >= COURSE, names[other], ""),
             np.array(implausible, dtype=object).reshape(len(other)),
             np.zeros(0, dtype=object) if happened is None else happened,
@@ -114,15 +118,17 @@ class Findings:
     @classmethod
     def join(cls, parts: Sequence["Findings"]) -> "Findings":
         """Return the findings of several parts, at least one, in their order."""
-        return cls(*(np.concatenate([getattr(p, one.name) for p in parts]) for one in fields(cls)))
+        return cls(
+            *(np.concatenate([getattr(p, item.name) for p in parts]) for item in fields(cls))
+        )
 
     def take(self, at: Int | Bool | slice) -> Self:
         """Return the findings of some rows."""
-        return type(self)(*(getattr(self, one.name)[at] for one in fields(self)))
+        return type(self)(*(getattr(self, item.name)[at] for item in fields(self)))
 
     def columns(self) -> dict[str, npt.NDArray[np.object_]]:
         """Return the columns by name."""
-        return {one.name: getattr(self, one.name) for one in fields(self)}
+        return {item.name: getattr(self, item.name) for item in fields(self)}
 
     def row(self, i: int) -> dict[str, str | None]:
         """Return one row's texts by name; None instead of empty ones."""
@@ -147,7 +153,7 @@ def is_unsafe_start(findings: Findings, harm: Float) -> Bool:
     return is_excused(findings, harm) & by_rule
 
 
-COLUMNS = tuple(one.name for one in fields(Findings))
+COLUMNS = tuple(item.name for item in fields(Findings))
 """The names of a table's columns of findings."""
 
 
@@ -162,7 +168,7 @@ def unpacked(rows: Sequence[Sequence[Any]]) -> Findings:
         if odd := {*map(type, column)} - {str, type(None)}:
             raise TypeError(f"{name} must be a text, got a {odd.pop().__name__}")
     # Interns the texts: there are few different ones, and SQL creates an object for each.
-    texts = [[intern(one) if one else "" for one in column] for column in columns]
+    texts = [[intern(item) if item else "" for item in column] for column in columns]
     if not texts:
         return Findings.none(0)
     return Findings(*(np.array(column, dtype=object) for column in texts))

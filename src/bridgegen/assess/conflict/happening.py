@@ -213,46 +213,46 @@ def _sampled(rollout: Rollout, rows: Int, every: int) -> Rollout:
     return replace(rollout, **parts)
 
 
-def _from_ego(one: Rollout, x: Float, y: Float) -> tuple[Float, Float]:
+def _from_ego(rollout: Rollout, x: Float, y: Float) -> tuple[Float, Float]:
     """Return points ``(K, ·, T)`` as the ego sees them: how far ahead and to the left [m]."""
-    cosine, sine = np.cos(one.h[:, :1]), np.sin(one.h[:, :1])
-    dx, dy = x - one.x[:, :1], y - one.y[:, :1]
+    cosine, sine = np.cos(rollout.h[:, :1]), np.sin(rollout.h[:, :1])
+    dx, dy = x - rollout.x[:, :1], y - rollout.y[:, :1]
     return dx * cosine + dy * sine, dy * cosine - dx * sine
 
 
-def _in_jam(one: Rollout, never: Bool, last: Int) -> Bool:
+def _in_jam(rollout: Rollout, never: Bool, last: Int) -> Bool:
     """Return ``(K, E)``: who has another that never moves just ahead of it in its lane."""
     rows = np.arange(len(last))
-    x, y, h = (values[rows, :, last] for values in (one.x, one.y, one.h))
+    x, y, h = (values[rows, :, last] for values in (rollout.x, rollout.y, rollout.h))
     dx, dy = x[:, np.newaxis] - x[:, :, np.newaxis], y[:, np.newaxis] - y[:, :, np.newaxis]
     cosine, sine = np.cos(h)[:, :, np.newaxis], np.sin(h)[:, :, np.newaxis]
     ahead, aside = dx * cosine + dy * sine, np.abs(dy * cosine - dx * sine)
-    follows = (ahead > 0.0) & (ahead <= OF_A_JAM) & (aside <= 0.5 * one.box[:, 1, np.newaxis])
+    follows = (ahead > 0.0) & (ahead <= OF_A_JAM) & (aside <= 0.5 * rollout.box[:, 1, np.newaxis])
     found: Bool = np.any(follows & never[:, np.newaxis], axis=2)
     return found
 
 
-def _red(one: Rollout) -> Bool:
+def _red(rollout: Rollout) -> Bool:
     """Return ``(K, T)``: a stop line of the ego's is just ahead, and its light is not green."""
-    found = np.zeros((one.shape[0], one.shape[2]), np.bool_)
-    for k in np.flatnonzero(one.stop_entities == 0).tolist():
-        x, y = (one.stop_lines[:, k, axis, np.newaxis, np.newaxis] for axis in range(2))
-        ahead, aside = (values[:, 0] for values in _from_ego(one, x, y))
-        state = one.lights[:, one.stop_lights[k]]
+    found = np.zeros((rollout.shape[0], rollout.shape[2]), np.bool_)
+    for k in np.flatnonzero(rollout.stop_entities == 0).tolist():
+        x, y = (rollout.stop_lines[:, k, axis, np.newaxis, np.newaxis] for axis in range(2))
+        ahead, aside = (values[:, 0] for values in _from_ego(rollout, x, y))
+        state = rollout.lights[:, rollout.stop_lights[k]]
         close = (ahead > 0.0) & (ahead <= LIGHT_AHEAD) & (np.abs(aside) <= LIGHT_AHEAD)
         found |= close & (state != _GREEN) & (state != _OFF)
     return found
 
 
-def _crossed(one: Rollout, distance: Float) -> Bool:
+def _crossed(rollout: Rollout, distance: Float) -> Bool:
     """Return ``(K, T)``: someone on foot is on a crosswalk of the ego's, just ahead of it."""
-    found = np.zeros((one.shape[0], one.shape[2]), np.bool_)
-    if not (one.crosswalks.size and one.kinds.size):
+    found = np.zeros((rollout.shape[0], rollout.shape[2]), np.bool_)
+    if not (rollout.crosswalks.size and rollout.kinds.size):
         return found
-    for e in np.flatnonzero(np.array(IS_ON_FOOT)[one.kinds]).tolist():
-        for c in range(one.crosswalks.shape[1]):
-            x, y, h, along, across = one.crosswalks[:, c].T[:, :, np.newaxis]
-            dx, dy = one.x[:, e] - x, one.y[:, e] - y
+    for e in np.flatnonzero(np.array(IS_ON_FOOT)[rollout.kinds]).tolist():
+        for c in range(rollout.crosswalks.shape[1]):
+            x, y, h, along, across = rollout.crosswalks[:, c].T[:, :, np.newaxis]
+            dx, dy = rollout.x[:, e] - x, rollout.y[:, e] - y
             on = np.abs(dx * np.cos(h) + dy * np.sin(h)) <= along
             on &= np.abs(dy * np.cos(h) - dx * np.sin(h)) <= across
             found |= on & (distance[:, e] <= LIGHT_AHEAD)
@@ -337,23 +337,23 @@ class Happening:
         """
         counts = Counter(text for text in texts if text)
         found = [(_Text.model_validate_json(text), rows) for text, rows in counts.items()]
-        ends = [(one.end, rows) for one, rows in found if one.end is not None]
-        stuck = [(one.stuck, rows) for one, rows in found if one.stuck]
+        ends = [(item.end, rows) for item, rows in found if item.end is not None]
+        stuck = [(item.stuck, rows) for item, rows in found if item.stuck]
         behind = Counter[str]()
         driven, left = list[int](), list[int]()
-        for one, rows in stuck:
-            behind[one.behind or ""] += rows
-            driven += [one.driven] * rows
-            left += [one.left] * rows
+        for item, rows in stuck:
+            behind[item.behind or ""] += rows
+            driven += [item.driven] * rows
+            left += [item.left] * rows
         who, most = behind.most_common(1)[0] if stuck else ("", 0)
         return cls(
             rows=sum(counts.values()),
-            events=_shares([(one.began, rows) for one, rows in found]),
-            near=_shares([(one.near, rows) for one, rows in found]),
-            met=_shares([(one.met, rows) for one, rows in found]),
+            events=_shares([(item.began, rows) for item, rows in found]),
+            near=_shares([(item.near, rows) for item, rows in found]),
+            met=_shares([(item.met, rows) for item, rows in found]),
             end=_share("end", ends) if ends else None,
             stuck=len(driven) if ends else None,
-            may_stop=sum(rows for one, rows in stuck if one.may_stop),
+            may_stop=sum(rows for item, rows in stuck if item.may_stop),
             behind=who if 2 * most > len(driven) else "",
             driven=median(driven) if stuck else float("nan"),
             left=median(left) if stuck else float("nan"),
@@ -368,18 +368,19 @@ class Happening:
     @cached_property
     def reasons(self) -> tuple[str, ...]:
         """Why it did not happen, a clause each."""
-        seldom = [one for one in self.events if one.value < SELDOM]
+        seldom = [event for event in self.events if event.value < SELDOM]
         if self.rows * SELDOM < 1.0 and len(seldom) < len(self.events):
             seldom = []  # too few to call one event of several seldom
         found = [
-            f"the event {one.name} began in {one.rows} of {one.of} evaluations" for one in seldom
+            f"the event {share.name} began in {share.rows} of {share.of} evaluations"
+            for share in seldom
         ]
-        if self.near and all(one.value < SELDOM for one in self.near):
-            most = max(self.near, key=lambda one: one.rows)
+        if self.near and all(share.value < SELDOM for share in self.near):
+            most = max(self.near, key=lambda share: share.rows)
             rows = f"{most.rows} of {most.of} evaluations"
             found.append(f"no participant came near the ego in more than {rows}")
-        elif self.met and all(one.value < SELDOM for one in self.met) and not found:
-            most = max(self.met, key=lambda one: one.rows)
+        elif self.met and all(share.value < SELDOM for share in self.met) and not found:
+            most = max(self.met, key=lambda share: share.rows)
             rows = f"{most.rows} of {most.of} evaluations"
             found.append(f"a participant that acts came near the ego in at most {rows}")
         if self.stuck is not None and self.stuck - self.may_stop > MOSTLY * self.rows:
@@ -413,8 +414,8 @@ class Happening:
         return "; ".join(filter(None, [*parts, self.stuck_in_words, self.domain]))
 
 
-def _in_words(one: Share) -> str:
-    return f"{one.name} {one.value:.0%}"
+def _in_words(share: Share) -> str:
+    return f"{share.name} {share.value:.0%}"
 
 
 def _share(name: str, found: Iterable[tuple[bool, int]]) -> Share:
@@ -423,7 +424,8 @@ def _share(name: str, found: Iterable[tuple[bool, int]]) -> Share:
 
 
 def _shares(found: Sequence[tuple[dict[str, bool], int]]) -> tuple[Share, ...]:
-    names = dict.fromkeys(name for one, _ in found for name in one)
+    names = dict.fromkeys(name for record, _ in found for name in record)
     return tuple(
-        _share(name, ((one[name], rows) for one, rows in found if name in one)) for name in names
+        _share(name, ((record[name], rows) for record, rows in found if name in record))
+        for name in names
     )

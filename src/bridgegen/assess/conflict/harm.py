@@ -83,7 +83,9 @@ def closeness_of_pairs(conflicts: Conflicts, count: Count) -> Float:
 
 def _of_kinds(conflicts: Conflicts, count: Count, contact: Float, near: Float) -> Float:
     """Return values by the kind of each pair, ``(N, E)``; 0 where a conflict does not count."""
-    touches, nearly = (conflicts.kind == one for one in (analysis.CONTACT, analysis.NEAR_MISS))
+    touches, nearly = (
+        conflicts.kind == number for number in (analysis.CONTACT, analysis.NEAR_MISS)
+    )
     value = np.select(
         [touches, nearly, (conflicts.kind != analysis.NO_CONFLICT) & np.isfinite(conflicts.ttc)],
         [contact, near, COURSE + (NEAR_MISS - COURSE) * urgency(conflicts)],

@@ -76,7 +76,7 @@ def with_outcomes(
     ]
     for queue in queues(rollout, row, vehicles, model, set(lanes)):
         who = {participants[name] for name in queue.who}
-        if any(who <= one for one in declared):
+        if any(who <= group for group in declared):
             continue
         node = writer.node("queue", "TrafficJam")
         writer.put(node, "has_time", ox.Literal(float(queue.time)))
@@ -93,7 +93,7 @@ def _without_outcomes(individuals: Individuals, scenario: Subject) -> Individual
     if not nodes:
         return individuals
     return Individuals(
-        one for one in individuals.quads if one.subject not in nodes and one.object not in nodes
+        quad for quad in individuals.quads if quad.subject not in nodes and quad.object not in nodes
     )
 
 

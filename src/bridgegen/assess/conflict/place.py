@@ -34,4 +34,4 @@ def place_on_route(way: Float, step: float, junctions: Float, x: Float, y: Float
     labels: npt.NDArray[np.str_] = np.select(
         [inside, s < junctions[0, 0], s > junctions[-1, 1]], [IN, BEFORE, AFTER], BETWEEN
     )
-    return [str(one) for one in labels]
+    return [str(label) for label in labels]

@@ -32,14 +32,14 @@ AFTER = 1.0
 LIMITS: Float = np.array(
     [
         (
-            one.limits.acceleration,
-            one.limits.deceleration,
-            one.limits.curvature,
-            one.limits.lateral_g * GRAVITY,
-            inf if one.limits.slides else SLIP,
-            one.limits.is_prop,
+            object_class.limits.acceleration,
+            object_class.limits.deceleration,
+            object_class.limits.curvature,
+            object_class.limits.lateral_g * GRAVITY,
+            inf if object_class.limits.slides else SLIP,
+            object_class.limits.is_prop,
         )
-        for one in OBJECT_CLASSES
+        for object_class in OBJECT_CLASSES
     ]
 )
 LIMITS.setflags(write=False)
@@ -139,7 +139,7 @@ class Plausibility:
     @property
     def labels(self) -> list[str]:
         """The `Implausible.label` of each of N rows."""
-        labels = [one.label for one in Implausible]
+        labels = [implausible.label for implausible in Implausible]
         return [labels[code] for code in self.code.tolist()]
 
     def reason(self, row: int) -> str:

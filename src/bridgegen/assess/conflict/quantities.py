@@ -37,10 +37,10 @@ _MEASURED = (
     ),
 )  # fmt: skip
 
-MEASURED = tuple(one.name for one in _MEASURED)
+MEASURED = tuple(quantity.name for quantity in _MEASURED)
 """The names of the conflict analysis's measures; a search records them all."""
 
-_BY_NAME: dict[str, Quantity] = {one.name: one for one in _MEASURED}
+_BY_NAME: dict[str, Quantity] = {quantity.name: quantity for quantity in _MEASURED}
 
 QUANTITIES: Mapping[str, Quantity] = ChainMap(_BY_NAME, cast(dict[str, Quantity], METRICS))
 """The metrics, then the measures of the conflict analysis."""

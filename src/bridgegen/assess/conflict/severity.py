@@ -32,7 +32,7 @@ FRONT, REAR, SIDE = range(3)
 DIRECTIONS = ("front", "rear", "side")
 """Directions of the force on an occupied vehicle, by code."""
 
-MASS: Float = np.array([one.mass for one in OBJECT_CLASSES])
+MASS: Float = np.array([object_class.mass for object_class in OBJECT_CLASSES])
 """Mass [kg] by `bridgegen.drivers.kinds`, as in exported storyboards.
 
 Source: car 1,500 (a van is a ``CAR`` too): default of SUMO; mean of new cars in the EU 1,392 (ICCT,
@@ -130,18 +130,20 @@ def _tables() -> tuple[Float, Float]:
     """Return intercepts and slopes, (kinds, directions); without persons, -inf and 0."""
     shape = (len(NAMES), len(DIRECTIONS))
     intercept, slope = np.full(shape, -np.inf), np.zeros(shape)
-    for kind, one in enumerate(OBJECT_CLASSES):
-        if one.injury is None:
+    for kind, object_class in enumerate(OBJECT_CLASSES):
+        if object_class.injury is None:
             continue
         for direction, name in enumerate(DIRECTIONS):
-            curve = CURVES[name if one.injury == "occupant" else one.injury]
+            curve = CURVES[name if object_class.injury == "occupant" else object_class.injury]
             intercept[kind, direction], slope[kind, direction] = curve.intercept, curve.slope
     return intercept, slope
 
 
 _INTERCEPT, _SLOPE = _tables()
 _IS_OBSTACLE: Bool = np.array(IS_OBSTACLE)
-_UNPROTECTED: Bool = np.array([one.injury not in (None, "occupant") for one in OBJECT_CLASSES])
+_UNPROTECTED: Bool = np.array(
+    [object_class.injury not in (None, "occupant") for object_class in OBJECT_CLASSES]
+)
 
 
 def effective_speed(closing_normal: npt.ArrayLike, closing_tangential: npt.ArrayLike) -> Float:

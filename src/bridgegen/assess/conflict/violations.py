@@ -119,7 +119,7 @@ def _put(arrays: dict[str, Any], at: tuple[Int, Int], **values: Any) -> None:
 def _is_excused(rollout: Rollout, found: Conflicts, moving: Motion, row: int, leaving: Int) -> bool:
     """Return whether a departure is another's fault, or leads round what is in the ego's lane."""
     at, _, off_road, side, sample, _ = leaving.tolist()
-    dx, dy = (one[row, :, at] - one[row, 0, at] for one in (moving.x, moving.y))
+    dx, dy = (array[row, :, at] - array[row, 0, at] for array in (moving.x, moving.y))
     c, s = moving.cosine[row, :, at], moving.sine[row, :, at]
     left = (dy * c[0] - dx * s[0]) * side  # how far towards where the ego leaves
     recent = (at - found.instant[row]) * found.time_step

@@ -30,9 +30,9 @@ def quantity(name: str) -> Quantity:
             LARGEST,
         )  # fmt: skip
     if name.startswith(OF_BASELINE):
-        one = quantity(name.removeprefix(OF_BASELINE))
-        text = f"{one.name} with the baseline's driver"
-        return Quantity(name, one.unit, text, one.sense, one.cap)
+        item = quantity(name.removeprefix(OF_BASELINE))
+        text = f"{item.name} with the baseline's driver"
+        return Quantity(name, item.unit, text, item.sense, item.cap)
     return quantities.get(name)
 
 
@@ -51,7 +51,7 @@ def evaluate(rollout: Rollout, names: Sequence[str], monitor: Monitor | None = N
     Raises:
         UnknownNameError: a name is not a quantity's.
     """
-    margins = {one: j for j, one in enumerate(monitor.names)} if monitor else {}
+    margins = {item: j for j, item in enumerate(monitor.names)} if monitor else {}
     others = [name for name in names if name not in margins]
     if len(others) == len(names):
         return quantities.evaluate(rollout, names)

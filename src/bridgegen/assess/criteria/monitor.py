@@ -87,20 +87,22 @@ class Monitor:
         self.criteria = tuple(criteria)
         self._entities = tuple(entities)
         problems, metrics = list[str](), list[str]()
-        for one in criteria:
-            wrong = self._problems(one, duration)
-            for reading in readings(one.formula):
+        for criterion in criteria:
+            wrong = self._problems(criterion, duration)
+            for reading in readings(criterion.formula):
                 if not reading.is_signal and reading.name in quantities.QUANTITIES:
                     metrics.append(reading.name)
                     try:
                         quantities.require([reading.name], held, source)
                     except BridgeGenError as error:
                         wrong += error.problems
-            where = at(one.place)
-            problems += [f"criterion {one.id}: {each}{where}" for each in dict.fromkeys(wrong)]
+            where = at(criterion.place)
+            problems += [
+                f"criterion {criterion.id}: {each}{where}" for each in dict.fromkeys(wrong)
+            ]
         if problems:
             raise InputError(*problems)
-        self.units = tuple(unit_of(one) for one in criteria)
+        self.units = tuple(unit_of(criterion) for criterion in criteria)
         self.metrics = tuple(dict.fromkeys(metrics))
 
     def __len__(self) -> int:
@@ -112,7 +114,7 @@ class Monitor:
     @property
     def names(self) -> tuple[str, ...]:
         """The names of the margins as quantities."""
-        return tuple(one.quantity for one in self.criteria)
+        return tuple(criterion.quantity for criterion in self.criteria)
 
     def margins(self, rollout: Rollout) -> Float:
         """Return the margin of every criterion in every scenario.
@@ -128,14 +130,14 @@ class Monitor:
             return out
         n_steps = np.asarray(rollout.n_steps, dtype=np.int64)
 
-        def given(one: Reading) -> Float:
-            if one.is_signal:
-                return read(rollout, one.name, one.of)
-            values = quantities.evaluate(rollout, [one.name])
+        def given(reading: Reading) -> Float:
+            if reading.is_signal:
+                return read(rollout, reading.name, reading.of)
+            values = quantities.evaluate(rollout, [reading.name])
             return np.where(np.isnan(values), 0.0, values)  # of failed rows, which are left out
 
-        for j, one in enumerate(self.criteria):
-            found = robustness(one.formula, given, n_steps, rollout.time_step)
+        for j, criterion in enumerate(self.criteria):
+            found = robustness(criterion.formula, given, n_steps, rollout.time_step)
             out[ok, j] = np.clip(found[ok], -LARGEST, LARGEST)
         return out
 
@@ -145,37 +147,44 @@ class Monitor:
             return ()
         margins = self.margins(rollout)[row].tolist()
         results = zip(self.criteria, margins, self.units, strict=True)
-        return tuple(CriterionResult(*one) for one in results)
+        return tuple(CriterionResult(*result) for result in results)
 
-    def _problems(self, one: Criterion, duration: float) -> list[str]:
+    def _problems(self, criterion: Criterion, duration: float) -> list[str]:
         """Return what is wrong with a criterion."""
         problems = [
-            problem for each in readings(one.formula) for problem in self._reading_problems(each)
+            problem
+            for each in readings(criterion.formula)
+            for problem in self._reading_problems(each)
         ]
-        wrong, _ = check_units(one.formula, _dimension)
-        ahead = horizon(one.formula)
+        wrong, _ = check_units(criterion.formula, _dimension)
+        ahead = horizon(criterion.formula)
         if ahead > duration * (1.0 + 1e-9):
             wrong.append(
-                f"'{one.states}' looks {ahead:g} s ahead, and the scenario ends at {duration:g} s"
+                f"'{criterion.states}' looks {ahead:g} s ahead, and the scenario ends at "
+                f"{duration:g} s"
             )
         return problems + wrong
 
-    def _reading_problems(self, one: Reading) -> list[str]:
-        where = f" (column {one.column})"
-        if not one.is_signal:
-            if one.name in quantities.QUANTITIES:
+    def _reading_problems(self, reading: Reading) -> list[str]:
+        where = f" (column {reading.column})"
+        if not reading.is_signal:
+            if reading.name in quantities.QUANTITIES:
                 return []
-            hint = _near(one.name, quantities.QUANTITIES)
-            return [f"unknown metric '{one.name}'{hint or '; see bridgegen list metrics'}{where}"]
-        pair = len(one.of) > 1
+            hint = _near(reading.name, quantities.QUANTITIES)
+            return [
+                f"unknown metric '{reading.name}'{hint or '; see bridgegen list metrics'}{where}"
+            ]
+        pair = len(reading.of) > 1
         known = [name for name, signal in SIGNALS.items() if signal.pair == pair]
         problems = []
-        if one.name not in known:
-            form = f"{one.name} to {one.of[-1]}" if pair else f"{one.of[0]}.{one.name}"
+        if reading.name not in known:
+            form = (
+                f"{reading.name} to {reading.of[-1]}" if pair else f"{reading.of[0]}.{reading.name}"
+            )
             names = ", ".join(known)
-            hint = _near(one.name, known) or f"; known: {names}"
+            hint = _near(reading.name, known) or f"; known: {names}"
             problems.append(f"unknown signal '{form}'{hint}{where}")
-        entity = one.of[-1]
+        entity = reading.of[-1]
         others = (ANY, *self._entities[1:]) if pair else ("ego", *self._entities)
         if entity not in others:
             kind = "other participant" if pair else "participant"
@@ -192,17 +201,17 @@ def margin_in_words(margin: float, unit: str, digits: int = 4) -> str:
     return f"{value:.{digits}g}" + ("" if unit == "1" else f" {unit}")
 
 
-def unit_of(one: Criterion) -> str:
+def unit_of(criterion: Criterion) -> str:
     """Return the unit of a criterion's margin; "1" of a mixture of units, or of a number."""
-    dimension = check_units(one.formula, _dimension)[1]
+    dimension = check_units(criterion.formula, _dimension)[1]
     return "1" if dimension is None else str(dimension)
 
 
-def _dimension(one: Reading) -> Dimension | None:
+def _dimension(reading: Reading) -> Dimension | None:
     """Return the dimension of what a formula reads; None if it is unknown."""
-    if one.is_signal:
-        return dimension_of_unit(SIGNALS[one.name].unit) if one.name in SIGNALS else None
-    known = quantities.QUANTITIES.get(one.name)
+    if reading.is_signal:
+        return dimension_of_unit(SIGNALS[reading.name].unit) if reading.name in SIGNALS else None
+    known = quantities.QUANTITIES.get(reading.name)
     return None if known is None else dimension_of_unit(known.unit)
 
 

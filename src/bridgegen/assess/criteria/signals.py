@@ -79,7 +79,7 @@ def _lateral(rollout: Rollout, e: int) -> Float:
 
 
 def _travelled(rollout: Rollout, e: int) -> Float:
-    x, y = (_held(rollout, e, np.asarray(one[:, e])) for one in (rollout.x, rollout.y))
+    x, y = (_held(rollout, e, np.asarray(array[:, e])) for array in (rollout.x, rollout.y))
     way = np.sqrt(np.diff(x, axis=1) ** 2 + np.diff(y, axis=1) ** 2)
     return np.concatenate([np.zeros((len(x), 1)), np.cumsum(way, axis=1)], axis=1)
 
@@ -118,7 +118,7 @@ def _thw(rollout: Rollout, e: int) -> Float:
     states = (m.x, m.y, m.cosine, m.sine, m.v, m.distance)
     _course_kernels.headway(
         np.ascontiguousarray(m.half[[0, e]]),
-        *(_by_instant(one, e) for one in states),
+        *(_by_instant(state, e) for state in states),
         np.ones(n * t, dtype=np.int64),
         out,
     )
@@ -144,7 +144,9 @@ _PAIRS = (
     Signal("thw", "s", "time headway: until the ego is where it is now; else inf", _thw, True),
 )
 
-SIGNALS: Mapping[str, Signal] = MappingProxyType({one.name: one for one in (*_STATES, *_PAIRS)})
+SIGNALS: Mapping[str, Signal] = MappingProxyType(
+    {state.name: state for state in (*_STATES, *_PAIRS)}
+)
 """All signals by name."""
 
 

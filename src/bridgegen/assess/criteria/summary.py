@@ -61,20 +61,20 @@ def summarise_criteria(
         names: of the M columns, the criteria's margins among them.
     """
     found = []
-    for one in criteria:
-        margins = np.asarray(metrics[:, list(names).index(one.quantity)])
+    for criterion in criteria:
+        margins = np.asarray(metrics[:, list(names).index(criterion.quantity)])
         known = ~np.isnan(margins)
         violated = int((margins < 0.0).sum())
         at = int(np.nanargmin(margins)) if known.any() else None
         found.append(
             CriterionSummary(
-                one,
+                criterion,
                 int(known.sum()) - violated,
                 violated,
                 int((~known).sum()),
                 float("nan") if at is None else float(margins[at]),
                 None if at is None else at + 1,
-                unit_of(one),
+                unit_of(criterion),
             )
         )
     return tuple(found)
@@ -82,9 +82,10 @@ def summarise_criteria(
 
 def by_gravity(found: Sequence[CriterionSummary]) -> list[CriterionSummary]:
     """Return the violated ones, the gravest first, then those violated most often."""
-    violated = [one for one in found if one.violated]
+    violated = [summary for summary in found if summary.violated]
     return sorted(
-        violated, key=lambda one: (_SEVERITIES.index(one.criterion.severity), -one.violated)
+        violated,
+        key=lambda summary: (_SEVERITIES.index(summary.criterion.severity), -summary.violated),
     )
 
 
@@ -95,7 +96,7 @@ def headline(ego: str, found: Sequence[CriterionSummary]) -> str:
         ego: the driver.
         found: of all criteria of a run.
     """
-    done = max((one.met + one.violated for one in found), default=0)
+    done = max((summary.met + summary.violated for summary in found), default=0)
     if not done:
         return ""
     evaluations = f"{done:,} evaluation{'s' * (done != 1)}"
@@ -103,7 +104,7 @@ def headline(ego: str, found: Sequence[CriterionSummary]) -> str:
     if not violated:
         which = found[0].criterion.id if len(found) == 1 else f"all {len(found)} pass criteria"
         return f"{ego} meets {which} in {'all ' if done > 1 else ''}{evaluations}"
-    named = [f"{one.criterion.id} in {one.violated:,}" for one in violated[:MOST_NAMED]]
+    named = [f"{summary.criterion.id} in {summary.violated:,}" for summary in violated[:MOST_NAMED]]
     if len(violated) > MOST_NAMED:
         return (
             f"{ego} violates {len(violated)} of {len(found)} pass criteria: {', '.join(named)}, … "

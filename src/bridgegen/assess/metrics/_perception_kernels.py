@@ -37,26 +37,26 @@ def cut(points: Float, n: int, axis: int, side: float, limit: float, out: Float)
 @kernel
 def overlap(
     dx: float, dy: float, turn: float, la: float, wa: float, lb: float, wb: float,
-    one: Float, other: Float,
+    array: Float, other: Float,
 ) -> float:  # fmt: skip
     """Return the area [m²] that boxes A and B share.
 
     In A's frame, B's centre is at (dx, dy) and its heading is ``turn``; la, wa, lb, wb are half
-    lengths and widths. ``one`` and ``other`` are ``(8, 2)`` scratch.
+    lengths and widths. ``array`` and ``other`` are ``(8, 2)`` scratch.
     """
     c, s = math.cos(turn), math.sin(turn)
-    one[0, 0], one[0, 1] = dx + (lb * c - wb * s), dy + (lb * s + wb * c)
-    one[1, 0], one[1, 1] = dx - (lb * c + wb * s), dy - (lb * s - wb * c)
-    one[2, 0], one[2, 1] = dx - (lb * c - wb * s), dy - (lb * s + wb * c)
-    one[3, 0], one[3, 1] = dx + (lb * c + wb * s), dy + (lb * s - wb * c)
-    n = cut(one, 4, 0, 1.0, la, other)
-    n = cut(other, n, 0, -1.0, la, one)
-    n = cut(one, n, 1, 1.0, wa, other)
-    n = cut(other, n, 1, -1.0, wa, one)
+    array[0, 0], array[0, 1] = dx + (lb * c - wb * s), dy + (lb * s + wb * c)
+    array[1, 0], array[1, 1] = dx - (lb * c + wb * s), dy - (lb * s - wb * c)
+    array[2, 0], array[2, 1] = dx - (lb * c - wb * s), dy - (lb * s + wb * c)
+    array[3, 0], array[3, 1] = dx + (lb * c + wb * s), dy + (lb * s - wb * c)
+    n = cut(array, 4, 0, 1.0, la, other)
+    n = cut(other, n, 0, -1.0, la, array)
+    n = cut(array, n, 1, 1.0, wa, other)
+    n = cut(other, n, 1, -1.0, wa, array)
     twice = 0.0
     for i in range(n):
         j = i + 1 if i + 1 < n else 0
-        twice += one[i, 0] * one[j, 1] - one[j, 0] * one[i, 1]
+        twice += array[i, 0] * array[j, 1] - array[j, 0] * array[i, 1]
     return 0.5 * twice
 
 
@@ -94,7 +94,7 @@ def mean_iou(
 ) -> None:  # fmt: skip
     """Write each scenario's mean intersection over union; +inf where no truth counts."""
     n_rows, n_entities, _ = h.shape
-    one, other = np.empty((8, 2)), np.empty((8, 2))
+    array, other = np.empty((8, 2)), np.empty((8, 2))
     for i in range(n_rows):
         total, count = 0.0, 0
         for e in range(1, n_entities):
@@ -111,7 +111,7 @@ def mean_iou(
                 lb, wb = 0.5 * seen[LENGTH], 0.5 * seen[WIDTH]
                 common = overlap(
                     dx * c + dy * s, dy * c - dx * s, seen[HEADING] - h[i, e, k],
-                    la, wa, lb, wb, one, other,
+                    la, wa, lb, wb, array, other,
                 )  # fmt: skip
                 total += common / (4.0 * (la * wa + lb * wb) - common)
         out[i] = min(total / count, 1.0) if count else np.inf  # rounding may exceed 1

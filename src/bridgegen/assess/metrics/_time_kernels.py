@@ -22,9 +22,9 @@ def sweep(position: float, rate: float, reach: float, still: float) -> tuple[flo
         if abs(position) <= reach:
             return -np.inf, np.inf
         return np.inf, -np.inf
-    one = (-reach - position) / rate
+    value = (-reach - position) / rate
     other = (reach - position) / rate
-    return min(one, other), max(one, other)
+    return min(value, other), max(value, other)
 
 
 @kernel
@@ -129,7 +129,7 @@ def separation(
     """
     c = abs(ca * cb + sa * sb)
     s = abs(ca * sb - sa * cb)
-    one = max(
+    value = max(
         abs(dx * ca + dy * sa) - (la + (c * lb + s * wb)),
         abs(dy * ca - dx * sa) - (wa + (s * lb + c * wb)),
     )
@@ -137,7 +137,7 @@ def separation(
         abs(dx * cb + dy * sb) - (lb + (c * la + s * wa)),
         abs(dy * cb - dx * sb) - (wb + (s * la + c * wa)),
     )
-    return max(one, other)
+    return max(value, other)
 
 
 @kernel

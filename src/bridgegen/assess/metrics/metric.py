@@ -159,7 +159,7 @@ def _motion(rollout: Rollout) -> Motion:
     a, reverses = recorded(rollout, "a"), None
     if v.size and v.min() < 0.0:
         reverses = _reverses(v)
-        cosine, sine, v, a = (np.where(reverses, -one, one) for one in (cosine, sine, v, a))
+        cosine, sine, v, a = (np.where(reverses, -array, array) for array in (cosine, sine, v, a))
         v = np.maximum(v, 0.0)
     half = 0.5 * box[:, :2]
     return Motion(

@@ -25,7 +25,9 @@ RANGES = np.array([50.0, 50.0, 40.0, 40.0, 30.0])
 THRESHOLDS = np.array([0.5, 1.0, 2.0, 4.0])
 """Distances between the centres of a detection and of the truth below which the two match [m]."""
 
-CLASS_OF_KIND = np.array([CLASSES.index(one.detection_class) for one in OBJECT_CLASSES])
+CLASS_OF_KIND = np.array(
+    [CLASSES.index(object_class.detection_class) for object_class in OBJECT_CLASSES]
+)
 """The class of each of `bridgegen.drivers.kinds`, int64."""
 
 

@@ -36,7 +36,7 @@ _BEYOND = (
     PET, DRAC, BTN, THW, TET, TIT, RSS, IMPACT_SPEED, RELATIVE_IMPACT_SPEED, SPEED_REDUCTION,
 )  # fmt: skip
 
-_OURS: dict[str, Metric] = {one.name: one for one in (*_TABLE_I, *_BEYOND)}
+_OURS: dict[str, Metric] = {metric.name: metric for metric in (*_TABLE_I, *_BEYOND)}
 
 ADDED = PlugIns("metric", "bridgegen.metrics")
 
@@ -84,7 +84,7 @@ METRICS: Mapping[str, Metric] = Registry(_OURS, ADDED, _checked)
 """Metrics by name: those of the paper's Table I, then ours beyond it, then those of installed
 packages."""
 
-TABLE_I = tuple(one.name for one in _TABLE_I)
+TABLE_I = tuple(metric.name for metric in _TABLE_I)
 """Names of the paper's eleven metrics, which every run records as far as its rollouts allow."""
 
 
@@ -153,7 +153,7 @@ def require(names: Sequence[str], held: Collection[Need], source: str) -> tuple[
         UnknownNameError: a name is not a metric's.
         InputError: those that do not exist there, all at once.
     """
-    perceive = ", ".join(one.name for one in DRIVERS.values() if one.perceives)
+    perceive = ", ".join(driver.name for driver in DRIVERS.values() if driver.perceives)
     hints = {"detections": f"; drivers that perceive (--ego): {perceive}" if perceive else ""}
     needs = {name: get(name).needs for name in names}
     problems = [

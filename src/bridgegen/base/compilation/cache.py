@@ -26,13 +26,13 @@ crossroads-s4."""
 def is_compiled() -> bool:
     """Return whether compiled kernels exist, so that this run starts at once."""
     folders = [cache_folder(), *([carried.folder] if (carried := shipped()) else [])]
-    return any(any((one / _folder_of(MAIN)).glob("*.nbi")) for one in folders)
+    return any(any((folder / _folder_of(MAIN)).glob("*.nbi")) for folder in folders)
 
 
 def n_compiled() -> int:
     """Return how many kernels the cache holds that other kernels call, whatever their source."""
     with suppress(OSError):
-        return sum(one.suffix == ".bc" for one in (cache_folder() / "code").iterdir())
+        return sum(path.suffix == ".bc" for path in (cache_folder() / "code").iterdir())
     return 0
 
 

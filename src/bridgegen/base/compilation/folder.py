@@ -107,8 +107,8 @@ def digest(source: Path) -> str:
         known |= found
         new += found
     digest = hashlib.sha256()
-    for one in sorted(known):
-        digest.update(_content(one))
+    for path in sorted(known):
+        digest.update(_content(path))
     return digest.hexdigest()[:16]
 
 
@@ -128,7 +128,7 @@ def _imports(text: str) -> Iterator[Path]:
         if home.is_dir():  # names of a package may be modules
             submodules = (home / f"{name}.py" for name in re.findall(r"\w+", names))
             yield home / "__init__.py"
-            yield from (one for one in submodules if one.is_file())
+            yield from (submodule for submodule in submodules if submodule.is_file())
         elif home.with_suffix(".py").is_file():
             yield home.with_suffix(".py")
 
@@ -171,7 +171,7 @@ def described() -> dict[str, str]:
 
 def features() -> str:
     """Return the baseline's instructions as LLVM wants them."""
-    return ",".join(f"+{one}" for one in FEATURES)
+    return ",".join(f"+{feature}" for feature in FEATURES)
 
 
 @cache
@@ -182,6 +182,6 @@ def shipped() -> Shipped | None:
         has = llvm.get_host_cpu_features()
     except (OSError, ValueError, RuntimeError):
         return None
-    if facts != described() or not all(has.get(one) for one in FEATURES):
+    if facts != described() or not all(has.get(feature) for feature in FEATURES):
         return None
     return Shipped(FOLDER, (facts["triple"], BASELINE, features()))

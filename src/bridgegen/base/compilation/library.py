@@ -153,7 +153,9 @@ class KernelLibrary(JITCodeLibrary):  # type: ignore[misc]
         self._finalized = True
         self._bitcode = self._final_module.as_bitcode()
         if self.is_stored:
-            (self.symbol,) = (one.name for one in self._final_module.functions if _is_own(one))
+            (self.symbol,) = (
+                function.name for function in self._final_module.functions if _is_own(function)
+            )
             self.by_symbol[self.symbol] = self
             self.store.write(self.symbol, "bc", (self.callees, self._bitcode, self.is_inlined))
 
@@ -205,7 +207,7 @@ class KernelLibrary(JITCodeLibrary):  # type: ignore[misc]
 
     def _defined(self) -> Iterator[str]:
         for some in (self._final_module.functions, self._final_module.global_variables):
-            yield from (one.name for one in some if not one.is_declaration)
+            yield from (item.name for item in some if not item.is_declaration)
 
     @classmethod
     def _unserialize(cls, codegen: Any, state: Any) -> Self:

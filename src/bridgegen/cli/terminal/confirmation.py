@@ -47,8 +47,11 @@ def print_confirmation(found: "RunConfirmation", *, as_json: bool) -> None:
         facts: dict[str, Any] = record.model_dump(mode="json", exclude={"scenarios"})
         facts["summary"] = to_json(found.summary)
         facts["scenarios"] = [
-            {"confirmed": one.confirmed, **one.model_dump(mode="json", exclude={"tracks"})}
-            for one in found.scenarios
+            {
+                "confirmed": scenario.confirmed,
+                **scenario.model_dump(mode="json", exclude={"tracks"}),
+            }
+            for scenario in found.scenarios
         ]
         facts["files"] = [str(path) for path in found.files]
         print(json.dumps(facts, indent=2))
@@ -56,10 +59,10 @@ def print_confirmation(found: "RunConfirmation", *, as_json: bool) -> None:
     print(f"{found.folder}: {record.scenario}, ego {record.ego}, in {record.label}\n")
     console = Console(markup=False, emoji=False, highlight=False)
     console.print(_table(found))
-    for one in found.scenarios:
-        if one.confirmed is False:
-            console.print(f"\n{name_of(one)} is not confirmed. {one.explanation}")
-    failures = Counter(one.failure for one in found.scenarios if one.there is None)
+    for scenario in found.scenarios:
+        if scenario.confirmed is False:
+            console.print(f"\n{name_of(scenario)} is not confirmed. {scenario.explanation}")
+    failures = Counter(scenario.failure for scenario in found.scenarios if scenario.there is None)
     if failures:
         console.print("\nNot run, so neither confirmed nor refuted:")
         for why, count in failures.most_common():
@@ -79,16 +82,16 @@ def _table(found: "RunConfirmation") -> Table:
         table.add_column(name, justify="right", no_wrap=True)
     table.add_column("first", overflow="fold")
     words = {True: "critical", False: "NOT", None: "not run"}
-    for one in found.scenarios:
-        here, there = one.here, one.there
-        name = one.name or f"eval. {one.evaluation + 1}"
-        if there is None or one.differences is None:
-            table.add_row(name, words[one.confirmed])
+    for scenario in found.scenarios:
+        here, there = scenario.here, scenario.there
+        name = scenario.name or f"eval. {scenario.evaluation + 1}"
+        if there is None or scenario.differences is None:
+            table.add_row(name, words[scenario.confirmed])
             continue
-        parting = next(iter(one.differences.partings), None)
+        parting = next(iter(scenario.differences.partings), None)
         table.add_row(
             name,
-            words[one.confirmed],
+            words[scenario.confirmed],
             *(
                 _change(of(here), of(there), none="∞" if of is _distance else "–")
                 for of in figures.values()
@@ -103,28 +106,30 @@ def _table(found: "RunConfirmation") -> Table:
 def _figures(found: "RunConfirmation") -> dict[str, Callable[["Outcome"], float | None]]:
     """Return what the verdict depends on, by its title: of the run's rule."""
     if found.record.rule == "harm":
-        return {"harm": lambda one: one.harm, "d_min [m]": _distance}
+        return {"harm": lambda outcome: outcome.harm, "d_min [m]": _distance}
     if found.record.rule == "thresholds":
-        return {"d_min [m]": _distance, "v_d [m/s]": lambda one: one.v_d}
+        return {"d_min [m]": _distance, "v_d [m/s]": lambda outcome: outcome.v_d}
     margins = found.scenarios[0].here.margins if found.scenarios else {}
-    units = {name: f"{name} [{one.unit}]".replace(" [1]", "") for name, one in margins.items()}
+    units = {
+        name: f"{name} [{margin.unit}]".replace(" [1]", "") for name, margin in margins.items()
+    }
     shown = list(units.items())[:MOST_MARGINS]
     return {title: partial(_margin_of, name) for name, title in shown} | {"d_min [m]": _distance}
 
 
-def _margin_of(name: str, one: "Outcome") -> float | None:
-    return one.margins[name].value if name in one.margins else None
+def _margin_of(name: str, outcome: "Outcome") -> float | None:
+    return outcome.margins[name].value if name in outcome.margins else None
 
 
-def _distance(one: "Outcome") -> float | None:
-    return one.d_min
+def _distance(outcome: "Outcome") -> float | None:
+    return outcome.d_min
 
 
-def _touch(one: "Outcome") -> float | None:
-    return None if one.contact is None else one.contact.time
+def _touch(outcome: "Outcome") -> float | None:
+    return None if outcome.contact is None else outcome.contact.time
 
 
 def _change(here: float | None, there: float | None, *, none: str = "∞") -> str:
     """Return a value in both simulators; once if both print the same."""
-    a, b = (none if one is None else f"{one:.2f}" for one in (here, there))
+    a, b = (none if value is None else f"{value:.2f}" for value in (here, there))
     return a if a == b else f"{a} → {b}"

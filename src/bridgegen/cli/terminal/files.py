@@ -24,8 +24,10 @@ def print_file_result(file: Path, result: "FileResult") -> None:
         print(f"failed: {result.status}")
     if result.cause is not None:
         print(f"cause of its harm, as it was found: {result.cause}")
-    for one in result.incidents:
-        print(f"at {one.step * result.rollout.time_step:.2f} s: {one.kind}: {one.what}")
+    for incident in result.incidents:
+        print(
+            f"at {incident.step * result.rollout.time_step:.2f} s: {incident.kind}: {incident.what}"
+        )
     _print_conflict(result.conflicts)
     if result.unjudged:
         print(f"not judged: {result.unjudged}")
@@ -39,13 +41,13 @@ def print_file_result(file: Path, result: "FileResult") -> None:
 def criteria_facts(results: "Iterable[CriterionResult]") -> list[dict[str, Any]]:
     """Return how a file meets criteria as JSON's types."""
     return [
-        one.criterion.to_dict()
+        result.criterion.to_dict()
         | {
-            "verdict": one.verdict,
-            "margin": one.margin if isfinite(one.margin) else None,
-            "unit": one.unit,
+            "verdict": result.verdict,
+            "margin": result.margin if isfinite(result.margin) else None,
+            "unit": result.unit,
         }
-        for one in results
+        for result in results
     ]
 
 
@@ -67,47 +69,47 @@ def _print_conflict(conflicts: "Conflicts", assumptions: Iterable[str] = ()) -> 
     """Print the decisive conflict: a sentence, then its facts."""
     from bridgegen.assess.conflict.summary import CAREFUL_DRIVER, summarise
 
-    one = summarise(conflicts)
-    if one is None:
+    summary = summarise(conflicts)
+    if summary is None:
         print("conflict: none")
         return
-    print(f"conflict: {one.sentence}")
+    print(f"conflict: {summary.sentence}")
     lines: list[tuple[str, str]] = []
-    violates = one.conflict == "violation"
-    if one.happened:
-        prevents = "would" if one.preventable else "would not"
+    violates = summary.conflict == "violation"
+    if summary.happened:
+        prevents = "would" if summary.preventable else "would not"
         lines += [
-            ("type", f"{one.conflict}, {one.type} ({one.type_source})"),
-            ("responsible", one.responsible),
-            ("rule", f"{one.rule}: {one.rule_says} ({one.rule_source})"),
+            ("type", f"{summary.conflict}, {summary.type} ({summary.type_source})"),
+            ("responsible", summary.responsible),
+            ("rule", f"{summary.rule}: {summary.rule_says} ({summary.rule_source})"),
         ]
     if violates:
-        lines += [("began", f"at {one.decided:.2f} s, worst at {one.time:.2f} s"),
-                  ("by", f"{abs(one.aside):.2f} m at {one.v_ego:.1f} m/s")]  # fmt: skip
-    elif one.happened:
+        lines += [("began", f"at {summary.decided:.2f} s, worst at {summary.time:.2f} s"),
+                  ("by", f"{abs(summary.aside):.2f} m at {summary.v_ego:.1f} m/s")]  # fmt: skip
+    elif summary.happened:
         lines += [
-            ("zones", f"ego {one.zone_ego}, {one.partner} {one.zone_other}"),
-            ("decided", f"at {one.decided:.2f} s, {one.left:.2f} s before contact"),
+            ("zones", f"ego {summary.zone_ego}, {summary.partner} {summary.zone_other}"),
+            ("decided", f"at {summary.decided:.2f} s, {summary.left:.2f} s before contact"),
             ("preventable", f"{CAREFUL_DRIVER} {prevents} have avoided it"),
         ]
     lines += [] if violates else [
-        ("closing speed", f"{one.closing_normal:.1f} m/s across the surfaces that meet, "
-                          f"{one.closing_tangential:.1f} m/s along them"),
+        ("closing speed", f"{summary.closing_normal:.1f} m/s across the surfaces that meet, "
+                          f"{summary.closing_tangential:.1f} m/s along them"),
     ]  # fmt: skip
-    if one.conflict == "contact":
+    if summary.conflict == "contact":
         lines += [
-            ("delta-v", f"ego {one.delta_v_ego:.1f} m/s, "
-                        f"{one.partner} {one.delta_v_other:.1f} m/s"),
-            ("severity", f"{one.severity:.3g} (probability of a MAIS3+ injury)"),
+            ("delta-v", f"ego {summary.delta_v_ego:.1f} m/s, "
+                        f"{summary.partner} {summary.delta_v_other:.1f} m/s"),
+            ("severity", f"{summary.severity:.3g} (probability of a MAIS3+ injury)"),
         ]  # fmt: skip
     elif not violates:
         lines += [
-            ("least TTC", f"{one.ttc:.2f} s at {one.time:.2f} s"),
-            ("deceleration", f"{one.needed_deceleration:.1f} m/s² needed then"),
+            ("least TTC", f"{summary.ttc:.2f} s at {summary.time:.2f} s"),
+            ("deceleration", f"{summary.needed_deceleration:.1f} m/s² needed then"),
         ]
     for name, text in lines:
         print(f"  {name:<13}  {text}")
-    for text in assumptions if one.happened else ():
+    for text in assumptions if summary.happened else ():
         print(f"  {'assumed':<13}  {text}")
 
 

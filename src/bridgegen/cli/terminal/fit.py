@@ -35,11 +35,11 @@ def print_fit(fit: "Fit", written: "Sequence[Path]", *, as_json: bool) -> None:
         ("parameter", "unit", "form", "D", "p"),
         [
             (
-                one.name, one.unit, one.form,
-                None if math.isnan(one.distance) else float(f"{one.distance:.3g}"),
-                None if math.isnan(one.p) else float(f"{one.p:.3g}"),
+                parameter.name, parameter.unit, parameter.form,
+                None if math.isnan(parameter.distance) else float(f"{parameter.distance:.3g}"),
+                None if math.isnan(parameter.p) else float(f"{parameter.p:.3g}"),
             )
-            for one in fit.parameters.values()
+            for parameter in fit.parameters.values()
         ],
         as_json=False,
     )  # fmt: skip
@@ -60,12 +60,12 @@ def _plain(fit: "Fit", written: "Sequence[Path]") -> dict[str, object]:
         "infeasible": fit.infeasible,
         "parameters": {
             name: {
-                "form": one.form,
-                "distance": None if math.isnan(one.distance) else one.distance,
-                "p": None if math.isnan(one.p) else one.p,
-                "ranking": [list(each) for each in one.ranking],
+                "form": parameter.form,
+                "distance": None if math.isnan(parameter.distance) else parameter.distance,
+                "p": None if math.isnan(parameter.p) else parameter.p,
+                "ranking": [list(each) for each in parameter.ranking],
             }
-            for name, one in fit.parameters.items()
+            for name, parameter in fit.parameters.items()
         },
         "correlated": list(fit.correlated),
         "correlation": fit.correlation.tolist(),

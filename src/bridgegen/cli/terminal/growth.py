@@ -28,26 +28,26 @@ _WORDS = {
 def print_additions(made: "Sequence[Addition]", to: Path, *, as_json: bool = False) -> None:
     """Print the outcome of each failure, then the totals."""
     if as_json:
-        print(json.dumps([vars(one) for one in made], indent=2, ensure_ascii=False))
+        print(json.dumps([vars(addition) for addition in made], indent=2, ensure_ascii=False))
         return
     table = Table(box=None, pad_edge=False, header_style="bold")
     for name in ("found in", "outcome", "failure"):
         table.add_column(name, overflow="fold")
-    for one in made:
-        outcome = _WORDS[one.outcome]
-        if one.status == "fixed":
+    for addition in made:
+        outcome = _WORDS[addition.outcome]
+        if addition.status == "fixed":
             outcome += ", called fixed: it is there again"
-        elif one.outcome in ("known", "worse") and one.status:
-            outcome += f" ({one.status})"
-        failure = ": ".join(filter(None, (one.id, one.title)))
-        table.add_row(one.source, outcome, "\n".join(filter(None, (failure, one.reason))))
+        elif addition.outcome in ("known", "worse") and addition.status:
+            outcome += f" ({addition.status})"
+        failure = ": ".join(filter(None, (addition.id, addition.title)))
+        table.add_row(addition.source, outcome, "\n".join(filter(None, (failure, addition.reason))))
     console = Console(markup=False, emoji=False, highlight=False)
     if not sys.stdout.isatty():
         console.width = WHOLE
     if made:
         console.print(table)
         print()
-    count = Counter(one.outcome for one in made)
+    count = Counter(addition.outcome for addition in made)
     parts = [f"{count['added']} added"]
     parts += [f"{count['replaced']} replaced"] if count["replaced"] else []
     parts += [f"{count['known'] + count['worse']} already known"]
@@ -55,9 +55,9 @@ def print_additions(made: "Sequence[Addition]", to: Path, *, as_json: bool = Fal
         parts[-1] += f", {count['worse']} of them by a less severe scenario (--replace-worse)"
     parts += [f"{count['refused']} refused"]
     print(f"{to}: {', '.join(parts)}")
-    written = [one for one in made if one.outcome in ("added", "replaced")]
+    written = [addition for addition in made if addition.outcome in ("added", "replaced")]
     if written:
-        same = sum(one.is_same for one in written)
+        same = sum(addition.is_same for addition in written)
         all_same = "with the recorded values, to the bit" if same == len(written) else (
             f"{same} with the recorded values, to the bit"
         )  # fmt: skip
@@ -66,22 +66,27 @@ def print_additions(made: "Sequence[Addition]", to: Path, *, as_json: bool = Fal
 
 def print_replayed(made: "Replayed", page: Path, *, as_json: bool = False) -> None:
     """Print a variation that was run again: its values, what happens, whether it is the same."""
-    one, row = made.result, made.result.rows[0]
+    result, row = made.result, made.result.rows[0]
     if as_json:
         facts = {
-            "scenario": one.entry, "variation": made.number, "ego": one.driver,
-            "values": dict(zip(one.parameters, row.x, strict=True)),
+            "scenario": result.entry,
+            "variation": made.number,
+            "ego": result.driver,
+            "values": dict(zip(result.parameters, row.x, strict=True)),
             "result": row.model_dump(exclude={"x", "margins"}),
             "margins": {
-                str(c["id"]): margin for c, margin in zip(one.criteria, row.margins, strict=False)
+                str(c["id"]): margin
+                for c, margin in zip(result.criteria, row.margins, strict=False)
             },
-            "same": made.is_same, "exported_same": made.is_same_exported,
-            "files": [str(file) for file in made.files], "page": str(page),
-        }  # fmt: skip
+            "same": made.is_same,
+            "exported_same": made.is_same_exported,
+            "files": [str(file) for file in made.files],
+            "page": str(page),
+        }
         print(json.dumps(facts, indent=2, ensure_ascii=False))
         return
-    print(f"{one.entry}, variation {made.number}, ego {one.driver}: {row.verdict}")
-    for name, value, unit in zip(one.parameters, row.x, one.units, strict=True):
+    print(f"{result.entry}, variation {made.number}, ego {result.driver}: {row.verdict}")
+    for name, value, unit in zip(result.parameters, row.x, result.units, strict=True):
         shown = "" if unit in ("1", "count", "?") else f" {unit}"
         print(f"  {name:<28}{value}{shown}")
     if row.conflict:
@@ -92,7 +97,7 @@ def print_replayed(made: "Replayed", page: Path, *, as_json: bool = False) -> No
         print(f"  {with_whom(row.conflict, row.partner)}{kind}, MAIS3+ {row.severity:.2%}")
     if row.problem or row.implausible:
         print(f"  {row.problem or f'implausible: {row.implausible}'}")
-    for criterion, margin in zip(one.criteria, row.margins, strict=False):
+    for criterion, margin in zip(result.criteria, row.margins, strict=False):
         print(f"  {'violates' if margin < 0 else 'meets'} {criterion['id']}: margin {margin:.6g}")
     same = "the recorded one, to the bit" if made.is_same else "NOT the recorded one"
     print(f"result: {same}")

@@ -88,33 +88,33 @@ def print_regions(run: "RunRegions", *, as_json: bool) -> None:
 def _print_regions(run: "RunRegions", start: int, stop: int) -> None:
     from bridgegen.search.regions.box import ANYWHERE, conditions
 
-    failed = any(one.fresh.failed for one in run.found.regions[start:stop])
+    failed = any(region.fresh.failed for region in run.found.regions[start:stop])
     table = Table(box=None, pad_edge=False, header_style="bold", padding=(0, 2, 1, 0))
     told = run.record["regions"][start:stop]
     met = ["road"] if "exposure" in run.record else []
     for name in ("#", "region", "fresh", "run", "space", *met, *(["failed"] if failed else [])):
         table.add_column(name, overflow="fold")
-    for number, one in enumerate(run.found.regions[start:stop], start=start + 1):
-        rule = "\nand ".join(conditions(one.box, run.space)) or ANYWHERE
-        note = "\n(narrowed to others)" if one.narrowed else ""
+    for number, region in enumerate(run.found.regions[start:stop], start=start + 1):
+        rule = "\nand ".join(conditions(region.box, run.space)) or ANYWHERE
+        note = "\n(narrowed to others)" if region.narrowed else ""
         table.add_row(
             str(number),
             rule + note,
-            _shares(one.fresh),
-            _shares(one.search),
-            _percent(one.space_share),
+            _shares(region.fresh),
+            _shares(region.search),
+            _percent(region.space_share),
             *([_percent(told[number - start - 1]["exposure"]["share"])] if met else []),
-            *([str(one.fresh.failed)] if failed else []),
+            *([str(region.fresh.failed)] if failed else []),
         )
     Console(markup=False, emoji=False, highlight=False).print(table)
 
 
-def _shares(one: "Evidence") -> str:
-    if one.share is None:
+def _shares(evidence: "Evidence") -> str:
+    if evidence.share is None:
         return "none"
-    low, high = map(_percent, one.interval)
+    low, high = map(_percent, evidence.interval)
     low = low.removesuffix(" %")
-    return f"{_percent(one.share)}\n{low} to {high}\n{one.critical} of {one.rows}"
+    return f"{_percent(evidence.share)}\n{low} to {high}\n{evidence.critical} of {evidence.rows}"
 
 
 def _percent(share: float) -> str:

@@ -119,14 +119,20 @@ def _print_figures(run: "Run", seconds: float) -> None:
         ("50th critical after", _count(s.fiftieth)),
         ("d_min", f"best {s.d_min_best:.2f} m, median {s.d_min_median:.2f} m"),
         ("v_d", f"best {s.v_d_best:.2f} m/s, median {s.v_d_median:.2f} m/s"),
-        *((f"criterion {one.criterion.id}", one.sentence) for one in run.criteria),
+        *(
+            (f"criterion {criterion.criterion.id}", criterion.sentence)
+            for criterion in run.criteria
+        ),
         *([("what happened", said)] if (said := run.happening.sentence) else []),
         ("wall time", f"{seconds:.2f} s, of which {s.seconds:.2f} s search"),
         ("scenarios", _exported(run)),
     ]
     rows += [
-        ("not exported", f"{one.name}, evaluation {one.evaluation + 1}: {'; '.join(one.problems)}")
-        for one in run.not_exported
+        (
+            "not exported",
+            f"{refused.name}, evaluation {refused.evaluation + 1}: {'; '.join(refused.problems)}",
+        )
+        for refused in run.not_exported
     ]
     reasons = run.failures.most_common(MOST_REASONS)
     rows += [("failed", f"{count} × {reason}") for reason, count in reasons]
@@ -170,8 +176,9 @@ def verdict_lines(run: "Run", seconds: float) -> list[str]:
         reasons = ", ".join(f"{n} × {why}" for why, n in run.failures.most_common(MOST_REASONS))
         lines.append(f"Without a result: {reasons}")
     lines += [
-        f"Not exported: {one.name}, evaluation {one.evaluation + 1}: {'; '.join(one.problems)}"
-        for one in run.not_exported
+        f"Not exported: {refused.name}, evaluation {refused.evaluation + 1}: "
+        f"{'; '.join(refused.problems)}"
+        for refused in run.not_exported
     ]
     folder = run.folder
     lines.append(f"Report: {run.report} (-v prints all figures)")
@@ -198,7 +205,7 @@ def conclusion(run: "Run") -> str:
         modes = len(found.modes) + found.unrecorded_modes
         ways = f"{modes} failure mode" + "s" * (modes != 1)
         return f"{word}  {name}: {ways} in {bound.harmful:,} of {bound.evaluations:,} evaluations"
-    if violated := [one.criterion.id for one in run.criteria if one.violated]:
+    if violated := [criterion.criterion.id for criterion in run.criteria if criterion.violated]:
         return f"{word}  {name}: violates {', '.join(violated)}"
     if run.verdict == "fails":
         drawn = f"{bound.space.harmful} of {bound.space.rows} fresh random draws"
@@ -215,14 +222,14 @@ def conclusion(run: "Run") -> str:
 def _mode_lines(found: "Triage") -> list[str]:
     """Return a line for each failure mode: its bar, count, event, rule, severity and cause."""
     modes = found.modes[:MOST_MODES]
-    most = max((one.count for one in modes), default=1)
+    most = max((mode.count for mode in modes), default=1)
     lines = ["         count  event · rule · worst MAIS3+ · root cause"] if modes else []
-    for one in modes:
-        bar = "█" * max(round(BAR * one.count / most), 1)
-        what, _, _ = one.title.partition(" (")
-        worst = percent(one.severity) if one.conflict == "contact" else one.conflict
-        about = " · ".join(filter(None, [one.rule, worst, one.cause]))
-        head = f"{one.number:>2} {bar:<{BAR}} {one.count:>5,}  "
+    for mode in modes:
+        bar = "█" * max(round(BAR * mode.count / most), 1)
+        what, _, _ = mode.title.partition(" (")
+        worst = percent(mode.severity) if mode.conflict == "contact" else mode.conflict
+        about = " · ".join(filter(None, [mode.rule, worst, mode.cause]))
+        head = f"{mode.number:>2} {bar:<{BAR}} {mode.count:>5,}  "
         room = max(WIDTH - len(head) - len(about) - 3, 12)
         short = what if len(what) <= room else f"{what[: room - 1]}…"
         lines.append(f"{head}{short} · {about}"[:WIDTH])
@@ -245,7 +252,7 @@ def _found_lines(found: "Triage") -> list[str]:
         lines.append(
             f"How common: {share}; uniform over the ranges, 95 % confidence; not a rate on roads"
         )
-    simplest = [one.minimal for one in found.modes if one.minimal is not None]
+    simplest = [mode.minimal for mode in found.modes if mode.minimal is not None]
     if simplest:
         lines.append(f"Simplest: {simplest[0].sentence}")
     if found.modes and (text := parameters_in_words(found)):
@@ -264,11 +271,11 @@ def _print_modes(found: "Triage") -> None:
     """Print the failure modes, with their simplest scenarios."""
     from bridgegen.search.triage.words import mode_in_words, parameters_in_words
 
-    for one in found.modes[:MOST_MODES]:
-        print(mode_in_words(one, found))
-        if one.minimal is not None:
-            edge = " (knife-edge)" if one.minimal.knife_edge else ""
-            print(f"     simplest{edge}: {one.minimal.sentence}")
+    for mode in found.modes[:MOST_MODES]:
+        print(mode_in_words(mode, found))
+        if mode.minimal is not None:
+            edge = " (knife-edge)" if mode.minimal.knife_edge else ""
+            print(f"     simplest{edge}: {mode.minimal.sentence}")
     more = len(found.modes[MOST_MODES:]) + found.unrecorded_modes
     if more:
         print(f"     and {more} more")
@@ -320,23 +327,29 @@ def print_coverage(run: Path, settings: "Settings", found: "Coverage", *, as_jso
         "The constraints\nexclude others. Critical: combinations with a critical scenario.\n"
     )
     print("Evaluations per bin, lowest first, of these critical; – where none is feasible:")
-    width = max(len(one.name) for one in found.parameters)
-    for one in found.parameters:
-        print(f"{one.name:<{width}}  {one.axis}, {one.span}")
-        print(f"    {_cells(one)}")
-        if one.met is not None:
-            print("    " + "".join(f"{f'{share:.1%}':>10}" for share in one.met) + "  of the road")
+    width = max(len(parameter.name) for parameter in found.parameters)
+    for parameter in found.parameters:
+        print(f"{parameter.name:<{width}}  {parameter.axis}, {parameter.span}")
+        print(f"    {_cells(parameter)}")
+        if parameter.met is not None:
+            print(
+                "    "
+                + "".join(f"{f'{share:.1%}':>10}" for share in parameter.met)
+                + "  of the road"
+            )
 
 
-def _cells(one: "ParameterBins") -> str:
-    counts = zip(one.evaluated, one.critical, one.feasible, strict=True)
+def _cells(parameter_bins: "ParameterBins") -> str:
+    counts = zip(
+        parameter_bins.evaluated, parameter_bins.critical, parameter_bins.feasible, strict=True
+    )
     return "".join(f"{f'{n}/{k}' if possible else '–':>10}" for n, k, possible in counts)
 
 
 def _plain(value: Any) -> Any:
     """Return nested arrays and tuples as lists."""
     if isinstance(value, dict):
-        return {key: _plain(one) for key, one in value.items()}
+        return {key: _plain(item) for key, item in value.items()}
     if isinstance(value, tuple):
-        return [_plain(one) for one in value]
+        return [_plain(item) for item in value]
     return value.tolist() if isinstance(value, np.ndarray) else value

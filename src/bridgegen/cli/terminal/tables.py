@@ -129,7 +129,7 @@ _WORDS = {"passed": "passed", "failed": "FAILED", "unknown": "NOT JUDGED"}
 
 def print_outcomes(outcomes: "Sequence[Outcome]") -> bool:
     """Print each outcome; return whether all passed."""
-    for one in outcomes:
-        word = _WORDS[one.verdict]
-        print(f"bridgegen: {word}: {one.test} ({one.details})", file=sys.stderr)
-    return all(one.verdict == "passed" for one in outcomes)
+    for outcome in outcomes:
+        word = _WORDS[outcome.verdict]
+        print(f"bridgegen: {word}: {outcome.test} ({outcome.details})", file=sys.stderr)
+    return all(outcome.verdict == "passed" for outcome in outcomes)

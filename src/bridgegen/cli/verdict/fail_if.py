@@ -88,13 +88,15 @@ class FailCondition:
     @property
     def figures(self) -> tuple[str, ...]:
         """The names of the figures that it compares."""
-        return tuple(dict.fromkeys(one.figure for one in self.comparisons))
+        return tuple(dict.fromkeys(comparison.figure for comparison in self.comparisons))
 
     def judge(self, values: Mapping[str, float]) -> Outcome:
         """Apply it to the figures of a result; NaN is an unknown figure."""
-        known = [one for one in self.comparisons if not isnan(values[one.figure])]
+        known = [
+            comparison for comparison in self.comparisons if not isnan(values[comparison.figure])
+        ]
         verdict: Verdict = "failed" if len(known) == len(self.comparisons) else "unknown"
-        if any(not one.holds(values[one.figure]) for one in known):
+        if any(not comparison.holds(values[comparison.figure]) for comparison in known):
             verdict = "passed"
         details = ", ".join(f"{name} {_value_text(values[name])}" for name in self.figures)
         return Outcome(f"not {self.text}", verdict, details, self.figures)
@@ -111,29 +113,33 @@ def unless_judged(
         known: figures that are known all the same, as they are not of the ego.
     """
 
-    def passes(one: Outcome) -> bool:
-        return bool(one.figures) and {*one.figures} <= {*known}
+    def passes(outcome: Outcome) -> bool:
+        return bool(outcome.figures) and {*outcome.figures} <= {*known}
 
     return tuple(
-        replace(one, verdict="unknown", details=f"{one.details}; not judged: {why}")
-        if why and one.verdict == "passed" and not passes(one)
-        else one
-        for one in outcomes
+        replace(outcome, verdict="unknown", details=f"{outcome.details}; not judged: {why}")
+        if why and outcome.verdict == "passed" and not passes(outcome)
+        else outcome
+        for outcome in outcomes
     )
 
 
-def outcome_of(one: CriterionResult) -> Outcome:
+def outcome_of(criterion_result: CriterionResult) -> Outcome:
     """Return whether a scenario meets a pass criterion, as an outcome."""
     verdict: Verdict = "unknown"
-    if one.verdict != "unknown":
-        verdict = "passed" if one.verdict == "met" else "failed"
-    margin = margin_in_words(one.margin, one.unit, 6)
-    return Outcome(words_of(one.criterion), verdict, f"margin {margin}, {one.criterion.states}")
+    if criterion_result.verdict != "unknown":
+        verdict = "passed" if criterion_result.verdict == "met" else "failed"
+    margin = margin_in_words(criterion_result.margin, criterion_result.unit, 6)
+    return Outcome(
+        words_of(criterion_result.criterion),
+        verdict,
+        f"margin {margin}, {criterion_result.criterion.states}",
+    )
 
 
-def words_of(one: "Criterion") -> str:
+def words_of(criterion: "Criterion") -> str:
     """Return a pass criterion's id and requirement, as the name of a test."""
-    return f"{one.id}: {one.text or one.states}"
+    return f"{criterion.id}: {criterion.text or criterion.states}"
 
 
 def _value_text(value: float) -> str:

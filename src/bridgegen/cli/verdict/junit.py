@@ -79,11 +79,11 @@ def junit_xml(suites: Iterable[Suite]) -> bytes:
     for suite in suites:
         counts = {
             "tests": len(suite.cases),
-            "failures": sum(one.problem == "failure" for one in suite.cases),
-            "errors": sum(one.problem == "error" for one in suite.cases),
+            "failures": sum(item.problem == "failure" for item in suite.cases),
+            "errors": sum(item.problem == "error" for item in suite.cases),
         }
         total = {name: total[name] + count for name, count in counts.items()}
-        skipped = sum(one.problem == "skipped" for one in suite.cases)
+        skipped = sum(item.problem == "skipped" for item in suite.cases)
         element = etree.SubElement(root, "testsuite", name=_legal(suite.name), skipped=f"{skipped}")
         for name, count in counts.items():
             element.set(name, str(count))
@@ -120,7 +120,7 @@ def refuse_junit(path: Path) -> None:
     Raises:
         StorageError: its folder cannot be created, or a file exists that is not JUnit XML.
     """
-    folder = next(one for one in path.absolute().parents if one.exists())
+    folder = next(parent for parent in path.absolute().parents if parent.exists())
     if not folder.is_dir() or not os.access(folder, os.W_OK):
         raise StorageError(f"{path}: cannot be written: {folder} is not a writable folder")
     try:

@@ -45,7 +45,7 @@ class ConfirmationCriteria(Conditions):
             f"{s.confirmed} confirmed, {s.lost} not, {s.not_run} not run",
         )
         figures = figures_of(found)
-        outcomes = (ran, *(one.judge(figures) for one in self.conditions))
+        outcomes = (ran, *(condition.judge(figures) for condition in self.conditions))
         if self.junit is not None:
             write_junit(self.junit, _suites(found, outcomes))
         return outcomes
@@ -78,21 +78,23 @@ def _suites(found: RunConfirmation, outcomes: Sequence[Outcome]) -> list[Suite]:
         "ego": record.ego,
         "simulator": record.label,
     } | {key: f"{value:.6g}" for key, value in figures_of(found).items()}
-    broken = {figure for one in outcomes if one.verdict == "failed" for figure in one.figures}
-    cases = [case_of(group, one) for one in outcomes]
-    scenarios = [_case(one, group, broken) for one in found.scenarios]
+    broken = {
+        figure for outcome in outcomes if outcome.verdict == "failed" for figure in outcome.figures
+    }
+    cases = [case_of(group, outcome) for outcome in outcomes]
+    scenarios = [_case(scenario, group, broken) for scenario in found.scenarios]
     return [
         Suite(f"{name} in {record.simulator} criteria", cases, facts),
         Suite(f"{name} in {record.simulator}", scenarios),
     ]
 
 
-def _case(one: Scenario, group: str, broken: set[str]) -> Case:
+def _case(scenario: Scenario, group: str, broken: set[str]) -> Case:
     """Return a scenario as a test, failed if it contributes to a failed criterion."""
-    name = f"critical {one.name or f'evaluation {one.evaluation + 1}'}"
-    if one.there is None:
+    name = f"critical {scenario.name or f'evaluation {scenario.evaluation + 1}'}"
+    if scenario.there is None:
         contributes = "not_run" in broken
-        return Case(group, name, "failure" if contributes else None, "not run", one.failure)
-    contributes = not one.there.critical and any(figure in broken for figure in _OF_THE_LOST)
-    message = "confirmed" if one.there.critical else "not confirmed"
-    return Case(group, name, "failure" if contributes else None, message, one.explanation)
+        return Case(group, name, "failure" if contributes else None, "not run", scenario.failure)
+    contributes = not scenario.there.critical and any(figure in broken for figure in _OF_THE_LOST)
+    message = "confirmed" if scenario.there.critical else "not confirmed"
+    return Case(group, name, "failure" if contributes else None, message, scenario.explanation)

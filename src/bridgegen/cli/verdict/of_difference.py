@@ -26,7 +26,7 @@ class DifferenceCriteria(Conditions):
         """Apply the criteria, and write the JUnit XML if requested."""
         suite, found, searches = result.suite, result.difference, result.searches
         figures = figures_of(found, searches)
-        outcomes = tuple(one.judge(figures) for one in self.conditions)
+        outcomes = tuple(condition.judge(figures) for condition in self.conditions)
         why = named([f"{entry}: {text}" for entry, text in _unjudged(suite, found).items()])
         if not {"not_comparable", "not_judged_entries"} & {f for o in outcomes for f in o.figures}:
             outcomes = unless_judged(outcomes, why)
@@ -47,18 +47,18 @@ class DifferenceCriteria(Conditions):
 
 def figures_of(found: Difference, searches: Sequence[WorseThan]) -> dict[str, float]:
     """Return the figures of a difference and of its searches."""
-    compared = [one for one in found.rows if one.change != "not comparable"]
+    compared = [row for row in found.rows if row.change != "not comparable"]
     return {
         **{change.replace(" ", "_"): count for change, count in found.counts.items()},
-        "more_severe": sum(one.severity > 0.0 for one in compared),
-        "less_severe": sum(one.severity < 0.0 for one in compared),
-        "not_run": sum(not one.run for one in found.rows),
+        "more_severe": sum(row_change.severity > 0.0 for row_change in compared),
+        "less_severe": sum(row_change.severity < 0.0 for row_change in compared),
+        "not_run": sum(not row.run for row in found.rows),
         "not_judged_entries": len(found.unjudged),
         "p_value": found.p_value,
-        "worse": sum(one.worse for one in searches),
-        "worse_modes": sum(len(one.modes) for one in searches),
-        "worse_scenarios": sum(bool(one.worse) for one in searches),
-        "not_searched": sum(bool(one.problem) for one in searches),
+        "worse": sum(search.worse for search in searches),
+        "worse_modes": sum(len(search.modes) for search in searches),
+        "worse_scenarios": sum(bool(search.worse) for search in searches),
+        "not_searched": sum(bool(search.problem) for search in searches),
     }
 
 
@@ -72,9 +72,9 @@ def _none(test: str, figures: dict[str, float], wrong: str, unknown: str) -> Out
 def _unjudged(suite: SuiteRun, found: Difference) -> dict[str, str]:
     """Return by entry why it cannot be compared, of those of which too few variations can be."""
     whys: dict[str, list[str]] = {}
-    for one in suite.results:
-        if one.verdict == "not judged":
-            whys.setdefault(one.entry, []).append(f"{one.ego}: {one.unjudged}")
+    for result in suite.results:
+        if result.verdict == "not judged":
+            whys.setdefault(result.entry, []).append(f"{result.ego}: {result.unjudged}")
     return {entry: "; ".join([why, *whys.get(entry, [])]) for entry, why in found.unjudged.items()}
 
 
@@ -86,13 +86,13 @@ def _suites(
 ) -> Iterator[Suite]:
     """Yield a suite for each entry; before them, one of the conditions, if there are any."""
     if outcomes:
-        yield Suite("conditions", [case_of("bridgegen.diff", one) for one in outcomes])
-    by_entry, unjudged = {one.entry: one for one in searches}, _unjudged(suite, found)
+        yield Suite("conditions", [case_of("bridgegen.diff", outcome) for outcome in outcomes])
+    by_entry, unjudged = {than.entry: than for than in searches}, _unjudged(suite, found)
     broken: dict[str, list[int]] = {}
-    lost = {one.entry for one in found.rows if not one.run}
-    for one in found.rows:
-        if one.change == "broken":
-            broken.setdefault(one.entry, []).append(one.row)
+    lost = {row.entry for row in found.rows if not row.run}
+    for row in found.rows:
+        if row.change == "broken":
+            broken.setdefault(row.entry, []).append(row.row)
     for second in suite.of_ego(found.second):
         group = f"bridgegen.{second.entry.replace('/', '.')}.{found.second}"
         name, rows = f"passes what {found.first} passes", broken.get(second.entry, [])
@@ -108,8 +108,8 @@ def _suites(
         yield Suite(second.entry, cases, facts)
 
 
-def _runs(group: str, one: EntryResult, lost: bool) -> Case:
-    why = one.problem or "a variation did not run with one of the drivers"
+def _runs(group: str, entry_result: EntryResult, lost: bool) -> Case:
+    why = entry_result.problem or "a variation did not run with one of the drivers"
     return Case(group, "runs with both", "error" if lost else None, why if lost else "")
 
 

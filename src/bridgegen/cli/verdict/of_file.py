@@ -53,7 +53,9 @@ class FileCriteria:
     @property
     def metrics(self) -> tuple[str, ...]:
         """The metrics that must be measured."""
-        return tuple(dict.fromkeys(name for one in self.conditions for name in one.figures))
+        return tuple(
+            dict.fromkeys(name for condition in self.conditions for name in condition.figures)
+        )
 
     def judge(self, file: Path, result: FileResult) -> tuple[Outcome, ...]:
         """Apply the criteria to a result, and write the JUnit XML if requested.
@@ -70,8 +72,8 @@ class FileCriteria:
             f"{result.status}, {result.seconds:g} s simulated",
         )
         stated = (
-            *(one.judge(result.metrics) for one in self.conditions),
-            *(outcome_of(one) for one in result.criteria),
+            *(condition.judge(result.metrics) for condition in self.conditions),
+            *(outcome_of(criterion) for criterion in result.criteria),
         )
         outcomes = (ran, *unless_judged(stated, result.unjudged))
         if self.junit is not None:
@@ -83,6 +85,6 @@ class FileCriteria:
             parameters = {name: f"{value:.6g}" for name, value in result.parameters.items()}
             facts = {"file": str(file), "ego": result.driver, **metrics, **parameters}
             group = f"bridgegen.{file.stem}.{result.driver.replace('.', '_')}"
-            cases = [case_of(group, one) for one in outcomes]
+            cases = [case_of(group, outcome) for outcome in outcomes]
             write_junit(self.junit, [Suite(file.name, cases, facts)])
         return outcomes

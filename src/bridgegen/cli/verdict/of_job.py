@@ -26,20 +26,24 @@ class JobCriteria(Conditions):
         is_asked = bool(self.conditions) or self.junit is not None
         if not is_asked and not self.always:
             return ()
-        parts = [(one, self._of(one)) for one in result.judged()]
+        parts = [(judged, self._of(judged)) for judged in result.judged()]
         if self.junit is not None:
-            write_junit(self.junit, [_suite(*one) for one in parts])
-        found = tuple(one for _, some in parts for one in some)
-        return found if is_asked else tuple(one for one in found if one.verdict != "passed")
+            write_junit(self.junit, [_suite(*part) for part in parts])
+        found = tuple(outcome for _, some in parts for outcome in some)
+        return (
+            found
+            if is_asked
+            else tuple(outcome for outcome in found if outcome.verdict != "passed")
+        )
 
     def _of(self, part: Judged) -> list[Outcome]:
         head = f"{part.of}: " if part.of else ""
         verdict = "passed" if part.holds else "unknown"
         outcomes = [Outcome(f"{head}{part.test}", verdict, part.details)]  # type: ignore[arg-type]
-        if any(part.missing in one.figures for one in self.conditions):
+        if any(part.missing in condition.figures for condition in self.conditions):
             outcomes = []
-        for one in self.conditions:
-            outcome = one.judge(part.figures)
+        for condition in self.conditions:
+            outcome = condition.judge(part.figures)
             outcomes.append(replace(outcome, test=f"{head}{outcome.test}"))
         return outcomes
 
@@ -53,4 +57,4 @@ class JobVerdict(JobCriteria):
 def _suite(part: Judged, outcomes: Sequence[Outcome]) -> Suite:
     """Return the tests of a part, with its facts and figures as properties."""
     facts = {**part.facts, **{key: f"{value:.6g}" for key, value in part.figures.items()}}
-    return Suite(part.suite, [case_of(part.group, one) for one in outcomes], facts)
+    return Suite(part.suite, [case_of(part.group, outcome) for outcome in outcomes], facts)

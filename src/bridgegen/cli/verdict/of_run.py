@@ -27,7 +27,7 @@ from bridgegen.scenario.language.criteria import PREFIX, read_criterion
 from bridgegen.search.triage.record import NOT_JUDGED
 from bridgegen.search.triage.words import mode_in_words
 
-_CAUSES = {one.label.replace(" ", "_"): one.label for one in CAUSES}
+_CAUSES = {cause.label.replace(" ", "_"): cause.label for cause in CAUSES}
 """Labels of root causes by the figure's name."""
 
 _TRIAGE = {
@@ -112,13 +112,13 @@ class PassFailCriteria:
         if not texts and junit is None:
             return cls((), None)
         settings = Run(folder).settings
-        names = [read_criterion(one).quantity for one in settings.criteria]
+        names = [read_criterion(criterion).quantity for criterion in settings.criteria]
         return cls.read(texts, junit, causes=settings.causes, criteria=names)
 
     @property
     def figures(self) -> set[str]:
         """The names of all figures in the criteria."""
-        return {name for one in self.conditions for name in one.figures}
+        return {name for condition in self.conditions for name in condition.figures}
 
     def judge(self, run: Run) -> tuple[Outcome, ...]:
         """Apply the criteria to a run, and write the JUnit XML if requested.
@@ -130,8 +130,8 @@ class PassFailCriteria:
             return () if run.verdict != NOT_JUDGED else (_searched(run),)
         figures = figures_of(run)
         stated = (
-            *(one.judge(figures) for one in self.conditions),
-            *(_outcome_of(one) for one in run.criteria),
+            *(condition.judge(figures) for condition in self.conditions),
+            *(_outcome_of(criterion) for criterion in run.criteria),
         )
         outcomes = (_searched(run), *unless_judged(stated, _why_not(run), _NOT_OF_THE_EGO))
         if self.junit is not None:
@@ -153,21 +153,25 @@ def figures_of(run: Run) -> dict[str, float]:
         "v_d_best": s.v_d_best,
         "v_d_median": s.v_d_median,
         "stuck": float("nan") if (stuck := run.happening.stuck) is None else stuck,
-        **{n: s.causes.get(one, 0) if sought else nan for n, one in _CAUSES.items()},
+        **{n: s.causes.get(cause, 0) if sought else nan for n, cause in _CAUSES.items()},
         **_of_triage(run),
     }
-    figures |= {one.criterion.quantity: one.violated for one in run.criteria}
+    figures |= {criterion.criterion.quantity: criterion.violated for criterion in run.criteria}
     if s.failed == s.evaluations:
         figures = dict.fromkeys(figures, nan)
     return figures | {"evaluations": s.evaluations, "failed": s.failed, "seconds": s.seconds}
 
 
-def _outcome_of(one: CriterionSummary) -> Outcome:
+def _outcome_of(criterion_summary: CriterionSummary) -> Outcome:
     """Return whether all evaluations of a run meet a pass criterion, as an outcome."""
-    known = one.met + one.violated
-    verdict: Verdict = "unknown" if not known else "failed" if one.violated else "passed"
-    figures = (one.criterion.quantity,)
-    return Outcome(words_of(one.criterion), verdict, one.sentence, figures)
+    known = criterion_summary.met + criterion_summary.violated
+    verdict: Verdict = (
+        "unknown" if not known else "failed" if criterion_summary.violated else "passed"
+    )
+    figures = (criterion_summary.criterion.quantity,)
+    return Outcome(
+        words_of(criterion_summary.criterion), verdict, criterion_summary.sentence, figures
+    )
 
 
 def _of_triage(run: Run) -> dict[str, float]:
@@ -179,7 +183,7 @@ def _of_triage(run: Run) -> dict[str, float]:
     return {
         "modes": len(found.modes) + found.unrecorded_modes or min(found.bound.failures, 1),
         "robust": found.robust + found.unrecorded_modes if found.neighbours else nan,
-        "worst_severity": max((one.severity for one in found.modes), default=0.0),
+        "worst_severity": max((mode.severity for mode in found.modes), default=0.0),
         "harmful.upper": space.high if space.drawn and space.rows else nan,
     }
 
@@ -222,9 +226,9 @@ def _suites(run: Run, outcomes: Sequence[Outcome]) -> list[Suite]:
     } | {key: f"{value:.6g}" for key, value in figures_of(run).items()}
     if run.triage is not None:
         facts |= {"found": run.triage.bound.sentence}
-        facts |= {f"mode {one.number}": mode_in_words(one, run.triage) for one in run.modes}
-    cases = [case_of(group, one) for one in outcomes]
-    broken = [one for one in outcomes if one.verdict == "failed"]
+        facts |= {f"mode {mode.number}": mode_in_words(mode, run.triage) for mode in run.modes}
+    cases = [case_of(group, outcome) for outcome in outcomes]
+    broken = [outcome for outcome in outcomes if outcome.verdict == "failed"]
     scenarios = [_scenario(run, path, name, group, broken) for path in run.scenarios]
     return [Suite(f"{name} criteria", cases, facts, run.summary.seconds), *scenarios]
 
@@ -237,26 +241,26 @@ def _scenario(run: Run, path: Path, name: str, group: str, broken: Sequence[Outc
             f"{path.with_suffix('.json')}: is not what was exported: it has no "
             f"{', '.join(sorted(missing))}"
         )
-    failed = [one.test for one in broken if _contributes(facts, one.figures)]
-    values = {key: _text_of(one) for key, one in facts.metrics.items()}
+    failed = [outcome.test for outcome in broken if _contributes(facts, outcome.figures)]
+    values = {key: _text_of(metric) for key, metric in facts.metrics.items()}
     cause = f", cause: {facts.cause}" if facts.cause else ""
     what = "collision" if facts.metrics["n_collision"].value else "failure without a collision"
     message = f"{what}: d_min {values['d_min']} at v_d {values['v_d']}{cause}"
     files = sorted(path.parent.glob(f"{path.stem}.*"))
     text = "\n".join(
         [
-            *(f"against: {one}" for one in failed),
+            *(f"against: {item}" for item in failed),
             f"again: bridgegen simulate {path}",
             f"playback: {run.report}",
             f"files: {' '.join(str(file) for file in files)}",
             "parameters:",
-            *(f"  {key} = {_text_of(one)}" for key, one in facts.parameters.items()),
+            *(f"  {key} = {_text_of(parameter)}" for key, parameter in facts.parameters.items()),
             "metrics:",
             *(f"  {key} = {value}" for key, value in values.items()),
         ]
     )
     case = Case(group, f"critical {path.stem}", "failure" if failed else None, message, text)
-    properties = values | {key: _text_of(one) for key, one in facts.parameters.items()}
+    properties = values | {key: _text_of(parameter) for key, parameter in facts.parameters.items()}
     properties |= {"cause": facts.cause or "", "evaluation": str(facts.evaluation)}
     if facts.robustness is not None:
         properties |= {"mode": str(facts.mode), "robustness": f"{facts.robustness:.6g}"}
@@ -276,11 +280,11 @@ def _contributes(facts: Facts, figures: Sequence[str]) -> bool:
     return False
 
 
-def _text_of(one: ParameterValue | Quantity) -> str:
+def _text_of(parameter_value: ParameterValue | Quantity) -> str:
     """Return a value with its unit; null is infinite, since exported values are never NaN."""
-    if one.value is None:
+    if parameter_value.value is None:
         return "inf"
-    if isinstance(one.value, str):
-        return one.value
-    unit = "" if one.unit in ("1", "count") else f" {one.unit}"
-    return f"{one.value:.6g}{unit}"
+    if isinstance(parameter_value.value, str):
+        return parameter_value.value
+    unit = "" if parameter_value.unit in ("1", "count") else f" {parameter_value.unit}"
+    return f"{parameter_value.value:.6g}{unit}"

@@ -36,8 +36,10 @@ class SuiteCriteria(Conditions):
     def judge(self, suite: SuiteRun) -> tuple[Outcome, ...]:
         """Apply the criteria to a suite, and write the JUnit XML if requested."""
         figures = figures_of(suite)
-        outcomes = tuple(one.judge(figures) for one in self.conditions)
-        if not {"not_judged", "not_judged_entries"} & {f for one in outcomes for f in one.figures}:
+        outcomes = tuple(condition.judge(figures) for condition in self.conditions)
+        if not {"not_judged", "not_judged_entries"} & {
+            f for outcome in outcomes for f in outcome.figures
+        }:
             outcomes = unless_judged(outcomes, unjudged_entries(suite.results))
         if not outcomes:
             outcomes = tuple(_all_pass(suite, ego) for ego in suite.egos)
@@ -50,24 +52,24 @@ def figures_of(suite: SuiteRun) -> dict[str, float]:
     """Return the figures of a suite, and of each criterion the variations that violate it."""
     results = suite.results
     standing = suite.known_failures.counts(results)
-    rows = [row for one in results for row in one.rows]
+    rows = [row for result in results for row in result.rows]
     number = counts(results)
     figures: dict[str, float] = {
         "entries": len(results),
         "variations": len(rows),
         "passed": number["passed"],
         "failed": number["failed"],
-        "known": sum(standing[one] for one in EXCUSED),
+        "known": sum(standing[item] for item in EXCUSED),
         "regressions": standing["regression"],
         "new_failures": standing["new"],
         "not_judged": number["not judged"],
-        "not_judged_entries": sum(one.verdict == "not judged" for one in results),
+        "not_judged_entries": sum(result.verdict == "not judged" for result in results),
         "not_run": number["not run"],
-        "failed_entries": sum(one.verdict == "failed" for one in results),
+        "failed_entries": sum(result.verdict == "failed" for result in results),
         "failed_clauses": sum(
-            one.verdict == "failed"
+            result.verdict == "failed"
             for ego in dict.fromkeys(each.ego for each in results)
-            for one in clause_results(results, ego)
+            for result in clause_results(results, ego)
         ),
         "critical": sum(row.critical for row in rows),
         "collisions": sum(row.collisions > 0 for row in rows),
@@ -76,10 +78,10 @@ def figures_of(suite: SuiteRun) -> dict[str, float]:
         "worst_impact": max((row.impact_speed for row in rows), default=0.0),
         "worst_severity": max((row.severity for row in rows), default=0.0),
     }
-    for one in results:
-        for number_of, given in enumerate(one.criteria):
+    for result in results:
+        for number_of, given in enumerate(result.criteria):
             name = read_criterion(given).quantity
-            violated = sum(number_of in row.violated for row in one.rows)
+            violated = sum(number_of in row.violated for row in result.rows)
             figures[name] = figures.get(name, 0.0) + violated
     return figures
 
@@ -104,7 +106,7 @@ def _all_pass(suite: SuiteRun, ego: str) -> Outcome:
     details += f", {number['not judged']} not judged" if number["not judged"] else ""
     details += f", {number['not run']} not run" if number["not run"] else ""
     standing = suite.known_failures.counts(results)
-    known = sum(standing[one] for one in EXCUSED)
+    known = sum(standing[name] for name in EXCUSED)
     if known:
         details += f"; {known} of the failed {'is' if known == 1 else 'are'} known"
     if again := suite.known_failures.regressions(results):
@@ -124,67 +126,75 @@ def _suites(suite: SuiteRun, outcomes: Sequence[Outcome]) -> list[Suite]:
     """Return each entry of each ego as a suite; the conditions, if any, as one more."""
     found = []
     if outcomes:
-        found.append(Suite("conditions", [case_of("bridgegen.suite", one) for one in outcomes]))
-    for one in suite.results:
-        group = f"bridgegen.{one.entry.replace('/', '.')}.{(one.ego or one.driver or 'ego')}"
+        found.append(
+            Suite("conditions", [case_of("bridgegen.suite", outcome) for outcome in outcomes])
+        )
+    for result in suite.results:
+        group = (
+            f"bridgegen.{result.entry.replace('/', '.')}.{(result.ego or result.driver or 'ego')}"
+        )
         facts = {
-            "scenario": one.scenario,
-            "distribution": one.distribution,
-            "ego": one.driver or one.ego,
-            "variations": str(len(one.rows)),
-            **{name.replace(" ", "_"): str(n) for name, n in one.outcomes().items()},
+            "scenario": result.scenario,
+            "distribution": result.distribution,
+            "ego": result.driver or result.ego,
+            "variations": str(len(result.rows)),
+            **{name.replace(" ", "_"): str(n) for name, n in result.outcomes().items()},
         }
         facts |= {
             f"clause {clause.id}": clause_in_words(clause)
-            for clause in clause_results([one], one.ego)
+            for clause in clause_results([result], result.ego)
         }
-        failure = suite.known_failures.failures.get(one.entry)
+        failure = suite.known_failures.failures.get(result.entry)
         if failure is not None:
             facts |= {"failure": failure[0], "status": failure[1].status}
-        found.append(Suite(one.entry, _cases(suite, one, group), facts))
+        found.append(Suite(result.entry, _cases(suite, result, group), facts))
     return found
 
 
-def _cases(suite: SuiteRun, one: EntryResult, group: str) -> list[Case]:
+def _cases(suite: SuiteRun, entry_result: EntryResult, group: str) -> list[Case]:
     """Return the tests of an entry: that it runs, that no variation is critical, its criteria.
 
     What fails as it is known to is skipped. Where the entry is not judged, none passes.
     """
-    if one.problem:
-        return [Case(group, "runs", "error", one.problem)]
+    if entry_result.problem:
+        return [Case(group, "runs", "error", entry_result.problem)]
     stated = suite.known_failures
-    failure = stated.failures.get(one.entry)
+    failure = stated.failures.get(entry_result.entry)
     again = failure is not None and failure[1].status == "fixed"
 
     def case(name: str, rows: Sequence[int], what: str, known: bool) -> Case:
         if rows and known and failure is not None:
             return case_of_rows(
-                group, name, one, rows, f"{what}: {failure[1].status} failure", "skipped"
+                group, name, entry_result, rows, f"{what}: {failure[1].status} failure", "skipped"
             )
         what += ": regression, this failure was fixed" if again and rows else ""
-        return case_of_rows(group, name, one, rows, what, "failure", suite)
+        return case_of_rows(group, name, entry_result, rows, what, "failure", suite)
 
-    lost = [i for i, row in enumerate(one.rows) if row.problem]
-    cases = [case_of_rows(group, "runs", one, lost, "did not run", "error")]
-    odd = [i for i, verdict in enumerate(one.verdicts) if verdict == "not judged"]
-    critical = [i for i, row in enumerate(one.rows) if row.critical]
-    excused = all(stated.is_excused(one, one.rows[i]) for i in critical)
+    lost = [i for i, row in enumerate(entry_result.rows) if row.problem]
+    cases = [case_of_rows(group, "runs", entry_result, lost, "did not run", "error")]
+    odd = [i for i, verdict in enumerate(entry_result.verdicts) if verdict == "not judged"]
+    critical = [i for i, row in enumerate(entry_result.rows) if row.critical]
+    excused = all(stated.is_excused(entry_result, entry_result.rows[i]) for i in critical)
     cases.append(case("no critical scenario", critical, "critical", excused))
-    for number, given in enumerate(one.criteria):
-        violating = [i for i, row in enumerate(one.rows) if number in row.violated]
+    for number, given in enumerate(entry_result.criteria):
+        violating = [i for i, row in enumerate(entry_result.rows) if number in row.violated]
         words = words_of(read_criterion(given))
-        cases.append(case(words, violating, "violate it", stated.is_criterion_excused(one, number)))
-    for number, given in enumerate(one.clauses):
+        cases.append(
+            case(words, violating, "violate it", stated.is_criterion_excused(entry_result, number))
+        )
+    for number, given in enumerate(entry_result.clauses):
         clause = read_clause(given)
-        failing = [i for i, letter in enumerate(one.letters(number)) if letter == FAILED]
+        failing = [i for i, letter in enumerate(entry_result.letters(number)) if letter == FAILED]
         name = f"clause {clause.id}: {clause.text}"
         cases.append(case(name, failing, "fail it", known=False))
-    if one.verdict != "not judged":
+    if entry_result.verdict != "not judged":
         return cases
-    why = case_of_rows(group, "", one, odd, f"not judged: {one.unjudged}", "error")
+    why = case_of_rows(
+        group, "", entry_result, odd, f"not judged: {entry_result.unjudged}", "error"
+    )
     return [
         each if each.problem or each.name == "runs"
-        else replace(why, name=each.name, message=f"not judged: {one.unjudged}")
+        else replace(why, name=each.name, message=f"not judged: {entry_result.unjudged}")
         for each in cases
     ]  # fmt: skip
 
@@ -192,7 +202,7 @@ def _cases(suite: SuiteRun, one: EntryResult, group: str) -> list[Case]:
 def case_of_rows(
     group: str,
     name: str,
-    one: EntryResult,
+    entry_result: EntryResult,
     rows: Sequence[int],
     what: str,
     problem: Problem,
@@ -203,24 +213,24 @@ def case_of_rows(
     Args:
         group: of tests.
         name: of the test.
-        one: the entry's results.
+        entry_result: the entry's results.
         rows: the numbers of these variations.
         what: what is wrong with them, in words.
         problem: that the test has.
         suite: to say how to see the first again; not said without.
     """
-    message = f"{len(rows)} of {len(one.rows)} variations {what}"
-    lines = [row_in_words(one, i, one.rows[i]) for i in rows[:MOST_NAMED]]
+    message = f"{len(rows)} of {len(entry_result.rows)} variations {what}"
+    lines = [row_in_words(entry_result, i, entry_result.rows[i]) for i in rows[:MOST_NAMED]]
     if len(rows) > MOST_NAMED:
         lines.append(f"and {len(rows) - MOST_NAMED} more")
     if rows and suite is not None:
-        lines.append(f"the first again: {replay_command(suite.folder, one, rows[0])}")
+        lines.append(f"the first again: {replay_command(suite.folder, entry_result, rows[0])}")
     return Case(group, name, problem if rows else None, message, "\n".join(lines))
 
 
-def row_in_words(one: EntryResult, i: int, row: RowResult) -> str:
+def row_in_words(entry_result: EntryResult, i: int, row: RowResult) -> str:
     """Return a variation in a line: its values, and what happened."""
-    values = zip(one.parameters, row.x, one.units, strict=True)
+    values = zip(entry_result.parameters, row.x, entry_result.units, strict=True)
     named = ", ".join(
         f"{name} = {value if isinstance(value, str) else f'{value:.6g}'}"
         + (f" {unit}" if unit not in ("1", "count", "?") else "")

@@ -94,7 +94,7 @@ _of_thread = _OfThread()
 
 @lru_cache(maxsize=64)
 def _fields_of(kind: Any) -> tuple[str, ...]:
-    return tuple(one.name for one in fields(kind))
+    return tuple(field.name for field in fields(kind))
 
 
 def length(head: bytes | bytearray) -> int:
@@ -180,7 +180,7 @@ def _is_deeper(value: Any, depth: int) -> bool:
         value = value.values()
     elif type(value) is not list:
         return False
-    return depth == 0 or any(_is_deeper(one, depth - 1) for one in value)
+    return depth == 0 or any(_is_deeper(item, depth - 1) for item in value)
 
 
 def _array(part: Message) -> Any:

@@ -264,5 +264,5 @@ def _short(value: Any) -> str:
 
 def _line(text: str) -> str:
     """Return a text from elsewhere as one line without control characters."""
-    shown = "".join(one if one.isprintable() else " " for one in text[:MAX_MESSAGE])
+    shown = "".join(name if name.isprintable() else " " for name in text[:MAX_MESSAGE])
     return " ".join(shown.split())

@@ -159,7 +159,7 @@ def _control(answer: Any) -> messages.Message:
         return {"type": "trajectory", **{name: _floats(getattr(answer, name)) for name in names}}
     try:
         pair = (answer.acceleration, answer.curvature) if hasattr(answer, "curvature") else answer
-        acceleration, curvature = (_floats(one) for one in pair)
+        acceleration, curvature = (_floats(item) for item in pair)
     except (TypeError, ValueError) as error:
         text = f"act must return a Control or (acceleration, curvature): {error}"
         raise messages.ProtocolError(text) from None
@@ -182,13 +182,13 @@ def _described(error: Exception) -> str:
 def _take(record: Any, rows: Any) -> Any:
     """Return the observation of some of the scenarios."""
     found = {}
-    for one in fields(record):
-        value = getattr(record, one.name)
+    for field in fields(record):
+        value = getattr(record, field.name)
         if isinstance(value, np.ndarray):
             value = value[rows]
         elif is_dataclass(value):
             value = _take(value, rows)
-        found[one.name] = value
+        found[field.name] = value
     return type(record)(**found)
 
 
@@ -202,16 +202,16 @@ def _record(name: str, values: messages.Message) -> Any:
         _classes[key] = make_dataclass(name, values, frozen=True, namespace={"take": _take})
     record = object.__new__(_classes[key])
     parts = vars(record)  # a frozen class sets its attributes slowly
-    for one, value in values.items():
+    for item, value in values.items():
         kind = type(value)
-        parts[one] = _part(one, value) if kind is dict or kind is list else value
+        parts[item] = _part(item, value) if kind is dict or kind is list else value
     return record
 
 
 def _part(name: str, value: Any) -> Any:
     if isinstance(value, dict):
         return _record(name, value)
-    return tuple(_part(name, one) for one in value) if isinstance(value, list) else value
+    return tuple(_part(name, item) for item in value) if isinstance(value, list) else value
 
 
 # --- The command line -----------------------------------------------------------------------------

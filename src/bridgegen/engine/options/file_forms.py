@@ -44,17 +44,17 @@ def _word(value: Any) -> str:
 
 def _words(value: Any) -> list[str]:
     if isinstance(value, list):
-        return [_word(one) for one in value]
+        return [_word(item) for item in value]
     return [_word(value)]
 
 
 def _pairs(value: Any, text: Callable[[Any], str]) -> list[str]:
     if not isinstance(value, dict):
         raise ValueError("must be a mapping, NAME: VALUE")
-    wrong = [name for name, one in value.items() if not isinstance(one, bool | int | float | str)]
+    wrong = [name for name, item in value.items() if not isinstance(item, bool | int | float | str)]
     if wrong or "" in value.values():
         raise ValueError("must be a mapping of names to numbers or texts")
-    return [f"{name}={text(one)}" for name, one in value.items()]
+    return [f"{name}={text(item)}" for name, item in value.items()]
 
 
 def _setting(text: str) -> Any:
@@ -80,17 +80,19 @@ def _split(pairs: list[str], value: Callable[[str], Any]) -> dict[str, Any]:
 def _criteria(value: Any) -> list[str]:
     """Return criteria as texts; mappings become JSON, which is YAML in braces."""
     given = value if isinstance(value, list) else [value]
-    if not all(isinstance(one, str | dict) for one in given):
+    if not all(isinstance(item, str | dict) for item in given):
         raise ValueError("must be a list of criteria: mappings, or texts ID: FORMULA")
-    return [one if isinstance(one, str) else json.dumps(one, ensure_ascii=False) for one in given]
+    return [
+        item if isinstance(item, str) else json.dumps(item, ensure_ascii=False) for item in given
+    ]
 
 
 def _plain_criteria(texts: list[str]) -> list[Any]:
     from bridgegen.scenario.language.plain_yaml import read_plain_yaml
 
     return [
-        read_plain_yaml(one.encode(), "--criterion").data if one.startswith("{") else one
-        for one in texts
+        read_plain_yaml(text.encode(), "--criterion").data if text.startswith("{") else text
+        for text in texts
     ]
 
 
@@ -131,7 +133,9 @@ CRITERIA = FileForm(
 )
 FIXED = FileForm(
     _PAIRS,
-    lambda value: _pairs(value, lambda one: repr(one) if isinstance(one, float) else str(one)),
+    lambda value: _pairs(
+        value, lambda value: repr(value) if isinstance(value, float) else str(value)
+    ),
     lambda pairs: _split(pairs, _fixed),
 )
 SETTINGS = FileForm(

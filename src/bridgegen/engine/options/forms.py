@@ -182,18 +182,18 @@ def _kept_criteria(
     )
 
     found: list[Criterion] = []
-    for one in given:
-        if isinstance(one, str):
-            found += read_criteria([one])
+    for name in given:
+        if isinstance(name, str):
+            found += read_criteria([name])
         else:
-            found.append(one if isinstance(one, Criterion) else read_criterion(one))
-    return tuple(one.to_dict() for one in joined(found))
+            found.append(name if isinstance(name, Criterion) else read_criterion(name))
+    return tuple(criterion.to_dict() for criterion in joined(found))
 
 
 def _criteria_texts(given: Iterable[Mapping[str, Any]]) -> list[str]:
     from bridgegen.scenario.language.criteria import in_words, read_criterion
 
-    return [in_words(read_criterion(one)) for one in given]
+    return [in_words(read_criterion(record)) for record in given]
 
 
 def _kept_terms(terms: Mapping[str, float | None] | Iterable[str] | None) -> Any:
@@ -261,7 +261,7 @@ NAMES = Form(
     _repeated(lambda names: [",".join(names)] if names else []),
     lambda names: None if names is None else tuple(names),
     file_forms.NAMES,
-    lambda names: isinstance(names, tuple) and all(isinstance(one, str) for one in names),
+    lambda names: isinstance(names, tuple) and all(isinstance(name, str) for name in names),
     "names",
 )
 """Form of a list of names: ``name,name``."""

@@ -67,7 +67,7 @@ class Option:
         if value is None or (isinstance(value, bool) and value == self.default):
             return []
         words = self.form.words(self.spelling, value)
-        return [one for one in words if one != self.spelling] if self.is_argument else words
+        return [word for word in words if word != self.spelling] if self.is_argument else words
 
 
 def option(
@@ -96,23 +96,23 @@ def options_of(kind: type[Any]) -> tuple[Option, ...]:
     """
     classes = [base for base in kind.__mro__ if "__dataclass_fields__" in vars(base)]
     declared = {
-        one.name: one
+        field.name: field
         for base in reversed(classes)
-        for one in fields(base)
-        if "option" in one.metadata
+        for field in fields(base)
+        if "option" in field.metadata
     }
     first = {name: base for base in classes for name in vars(base)["__annotations__"]}
     return tuple(
         replace(
-            one.metadata["option"],
-            help=one.metadata["help"],
-            spelling=one.metadata["option"].spelling or f"--{one.name.replace('_', '-')}",
-            name=one.name,
-            default=None if one.default is MISSING else one.default,
-            is_required=one.default is MISSING and one.default_factory is MISSING,
+            field.metadata["option"],
+            help=field.metadata["help"],
+            spelling=field.metadata["option"].spelling or f"--{field.name.replace('_', '-')}",
+            name=field.name,
+            default=None if field.default is MISSING else field.default,
+            is_required=field.default is MISSING and field.default_factory is MISSING,
         )
         for base in classes
-        for name, one in declared.items()
+        for name, field in declared.items()
         if first[name] is base
     )
 
@@ -120,13 +120,13 @@ def options_of(kind: type[Any]) -> tuple[Option, ...]:
 def range_problems(options: object) -> list[str]:
     """Return what is wrong with numbers that are out of an option's limits."""
     problems = []
-    for one in options_of(type(options)):
-        value = getattr(options, one.name)
-        if one.limits and value is not None and not one.limits[0] <= value <= one.limits[1]:
-            low, high = one.limits
+    for item in options_of(type(options)):
+        value = getattr(options, item.name)
+        if item.limits and value is not None and not item.limits[0] <= value <= item.limits[1]:
+            low, high = item.limits
             problems.append(
-                f"{low} <= {one.name} <= {high} must hold, got {value} "
-                f"({one.spelling}: {one.help[0].lower()}{one.help[1:].rstrip('.')})"
+                f"{low} <= {item.name} <= {high} must hold, got {value} "
+                f"({item.spelling}: {item.help[0].lower()}{item.help[1:].rstrip('.')})"
             )
     return problems
 
@@ -136,10 +136,10 @@ class Declared:
 
     def __post_init__(self) -> None:
         problems: list[str] = []
-        for one in options_of(type(self)):
+        for item in options_of(type(self)):
             try:
-                kept = one.form.taken(getattr(self, one.name), one.name, one.default)
-                object.__setattr__(self, one.name, kept)
+                kept = item.form.taken(getattr(self, item.name), item.name, item.default)
+                object.__setattr__(self, item.name, kept)
             except InputError as error:
                 problems += error.problems
         if problems:
@@ -207,9 +207,9 @@ def _require_signature(
     Raises:
         InputError: for the first of them.
     """
-    for one in named:
-        if one not in signature.parameters:
-            raise UnknownNameError(f"argument of {name}", one, signature.parameters)
+    for item in named:
+        if item not in signature.parameters:
+            raise UnknownNameError(f"argument of {name}", item, signature.parameters)
     try:
         signature.bind(*given, **named)
     except TypeError as error:
@@ -223,23 +223,23 @@ def _require_types(arguments: Any) -> None:
         InputError: names all of them.
     """
     problems = []
-    for one in fields(arguments):
-        value = getattr(arguments, one.name)
+    for field in fields(arguments):
+        value = getattr(arguments, field.name)
         is_whole = isinstance(value, Integral) and not isinstance(value, bool)
         try:
-            fits = isinstance(int(value) if is_whole else value, one.type)  # type: ignore[arg-type]
+            fits = isinstance(int(value) if is_whole else value, field.type)  # type: ignore[arg-type]
         except TypeError:  # the type is of elements, too
             continue
-        if "option" not in one.metadata and not fits and not (one.type is float and is_whole):
-            kind = inspect.formatannotation(one.type)
-            problems.append(f"{one.name} must be {kind}, got {value!r}")
+        if "option" not in field.metadata and not fits and not (field.type is float and is_whole):
+            kind = inspect.formatannotation(field.type)
+            problems.append(f"{field.name} must be {kind}, got {value!r}")
     if problems:
         raise InputError(*problems)
 
 
 def _described(arguments: Any, signature: inspect.Signature) -> str:
     """Return the section ``Args:`` of a docstring."""
-    declared = {one.name: one.metadata for one in fields(arguments)}
+    declared = {field.name: field.metadata for field in fields(arguments)}
     lines = ["Args:"]
     for name in signature.parameters:
         option = declared[name].get("option")

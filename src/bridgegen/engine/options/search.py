@@ -151,7 +151,7 @@ class PipelineOptions(Declared):
             options: of any class; what it lacks keeps its default.
             changes: fields, by name; those that ``options`` lacks among them.
         """
-        shared = vars(options).keys() & {one.name for one in fields(cls)}
+        shared = vars(options).keys() & {item.name for item in fields(cls)}
         return cls(**{name: getattr(options, name) for name in shared} | changes)
 
 

@@ -155,7 +155,7 @@ class Cluster(WorkerPool[int]):
 
     def _start_worker(self) -> int:
         number, taken = next(self._numbers), set(self._slots.values())
-        slot = next(one for one in itertools.count() if one not in taken)
+        slot = next(item for item in itertools.count() if item not in taken)
         self._slots[number] = slot
         self._request(RayBridge.start_worker, number, slot)
         return number

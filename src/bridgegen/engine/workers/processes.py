@@ -99,7 +99,7 @@ class Processes(WorkerPool[Process]):
     @property
     def pids(self) -> tuple[int, ...]:
         """The process numbers of the workers that have been started."""
-        return tuple(one.pid for one in self._workers)
+        return tuple(worker.pid for worker in self._workers)
 
     def _start_worker(self) -> Process:
         return Process(self._said)

@@ -220,10 +220,10 @@ class Benchmark:
         """Return what is known of each driver."""
         return [
             {
-                **vars(one), "first": one.first if isfinite(one.first) else None,
-                "avoided": {k: v if isfinite(v) else None for k, v in one.avoided.items()},
+                **vars(standing), "first": standing.first if isfinite(standing.first) else None,
+                "avoided": {k: v if isfinite(v) else None for k, v in standing.avoided.items()},
             }
-            for one in self.standings
+            for standing in self.standings
         ]  # fmt: skip
 
     def shown(self) -> list[str | Table]:
@@ -235,7 +235,7 @@ class Benchmark:
         )  # fmt: skip
         gaps = [f"missing: {cell.name}: {why}" for cell, why in self.gaps.items()]
         return [
-            Table(head, [_row(one) for one in self.standings], texts=2),
+            Table(head, [_row(standing) for standing in self.standings], texts=2),
             *gaps,
             f"\n{'page':<12}{self.page}",
             f"{'tables':<12}{self.plan.out / '*.csv'}",
@@ -247,28 +247,41 @@ class Benchmark:
         facts = {"command": self.plan.command(), "page": str(self.page)}
         return [
             Judged(
-                suite="planners", group=f"bridgegen.planners.{one.driver.replace('.', '_')}",
-                test="it drove", holds=one.driven > 0,
-                details=f"{one.evaluations} evaluations in {one.driven} scenarios",
+                suite="planners",
+                group=f"bridgegen.planners.{standing.driver.replace('.', '_')}",
+                test="it drove",
+                holds=standing.driven > 0,
+                details=f"{standing.evaluations} evaluations in {standing.driven} scenarios",
                 figures={
-                    "modes": one.modes, "robust": one.robust, "severity": one.severity,
-                    "failures": one.failures, "failed_rows": one.failed_rows,
-                    "no_result": one.failed,
+                    "modes": standing.modes,
+                    "robust": standing.robust,
+                    "severity": standing.severity,
+                    "failures": standing.failures,
+                    "failed_rows": standing.failed_rows,
+                    "no_result": standing.failed,
                 },
-                facts=facts, of=f"{one.driver}, {COLUMNS[one.column]}",
+                facts=facts,
+                of=f"{standing.driver}, {COLUMNS[standing.column]}",
             )
-            for one in self.standings
-        ]  # fmt: skip
+            for standing in self.standings
+        ]
 
 
-def _row(one: Standing) -> list[object]:
-    shares = (one.avoided.get(name, nan) for name in CAREFUL)
+def _row(standing: Standing) -> list[object]:
+    shares = (standing.avoided.get(name, nan) for name in CAREFUL)
     return [
-        one.driver, COLUMNS[one.column].removesuffix(" perception"), one.modes, one.robust,
-        number(one.first, 0), f"{one.severity:.2f}",
+        standing.driver,
+        COLUMNS[standing.column].removesuffix(" perception"),
+        standing.modes,
+        standing.robust,
+        number(standing.first, 0),
+        f"{standing.severity:.2f}",
         *(number(100 * share, 0) + ("" if isnan(share) else " %") for share in shares),
-        one.driven, one.not_applicable, one.failed, one.failed_rows,
-    ]  # fmt: skip
+        standing.driven,
+        standing.not_applicable,
+        standing.failed,
+        standing.failed_rows,
+    ]
 
 
 @called_with(BenchmarkOptions)
@@ -302,7 +315,9 @@ def benchmark_planners(given: BenchmarkOptions) -> Benchmark:
     effort(triage)
     resolve(toolkit.get(algorithm), Problem.unnamed(1), 0, {})
     taking_part = entrants(given.drivers or None, QUICK_DRIVERS if quick else ours())
-    searched = [str(one) for one in given.scenarios or (QUICK_SCENARIOS if quick else catalogue())]
+    searched = [
+        str(scenario) for scenario in given.scenarios or (QUICK_SCENARIOS if quick else catalogue())
+    ]
     folder = Path(given.out or Path("benchmarks") / ("planners-quick" if quick else "planners"))
     callbacks.stage("reading the scenarios")
     callbacks.compile()
@@ -340,7 +355,7 @@ def _run(plan: Plan, at_once: int, callbacks: JobCallbacks, done: list[str]) -> 
     plan, speeds = measured(plan, lambda driver: callbacks.stage(f"measuring {driver}"))
     failures: dict[Cell, str] = {}
     tasks, ended, made = searches(plan, failures)
-    waiting = {one.name for one in tasks}
+    waiting = {task.name for task in tasks}
     done += [cell.name for cell in plan.cells if cell.name not in waiting and cell not in failures]
     _say_plan(plan, seconds_of(plan, speeds, at_once), callbacks)
     callbacks.stage("searching")
@@ -407,9 +422,9 @@ class _Counting(RunsProgress):
 
 def _say_plan(plan: Plan, seconds: float, callbacks: JobCallbacks) -> None:
     """Say who does not take part, and how long the runs take."""
-    for one in plan.entrants:
-        if one.problem:
-            callbacks.say(f"{one.name}: {one.problem}")
+    for entrant in plan.entrants:
+        if entrant.problem:
+            callbacks.say(f"{entrant.name}: {entrant.problem}")
     callbacks.say(
         f"{len(plan.cells)} runs of {plan.budget:,} evaluations: about {_duration(seconds)}, by "
         "the speed of each driver on this machine; less where runs have ended already"

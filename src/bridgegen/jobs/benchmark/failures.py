@@ -100,7 +100,7 @@ def recorded(folder: Path) -> tuple[Scene, list[Observation]]:
     found = list(_read(folder / _SEEN))
     scene, seen = found[0], found[1:]
     assert isinstance(scene, Scene)
-    return scene, [one.take(slice(0, 1)) for one in seen]
+    return scene, [item.take(slice(0, 1)) for item in seen]
 
 
 def _read(path: Path) -> Iterator[Any]:
@@ -177,7 +177,7 @@ def failures_of(run: Run, rows: Rows) -> Failures:
     severity = rows.metrics[at, run.metrics.index("severity")]
     return Failures(
         at,
-        tuple(zip(*(one.tolist() for one in columns), strict=True)),
+        tuple(zip(*(column.tolist() for column in columns), strict=True)),
         tuple(np.nan_to_num(severity).tolist()),
         int(harmful.sum() - own.sum()),
     )
@@ -244,19 +244,19 @@ def write_reproductions(run: Run, rows: Rows) -> dict[str, str]:
     """
     notes = {}
     adapter = _adapter(run.settings.ego)
-    for one in run.exported():
-        stem = run.folder / "critical" / one.name
+    for exported in run.exported():
+        stem = run.folder / "critical" / exported.name
         text, seen = "", {}
         if adapter is not None:
             try:
-                seen = _seen(run, rows, one.evaluation, adapter.export)
-                text = adapter.reproduction(f"{one.name}{OBSERVATIONS}")
+                seen = _seen(run, rows, exported.evaluation, adapter.export)
+                text = adapter.reproduction(f"{exported.name}{OBSERVATIONS}")
             except Exception as error:  # of a planner, or of its adapter
-                notes[one.name] = f"{type(error).__name__}: {error}"
+                notes[exported.name] = f"{type(error).__name__}: {error}"
         if seen:
-            _write_arrays(stem.with_name(f"{one.name}{OBSERVATIONS}"), seen)
-        script = text or _with_bridgegen(run, one.name)
-        write_whole(stem.with_name(f"{one.name}{SCRIPT}"), [script.encode()])
+            _write_arrays(stem.with_name(f"{exported.name}{OBSERVATIONS}"), seen)
+        script = text or _with_bridgegen(run, exported.name)
+        write_whole(stem.with_name(f"{exported.name}{SCRIPT}"), [script.encode()])
     return notes
 
 
@@ -285,7 +285,7 @@ def _seen(
         pipeline.rollout(rows.X[[evaluation]])
         pipeline.runner.simulator.stop()
         scene, observations = recorded(Path(name))
-    return {key: np.asarray(one) for key, one in export(observations, scene).items()}
+    return {key: np.asarray(item) for key, item in export(observations, scene).items()}
 
 
 def _write_arrays(path: Path, arrays: Mapping[str, np.ndarray]) -> None:

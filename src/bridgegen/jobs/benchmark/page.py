@@ -23,17 +23,17 @@ def write_page(
     Raises:
         StorageError: it cannot be written.
     """
-    known = {(one.driver, one.scenario, one.column): one for one in found}
+    known = {(outcome.driver, outcome.scenario, outcome.column): outcome for outcome in found}
     templates.write_page(
         path, "jobs/benchmark/page.html",
         title="Benchmark of planners",
         facts=[*_facts(plan, found)],
-        standings=[(one, _measured(one)) for one in standings],
-        entrants=[_entrant(one, found) for one in plan.entrants],
+        standings=[(standing, _measured(standing)) for standing in standings],
+        entrants=[_entrant(entrant, found) for entrant in plan.entrants],
         scenarios=[
             (name, in_words(plan.needs[name]), [
-                _cell([known[one.name, name, column] for column in one.columns])
-                for one in plan.entrants
+                _cell([known[entrant.name, name, column] for column in entrant.columns])
+                for entrant in plan.entrants
             ])
             for name in plan.scenarios
         ],
@@ -48,16 +48,16 @@ def _facts(plan: Plan, found: Sequence[Outcome]) -> Iterator[str]:
     yield counted(plan.seeds, "seed")
     yield f"{plan.budget:,} evaluations a run"
     yield f"algorithm {plan.algorithm}"
-    yield f"{sum(one.evaluations for one in found):,} evaluations"
+    yield f"{sum(outcome.evaluations for outcome in found):,} evaluations"
 
 
-def _measured(one: Standing) -> list[str | int]:
+def _measured(standing: Standing) -> list[str | int]:
     """Return the cells of a line of the table of drivers that need a driven scenario."""
-    if not one.driven:
+    if not standing.driven:
         return ["–"] * (4 + len(CAREFUL))
-    shares = [one.avoided.get(name, float("nan")) for name in CAREFUL]
+    shares = [standing.avoided.get(name, float("nan")) for name in CAREFUL]
     return [
-        one.modes, one.robust, number(one.first, 0), f"{one.severity:.2f}",
+        standing.modes, standing.robust, number(standing.first, 0), f"{standing.severity:.2f}",
         *("–" if share != share else f"{100 * share:.0f} %" for share in shares),
     ]  # fmt: skip
 
@@ -67,48 +67,57 @@ def _cell(columns: Sequence[Outcome]) -> dict[str, object]:
     if columns[0].state == "not applicable":
         return {"texts": ["n/a"], "why": columns[0].why, "is_robust": False}
     return {
-        "texts": [str(len(one.ways)) if one.state == "driven" else "failed" for one in columns],
-        "why": "; ".join(dict.fromkeys(one.why for one in columns if one.why)),
-        "is_robust": any(one.robust for one in columns),
+        "texts": [
+            str(len(column.ways)) if column.state == "driven" else "failed" for column in columns
+        ],
+        "why": "; ".join(dict.fromkeys(column.why for column in columns if column.why)),
+        "is_robust": any(column.robust for column in columns),
     }
 
 
 def _entrant(entrant: Entrant, found: Sequence[Outcome]) -> dict[str, object]:
     """Return what is known of a driver, and its outcomes by scenario."""
-    own = [one for one in found if one.driver == entrant.name]
+    own = [outcome for outcome in found if outcome.driver == entrant.name]
     about, planner = "", entrant.planner
     if planner is not None:
         about = (
             f"{planner.description} {planner.licence}; {planner.source}; {available(planner)}. "
             f"Domain: {in_words(entrant.domain)}."
         )
-    modes = (
-        f"{counted(sum(len(one.ways) for one in own if one.column == column), 'failure mode')} "
-        f"{'with ' if column == PERFECT else ''}{COLUMNS[column]}"
+    number = {
+        column: sum(len(outcome.ways) for outcome in own if outcome.column == column)
         for column in entrant.columns
+    }
+    modes = (
+        f"{counted(n, 'failure mode')} {'with ' if column == PERFECT else ''}{COLUMNS[column]}"
+        for column, n in number.items()
     )
     return {
-        "name": entrant.name, "problem": entrant.problem, "about": about,
+        "name": entrant.name,
+        "problem": entrant.problem,
+        "about": about,
         "stated": "" if entrant.domain == DOMAINS.keys() else in_words(entrant.domain),
         "summary": f"{entrant.name}: {'; '.join(modes)}",
-        "outside": sorted({one.scenario for one in own if one.state == "not applicable"}),
-        "outcomes": [one for one in own if one.state != "not applicable"],
-    }  # fmt: skip
+        "outside": sorted(
+            {outcome.scenario for outcome in own if outcome.state == "not applicable"}
+        ),
+        "outcomes": [outcome for outcome in own if outcome.state != "not applicable"],
+    }
 
 
-def _said(one: Outcome) -> Iterator[str]:
+def _said(outcome: Outcome) -> Iterator[str]:
     """Yield what else is to be said of an outcome: that it has no mode or result, failed rows."""
-    if one.state == "failed":
-        yield f"no result: {one.why}"
+    if outcome.state == "failed":
+        yield f"no result: {outcome.why}"
         return
-    if not one.ways:
-        text = f"no failure in {counted(one.evaluations, 'evaluation')}"
-        if one.preventable:
-            text += f"; {one.preventable:,} that it could have prevented, others responsible"
-        yield one.unjudged or text
-    if one.failed_rows:
-        reasons = "; ".join(f"{count:,} × {text}" for text, count in one.messages[:3])
-        yield f"{counted(one.failed_rows, 'row')} without a result: {reasons}"
+    if not outcome.ways:
+        text = f"no failure in {counted(outcome.evaluations, 'evaluation')}"
+        if outcome.preventable:
+            text += f"; {outcome.preventable:,} that it could have prevented, others responsible"
+        yield outcome.unjudged or text
+    if outcome.failed_rows:
+        reasons = "; ".join(f"{count:,} × {text}" for text, count in outcome.messages[:3])
+        yield f"{counted(outcome.failed_rows, 'row')} without a result: {reasons}"
 
 
 def _short(name: str) -> str:

@@ -121,12 +121,12 @@ class Plan:
     def cells(self) -> tuple[Cell, ...]:
         """Every run, in execution order: seed by seed, so that intermediate results compare."""
         return tuple(
-            self.cell(scenario, one, column, seed)
+            self.cell(scenario, entrant, column, seed)
             for seed in range(self.seeds)
             for scenario in self.scenarios
-            for one in self.entrants
-            if self.is_applicable(one, scenario) and not one.problem
-            for column in one.columns
+            for entrant in self.entrants
+            if self.is_applicable(entrant, scenario) and not entrant.problem
+            for column in entrant.columns
         )
 
     def cell(self, scenario: str, entrant: Entrant, column: str, seed: int) -> Cell:
@@ -144,7 +144,9 @@ class Plan:
 
     def options_of(self, cell: Cell) -> SearchOptions:
         """Return the options of a run."""
-        perceives = next(one.perceives for one in self.entrants if one.name == cell.driver)
+        perceives = next(
+            entrant.perceives for entrant in self.entrants if entrant.name == cell.driver
+        )
         return SearchOptions(
             ego=cell.driver,
             ideal=("perception",) if perceives and cell.column == PERFECT else (),
@@ -158,10 +160,14 @@ class Plan:
     def command(self) -> str:
         """Return the command line that starts or resumes this benchmark."""
         given = BenchmarkOptions(
-            tuple(one.name for one in self.entrants), scenarios=tuple(self.scenarios.values()),
-            budget=self.budget, seeds=self.seeds, algorithm=self.algorithm, keep=self.keep,
+            tuple(entrant.name for entrant in self.entrants),
+            scenarios=tuple(self.scenarios.values()),
+            budget=self.budget,
+            seeds=self.seeds,
+            algorithm=self.algorithm,
+            keep=self.keep,
             triage=self.triage,
-        )  # fmt: skip
+        )
         return command_of("benchmark planners", given, self.out)
 
     def identity(self) -> dict[str, Any]:
@@ -174,9 +180,9 @@ class Plan:
             "triage": self.triage,
         }
         same |= {f"scenario {name}": mark for name, mark in self.fingerprints.items()}
-        for one in self.entrants:
-            if one.planner is not None and not missing(one.planner):
-                same[f"planner {one.name}"] = installed(one.planner)
+        for entrant in self.entrants:
+            if entrant.planner is not None and not missing(entrant.planner):
+                same[f"planner {entrant.name}"] = installed(entrant.planner)
         return same
 
 
@@ -192,13 +198,13 @@ def entrants(chosen: Sequence[str] | None, ours: Sequence[str]) -> tuple[Entrant
         InputError: one that is named twice, is not installed, or is told apart by its folder only.
     """
     if chosen is None:
-        there = [name for name, one in planners().items() if not missing(one)]
+        there = [name for name, planner in planners().items() if not missing(planner)]
         chosen = [*there, *ours]
     if not chosen:
         raise InputError("a benchmark needs at least one driver")
     found = tuple(_entrant(egos.get(name)) for name in chosen)
-    for one in found:
-        same = [each.name for each in found if each.slug == one.slug]
+    for entrant in found:
+        same = [each.name for each in found if each.slug == entrant.slug]
         if len(same) > 1:
             raise InputError(f"drivers must have different names, got {', '.join(same)}")
     return found
@@ -244,18 +250,18 @@ def make_plan(
     Raises:
         InputError: a scenario that breaks a rule, or two of one name.
     """
-    loaded = [(str(one), load(one)) for one in scenarios]
-    called = [one.name for _, one in loaded]
+    loaded = [(str(scenario), load(scenario)) for scenario in scenarios]
+    called = [scenario.name for _, scenario in loaded]
     if again := sorted({name for name in called if called.count(name) > 1}):
         raise InputError(*(f"scenario {name} must be named once" for name in again))
     return Plan(
         out=out,
         scenarios={
-            one.name: str(Path(given).resolve()) if is_file(given) else given
-            for given, one in loaded
+            scenario.name: str(Path(given).resolve()) if is_file(given) else given
+            for given, scenario in loaded
         },
-        fingerprints={one.name: one.fingerprint for _, one in loaded},
-        needs={one.name: needs[given] for given, one in loaded},
+        fingerprints={scenario.name: scenario.fingerprint for _, scenario in loaded},
+        needs={scenario.name: needs[given] for given, scenario in loaded},
         entrants=drivers,
         seeds=seeds,
         budget=budget,
@@ -332,20 +338,20 @@ def measured(plan: Plan, say: Callable[[str], None]) -> tuple[Plan, dict[str, Sp
         say: called with each driver's name.
     """
     found, speeds = [], {}
-    for one in plan.entrants:
-        say(one.name)
-        runs = sum(cell.driver == one.name for cell in plan.cells)
-        scenario = next((s for s in plan.scenarios if plan.is_applicable(one, s)), None)
+    for entrant in plan.entrants:
+        say(entrant.name)
+        runs = sum(cell.driver == entrant.name for cell in plan.cells)
+        scenario = next((s for s in plan.scenarios if plan.is_applicable(entrant, s)), None)
         if scenario is None:
-            found.append(one)
+            found.append(entrant)
             continue
         try:
-            seconds = _seconds(one, plan.scenarios[scenario])
+            seconds = _seconds(entrant, plan.scenarios[scenario])
         except BridgeGenError as error:
-            found.append(replace(one, problem=str(error)))
+            found.append(replace(entrant, problem=str(error)))
             continue
-        found.append(one)
-        speeds[one.name] = Speed(seconds, runs)
+        found.append(entrant)
+        speeds[entrant.name] = Speed(seconds, runs)
     return replace(plan, entrants=tuple(found)), speeds
 
 
@@ -356,9 +362,9 @@ def seconds_of(plan: Plan, speeds: dict[str, Speed], at_once: int) -> float:
     tested, too.
     """
     total = 0.0
-    for one in speeds.values():
-        tested = one.runs / plan.seeds * TESTED[plan.triage]
-        total += one.seconds * (one.runs * plan.budget + tested) + one.runs * BESIDE
+    for speed in speeds.values():
+        tested = speed.runs / plan.seeds * TESTED[plan.triage]
+        total += speed.seconds * (speed.runs * plan.budget + tested) + speed.runs * BESIDE
     return total / at_once
 
 

@@ -103,7 +103,7 @@ class Outcome:
     @property
     def robust(self) -> int:
         """How many of its ways to fail are robust."""
-        return sum(bool(one.robust) for one in self.ways)
+        return sum(bool(way.robust) for way in self.ways)
 
 
 @dataclass(frozen=True)
@@ -152,18 +152,18 @@ def outcomes(plan: Plan, gaps: Mapping[Cell, str]) -> tuple[Outcome, ...]:
         gaps: why runs have no result.
     """
     return tuple(
-        _outcome(plan, gaps, one, scenario, column)
-        for one in plan.entrants
+        _outcome(plan, gaps, entrant, scenario, column)
+        for entrant in plan.entrants
         for scenario in plan.scenarios
-        for column in one.columns
+        for column in entrant.columns
     )
 
 
 def standings(found: Iterable[Outcome]) -> tuple[Standing, ...]:
     """Return every driver's standing in each of its columns, in the order of the outcomes."""
     groups: dict[tuple[str, str], list[Outcome]] = {}
-    for one in found:
-        groups.setdefault((one.driver, one.column), []).append(one)
+    for outcome in found:
+        groups.setdefault((outcome.driver, outcome.column), []).append(outcome)
     return tuple(_standing(driver, column, some) for (driver, column), some in groups.items())
 
 
@@ -203,25 +203,25 @@ def _outcome(
             judged += judgement.failures
             avoided += Counter(judgement.avoided)
         bounds += [run.triage.bound] if run.triage is not None else []
-        modes += [(cell, run, one) for one in run.modes if one.responsible in RESPONSIBLE]
+        modes += [(cell, run, mode) for mode in run.modes if mode.responsible in RESPONSIBLE]
     return Outcome(
         name, scenario, column, "driven", why, len(good), evaluations, failed_rows,
         tuple(messages.most_common()), failures, preventable, tuple(first), severity,
         dict(avoided), judged, _ways(modes),
-        "" if any(one.judged for one in bounds) or not bounds else bounds[0].sentence,
+        "" if any(bound.judged for bound in bounds) or not bounds else bounds[0].sentence,
     )  # fmt: skip
 
 
 def _ways(modes: Iterable[tuple[Cell, Run, Mode]]) -> tuple[Way, ...]:
     """Return the distinct ways to fail of several runs; those that differ in cause are one."""
     groups: dict[tuple[str, ...], list[tuple[Cell, Run, Mode]]] = {}
-    for cell, run, one in modes:
+    for cell, run, mode in modes:
         key = (
-            one.conflict, one.conflict_type, one.responsible, one.partner, one.place,
+            mode.conflict, mode.conflict_type, mode.responsible, mode.partner, mode.place,
         )  # fmt: skip
-        groups.setdefault(key, []).append((cell, run, one))
+        groups.setdefault(key, []).append((cell, run, mode))
     found = [_way(some) for some in groups.values()]
-    return tuple(sorted(found, key=lambda one: (not one.robust, -one.harm, one.title)))
+    return tuple(sorted(found, key=lambda way: (not way.robust, -way.harm, way.title)))
 
 
 def _way(same: list[tuple[Cell, Run, Mode]]) -> Way:
@@ -229,8 +229,8 @@ def _way(same: list[tuple[Cell, Run, Mode]]) -> Way:
     cell, run, shown = max(
         same, key=lambda each: (bool(each[2].exports), not each[2].knife_edge, each[2].harm)
     )
-    tested = [one for _, _, one in same if one.robustness is not None]
-    robust = any(not one.knife_edge for one in tested) if tested else None
+    tested = [mode for _, _, mode in same if mode.robustness is not None]
+    robust = any(not mode.knife_edge for mode in tested) if tested else None
     place = Path(RUNS) / cell.name
     name = shown.exports[0] if shown.exports else ""
     stem = place / FOLDER / name
@@ -244,9 +244,9 @@ def _way(same: list[tuple[Cell, Run, Mode]]) -> Way:
     return Way(
         title=shown.title,
         robust=robust,
-        harm=max(one.harm for _, _, one in same),
-        severity=max(one.severity for _, _, one in same),
-        causes=tuple(sorted({one.cause for _, _, one in same if one.cause})),
+        harm=max(mode.harm for _, _, mode in same),
+        severity=max(mode.severity for _, _, mode in same),
+        causes=tuple(sorted({mode.cause for _, _, mode in same if mode.cause})),
         minimal=minimal.sentence if minimal else "",
         scenario=f"{stem.as_posix()}.xosc" if name else "",
         minimal_scenario=file,
@@ -256,14 +256,14 @@ def _way(same: list[tuple[Cell, Run, Mode]]) -> Way:
 
 
 def _standing(driver: str, column: str, some: list[Outcome]) -> Standing:
-    ways = [way for one in some for way in one.ways]
-    judged = sum(one.judged for one in some)
+    ways = [way for outcome in some for way in outcome.ways]
+    judged = sum(outcome.judged for outcome in some)
     avoided: Counter[str] = Counter()
-    for one in some:
-        avoided.update(one.avoided or {})
-    first = [value for one in some for value in one.first]
+    for outcome in some:
+        avoided.update(outcome.avoided or {})
+    first = [value for outcome in some for value in outcome.first]
     causes = Counter(cause for way in ways for cause in way.causes)
-    states = Counter(one.state for one in some)
+    states = Counter(outcome.state for outcome in some)
     return Standing(
         driver=driver,
         column=column,
@@ -271,12 +271,12 @@ def _standing(driver: str, column: str, some: list[Outcome]) -> Standing:
         not_applicable=states["not applicable"],
         failed=states["failed"],
         modes=len(ways),
-        robust=sum(bool(one.robust) for one in ways),
+        robust=sum(bool(element.robust) for element in ways),
         first=quartiles(np.array(first, dtype=np.float64)).median,
-        severity=max((one.severity for one in some), default=0.0),
-        failures=sum(one.failures for one in some),
-        evaluations=sum(one.evaluations for one in some),
-        failed_rows=sum(one.failed_rows for one in some),
+        severity=max((outcome.severity for outcome in some), default=0.0),
+        failures=sum(outcome.failures for outcome in some),
+        evaluations=sum(outcome.evaluations for outcome in some),
+        failed_rows=sum(outcome.failed_rows for outcome in some),
         causes=tuple(sorted(causes.items(), key=lambda item: (-item[1], item[0]))),
         avoided={
             name: count / judged if judged else nan for name, count in sorted(avoided.items())
@@ -332,41 +332,81 @@ def write_tables(plan: Plan, found: Sequence[Outcome], standings: Sequence[Stand
     """
     write_csv(plan.out / DRIVERS_FILE, DRIVERS_HEAD, map(_of_standing, standings))
     write_csv(plan.out / OUTCOMES_FILE, OUTCOMES_HEAD, map(_of_outcome, found))
-    write_csv(plan.out / MODES_FILE, MODES_HEAD, (line for one in found for line in _modes(one)))
+    write_csv(
+        plan.out / MODES_FILE, MODES_HEAD, (line for outcome in found for line in _modes(outcome))
+    )
 
 
-def _of_standing(one: Standing) -> Sequence[object]:
-    causes = "; ".join(f"{name} {count}" for name, count in one.causes)
-    shares = (one.avoided.get(name, float("nan")) for name in CAREFUL)
+def _of_standing(standing: Standing) -> Sequence[object]:
+    causes = "; ".join(f"{name} {count}" for name, count in standing.causes)
+    shares = (standing.avoided.get(name, float("nan")) for name in CAREFUL)
     return (
-        one.driver, one.column, one.driven, one.not_applicable, one.failed, one.modes, one.robust,
-        one.first, one.severity, one.failures, one.evaluations, one.failed_rows, causes, *shares,
-    )  # fmt: skip
+        standing.driver,
+        standing.column,
+        standing.driven,
+        standing.not_applicable,
+        standing.failed,
+        standing.modes,
+        standing.robust,
+        standing.first,
+        standing.severity,
+        standing.failures,
+        standing.evaluations,
+        standing.failed_rows,
+        causes,
+        *shares,
+    )
 
 
-def _of_outcome(one: Outcome) -> Sequence[object]:
-    head = (one.driver, one.scenario, one.column, one.state, one.why or one.unjudged)
-    if one.state != "driven":
+def _of_outcome(outcome: Outcome) -> Sequence[object]:
+    head = (
+        outcome.driver,
+        outcome.scenario,
+        outcome.column,
+        outcome.state,
+        outcome.why or outcome.unjudged,
+    )
+    if outcome.state != "driven":
         return (*head, *[""] * (len(OUTCOMES_HEAD) - len(head)))
     shares = [
-        (one.avoided or {}).get(name, 0) / one.judged if one.judged else "" for name in CAREFUL
+        (outcome.avoided or {}).get(name, 0) / outcome.judged if outcome.judged else ""
+        for name in CAREFUL
     ]
     return (
-        *head, one.runs, one.evaluations, one.failed_rows, one.failures, one.preventable,
-        first(one), one.severity, len(one.ways), one.robust, *shares,
-    )  # fmt: skip
+        *head,
+        outcome.runs,
+        outcome.evaluations,
+        outcome.failed_rows,
+        outcome.failures,
+        outcome.preventable,
+        first(outcome),
+        outcome.severity,
+        len(outcome.ways),
+        outcome.robust,
+        *shares,
+    )
 
 
-def first(one: Outcome) -> float:
+def first(outcome: Outcome) -> float:
     """Return the median of the evaluations until the first failure; +inf where most have none."""
-    return quartiles(np.array(one.first, dtype=np.float64)).median
+    return quartiles(np.array(outcome.first, dtype=np.float64)).median
 
 
-def _modes(one: Outcome) -> Iterable[Sequence[object]]:
-    for way in one.ways:
+def _modes(outcome: Outcome) -> Iterable[Sequence[object]]:
+    for way in outcome.ways:
         robust = "" if way.robust is None else "yes" if way.robust else "no"
         yield (
-            one.driver, one.scenario, one.column, way.title, robust, way.harm, way.severity,
-            "; ".join(way.causes), way.minimal, way.scenario, way.minimal_scenario, way.script,
+            outcome.driver,
+            outcome.scenario,
+            outcome.column,
+            way.title,
+            robust,
+            way.harm,
+            way.severity,
+            "; ".join(way.causes),
+            way.minimal,
+            way.scenario,
+            way.minimal_scenario,
+            way.script,
             way.playback,
-        )  # fmt: skip
+        )

@@ -126,9 +126,9 @@ def _conclude(
     measured = {
         scenario: measure(of_it, plan.budget, plan.baseline)
         for scenario in plan.scenarios
-        if (of_it := {c: one for c, one in records.items() if c.scenario == scenario})
+        if (of_it := {c: record for c, record in records.items() if c.scenario == scenario})
     }
-    values = {cell: row for one in measured.values() for cell, row in one.values.items()}
+    values = {cell: row for item in measured.values() for cell, row in item.values.items()}
     kinds = measures(plan.budget)
     lines = summarise(values, plan.scenarios, list(plan.algorithms), plan.baseline, kinds)
     result = Comparison(plan, records, measured, gaps, lines, kinds)
@@ -157,7 +157,7 @@ def _common_terms(plan: Plan, gaps: dict[Cell, str]) -> dict[str, tuple[str, ...
         except StorageError as error:
             gaps[cell] = str(error)
             continue
-        found[cell.scenario] = tuple(one for one in found.get(cell.scenario, own) if one in own)
+        found[cell.scenario] = tuple(name for name in found.get(cell.scenario, own) if name in own)
     return found
 
 

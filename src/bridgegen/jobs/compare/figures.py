@@ -177,7 +177,7 @@ def curves(
         spans = [quartiles(column) for column in samples[name].T]
         x = [0, *points]
         low, median, high = (
-            [0.0, *(getattr(one, part) for one in spans)] for part in ("low", "median", "high")
+            [0.0, *(getattr(span, part) for span in spans)] for part in ("low", "median", "high")
         )
         axes.fill_between(x, low, high, color=colour, alpha=0.16, linewidth=0)
         axes.plot(x, median, color=colour, linestyle=style, linewidth=2, label=name)

@@ -132,7 +132,7 @@ def others(records: Mapping[Cell, Record], baseline: str) -> set[str]:
     """
     usual = next(iter(records.values())).parameters
     usual = next((r.parameters for cell, r in records.items() if cell.algorithm == baseline), usual)
-    return {cell.algorithm for cell, one in records.items() if one.parameters != usual}
+    return {cell.algorithm for cell, record in records.items() if record.parameters != usual}
 
 
 def measure(records: Mapping[Cell, Record], budget: int, baseline: str) -> Measured:
@@ -142,57 +142,59 @@ def measure(records: Mapping[Cell, Record], budget: int, baseline: str) -> Measu
     parameters than the baseline, for example an adversary's.
     """
     m = len(next(iter(records.values())).terms)
-    ranges = [(one.low, one.high) for one in records.values()]
+    ranges = [(record.low, record.high) for record in records.values()]
     known = [(low, high) for low, high in ranges if low is not None and high is not None]
     scale = Scale.pooled(known, m)
-    final = {cell: scale.objectives(one.fronts[-1]) for cell, one in records.items()}
+    final = {cell: scale.objectives(record.fronts[-1]) for cell, record in records.items()}
     reference = front(np.concatenate(list(final.values())))
-    curves = {cell: _curve(one, scale) for cell, one in records.items()}
+    curves = {cell: _curve(record, scale) for cell, record in records.items()}
     k = waited_for(budget)
-    reached = {cell: one.reached[k] for cell, one in records.items()}
-    seconds = {cell: one.seconds_reached[k] for cell, one in records.items()}
+    reached = {cell: record.reached[k] for cell, record in records.items()}
+    seconds = {cell: record.seconds_reached[k] for cell, record in records.items()}
     relative, relative_seconds = _by_the_best(reached), _by_the_best(seconds)
     strange = others(records, baseline)
     values = {
         cell: {
-            "r_critic": one.critical / one.evaluations if one.evaluations else float("nan"),
+            "r_critic": record.critical / record.evaluations
+            if record.evaluations
+            else float("nan"),
             "t_critic": relative[cell],
-            **{f"to_{n}": count for n, count in one.reached.items()},
-            "modes": float(one.modes),
-            **{f"to_{n}_modes": count for n, count in one.modes_reached.items()},
+            **{f"to_{n}": count for n, count in record.reached.items()},
+            "modes": float(record.modes),
+            **{f"to_{n}_modes": count for n, count in record.modes_reached.items()},
             **(
-                dict.fromkeys(_in_parameters(one), float("nan"))
+                dict.fromkeys(_in_parameters(record), float("nan"))
                 if cell.algorithm in strange
-                else _in_parameters(one)
+                else _in_parameters(record)
             ),
             "hypervolume": float(curves[cell][-1]),
             "gd": generational_distance(final[cell], reference),
             "spread": spread(final[cell], reference),
             "t_critic_seconds": relative_seconds[cell],
             f"seconds_to_{k}": seconds[cell],
-            "seconds": one.seconds,
+            "seconds": record.seconds,
         }
-        for cell, one in records.items()
+        for cell, record in records.items()
     }
     return Measured(values, curves, scale, reference)
 
 
-def _in_parameters(one: Record) -> dict[str, float]:
+def _in_parameters(record: Record) -> dict[str, float]:
     return {
-        "distinct": float(one.distinct),
-        **{f"to_{n}_distinct": count for n, count in one.distinct_reached.items()},
-        "critical_bins": float(one.critical_bins),
-        "critical_pairs": float(one.critical_pairs),
+        "distinct": float(record.distinct),
+        **{f"to_{n}_distinct": count for n, count in record.distinct_reached.items()},
+        "critical_bins": float(record.critical_bins),
+        "critical_pairs": float(record.critical_pairs),
     }
 
 
 def _curve(record: Record, scale: Scale) -> Float:
     """Return the hypervolume at each point; an unchanged front is not measured again."""
     volumes, last = [], None
-    for one in record.fronts:
-        if last is None or one is not last:
-            volume = hypervolume(scale.objectives(one))
-        last = one
+    for array in record.fronts:
+        if last is None or array is not last:
+            volume = hypervolume(scale.objectives(array))
+        last = array
         volumes.append(volume)
     return np.array(volumes)
 

@@ -37,14 +37,14 @@ def write_page(comparison: Comparison) -> None:
         (comparison.folder / FIGURES).mkdir(exist_ok=True)
     except OSError as error:
         raise StorageError(f"{comparison.folder}: cannot be written: {error.strerror}") from None
-    settled = [one for one in comparison.measures if not one.timed]
+    settled = [measure for measure in comparison.measures if not measure.timed]
     templates.write_page(
         comparison.page, "jobs/compare/page.html",
         title=f"Comparison: {', '.join(plan.scenarios)}",
         facts=[*_facts(comparison)],
         scenarios=[_scenario(comparison, name, settled) for name in plan.scenarios],
         measures=settled,
-        shown=[one for one in settled if one.name != "t_critic"],
+        shown=[measure for measure in settled if measure.name != "t_critic"],
         baseline=plan.baseline, sure=words.SURE, apart=100 * plan.apart,
         tested=counted(len(plan.algorithms) - 1, "algorithm"),
         waited=waited_for(plan.budget), tenth=ordinal(10),
@@ -66,7 +66,7 @@ def _facts(comparison: Comparison) -> Iterator[str]:
                 shown = ", ".join(map(_shown, value))
             elif isinstance(value, dict):
                 shown = ", ".join(
-                    k if one is None else f"{k} = {one:g}" for k, one in value.items()
+                    k if item is None else f"{k} = {item:g}" for k, item in value.items()
                 )
             yield name.replace("_", " ") if value is True else f"{name.replace('_', ' ')}: {shown}"
     if comparison.gaps:
@@ -81,12 +81,12 @@ def _shown(value: str | Mapping[str, Any]) -> str:
 def _scenario(
     comparison: Comparison, scenario: str, measures: Sequence[Measure]
 ) -> dict[str, object]:
-    first = [one.name for one in measures].index("r_critic")
-    often = [one for one in measures[first:] if one.name[0] in "rt"]
+    first = [measure.name for measure in measures].index("r_critic")
+    often = [measure for measure in measures[first:] if measure.name[0] in "rt"]
     groups = (
         ("What was found, and how soon", measures[:first]),
         ("How often", often),
-        ("How bad at once", [one for one in measures[first:] if one not in often]),
+        ("How bad at once", [measure for measure in measures[first:] if measure not in often]),
     )
     is_measured = scenario in comparison.measured
     return {
@@ -109,29 +109,31 @@ def _medians(
 ) -> list[tuple[str, list[dict[str, object]]]]:
     """Return each algorithm's medians and quartiles; the best of each measure is marked."""
     names = comparison.plan.algorithms
-    columns = [[comparison.line(scenario, name, one.name) for name in names] for one in measures]
+    columns = [
+        [comparison.line(scenario, name, measure.name) for name in names] for measure in measures
+    ]
     cells = [
-        [_median(line, one, _best(column, one)) for line in column]
-        for column, one in zip(columns, measures, strict=True)
+        [_median(line, measure, _best(column, measure)) for line in column]
+        for column, measure in zip(columns, measures, strict=True)
     ]
     return [(name, [column[row] for column in cells]) for row, name in enumerate(names)]
 
 
-def _best(column: Sequence[Line], one: Measure) -> float:
+def _best(column: Sequence[Line], measure: Measure) -> float:
     known = [line.quartiles.median for line in column if np.isfinite(line.quartiles.median)]
     if not known:
         return float("nan")
-    return max(known) if one.larger else min(known)
+    return max(known) if measure.larger else min(known)
 
 
-def _median(line: Line, one: Measure, best: float) -> dict[str, object]:
-    notes = [words.span(line, one)]
+def _median(line: Line, measure: Measure, best: float) -> dict[str, object]:
+    notes = [words.span(line, measure)]
     if not np.isnan(line.p_holm):
         notes.append(f"p {words.p_value(line.p_holm)}, A12 {line.a12:.2f}")
     if 0 < line.never < line.runs:
         notes.append(f"never in {line.never} of {line.runs}")
     return {
-        "median": words.median(line, one),
+        "median": words.median(line, measure),
         "verdict": words.verdict(line),
         "notes": notes,
         "is_best": line.quartiles.median == best,
@@ -189,7 +191,11 @@ def _run(comparison: Comparison, cell: Cell, measures: Sequence[Measure]) -> dic
         return about
     record = comparison.records[cell]
     row: Mapping[str, float] = comparison.measured[cell.scenario].values[cell]
-    values = [words.number(row[one.name], one.digits) for one in measures if one.name != "t_critic"]
+    values = [
+        words.number(row[measure.name], measure.digits)
+        for measure in measures
+        if measure.name != "t_critic"
+    ]
     return {
         **about, "evaluations": record.evaluations, "values": values, "command": record.command
     }  # fmt: skip
@@ -197,7 +203,7 @@ def _run(comparison: Comparison, cell: Cell, measures: Sequence[Measure]) -> dic
 
 def _range(term: Quantity, worst: float, best: float) -> str:
     """Return a term's values in its unit, given as larger = more critical."""
-    low, high = (term.sign * one + 0.0 for one in (worst, best))  # no negative zero
+    low, high = (term.sign * value + 0.0 for value in (worst, best))  # no negative zero
     return f"{term.name} {low:.4g} to {high:.4g} {term.unit}".removesuffix(" 1")
 
 
@@ -208,10 +214,10 @@ def _boxes(comparison: Comparison) -> str:
             _range(quantity(term), worst, best)
             for term, worst, best in zip(
                 next(r for c, r in comparison.records.items() if c.scenario == name).terms,
-                one.scale.worst, one.scale.best, strict=True,
+                measured.scale.worst, measured.scale.best, strict=True,
             )
         )
-        for name, one in comparison.measured.items()
+        for name, measured in comparison.measured.items()
     )  # fmt: skip
 
 

@@ -129,7 +129,7 @@ class Plan:
             self.options,
             scenarios=tuple(self.scenarios.values()),
             algorithms=tuple(self.methods.values()),
-            settings={name: one for name, one in self.algorithms.items() if one},
+            settings={name: algorithm for name, algorithm in self.algorithms.items() if algorithm},
             baseline=None if self.baseline == next(iter(self.algorithms)) else self.baseline,
             apart=self.apart,
             seeds=self.seeds,
@@ -150,7 +150,7 @@ class Plan:
         same |= {f"scenario {name}": mark for name, mark in self.fingerprints.items()}
         for name, settings in self.algorithms.items():
             method = self.methods[name]
-            known = {key: one.default for key, one in toolkit.get(method).settings.items()}
+            known = {key: setting.default for key, setting in toolkit.get(method).settings.items()}
             same[f"settings of {name}"] = {**known, **settings}
             if (file := file_of(method)) is not None:
                 same[f"algorithm {name}"] = _digest(file)
@@ -175,9 +175,9 @@ def make_plan(
         InputError: a name twice or missing, a value out of range; a scenario that breaks a rule.
         UnknownNameError: no such scenario, algorithm or setting.
     """
-    methods = {label_of(one): one for one in algorithms}
-    problems = _twice("scenario", [str(one) for one in scenarios])
-    problems += _twice("algorithm", [label_of(one) for one in algorithms])
+    methods = {label_of(algorithm): algorithm for algorithm in algorithms}
+    problems = _twice("scenario", [str(scenario) for scenario in scenarios])
+    problems += _twice("algorithm", [label_of(algorithm) for algorithm in algorithms])
     problems += [
         f"{low} <= {name} <= {high} must hold, got {value}"
         for name, value, low, high in (("seeds", seeds, 1, MAX_SEEDS), ("budget", budget, 1, 10**7))
@@ -195,16 +195,16 @@ def make_plan(
     for name in [*settings, first]:
         if name not in methods:
             raise UnknownNameError("algorithm of this comparison", name, methods)
-    loaded = [(str(one), load(one, options.distribution)) for one in scenarios]
-    if problems := _twice("scenario called", [one.name for _, one in loaded]):
+    loaded = [(str(scenario), load(scenario, options.distribution)) for scenario in scenarios]
+    if problems := _twice("scenario called", [scenario.name for _, scenario in loaded]):
         raise InputError(*problems)
     return Plan(
-        out=out or Path("comparisons") / "-".join(one.name for _, one in loaded),
+        out=out or Path("comparisons") / "-".join(scenario.name for _, scenario in loaded),
         scenarios={
-            one.name: str(Path(given).resolve()) if is_file(given) else given
-            for given, one in loaded
+            scenario.name: str(Path(given).resolve()) if is_file(given) else given
+            for given, scenario in loaded
         },
-        fingerprints={one.name: one.fingerprint for _, one in loaded},
+        fingerprints={scenario.name: scenario.fingerprint for _, scenario in loaded},
         algorithms={name: dict(settings.get(name, {})) for name in methods},
         methods=methods,
         seeds=seeds,

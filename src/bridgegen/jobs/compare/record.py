@@ -41,8 +41,10 @@ def normalised(space: SearchSpace, X: Float) -> Float:
     """
     parts = [np.empty((len(X), 0))]
     for name in space.variables:
-        one = space.parameters[name]
-        parts.append(one.kind.coordinates(X[:, space.index(name)], one.low, one.high))
+        parameter = space.parameters[name]
+        parts.append(
+            parameter.kind.coordinates(X[:, space.index(name)], parameter.low, parameter.high)
+        )
     return np.concatenate(parts, axis=1)
 
 

@@ -63,12 +63,12 @@ class Comparison:
         """Return what ``summary.csv`` says, a measure of an algorithm each."""
         return [
             {
-                "scenario": one.scenario, "algorithm": one.algorithm, "measure": one.measure,
-                "runs": one.runs, "never": one.never,
-                **{name: number(value) for name, value in vars(one.quartiles).items()},
-                "p": number(one.p), "p_holm": number(one.p_holm), "a12": number(one.a12),
+                "scenario": line.scenario, "algorithm": line.algorithm, "measure": line.measure,
+                "runs": line.runs, "never": line.never,
+                **{name: number(value) for name, value in vars(line.quartiles).items()},
+                "p": number(line.p), "p_holm": number(line.p_holm), "a12": number(line.a12),
             }
-            for one in self.lines
+            for line in self.lines
         ]  # fmt: skip
 
     def shown(self) -> list[str | Table]:
@@ -96,9 +96,11 @@ class Comparison:
             KeyError: no such line.
         """
         wanted = (scenario, algorithm, measure)
-        found = (one for one in self.lines if (one.scenario, one.algorithm, one.measure) == wanted)
-        for one in found:
-            return one
+        found = (
+            item for item in self.lines if (item.scenario, item.algorithm, item.measure) == wanted
+        )
+        for item in found:
+            return item
         raise KeyError(wanted)
 
     def _repr_html_(self) -> str:

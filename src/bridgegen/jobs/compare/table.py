@@ -57,21 +57,21 @@ def summarise(
     """Return every measure of every algorithm in every scenario, in this order of nesting."""
     lines: list[Line] = []
     for scenario in scenarios:
-        for one in measures:
-            lines += _lines(values, scenario, algorithms, baseline, one)
+        for measure in measures:
+            lines += _lines(values, scenario, algorithms, baseline, measure)
     order = {name: k for k, name in enumerate(algorithms)}
     places = {name: k for k, name in enumerate(dict.fromkeys(line.scenario for line in lines))}
     return tuple(sorted(lines, key=lambda line: (places[line.scenario], order[line.algorithm])))
 
 
 def _lines(
-    values: Values, scenario: str, algorithms: Sequence[str], baseline: str, one: Measure
+    values: Values, scenario: str, algorithms: Sequence[str], baseline: str, measure: Measure
 ) -> list[Line]:
     nan = float("nan")
     samples = {
         name: np.array(
             [
-                row[one.name]
+                row[measure.name]
                 for cell, row in values.items()
                 if (cell.scenario, cell.algorithm) == (scenario, name)
             ],
@@ -79,15 +79,16 @@ def _lines(
         )
         for name in algorithms
     }
-    tested = [name for name in algorithms if name != baseline and not one.timed]
+    tested = [name for name in algorithms if name != baseline and not measure.timed]
     p = {name: mann_whitney(samples[name], samples[baseline]) for name in tested}
     corrected = dict(zip(tested, holm([p[name] for name in tested]), strict=True))
     effects = {
-        name: a12(samples[name], samples[baseline], larger_is_better=one.larger) for name in tested
+        name: a12(samples[name], samples[baseline], larger_is_better=measure.larger)
+        for name in tested
     }
     return [
         Line(
-            scenario, name, one.name,
+            scenario, name, measure.name,
             runs=int(np.count_nonzero(~np.isnan(sample))),
             never=int(np.count_nonzero(np.isinf(sample))),
             quartiles=quartiles(sample),
@@ -111,13 +112,13 @@ def write_tables(
         StorageError: they cannot be written.
     """
     out, cells = plan.out, plan.cells_in_order
-    settled = [one for one in measures if not one.timed]
-    timed = [one for one in measures if one.timed]
+    settled = [measure for measure in measures if not measure.timed]
+    timed = [measure for measure in measures if measure.timed]
     write_csv(out / RUNS_FILE, RUNS_HEAD, _runs(cells, records, values, gaps, settled))
     write_csv(out / TIMES_FILE, RUNS_HEAD[:5], _times(cells, values, timed))
-    kept = {one.name for one in settled}
+    kept = {measure.name for measure in settled}
     write_csv(
-        out / SUMMARY_FILE, SUMMARY_HEAD, (_line(one) for one in lines if one.measure in kept)
+        out / SUMMARY_FILE, SUMMARY_HEAD, (_line(line) for line in lines if line.measure in kept)
     )
 
 
@@ -146,8 +147,15 @@ def _runs(
         if cell in gaps:
             yield (*name, "", "", "", "", "", f"failed: {gaps[cell]}", folder, "")
             continue
-        one = records[cell]
-        facts = (one.evaluations, one.critical, one.failed, one.ended, folder, one.command)
+        record = records[cell]
+        facts = (
+            record.evaluations,
+            record.critical,
+            record.failed,
+            record.ended,
+            folder,
+            record.command,
+        )
         for measure in measures:
             yield (*name, measure.name, values[cell][measure.name], *facts)
 

@@ -31,19 +31,19 @@ def number(value: float, digits: int) -> str:
     return "never" if isinf(value) else f"{value:,.{digits}f}"
 
 
-def median(line: Line, one: Measure) -> str:
+def median(line: Line, measure: Measure) -> str:
     """Return a line's median; a small count that lies between two has a decimal."""
     value = line.quartiles.median
-    between = one.digits == 0 and abs(value) < 10.0 and value % 1.0 > 0.0
-    return number(value, 1 if between else one.digits)
+    between = measure.digits == 0 and abs(value) < 10.0 and value % 1.0 > 0.0
+    return number(value, 1 if between else measure.digits)
 
 
-def span(line: Line, one: Measure) -> str:
+def span(line: Line, measure: Measure) -> str:
     """Return a line's quartiles."""
     q = line.quartiles
     if isnan(q.low) or isinf(q.low):
         return ""
-    return f"{number(q.low, one.digits)} to {number(q.high, one.digits)}"
+    return f"{number(q.low, measure.digits)} to {number(q.high, measure.digits)}"
 
 
 def p_value(p: float) -> str:
@@ -87,13 +87,13 @@ def lines(comparison: Comparison) -> Iterator[str | Table]:
 
 def _findings(comparison: Comparison, scenario: str) -> Table:
     """Return the table of what was found and how soon, with the tests of ``distinct``."""
-    kinds = {one.name: one for one in comparison.measures}
+    kinds = {measure.name: measure for measure in comparison.measures}
     early = [name for name in kinds if name.endswith(("_distinct", "_modes", "to_1"))]
     head = ("algorithm", "found in", "modes", "distinct", "quartiles", "p", "A12",
             *(kinds[name].title for name in early), "R_critic")  # fmt: skip
     rows = []
     for name in comparison.plan.algorithms:
-        of = {one: comparison.line(scenario, name, one) for one in kinds}
+        of = {kind: comparison.line(scenario, name, kind) for kind in kinds}
         distinct = of["distinct"]
         cells = [
             name,
@@ -103,7 +103,7 @@ def _findings(comparison: Comparison, scenario: str) -> Table:
             span(distinct, kinds["distinct"]),
             p_value(distinct.p_holm),
             number(distinct.a12, 2),
-            *(median(of[one], kinds[one]) for one in (*early, "r_critic")),
+            *(median(of[item], kinds[item]) for item in (*early, "r_critic")),
         ]
         rows.append(cells)
     return Table(head, rows, _TEXTS)
@@ -117,19 +117,23 @@ _MORE = {
 
 def _others(comparison: Comparison, scenario: str) -> Table:
     """Return the table of the other measures, and of the time that it took."""
-    shown = [one for one in comparison.measures if one.name in _MORE]
+    shown = [measure for measure in comparison.measures if measure.name in _MORE]
     rows = []
     for name in comparison.plan.algorithms:
-        of = (comparison.line(scenario, name, one.name) for one in shown)
-        rows.append([name, *(median(line, one) for line, one in zip(of, shown, strict=True))])
-    return Table(("algorithm", *(one.title for one in shown)), rows, _TEXTS)
+        of = (comparison.line(scenario, name, measure.name) for measure in shown)
+        rows.append(
+            [name, *(median(line, measure) for line, measure in zip(of, shown, strict=True))]
+        )
+    return Table(("algorithm", *(measure.title for measure in shown)), rows, _TEXTS)
 
 
 def sentences(comparison: Comparison, scenario: str) -> list[str]:
     """Return the findings in one scenario: the best algorithms, the tests, and peculiarities."""
-    measures = {one.name: one for one in comparison.measures}
+    measures = {measure.name: measure for measure in comparison.measures}
     few = _too_few(comparison, scenario)
-    found = any(one.critical for c, one in comparison.records.items() if c.scenario == scenario)
+    found = any(
+        record.critical for c, record in comparison.records.items() if c.scenario == scenario
+    )
     names = list(SENTENCE_STARTS) if found else ["hypervolume"]
     texts = [] if found else ["No run found a critical scenario."]
     texts += [_best(comparison, scenario, measures[name], is_open=not few) for name in names]
@@ -159,10 +163,12 @@ def _too_few(comparison: Comparison, scenario: str) -> str:
     )
 
 
-def _best(comparison: Comparison, scenario: str, one: Measure, *, is_open: bool) -> str:
+def _best(comparison: Comparison, scenario: str, measure: Measure, *, is_open: bool) -> str:
     """Return which algorithm's median is the largest, and which differ from the baseline."""
     lines = [
-        line for line in comparison.lines if (line.scenario, line.measure) == (scenario, one.name)
+        line
+        for line in comparison.lines
+        if (line.scenario, line.measure) == (scenario, measure.name)
     ]
     known = [line for line in lines if line.runs]
     if not known:
@@ -170,12 +176,12 @@ def _best(comparison: Comparison, scenario: str, one: Measure, *, is_open: bool)
     top = max(line.quartiles.median for line in known)
     best = [line for line in known if line.quartiles.median == top]
     names = _and(line.algorithm for line in best)
-    text = f"{SENTENCE_STARTS[one.name]} {names} (median {median(best[0], one)}"
+    text = f"{SENTENCE_STARTS[measure.name]} {names} (median {median(best[0], measure)}"
     base = next((line for line in known if line.algorithm == comparison.plan.baseline), None)
     if base is None or base in best:
         text += ")."
     else:
-        text += f"; {base.algorithm}: {median(base, one)})."
+        text += f"; {base.algorithm}: {median(base, measure)})."
     parts = []
     for which in ("better", "worse"):
         if chosen := [line for line in lines if verdict(line) == which]:
@@ -207,10 +213,10 @@ def _is(p: float) -> str:
 def _short(comparison: Comparison, scenario: str) -> Iterable[str]:
     """Yield notes on runs that failed, or that ended before their budget."""
     budget = comparison.plan.budget
-    records = {c: one for c, one in comparison.records.items() if c.scenario == scenario}
-    ended = Counter(c.algorithm for c, one in records.items() if one.evaluations < budget)
+    records = {c: record for c, record in comparison.records.items() if c.scenario == scenario}
+    ended = Counter(c.algorithm for c, record in records.items() if record.evaluations < budget)
     for name, count in ended.items():
-        made = [one.evaluations for c, one in records.items() if c.algorithm == name]
+        made = [record.evaluations for c, record in records.items() if c.algorithm == name]
         few = f"{min(made):,}" if min(made) == max(made) else f"{min(made):,} to {max(made):,}"
         yield (
             f"{name} had no more rows to propose after {few} of {budget:,} evaluations in "
@@ -223,9 +229,9 @@ def _short(comparison: Comparison, scenario: str) -> Iterable[str]:
             f"{_and(names)} searched other parameters than {comparison.plan.baseline}: different "
             "scenarios and bins are not counted, for they could not be compared."
         )
-    failed = Counter(c.algorithm for c, one in records.items() if one.failed)
+    failed = Counter(c.algorithm for c, record in records.items() if record.failed)
     if failed:
-        total = sum(one.failed for one in records.values())
+        total = sum(record.failed for record in records.values())
         yield (
             f"{total:,} simulations failed, in runs of {_and(failed)}; they count as evaluations "
             "that are not critical."

@@ -73,12 +73,12 @@ class Dashboard:
     @cached_property
     def failing(self) -> tuple[OpenMode, ...]:
         """The failure modes that current results have."""
-        return tuple(one for one in self.modes if one.fails_now)
+        return tuple(mode for mode in self.modes if mode.fails_now)
 
     @cached_property
     def regressions(self) -> tuple[OpenMode, ...]:
         """Those of them that are called fixed."""
-        return tuple(one for one in self.failing if one.is_regression)
+        return tuple(mode for mode in self.failing if mode.is_regression)
 
     @cached_property
     def unseen(self) -> dict[str, Failure]:
@@ -96,38 +96,42 @@ class Dashboard:
     def violated(self) -> dict[str, list[tuple[Matrix, list[str]]]]:
         """By violated requirement, the drivers that violate it, each with the scenarios."""
         found: dict[str, list[tuple[Matrix, list[str]]]] = {}
-        for one in self.criteria:
-            some = [(each, each.violated(one.id)) for each in self.requirements]
+        for criterion in self.criteria:
+            some = [(each, each.violated(criterion.id)) for each in self.requirements]
             if any(names for _, names in some):
-                found[one.id] = [(each, names) for each, names in some if names]
+                found[criterion.id] = [(each, names) for each, names in some if names]
         return found
 
     @cached_property
     def untested(self) -> list[str]:
         """The ids of the requirements that no driver is tested by with a result."""
-        found = [set(one.untested) for one in self.requirements]
-        return [one.id for one in self.criteria if all(one.id in each for each in found)]
+        found = [set(requirement.untested) for requirement in self.requirements]
+        return [
+            criterion.id
+            for criterion in self.criteria
+            if all(criterion.id in each for each in found)
+        ]
 
     @cached_property
     def without_requirement(self) -> list[str]:
         """The scenarios that test no requirement with any driver."""
-        tested = {name for one in self.requirements for name, _ in one.cells}
+        tested = {name for requirement in self.requirements for name, _ in requirement.cells}
         return [name for name in self.scenarios if name not in tested]
 
     @cached_property
     def scenarios(self) -> list[str]:
         """The names of all scenarios that were tested."""
-        return sorted({one.scenario for one in self.project.results})
+        return sorted({result.scenario for result in self.project.results})
 
     @cached_property
     def drivers(self) -> list[str]:
         """The labels of all drivers, each version by itself."""
-        return sorted({one.driver.label for one in self.project.results})
+        return sorted({result.driver.label for result in self.project.results})
 
     @property
     def work(self) -> str:
         """How much was read."""
-        return f"{sum(one.evaluations for one in self.project.results):,} evaluations"
+        return f"{sum(result.evaluations for result in self.project.results):,} evaluations"
 
     def to_json(self) -> Any:
         """Return figures, failure modes, notes and problems as JSON's types."""
@@ -137,23 +141,25 @@ class Dashboard:
             "added": self.added,
             "modes": [
                 {
-                    "id": one.key.id,
-                    "status": one.status,
-                    "comment": one.comment,
-                    "decided": one.decided,
-                    "fails_now": one.fails_now,
-                    "regression": one.is_regression,
-                    "scenario": one.key.scenario,
-                    "driver": one.key.driver,
-                    "title": one.title,
-                    "evaluations": one.count,
-                    "severity": one.severity,
-                    "results": [result.source for result in one.results],
+                    "id": mode.key.id,
+                    "status": mode.status,
+                    "comment": mode.comment,
+                    "decided": mode.decided,
+                    "fails_now": mode.fails_now,
+                    "regression": mode.is_regression,
+                    "scenario": mode.key.scenario,
+                    "driver": mode.key.driver,
+                    "title": mode.title,
+                    "evaluations": mode.count,
+                    "severity": mode.severity,
+                    "results": [result.source for result in mode.results],
                 }
-                for one in self.modes
+                for mode in self.modes
             ],
             "notes": list(self.notes),
-            "problems": [{"place": one.place, "why": one.why} for one in self.project.problems],
+            "problems": [
+                {"place": problem.place, "why": problem.why} for problem in self.project.problems
+            ],
         }
 
     def shown(self) -> list[str | Table]:
@@ -163,14 +169,16 @@ class Dashboard:
         lines: list[str | Table] = [failing_sentence(self)]
         if words := requirements_sentence(self):
             lines.append(words)
-        for one in self.failing[:MOST_LINES]:
-            status = "regression" if one.is_regression else one.status
-            of = f"{one.key.scenario}, {one.key.driver}: {one.title}"
-            lines.append(f"  {status:<11}{one.key.id}  {of}")
+        for mode in self.failing[:MOST_LINES]:
+            status = "regression" if mode.is_regression else mode.status
+            of = f"{mode.key.scenario}, {mode.key.driver}: {mode.title}"
+            lines.append(f"  {status:<11}{mode.key.id}  {of}")
         if len(self.failing) > MOST_LINES:
             lines.append(f"  and {len(self.failing) - MOST_LINES:,} more")
         problems = self.project.problems
-        lines += [f"  not read    {one.place}: {one.why}" for one in problems[:MOST_LINES]]
+        lines += [
+            f"  not read    {problem.place}: {problem.why}" for problem in problems[:MOST_LINES]
+        ]
         if len(problems) > MOST_LINES:
             lines.append(f"  and {len(problems) - MOST_LINES:,} more are not read")
         lines += [f"{'note':<12}{note}" for note in self.notes[:MOST_LINES]]
@@ -187,7 +195,9 @@ class Dashboard:
                 group="bridgegen.dashboard",
                 test="all results are read",
                 holds=not problems,
-                details="; ".join(f"{one.place}: {one.why}" for one in problems[:MOST_LINES])
+                details="; ".join(
+                    f"{problem.place}: {problem.why}" for problem in problems[:MOST_LINES]
+                )
                 or self.work,
                 figures=self.figures,
                 facts={},
@@ -198,16 +208,16 @@ class Dashboard:
     @cached_property
     def figures(self) -> dict[str, float]:
         """The figures that ``--fail-if`` judges, see `bridgegen.jobs.dashboard.options`."""
-        failing = [one.status for one in self.failing]
+        failing = [mode.status for mode in self.failing]
         project = self.project
         return {
             "new": failing.count("new"),
             "known": failing.count("known"),
             "accepted": failing.count("accepted"),
-            "fixed": sum(one.status == "fixed" and not one.fails_now for one in self.modes),
+            "fixed": sum(mode.status == "fixed" and not mode.fails_now for mode in self.modes),
             "regressions": len(self.regressions),
             "failing": len(failing),
-            "worst_severity": max((one.severity for one in self.failing), default=0.0),
+            "worst_severity": max((mode.severity for mode in self.failing), default=0.0),
             "requirements": len(self.criteria),
             "violated_requirements": len(self.violated),
             "untested_requirements": len(self.untested),
@@ -218,7 +228,7 @@ class Dashboard:
             "comparisons": len(project.comparisons),
             "scenarios": len(self.scenarios),
             "drivers": len(self.drivers),
-            "evaluations": sum(one.evaluations for one in project.results),
+            "evaluations": sum(result.evaluations for result in project.results),
             "problems": len(project.problems),
         }
 
@@ -248,11 +258,13 @@ def build_dashboard(given: DashboardOptions) -> Dashboard:
     project = read_project(
         folder, lambda number, total: given.callbacks.progress("folders", number, total, "")
     )
-    if update and (damaged := [one.why for one in project.problems if one.place.endswith(FILE)]):
+    if update and (
+        damaged := [problem.why for problem in project.problems if problem.place.endswith(FILE)]
+    ):
         raise FileFormatError(*damaged)  # it may name modes that seem to be new
     modes = failure_modes(project.results, decisions_of(own, project))
     new = {} if not update else undecided(modes, own)
-    moved = {id: one for id, one in old.items() if id not in file.failures}
+    moved = {id: failure for id, failure in old.items() if id not in file.failures}
     if update and (new or moved):
         write_failures(file, {**moved, **new})
     notes = contradictions(modes, own)

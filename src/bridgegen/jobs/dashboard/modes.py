@@ -83,8 +83,8 @@ class Decisions:
             key.scenario, "", key.conflict, key.conflict_type, key.responsible,
             requirement=key.requirement,
         )  # fmt: skip
-        for one in (replace(key, scenario=failure.searched or key.scenario), in_file, key.id):
-            if some := self.others.get(one, []):
+        for mode_key in (replace(key, scenario=failure.searched or key.scenario), in_file, key.id):
+            if some := self.others.get(mode_key, []):
                 return min(some, key=lambda pair: STATUSES.index(pair[1].status))
         return "", self.own.get(key.id) or Block()
 
@@ -112,7 +112,9 @@ def decisions_of(own: Mapping[str, Block], project: Project) -> Decisions:
             id, block = kept
             place = place_of(str(path.parent / FILE), project.folder)
             happens = ModeKey(scenario, "", block.conflict, block.type, block.responsible)
-            violated = [ModeKey(scenario, "", requirement=one.id) for one in block.violates]
+            violated = [
+                ModeKey(scenario, "", requirement=criterion.id) for criterion in block.violates
+            ]
             for key in (happens, *violated):
                 found.others[key] = [(f"{place}: {id}", block)]
     return found
@@ -127,8 +129,8 @@ def _keys(block: Block, project: Project) -> Iterator[ModeKey]:
             block.place,
         )  # fmt: skip
     else:
-        for one in block.violates:
-            yield ModeKey(scenario, driver, requirement=one.id)
+        for criterion in block.violates:
+            yield ModeKey(scenario, driver, requirement=criterion.id)
 
 
 # --- The modes, each with its block ---
@@ -144,7 +146,7 @@ def failure_modes(results: Sequence[Result], decisions: Decisions) -> list[OpenM
         results: of the project.
         decisions: with the status of each.
     """
-    now = {id(one) for one in current(results)}
+    now = {id(item) for item in current(results)}
     held: dict[ModeKey, list[tuple[Result, Failure]]] = {}
     for result in in_order(results):
         for failure in result.failures:
@@ -165,38 +167,47 @@ def failure_modes(results: Sequence[Result], decisions: Decisions) -> list[OpenM
                 sum(failure.count for _, failure in shown),
                 max(failure.severity for _, failure in shown),
                 all(failure.knife_edge for _, failure in shown),
-                tuple(dict.fromkeys(filter(None, (one.driver.version for one, _ in some)))),
+                tuple(dict.fromkeys(filter(None, (item.driver.version for item, _ in some)))),
                 tuple(result for result, _ in reversed(some)),
             )
         )
     return sorted(found, key=_order)
 
 
-def _order(one: OpenMode) -> tuple[bool, int, bool, float, int, ModeKey]:
-    rank = _RANK["regression" if one.is_regression else one.status]
-    return not one.fails_now, rank, one.knife_edge, -one.severity, -one.count, one.key
+def _order(open_mode: OpenMode) -> tuple[bool, int, bool, float, int, ModeKey]:
+    rank = _RANK["regression" if open_mode.is_regression else open_mode.status]
+    return (
+        not open_mode.fails_now,
+        rank,
+        open_mode.knife_edge,
+        -open_mode.severity,
+        -open_mode.count,
+        open_mode.key,
+    )
 
 
 def undecided(modes: Sequence[OpenMode], own: Mapping[str, Block]) -> dict[str, Block]:
     """Return blocks for the failure modes that no block is about, by id."""
     return {
-        one.key.id: Block(
-            title=_clean(one.title),
-            scenario=_clean(one.key.scenario),
-            driver=_clean(one.key.driver),
+        mode.key.id: Block(
+            title=_clean(mode.title),
+            scenario=_clean(mode.key.scenario),
+            driver=_clean(mode.key.driver),
         )
-        for one in modes
-        if not one.decided and one.key.id not in own
+        for mode in modes
+        if not mode.decided and mode.key.id not in own
     }
 
 
 def contradictions(modes: Sequence[OpenMode], own: Mapping[str, Block]) -> list[str]:
     """Return a sentence on each decision of the project's folder that a suite's overrules."""
     return [
-        f"{id} is {own[id].status} in {FILE} and {one.status} in {one.decided}, which counts: "
+        f"{id} is {own[id].status} in {FILE} and {mode.status} in {mode.decided}, which counts: "
         "remove the former"
-        for one in modes
-        if one.decided and (id := one.key.id) in own and own[id].status not in ("new", one.status)
+        for mode in modes
+        if mode.decided
+        and (id := mode.key.id) in own
+        and own[id].status not in ("new", mode.status)
     ]
 
 
@@ -207,5 +218,5 @@ def _clean(text: str) -> str:
 
 def unseen(modes: Sequence[OpenMode], own: Mapping[str, Block]) -> dict[str, Block]:
     """Return the blocks of the project's folder about modes that none of its results has."""
-    known = {one.key.id for one in modes}
-    return {id: one for id, one in own.items() if id not in known and not one.files}
+    known = {mode.key.id for mode in modes}
+    return {id: failure for id, failure in own.items() if id not in known and not failure.files}

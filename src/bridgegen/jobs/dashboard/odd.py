@@ -45,8 +45,8 @@ class Coverage:
     @property
     def counts(self) -> tuple[int, int, int]:
         """The numbers of attributes that are covered, not covered, and not expressible."""
-        covered = sum(bool(one.scenarios) for one in self.attributes)
-        cannot = sum(not one.attribute.expressible for one in self.attributes)
+        covered = sum(bool(attribute.scenarios) for attribute in self.attributes)
+        cannot = sum(not attribute.attribute.expressible for attribute in self.attributes)
         return covered, len(self.attributes) - covered - cannot, cannot
 
 
@@ -62,8 +62,10 @@ def coverage(results: Sequence[Result], sceneries: Mapping[str, Scenery]) -> Cov
         if result.seen is not None and result.scenario in sceneries:
             seen.setdefault(result.scenario, Seen()).add(result.seen)
     attributes = tuple(
-        Covered(one, _scenarios(one, seen, sceneries), _unread(one, seen, sceneries))
-        for one in TAXONOMY
+        Covered(
+            attribute, _scenarios(attribute, seen, sceneries), _unread(attribute, seen, sceneries)
+        )
+        for attribute in TAXONOMY
     )
     return Coverage(attributes, dict(sorted(seen.items())), sceneries)
 
@@ -84,13 +86,13 @@ def _scenarios(
     attribute: Attribute, seen: Mapping[str, Seen], sceneries: Mapping[str, Scenery]
 ) -> dict[str, int]:
     found = {}
-    for name, one in seen.items():
+    for name, element in seen.items():
         if attribute.band is not None:
             quantity, number = attribute.band
-            count = one.bands[quantity][number] if quantity in one.bands else 0
+            count = element.bands[quantity][number] if quantity in element.bands else 0
         else:
             has = bool(attribute.fact) and attribute.fact in sceneries[name].facts
-            count = one.evaluations if has else 0
+            count = element.evaluations if has else 0
         if count:
             found[name] = count
     return dict(sorted(found.items(), key=lambda item: (-item[1], item[0])))

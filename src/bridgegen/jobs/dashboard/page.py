@@ -51,40 +51,60 @@ def write_page(found: Dashboard) -> None:
     """
     name = found.project.folder.name
     base = os.path.relpath(found.project.folder, found.page.resolve().parent).replace(os.sep, "/")
-    again = [one for one in found.trends if len(one.points) > 1]
-    partly = {one.partly for one in found.coverage.sceneries.values() if one.partly}
+    again = [trend for trend in found.trends if len(trend.points) > 1]
+    partly = {scenery.partly for scenery in found.coverage.sceneries.values() if scenery.partly}
     templates.write_page(
-        found.page, "jobs/dashboard/page.html",
-        title=f"{name or 'project'}: dashboard", heading=name or "Project", generator=GENERATOR,
-        facts=[*_facts(found)], problems=found.project.problems,
-        lead=[one for one in (failing_sentence(found), requirements_sentence(found)) if one],
-        file=FILE, notes=found.notes[:MOST_RESULTS],
+        found.page,
+        "jobs/dashboard/page.html",
+        title=f"{name or 'project'}: dashboard",
+        heading=name or "Project",
+        generator=GENERATOR,
+        facts=[*_facts(found)],
+        problems=found.project.problems,
+        lead=[item for item in (failing_sentence(found), requirements_sentence(found)) if item],
+        file=FILE,
+        notes=found.notes[:MOST_RESULTS],
         modes=_modes("Failure modes of current results", found.failing, base),
         before=_modes(
             "Failure modes of earlier results",
-            [one for one in found.modes if not one.fails_now], base,
+            [mode for mode in found.modes if not mode.fails_now],
+            base,
         ),
         unseen=_table(
-            "Failure modes in no result", ("failure mode", "status", "scenario", "driver",
-                                           "comment"),
-            [[one.title or id, one.status, one.scenario, one.driver, one.comment]
-             for id, one in found.unseen.items()], MOST_MODES,
+            "Failure modes in no result",
+            ("failure mode", "status", "scenario", "driver", "comment"),
+            [
+                [
+                    failure.title or id,
+                    failure.status,
+                    failure.scenario,
+                    failure.driver,
+                    failure.comment,
+                ]
+                for id, failure in found.unseen.items()
+            ],
+            MOST_MODES,
         ),
         scenarios=joined(found.scenarios, 8) or "none",
         requirements=_requirements(found) if found.criteria else None,
         matrices=_matrices(found, base),
         versions=_versions(found),
-        figures=[(one, chart(one, base)) for one in again[:MOST_CHARTS]],
+        figures=[(series, chart(series, base)) for series in again[:MOST_CHARTS]],
         more_figures=len(again) - MOST_CHARTS,
-        once=_once([one for one in found.trends if len(one.points) == 1], base),
-        source=SOURCE, counts=found.coverage.counts,
-        attributes=[*_attributes(found.coverage.attributes)], partly=sorted(partly),
+        once=_once([trend for trend in found.trends if len(trend.points) == 1], base),
+        source=SOURCE,
+        counts=found.coverage.counts,
+        attributes=[*_attributes(found.coverage.attributes)],
+        partly=sorted(partly),
         parameters=_parameters(found.coverage),
-        results=[one for one in _results(found, base) if one["rows"]],
-        unread=_table("What cannot be read", ("folder or scenario", "why"),
-                      [[one.place, one.why] for one in found.project.problems]),
+        results=[result for result in _results(found, base) if result["rows"]],
+        unread=_table(
+            "What cannot be read",
+            ("folder or scenario", "why"),
+            [[problem.place, problem.why] for problem in found.project.problems],
+        ),
         open=OPEN,
-    )  # fmt: skip
+    )
 
 
 def _facts(found: Dashboard) -> Iterator[str]:
@@ -118,7 +138,7 @@ def _span(value: float, low: float, high: float) -> str | tuple[str, str]:
 
 def within(sizes: Iterable[int], most: int) -> int:
     """Return how many parts fit, by their sizes; the first always does."""
-    return max(1, sum(one <= most for one in accumulate(sizes)))
+    return max(1, sum(number <= most for number in accumulate(sizes)))
 
 
 # --- Failure modes: what fails now, what failed before ---
@@ -126,28 +146,28 @@ def within(sizes: Iterable[int], most: int) -> int:
 
 def _modes(name: str, some: Sequence[OpenMode], base: str) -> Table:
     heads = ("failure mode", "status", "scenario", "driver", "evaluations", "MAIS3+", "last seen")
-    return _table(name, heads, [_mode(one, base) for one in some], MOST_MODES)
+    return _table(name, heads, [_mode(mode, base) for mode in some], MOST_MODES)
 
 
-def _mode(one: OpenMode, base: str) -> Row:
-    notes = ["knife-edge: small changes make it vanish"] if one.knife_edge else []
-    notes += [one.comment] if one.comment else []
-    notes.append(one.key.id + (f" ({one.decided})" if one.decided else ""))
-    more = len(one.results) - MOST_RESULTS
+def _mode(open_mode: OpenMode, base: str) -> Row:
+    notes = ["knife-edge: small changes make it vanish"] if open_mode.knife_edge else []
+    notes += [open_mode.comment] if open_mode.comment else []
+    notes.append(open_mode.key.id + (f" ({open_mode.decided})" if open_mode.decided else ""))
+    more = len(open_mode.results) - MOST_RESULTS
     return [
-        Cell(one.title, notes),
+        Cell(open_mode.title, notes),
         Cell("fixed, but fails again", kind="status regression")
-        if one.is_regression
-        else Cell(one.status, kind=f"status {one.status}"),
-        one.key.scenario,
-        (one.key.driver, joined(one.versions, 6)),
-        one.count,
-        share(one.severity) if one.severity else "–",
+        if open_mode.is_regression
+        else Cell(open_mode.status, kind=f"status {open_mode.status}"),
+        open_mode.key.scenario,
+        (open_mode.key.driver, joined(open_mode.versions, 6)),
+        open_mode.count,
+        share(open_mode.severity) if open_mode.severity else "–",
         Cell(
-            when(one.results[0].time),
+            when(open_mode.results[0].time),
             links=[
-                (_address(base, each.page), each.source, f"{each.source}: {one.title}")
-                for each in one.results[:MOST_RESULTS]
+                (_address(base, each.page), each.source, f"{each.source}: {open_mode.title}")
+                for each in open_mode.results[:MOST_RESULTS]
             ],
             more=f" and {more:,} more" if more > 0 else "",
         ),
@@ -160,18 +180,18 @@ def _mode(one: OpenMode, base: str) -> Row:
 def _requirements(found: Dashboard) -> Table:
     rows: list[Row] = []
     stated = statements(found.project.results)
-    for one in found.criteria:
-        violated = found.violated.get(one.id, [])
+    for criterion in found.criteria:
+        violated = found.violated.get(criterion.id, [])
         who = "; ".join(f"{matrix.driver} in {joined(names, 3)}" for matrix, names in violated)
         state = Cell("met", kind="status fixed")
-        if one.id in found.untested:
+        if criterion.id in found.untested:
             state = Cell("tested by no scenario", kind="status untested")
         elif violated:
             state = Cell("violated", [who], kind="status regression")
-        others = [each for each in stated.get(one.id, []) if each != one.states]
+        others = [each for each in stated.get(criterion.id, []) if each != criterion.states]
         notes = [f"stated otherwise in some results: {joined(others, 3)}"] if others else []
-        words = Cell(one.text, notes, code=one.states)
-        rows.append([Cell(one.id, kind="id"), words, one.severity, state])
+        words = Cell(criterion.text, notes, code=criterion.states)
+        rows.append([Cell(criterion.id, kind="id"), words, criterion.severity, state])
     heads = ("id", "requirement", "severity", "state")
     return _table("Requirements", heads, rows, MOST_SCENARIOS, "list ids")
 
@@ -179,41 +199,42 @@ def _requirements(found: Dashboard) -> Table:
 def _matrices(found: Dashboard, base: str) -> dict[str, Any]:
     some = found.requirements
     cells = (
-        min(len(one.scenarios), MOST_SCENARIOS) * min(len(one.requirements), MOST_REQUIREMENTS)
-        for one in some
+        min(len(matrix.scenarios), MOST_SCENARIOS)
+        * min(len(matrix.requirements), MOST_REQUIREMENTS)
+        for matrix in some
     )
     fit = within(cells, MOST_CELLS)
     return {
-        "tables": [_matrix(one, base) for one in some[:fit]],
+        "tables": [_matrix(matrix, base) for matrix in some[:fit]],
         "more": max(0, len(some) - fit),
-        "is_open": sum(len(one.scenarios) for one in some) <= OPEN_MATRICES,
+        "is_open": sum(len(matrix.scenarios) for matrix in some) <= OPEN_MATRICES,
     }
 
 
-def _matrix(one: Matrix, base: str) -> Table:
-    labels = joined([label for label in one.labels if label != one.driver], 3)
-    violated = [each.id for each in one.requirements if one.violated(each.id)]
-    words = one.driver + (f" ({labels})" if labels else "")
+def _matrix(matrix: Matrix, base: str) -> Table:
+    labels = joined([label for label in matrix.labels if label != matrix.driver], 3)
+    violated = [each.id for each in matrix.requirements if matrix.violated(each.id)]
+    words = matrix.driver + (f" ({labels})" if labels else "")
     words += f": violates {joined(violated)}" if violated else ": violates none"
-    if one.without:
-        words += f"; {counted(len(one.without), 'scenario')} without requirement"
-    shown = one.requirements[:MOST_REQUIREMENTS]
+    if matrix.without:
+        words += f"; {counted(len(matrix.without), 'scenario')} without requirement"
+    shown = matrix.requirements[:MOST_REQUIREMENTS]
     left = [
         f"{counted(len(all_) - most, noun)} left out"
         for all_, most, noun in (
-            (one.requirements, MOST_REQUIREMENTS, "requirement"),
-            (one.scenarios, MOST_SCENARIOS, "scenario"),
+            (matrix.requirements, MOST_REQUIREMENTS, "requirement"),
+            (matrix.scenarios, MOST_SCENARIOS, "scenario"),
         )
         if len(all_) > most
     ]
     rows = [
         [
-            (name, "without requirement" if name in one.without else ""),
-            *(_verdict(one, name, each.id, base) for each in shown),
+            (name, "without requirement" if name in matrix.without else ""),
+            *(_verdict(matrix, name, each.id, base) for each in shown),
         ]
-        for name in one.scenarios[:MOST_SCENARIOS]
+        for name in matrix.scenarios[:MOST_SCENARIOS]
     ]
-    name, heads = f"Requirements of {one.driver} by scenario", [each.id for each in shown]
+    name, heads = f"Requirements of {matrix.driver} by scenario", [each.id for each in shown]
     return {**_table(name, ("scenario", *heads), rows, kind="matrix", title=words),
             "left": "; ".join(left)}  # fmt: skip
 
@@ -236,7 +257,7 @@ def _verdict(matrix: Matrix, scenario: str, requirement: str, base: str) -> Cell
 # --- Trends: versions, a chart for each series, and what was measured once ---
 
 
-def chart(one: Series, base: str) -> str:
+def chart(series: Series, base: str) -> str:
     """Return a series as a chart; a dot leads to its result's page."""
     points = [
         charts.Point(
@@ -245,22 +266,27 @@ def chart(one: Series, base: str) -> str:
             f"{point.of:,}); {point.source}",
             (point.version, point.driver), _address(base, point.page),
         )
-        for point in one.points
+        for point in series.points
     ]  # fmt: skip
-    latest = ", ".join(f"{point.driver} {share(point.share)}" for point in one.points[-5:])
-    return charts.trend(points, f"{one.measure} of {one.driver} in {one.title}: {latest}")
+    latest = ", ".join(f"{point.driver} {share(point.share)}" for point in series.points[-5:])
+    return charts.trend(points, f"{series.measure} of {series.driver} in {series.title}: {latest}")
 
 
 def _versions(found: Dashboard) -> Table:
     rows = []
     for _, some in sorted(versions(found.project.results).items()):
         for driver in some:
-            of_it = [one for one in found.project.results if one.driver == driver]
-            rows.append([
-                driver.label, driver.version or "not known", when(min(one.time for one in of_it)),
-                len({one.scenario for one in of_it}), sum(one.evaluations for one in of_it),
-                len({failure.key for one in of_it for failure in one.failures}),
-            ])  # fmt: skip
+            of_it = [result for result in found.project.results if result.driver == driver]
+            rows.append(
+                [
+                    driver.label,
+                    driver.version or "not known",
+                    when(min(result.time for result in of_it)),
+                    len({result.scenario for result in of_it}),
+                    sum(result.evaluations for result in of_it),
+                    len({failure.key for result in of_it for failure in result.failures}),
+                ]
+            )
     heads = ("driver", "version", "first result (UTC)", "scenarios", "evaluations",
              "failure modes")  # fmt: skip
     return _table("Versions of drivers", heads, rows[-MOST_ROWS:])
@@ -269,12 +295,12 @@ def _versions(found: Dashboard) -> Table:
 def _once(some: list[Series], base: str) -> Table:
     rows = [
         [
-            one.title, point.driver, one.measure, _span(point.share, point.low, point.high),
+            series.title, point.driver, series.measure, _span(point.share, point.low, point.high),
             f"{point.count:,} of {point.of:,}",
             Cell(point.source, href=_address(base, point.page)),
         ]
-        for one in some
-        for point in one.points
+        for series in some
+        for point in series.points
     ]  # fmt: skip
     title = f"Measured once: {counted(len(some), 'scenario and driver', 'pairs')}"
     heads = ("scenario or suite", "driver", "measure", "share", "count", "result")
@@ -286,44 +312,48 @@ def _once(some: list[Series], base: str) -> Table:
 
 def _attributes(some: Iterable[Covered]) -> Iterator[tuple[str, list[tuple[str, Table, str]]]]:
     """Yield each part of the taxonomy in words, with its groups: name, table, what is left out."""
-    for top, part in groupby(some, lambda one: one.attribute.path[0]):
+    for top, part in groupby(some, lambda item: item.attribute.path[0]):
         members = list(part)
-        states = [_state(one) for one in members]
+        states = [_state(member) for member in members]
         covered, cannot = states.count("covered"), states.count("not expressible")
         words = f"{top}: {covered} of {len(members) - cannot} covered"
         words += f", {cannot} not expressible" if cannot else ""
-        groups = groupby(members, lambda one: one.attribute.path[1:-1])
+        groups = groupby(members, lambda item: item.attribute.path[1:-1])
         yield words, [_group(" / ".join(path), list(each)) for path, each in groups]
 
 
-def _state(one: Covered) -> str:
-    if not one.attribute.expressible:
+def _state(covered: Covered) -> str:
+    if not covered.attribute.expressible:
         return "not expressible"
-    return "covered" if one.scenarios else "not covered"
+    return "covered" if covered.scenarios else "not covered"
 
 
 def _group(name: str, some: list[Covered]) -> tuple[str, Table, str]:
-    rows = [_attribute(one) for one in some if one.attribute.expressible]
+    rows = [_attribute(covered) for covered in some if covered.attribute.expressible]
     cannot = [
-        one.attribute.path[-1] + (f" ({one.attribute.note})" if one.attribute.note else "")
-        for one in some
-        if not one.attribute.expressible
+        covered.attribute.path[-1]
+        + (f" ({covered.attribute.note})" if covered.attribute.note else "")
+        for covered in some
+        if not covered.attribute.expressible
     ]
     table = _table(name, ("attribute", "evaluations", "covered by"), rows, kind="list odd")
     return name, table, "; ".join(cannot)
 
 
-def _attribute(one: Covered) -> Row:
-    state, note = _state(one), one.attribute.note
-    kind, names = state.replace(" ", "-"), [f"{name} ({n:,})" for name, n in one.scenarios.items()]
+def _attribute(covered: Covered) -> Row:
+    state, note = _state(covered), covered.attribute.note
+    kind, names = (
+        state.replace(" ", "-"),
+        [f"{name} ({n:,})" for name, n in covered.scenarios.items()],
+    )
     by = Cell(state, kind=kind)
     if names:
         by = Cell(joined(names, 2))
-    elif one.unread:
-        by = Cell(state, [f"not read of {counted(one.unread, 'scenario')}"], kind=kind)
+    elif covered.unread:
+        by = Cell(state, [f"not read of {counted(covered.unread, 'scenario')}"], kind=kind)
     mark = "✓ " if state == "covered" else "○ "
-    name = Cell(one.attribute.path[-1], [note] if note else [], mark=(mark, kind))
-    return [name, one.evaluations, by]
+    name = Cell(covered.attribute.path[-1], [note] if note else [], mark=(mark, kind))
+    return [name, covered.evaluations, by]
 
 
 def _parameters(of: Coverage) -> dict[str, Any]:
@@ -336,15 +366,18 @@ def _parameters(of: Coverage) -> dict[str, Any]:
 def _bins(of: Coverage, name: str) -> Table:
     """Return the bins of a scenario's parameters."""
     seen, rows = of.seen[name], []
-    for one in of.sceneries[name].parameters:
-        counts = seen.bins.get(one.name, [])
-        unit = "" if one.unit in ("1", "count") else f" {one.unit}"
-        outside = seen.outside.get(one.name, 0)
-        rows.append([
-            one.name, one.kind.span_text(one.low, one.high, "{:.4g}".format, unit),
-            f"{sum(count > 0 for count in counts)} of {len(counts)}",
-            (charts.strip(counts), f"{outside:,} outside" if outside else ""),
-        ])  # fmt: skip
+    for parameter in of.sceneries[name].parameters:
+        counts = seen.bins.get(parameter.name, [])
+        unit = "" if parameter.unit in ("1", "count") else f" {parameter.unit}"
+        outside = seen.outside.get(parameter.name, 0)
+        rows.append(
+            [
+                parameter.name,
+                parameter.kind.span_text(parameter.low, parameter.high, "{:.4g}".format, unit),
+                f"{sum(count > 0 for count in counts)} of {len(counts)}",
+                (charts.strip(counts), f"{outside:,} outside" if outside else ""),
+            ]
+        )
     bins = [count for counts in seen.bins.values() for count in counts]
     words = f"{name}: {counted(seen.evaluations, 'evaluation')}"
     if bins:
@@ -358,93 +391,132 @@ def _bins(of: Coverage, name: str) -> Table:
 
 def _results(found: Dashboard, base: str) -> Iterator[Table]:
     project = found.project
-    runs = sorted(project.runs, key=lambda one: (-one.time, one.source))
-    suites = sorted(project.suites, key=lambda one: (-one.time, one.source))
-    compared = [one for one in suites if one.difference]
+    runs = sorted(project.runs, key=lambda run: (-run.time, run.source))
+    suites = sorted(project.suites, key=lambda suite: (-suite.time, suite.source))
+    compared = [suite for suite in suites if suite.difference]
     for title, heads, rows in (
         (
             counted(len(runs), "run"),
-            ("run", "scenario", "driver", "evaluations", "harmful", "of the space",
-             "changed (UTC)"),
-            [_run(one, base) for one in runs],
+            (
+                "run",
+                "scenario",
+                "driver",
+                "evaluations",
+                "harmful",
+                "of the space",
+                "changed (UTC)",
+            ),
+            [_run(run, base) for run in runs],
         ),
         (
             counted(len(suites), "suite"),
-            ("suite", "drivers", "scenarios", "not judged", "variations", "fail", "not run",
-             "changed (UTC)"),
-            [_suite(one, base) for one in suites],
+            (
+                "suite",
+                "drivers",
+                "scenarios",
+                "not judged",
+                "variations",
+                "fail",
+                "not run",
+                "changed (UTC)",
+            ),
+            [_suite(suite, base) for suite in suites],
         ),
         (
             counted(len(compared), "difference of two drivers", "differences of two drivers"),
-            ("suite", "first driver", "second driver", "only the first fails",
-             "only the second fails", "both fail", "both pass", "by chance"),
-            [_difference(one, base) for one in compared],
+            (
+                "suite",
+                "first driver",
+                "second driver",
+                "only the first fails",
+                "only the second fails",
+                "both fail",
+                "both pass",
+                "by chance",
+            ),
+            [_difference(line, base) for line in compared],
         ),
         (
             counted(len(project.maps), "preventability map"),
-            ("map", "scenario", "driver", "cells", "avoided", "not avoided though preventable",
-             "not preventable"),
+            (
+                "map",
+                "scenario",
+                "driver",
+                "cells",
+                "avoided",
+                "not avoided though preventable",
+                "not preventable",
+            ),
             [*_maps(found, base)],
         ),
         (
-            counted(len(project.comparisons), "comparison of algorithms",
-                    "comparisons of algorithms"),
+            counted(
+                len(project.comparisons), "comparison of algorithms", "comparisons of algorithms"
+            ),
             ("comparison", "scenarios", "algorithms", "runs"),
             [
-                [Cell(one.source, href=_address(base, one.page)), joined(one.scenarios),
-                 joined(one.algorithms), one.runs]
-                for one in project.comparisons
+                [
+                    Cell(comparison.source, href=_address(base, comparison.page)),
+                    joined(comparison.scenarios),
+                    joined(comparison.algorithms),
+                    comparison.runs,
+                ]
+                for comparison in project.comparisons
             ],
         ),
-    ):  # fmt: skip
+    ):
         yield _table(title, heads, rows)
 
 
-def _run(one: Result, base: str) -> Row:
-    space = one.space
-    is_known = space is not None and space.share is not None and not one.unjudged
+def _run(result: Result, base: str) -> Row:
+    space = result.space
+    is_known = space is not None and space.share is not None and not result.unjudged
     return [
-        Cell(one.source, [] if one.finished else ["not finished"], href=_address(base, one.page)),
-        one.scenario,
-        (one.driver.label, f"worse than {one.worse_than}" if one.worse_than else ""),
-        one.evaluations,
-        "not judged" if one.unjudged else one.failed if space or one.worse_than else "–",
+        Cell(
+            result.source,
+            [] if result.finished else ["not finished"],
+            href=_address(base, result.page),
+        ),
+        result.scenario,
+        (result.driver.label, f"worse than {result.worse_than}" if result.worse_than else ""),
+        result.evaluations,
+        "not judged" if result.unjudged else result.failed if space or result.worse_than else "–",
         _span(space.share or 0.0, space.low, space.high) if space and is_known else "–",
-        when(one.time),
+        when(result.time),
     ]
 
 
-def _suite(one: SuiteLine, base: str) -> Row:
+def _suite(suite_line: SuiteLine, base: str) -> Row:
     return [
-        Cell(one.source, href=_address(base, one.page)),
-        joined(one.egos),
-        len({each.entry for each in one.results}),
-        len({each.entry for each in one.results if each.unjudged}),
-        *(sum(getattr(each, name) for each in one.results)
+        Cell(suite_line.source, href=_address(base, suite_line.page)),
+        joined(suite_line.egos),
+        len({each.entry for each in suite_line.results}),
+        len({each.entry for each in suite_line.results if each.unjudged}),
+        *(sum(getattr(each, name) for each in suite_line.results)
           for name in ("evaluations", "failed", "lost")),
-        when(one.time),
+        when(suite_line.time),
     ]  # fmt: skip
 
 
-def _difference(one: SuiteLine, base: str) -> Row:
-    found = one.difference
+def _difference(suite_line: SuiteLine, base: str) -> Row:
+    found = suite_line.difference
     assert found is not None
     return [
-        Cell(one.source, href=_address(base, one.page)), found.first, found.second,
+        Cell(suite_line.source, href=_address(base, suite_line.page)), found.first, found.second,
         *(found.counts[name] for name in ("fixed", "broken", "both fail", "both pass")),
         f"p = {found.p_value:.2g}",
     ]  # fmt: skip
 
 
 def _maps(found: Dashboard, base: str) -> Iterator[Row]:
-    for one in found.project.maps:
-        href = _address(base, one.page)
-        if not one.scenario:
-            yield [Cell(one.source, ["not finished"], href=href), *[""] * 6]
+    for line in found.project.maps:
+        href = _address(base, line.page)
+        if not line.scenario:
+            yield [Cell(line.source, ["not finished"], href=href), *[""] * 6]
             continue
-        for each in one.drivers:
+        for each in line.drivers:
             numbers = (each.avoided, each.preventable, each.unpreventable)
             yield [
-                Cell(one.source, href=href), one.scenario, each.driver, one.cells,
+                Cell(line.source, href=href), line.scenario, each.driver, line.cells,
                 *((n, share(n / each.judged)) if each.judged else "–" for n in numbers),
             ]  # fmt: skip

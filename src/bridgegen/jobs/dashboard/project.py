@@ -68,7 +68,7 @@ class Project:
     @property
     def results(self) -> tuple[Result, ...]:
         """Of all runs and of all entries of suites."""
-        return (*self.runs, *(one for suite in self.suites for one in suite.results))
+        return (*self.runs, *(result for suite in self.suites for result in suite.results))
 
 
 def read_project(folder: Path, begun: Callable[[int, int], None] | None = None) -> Project:
@@ -91,10 +91,10 @@ def read_project(folder: Path, begun: Callable[[int, int], None] | None = None) 
             f"{folder}: contains no run, suite, preventability map or comparison, nor does any "
             "folder below it"
         )
-    for number, one in enumerate(found):
+    for number, path in enumerate(found):
         if begun is not None:
             begun(number, len(found))
-        reader.read(one)
+        reader.read(path)
     if len(found) >= MOST_RUNS:
         why = f"a dashboard reads at most {MOST_RUNS:,} folders; the others are left out"
         reader.problems.append(Problem(".", why))
@@ -151,8 +151,10 @@ class _Reader:
     def project(self) -> Project:
         """Return all that was read."""
         decisions = self._decisions()
-        results = (*self.runs, *(one for suite in self.suites for one in suite.results))
-        unread = sorted({one.scenario for one in results if one.seen is None and one.finished})
+        results = (*self.runs, *(result for suite in self.suites for result in suite.results))
+        unread = sorted(
+            {result.scenario for result in results if result.seen is None and result.finished}
+        )
         problems = [*self.problems]
         for name in unread:
             why = "is missing, or has changed since it was tested; its coverage is not counted"
@@ -169,7 +171,7 @@ class _Reader:
         )
 
     def _decisions(self) -> dict[Path, FailureFile]:
-        beside = [path.parent for one in self.suites for path in one.files.values()]
+        beside = [path.parent for suite in self.suites for path in suite.files.values()]
         found = {}
         for folder in sorted({*self.deciding, *beside} - {self.root}):
             try:

@@ -76,8 +76,8 @@ class Matrix:
     @property
     def untested(self) -> list[str]:
         """The ids of the requirements that no scenario tests with a result."""
-        tested = {one for (_, one), cell in self.cells.items() if cell.verdict != "unknown"}
-        return [one.id for one in self.requirements if one.id not in tested]
+        tested = {name for (_, name), cell in self.cells.items() if cell.verdict != "unknown"}
+        return [requirement.id for requirement in self.requirements if requirement.id not in tested]
 
 
 def matrices(results: Sequence[Result], declared: Iterable[Criterion] = ()) -> list[Matrix]:
@@ -87,20 +87,22 @@ def matrices(results: Sequence[Result], declared: Iterable[Criterion] = ()) -> l
         results: of the project.
         declared: requirements that the project has, whether they are tested or not.
     """
-    known = {one.id: one for one in declared}
+    known = {criterion.id: criterion for criterion in declared}
     for result in results:
         for judged in result.judged:
             known.setdefault(judged.criterion.id, judged.criterion)
-    order = sorted(known.values(), key=lambda one: (_GRAVITY.index(one.severity), one.id))
+    order = sorted(
+        known.values(), key=lambda criterion: (_GRAVITY.index(criterion.severity), criterion.id)
+    )
     by_driver: dict[str, list[Result]] = {}
     for result in current(results):
         by_driver.setdefault(result.driver.name, []).append(result)
     return [
         Matrix(
             name,
-            tuple(dict.fromkeys(one.driver.label for one in some)),
+            tuple(dict.fromkeys(result.driver.label for result in some)),
             tuple(order),
-            tuple(sorted({one.scenario for one in some})),
+            tuple(sorted({result.scenario for result in some})),
             _cells(some),
         )
         for name, some in sorted(by_driver.items())

@@ -76,7 +76,7 @@ def driver_of(text: str, project: Path, bridgegen: str) -> Driver:
 
 def _split(part: str) -> tuple[str, str]:
     """Return a part of a name without its version, and the version."""
-    suffix = next((one for one in _SUFFIXES if part.endswith(one)), "")
+    suffix = next((name for name in _SUFFIXES if part.endswith(name)), "")
     stem = part.removesuffix(suffix)
     found = _VERSION.search(stem)
     if found is None or not found.start():
@@ -89,7 +89,7 @@ def place_of(text: str, project: Path) -> str:
     path = Path(text)
     if not path.is_absolute():
         tried = (project / path, project.parent / path, Path.cwd() / path)
-        path = next((one for one in tried if one.exists()), path)
+        path = next((item for item in tried if item.exists()), path)
         if not path.is_absolute():
             return path.as_posix()
     try:
@@ -261,7 +261,9 @@ class Result:
 
 def in_order(results: Iterable[Result]) -> list[Result]:
     """Return results by time; equal ones by their folder."""
-    return sorted(results, key=lambda one: (one.time, one.source, one.entry, one.driver))
+    return sorted(
+        results, key=lambda result: (result.time, result.source, result.entry, result.driver)
+    )
 
 
 def current(results: Iterable[Result]) -> list[Result]:
@@ -272,19 +274,21 @@ def current(results: Iterable[Result]) -> list[Result]:
     finished says nothing against what has: its failures are not known yet.
     """
     held: dict[tuple[str, str, str], list[Result]] = {}
-    for one in in_order(results):
-        held.setdefault((one.scenario, one.driver.name, one.kind), []).append(one)
+    for result in in_order(results):
+        held.setdefault((result.scenario, result.driver.name, result.kind), []).append(result)
     found = []
     for some in held.values():
-        last = next((one for one in reversed(some) if one.finished), some[-1])
+        last = next((result for result in reversed(some) if result.finished), some[-1])
         version = last.driver.version
-        found += [one for one in some if one.driver.version == version] if version else [last]
+        found += (
+            [result for result in some if result.driver.version == version] if version else [last]
+        )
     return in_order(found)
 
 
 def versions(results: Iterable[Result]) -> Mapping[str, list[Driver]]:
     """Return the versions of each driver, in the order of first appearance."""
     found: dict[str, dict[Driver, None]] = {}
-    for one in in_order(results):
-        found.setdefault(one.driver.name, {})[one.driver] = None
+    for result in in_order(results):
+        found.setdefault(result.driver.name, {})[result.driver] = None
     return {name: list(some) for name, some in found.items()}

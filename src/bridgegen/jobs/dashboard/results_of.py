@@ -85,7 +85,7 @@ def read_run(project: Path, folder: Path, sceneries: Sceneries) -> Result:
         bound.failed if bound else 0,
         line.finished,
         bound.space if bound and other is None else None,
-        tuple(replace(one, searched=searched) for one in failures),
+        tuple(replace(failure, searched=searched) for failure in failures),
         judged,
         seen[0],
         worse_than="" if other is None else driver_of(other, project, line.version).label,
@@ -95,35 +95,42 @@ def read_run(project: Path, folder: Path, sceneries: Sceneries) -> Result:
 
 def violations(judged: tuple[Judged, ...], scenario: str, driver: str) -> Iterator[Failure]:
     """Yield each violated requirement as a failure mode."""
-    for one in judged:
-        if one.violated:
-            key = ModeKey(scenario, driver, requirement=one.criterion.id)
-            words = one.criterion.text or one.criterion.states
-            yield Failure(key, f"violates {one.criterion.id}: {words}", one.violated)
+    for item in judged:
+        if item.violated:
+            key = ModeKey(scenario, driver, requirement=item.criterion.id)
+            words = item.criterion.text or item.criterion.states
+            yield Failure(key, f"violates {item.criterion.id}: {words}", item.violated)
 
 
 def _failures(line: RunLine, scenario: str, driver: Driver) -> Iterator[Failure]:
     """Yield the failure modes of a run; those that differ in cause or cluster alone are one."""
     held: dict[ModeKey, list[Mode]] = {}
-    for one in line.modes:
+    for mode in line.modes:
         key = ModeKey(
-            scenario, driver.name, one.conflict, one.conflict_type, one.responsible,
-            one.partner, one.place,
+            scenario, driver.name, mode.conflict, mode.conflict_type, mode.responsible,
+            mode.partner, mode.place,
         )  # fmt: skip
-        held.setdefault(key, []).append(one)
+        held.setdefault(key, []).append(mode)
     for key, modes in held.items():
         yield Failure(
             key,
             modes[0].title,
-            sum(one.count for one in modes),
-            max(one.severity for one in modes),
-            all(one.knife_edge for one in modes),
+            sum(mode.count for mode in modes),
+            max(mode.severity for mode in modes),
+            all(mode.knife_edge for mode in modes),
         )
 
 
-def _judged(one: CriterionSummary) -> Judged:
-    worst = one.worst if isfinite(one.worst) else None
-    return Judged(one.criterion, one.met, one.violated, one.unknown, worst, one.unit)
+def _judged(criterion_summary: CriterionSummary) -> Judged:
+    worst = criterion_summary.worst if isfinite(criterion_summary.worst) else None
+    return Judged(
+        criterion_summary.criterion,
+        criterion_summary.met,
+        criterion_summary.violated,
+        criterion_summary.unknown,
+        worst,
+        criterion_summary.unit,
+    )
 
 
 def _seen(store: Store, settings: Settings, sceneries: Sceneries) -> Seen | None:
@@ -195,20 +202,20 @@ def read_suite_line(project: Path, folder: Path, sceneries: Sceneries) -> SuiteL
     page = f"{source}/{PAGE}" if (folder / PAGE).is_file() else ""
     made = str(suite.settings.get("version", ""))
     results = tuple(  # the file has them as they ended
-        _result(project, source, page, time, made, one, sceneries)
-        for one in sorted(suite.results, key=lambda one: (one.entry, one.ego))
+        _result(project, source, page, time, made, result, sceneries)
+        for result in sorted(suite.results, key=lambda result: (result.entry, result.ego))
     )
-    egos = tuple(dict.fromkeys(one.driver.label for one in results))
+    egos = tuple(dict.fromkeys(result.driver.label for result in results))
     lost = tuple(
-        (f"{one.entry} ({one.ego})" if one.ego else one.entry, one.problem)
-        for one in suite.results
-        if one.problem
+        (f"{result.entry} ({result.ego})" if result.ego else result.entry, result.problem)
+        for result in suite.results
+        if result.problem
     )
     files = {
-        scenario_name(one.scenario, project): path.resolve()
-        for one in suite.results
-        if one.scenario.lower().endswith(".xosc") and not one.distribution
-        and (path := _path(project, one.scenario)).is_file()
+        scenario_name(result.scenario, project): path.resolve()
+        for result in suite.results
+        if result.scenario.lower().endswith(".xosc") and not result.distribution
+        and (path := _path(project, result.scenario)).is_file()
     }  # fmt: skip
     return SuiteLine(
         source, page, time, egos, results, _difference(project, suite, made), lost, files
@@ -222,7 +229,7 @@ def _difference(project: Path, suite: SuiteRun, made: str) -> Difference | None:
     egos = sorted(suite.egos)
     labels = [driver_of(ego or "the scenarios' own", project, made).label for ego in egos]
     first, second = (
-        {one.entry: one for one in suite.of_ego(ego)} for ego in egos
+        {result.entry: result for result in suite.of_ego(ego)} for ego in egos
     )  # a suite that was stopped lacks some
     both = sorted(name for name in first if name in second)
     return difference(
@@ -237,12 +244,14 @@ def _result(
     page: str,
     time: float,
     made: str,
-    one: EntryResult,
+    entry_result: EntryResult,
     sceneries: Sceneries,
 ) -> Result:
-    scenario = scenario_name(one.scenario, project, one.distribution)
-    driver = driver_of(one.ego or one.driver or "the scenario's own", project, made)
-    judged = tuple(_judged_entry(one))
+    scenario = scenario_name(entry_result.scenario, project, entry_result.distribution)
+    driver = driver_of(
+        entry_result.ego or entry_result.driver or "the scenario's own", project, made
+    )
+    judged = tuple(_judged_entry(entry_result))
     return Result(
         "suite",
         source,
@@ -250,27 +259,27 @@ def _result(
         time,
         scenario,
         driver,
-        len(one.rows),
-        one.count("failed"),
-        one.count("not run"),
-        finished=not one.problem,
+        len(entry_result.rows),
+        entry_result.count("failed"),
+        entry_result.count("not run"),
+        finished=not entry_result.problem,
         failures=(
-            *_failures_of_entry(one, scenario, driver.name),
+            *_failures_of_entry(entry_result, scenario, driver.name),
             *violations(judged, scenario, driver.name),
         ),
         judged=judged,
-        unjudged=one.verdict == "not judged",
-        seen=_seen_in_entry(one, _scenery(project, one, sceneries)),
-        entry=one.entry,
+        unjudged=entry_result.verdict == "not judged",
+        seen=_seen_in_entry(entry_result, _scenery(project, entry_result, sceneries)),
+        entry=entry_result.entry,
     )
 
 
-def _judged_entry(one: EntryResult) -> Iterator[Judged]:
-    for i, given in enumerate(one.criteria):
+def _judged_entry(entry_result: EntryResult) -> Iterator[Judged]:
+    for i, given in enumerate(entry_result.criteria):
         criterion = read_criterion(given)
         margins = [
             row.margins[i]
-            for row, verdict in zip(one.rows, one.verdicts, strict=True)
+            for row, verdict in zip(entry_result.rows, entry_result.verdicts, strict=True)
             if i < len(row.margins) and verdict != "not judged"
         ]
         violated = sum(margin < 0.0 for margin in margins)
@@ -278,16 +287,16 @@ def _judged_entry(one: EntryResult) -> Iterator[Judged]:
             criterion,
             len(margins) - violated,
             violated,
-            len(one.rows) - len(margins),
+            len(entry_result.rows) - len(margins),
             min(margins, default=None),
             unit_of(criterion),
         )
 
 
-def _failures_of_entry(one: EntryResult, scenario: str, driver: str) -> Iterator[Failure]:
+def _failures_of_entry(entry_result: EntryResult, scenario: str, driver: str) -> Iterator[Failure]:
     """Yield the critical variations, grouped by what happens."""
     held: dict[ModeKey, list[RowResult]] = {}
-    for row in one.rows:
+    for row in entry_result.rows:
         if row.critical:
             key = ModeKey(
                 scenario, driver, row.conflict, row.conflict_type, row.responsible,
@@ -306,10 +315,12 @@ def _title(row: RowResult) -> str:
     return title(key).replace("another participant", f"'{row.partner}'")
 
 
-def _scenery(project: Path, one: EntryResult, sceneries: Sceneries) -> Scenery | None:
+def _scenery(project: Path, entry_result: EntryResult, sceneries: Sceneries) -> Scenery | None:
     """Return the scenery of an entry."""
-    scenario = str(_path(project, one.scenario))
-    distribution = str(_path(project, one.distribution)) if one.distribution else ""
+    scenario = str(_path(project, entry_result.scenario))
+    distribution = (
+        str(_path(project, entry_result.distribution)) if entry_result.distribution else ""
+    )
     return sceneries.of((scenario, distribution, "", False))
 
 
@@ -319,13 +330,17 @@ def _path(project: Path, text: str) -> Path:
     return next((path for path in tried if path.is_file()), Path(text))
 
 
-def _seen_in_entry(one: EntryResult, scenery: Scenery | None) -> Seen | None:
+def _seen_in_entry(entry_result: EntryResult, scenery: Scenery | None) -> Seen | None:
     """Count an entry's variations."""
-    if scenery is None or one.problem:
+    if scenery is None or entry_result.problem:
         return None
-    rows = [row for row in one.rows if not row.problem and len(row.x) == len(one.parameters)]
+    rows = [
+        row
+        for row in entry_result.rows
+        if not row.problem and len(row.x) == len(entry_result.parameters)
+    ]
     columns: dict[str, Float] = {}
-    for k, name in enumerate(one.parameters):
+    for k, name in enumerate(entry_result.parameters):
         values = [row.x[k] for row in rows]
         if name in scenery.edges:
             columns[name] = np.array([scenery.inner(name, value) for value in values])

@@ -71,7 +71,10 @@ class Measure:
             KeyError: a parameter is not among the columns.
         """
         return self.of(
-            *(columns[one] if isinstance(one, str) else np.array([one]) for one in self.sources)
+            *(
+                columns[source] if isinstance(source, str) else np.array([source])
+                for source in self.sources
+            )
         )
 
 
@@ -99,23 +102,23 @@ class Scenery:
     def edges(self) -> Mapping[str, Float]:
         """Of each parameter that varies, the edges of the bins of its declared range."""
         found = {}
-        for one in self.parameters:
-            edges = one.kind.edges(one.low, one.high, BINS)
+        for parameter in self.parameters:
+            edges = parameter.kind.edges(parameter.low, parameter.high, BINS)
             if len(edges) > MOST_BINS + 1:
-                edges = np.linspace(one.low, one.high, BINS + 1)
-            found[one.name] = edges
+                edges = np.linspace(parameter.low, parameter.high, BINS + 1)
+            found[parameter.name] = edges
         return found
 
     @cached_property
     def columns(self) -> frozenset[str]:
         """The parameters on whose values the counts depend."""
-        sources = (one for each in self.quantities.values() for one in each.sources)
-        return frozenset(self.edges) | {one for one in sources if isinstance(one, str)}
+        sources = (source for each in self.quantities.values() for source in each.sources)
+        return frozenset(self.edges) | {source for source in sources if isinstance(source, str)}
 
     def inner(self, name: str, value: float | str) -> float:
         """Return the inner value of a parameter that varies, from what people read."""
-        one = next(each for each in self.parameters if each.name == name)
-        found = one.kind.read(value, one.low, one.high)
+        parameter = next(each for each in self.parameters if each.name == name)
+        found = parameter.kind.read(value, parameter.low, parameter.high)
         return float("nan") if found is None else found
 
     def seen(self, columns: Columns, n: int) -> Seen:
@@ -155,8 +158,10 @@ def scenery_of(scenario: SearchedScenario, *, on_map: bool = False) -> Scenery:
         scenario: logical, or of a file.
         on_map: whether it takes place on a map, whose roads are not read.
     """
-    parameters = tuple(one for one in scenario.parameters.values() if one.low < one.high)
-    defaults = {one.name: one.default for one in scenario.parameters.values()}
+    parameters = tuple(
+        parameter for parameter in scenario.parameters.values() if parameter.low < parameter.high
+    )
+    defaults = {parameter.name: parameter.default for parameter in scenario.parameters.values()}
     if isinstance(scenario, LogicalScenario):
         defaults = scenario.usual_values()
         facts, quantities = _of_logical(scenario, on_map)
@@ -175,11 +180,11 @@ def scenery_of(scenario: SearchedScenario, *, on_map: bool = False) -> Scenery:
 
 def _of_logical(scenario: LogicalScenario, on_map: bool) -> tuple[set[str], dict[str, Measure]]:
     kinds = {
-        kind for one in scenario.participants if one.name != "ego"
-        for kind in (one.types or (one.type,))
+        kind for participant in scenario.participants if participant.name != "ego"
+        for kind in (participant.types or (participant.type,))
     }  # fmt: skip
-    facts = {f"participant:{_kind(one)}" for one in kinds}
-    facts |= {"participant:emergency" for one in scenario.participants if one.siren}
+    facts = {f"participant:{_kind(item)}" for item in kinds}
+    facts |= {"participant:emergency" for participant in scenario.participants if participant.siren}
     facts |= {"jam"} if scenario.story.jams else set()
     facts |= {"road works", "warning sign"} if scenario.story.works else set()
     quantities = {name: Measure((source,), of) for name, (source, of) in _WEATHER.items()}
@@ -210,9 +215,9 @@ def _facts_of_roads(roads: RoadsSpec) -> set[str]:
         facts.add("divided" if knobs["lanes_against"] == 0 else "undivided")
     facts |= {"pavement"} if knobs["sidewalk_width"] != 0 else set()
     facts |= {"shoulder"} if knobs["shoulder_width"] != 0 else set()
-    if roads.crosswalk_at is not None or any(one.crosswalk for one in roads.legs.values()):
+    if roads.crosswalk_at is not None or any(leg.crosswalk for leg in roads.legs.values()):
         facts.add("crosswalk")
-    if any(one.sign for one in roads.legs.values()) or roads.signals != "none":
+    if any(leg.sign for leg in roads.legs.values()) or roads.signals != "none":
         facts.add("regulatory sign")
     return facts
 
@@ -225,14 +230,14 @@ def _quantities_of_roads(roads: RoadsSpec) -> dict[str, Measure]:
         "speed_limit": Measure((knobs["speed_limit"],), lambda v: np.rint(_KMH * v)),
         "grade": Measure((knobs.get("grade", 0.0),), _same),
     }
-    lanes = next((knobs[one] for one in ("lanes", "lanes_per_direction") if one in knobs), None)
+    lanes = next((knobs[name] for name in ("lanes", "lanes_per_direction") if name in knobs), None)
     if lanes is not None:
         found["lanes"] = Measure((lanes,), _same)
     if roads.template == "roundabout":
         measures = (knobs["radius"], knobs["ring_lane_width"])
         found["roundabout_diameter"] = Measure(measures, lambda r, width: 2.0 * r + width)
         return found
-    bends = [one for each in roads.segments for one in (each.curvature, each.end_curvature)]
+    bends = [name for each in roads.segments for name in (each.curvature, each.end_curvature)]
     found["curve_radius"] = Measure((0.0, *bends), _radius)
     return found
 
@@ -261,8 +266,8 @@ _ROAD_TYPES = {
 def _of_file(scenario: FileScenario) -> set[str]:
     """Return the facts of a scenario file and its map."""
     facts = set[str]()
-    for one in scenario.storyboard.entities.scenario_objects:
-        kind = kind_of(one.entity_object) if str(one.name).lower() != "ego" else None
+    for obj in scenario.storyboard.entities.scenario_objects:
+        kind = kind_of(obj.entity_object) if str(obj.name).lower() != "ego" else None
         if kind is not None and kind.takes_part:
             facts.add(f"participant:{_kind(kind.name)}")
     return facts | _facts_of_map(scenario.roads.model)
@@ -272,20 +277,20 @@ def _facts_of_map(roads: OpenDrive) -> set[str]:
     facts = {"traffic lane"} if roads.roads else set()
     for road in roads.roads:
         facts.add("left-hand traffic" if road.rule == "LHT" else "right-hand traffic")
-        facts |= {_ROAD_TYPES[one.type] for one in road.types if one.type in _ROAD_TYPES}
+        facts |= {_ROAD_TYPES[kind.type] for kind in road.types if kind.type in _ROAD_TYPES}
         facts |= _facts_of_lanes(road)
     return facts
 
 
 def _facts_of_lanes(road: Road) -> set[str]:
-    lanes = [one for section in road.sections for one in (*section.left, *section.right)]
-    kinds = {one.type for one in lanes}
+    lanes = [lane for section in road.sections for lane in (*section.left, *section.right)]
+    kinds = {lane.type for lane in lanes}
     facts = {"pavement"} if kinds & {"sidewalk", "walking"} else set()
     facts |= {"shoulder"} if kinds & {"shoulder", "stop"} else set()
     facts |= {"slip road"} if kinds & {"entry", "exit", "onRamp", "offRamp"} else set()
-    if any(mark.type != "none" for one in lanes for mark in one.road_marks):
+    if any(mark.type != "none" for lane in lanes for mark in lane.road_marks):
         facts.add("marked")
-    if any(one.type == "crosswalk" for one in road.objects):
+    if any(obj.type == "crosswalk" for obj in road.objects):
         facts.add("crosswalk")
     return facts
 

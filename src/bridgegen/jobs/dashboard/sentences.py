@@ -13,8 +13,8 @@ def failing_sentence(found: Dashboard) -> str:
     modes = found.failing
     if not modes:
         return "No failure mode is in any current result."
-    drivers = sorted({one.key.driver for one in modes})
-    scenarios = {one.key.scenario for one in modes}
+    drivers = sorted({mode.key.driver for mode in modes})
+    scenarios = {mode.key.scenario for mode in modes}
     verb = "fails" if len(drivers) == 1 else "fail"
     some = joined(drivers, MOST_NAMED)
     ways = counted(len(modes), "way")
@@ -55,10 +55,10 @@ def requirements_sentence(found: Dashboard) -> str:
 
 
 def _violation(found: Dashboard, name: str) -> str:
-    one = next(each for each in found.criteria if each.id == name)
+    criterion = next(each for each in found.criteria if each.id == name)
     by = [matrix.driver for matrix, _ in found.violated[name]]
     places = sorted({place for _, some in found.violated[name] for place in some})
-    return f"{name} ({one.severity}) by {joined(by, 2)} in {joined(places, 2)}"
+    return f"{name} ({criterion.severity}) by {joined(by, 2)} in {joined(places, 2)}"
 
 
 def _is(number: int) -> str:

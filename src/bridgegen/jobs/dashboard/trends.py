@@ -79,7 +79,7 @@ def trends(runs: Sequence[Result], suites: Iterable[SuiteLine]) -> list[Series]:
         if point is not None:
             key = (run.scenario, run.driver.name, _RUN)
             held.setdefault(key, []).append(point)
-    in_time = sorted(suites, key=lambda one: (one.time, one.source))
+    in_time = sorted(suites, key=lambda line: (line.time, line.source))
     latest = {_entries(suite): suite.source for suite in in_time}
     for suite in in_time:
         entries = _entries(suite)
@@ -90,7 +90,9 @@ def trends(runs: Sequence[Result], suites: Iterable[SuiteLine]) -> list[Series]:
         Series(title, driver, measure, tuple(some[-MOST_POINTS:]), max(0, len(some) - MOST_POINTS))
         for (title, driver, measure), some in held.items()
     ]
-    return sorted(found, key=lambda one: (-one.change, -one.points[-1].share, one.title))
+    return sorted(
+        found, key=lambda series: (-series.change, -series.points[-1].share, series.title)
+    )
 
 
 _RUN: Measure = "harmful share"
@@ -98,7 +100,7 @@ _SUITE: Measure = "failed variations"
 
 
 def _entries(suite: SuiteLine) -> frozenset[str]:
-    return frozenset(one.entry for one in suite.results)
+    return frozenset(result.entry for result in suite.results)
 
 
 def _of_run(run: Result) -> Point | None:
@@ -119,8 +121,10 @@ def _version(result: Result) -> str:
 def _of_suite(suite: SuiteLine) -> list[tuple[str, Point]]:
     found = []
     for label in suite.egos:
-        some = [one for one in suite.results if one.driver.label == label]
-        count, of = (sum(getattr(one, name) for one in some) for name in ("failed", "evaluations"))
+        some = [result for result in suite.results if result.driver.label == label]
+        count, of = (
+            sum(getattr(result, name) for result in some) for name in ("failed", "evaluations")
+        )
         if of:
             share = count / of
             point = Point(

@@ -118,7 +118,7 @@ class Mined:
     @property
     def work(self) -> str:
         """How much was read."""
-        return f"{sum(one.states for one in self.recordings):,} states"
+        return f"{sum(recording.states for recording in self.recordings):,} states"
 
     def to_json(self) -> Any:
         """Return what was recorded, found and written as JSON's types."""
@@ -134,17 +134,19 @@ class Mined:
 
     def judged(self) -> list[Judged]:
         """Return whether all files could be read, and the figures."""
-        conflicts = [each for one in self.recordings for each in one.conflicts]
+        conflicts = [each for recording in self.recordings for each in recording.conflicts]
         figures = {
             "recordings": len(self.recordings),
             "skipped": len(self.skipped),
-            "hours": sum(one.hours for one in self.recordings),
-            "kilometres": sum(one.kilometres for one in self.recordings),
-            "near_misses": sum(not one.is_contact for one in conflicts),
-            "contacts": sum(one.is_contact for one in conflicts),
-            "events": sum(len(kind) for one in self.recordings for kind in one.events.kinds),
+            "hours": sum(recording.hours for recording in self.recordings),
+            "kilometres": sum(recording.kilometres for recording in self.recordings),
+            "near_misses": sum(not conflict.is_contact for conflict in conflicts),
+            "contacts": sum(conflict.is_contact for conflict in conflicts),
+            "events": sum(
+                len(kind) for recording in self.recordings for kind in recording.events.kinds
+            ),
             "scenarios": len(self.replays),
-            "mined": sum(isinstance(one, MinedScenario) for one in self.mined),
+            "mined": sum(isinstance(scenario, MinedScenario) for scenario in self.mined),
         }
         return [
             Judged(
@@ -207,11 +209,11 @@ def mine(given: MineOptions) -> Mined:
                 cleaned = clean(traffic, time_step)
                 located = locate(cleaned.traffic, on_map)
                 conflicts = conflicts_of(cleaned.traffic)
-                one = summarise(traffic, cleaned, located, conflicts)
-                found.append(one)
+                summary = summarise(traffic, cleaned, located, conflicts)
+                found.append(summary)
                 clock = clock_of(cleaned.traffic)
-                played = closest(played, cleaned.traffic, clock, one.events, counts)
-                counts.update({each.kind.name: len(each) for each in one.events.kinds})
+                played = closest(played, cleaned.traffic, clock, summary.events, counts)
+                counts.update({each.kind.name: len(each) for each in summary.events.kinds})
                 kept = _most_critical(kept, cleaned.traffic, clock, conflicts, given.keep)
         except FileFormatError as error:
             if not given.lenient:
@@ -227,8 +229,8 @@ def mine(given: MineOptions) -> Mined:
         raise FileFormatError(*problems, "no recording could be read")
     replays = _written(kept, out / CRITICAL, given.ego)
     warnings = on_map.warnings if on_map is not None else ()
-    events = [one.events for one in found]
-    met = tuple(scenario_events(one.scenario, one.spec, events) for one in sought)
+    events = [item.events for item in found]
+    met = tuple(scenario_events(item.scenario, item.spec, events) for item in sought)
     write_events(out, events, met)
     made = write_mined(
         out,
@@ -273,8 +275,8 @@ def _most_critical(
     keep: int,
 ) -> list[Prepared]:
     """Return the most critical events of earlier recordings and of one more."""
-    more = [prepare(traffic, clock, one) for one in conflicts[:keep]]
-    return sorted([*kept, *more], key=lambda one: order(one.event))[:keep]
+    more = [prepare(traffic, clock, conflict) for conflict in conflicts[:keep]]
+    return sorted([*kept, *more], key=lambda prepared: order(prepared.event))[:keep]
 
 
 def _written(kept: list[Prepared], folder: Path, ego: str | None) -> tuple[Replay, ...]:
@@ -286,7 +288,7 @@ def _written(kept: list[Prepared], folder: Path, ego: str | None) -> tuple[Repla
                 old.unlink()
     except OSError as error:
         raise StorageError(f"{folder}: cannot be made: {error.strerror}") from None
-    return tuple(write(one, folder / f"{k:04}", ego) for k, one in enumerate(kept, 1))
+    return tuple(write(prepared, folder / f"{k:04}", ego) for k, prepared in enumerate(kept, 1))
 
 
 def _files(paths: Sequence[Path]) -> tuple[list[Path], list[Path]]:
@@ -325,5 +327,5 @@ def summarise(
         findings=cleaned.quality.findings, paths=tuple(paths), lanes=lanes,
         events=find_events(after, located),
         conflicts=conflicts,
-        names={p: after.names[p] for one in conflicts for p in (one.ego, one.other)},
+        names={p: after.names[p] for conflict in conflicts for p in (conflict.ego, conflict.other)},
     )  # fmt: skip

@@ -18,54 +18,64 @@ TRUSTED = 0.02
 
 def rows(mined: Mined) -> Iterator[list[object]]:
     """Yield a row for each conflict, under `HEAD`."""
-    written = {id(one.event.event): one for one in mined.replays}
-    for one in mined.recordings:
-        for each in one.conflicts:
+    written = {id(item.event.event): item for item in mined.replays}
+    for recording in mined.recordings:
+        for each in recording.conflicts:
             found, replay = each.found, written.get(id(each))
             yield [
-                one.facts.name, one.facts.source, one.names[each.ego], one.names[each.other],
-                f"{each.instant * mined.time_step:.2f}", found.conflict, found.type,
-                found.responsible, f"{found.ttc:.3f}", f"{found.needed_deceleration:.2f}",
-                f"{found.v_ego:.2f}", f"{found.v_other:.2f}", f"{found.harm:.3f}", each.doubt,
+                recording.facts.name,
+                recording.facts.source,
+                recording.names[each.ego],
+                recording.names[each.other],
+                f"{each.instant * mined.time_step:.2f}",
+                found.conflict,
+                found.type,
+                found.responsible,
+                f"{found.ttc:.3f}",
+                f"{found.needed_deceleration:.2f}",
+                f"{found.v_ego:.2f}",
+                f"{found.v_other:.2f}",
+                f"{found.harm:.3f}",
+                each.doubt,
                 found.sentence,
                 f"{CRITICAL}/{replay.scenario.name}" if replay else "",
                 f"{replay.off:.4f}" if replay else "",
                 f"{replay.too_fast:.3f}" if replay else "",
-            ]  # fmt: skip
+            ]
 
 
-def in_words(one: Summary) -> str:
+def in_words(summary: Summary) -> str:
     """Return how many conflicts a recording has, and whether to trust them."""
-    near = [each for each in one.conflicts if not each.is_contact]
+    near = [each for each in summary.conflicts if not each.is_contact]
     doubtful = sum(each.doubt != "" for each in near)
-    touching = {p for each in one.conflicts if each.is_contact for p in (each.ego, each.other)}
+    touching = {p for each in summary.conflicts if each.is_contact for p in (each.ego, each.other)}
     text = counted(len(near), "near miss")
     if doubtful:
         text += f", {doubtful:,} of them with motion that could not happen"
     if touching:
-        share = len(touching) / max(one.tracks, 1)
+        share = len(touching) / max(summary.tracks, 1)
         text += f"; boxes of {len(touching):,} participants ({share:.0%}) touch"
         if share > TRUSTED:
             text += ": unless these are accidents, boxes or positions are wrong, near misses too"
     return text
 
 
-def shown(one: Replay) -> dict[str, object]:
+def shown(replay: Replay) -> dict[str, object]:
     """Return what the page shows of an event that is written."""
-    event, found = one.event, one.event.event.found
+    event, found = replay.event, replay.event.event.found
     ego, other = event.names
-    paths = (one.scenario.with_suffix(end) for end in (".xosc", ".xodr", ".owl"))
+    paths = (replay.scenario.with_suffix(end) for end in (".xosc", ".xodr", ".owl"))
     facts = [
         f"the ego is {ego}, the other {other}, of {event.recording}",
         f"responsible: {found.responsible or 'unknown'}; {found.type}",
         f"time to collision {found.ttc:.2f} s, {found.needed_deceleration:.1f} m/s² needed",
-        f"not simulated: {one.problem}"
-        if one.problem
-        else f"simulated here, all participants are within {max(one.off, 0.001):.3f} m of where "
-        f"they were recorded, and within {max(one.too_fast, 0.01):.2f} m/s of their speed",
+        f"not simulated: {replay.problem}"
+        if replay.problem
+        else f"simulated here, all participants are within {max(replay.off, 0.001):.3f} m of where "
+        f"they were recorded, and within {max(replay.too_fast, 0.01):.2f} m/s of their speed",
     ]
     return {
-        "id": one.scenario.stem,
+        "id": replay.scenario.stem,
         "sentence": found.sentence,
         "picture": moving_picture(event.motion, 1, event.when, found.sentence),
         "facts": [*facts, f"doubtful: {event.event.doubt}"] if event.event.doubt else facts,
@@ -75,26 +85,31 @@ def shown(one: Replay) -> dict[str, object]:
 
 def screen_rows(mined: Mined) -> Iterator[tuple[str, str, str, str, float, float, str]]:
     """Yield what the terminal shows of the events that are written."""
-    for one in mined.replays:
-        found = one.event.event.found
+    for replay in mined.replays:
+        found = replay.event.event.found
         yield (
-            one.scenario.name, one.event.recording, " and ".join(one.event.names), found.type,
-            round(found.ttc, 2), round(found.needed_deceleration, 1), found.responsible,
-        )  # fmt: skip
+            replay.scenario.name,
+            replay.event.recording,
+            " and ".join(replay.event.names),
+            found.type,
+            round(found.ttc, 2),
+            round(found.needed_deceleration, 1),
+            found.responsible,
+        )
 
 
-def conflicts_as_json(one: Summary, time_step: float) -> list[dict[str, object]]:
+def conflicts_as_json(summary: Summary, time_step: float) -> list[dict[str, object]]:
     """Return a recording's conflicts as plain data."""
-    return [_as_json(one, each, time_step) for each in one.conflicts]
+    return [_as_json(summary, each, time_step) for each in summary.conflicts]
 
 
-def _as_json(one: Summary, each: RecordedConflict, time_step: float) -> dict[str, object]:
+def _as_json(summary: Summary, each: RecordedConflict, time_step: float) -> dict[str, object]:
     return {
-        "ego": one.names[each.ego], "other": one.names[each.other],
+        "ego": summary.names[each.ego], "other": summary.names[each.other],
         "time": each.instant * time_step, "doubt": each.doubt or None, **each.found.to_dict(),
     }  # fmt: skip
 
 
 def recordings_in_words(mined: Mined) -> Sequence[tuple[str, str]]:
     """Return each recording's name and its conflicts in words."""
-    return [(one.facts.name, in_words(one)) for one in mined.recordings]
+    return [(recording.facts.name, in_words(recording)) for recording in mined.recordings]

@@ -92,63 +92,94 @@ def write_all(mined: Mined) -> None:
     Raises:
         StorageError: they cannot be written.
     """
-    rows = [_row(one) for one in mined.recordings]
+    rows = [_row(recording) for recording in mined.recordings]
     write_whole(mined.out / TABLE, _csv(TABLE_HEAD, rows))
     write_whole(mined.out / LANES, _csv(LANES_HEAD, _lane_rows(mined)))
     write_whole(mined.out / QUALITY, _csv(QUALITY_HEAD, _quality_rows(mined)))
     write_whole(mined.out / CONFLICTS, _csv(conflicts.HEAD, conflicts.rows(mined)))
     templates.write_page(
-        mined.out / PAGE, "jobs/mine/page.html",
-        title="What was recorded", generator=GENERATOR, facts=[*_facts(mined)],
-        **_recordings(mined), **_events(mined),
+        mined.out / PAGE,
+        "jobs/mine/page.html",
+        title="What was recorded",
+        generator=GENERATOR,
+        facts=[*_facts(mined)],
+        **_recordings(mined),
+        **_events(mined),
         played={
-            kind: [(one.name, moving_picture(one.motion, 1, one.when, caption(one)), caption(one))
-                   for one in mined.played if one.kind == kind]
-            for kind in dict.fromkeys(one.kind for one in mined.played)
+            kind: [
+                (
+                    event.name,
+                    moving_picture(event.motion, 1, event.when, caption(event)),
+                    caption(event),
+                )
+                for event in mined.played
+                if event.kind == kind
+            ]
+            for kind in dict.fromkeys(event.kind for event in mined.played)
         },
         per_kind=SHOWN,
-        mined=[one for one in mined.mined if isinstance(one, MinedScenario)],
-        unmade=_grouped((one.source, one.reason) for one in mined.mined if isinstance(one, Unmade)),
-        files=[*zip(ENDINGS, _LINKS, strict=True)], folder=SCENARIOS,
+        mined=[scenario for scenario in mined.mined if isinstance(scenario, MinedScenario)],
+        unmade=_grouped(
+            (scenario.source, scenario.reason)
+            for scenario in mined.mined
+            if isinstance(scenario, Unmade)
+        ),
+        files=[*zip(ENDINGS, _LINKS, strict=True)],
+        folder=SCENARIOS,
         conflicts=_grouped(conflicts.recordings_in_words(mined)),
         near_misses=map(conflicts.shown, mined.replays),
-        left_out=[*(text for _, texts in mined.skipped for text in texts),
-                  *(f"{path}: no recording" for path in mined.others)],
-    )  # fmt: skip
-    for one in mined.mined:
-        if isinstance(one, MinedScenario):
-            exposure.write_page(mined.out / SCENARIOS / f"{one.name}{ENDINGS[1]}", one.fit)
+        left_out=[
+            *(text for _, texts in mined.skipped for text in texts),
+            *(f"{path}: no recording" for path in mined.others),
+        ],
+    )
+    for scenario in mined.mined:
+        if isinstance(scenario, MinedScenario):
+            exposure.write_page(
+                mined.out / SCENARIOS / f"{scenario.name}{ENDINGS[1]}", scenario.fit
+            )
 
 
-def _row(one: Summary) -> list[object]:
-    facts = one.facts
+def _row(summary: Summary) -> list[object]:
+    facts = summary.facts
     return [
         facts.name, facts.format, facts.source, facts.frame, facts.map, f"{facts.time_step:.6g}",
-        f"{one.duration:.6g}", sum(one.participants.values()),
-        *(one.participants.get(name, 0) for name in NAMES), one.tracks, one.states,
-        f"{one.hours:.6g}", f"{one.kilometres:.6g}", f"{one.read_hours:.6g}",
-        f"{one.read_kilometres:.6g}", len(facts.lights), one.lanes.source,
-        f"{one.lanes.vehicle_share:.4g}", f"{one.lanes.km_on:.6g}",
+        f"{summary.duration:.6g}", sum(summary.participants.values()),
+        *(summary.participants.get(name, 0) for name in NAMES), summary.tracks, summary.states,
+        f"{summary.hours:.6g}", f"{summary.kilometres:.6g}", f"{summary.read_hours:.6g}",
+        f"{summary.read_kilometres:.6g}", len(facts.lights), summary.lanes.source,
+        f"{summary.lanes.vehicle_share:.4g}", f"{summary.lanes.km_on:.6g}",
     ]  # fmt: skip
 
 
 def _lane_rows(mined: Mined) -> Iterator[list[object]]:
-    for one in mined.recordings:
-        for each in one.lanes.carriageways:
+    for recording in mined.recordings:
+        for each in recording.lanes.carriageways:
             yield [
-                one.facts.name, one.facts.source, one.lanes.source, each.number + 1, each.lanes,
-                f"{each.width:.4g}", f"{each.length:.5g}", each.states, f"{each.rms:.3g}",
+                recording.facts.name,
+                recording.facts.source,
+                recording.lanes.source,
+                each.number + 1,
+                each.lanes,
+                f"{each.width:.4g}",
+                f"{each.length:.5g}",
+                each.states,
+                f"{each.rms:.3g}",
                 f"{each.p95:.3g}",
-            ]  # fmt: skip
+            ]
 
 
 def _quality_rows(mined: Mined) -> Iterator[list[object]]:
-    for one in mined.recordings:
-        for each in one.findings:
+    for recording in mined.recordings:
+        for each in recording.findings:
             yield [
-                one.facts.name, one.facts.source, each.rule.value, each.participants, each.count,
+                recording.facts.name,
+                recording.facts.source,
+                each.rule.value,
+                each.participants,
+                each.count,
                 "; ".join(each.examples),
-            ]  # fmt: skip
+            ]
 
 
 def _csv(head: Iterable[str], rows: Iterable[Iterable[object]]) -> Iterator[bytes]:
@@ -162,9 +193,12 @@ def _csv(head: Iterable[str], rows: Iterable[Iterable[object]]) -> Iterator[byte
 
 def _facts(mined: Mined) -> Iterator[str]:
     yield counted(len(mined.recordings), "recording")
-    yield f"{sum(sum(one.participants.values()) for one in mined.recordings):,} participants"
-    yield f"{sum(one.hours for one in mined.recordings):.4g} h"
-    yield f"{sum(one.kilometres for one in mined.recordings):.4g} km"
+    yield (
+        f"{sum(sum(recording.participants.values()) for recording in mined.recordings):,} "
+        "participants"
+    )
+    yield f"{sum(recording.hours for recording in mined.recordings):.4g} h"
+    yield f"{sum(recording.kilometres for recording in mined.recordings):.4g} km"
     yield f"cleaned at {mined.time_step:g} s"
     if mined.skipped:
         yield f"{counted(len(mined.skipped), 'file')} skipped"
@@ -180,30 +214,43 @@ def _grouped(pairs: Iterable[tuple[str, str]]) -> list[str]:
 
 def _recordings(mined: Mined) -> dict[str, object]:
     """Return the table of recordings, and what is shown of each."""
-    kinds = [name for name in NAMES if any(name in one.participants for one in mined.recordings)]
+    kinds = [
+        name
+        for name in NAMES
+        if any(name in recording.participants for recording in mined.recordings)
+    ]
     rows = [
         [
-            one.facts.name, one.facts.format, f"{one.facts.time_step:.4g} s",
-            f"{one.duration:.4g} s", *(one.participants.get(kind, 0) for kind in kinds),
-            f"{one.hours:.4g}", f"{one.kilometres:.4g}",
+            recording.facts.name, recording.facts.format, f"{recording.facts.time_step:.4g} s",
+            f"{recording.duration:.4g} s", *(recording.participants.get(kind, 0) for kind in kinds),
+            f"{recording.hours:.4g}", f"{recording.kilometres:.4g}",
         ]
-        for one in mined.recordings
+        for recording in mined.recordings
     ]  # fmt: skip
     return {
         "kinds": kinds, "rows": rows,
-        "recordings": [_recording(one, mined.time_step) for one in mined.recordings],
+        "recordings": [_recording(recording, mined.time_step) for recording in mined.recordings],
     }  # fmt: skip
 
 
 def _events(mined: Mined) -> dict[str, object]:
     """Return the tables of events and scenarios; those without any event in a line."""
-    found = [one.events for one in mined.recordings]
+    found = [recording.events for recording in mined.recordings]
     kinds = [*kind_rows(found)]
     met = [
-        (one.complete + one.incomplete, [one.scenario, one.kind, one.complete, one.incomplete,
-         *rates_in_words(one.encounters), ", ".join(one.unmapped) or "–"])
-        for one in mined.scenarios
-    ]  # fmt: skip
+        (
+            scenario.complete + scenario.incomplete,
+            [
+                scenario.scenario,
+                scenario.kind,
+                scenario.complete,
+                scenario.incomplete,
+                *rates_in_words(scenario.encounters),
+                ", ".join(scenario.unmapped) or "–",
+            ],
+        )
+        for scenario in mined.scenarios
+    ]
     return {
         "seen": [row for row in kinds if row[1] or row[4]],
         "unseen": _grouped(
@@ -213,20 +260,20 @@ def _events(mined: Mined) -> dict[str, object]:
         ),
         "met": [row for count, row in met if count],
         "unmet": _grouped(
-            (f"{one.scenario} ({', '.join(one.unmapped)} not given)" if one.unmapped
-             else one.scenario, f"no {one.kind}")
-            for one, (count, _) in zip(mined.scenarios, met, strict=True)
+            (f"{scenario.scenario} ({', '.join(scenario.unmapped)} not given)" if scenario.unmapped
+             else scenario.scenario, f"no {scenario.kind}")
+            for scenario, (count, _) in zip(mined.scenarios, met, strict=True)
             if not count
         ),
-        "against": [f"{one.scenario}: {text}"
-                    for one in mined.scenarios for text in against_in_words(one)],
-        "driven": [sum(getattr(one, name) for one in found)
+        "against": [f"{scenario.scenario}: {text}"
+                    for scenario in mined.scenarios for text in against_in_words(scenario)],
+        "driven": [sum(getattr(events, name) for events in found)
                    for name in ("hours", "kilometres", "all_hours", "all_kilometres")],
     }  # fmt: skip
 
 
-def _recording(one: Summary, time_step: float) -> dict[str, object]:
-    facts, lanes = one.facts, one.lanes
+def _recording(summary: Summary, time_step: float) -> dict[str, object]:
+    facts, lanes = summary.facts, summary.lanes
     used = " (not read)" if lanes.source in ("inferred", "none") else ""
     ways = lanes.carriageways
     return {
@@ -235,35 +282,45 @@ def _recording(one: Summary, time_step: float) -> dict[str, object]:
             f"file: {facts.source}",
             f"frame: {facts.frame}",
             f"map: {facts.map}{used}" if facts.map else "map: none named",
-            f"{one.states:,} states read, every {facts.time_step:.4g} s; {one.tracks:,} tracks "
+            f"{summary.states:,} states read, every {facts.time_step:.4g} s; {summary.tracks:,} "
+            "tracks "
             f"after cleaning, every {time_step:g} s",
-            f"{one.read_hours:.4g} h and {one.read_kilometres:.4g} km before cleaning, "
-            f"{one.hours:.4g} h and {one.kilometres:.4g} km after",
+            f"{summary.read_hours:.4g} h and {summary.read_kilometres:.4g} km before cleaning, "
+            f"{summary.hours:.4g} h and {summary.kilometres:.4g} km after",
             f"traffic lights: {len(facts.lights) or 'none recorded'}",
             *facts.notes,
         ],
-        "picture": _picture(one),
+        "picture": _picture(summary),
         "paths": "all"
-        if len(one.paths) == one.tracks
-        else f"{len(one.paths):,} of {one.tracks:,}",
+        if len(summary.paths) == summary.tracks
+        else f"{len(summary.paths):,} of {summary.tracks:,}",
         "lanes": [
             f"lanes: {lanes_in_words(lanes)}; {lanes.km_on:.4g} km on lanes, "
             f"{lanes.km_off:.4g} km off",
             *lanes.notes,
         ],
         "ways": [
-            [f"{each.number + 1}", f"{each.lanes or '–'}", f"{each.width:.2f} m",
-             f"{each.length:.0f} m", each.states, f"{each.rms:.2f} m", f"{each.p95:.2f} m"]
+            [
+                f"{each.number + 1}",
+                f"{each.lanes or '–'}",
+                f"{each.width:.2f} m",
+                f"{each.length:.0f} m",
+                each.states,
+                f"{each.rms:.2f} m",
+                f"{each.p95:.2f} m",
+            ]
             for each in ways[:CARRIAGEWAYS_SHOWN]
         ],
         "more_ways": max(0, len(ways) - CARRIAGEWAYS_SHOWN),
         "findings": [
             [each.rule.value, each.participants, each.count, "; ".join(each.examples)]
-            for each in one.findings if each.count or each.participants
+            for each in summary.findings
+            if each.count or each.participants
         ],
-        "clean": [each.rule.value for each in one.findings
-                  if not (each.count or each.participants)],
-    }  # fmt: skip
+        "clean": [
+            each.rule.value for each in summary.findings if not (each.count or each.participants)
+        ],
+    }
 
 
 def lanes_in_words(found: LanesFound) -> str:
@@ -280,12 +337,12 @@ of vehicles that drive on them"
     return f"{SOURCES[found.source]}: {ways} with traffic{share}"
 
 
-def _picture(one: Summary) -> str:
+def _picture(summary: Summary) -> str:
     def kind(code: int) -> str:
         return "walks" if code == PEDESTRIAN else "cycles" if code in TWO_WHEELED else "drives"
 
-    points = np.concatenate([path for _, path in one.paths])
-    lines = [("lane", border) for border in one.lanes.borders]
-    lines += [(kind(code), path) for code, path in one.paths[:PATHS_SHOWN]]
+    points = np.concatenate([path for _, path in summary.paths])
+    lines = [("lane", border) for border in summary.lanes.borders]
+    lines += [(kind(code), path) for code, path in summary.paths[:PATHS_SHOWN]]
     low, high = points.min(axis=0) - SPACE, points.max(axis=0) + SPACE
     return charts.ground(lines, low, high, "Paths of the recording")

@@ -25,7 +25,10 @@ CARRIAGEWAYS_SHOWN = 4
 def warnings_of(mined: Mined) -> list[str]:
     """Return what was left out, and what to know of lanes and map."""
     notes = [
-        note for one in mined.recordings if one.lanes.source == "map" for note in one.lanes.notes
+        note
+        for recording in mined.recordings
+        if recording.lanes.source == "map"
+        for note in recording.lanes.notes
     ]
     found = [f"warning: skipped: {text}" for _, texts in mined.skipped for text in texts]
     if mined.others:
@@ -36,20 +39,20 @@ def warnings_of(mined: Mined) -> list[str]:
 def json_of(mined: Mined) -> dict[str, Any]:
     """Return what was recorded, found and written as JSON's types."""
     return {
-        "recordings": [_facts(one, mined.time_step) for one in mined.recordings],
+        "recordings": [_facts(recording, mined.time_step) for recording in mined.recordings],
         "scenarios": [
-            {"file": str(one.scenario), "recording": one.event.recording,
-             "ego": one.event.names[0], "other": one.event.names[1],
-             "position_off": None if one.problem else one.off,
-             "speed_off": None if one.problem else one.too_fast,
-             "problem": one.problem or None, "ontology_lacks": one.lacks}
-            for one in mined.replays
+            {"file": str(replay.scenario), "recording": replay.event.recording,
+             "ego": replay.event.names[0], "other": replay.event.names[1],
+             "position_off": None if replay.problem else replay.off,
+             "speed_off": None if replay.problem else replay.too_fast,
+             "problem": replay.problem or None, "ontology_lacks": replay.lacks}
+            for replay in mined.replays
         ],
         "skipped": [str(path) for path, _ in mined.skipped],
         "others": [str(path) for path in mined.others],
         **_events(mined),
-        "mined": [made_as_json(one, mined.out) for one in mined.mined],
-        "updates": [{**asdict(one), "path": str(one.path)} for one in mined.updates],
+        "mined": [made_as_json(scenario, mined.out) for scenario in mined.mined],
+        "updates": [{**asdict(update), "path": str(update.path)} for update in mined.updates],
     }  # fmt: skip
 
 
@@ -59,20 +62,20 @@ def shown_of(mined: Mined) -> Iterator[str | Table]:
         ("recording", "format", "participants", "h", "km", "step [s]", "frame"),
         [
             (
-                one.facts.name,
-                one.facts.format,
-                ", ".join(f"{count:,} {kind}" for kind, count in one.participants.items()),
-                float(f"{one.hours:.4g}"),
-                float(f"{one.kilometres:.4g}"),
-                float(f"{one.facts.time_step:.4g}"),
-                one.facts.frame,
+                recording.facts.name,
+                recording.facts.format,
+                ", ".join(f"{count:,} {kind}" for kind, count in recording.participants.items()),
+                float(f"{recording.hours:.4g}"),
+                float(f"{recording.kilometres:.4g}"),
+                float(f"{recording.facts.time_step:.4g}"),
+                recording.facts.frame,
             )
-            for one in mined.recordings
+            for recording in mined.recordings
         ],
     )
     yield ""
     of_lanes = ("lanes of", "source", "carriageways", "lanes", "vehicles on", "RMS [m]")
-    yield Table(of_lanes, [_lane_row(one) for one in mined.recordings])
+    yield Table(of_lanes, [_lane_row(recording) for recording in mined.recordings])
     yield ""
     yield from _events_shown(mined)
     yield ""
@@ -92,16 +95,16 @@ def shown_of(mined: Mined) -> Iterator[str | Table]:
         yield Table(of_events, list(screen_rows(mined)))
     yield ""
     unmade: dict[str, list[str]] = {}
-    for one in mined.mined:
-        if isinstance(one, Unmade):
-            unmade.setdefault(one.reason, []).append(one.source)
+    for scenario in mined.mined:
+        if isinstance(scenario, Unmade):
+            unmade.setdefault(scenario.reason, []).append(scenario.source)
     for reason, sources in unmade.items():
         yield f"{', '.join(sources)}: no scenario: {reason}"
-    made = [one for one in mined.mined if isinstance(one, MinedScenario)]
+    made = [scenario for scenario in mined.mined if isinstance(scenario, MinedScenario)]
     if made:
         yield ""
         of_made = ("mined scenario", "events", "per hour (95 %)", "parameters beyond the source's")
-        yield Table(of_made, [made_row(one) for one in made])
+        yield Table(of_made, [made_row(scenario) for scenario in made])
     tables = ("recordings", "lanes", "quality", "events", "conflicts")
     yield f"\n{'page':<12}{mined.out / 'recordings.html'}"
     yield f"{'tables':<12}{', '.join(str(mined.out / f'{name}.csv') for name in tables)}"
@@ -122,7 +125,7 @@ def shown_of(mined: Mined) -> Iterator[str | Table]:
 
 def _events_shown(mined: Mined) -> Iterator[str | Table]:
     """Yield the events by kind, those that are a scenario, and what they say against it."""
-    found = [one.events for one in mined.recordings]
+    found = [recording.events for recording in mined.recordings]
     kinds = list(kind_rows(found))
     if rows := [row[:4] for row in kinds if row[1]]:
         yield Table(("event", "count", "per hour (95 %)", "per 1000 km (95 %)"), rows)
@@ -131,68 +134,71 @@ def _events_shown(mined: Mined) -> Iterator[str | Table]:
     for kind, _, _, _, refused in kinds:
         if refused:
             yield f"{kind}: refused {refused}"
-    met = [one for one in mined.scenarios if one.count]
+    met = [scenario for scenario in mined.scenarios if scenario.count]
     if met:
         yield ""
         yield Table(
             ("scenario", "event", "rows", "incomplete", "per hour (95 %)"),
             [
-                (one.scenario, one.kind, one.complete, one.incomplete,
-                 rates_in_words(one.encounters)[0])
-                for one in met
+                (events.scenario, events.kind, events.complete, events.incomplete,
+                 rates_in_words(events.encounters)[0])
+                for events in met
             ],
         )  # fmt: skip
-    for one in met:
-        for text in against_in_words(one):
-            yield f"{one.scenario}: {text}"
+    for events in met:
+        for text in against_in_words(events):
+            yield f"{events.scenario}: {text}"
 
 
 def _events(mined: Mined) -> dict[str, object]:
     """Return the events by kind and by scenario, with rates and all that is refused."""
-    found = [one.events for one in mined.recordings]
+    found = [recording.events for recording in mined.recordings]
     by_kind = {
-        kind: [one for each in found for one in each.kinds if one.kind.name == kind]
+        kind: [events for each in found for events in each.kinds if events.kind.name == kind]
         for kind in EVENT_KINDS
     }
     kinds = {}
     for kind, events in by_kind.items():
-        count = sum(len(one) for one in events)
+        count = sum(len(event) for event in events)
         refused = Counter[str]()
-        for one in events:
-            refused.update(one.refused)
+        for event in events:
+            refused.update(event.refused)
         kinds[kind] = {
             "count": count, **_rates(encounters_of(count, found, kind)), "refused": dict(refused),
         }  # fmt: skip
     return {
-        "hours_on_lanes": sum(one.hours for one in found),
-        "km_on_lanes": sum(one.kilometres for one in found),
-        "hours_driven": sum(one.all_hours for one in found),
-        "km_driven": sum(one.all_kilometres for one in found),
+        "hours_on_lanes": sum(found_events.hours for found_events in found),
+        "km_on_lanes": sum(found_events.kilometres for found_events in found),
+        "hours_driven": sum(found_events.all_hours for found_events in found),
+        "km_driven": sum(found_events.all_kilometres for found_events in found),
         "events": kinds,
         "parameters": {
-            one.scenario: {
-                "event": one.kind, "count": one.count, "rows": one.complete,
-                **_rates(one.encounters), "outside": [asdict(each) for each in one.outside],
-                "broken": {each.rule: each.events for each in one.broken},
-                "not_given": one.unmapped,
+            scenario.scenario: {
+                "event": scenario.kind,
+                "count": scenario.count,
+                "rows": scenario.complete,
+                **_rates(scenario.encounters),
+                "outside": [asdict(each) for each in scenario.outside],
+                "broken": {each.rule: each.events for each in scenario.broken},
+                "not_given": scenario.unmapped,
             }
-            for one in mined.scenarios
+            for scenario in mined.scenarios
         },
-    }  # fmt: skip
+    }
 
 
 def _rates(met: Encounters | None) -> dict[str, object]:
     rates = {"per_hour": met.per_hour, "per_km": met.per_km} if met else {}
-    return {name: asdict(one) for name, one in rates.items() if one is not None}
+    return {name: asdict(rate) for name, rate in rates.items() if rate is not None}
 
 
-def _lane_row(one: Summary) -> tuple[str, str, int, str, str, str]:
+def _lane_row(summary: Summary) -> tuple[str, str, int, str, str, str]:
     """Return a recording's lanes: their number by carriageway, the fit of the one used most."""
-    found, share = one.lanes, one.lanes.vehicle_share
+    found, share = summary.lanes, summary.lanes.vehicle_share
     shown = found.carriageways[:CARRIAGEWAYS_SHOWN]
     more = ", …" if len(found.carriageways) > len(shown) else ""
     return (
-        one.facts.name,
+        summary.facts.name,
         "none: give --map" if found.source == "none" else found.source,
         len(found.carriageways),
         ", ".join(str(each.lanes) for each in shown) + more,
@@ -203,7 +209,7 @@ def _lane_row(one: Summary) -> tuple[str, str, int, str, str, str]:
 
 def _quality(mined: Mined) -> Iterator[tuple[str, int, int, int, str]]:
     """Yield what cleaning did, rule by rule, of all recordings together."""
-    for same in zip(*(one.findings for one in mined.recordings), strict=True):
+    for same in zip(*(recording.findings for recording in mined.recordings), strict=True):
         applied = [each for each in same if each.count]
         yield (
             same[0].rule.value,
@@ -214,25 +220,42 @@ def _quality(mined: Mined) -> Iterator[tuple[str, int, int, int, str]]:
         )
 
 
-def _facts(one: Summary, time_step: float) -> dict[str, object]:
-    facts = one.facts
+def _facts(summary: Summary, time_step: float) -> dict[str, object]:
+    facts = summary.facts
     return {
-        "name": facts.name, "format": facts.format, "file": facts.source, "frame": facts.frame,
-        "map": facts.map, "time_step": facts.time_step, "duration": one.duration,
-        "participants": one.participants, "states": one.states, "tracks": one.tracks,
-        "hours": one.hours, "km": one.kilometres, "hours_read": one.read_hours,
-        "km_read": one.read_kilometres, "notes": facts.notes,
+        "name": facts.name,
+        "format": facts.format,
+        "file": facts.source,
+        "frame": facts.frame,
+        "map": facts.map,
+        "time_step": facts.time_step,
+        "duration": summary.duration,
+        "participants": summary.participants,
+        "states": summary.states,
+        "tracks": summary.tracks,
+        "hours": summary.hours,
+        "km": summary.kilometres,
+        "hours_read": summary.read_hours,
+        "km_read": summary.read_kilometres,
+        "notes": facts.notes,
         "lanes": {
-            "source": one.lanes.source, "km_on": one.lanes.km_on, "km_off": one.lanes.km_off,
-            "vehicle_share":
-                None if math.isnan(one.lanes.vehicle_share) else one.lanes.vehicle_share,
-            "carriageways": [asdict(each) for each in one.lanes.carriageways],
-            "notes": one.lanes.notes,
+            "source": summary.lanes.source,
+            "km_on": summary.lanes.km_on,
+            "km_off": summary.lanes.km_off,
+            "vehicle_share": None
+            if math.isnan(summary.lanes.vehicle_share)
+            else summary.lanes.vehicle_share,
+            "carriageways": [asdict(each) for each in summary.lanes.carriageways],
+            "notes": summary.lanes.notes,
         },
-        "conflicts": conflicts_as_json(one, time_step),
+        "conflicts": conflicts_as_json(summary, time_step),
         "quality": [
-            {"rule": each.rule.value, "participants": each.participants, "count": each.count,
-             "examples": each.examples}
-            for each in one.findings
+            {
+                "rule": each.rule.value,
+                "participants": each.participants,
+                "count": each.count,
+                "examples": each.examples,
+            }
+            for each in summary.findings
         ],
-    }  # fmt: skip
+    }

@@ -68,8 +68,8 @@ def outcomes(pipeline: Pipeline, X: Float) -> Codes:
         ``(N,)``, an `Outcome` each.
     """
     found = np.empty(len(X), np.int8)
-    for at, one in pipeline.runner.by_variant(X):
-        rollout = one.run(X[at], until_collision=True)
+    for at, runner in pipeline.runner.by_variant(X):
+        rollout = runner.run(X[at], until_collision=True)
         code = np.where(collides(rollout), Outcome.COLLIDED, Outcome.AVOIDED)
         implausible = plausibility(rollout).code != Implausible.NONE
         code = np.where(implausible, Outcome.NOT_APPLICABLE, code)

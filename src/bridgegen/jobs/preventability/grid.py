@@ -39,7 +39,7 @@ def read_axis(text: str) -> tuple[str, GridAxis]:
         InputError: it does not read so.
     """
     name, equals, rest = text.partition("=")
-    parts = [one.strip() for one in rest.split(":")]
+    parts = [part.strip() for part in rest.split(":")]
     if not (name and equals) or len(parts) != 3 or not all(parts):
         raise InputError(f"--grid must read NAME=LOW:HIGH:N, got '{text}'")
     try:
@@ -100,7 +100,7 @@ class Grid:
                 problems += [f"--grid {name}: {problem}" for problem in error.problems]
         if problems:
             raise InputError(*problems)
-        cells = math.prod(len(one) for one in values)
+        cells = math.prod(len(value) for value in values)
         if cells > MOST_CELLS:
             raise InputError(f"a map has at most {MOST_CELLS:,} cells, got {cells:,}")
         units = tuple(space.parameters[name].unit for name in axes)
@@ -109,7 +109,7 @@ class Grid:
     @property
     def shape(self) -> tuple[int, ...]:
         """The number of values of each axis."""
-        return tuple(len(one) for one in self.values)
+        return tuple(len(value) for value in self.values)
 
     @property
     def cells(self) -> int:

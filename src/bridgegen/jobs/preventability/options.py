@@ -21,7 +21,7 @@ def _axes(grid: Any) -> list[str]:
     """Return the texts of axes that texts or `GridAxis` state."""
     if not isinstance(grid, Mapping):
         return list(grid or ())
-    return [f"{name}={one.low}:{one.high}:{one.n}" for name, one in grid.items()]
+    return [f"{name}={item.low}:{item.high}:{item.n}" for name, item in grid.items()]
 
 
 def _repeated(spelling: str, texts: Sequence[str]) -> list[str]:

@@ -34,7 +34,7 @@ def png(codes: Codes) -> bytes:
         codes: ``(height, width)``, a `CellClass` each, the uppermost row first.
     """
     picture, out = Image.fromarray(codes.astype("u1"), "P"), io.BytesIO()
-    picture.putpalette(b"".join(bytes.fromhex(COLOURS[one][1:]) for one in CellClass))
+    picture.putpalette(b"".join(bytes.fromhex(COLOURS[class_][1:]) for class_ in CellClass))
     picture.save(out, "PNG")
     return out.getvalue()
 
@@ -58,15 +58,15 @@ def write_page(path: Path, result: PreventabilityMap) -> None:
     """
     combinations = [*product(*map(range, result.grid.shape[3:]))]
     shown = [combinations[i] for i in _spread(len(combinations), BLOCKS)]
-    there = np.unique(np.concatenate([one.ravel() for one in result.classes.values()]))
+    there = np.unique(np.concatenate([kind.ravel() for kind in result.classes.values()]))
     templates.write_page(
         path, "jobs/preventability/page.html",
         title=f"{result.scenario.name}: which collisions are preventable",
         facts=[*_facts(result)],
         lead=_lead(result),
-        classes=[one.label for one in CellClass],
+        classes=[class_.label for class_ in CellClass],
         counts=[[name, *_counts(result, name)] for name in result.drivers],
-        legend=[(COLOURS[one], one.label) for one in CellClass if one in there],
+        legend=[(COLOURS[class_], class_.label) for class_ in CellClass if class_ in there],
         shown=len(shown), combinations=len(combinations),
         blocks=[_block(result, at) for at in shown],
         models=result.models,
@@ -82,10 +82,10 @@ def _facts(result: PreventabilityMap) -> Iterator[str]:
         yield f"{name}: {_span(values, unit)}"
     space = grid.space
     held = {*space.variables, *space.fixed} - set(grid.names)
-    for name, one in space.parameters.items():
+    for name, parameter in space.parameters.items():
         if name in held:
-            value = one.kind.text(space.defaults[name], "{:.4g}".format)
-            yield f"{name} = {value}{'' if one.unit == '1' else f' {one.unit}'}"
+            value = parameter.kind.text(space.defaults[name], "{:.4g}".format)
+            yield f"{name} = {value}{'' if parameter.unit == '1' else f' {parameter.unit}'}"
     yield f"preventable by: {', '.join(result.models)}"
 
 
@@ -98,11 +98,11 @@ def _span(values: Float, unit: str) -> str:
 
 def _lead(result: PreventabilityMap) -> str:
     sentences = []
-    for one in map(result.figures, result.drivers):
-        judged = sum(one[name.name.lower()] for name in CellClass if name < 3)
+    for driver in map(result.figures, result.drivers):
+        judged = sum(driver[name.name.lower()] for name in CellClass if name < 3)
         sentences.append(
-            f"{one['driver']} avoids {_share(one['avoided'], judged)} of {judged:,} cells; "
-            f"{_share(one['preventable'], judged)} end in a collision that a model avoids."
+            f"{driver['driver']} avoids {_share(driver['avoided'], judged)} of {judged:,} cells; "
+            f"{_share(driver['preventable'], judged)} end in a collision that a model avoids."
         )
     return " ".join(sentences)
 
@@ -114,10 +114,10 @@ def _share(count: int, of: int) -> str:
 def _counts(result: PreventabilityMap, driver: str) -> Iterator[int | tuple[int, str]]:
     """Yield the cells of each class; with their share where cells apply and have a result."""
     counts = result.counts(driver)
-    judged = sum(counts[one] for one in CellClass if one < CellClass.NOT_APPLICABLE)
-    for one in CellClass:
-        applies = one < CellClass.NOT_APPLICABLE and judged
-        yield (counts[one], _share(counts[one], judged)) if applies else counts[one]
+    judged = sum(counts[class_] for class_ in CellClass if class_ < CellClass.NOT_APPLICABLE)
+    for class_ in CellClass:
+        applies = class_ < CellClass.NOT_APPLICABLE and judged
+        yield (counts[class_], _share(counts[class_], judged)) if applies else counts[class_]
 
 
 def _block(result: PreventabilityMap, further: tuple[int, ...]) -> dict[str, object]:

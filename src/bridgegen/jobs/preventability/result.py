@@ -73,19 +73,23 @@ class PreventabilityMap:
     def counts(self, driver: str) -> dict[CellClass, int]:
         """Return the number of cells of each class."""
         found = np.bincount(self.classes[driver].ravel(), minlength=len(CellClass))
-        return {one: int(found[one]) for one in CellClass}
+        return {class_: int(found[class_]) for class_ in CellClass}
 
     def figures(self, driver: str) -> dict[str, Any]:
         """Return a driver's numbers of cells, and shares of those that apply and have a result."""
         counts = self.counts(driver)
-        judged = sum(counts[one] for one in CellClass if one < CellClass.NOT_APPLICABLE)
-        names = {one: one.name.lower() for one in CellClass}
+        judged = sum(counts[class_] for class_ in CellClass if class_ < CellClass.NOT_APPLICABLE)
+        names = {class_: class_.name.lower() for class_ in CellClass}
         shares = {
-            f"{names[one]}_share": counts[one] / judged if judged else None
-            for one in CellClass
-            if one < CellClass.NOT_APPLICABLE
+            f"{names[class_]}_share": counts[class_] / judged if judged else None
+            for class_ in CellClass
+            if class_ < CellClass.NOT_APPLICABLE
         }
-        return {"driver": driver, **{names[one]: counts[one] for one in CellClass}, **shares}
+        return {
+            "driver": driver,
+            **{names[class_]: counts[class_] for class_ in CellClass},
+            **shares,
+        }
 
     @property
     def work(self) -> str:
@@ -99,7 +103,9 @@ class PreventabilityMap:
     def shown(self) -> list[str | Table]:
         """Return what the terminal shows: each driver's cells by class, and the files."""
         figures = self.to_json()
-        rows = [(one["driver"], *(_cell(one, kind) for kind in CellClass)) for one in figures]
+        rows = [
+            (figure["driver"], *(_cell(figure, kind) for kind in CellClass)) for figure in figures
+        ]
         head = ("driver", *(kind.name.lower().replace("_", " ") for kind in CellClass))
         return [Table(head, rows), f"\n{'page':<12}{self.page}", f"{'arrays':<12}{self.folder}"]
 
@@ -109,19 +115,21 @@ class PreventabilityMap:
 
     def _judged(self, driver: str) -> Judged:
         known, name = self.figures(driver), self.scenario.name
-        holds = any(known[one] for one in ("avoided", "preventable", "unpreventable"))
+        holds = any(known[item] for item in ("avoided", "preventable", "unpreventable"))
         figures = {
-            one: known[one] if holds or one in ("not_applicable", "no_result") else float("nan")
-            for one in FIGURES
+            figure: known[figure]
+            if holds or figure in ("not_applicable", "no_result")
+            else float("nan")
+            for figure in FIGURES
         }
         facts = {"scenario": name, "ego": driver, "models": ", ".join(self.models)}
         for axis, unit, v in zip(self.grid.names, self.grid.units, self.grid.values, strict=True):
             facts[f"axis {axis}"] = f"{v[0]:.6g} to {v[-1]:.6g} {unit}, {len(v)} values"
-        counts = ((one, count) for one, count in figures.items() if not one.endswith("_share"))
+        counts = ((item, count) for item, count in figures.items() if not item.endswith("_share"))
         return Judged(
             suite=f"{name} preventability", group=f"bridgegen.{name}.{driver.replace('.', '_')}",
             test="the map has results", holds=holds,
-            details=", ".join(f"{one} {count:.0f}" for one, count in counts), figures=figures,
+            details=", ".join(f"{item} {count:.0f}" for item, count in counts), figures=figures,
             facts=facts | {"command": self.command, "page": str(self.page)}, of=driver,
         )  # fmt: skip
 
@@ -165,7 +173,7 @@ class PreventabilityMap:
         text = pa.dictionary(pa.int32(), pa.string())
         fields = [(name, pa.float64()) for name in self.grid.names]
         schema = pa.schema([*fields, *((name, text) for name in self.drivers)])
-        labels = pa.array([one.label for one in CellClass])
+        labels = pa.array([class_.label for class_ in CellClass])
         with (
             writing_whole(path) as file,
             parquet.ParquetWriter(file, schema, compression="zstd") as writer,
@@ -189,7 +197,7 @@ def _cell(figures: Mapping[str, Any], kind: CellClass) -> str:
 
 def simulated(drivers: Sequence[str], models: Sequence[str]) -> tuple[str, ...]:
     """Return the drivers, then the models that are not among them."""
-    return (*drivers, *(one for one in models if one not in drivers))
+    return (*drivers, *(model for model in models if model not in drivers))
 
 
 # --- A map's folder: what it is a map of, and the outcomes of the chunks of cells that are done ---

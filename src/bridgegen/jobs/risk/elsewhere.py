@@ -142,7 +142,7 @@ def look_elsewhere(
     parts = ((is_event, rows // 2), (close, rows - rows // 2))
     return compare(
         simulator,
-        *(_group(there, Z[one], weights[one], n, threshold, random) for one, n in parts),
+        *(_group(there, Z[part], weights[part], n, threshold, random) for part, n in parts),
     )
 
 
@@ -258,13 +258,13 @@ def _new(event: Group, close: Group) -> Ratio:
     return Ratio(estimate, estimate * math.exp(-down), estimate * math.exp(up))
 
 
-def _sum(one: Ratio, other: Ratio) -> Ratio:
-    estimate = one.estimate + other.estimate
-    low = math.hypot(one.estimate - one.low, other.estimate - other.low)
-    high = math.hypot(one.high - one.estimate, other.high - other.estimate)
+def _sum(ratio: Ratio, other: Ratio) -> Ratio:
+    estimate = ratio.estimate + other.estimate
+    low = math.hypot(ratio.estimate - ratio.low, other.estimate - other.low)
+    high = math.hypot(ratio.high - ratio.estimate, other.high - other.estimate)
     return Ratio(estimate, estimate - low, estimate + high)
 
 
-def _known(one: Ratio) -> Mapping[str, float | None]:
+def _known(ratio: Ratio) -> Mapping[str, float | None]:
     """Return it for a record, which has no NaN."""
-    return vars(one) | {"estimate": one.estimate if math.isfinite(one.estimate) else None}
+    return vars(ratio) | {"estimate": ratio.estimate if math.isfinite(ratio.estimate) else None}

@@ -101,14 +101,14 @@ class Experiment:
         parts = self._workers.map(self._pipeline, outcomes, X, self._count)
         return Outcomes.join(
             [
-                Outcomes.lost(one.rows) if isinstance(one.result, Lost) else one.result
-                for one in parts
+                Outcomes.lost(part.rows) if isinstance(part.result, Lost) else part.result
+                for part in parts
             ]
         )
 
     def _numbered(self, found: Outcomes) -> Float:
         """Return outcomes whose modes are numbered as `modes` are."""
-        numbers = np.array([self.modes.setdefault(one, len(self.modes)) for one in found.modes])
+        numbers = np.array([self.modes.setdefault(mode, len(self.modes)) for mode in found.modes])
         values = found.values.copy()
         has = values[:, Column.MODE] >= 0.0
         if has.any():

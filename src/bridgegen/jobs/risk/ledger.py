@@ -59,13 +59,13 @@ class Ledger:
         try:
             data = io.BytesIO(read_bytes(self._path()))
             with zipfile.ZipFile(data) as members:
-                if any(one.compress_type != zipfile.ZIP_STORED for one in members.infolist()):
+                if any(info.compress_type != zipfile.ZIP_STORED for info in members.infolist()):
                     return None
             found = np.load(data, allow_pickle=False)
             if str(found["digest"]) != _digest(Z, least):
                 return None
             at, held = found["at"], found["values"]
-            modes = tuple(str(one) for one in found["modes"].tolist())
+            modes = tuple(str(item) for item in found["modes"].tolist())
             shape = (len(at), len(Column))
             if held.shape != shape or held.dtype != np.float64 or at.dtype != np.int64:
                 return None
@@ -97,7 +97,7 @@ class Ledger:
             values=outcomes.values[at],
             without=without,
             why=outcomes.values[without, Column.RESULT],
-            modes=np.array([one[:_LONGEST_MODE] for one in outcomes.modes] or [""]),
+            modes=np.array([mode[:_LONGEST_MODE] for mode in outcomes.modes] or [""]),
         )
         write_whole(self._path(), [data.getvalue()])
         self._number += 1

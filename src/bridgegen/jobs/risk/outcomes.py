@@ -57,9 +57,9 @@ class Outcomes:
         """Return the outcomes of several parts, at least one, in their order."""
         modes: dict[str, int] = {}
         values = []
-        for one in parts:
-            numbers = np.array([modes.setdefault(mode, len(modes)) for mode in one.modes], float)
-            found = one.values.copy()
+        for part in parts:
+            numbers = np.array([modes.setdefault(mode, len(modes)) for mode in part.modes], float)
+            found = part.values.copy()
             has = found[:, Column.MODE] >= 0.0
             found[has, Column.MODE] = numbers[found[has, Column.MODE].astype(np.int64)]
             values.append(found)
@@ -83,8 +83,8 @@ def outcomes(pipeline: Pipeline, X: Float, count: Count) -> Outcomes:
     """
     values = np.zeros((len(X), len(Column)))
     words = np.full(len(X), "", dtype=object)
-    for at, one in pipeline.runner.by_variant(X):
-        values[at], words[at] = _outcomes(one, X[at], count)
+    for at, runner in pipeline.runner.by_variant(X):
+        values[at], words[at] = _outcomes(runner, X[at], count)
     harmful = values[:, Column.SCORE] >= NEAR_MISS
     modes = dict.fromkeys(words[harmful])
     numbers = {mode: number for number, mode in enumerate(modes)}
@@ -203,8 +203,8 @@ def data_band(exposure: Exposure, weighted: Weighted, threshold: float, fit: Fit
     good = np.isfinite(before)
     X, weights, before = X[good], weights[good], before[good]
     factors = []
-    for one in replicates:
-        parts: Float = weights * np.exp(np.minimum(one.log_density(X) - before, 50.0))
+    for replicate in replicates:
+        parts: Float = weights * np.exp(np.minimum(replicate.log_density(X) - before, 50.0))
         total, squares = float(parts.sum()), float(np.sum(parts * parts))
         if squares > 0.0 and total * total / squares >= FEWEST:
             factors.append(total / float(weights.sum()))

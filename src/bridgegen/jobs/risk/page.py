@@ -22,20 +22,23 @@ def write_page(path: Path, risk: Risk) -> None:
         StorageError: it cannot be written.
     """
     templates.write_page(
-        path, "jobs/risk/page.html",
+        path,
+        "jobs/risk/page.html",
         title=f"Risk of {risk.exposure.scenario.name}",
         facts=[*facts(risk)],
         sentence=sentence(risk),
         doubts=risk.weighted.doubts,
         picture=_intervals(risk),
         has_rates=risk.exposure.encounters is not None,
-        stated=[[words, *_cells(one), *_rates(risk, name)] for words, name, one in risk.stated],
-        modes=[[words, *_cells(one)] for words, one in risk.by_mode.items()],
-        parameters=[(one, _shares(one)) for one in risk.parameters],
-        likely=[(one, [*_values(risk, one.x)]) for one in risk.most_likely],
+        stated=[
+            [words, *_cells(finding), *_rates(risk, name)] for words, name, finding in risk.stated
+        ],
+        modes=[[words, *_cells(finding)] for words, finding in risk.by_mode.items()],
+        parameters=[(parameter, _shares(parameter)) for parameter in risk.parameters],
+        likely=[(likely, [*_values(risk, likely.x)]) for likely in risk.most_likely],
         unsure=[*unsure(risk)],
         command=risk.command,
-    )  # fmt: skip
+    )
 
 
 def facts(risk: Risk) -> Iterator[str]:
@@ -108,16 +111,16 @@ def _rates(risk: Risk, name: str | None) -> Iterator[tuple[str, str] | None]:
             )
 
 
-def _cells(one: Finding) -> tuple[str, ...]:
-    value, width, upper = interval(one.probability)
-    return value, width if one.probability else one.doubt, upper, f"{one.hits:,.0f}"
+def _cells(finding: Finding) -> tuple[str, ...]:
+    value, width, upper = interval(finding.probability)
+    return value, width if finding.probability else finding.doubt, upper, f"{finding.hits:,.0f}"
 
 
 def _intervals(risk: Risk) -> str:
     """Return a picture of all intervals; nothing where no estimate is above 0."""
-    lines = [("event", WORDS[name], one.probability) for name, one in risk.findings.items()]
+    lines = [("event", WORDS[name], finding.probability) for name, finding in risk.findings.items()]
     modes = [*risk.by_mode.items()][:MOST_DRAWN]
-    lines += [("mode", words, one.probability) for words, one in modes]
+    lines += [("mode", words, mode.probability) for words, mode in modes]
     if risk.check is not None:
         p = risk.check.probability(EVENTS[risk.event].score)
         lines.append(("check", f"{WORDS[risk.event]}, by Monte Carlo", p))
@@ -130,9 +133,9 @@ def _intervals(risk: Risk) -> str:
     return charts.intervals(drawn, label) if drawn else ""
 
 
-def _shares(one: ParameterShare) -> str:
-    label = f"Shares of harmful rows by tenths of {one.name}"
-    return charts.bars(one.shares, 0.1, label)
+def _shares(parameter_share: ParameterShare) -> str:
+    label = f"Shares of harmful rows by tenths of {parameter_share.name}"
+    return charts.bars(parameter_share.shares, 0.1, label)
 
 
 def _values(risk: Risk, x: Float) -> Iterator[tuple[str, str]]:
@@ -140,6 +143,6 @@ def _values(risk: Risk, x: Float) -> Iterator[tuple[str, str]]:
     space = risk.exposure.space
     values = space.values(x)
     for name in risk.exposure.marginals:
-        one = space.parameters[name]
-        if text := one.kind.text(values[name], "{:.4g}".format):
-            yield name, text if one.unit == "1" else f"{text} {one.unit}"
+        parameter = space.parameters[name]
+        if text := parameter.kind.text(values[name], "{:.4g}".format):
+            yield name, text if parameter.unit == "1" else f"{text} {parameter.unit}"

@@ -157,13 +157,13 @@ class Risk:
         values, number = self._values(self.event), self.weighted.outcomes[:, Column.MODE]
         parts = self.weighted.weights * values
         sums = {words: float(parts[number == k].sum()) for k, words in enumerate(self.modes)}
-        order = sorted((one for one in sums if sums[one] > 0.0), key=lambda one: -sums[one])
-        return {one: self._finding(values * (number == self.modes.index(one))) for one in order}
+        order = sorted((sum_ for sum_ in sums if sums[sum_] > 0.0), key=lambda name: -sums[name])
+        return {name: self._finding(values * (number == self.modes.index(name))) for name in order}
 
     @property
     def stated(self) -> tuple[tuple[str, str | None, Finding], ...]:
         """What is stated, in order: words, the event's name for its rate, and the finding."""
-        found = [(WORDS[name], name, one) for name, one in self.findings.items()]
+        found = [(WORDS[name], name, finding) for name, finding in self.findings.items()]
         if self.preventable is not None:
             words = f"{WORDS[self.event]}, preventable"
             return (*found, (words, None, self.preventable))
@@ -202,7 +202,7 @@ class Risk:
             for k, name in enumerate(self.exposure.space.names)
             if name in self.exposure.marginals
         ]
-        return tuple(sorted(found, key=lambda one: -one.distance))
+        return tuple(sorted(found, key=lambda share: -share.distance))
 
     def to_dict(self) -> dict[str, Any]:
         """Return what ``risk.json`` says."""
@@ -223,21 +223,27 @@ class Risk:
             "seed": self.seed,
             "failed": self.failed,
             "implausible": self.implausible,
-            "per_encounter": {name: _finding(one) for name, one in self.findings.items()},
+            "per_encounter": {name: _finding(finding) for name, finding in self.findings.items()},
             "preventable": None if self.preventable is None else _finding(self.preventable),
-            "by_mode": {words: _finding(one) for words, one in self.by_mode.items()},
+            "by_mode": {words: _finding(finding) for words, finding in self.by_mode.items()},
             "per_hour": {name: _rate(self.rate(name, "h")) for name in self.findings},
             "per_km": {name: _rate(self.rate(name, "km")) for name in self.findings},
             "parameters": {
-                one.name: {
-                    "unit": one.unit, "distance": one.distance, "harmful": list(one.harmful),
-                    "road": list(one.road),
+                parameter.name: {
+                    "unit": parameter.unit,
+                    "distance": parameter.distance,
+                    "harmful": list(parameter.harmful),
+                    "road": list(parameter.road),
                 }
-                for one in self.parameters
+                for parameter in self.parameters
             },
             "most_likely": [
-                {"mode": one.mode, "files": one.name, "values": exposure.space.values(one.x)}
-                for one in self.most_likely
+                {
+                    "mode": likely.mode,
+                    "files": likely.name,
+                    "values": exposure.space.values(likely.x),
+                }
+                for likely in self.most_likely
             ],
             "diagnostics": weighted.facts,
             "check": None
@@ -249,7 +255,7 @@ class Risk:
             "data": None if self.data is None else vars(self.data),
             "elsewhere": None if self.elsewhere is None else self.elsewhere.to_dict(),
             "command": self.command,
-        }  # fmt: skip
+        }
 
     @property
     def work(self) -> str:
@@ -269,8 +275,8 @@ class Risk:
     def judged(self) -> tuple[Judged, ...]:
         """Return the figures, of which none is believed where the aimed event's is not."""
         found = {"evaluations": float(self.weighted.evaluations)}
-        for name, one in self.findings.items():
-            p, nan = one.probability, float("nan")
+        for name, finding in self.findings.items():
+            p, nan = finding.probability, float("nan")
             found[name] = nan if p is None else p.estimate
             found[f"{name}_upper"] = nan if p is None else p.upper
             for unit, words in (("h", "hour"), ("km", "km")):
@@ -282,7 +288,7 @@ class Risk:
                 suite=f"{name} risk", group=f"bridgegen.{name}.{self.driver.replace('.', '_')}",
                 test="the interval is believed", holds=self.believed,
                 details=self.findings[self.event].doubt or f"method {method}",
-                figures={one: found[one] for one in FIGURES},
+                figures={figure: found[figure] for figure in FIGURES},
                 facts={"scenario": name, "ego": self.driver, "method": method,
                        "command": self.command},
             ),
@@ -309,11 +315,11 @@ class Risk:
         out.writerow([*names, "conflict", "severity", "mode", "weight"])
         Z, found = self.weighted.Z[:MOST_ROWS], self.weighted.outcomes[:MOST_ROWS]
         X = self.exposure.from_normal(Z) if len(Z) else np.empty((0, len(names)))
-        for x, one, weight in zip(X, found, self.weighted.weights[:MOST_ROWS], strict=True):
-            number = int(one[Column.MODE])
+        for x, item, weight in zip(X, found, self.weighted.weights[:MOST_ROWS], strict=True):
+            number = int(item[Column.MODE])
             mode = self.modes[number] if number >= 0 else ""
-            kind = "collision" if one[Column.SCORE] >= EVENTS["collision"].score else "near miss"
-            severity = repr(float(one[Column.SEVERITY]))
+            kind = "collision" if item[Column.SCORE] >= EVENTS["collision"].score else "near miss"
+            severity = repr(float(item[Column.SEVERITY]))
             out.writerow([*map(repr, x.tolist()), kind, severity, mode, repr(float(weight))])
         return text.getvalue()
 
@@ -332,12 +338,14 @@ class Risk:
         )
 
     def _finding(self, values: Float) -> Finding:
-        hits, one = self.weighted.hits(values), self.weighted
-        if one.doubts:  # of the aim; what comes with it is no surer
-            return Finding(None, hits, one.doubts[0])
-        counted = bool(one.rows) and (not one.weights.size or np.ptp(one.weights) == 0.0)
+        hits, weighted = self.weighted.hits(values), self.weighted
+        if weighted.doubts:  # of the aim; what comes with it is no surer
+            return Finding(None, hits, weighted.doubts[0])
+        counted = bool(weighted.rows) and (
+            not weighted.weights.size or np.ptp(weighted.weights) == 0.0
+        )
         if counted or hits >= FEWEST_HITS:
-            return Finding(one.mean(values), hits)
+            return Finding(weighted.mean(values), hits)
         return Finding(None, hits, f"{hits:.0f} effective rows, and {FEWEST_HITS:.0f} are needed")
 
 
@@ -358,12 +366,12 @@ def _share(name: str, unit: str, values: Float, weights: Float, road: Float) -> 
     )  # fmt: skip
 
 
-def _finding(one: Finding) -> Mapping[str, Any]:
-    found: dict[str, Any] = {"hits": one.hits}
-    if one.probability is None:
-        return found | {"estimate": None, "doubt": one.doubt}
-    return found | vars(one.probability)
+def _finding(finding: Finding) -> Mapping[str, Any]:
+    found: dict[str, Any] = {"hits": finding.hits}
+    if finding.probability is None:
+        return found | {"estimate": None, "doubt": finding.doubt}
+    return found | vars(finding.probability)
 
 
-def _rate(one: Rate | None) -> Mapping[str, float] | None:
-    return None if one is None else vars(one)
+def _rate(rate: Rate | None) -> Mapping[str, float] | None:
+    return None if rate is None else vars(rate)

@@ -35,10 +35,10 @@ def lines(risk: Risk) -> Iterator[str | Table]:
     """Yield what the terminal shows of a risk: its sentence, its table, and what to know."""
     yield f"{sentence(risk)}\n"
     met = risk.exposure.encounters
-    units = [one for one in ("h", "km") if met is not None and getattr(met, _AMOUNTS[one])]
+    units = [item for item in ("h", "km") if met is not None and getattr(met, _AMOUNTS[item])]
     rows = []
-    for words, name, one in risk.stated:
-        row = [words, *interval(one.probability), f"{one.hits:,.0f}"]
+    for words, name, finding in risk.stated:
+        row = [words, *interval(finding.probability), f"{finding.hits:,.0f}"]
         row += [rate_text(None if name is None else risk.rate(name, unit)) for unit in units]
         rows.append(row)
     head = ("", "per encounter", "95 %", "below (95 %)", "effective rows")
@@ -98,8 +98,8 @@ def elsewhere_sentence(found: Elsewhere) -> str:
     )
 
 
-def _ratio(one: Ratio) -> str:
-    return f"{one.estimate:.3g} (95 %: {one.low:.3g} to {one.high:.3g})"
+def _ratio(ratio: Ratio) -> str:
+    return f"{ratio.estimate:.3g} (95 %: {ratio.low:.3g} to {ratio.high:.3g})"
 
 
 def rate_text(rate: Rate | None) -> str:

@@ -80,10 +80,10 @@ class RunArgument(Part):
         )  # fmt: skip
 
     def _bins(self, k: int) -> str:
-        one = self._facts.coverage.parameters[k]
-        counts = zip(one.evaluated.tolist(), one.feasible.tolist(), strict=True)
+        parameter = self._facts.coverage.parameters[k]
+        counts = zip(parameter.evaluated.tolist(), parameter.feasible.tolist(), strict=True)
         cells = ", ".join(str(n) if there else "not feasible" for n, there in counts)
-        return f"{one.name} ({one.span}): {cells}"
+        return f"{parameter.name} ({parameter.span}): {cells}"
 
     def _space(self) -> None:
         at, space = f"{self._at}.4", self._facts.triage.bound.space
@@ -154,26 +154,35 @@ class RunArgument(Part):
             link="criteria.md",
         )  # fmt: skip
         strategy = goal.add("Strategy", at, "Argument over each requirement.")
-        for k, one in enumerate(criteria, start=1):
-            self._requirement(strategy, f"{at}.{k}", one)
+        for k, criterion in enumerate(criteria, start=1):
+            self._requirement(strategy, f"{at}.{k}", criterion)
 
-    def _requirement(self, above: Draft, at: str, one: CriterionSummary) -> None:
-        name = one.criterion.id
-        words = f" ({one.criterion.text.rstrip('.')})" if one.criterion.text else ""
-        known = bool(one.met + one.violated) and self._facts.run.verdict != NOT_JUDGED
+    def _requirement(self, above: Draft, at: str, criterion_summary: CriterionSummary) -> None:
+        name = criterion_summary.criterion.id
+        words = (
+            f" ({criterion_summary.criterion.text.rstrip('.')})"
+            if criterion_summary.criterion.text
+            else ""
+        )
+        known = (
+            bool(criterion_summary.met + criterion_summary.violated)
+            and self._facts.run.verdict != NOT_JUDGED
+        )
         goal = above.add(
-            "Goal", at,
-            f"{name}{words} is met in every evaluation with a result: {one.criterion.states}"
+            "Goal",
+            at,
+            f"{name}{words} is met in every evaluation with a result: "
+            f"{criterion_summary.criterion.states}"
             + ("" if known else ". The run was not judged, so its evaluations do not support it."),
             holds=Condition(number=self._numbers.id(f"violated:{name}"), equals=0),
-            details=[f"severity of a violation: {one.criterion.severity}"],
+            details=[f"severity of a violation: {criterion_summary.criterion.severity}"],
             undeveloped=not known,
-        )  # fmt: skip
+        )
         if not known:
             return
         least = ""
         if f"worst:{name}" in self._numbers:
-            unit = "" if one.unit == "1" else f" {one.unit}"
+            unit = "" if criterion_summary.unit == "1" else f" {criterion_summary.unit}"
             least = (
                 f"; least margin {self._n(f'worst:{name}')}{unit} "
                 f"(evaluation {self._n(f'worst_at:{name}')})"
@@ -182,7 +191,7 @@ class RunArgument(Part):
             f"Met in {self._n(f'met:{name}')} evaluations, violated in "
             f"{self._n(f'violated:{name}')}, unknown in {self._n(f'unknown:{name}')}{least}."
         )
-        if one.violated:
+        if criterion_summary.violated:
             counter = goal.challenge(
                 f"{self._ego} violates {name} in {self._n(f'violated:{name}')} evaluations."
             )
@@ -205,7 +214,7 @@ class RunArgument(Part):
         )  # fmt: skip
         for k, (name, file) in enumerate(self._files.confirmations.items(), start=1):
             ran = self._numbers[f"ran:{name}"].value
-            one = confirmed.add(
+            draft = confirmed.add(
                 "Goal", f"{at}.1.{k}",
                 f"In {name} each scenario that ran is critical, too: "
                 f"{self._n(f'confirmed:{name}')} of {self._n(f'ran:{name}')}.",
@@ -216,7 +225,7 @@ class RunArgument(Part):
                 undeveloped=not ran,
             )  # fmt: skip
             if ran:
-                one.add("Solution", f"{at}.1.{k}", f"Confirmation in {name}.", evidence=[file])
+                draft.add("Solution", f"{at}.1.{k}", f"Confirmation in {name}.", evidence=[file])
         strategy.add(
             "Goal", f"{at}.2",
             "It misses no failure that the vehicle has. No result was compared with a vehicle.",

@@ -62,47 +62,47 @@ class Draft:
         link: str = "",
     ) -> "Draft":
         """Add an element below this one, and return it; its relation follows from its kind."""
-        one = Draft(kind, at, template, details, undeveloped, holds, evidence, link)
+        draft = Draft(kind, at, template, details, undeveloped, holds, evidence, link)
         context = kind in ("Context", "Assumption", "Justification")
-        self.below.append(("InContextOf" if context else "SupportedBy", one))
-        return one
+        self.below.append(("InContextOf" if context else "SupportedBy", draft))
+        return draft
 
     def challenge(self, template: str, details: Sequence[str] = ()) -> "Draft":
         """Add a counter goal that challenges this goal, and return it."""
-        one = Draft("CounterGoal", self.at, template, details)
-        self.challengers.append(one)
-        return one
+        draft = Draft("CounterGoal", self.at, template, details)
+        self.challengers.append(draft)
+        return draft
 
     def walk(self) -> Iterable["Draft"]:
         """Yield this element, then all that is below it or challenges it."""
         yield self
-        for _, one in self.below:
-            yield from one.walk()
-        for one in self.challengers:
-            yield from one.walk()
+        for _, draft in self.below:
+            yield from draft.walk()
+        for challenger in self.challengers:
+            yield from challenger.walk()
 
 
-def status_of(one: Draft, values: dict[str, float]) -> Status:
+def status_of(draft: Draft, values: dict[str, float]) -> Status:
     """Return the status of a goal; "" of another element.
 
     A goal is not supported if its condition does not hold, if a counter goal challenges it, or if
     a goal below it is not supported; incomplete if a goal below it is undeveloped or incomplete.
     """
-    if one.kind not in ("Goal", "CounterGoal"):
+    if draft.kind not in ("Goal", "CounterGoal"):
         return ""
-    if one.undeveloped:
+    if draft.undeveloped:
         return "undeveloped"
-    if one.challengers or not _holds(one.holds, values):
+    if draft.challengers or not _holds(draft.holds, values):
         return "not supported"
-    found = {status_of(goal, values) for goal in _goals(one)}
+    found = {status_of(goal, values) for goal in _goals(draft)}
     if "not supported" in found:
         return "not supported"
     return "incomplete" if found & {"undeveloped", "incomplete"} else "supported"
 
 
-def _goals(one: Draft) -> Iterable[Draft]:
+def _goals(draft: Draft) -> Iterable[Draft]:
     """Yield the goals next below one, strategies between left out."""
-    for relation, other in one.below:
+    for relation, other in draft.below:
         if relation == "SupportedBy":
             yield from _goals(other) if other.kind == "Strategy" else (other,)
 
@@ -123,46 +123,46 @@ def finish(
         top: its top goal.
         numbers: all of the case, by id.
     """
-    values = {n: one.value for n, one in numbers.items() if not isinstance(one.value, str)}
+    values = {n: number.value for n, number in numbers.items() if not isinstance(number.value, str)}
     drafts = list(top.walk())
-    elements = tuple(_element(one, status_of(one, values), numbers) for one in drafts)
+    elements = tuple(_element(draft, status_of(draft, values), numbers) for draft in drafts)
     relations: list[Relation] = []
-    for one in drafts:
-        relations += [_relation(kind, one, other) for kind, other in one.below]
-        relations += [_relation("Challenges", other, one) for other in one.challengers]
+    for draft in drafts:
+        relations += [_relation(kind, draft, other) for kind, other in draft.below]
+        relations += [_relation("Challenges", other, draft) for other in draft.challengers]
     return elements, tuple(relations)
 
 
-def _element(one: Draft, status: Status, numbers: dict[str, Number]) -> Element:
+def _element(draft: Draft, status: Status, numbers: dict[str, Number]) -> Element:
     return Element(
-        id=one.id,
-        kind=one.kind,
-        sacm=SACM[one.kind],
-        declaration=_declaration(one, status),
-        statement=statement(one.template, numbers),
-        details=tuple(statement(text, numbers) for text in one.details),
+        id=draft.id,
+        kind=draft.kind,
+        sacm=SACM[draft.kind],
+        declaration=_declaration(draft, status),
+        statement=statement(draft.template, numbers),
+        details=tuple(statement(text, numbers) for text in draft.details),
         status=status,
-        undeveloped=one.undeveloped,
-        holds=one.holds,
-        evidence=tuple(one.evidence),
-        link=one.link,
+        undeveloped=draft.undeveloped,
+        holds=draft.holds,
+        evidence=tuple(draft.evidence),
+        link=draft.link,
     )
 
 
-def _declaration(one: Draft, status: Status) -> Declaration:
+def _declaration(draft: Draft, status: Status) -> Declaration:
     """Return what SACM says of a claim."""
-    if one.kind not in _CLAIMS:
+    if draft.kind not in _CLAIMS:
         return ""
-    if one.kind == "Assumption":
+    if draft.kind == "Assumption":
         return "assumed"
-    if one.kind == "Justification":
+    if draft.kind == "Justification":
         return "axiomatic"
     if status == "not supported":
         return "defeated"
     return "asserted" if status == "supported" else "needsSupport"
 
 
-def _relation(kind: RelationKind, one: Draft, other: Draft) -> Relation:
+def _relation(kind: RelationKind, draft: Draft, other: Draft) -> Relation:
     if kind == "InContextOf":
         sacm = "AssertedContext"
     elif other.kind in ("Solution", "CounterSolution"):
@@ -170,5 +170,5 @@ def _relation(kind: RelationKind, one: Draft, other: Draft) -> Relation:
     else:
         sacm = "AssertedInference"
     return Relation(
-        kind=kind, source=one.id, target=other.id, sacm=sacm, counter=kind == "Challenges"
+        kind=kind, source=draft.id, target=other.id, sacm=sacm, counter=kind == "Challenges"
     )

@@ -23,9 +23,10 @@ def add_context(top: Draft, facts: Facts, files: Files) -> None:
     """Add what the goal of a run is stated in the context of."""
     at, scenario, settings = top.at, facts.scenario, facts.run.settings
     searched = [scenario.parameters[name] for name in facts.space.variables]
-    inputs = [f"file {one}" for one in files.inputs]
+    inputs = [f"file {input_}" for input_ in files.inputs]
     top.add(
-        "Context", f"{at}.1",
+        "Context",
+        f"{at}.1",
         f"What was searched: {scenario.name}, {counted(len(searched), 'parameter')} over the "
         "declared ranges, within the declared constraints.",
         details=[
@@ -33,11 +34,14 @@ def add_context(top: Draft, facts: Facts, files: Files) -> None:
             f"digest of the scenario {settings.fingerprint}",
             *inputs,
             *map(_range, searched),
-            *(f"constraint {one}: {one.why} ({one.source})" for one in scenario.bounds),
-            *(f"derived {one}: {one.why} ({one.source})" for one in scenario.derived),
+            *(f"constraint {bound}: {bound.why} ({bound.source})" for bound in scenario.bounds),
+            *(
+                f"derived {derived}: {derived.why} ({derived.source})"
+                for derived in scenario.derived
+            ),
         ],
         link="scenarios.md",
-    )  # fmt: skip
+    )
     top.add(
         "Context", f"{at}.2",
         f"Operational design domain: {scenario.title}{_road(facts)}; {_weather(facts)}.",
@@ -109,25 +113,30 @@ def _environment(facts: Facts) -> Iterator[str]:
     yield scenario.description
     if isinstance(scenario, LogicalScenario):
         yield from story_lines(scenario)
-    for one in scenario.parameters.values():
-        if one.name not in space.variables:
-            yield f"{one.name} = {_value(one, space.defaults[one.name])} ({one.axis}, not searched)"
-    if not any(one.axis == Axis.WEATHER for one in scenario.parameters.values()):
+    for parameter in scenario.parameters.values():
+        if parameter.name not in space.variables:
+            yield (
+                f"{parameter.name} = {_value(parameter, space.defaults[parameter.name])} "
+                f"({parameter.axis}, not searched)"
+            )
+    if not any(parameter.axis == Axis.WEATHER for parameter in scenario.parameters.values()):
         yield "no weather parameters"
 
 
-def _range(one: Parameter) -> str:
-    span = one.kind.span_text(one.low, one.high, "{:g}".format, _unit(one))
-    source = f" ({one.source})" if one.source else ""
-    return f"parameter {one.name}: {one.axis}, {span}{source}"
+def _range(parameter: Parameter) -> str:
+    span = parameter.kind.span_text(parameter.low, parameter.high, "{:g}".format, _unit(parameter))
+    source = f" ({parameter.source})" if parameter.source else ""
+    return f"parameter {parameter.name}: {parameter.axis}, {span}{source}"
 
 
-def _value(one: Parameter, value: float) -> str:
-    return one.kind.text(value, "{:g}".format) + ("" if one.kind.names else _unit(one))
+def _value(parameter: Parameter, value: float) -> str:
+    return parameter.kind.text(value, "{:g}".format) + (
+        "" if parameter.kind.names else _unit(parameter)
+    )
 
 
-def _unit(one: Parameter) -> str:
-    return "" if one.unit in _UNITLESS else f" {one.unit}"
+def _unit(parameter: Parameter) -> str:
+    return "" if parameter.unit in _UNITLESS else f" {parameter.unit}"
 
 
 def add_assumptions(strategy: Draft, egos: list[Facts]) -> None:
@@ -137,7 +146,7 @@ def add_assumptions(strategy: Draft, egos: list[Facts]) -> None:
 
 
 def _assumptions(runs: list[Facts]) -> Iterator[tuple[str, str]]:
-    simulators = {one.run.settings.simulator.name for one in runs}
+    simulators = {run.run.settings.simulator.name for run in runs}
     if EMBEDDED.name in simulators:
         yield (
             "The ego moves as a kinematic bicycle with limits of speed, acceleration, curvature "
@@ -163,19 +172,19 @@ def _assumptions(runs: list[Facts]) -> Iterator[tuple[str, str]]:
         f"a careful driver prevents is judged by {CAREFUL_DRIVER}.",
         "#traffic-behaviour",
     )
-    if any(one.run.settings.ego == "un-r157" for one in runs):
+    if any(run.run.settings.ego == "un-r157" for run in runs):
         yield (
             "The driver un-r157 follows the careful driver's own model: that it prevents what a "
             "careful driver prevents says little about it.",
             "#sotif-un-r157-euro-ncap",
         )
-    if any(is_spec(one.run.settings.ego) for one in runs):
+    if any(is_spec(run.run.settings.ego) for run in runs):
         yield (
             "The code of the driver is still what drove in the run: a run records the driver's "
             "name, and the digest of its file is that of the export.",
             "",
         )
-    if any(one.run.settings.ego == STORYBOARD.name for one in runs):
+    if any(run.run.settings.ego == STORYBOARD.name for run in runs):
         yield "The scenario's own storyboard moves the ego; no system is under test.", ""
 
 

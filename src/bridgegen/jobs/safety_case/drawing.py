@@ -95,10 +95,10 @@ class _Layout:
     def place(self, goal: Element, deep: bool) -> Layout:
         (strategy,) = self._case.targets(goal.id, "SupportedBy")
         goals = list(self._case.targets(strategy.id, "SupportedBy"))
-        weights = [self._weight(one) if deep else 1.0 for one in goals]
+        weights = [self._weight(item) if deep else 1.0 for item in goals]
         gaps = GAP * (len(goals) - 1)
         unit = min(max((WIDTH - gaps) / sum(weights), LEAST), MOST)
-        widths = [unit * one for one in weights]
+        widths = [unit * weight for weight in weights]
         columns = sum(widths) + gaps
         width = max(columns, HEAD + 2.0 * SIDE + 4.0 * GAP)
         upper, below = self._head(goal, 0.0, width)
@@ -107,8 +107,8 @@ class _Layout:
         self._edge("SupportedBy", (middle, upper.bottom), (middle, lower.y))
         bus = below + 1.5 * GAP
         x, height = 0.5 * (width - columns), 0.0
-        for one, own in zip(goals, widths, strict=True):
-            box, bottom = self._tree(one, x, bus + 2.0 * GAP, own, deep)
+        for item, own in zip(goals, widths, strict=True):
+            box, bottom = self._tree(item, x, bus + 2.0 * GAP, own, deep)
             end = x + 0.5 * own
             self._edge(
                 "SupportedBy", (middle, lower.bottom), (middle, bus), (end, bus), (end, box.y)
@@ -122,20 +122,20 @@ class _Layout:
             return 1.4
         return {1: 0.8, 2: 1.0}.get(self._depth(goal), 1.1)
 
-    def _depth(self, one: Element) -> int:
-        return 1 + max((self._depth(other) for other in self._below(one)), default=0)
+    def _depth(self, item: Element) -> int:
+        return 1 + max((self._depth(other) for other in self._below(item)), default=0)
 
-    def _below(self, one: Element) -> list[Element]:
+    def _below(self, item: Element) -> list[Element]:
         return [
-            *self._case.targets(one.id, "InContextOf"),
-            *self._case.challengers(one.id),
-            *self._case.targets(one.id, "SupportedBy"),
+            *self._case.targets(item.id, "InContextOf"),
+            *self._case.challengers(item.id),
+            *self._case.targets(item.id, "SupportedBy"),
         ]
 
-    def _head(self, one: Element, y: float, width: float) -> tuple[Box, float]:
+    def _head(self, item: Element, y: float, width: float) -> tuple[Box, float]:
         """Place an element in the middle, its contexts on both sides; return the lower edge."""
-        box = self._box(one, 0.5 * (width - HEAD), y, HEAD)
-        context = list(self._case.targets(one.id, "InContextOf"))
+        box = self._box(item, 0.5 * (width - HEAD), y, HEAD)
+        context = list(self._case.targets(item.id, "InContextOf"))
         half = (len(context) + 1) // 2
         bottom = box.bottom
         sides = (
@@ -157,18 +157,18 @@ class _Layout:
         return box, bottom
 
     def _tree(
-        self, one: Element, x: float, y: float, width: float, deep: bool = True
+        self, item: Element, x: float, y: float, width: float, deep: bool = True
     ) -> tuple[Box, float]:
         """Place an element and all below it in a column; return the lower edge of all."""
-        box = self._box(one, x, y, width)
-        bottom = box.bottom + (10.0 if one.undeveloped else 0.0)
+        box = self._box(item, x, y, width)
+        bottom = box.bottom + (10.0 if item.undeveloped else 0.0)
         if not deep:
             return box, bottom
         for kind in ("InContextOf", "Challenges", "SupportedBy"):
             found = (
-                self._case.challengers(one.id)
+                self._case.challengers(item.id)
                 if kind == "Challenges"
-                else self._case.targets(one.id, kind)
+                else self._case.targets(item.id, kind)
             )
             for other in found:
                 child, end = self._tree(other, x + INDENT, bottom + GAP, width - INDENT)
@@ -178,20 +178,20 @@ class _Layout:
                 bottom = end
         return box, bottom
 
-    def _box(self, one: Element, x: float, y: float, width: float) -> Box:
-        badge = one.kind in ROUND
+    def _box(self, item: Element, x: float, y: float, width: float) -> Box:
+        badge = item.kind in ROUND
         inside = (
             width
             - 2.0 * PAD
             - (BADGE if badge else 0.0)
-            - (24.0 if one.kind == "Strategy" else 0.0)
+            - (24.0 if item.kind == "Strategy" else 0.0)
         )
-        lines = wrapped(one.statement.text, inside)
+        lines = wrapped(item.statement.text, inside)
         rows = len(lines) if badge else len(lines) + 1  # and its id
         height = rows * LINE + (4.0 if badge else 2.0 * PAD)
         if badge:
             height = max(height, BADGE)
-        box = Box(one, x, y, width, height, lines, badge)
+        box = Box(item, x, y, width, height, lines, badge)
         self._boxes.append(box)
         return box
 
@@ -249,13 +249,13 @@ def _edge(edge: Edge) -> Markup:
 
 
 def _element(box: Box) -> Markup:
-    one = box.element
-    kind = one.kind.removeprefix("Counter").lower()
-    counter = " counter" if one.kind.startswith("Counter") else ""
-    words = f"{one.id}: {one.statement.text}" + (f" ({one.status})" if one.status else "")
+    item = box.element
+    kind = item.kind.removeprefix("Counter").lower()
+    counter = " counter" if item.kind.startswith("Counter") else ""
+    words = f"{item.id}: {item.statement.text}" + (f" ({item.status})" if item.status else "")
     return element(
         "a", element("title", words), *_shape(box), *_text(box), *_marks(box),
-        href=f"#{one.id}", class_=f"{kind}{counter} {_CLASS[one.status]}",
+        href=f"#{item.id}", class_=f"{kind}{counter} {_CLASS[item.status]}",
     )  # fmt: skip
 
 
@@ -279,18 +279,18 @@ def _shape(box: Box) -> Iterator[Markup]:
 
 
 def _text(box: Box) -> Iterator[Markup]:
-    one = box.element
+    item = box.element
     if box.badge:
         x, y = box.x + BADGE + 4.0, box.y + 13.0
         middle, height = box.x + 0.5 * BADGE, box.y + 0.5 * BADGE
-        letters = one.id.rstrip("0123456789.")
-        for part, drop in ((letters, -1.5), (one.id.removeprefix(letters), 9.0)):
+        letters = item.id.rstrip("0123456789.")
+        for part, drop in ((letters, -1.5), (item.id.removeprefix(letters), 9.0)):
             yield element("text", part, class_="badge", x=middle, y=height + drop)
     else:
-        x = box.x + PAD + (SLANT if one.kind == "Strategy" else 0.0)
+        x = box.x + PAD + (SLANT if item.kind == "Strategy" else 0.0)
         y = box.y + PAD + 10.0
-        word = (" ", element("tspan", one.status, class_="status")) if one.status else ()
-        yield element("text", one.id, *word, class_="id", x=x, y=y)
+        word = (" ", element("tspan", item.status, class_="status")) if item.status else ()
+        yield element("text", item.id, *word, class_="id", x=x, y=y)
         y += LINE
     lines = (element("tspan", line, x=x, y=y + k * LINE) for k, line in enumerate(box.lines))
     yield element("text", *lines)
@@ -298,10 +298,10 @@ def _text(box: Box) -> Iterator[Markup]:
 
 def _marks(box: Box) -> Iterator[Markup]:
     """Yield the diamond of an undeveloped goal, and the cross of a defeated one."""
-    x, y, one = box.x + 0.5 * box.width, box.bottom, box.element
-    if one.undeveloped:
+    x, y, item = box.x + 0.5 * box.width, box.bottom, box.element
+    if item.undeveloped:
         corners = ((x, y), (x + 9, y + 9), (x, y + 18), (x - 9, y + 9))
         yield element("polygon", class_="diamond", points=points_of(corners))
-    if one.defeated:
+    if item.defeated:
         for a, b in ((box.y, y), (y, box.y)):
             yield element("line", class_="cross", x1=box.x, y1=a, x2=box.x + box.width, y2=b)

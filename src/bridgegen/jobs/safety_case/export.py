@@ -38,8 +38,8 @@ def build(runs: Sequence[Facts], out: Path) -> SafetyCase:
         runs: at least one.
         out: the folder of the case, which its files are named from.
     """
-    names = " and ".join(dict.fromkeys(one.triage.scenario for one in runs))
-    egos = " and ".join(dict.fromkeys(one.ego for one in runs))
+    names = " and ".join(dict.fromkeys(run.triage.scenario for run in runs))
+    egos = " and ".join(dict.fromkeys(run.ego for run in runs))
     numbers: dict[str, Number] = {}
     top = Draft("Goal", "1", _claim(runs[0]))
     if len(runs) > 1:
@@ -51,7 +51,7 @@ def build(runs: Sequence[Facts], out: Path) -> SafetyCase:
         own = top if strategy is None else strategy.add("Goal", f"1.{k}", _claim(facts))
         files, of = Files(facts, k, out), Numbers(f"R{k}")
         measure(facts, of)
-        numbers |= {one.id: one for one in of.all}
+        numbers |= {number.id: number for number in of.all}
         add_context(own, facts, files)
         inner = own.add("Strategy", own.at, _STRATEGY)
         if strategy is None:
@@ -95,10 +95,10 @@ def _over(runs: Sequence[Facts], numbers: dict[str, Number]) -> Draft:
     strategy = top.add("Strategy", "1", "Argument over each run.")
     strategy.add("Justification", "1", justification())
     of = Numbers("all")
-    bounded = sum(bool(one.triage.bound.space.rows) for one in runs)
+    bounded = sum(bool(run.triage.bound.space.rows) for run in runs)
     if bounded > 1:
         of.add("joint", max(0.0, round(1.0 - bounded * (1.0 - CONFIDENCE), 12)), "percent")
-        numbers |= {one.id: one for one in of.all}
+        numbers |= {number.id: number for number in of.all}
         strategy.add(
             "Justification", "1.1",
             "The confidence of an interval is that of its run alone. All of them hold together "
@@ -123,7 +123,10 @@ def _facts(facts: Facts, name: str, out: Path) -> RunFacts:
         results=triage.results,
         count=triage.count,
         drawn="" if not drawn else "fresh" if drawn == "fresh" else "run",
-        edges={one.name: tuple(one.edges[1:-1].tolist()) for one in facts.coverage.parameters},
+        edges={
+            parameter.name: tuple(parameter.edges[1:-1].tolist())
+            for parameter in facts.coverage.parameters
+        },
     )
 
 
@@ -169,13 +172,13 @@ class Exported:
     def to_json(self) -> list[dict[str, str]]:
         """Return the goals that decide, with their status, as JSON's types."""
         return [
-            {"goal": one.id, "status": one.status, "claim": one.statement.text}
-            for one in self.case.main_goals()
+            {"goal": goal.id, "status": goal.status, "claim": goal.statement.text}
+            for goal in self.case.main_goals()
         ]
 
     def shown(self) -> list[str | Table]:
         """Return the goals that decide, then the files."""
-        goals = [(one.id, one.status, one.statement.text) for one in self.case.main_goals()]
+        goals = [(goal.id, goal.status, goal.statement.text) for goal in self.case.main_goals()]
         return [
             Table(("goal", "status", "claim"), goals),
             f"\n{'page':<12}{self.page}",
@@ -185,7 +188,7 @@ class Exported:
 
     def judged(self) -> list[Judged]:
         """Return whether all runs could be judged, and the goals by status."""
-        status = Counter(one.status for one in self.case.main_goals())
+        status = Counter(goal.status for goal in self.case.main_goals())
         whys = [
             f"{run} supports no claim on its driver: {why.removeprefix('Not judged: ')}"
             for run, why in self.unjudged.items()
@@ -220,16 +223,16 @@ def export_safety_case(given: SafetyCaseOptions) -> Exported:
     if not folders:
         raise InputError("a safety case is of one run at least, got none")
     seen: set[Path] = set()
-    for one in folders:
-        if one.resolve() in seen:
-            raise InputError(f"{one}: a safety case takes each run once, and it is given twice")
-        seen.add(one.resolve())
+    for path in folders:
+        if path.resolve() in seen:
+            raise InputError(f"{path}: a safety case takes each run once, and it is given twice")
+        seen.add(path.resolve())
     folder = (
         Path(given.out)
         if given.out
         else (folders[0] / FOLDER if len(folders) == 1 else Path(FOLDER))
     )
-    found = [read_facts(one) for one in folders]
+    found = [read_facts(path) for path in folders]
     if folder.resolve() in seen:
         raise InputError(f"{folder}: is the folder of a run; choose another --out")
     try:
@@ -244,6 +247,8 @@ def export_safety_case(given: SafetyCaseOptions) -> Exported:
         folder / SCRIPT, [files("bridgegen.jobs.safety_case").joinpath(SCRIPT).read_bytes()]
     )
     unjudged = {
-        one.run.folder: one.triage.bound.sentence for one in found if one.run.verdict == NOT_JUDGED
+        facts.run.folder: facts.triage.bound.sentence
+        for facts in found
+        if facts.run.verdict == NOT_JUDGED
     }
     return Exported(case, folder, unjudged)

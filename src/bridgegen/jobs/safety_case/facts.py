@@ -207,12 +207,12 @@ class Files:
                 for path, shows in self._scenario(stem)
             ]
         self.confirmations = {
-            one.simulator: self._add(
-                self._folder / file_name(one.simulator),
-                f"exported scenarios simulated again in {one.label}",
-                shlex.join(["bridgegen", "confirm", name, "--simulator", one.simulator]),
+            confirmation.simulator: self._add(
+                self._folder / file_name(confirmation.simulator),
+                f"exported scenarios simulated again in {confirmation.label}",
+                shlex.join(["bridgegen", "confirm", name, "--simulator", confirmation.simulator]),
             )
-            for one in facts.confirmations
+            for confirmation in facts.confirmations
         }
         self.inputs = [
             self._add(path, shows, "")
@@ -248,7 +248,7 @@ class Files:
         """
         path = Path(path)
         file = Path(os.path.relpath(path.resolve(), self._out.resolve())).as_posix()
-        known = next((one.id for one in self.all if one.file == file), None)
+        known = next((item.id for item in self.all if item.file == file), None)
         if known is not None:
             return known
         try:
@@ -257,9 +257,9 @@ class Files:
             size = path.stat().st_size
         except OSError as error:
             raise StorageError(f"{path}: cannot be read: {error.strerror}") from None
-        one = Evidence(
+        evidence = Evidence(
             id=f"E{self._number}.{len(self.all) + 1}", file=file, sha256=digest, bytes=size,
             shows=shows, command=command,
         )  # fmt: skip
-        self.all.append(one)
-        return one.id
+        self.all.append(evidence)
+        return evidence.id

@@ -151,7 +151,7 @@ class Failures(Part):
                 f"{word}: {self._n(f'still_harmful{k}')} of {self._n(f'neighbours{k}')} neighbours"
             )
         cause = f"; root cause: {mode.cause}" if mode.cause else ""
-        one = counter.add(
+        draft = counter.add(
             "CounterGoal", at,
             f"{self._ego} {self._n(f'title{k}')}: {self._n(f'count{k}')} evaluations; "
             f"{near}{cause}.",
@@ -163,7 +163,7 @@ class Failures(Part):
         where = ""
         if f"simplest{k}" in self._numbers:
             where = f" Simplest form: {self._n(f'simplest{k}')}."
-        one.add(
+        draft.add(
             "CounterSolution", at,
             f"Evaluation {self._n(f'at{k}')}: harm {self._n(f'harm{k}')}{severity}.{where}",
             evidence=[self._files.run, *self._files.modes[k]],

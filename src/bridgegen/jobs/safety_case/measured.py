@@ -71,11 +71,11 @@ def _failures(facts: Facts, numbers: Numbers) -> None:
         every = int((fit & (facts.harm >= NEAR_MISS)).sum())
         numbers.add("other_causes", every - triage.bound.harmful)
     nearest = () if found else triage.bound.least
-    for one in nearest:
-        if one.value is not None and one.evaluation is not None:
-            name, of = one.quantity, one.quantity
-            numbers.add(f"least:{name}", one.value, "number", of=of, unit=one.unit)
-            numbers.add(f"least_at:{name}", one.evaluation + 1, of=of)
+    for least in nearest:
+        if least.value is not None and least.evaluation is not None:
+            name, of = least.quantity, least.quantity
+            numbers.add(f"least:{name}", least.value, "number", of=of, unit=least.unit)
+            numbers.add(f"least_at:{name}", least.evaluation + 1, of=of)
     if triage.modes:
         numbers.add("modes", len(triage.modes) + triage.unrecorded_modes, source=TRIAGE)
         if not triage.untested:
@@ -120,19 +120,19 @@ def _space(facts: Facts, numbers: Numbers) -> None:
 
 def _coverage(facts: Facts, numbers: Numbers) -> None:
     again = shlex.join(["bridgegen", "coverage", facts.run.folder.resolve().name])
-    for one in facts.coverage.ways:
-        name = {1: "bins", 2: "pairs"}[one.strength]
-        numbers.add(f"{name}_all", one.total)
-        numbers.add(f"{name}_feasible", one.feasible, again=again)
-        numbers.add(f"{name}_evaluated", one.evaluated)
+    for way in facts.coverage.ways:
+        name = {1: "bins", 2: "pairs"}[way.strength]
+        numbers.add(f"{name}_all", way.total)
+        numbers.add(f"{name}_feasible", way.feasible, again=again)
+        numbers.add(f"{name}_evaluated", way.evaluated)
 
 
 def _criteria(facts: Facts, numbers: Numbers) -> None:
-    for one in facts.run.criteria:
-        name = one.criterion.id
-        numbers.add(f"met:{name}", one.met, of=name)
-        numbers.add(f"violated:{name}", one.violated, of=name)
-        numbers.add(f"unknown:{name}", one.unknown, of=name)
-        if one.at is not None and np.isfinite(one.worst):
-            numbers.add(f"worst:{name}", one.worst, "number", of=name, unit=one.unit)
-            numbers.add(f"worst_at:{name}", one.at, of=name)
+    for criterion in facts.run.criteria:
+        name = criterion.criterion.id
+        numbers.add(f"met:{name}", criterion.met, of=name)
+        numbers.add(f"violated:{name}", criterion.violated, of=name)
+        numbers.add(f"unknown:{name}", criterion.unknown, of=name)
+        if criterion.at is not None and np.isfinite(criterion.worst):
+            numbers.add(f"worst:{name}", criterion.worst, "number", of=name, unit=criterion.unit)
+            numbers.add(f"worst_at:{name}", criterion.at, of=name)

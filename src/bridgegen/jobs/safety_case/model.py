@@ -236,33 +236,38 @@ class SafetyCase(_Model):
 
     @model_validator(mode="after")
     def _consistent(self) -> "SafetyCase":
-        known = {one.id for one in self.elements}
+        known = {element.id for element in self.elements}
         for kind, ids in (
-            ("element", [one.id for one in self.elements]),
-            ("number", [one.id for one in self.numbers]),
-            ("evidence item", [one.id for one in self.evidence]),
+            ("element", [element.id for element in self.elements]),
+            ("number", [number.id for number in self.numbers]),
+            ("evidence item", [evidence.id for evidence in self.evidence]),
         ):
             if len({*ids}) != len(ids):
                 raise ValueError(f"the ids of each {kind} must differ")
-        if odd := {end for one in self.relations for end in (one.source, one.target)} - known:
+        if (
+            odd := {
+                end for relation in self.relations for end in (relation.source, relation.target)
+            }
+            - known
+        ):
             raise ValueError(f"a relation must be between elements, got {min(odd)}")
         return self
 
     def element(self, name: str) -> Element:
         """Return an element by its id."""
-        return next(one for one in self.elements if one.id == name)
+        return next(item for item in self.elements if item.id == name)
 
     def targets(self, name: str, kind: RelationKind) -> Iterator[Element]:
         """Yield the elements that one has a relation to, in their order."""
-        for one in self.relations:
-            if one.source == name and one.kind == kind:
-                yield self.element(one.target)
+        for relation in self.relations:
+            if relation.source == name and relation.kind == kind:
+                yield self.element(relation.target)
 
     def challengers(self, name: str) -> Iterator[Element]:
         """Yield the elements that challenge one."""
-        for one in self.relations:
-            if one.target == name and one.kind == "Challenges":
-                yield self.element(one.source)
+        for relation in self.relations:
+            if relation.target == name and relation.kind == "Challenges":
+                yield self.element(relation.source)
 
     def goals_of(self, name: str) -> Iterator[Element]:
         """Yield the goals that the strategies of a goal have."""
@@ -277,9 +282,9 @@ class SafetyCase(_Model):
     def main_goals(self) -> Iterator[Element]:
         """Yield the top goal, then the goals next below each run's."""
         yield self.elements[0]
-        for one in self.run_goals():
-            yield from (one,) if one is not self.elements[0] else ()
-            yield from self.goals_of(one.id)
+        for goal in self.run_goals():
+            yield from (goal,) if goal is not self.elements[0] else ()
+            yield from self.goals_of(goal.id)
 
 
 def json_schema() -> dict[str, Any]:

@@ -41,14 +41,14 @@ def page(case: SafetyCase, data: bytes) -> bytes:
     drawn = [("", case.title, _drawn(case, top, case.title))]
     if len(case.runs) > 1:
         drawn = [("", "all runs", _drawn(case, top, "all runs", deep=False))]
-        for one, goal in zip(case.runs, case.run_goals(), strict=True):
-            label = f"{one.ego} in {one.scenario}"
-            drawn.append((f"{one.id}: {label}", label, _drawn(case, goal, label)))
+        for run, goal in zip(case.runs, case.run_goals(), strict=True):
+            label = f"{run.ego} in {run.scenario}"
+            drawn.append((f"{run.id}: {label}", label, _drawn(case, goal, label)))
     return templates.page(
         "jobs/safety_case/page.html",
         title=f"Safety case: {case.title}", case=case, top=top, drawn=drawn,
-        elements=[(one, _relations(case, one)) for one in case.elements],
-        files={one.id: one for one in case.evidence},
+        elements=[(element, _relations(case, element)) for element in case.elements],
+        files={evidence.id: evidence for evidence in case.evidence},
         states=_STATES, meaning=_MEANING, site=SITE, file=FILE,
         digest=hashlib.sha256(data).hexdigest(),
     )  # fmt: skip
@@ -58,11 +58,11 @@ def _drawn(case: SafetyCase, goal: Element, label: str, *, deep: bool = True) ->
     return drawing(layout(case, goal.id, deep=deep), f"Argument: {label}")
 
 
-def _relations(case: SafetyCase, one: Element) -> list[tuple[str, list[str]]]:
+def _relations(case: SafetyCase, element: Element) -> list[tuple[str, list[str]]]:
     """Return what an element is related to: how, and the ids of the others."""
     found = (
         (words, [each.target for each in case.relations
-                 if (each.source, each.kind) == (one.id, kind)])
+                 if (each.source, each.kind) == (element.id, kind)])
         for kind, words in _RELATIONS.items()
     )  # fmt: skip
     return [(words, names) for words, names in found if names]

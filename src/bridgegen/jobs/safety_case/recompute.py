@@ -86,13 +86,16 @@ def recompute(what: str, of: str, run: dict[str, Any], folder: Path, confidence:
     sql = sqlite3.connect(f"{(folder / 'run.sqlite').absolute().as_uri()}?mode=ro", uri=True)
     about = {key: json.loads(text) for key, text in sql.execute("SELECT * FROM run")}
     info = sql.execute("PRAGMA table_info(evaluations)")
-    names = ['"' + one[1].replace('"', '""') + '"' for one in info]
+    names = ['"' + item[1].replace('"', '""') + '"' for item in info]
     start = 4 + len(about["parameters"])  # after id, batch, seconds and u
     column = dict(zip(about["metrics"], names[start:], strict=False))
     column["harm"] = column["harm" if run["count"] == "ego" else "harm_any"]
     bad = HARMFUL.format(**column) + " AND critical" * bool(about["settings"].get("cause"))
     triage = json.loads((folder / "triage.json").read_text("utf-8"))
-    modes, counted = triage["modes"], {one["evaluation"]: one for one in triage["neighbourhoods"]}
+    modes, counted = (
+        triage["modes"],
+        {item["evaluation"]: item for item in triage["neighbourhoods"]},
+    )
     mode = modes[int(of) - 1] if of.isdecimal() and 0 < int(of) <= len(modes) else {}
     course = "" if of == "harm" else f" AND {column['harm']} >= 0.1"  # on a collision course
     place = column | {
@@ -116,8 +119,10 @@ def recompute(what: str, of: str, run: dict[str, Any], folder: Path, confidence:
         chosen = combinations(zip(*in_bins, strict=True), 1 if what == "bins_evaluated" else 2)
         return sum(len({*zip(*some, strict=True)}) for some in chosen)
     if what in ("ran", "confirmed"):
-        there = [one["there"] for one in json.loads((folder / of).read_text("utf-8"))["scenarios"]]
-        return sum(one is not None and (what == "ran" or one["critical"]) for one in there)
+        there = [
+            load["there"] for load in json.loads((folder / of).read_text("utf-8"))["scenarios"]
+        ]
+        return sum(item is not None and (what == "ran" or item["critical"]) for item in there)
     if what in ("title", "count", "simplest"):
         return mode["minimal"]["sentence"] if what == "simplest" else mode[what]
     if what in ("neighbours", "still_harmful"):
@@ -125,13 +130,13 @@ def recompute(what: str, of: str, run: dict[str, Any], folder: Path, confidence:
     if what == "modes":
         return len(modes) + triage["unrecorded_modes"]
     if what == "robust_modes":  # half of the neighbours are harmful, or none were simulated
-        around = [counted.get(one["shown"], {"rows": 0, "harmful": 0}) for one in modes]
-        return sum(2 * one["harmful"] >= one["rows"] for one in around)
+        around = [counted.get(item["shown"], {"rows": 0, "harmful": 0}) for item in modes]
+        return sum(2 * item["harmful"] >= item["rows"] for item in around)
     if run["drawn"] == "fresh":
-        harm = [one for one in triage["fresh"]["harm"] if one is not None]
-        drawn, n, k = len(triage["fresh"]["harm"]), len(harm), sum(one >= 0.3 for one in harm)
+        harm = [item for item in triage["fresh"]["harm"] if item is not None]
+        drawn, n, k = len(triage["fresh"]["harm"]), len(harm), sum(item >= 0.3 for item in harm)
     else:
-        drawn, n, k = (ask(f"count(*) FROM evaluations WHERE {one}") for one in ("1", FIT, bad))
+        drawn, n, k = (ask(f"count(*) FROM evaluations WHERE {item}") for item in ("1", FIT, bad))
     if what == "failures":  # those of the search, and of the draws besides
         return ask(f"count(*) FROM evaluations WHERE {bad}") + k * (run["drawn"] == "fresh")
     if what in ("share_low", "share_high"):
@@ -141,10 +146,10 @@ def recompute(what: str, of: str, run: dict[str, Any], folder: Path, confidence:
 
 def status(name: str, case: dict[str, Any], numbers: dict[str, Any]) -> set[str]:
     """Return the status of a goal as numbers and goals below make it; of a strategy, of its."""
-    element = next(one for one in case["elements"] if one["id"] == name)
-    at = [(one["kind"], one["source"], one["target"]) for one in case["relations"]]
-    below = [end for kind, one, end in at if kind == "SupportedBy" and one == name]
-    found = {each for one in below for each in status(one, case, numbers)}
+    element = next(item for item in case["elements"] if item["id"] == name)
+    at = [(item["kind"], item["source"], item["target"]) for item in case["relations"]]
+    below = [end for kind, item, end in at if kind == "SupportedBy" and item == name]
+    found = {each for item in below for each in status(item, case, numbers)}
     if element["kind"] not in ("Goal", "CounterGoal"):
         return found
     if element["undeveloped"]:
@@ -160,36 +165,36 @@ def status(name: str, case: dict[str, Any], numbers: dict[str, Any]) -> set[str]
 def check(base: Path) -> Iterator[tuple[str, Any, Any, bool | None]]:
     """Yield each claim, what the case states, what is found, and whether they agree."""
     case = json.loads((base / "safety-case.json").read_text("utf-8"))
-    for one in case["evidence"]:
-        digest = hashlib.sha256((base / one["file"]).read_bytes()).hexdigest()
-        yield f"SHA-256 {one['file']}", one["sha256"][:16], digest[:16], digest == one["sha256"]
-    runs, numbers, texts = {one["id"]: one for one in case["runs"]}, {}, {}
-    known = {one["id"] for one in case["numbers"]}
-    for one in case["numbers"]:
-        name, stated, form = one["id"], one["value"], one["form"]
+    for item in case["evidence"]:
+        digest = hashlib.sha256((base / item["file"]).read_bytes()).hexdigest()
+        yield f"SHA-256 {item['file']}", item["sha256"][:16], digest[:16], digest == item["sha256"]
+    runs, numbers, texts = {item["id"]: item for item in case["runs"]}, {}, {}
+    known = {item["id"] for item in case["numbers"]}
+    for item in case["numbers"]:
+        name, stated, form = item["id"], item["value"], item["form"]
         owner, _, rest = name.partition(".")
         what, found = rest.partition(":")[0].rstrip("0123456789"), stated
         if name == "all.joint":  # Bonferroni's inequality
-            bounds = sum(f"{one}.share" in known for one in runs)
+            bounds = sum(f"{run}.share" in known for run in runs)
             found = max(0.0, round(1 - bounds * (1 - case["confidence"]), 12))
         elif not what.endswith("_feasible"):  # which bins are feasible, the scenario says
             place = base / runs[owner]["folder"]
-            found = recompute(what, one["of"], runs[owner], place, case["confidence"])
+            found = recompute(what, item["of"], runs[owner], place, case["confidence"])
         near = isinstance(found, float) and math.isclose(found, stated, rel_tol=1e-9, abs_tol=1e-12)
-        same = (near or found == stated) and one["text"] == written(stated, form)
-        numbers[name], texts[name] = found, one["text"]
+        same = (near or found == stated) and item["text"] == written(stated, form)
+        numbers[name], texts[name] = found, item["text"]
         if what.endswith("_feasible"):
-            yield name, one["text"], f"not recomputable; again: {one['again']}", None
+            yield name, item["text"], f"not recomputable; again: {item['again']}", None
         else:
-            yield name, one["text"], written(found, form), same
-    for one in case["elements"]:
-        for said in (one["statement"], *one["details"]):
+            yield name, item["text"], written(found, form), same
+    for item in case["elements"]:
+        for said in (item["statement"], *item["details"]):
             made = re.sub(r"\{([\w.:-]+)\}", lambda m: texts.get(m[1], m[0]), said["template"])
             if said["template"] and made != said["text"]:
-                yield f"text of {one['id']}", said["text"], made, False
-        if one["status"]:
-            (word,) = status(one["id"], case, numbers)
-            yield f"status of {one['id']}", one["status"], word, one["status"] == word
+                yield f"text of {item['id']}", said["text"], made, False
+        if item["status"]:
+            (word,) = status(item["id"], case, numbers)
+            yield f"status of {item['id']}", item["status"], word, item["status"] == word
 
 
 def main() -> int:

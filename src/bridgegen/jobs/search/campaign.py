@@ -200,7 +200,7 @@ def run_search(given: SearchArguments) -> Run:
             junction=_junction(given, roads),
             adversary=driven,
             optimised=chosen.to_dict(),
-            criteria=[one.to_dict() for one in pipeline.monitor],
+            criteria=[criterion.to_dict() for criterion in pipeline.monitor],
         )
         searcher = searcher_of(pipeline, made_with, callbacks.warning)  # it may refuse
         with Store.create(
@@ -349,7 +349,7 @@ def _finish(
     )
     callbacks.stage("report")
     run = Run.of(store, rows)
-    there = np.flatnonzero(np.isin(best, [one.evaluation for one in exported]))
+    there = np.flatnonzero(np.isin(best, [item.evaluation for item in exported]))
     write_run_report(pipeline, run, rows, exported, replays.take(there) if replays else None)
     return run
 

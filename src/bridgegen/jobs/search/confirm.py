@@ -114,7 +114,7 @@ def confirm(
             f"{place}: was searched in the simulator {simulator.name}; confirm it in another one "
             "(--simulator)"
         )
-    names = {one.evaluation: one.name for one in run.exported(len(every))}
+    names = {exported.evaluation: exported.name for exported in run.exported(len(every))}
     asked = _chosen(place, every, names, rows, settings.budget)
     command = f"confirm --simulator {simulator.name}"
     here = pipeline_of(run, command, ego=ego)
@@ -131,8 +131,8 @@ def confirm(
         growing.write()  # fails before anything is run, if the folder cannot be written
         stage("confirm")
         try:
-            for one in run_elsewhere(here, there, every, todo):
-                growing.add(one)
+            for scenario in run_elsewhere(here, there, every, todo):
+                growing.add(scenario)
                 if progress:
                     progress(growing.tally.total(), len(todo), growing.tally)
         except KeyboardInterrupt:
@@ -194,10 +194,10 @@ class _GrowingRecord:
         self._robustness = robustness
         self._written = 0.0
 
-    def add(self, one: Scenario) -> None:
+    def add(self, scenario: Scenario) -> None:
         """Add a scenario's result; write it within ``SECONDS``."""
-        self._found[one.evaluation] = one
-        self.tally[one.confirmed] += 1
+        self._found[scenario.evaluation] = scenario
+        self.tally[scenario.confirmed] += 1
         if time.monotonic() - self._written >= SECONDS:
             self.write()
 
@@ -214,8 +214,8 @@ class _GrowingRecord:
         """Write all, most critical first."""
         order = sorted(self._found, key=lambda k: self._merit.get(k, len(self._merit)))
         scenarios = [
-            one if place < MOST_TRACKS else one.model_copy(update={"tracks": ()})
-            for place, one in enumerate(self.of(order))
+            scenario if place < MOST_TRACKS else scenario.model_copy(update={"tracks": ()})
+            for place, scenario in enumerate(self.of(order))
         ]
         record = self._empty.model_copy(update={"scenarios": tuple(scenarios)})
         write_record(self._folder, record)
@@ -235,7 +235,7 @@ def _chosen(
         if outside := [k for k in names if not 0 <= k < len(every) or every.status[k] != 0]:
             raise InputError(f"{folder}: has no result of evaluation {outside[0] + 1}")
         return list(names)
-    order = sorted(_merit(every).items(), key=lambda one: one[1])
+    order = sorted(_merit(every).items(), key=lambda pair: pair[1])
     finish = f"'bridgegen resume {folder}'"
     if not order:
         more = "search with a larger --budget, another --seed or another --algorithm"
@@ -265,7 +265,9 @@ def _robustness(folder: Path, every: Rows) -> dict[int, float | None]:
     found = read_triage(folder / TRIAGE_FILE)
     if found is None or found.results != every.digest():
         return {}
-    return {one.evaluation: one.robustness for one in found.neighbourhoods}
+    return {
+        neighbourhood.evaluation: neighbourhood.robustness for neighbourhood in found.neighbourhoods
+    }
 
 
 def _known(folder: Path, empty: Record, every: Rows) -> dict[int, Scenario]:
@@ -287,7 +289,7 @@ def _known(folder: Path, empty: Record, every: Rows) -> dict[int, Scenario]:
                 f"{path}: its {'simulator' if name == 'label' else name} is {was}, and now would "
                 f"be {would}; confirm all of it with --again"
             )
-    return {one.evaluation: one for one in earlier.scenarios}
+    return {scenario.evaluation: scenario for scenario in earlier.scenarios}
 
 
 def _stopped(folder: Path, simulator: str, rows: int | None, done: int, total: int) -> Interrupted:

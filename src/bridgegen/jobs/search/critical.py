@@ -148,7 +148,7 @@ def _write_refused(refused: list[Refused], path: Path) -> None:
     if not refused:
         path.unlink(missing_ok=True)
         return
-    text = json.dumps([asdict(one) for one in refused], indent=2, ensure_ascii=False)
+    text = json.dumps([asdict(item) for item in refused], indent=2, ensure_ascii=False)
     path.write_text(f"{text}\n", encoding="utf-8")
 
 
@@ -164,7 +164,7 @@ def _triaged(
     name: str, quick: Cause, tested: Neighbourhood | None, triage: Triage | None
 ) -> dict[str, object]:
     """Return the triage's findings on an exported scenario, as JSON's types."""
-    modes = [one.number for one in (triage.modes if triage else ()) if name in one.exports]
+    modes = [mode.number for mode in (triage.modes if triage else ()) if name in mode.exports]
     cause = tested.cause if tested is not None and tested.cause else quick.label
     return {
         "cause": cause or None,
@@ -189,7 +189,7 @@ def _write_minimal(
         "mode": mode.number,
         "title": mode.title,
         "sentence": minimal.sentence,
-        "conditions": [one.model_dump() for one in minimal.conditions],
+        "conditions": [condition.model_dump() for condition in minimal.conditions],
         "inside": minimal.inside.model_dump(),
         "noise_key": minimal.noise_key,
         "robustness": minimal.robustness,

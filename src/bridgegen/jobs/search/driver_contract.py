@@ -105,11 +105,11 @@ def check_driver(
         pipeline.warm_up()
         rng = np.random.default_rng(0)
         X = pipeline.space.decode(rng.random((ROWS, pipeline.space.n_var)))
-        for one in _in_one(name, pipeline, X, rng):
+        for check in _in_one(name, pipeline, X, rng):
             if not done:
                 yield Check(spec, "it is", figure=described(spec, pipeline))
-            done.append(one)
-            yield one
+            done.append(check)
+            yield check
     yield from _in_short(done)
 
 
@@ -136,17 +136,22 @@ def described(spec: str, pipeline: Pipeline) -> str:
         every = traits.steps(step)
         asked = f"asked every {every * step:.4g} s ({every} time steps of {step:g} s)"
     wants = f"wants {', '.join(traits.wants)}" if traits.wants else "wants nothing beyond the usual"
-    answers = " and ".join({"control": "controls", "trajectory": "trajectories"}[one] for one in
-                           sorted(own.process.answers)) or "nothing valid"  # fmt: skip
+    answers = (
+        " and ".join(
+            {"control": "controls", "trajectory": "trajectories"}[answer]
+            for answer in sorted(own.process.answers)
+        )
+        or "nothing valid"
+    )
     return f"{kind}; {asked}; {wants}; answers {answers}"
 
 
 def _in_short(done: Sequence[Check]) -> Iterator[Check]:
     """Yield what the rules come to, over all scenarios."""
     for word, rules in IN_SHORT.items():
-        tried = [one for one in done if one.rule in rules]
-        where = dict.fromkeys(one.scenario for one in tried if one.problem)
-        complete = len(tried) == len(rules) * len({one.scenario for one in done})
+        tried = [check for check in done if check.rule in rules]
+        where = dict.fromkeys(check.scenario for check in tried if check.problem)
+        complete = len(tried) == len(rules) * len({check.scenario for check in done})
         answer = "yes" if complete else "not known"
         if where:
             answer = f"no, see {', '.join(where)}"
@@ -221,28 +226,28 @@ def _failures(pipeline: Pipeline, X: Float, rollout: Rollout) -> str:
     )
 
 
-def _difference(one: Rollout, other: Rollout, rows: Int) -> str:
+def _difference(rollout: Rollout, other: Rollout, rows: Int) -> str:
     """Return the first difference in time between two rollouts in words, or nothing.
 
     Args:
-        one: of N rows.
+        rollout: of N rows.
         other: of the same rows.
         rows: ``(N,)`` their numbers.
     """
     found = []
     for rank, name in enumerate(_STATES):
-        apart = np.argwhere(getattr(one, name) != getattr(other, name))
+        apart = np.argwhere(getattr(rollout, name) != getattr(other, name))
         if len(apart):
             i, entity, k = apart[np.lexsort((apart[:, 1], apart[:, 0], apart[:, 2]))[0]].tolist()
             found.append((k, i, rank, entity, name))
     if not found:
-        ends = np.flatnonzero((one.n_steps != other.n_steps) | (one.status != other.status))
+        ends = np.flatnonzero((rollout.n_steps != other.n_steps) | (rollout.status != other.status))
         return f"row {rows[ends[0]]} ends in another way" if len(ends) else ""
     k, i, _, entity, name = min(found)
-    before, after = (float(getattr(made, name)[i, entity, k]) for made in (one, other))
+    before, after = (float(getattr(made, name)[i, entity, k]) for made in (rollout, other))
     problem = (
-        f"row {rows[i]} differs first at {k * one.time_step:g} s: {_STATES[name]} of "
-        f"'{one.names[entity]}' = {before:.17g}, and then {after:.17g}"
+        f"row {rows[i]} differs first at {k * rollout.time_step:g} s: {_STATES[name]} of "
+        f"'{rollout.names[entity]}' = {before:.17g}, and then {after:.17g}"
     )
     rounded = abs(before - after) <= ROUNDING * max(abs(before), abs(after), 1.0)
     return f"{problem}; {FIXED_BATCH}" if rounded else problem

@@ -69,8 +69,8 @@ def run_elsewhere(
         every: all rows of the run.
         evaluations: some of these, which succeeded.
     """
-    for at, one in here.runner.by_variant(every.X[list(evaluations)]):
-        yield from _run_some(here, one, there, every, [evaluations[row] for row in at.tolist()])
+    for at, runner in here.runner.by_variant(every.X[list(evaluations)]):
+        yield from _run_some(here, runner, there, every, [evaluations[row] for row in at.tolist()])
 
 
 def _run_some(
@@ -103,14 +103,14 @@ def _elsewhere(there: Pipeline, X: Float, count: Count) -> Iterator[_Ran | str]:
         for x in X:  # isolate the row that fails
             yield from _elsewhere(there, x[np.newaxis], count)
         return
-    for one in found:
-        if isinstance(one, Lost):
-            yield f"{STATUS_MESSAGES[WORKER_ENDED]}: {one.reason}"
+    for rollout in found:
+        if isinstance(rollout, Lost):
+            yield f"{STATUS_MESSAGES[WORKER_ENDED]}: {rollout.reason}"
             continue
-        metrics = there.measure(one)
-        findings = _findings(one, count)
-        for row in range(one.shape[0]):
-            yield _Ran(one, row, metrics[row], findings)
+        metrics = there.measure(rollout)
+        findings = _findings(rollout, count)
+        for row in range(rollout.shape[0]):
+            yield _Ran(rollout, row, metrics[row], findings)
 
 
 def _findings(rollout: Rollout, count: Count) -> Findings:
@@ -133,8 +133,8 @@ def _scenario(
     found = compare(motion, ran.rollout, row, ran.row, partner)
     both = (known, _outcome(here, ran.metrics, F[0], ran.findings.row(ran.row)))
     ours, theirs = (
-        one.model_copy(update={"contact": contact, "ends": ends})
-        for one, contact, ends in zip(both, found.contacts, found.ends, strict=True)
+        outcome.model_copy(update={"contact": contact, "ends": ends})
+        for outcome, contact, ends in zip(both, found.contacts, found.ends, strict=True)
     )
     differences = Differences.of(found)
     return Scenario(
@@ -145,7 +145,7 @@ def _scenario(
         there=theirs,
         change=Change.between(ours, theirs),
         differences=differences,
-        tracks=tuple(Course.of(one) for one in tracks(motion, ran.rollout, row, ran.row)),
+        tracks=tuple(Course.of(track) for track in tracks(motion, ran.rollout, row, ran.row)),
         explanation=explanation(ours, theirs, differences, objective.thresholds, objective.rule),
     )
 
@@ -165,7 +165,7 @@ def _outcome(
         n_collision=n_collision,
         d_min=d_min,
         v_d=v_d,
-        F=tuple(number(one) for one in F),
+        F=tuple(number(item) for item in F),
         **measured,
         **{name: finding[name] or "" for name in FOUND},
         margins={
@@ -185,4 +185,4 @@ def _failure(ran: _Ran) -> str:
 
 def _legal(text: str) -> str:
     """Return another program's text without control characters."""
-    return "".join(one if one.isprintable() else " " for one in text).strip()
+    return "".join(name if name.isprintable() else " " for name in text).strip()

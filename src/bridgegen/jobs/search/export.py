@@ -163,13 +163,13 @@ def _export(path: Path, flavour: Flavour, folder: Path, town: str | None) -> lis
     made, maps = flavour(scenario, path), []
     if scenario.road_network.logic_file is not None and town is None:
         maps = [logic_path(scenario, path)]
-    made = _moved(made, path, [one.name for one in maps], folder)
+    made = _moved(made, path, [item.name for item in maps], folder)
     if town is not None:
         made = replace(made, road_network=osc.RoadNetwork(osc.File(town)))
     if flavour is _carla and made.road_network.logic_file is None:
         raise InputError(f"{path}: a map, or a town, must be named for ScenarioRunner")
     files = {folder / path.name: to_xml(made)} | {
-        folder / one.name: read_bytes(one) for one in maps
+        folder / item.name: read_bytes(item) for item in maps
     }
     _write(files, folder, (path, *maps))
     return list(files)
@@ -180,7 +180,7 @@ def _write(files: Mapping[Path, bytes], folder: Path, sources: Sequence[Path]) -
     try:
         folder.mkdir(parents=True, exist_ok=True)
         for target in files:
-            if target.exists() and any(target.samefile(one) for one in sources):
+            if target.exists() and any(target.samefile(source) for source in sources):
                 raise StorageError(f"{target}: is what is exported, and is not overwritten")
         for target, data in files.items():
             target.write_bytes(data)

@@ -45,9 +45,9 @@ def corners(pipeline: Pipeline) -> tuple[Float, tuple[str, ...]]:
         words += ["with all parameters at their lowest", "with all parameters at their highest"]
         for i, name in enumerate(space.variables[:MOST_CORNERS]):
             for value, which in ((0.0, "lowest"), (1.0, "highest")):
-                one = u.copy()
-                one[i] = value
-                cube.append(one)
+                item = u.copy()
+                item[i] = value
+                cube.append(item)
                 words.append(f"with {name} at its {which}")
         rows += list(space.decode(np.array(cube)))
     return np.array(rows), tuple(words)
@@ -70,8 +70,8 @@ def require_exportable(pipeline: Pipeline, checked: int = CHECKED) -> None:
     if pipeline.runner.simulator is not pipeline.runner.embedded or pipeline.driver.is_own:
         return  # other simulators and drivers take seconds a row
     status = np.empty(len(X), np.int8)
-    for at, one in pipeline.runner.by_variant(X):
-        status[at] = one.run(X[at]).status
+    for at, runner in pipeline.runner.by_variant(X):
+        status[at] = runner.run(X[at]).status
     if status[0] in FAULTS_OF_THE_SCENARIO:
         raise InputError(f"{pipeline.scenario.place}: {words[0]}: {STATUS_MESSAGES[status[0]]}")
 

@@ -101,8 +101,8 @@ class Model:
         self.scenario, self.driver = pipeline.scenario.name, pipeline.driver.label
         declared = self._space.parameters
         self.parameters: Mapping[str, tuple[float, float, float, str]] = {
-            name: (one.low, one.high, self._space.defaults[name], one.unit)
-            for name, one in ((name, declared[name]) for name in self._space.variables)
+            name: (parameter.low, parameter.high, self._space.defaults[name], parameter.unit)
+            for name, parameter in ((name, declared[name]) for name in self._space.variables)
         }
         odd = outside(pipeline.runner)
         self.notes = (*pipeline.scenario.notes, *pipeline.runner.notes, *([odd] if odd else []))
@@ -158,9 +158,9 @@ class Model:
         table: dict[str, object] = dict(self._pipeline.runner.columns(rows))
         table |= dict(zip(self._pipeline.metrics, found.metrics.T, strict=True))
         table["critical"] = found.critical
-        for name, one in found.findings.columns().items():
+        for name, column in found.findings.columns().items():
             if name != "happened":
-                table[name] = np.array([text or None for text in one.tolist()], dtype=object)
+                table[name] = np.array([text or None for text in column.tolist()], dtype=object)
         problems = np.full(len(rows), None, dtype=object)
         for k in np.flatnonzero(found.status).tolist():
             words = (STATUS_MESSAGES[int(found.status[k])], found.messages.get(k, ""))
@@ -185,7 +185,7 @@ class Model:
             row = self._rows(x[np.newaxis])[0]
         else:  # a row of what ``evaluate`` returns has results, too
             row = self._rows(
-                {str(name): [one] for name, one in x.items() if not self._is_result(str(name))}
+                {str(name): [value] for name, value in x.items() if not self._is_result(str(name))}
             )[0]
         runner = self._pipeline.runner
         rollout = self._pipeline.rollout(row[np.newaxis])
@@ -197,7 +197,7 @@ class Model:
 
     def _is_result(self, name: str) -> bool:
         """Whether ``evaluate`` adds a column, which is no parameter."""
-        findings = (one.name for one in fields(Findings))
+        findings = (item.name for item in fields(Findings))
         return name not in self.columns and name in {
             *self._pipeline.metrics, *findings, "critical", "problem"
         }  # fmt: skip
@@ -218,13 +218,15 @@ class Model:
                 )
             rows = np.ascontiguousarray(X, dtype=np.float64)
         else:
-            columns = {str(name): self._numbers(str(name), one) for name, one in X.items()}
-            counts = {len(one) for one in columns.values()}
+            columns = {str(name): self._numbers(str(name), series) for name, series in X.items()}
+            counts = {len(column) for column in columns.values()}
             if len(counts) > 1:
                 raise InputError(f"all columns must be as long, got {sorted(counts)} values")
             rows = space.rows(columns, counts.pop() if counts else 1)
         if broken := space.violations(rows):
-            some = [f"row {one.row}: {one.reason}" for one in broken[:MOST_PROBLEMS]]
+            some = [
+                f"row {violation.row}: {violation.reason}" for violation in broken[:MOST_PROBLEMS]
+            ]
             more = len(broken) - len(some)
             raise ScenarioError(*some, *([f"and {more} more"] if more else []))
         return rows
@@ -233,8 +235,8 @@ class Model:
         """Return a column's values as numbers within the parameter's range."""
         self._space.index(name)
         parameter, given = self._space.parameters.get(name), list(values)
-        if parameter is not None and any(isinstance(one, str) for one in given):
-            given = [parameter.read(one) for one in given]
+        if parameter is not None and any(isinstance(item, str) for item in given):
+            given = [parameter.read(item) for item in given]
         try:
             found = np.asarray(given, dtype=np.float64)
         except (TypeError, ValueError):

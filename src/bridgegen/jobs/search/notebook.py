@@ -97,8 +97,10 @@ def _needed(run: "Run") -> list[str]:
     """Return the parameters that the worst failure mode needs, most important first."""
     if not run.modes:
         return []
-    worst = max(run.modes, key=lambda one: (one.severity, one.harm))
-    return [] if worst.minimal is None else [one.name for one in worst.minimal.conditions]
+    worst = max(run.modes, key=lambda mode: (mode.severity, mode.harm))
+    return (
+        [] if worst.minimal is None else [condition.name for condition in worst.minimal.conditions]
+    )
 
 
 def _telling(X: Float, critical: Bool, needed: Sequence[int]) -> tuple[int, int]:
@@ -170,7 +172,7 @@ def run_html(run: "Run") -> str:
         parts.append(f"<p><b>{html.escape(text)}</b></p>")
     if found is not None:
         parts.append(f"<p>{html.escape(headline(found))}</p>")
-        modes = [f"<li>{html.escape(shortly(one))}</li>" for one in found.modes[:10]]
+        modes = [f"<li>{html.escape(shortly(mode))}</li>" for mode in found.modes[:10]]
         parts.append(f"<ul>{''.join(modes)}</ul>" if modes else "")
     data = base64.b64encode(draw(run)._repr_png_()).decode()
     parts.append(f'<img alt="The run in figures" src="data:image/png;base64,{data}">')
@@ -196,7 +198,7 @@ def player(rollout: Rollout) -> str:
         [
             None
             if present is not None and not present[i, k]
-            else [round(float(one[0, i, k]), 3) for one in (rollout.x, rollout.y, rollout.h)]
+            else [round(float(array[0, i, k]), 3) for array in (rollout.x, rollout.y, rollout.h)]
             for i in range(len(names))
         ]
         for k in steps.tolist()

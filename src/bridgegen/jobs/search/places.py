@@ -81,9 +81,9 @@ def places_of(
         if wanted in ("merge", "road"):
             every = candidates(scenario, model, path.name)
             known = {sites[0].place_id: sites for sites in every}
-        for i, one in enumerate(found):
-            rotations, placed, lacks = _fit(one, scenario, model, data, path, known.get(one.id))
-            found[i] = replace(one, rotations=rotations, placed=placed, lacks=lacks)
+        for i, fit in enumerate(found):
+            rotations, placed, lacks = _fit(fit, scenario, model, data, path, known.get(fit.id))
+            found[i] = replace(fit, rotations=rotations, placed=placed, lacks=lacks)
     return found, model, warnings
 
 

@@ -138,7 +138,7 @@ def regions_of(
     return RunRegions(
         place, space, found, record,
         files=tuple(files),
-        unstated=tuple(one for one in found.confirmed if one not in stated),
+        unstated=tuple(region for region in found.confirmed if region not in stated),
     )  # fmt: skip
 
 
@@ -153,10 +153,10 @@ def _add_exposure(record: dict[str, Any], found: Found, X: Float, space: SearchS
     """
     columns = X[:, [space.index(name) for name in space.variables]]
     anywhere = np.zeros(len(X), np.bool_)
-    for told, one in zip(record["regions"], found.regions, strict=True):
-        inside = one.box.holds(columns)
+    for told, region in zip(record["regions"], found.regions, strict=True):
+        inside = region.box.holds(columns)
         told["exposure"] = _share_of(inside)
-        anywhere |= inside & one.confirmed
+        anywhere |= inside & region.confirmed
     record["exposure_share"] = _share_of(anywhere)
 
 
@@ -175,9 +175,9 @@ def _state(pipeline: Pipeline, found: Found, path: Path, origin: str) -> list[Re
         {} if individuals is None else carriers(individuals, space.values(x), space.parameters)
     )
     stated = {
-        number: one
-        for number, one in enumerate(found.confirmed, start=1)
-        if individuals is not None and statable(one, space, carried)
+        number: region
+        for number, region in enumerate(found.confirmed, start=1)
+        if individuals is not None and statable(region, space, carried)
     }
     if stated:
         driver = pipeline.driver.label

@@ -61,7 +61,7 @@ def write_run_report(
         StorageError: the page cannot be written.
         FileFormatError: the regions' file, or a confirmation's, is damaged, or another run's.
     """
-    names = [*(name for one in exported for name in one.files), *further_files(run.folder)]
+    names = [*(name for item in exported for name in item.files), *further_files(run.folder)]
     files = {name: read_inside(run.folder, name) for name in names}
     data = run_data(pipeline, run, rows, exported, files=files, more=True, replays=replays)
     write_report(run.report, data)
@@ -102,7 +102,7 @@ def run_data(
     triage = _triage(folder, results)
     return build_report(
         pipeline, rows, run.summary,
-        kept=[(one.name, one.evaluation, one.files) for one in exported], replays=replays,
+        kept=[(item.name, item.evaluation, item.files) for item in exported], replays=replays,
         algorithm=settings.algorithm, seed=settings.seed, budget=settings.budget,
         command=settings.command(folder), finished=run.finished,
         version=run.version, notes=run.notes, view=view_command(folder),
@@ -117,7 +117,9 @@ def run_data(
 
 def further_files(folder: Path) -> tuple[str, ...]:
     """Return the files of a run's minimal scenarios and fresh draws, relative to its folder."""
-    found = {one.name for kind in (MINIMAL, FRESH) for one in (folder / FOLDER).glob(f"{kind}*.*")}
+    found = {
+        path.name for kind in (MINIMAL, FRESH) for path in (folder / FOLDER).glob(f"{kind}*.*")
+    }
     stems = sorted({name.partition(".")[0] for name in found})
     names = [f"{stem}.{kind}" for stem in stems for kind in ("owl", "xodr", "xosc", "json")]
     return tuple(f"{FOLDER}/{name}" for name in names if name in found)

@@ -166,7 +166,7 @@ class Run:
 
         It fails by harm, or by a pass criterion. It is not judged before it has ended.
         """
-        if any(one.violated for one in self.criteria):
+        if any(criterion.violated for criterion in self.criteria):
             return "fails"
         if self.triage is None or not self.triage.bound.judged:
             return NOT_JUDGED
@@ -216,11 +216,11 @@ def judged(store: Store, settings: Settings) -> tuple[CriterionSummary, ...]:
     Raises:
         StorageError: the database is damaged.
     """
-    criteria = [read_criterion(one) for one in settings.criteria]
+    criteria = [read_criterion(criterion) for criterion in settings.criteria]
     if not criteria:
         return ()
     of, n = dict(zip(store.metrics, store.columns.metrics, strict=True)), len(store)
-    names = [one.quantity for one in criteria]
+    names = [criterion.quantity for criterion in criteria]
     if missing := sorted({*names} - of.keys()):
         raise StorageError(f"{store.folder}: the margins of {', '.join(missing)} are not recorded")
     margins, at = np.empty((n, len(names))), 0

@@ -107,7 +107,9 @@ def _with_header(
     if header.rev_minor in (0, 1):
         return storyboard
     before = header.properties or osc.Properties()
-    others = tuple(one for one in before.properties if one.name not in (*FINDINGS, SEVERITY))
+    others = tuple(
+        property_ for property_ in before.properties if property_.name not in (*FINDINGS, SEVERITY)
+    )
     added = tuple(osc.Property(name, value) for name, value in stated.items())
     if (*others, *added) == before.properties:
         return storyboard
@@ -131,7 +133,7 @@ def with_vehicle(scenario: osc.OpenScenario, vehicle: str) -> osc.OpenScenario:
     ego = ego_of(scenario)
 
     def changed(before: osc.Properties) -> osc.Properties:
-        others = tuple(one for one in before.properties if one.name != VEHICLE)
+        others = tuple(property_ for property_ in before.properties if property_.name != VEHICLE)
         added = () if vehicle == KINEMATIC else (osc.Property(VEHICLE, vehicle),)
         return replace(before, properties=(*others, *added))
 
@@ -151,17 +153,20 @@ def _with_properties(
         only: the name of the one entity whose controllers are changed; all by default.
     """
 
-    def with_changed(one: osc.ObjectController) -> osc.ObjectController:
-        before = one.controller.properties
+    def with_changed(object_controller: osc.ObjectController) -> osc.ObjectController:
+        before = object_controller.controller.properties
         if before is None or before.get(DRIVER) is None:
-            return one
-        return replace(one, controller=replace(one.controller, properties=changed(before)))
+            return object_controller
+        return replace(
+            object_controller,
+            controller=replace(object_controller.controller, properties=changed(before)),
+        )
 
     objects = tuple(
-        replace(one, object_controllers=tuple(with_changed(c) for c in one.object_controllers))
-        if only in (None, str(one.name))
-        else one
-        for one in scenario.entities.scenario_objects
+        replace(obj, object_controllers=tuple(with_changed(c) for c in obj.object_controllers))
+        if only in (None, str(obj.name))
+        else obj
+        for obj in scenario.entities.scenario_objects
     )
     return replace(scenario, entities=replace(scenario.entities, scenario_objects=objects))
 
@@ -177,7 +182,9 @@ def _with_findings(
         values["has_severity"] = conflict.severity
     terms = {bg(name) for name in (*FINDINGS.values(), "has_severity")}
     others = [
-        one for one in individuals.quads if one.subject != scenario or one.predicate not in terms
+        quad
+        for quad in individuals.quads
+        if quad.subject != scenario or quad.predicate not in terms
     ]
     quads = [ox.Quad(scenario, bg(name), ox.Literal(value)) for name, value in values.items()]
     return Individuals([*others, *quads])

@@ -74,8 +74,8 @@ def margins_of(scenario: str | Path, options: CommonOptions) -> tuple[str, ...]:
         InputError: as the readers say, or two criteria have one id.
     """
     found = load(scenario, options.distribution, options.empty_trigger)
-    given = [read_criterion(one) for one in options.criteria]
-    return tuple(one.quantity for one in joined(found.criteria, given))
+    given = [read_criterion(criterion) for criterion in options.criteria]
+    return tuple(criterion.quantity for criterion in joined(found.criteria, given))
 
 
 def driven_by(scenario: SearchedScenario, others: str | None) -> SearchedScenario:

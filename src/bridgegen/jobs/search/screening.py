@@ -48,9 +48,12 @@ def require_screen(given: SearchOptions, budget: int) -> None:
         raise InputError(*problems)
 
 
-def is_same(one: SimulatorChoice, other: SimulatorChoice) -> bool:
+def is_same(simulator_choice: SimulatorChoice, other: SimulatorChoice) -> bool:
     """Return whether two choices give the same results."""
-    return (one.name, dict(one.settings)) == (other.name, dict(other.settings))
+    return (simulator_choice.name, dict(simulator_choice.settings)) == (
+        other.name,
+        dict(other.settings),
+    )
 
 
 def screen_budget(given: SearchOptions, budget: int) -> int | None:
@@ -106,5 +109,7 @@ def screen_of(pipeline: Pipeline, simulator: SimulatorChoice) -> Pipeline:
     try:
         return pipeline.elsewhere(simulator)
     except InputError as error:
-        problems = [f"the screen {simulator.name} (--screen): {one}" for one in error.problems]
+        problems = [
+            f"the screen {simulator.name} (--screen): {problem}" for problem in error.problems
+        ]
         raise InputError(*problems) from None

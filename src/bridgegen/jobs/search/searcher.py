@@ -59,7 +59,7 @@ def require_asynchronous(given: SearchOptions, algorithm: type[toolkit.Algorithm
     if given.screen is not None:
         raise InputError(f"--ahead is for a search without a screen (--screen), got {given.ahead}")
     if not asynchronous(algorithm):
-        able = ", ".join(name for name, one in toolkit.ALGORITHMS.items() if asynchronous(one))
+        able = ", ".join(name for name, kind in toolkit.ALGORITHMS.items() if asynchronous(kind))
         raise InputError(
             f"--ahead {given.ahead}: {given.algorithm} needs the results of all its rows before it "
             f"asks for more; these algorithms do not: {able}"
@@ -138,7 +138,7 @@ class FailingDriver:
             return
         reasons = Run.of(self._store, self._store.read()).failures
         of_drivers = tuple(STATUS_MESSAGES[status] for status in FAILURES.values())
-        reason, count = next(one for one in reasons.items() if one[0].startswith(of_drivers))
+        reason, count = next(pair for pair in reasons.items() if pair[0].startswith(of_drivers))
         check = f"bridgegen check-driver {shlex.quote(self._driver)}"
         raise InputError(
             f"the driver '{self._driver}' failed in all {self._failed} scenarios that it was to "

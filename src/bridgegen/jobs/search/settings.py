@@ -17,7 +17,9 @@ from bridgegen.scenario.language.objectives import PAPERS
 from bridgegen.simulation.choice import SimulatorChoice, Value
 
 DEFAULTS_BEFORE_FIELD: Mapping[str, Any] = {
-    one.name: one.before for one in options_of(SearchOptions) if one.before is not ALWAYS
+    option.name: option.before
+    for option in options_of(SearchOptions)
+    if option.before is not ALWAYS
 }
 """The values that apply to a run recorded before an option existed."""
 
@@ -62,7 +64,7 @@ class Settings(SearchOptions):
 
     def to_dict(self) -> dict[str, Any]:
         """Return everything as JSON's types."""
-        plain = {one.name: _plain(getattr(self, one.name)) for one in fields(self)}
+        plain = {field.name: _plain(getattr(self, field.name)) for field in fields(self)}
         chosen = {name: plain.pop(name) for name in CHOSEN}
         plain["simulator_settings"] = dict(self.simulator.settings)
         plain["simulator"] = self.simulator.name
@@ -103,7 +105,7 @@ class Settings(SearchOptions):
                 raise InputError(*problems)
         except ValidationError as error:
             first = error.errors(include_input=False, include_url=False)[0]
-            inside = [str(one) for one in first["loc"] if one not in ("float", "str")]
+            inside = [str(number) for number in first["loc"] if number not in ("float", "str")]
             where = ".".join([RECORDED_AS.get(name, name), *inside])
             what = f"{where}: {first['msg']}"
             raise StorageError(f"{place}: the run's settings are damaged: {what}") from None
@@ -122,9 +124,9 @@ class Settings(SearchOptions):
     def command(self, folder: Path) -> str:
         """Return the command line that repeats the run."""
         words = ["bridgegen", "search", self.scenario]
-        for one in options_of(type(self)):
-            if one.name != "ego" or self.ego != STORYBOARD.name:
-                words += one.words(getattr(self, one.name))
+        for option in options_of(type(self)):
+            if option.name != "ego" or self.ego != STORYBOARD.name:
+                words += option.words(getattr(self, option.name))
         return shlex.join([*words, "--out", str(folder)])
 
 
@@ -162,19 +164,19 @@ def _texts(value: Any) -> Iterator[str]:
     if isinstance(value, str):
         yield value
     elif isinstance(value, Mapping):
-        for key, one in value.items():
+        for key, item in value.items():
             yield key
-            yield from _texts(one)
+            yield from _texts(item)
     elif isinstance(value, list):
-        for one in value:
-            yield from _texts(one)
+        for item in value:
+            yield from _texts(item)
 
 
 _STRICT = ConfigDict(strict=True, allow_inf_nan=False)
 _ADAPTERS = {
     name: TypeAdapter(kind, config=_STRICT)
     for name, kind in {
-        **{one.name: get_type_hints(Settings)[one.name] for one in fields(Settings)},
+        **{field.name: get_type_hints(Settings)[field.name] for field in fields(Settings)},
         "simulator": str,
         "simulator_settings": Mapping[str, Value],
         "screen": Mapping[str, str | Mapping[str, Value]] | None,

@@ -102,9 +102,11 @@ def _schema(store: Store, of_run: dict[str, Any], settings: Settings, sample: fl
     import pyarrow as pa
 
     columns, text = store.columns, pa.dictionary(pa.int32(), pa.string())
-    fields = [(name, pa.int64() if isinstance(one, int) else text) for name, one in of_run.items()]
+    fields = [
+        (name, pa.int64() if isinstance(item, int) else text) for name, item in of_run.items()
+    ]
     fields += [("id", pa.int64()), ("batch", pa.int64()), ("seconds", pa.float64())]
-    named = {name for name, one in _labels(store) if "words" in one}
+    named = {name for name, label in _labels(store) if "words" in label}
     fields += [(name, text if name in named else pa.float64()) for name in columns.X]
     fields += [(name, pa.float64()) for name in (*columns.metrics, *columns.F)]
     fields += [("status", pa.int16()), ("critical", pa.bool_())]
@@ -122,7 +124,7 @@ def _schema(store: Store, of_run: dict[str, Any], settings: Settings, sample: fl
 def _labels(store: Store) -> list[tuple[str, dict[str, Any]]]:
     """Return the columns of the parameters that are no plain numbers, and how they are read."""
     columns = dict(zip(store.parameters, store.columns.X, strict=True))
-    return [(columns[name], one) for name, one in store.labels.items()]
+    return [(columns[name], label) for name, label in store.labels.items()]
 
 
 def _worded(store: Store, name: str, values: Float, words: Sequence[str]) -> list[str]:
@@ -152,19 +154,19 @@ def _chances(X: Float) -> Float:
 
 def _columns(store: Store, of_run: dict[str, Any], rows: Rows, weight: Float) -> dict[str, Any]:
     n, columns = len(rows), store.columns
-    found: dict[str, Any] = {name: [one] * n for name, one in of_run.items()}
+    found: dict[str, Any] = {name: [item] * n for name, item in of_run.items()}
     found |= {"id": rows.id, "batch": rows.batch, "seconds": rows.seconds}
     for names, values in ((columns.X, rows.X), (columns.metrics, rows.metrics),
                           (columns.F, rows.F)):  # fmt: skip
         found |= dict(zip(names, values.T, strict=True))
-    for name, one in _labels(store):
-        if words := one.get("words"):
+    for name, label in _labels(store):
+        if words := label.get("words"):
             found[name] = _worded(store, name, found[name], words)
-        elif turn := one.get("turn"):
+        elif turn := label.get("turn"):
             found[name] = np.where(found[name] > turn, found[name] - 360.0, found[name])
     found |= {"status": rows.status.astype(np.int16), "critical": rows.critical}
-    labels = {int(one): Cause(one).label or None for one in np.unique(rows.cause)}
-    found["cause"] = [labels[one] for one in rows.cause.tolist()]
+    labels = {int(item): Cause(item).label or None for item in np.unique(rows.cause)}
+    found["cause"] = [labels[item] for item in rows.cause.tolist()]
     found |= {name: [text or None for text in texts.tolist()]
               for name, texts in rows.findings.columns().items()}  # fmt: skip
     return found | {WEIGHT: weight}

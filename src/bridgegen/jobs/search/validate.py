@@ -89,15 +89,15 @@ def notes_on(path: Path) -> list[str]:
         notes.append(
             f"texts of the template that its author is to replace: {count} (description, source)"
         )
-    return [f"{path}: {one}" for one in (*notes, *_misleading_indicators(scenario.events))]
+    return [f"{path}: {note}" for note in (*notes, *_misleading_indicators(scenario.events))]
 
 
 def _misleading_indicators(events: "Sequence[EventSpec]") -> Iterator[str]:
     """Yield a note for each participant whose indicators contradict its lane changes."""
     from bridgegen.scenario.language.story import Indication, LaneChange
 
-    for actor in dict.fromkeys(one.participant for one in events):
-        actions = [act for one in events if one.participant == actor for act in one.actions]
+    for actor in dict.fromkeys(event.participant for event in events):
+        actions = [act for event in events if event.participant == actor for act in event.actions]
         shown = {act.side for act in actions if isinstance(act, Indication)} & {"left", "right"}
         taken = {
             "left" if act.lanes > 0 else "right" for act in actions if isinstance(act, LaneChange)
@@ -117,9 +117,9 @@ def _ontology(path: Path) -> list[str]:
 
     individuals = load(path)
     if _is_map(individuals) or _is_mined(individuals):
-        return [str(one) for one in check(individuals)]
+        return [str(violation) for violation in check(individuals)]
     individuals.text(individuals.one("Scenario"), "has_name")  # all of ours have one
-    return [str(one) for one in check(individuals, scenario_of(individuals))]
+    return [str(violation) for violation in check(individuals, scenario_of(individuals))]
 
 
 def _is_map(individuals: Individuals) -> bool:

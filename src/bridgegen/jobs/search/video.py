@@ -53,10 +53,10 @@ def film(
             raise InputError(f"{source}: is one scenario: --evaluation is for a run")
         out = out or Path(f"{source.stem}.gif")
         refuse_path(out)
-        one = _of_file(source, ego)
+        playback = _of_file(source, ego)
     else:
-        one, out = _of_run(source, out, evaluation, ego)
-    write_video(one, out, size=size, fps=fps, start=start, end=end)
+        playback, out = _of_run(source, out, evaluation, ego)
+    write_video(playback, out, size=size, fps=fps, start=start, end=end)
     return out
 
 
@@ -83,13 +83,13 @@ def _of_run(
             evaluation = known[0].evaluation + 1
         if failed[evaluation - 1]:
             raise InputError(f"{folder}: evaluation {evaluation} failed: it has no motion")
-        names = {one.evaluation: one.name for one in known}
+        names = {exported.evaluation: exported.name for exported in known}
         name = names.get(evaluation - 1, f"evaluation-{evaluation}")
         out = out or Path(f"{run.folder.resolve().name}-{name}.gif")
         refuse_path(out)
         pipeline = pipeline_of(run, "video", ego=ego)
-        (one,) = playbacks(pipeline, rows, [(name, evaluation - 1, ())], brief=True)
-    return one, out
+        (playback,) = playbacks(pipeline, rows, [(name, evaluation - 1, ())], brief=True)
+    return playback, out
 
 
 def _nothing(folder: Path, names: tuple[str, ...], rows: Recorded) -> str:

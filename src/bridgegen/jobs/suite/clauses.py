@@ -69,12 +69,12 @@ def clause_results(results: Sequence[EntryResult], ego: str) -> tuple[ClauseResu
     """Return the clauses that entries state, judged with one ego, in the order of their ids."""
     of: dict[str, list[tuple[EntryResult, int]]] = {}
     texts: dict[str, str] = {}
-    for one in results:
-        if one.ego != ego:
+    for result in results:
+        if result.ego != ego:
             continue
-        for number, given in enumerate(one.clauses):
+        for number, given in enumerate(result.clauses):
             clause = read_clause(given)
-            of.setdefault(clause.id, []).append((one, number))
+            of.setdefault(clause.id, []).append((result, number))
             texts.setdefault(clause.id, clause.text)
     return tuple(_result(id, texts[id], ego, of[id]) for id in sorted(of, key=_order))
 
@@ -88,10 +88,10 @@ def _order(id: str) -> list[tuple[bool, int, str]]:
 def _result(
     id: str, text: str, ego: str, stated: Sequence[tuple[EntryResult, int]]
 ) -> ClauseResult:
-    letters = [letter for one, number in stated for letter in one.letters(number)]
+    letters = [letter for result, number in stated for letter in result.letters(number)]
     counts = Counter(letters)
     return ClauseResult(
-        id, text, ego, tuple(dict.fromkeys(one.entry for one, _ in stated)),
+        id, text, ego, tuple(dict.fromkeys(result.entry for result, _ in stated)),
         passed=counts[PASSED] + counts[EXCUSED], failed=counts[FAILED],
         not_run=counts[NOT_RUN], not_applicable=counts[NOT_APPLICABLE],
         unpreventable=counts[EXCUSED],
@@ -113,16 +113,16 @@ def judged(
     if not clauses:
         return list(rows)
     found = np.full(len(rows), CellClass.AVOIDED, np.int8)
-    if any(one.collisions for one in clauses):
-        strict = any(one.collisions == "preventable" for one in clauses)
+    if any(clause.collisions for clause in clauses):
+        strict = any(clause.collisions == "preventable" for clause in clauses)
         found = _classes(pipeline, simulator, X, rows, MODELS if strict else ())
-    ids = [one.id for one in pipeline.monitor]
+    ids = [criterion.id for criterion in pipeline.monitor]
     return [
         row.model_copy(
             update={
                 "clauses": "".join(
-                    _letter(row, CellClass(code), one.collisions, one.criteria, ids)
-                    for one in clauses
+                    _letter(row, CellClass(code), clause.collisions, clause.criteria, ids)
+                    for clause in clauses
                 )
             }
         )

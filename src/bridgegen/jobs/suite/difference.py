@@ -70,15 +70,15 @@ class Difference:
     @property
     def counts(self) -> dict[Change, int]:
         """The number of variations of each change."""
-        found = Counter(one.change for one in self.rows)
+        found = Counter(row.change for row in self.rows)
         return {change: found[change] for change in CHANGES}
 
     @cached_property
     def unjudged(self) -> dict[str, str]:
         """By entry why it says nothing, of those of which too few variations can be compared."""
         of: dict[str, list[bool]] = {}
-        for one in self.rows:
-            of.setdefault(one.entry, []).append(one.change != "not comparable")
+        for row in self.rows:
+            of.setdefault(row.entry, []).append(row.change != "not comparable")
         whys = {
             entry: too_few(sum(known), len(known), "variations could be compared")
             if len(known) > 1 or known[0]
@@ -211,7 +211,7 @@ def search_worse(
     if not budget:
         return ()
     first, second = egos
-    runs = {(one.entry, one.ego): one for one in suite.results}
+    runs = {(result.entry, result.ego): result for result in suite.results}
     jobs = [
         job
         for job in suite.jobs
@@ -266,7 +266,7 @@ def _searched(
     if triage is None or triage.bound.harmful != summary.critical:  # critical by another rule
         words = f"{summary.critical} of {summary.evaluations} evaluations are critical"
         sentence = "; ".join(filter(None, (f"{words} with {job.ego} alone", sentence)))
-    modes = tuple(one.title for one in triage.modes) if triage else ()
+    modes = tuple(mode.title for mode in triage.modes) if triage else ()
     return WorseThan(name, folder, summary.evaluations, summary.critical, modes, sentence)
 
 
@@ -299,7 +299,7 @@ class DriverDifference:
     @property
     def work(self) -> str:
         """How much was done."""
-        searched = sum(one.evaluations for one in self.searches)
+        searched = sum(search.evaluations for search in self.searches)
         return f"{self.suite.work}, {searched:,} evaluations of searches"
 
     def to_json(self) -> Any:

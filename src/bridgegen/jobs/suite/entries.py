@@ -60,8 +60,8 @@ class Entry:
                 return load(self.scenario).fingerprint
             if self.criteria or self.count:
                 made.update(json.dumps([self.criteria, self.count], sort_keys=True).encode())
-            for one in filter(None, (self.scenario, self.distribution)):
-                for path in (Path(one), *files_named_in(Path(one))):
+            for name in filter(None, (self.scenario, self.distribution)):
+                for path in (Path(name), *files_named_in(Path(name))):
                     made.update(hashlib.sha256(path.read_bytes()).digest())
         except (BridgeGenError, OSError):
             return ""
@@ -89,8 +89,8 @@ def find_entries(given: Sequence[str | Path]) -> tuple[Entry, ...]:
     """
     problems, found = list[str](), dict[str, Entry]()
     shipped = (*catalogue_names(), *pack_names())
-    for one in given:
-        path = Path(one)
+    for item in given:
+        path = Path(item)
         if path.is_dir():
             for file in _files(path):
                 if (entry := _entry(file)) is not None:
@@ -101,38 +101,38 @@ def find_entries(given: Sequence[str | Path]) -> tuple[Entry, ...]:
                 problems.append(f"{path}: is no scenario and no distribution of one")
             else:
                 found.setdefault(entry.distribution or entry.scenario, entry)
-        elif some := [name for name in shipped if name == str(one) or name.startswith(f"{one}/")]:
+        elif some := [name for name in shipped if name == str(item) or name.startswith(f"{item}/")]:
             for name in some:
                 found.setdefault(name, Entry(name, name))
         else:
-            problems.append(f"{one}: no such file, folder, pack or scenario that ships")
+            problems.append(f"{item}: no such file, folder, pack or scenario that ships")
     if problems:
         raise InputError(*problems)
     if not found:
         raise InputError(f"no scenario in {', '.join(map(str, given))}")
-    varied = {Path(one.scenario).resolve() for one in found.values() if one.distribution}
+    varied = {Path(item.scenario).resolve() for item in found.values() if item.distribution}
     kept = [
-        one
-        for one in found.values()
-        if one.distribution or not Path(one.scenario).is_file()
-        or Path(one.scenario).resolve() not in varied
+        item
+        for item in found.values()
+        if item.distribution or not Path(item.scenario).is_file()
+        or Path(item.scenario).resolve() not in varied
     ]  # fmt: skip
     read = dict[Path, FailureFile]()
-    return _named([indexed(one, read) for one in kept])
+    return _named([indexed(item, read) for item in kept])
 
 
-def indexed(one: Entry, read: dict[Path, FailureFile] | None = None) -> Entry:
+def indexed(entry: Entry, read: dict[Path, FailureFile] | None = None) -> Entry:
     """Return an entry with what the index of its folder states for it.
 
     Raises:
         FileFormatError: the index is damaged.
     """
-    found = failure_of(one.scenario, one.distribution, {} if read is None else read)
+    found = failure_of(entry.scenario, entry.distribution, {} if read is None else read)
     if found is None:
-        return one
+        return entry
     _, failure = found
     count: Literal["any"] | None = "any" if failure.count == "any" else None
-    return replace(one, criteria=tuple(failure.criteria), count=count, is_failure=True)
+    return replace(entry, criteria=tuple(failure.criteria), count=count, is_failure=True)
 
 
 def of_edition(entries: Sequence[Entry], edition: str | None) -> tuple[Entry, ...]:
@@ -144,11 +144,11 @@ def of_edition(entries: Sequence[Entry], edition: str | None) -> tuple[Entry, ..
     if edition in (None, NO_MATRIX):
         return tuple(entries)
     kept, known = list[Entry](), set[str]()
-    for one in entries:
-        editions = _editions(one)
+    for entry in entries:
+        editions = _editions(entry)
         known |= editions
         if not editions or edition in editions:
-            kept.append(one)
+            kept.append(entry)
     if edition not in known:
         some = f"; editions: {', '.join(sorted(known))}" if known else ""
         raise InputError(f"no scenario has a matrix of the edition '{edition}'{some}")
@@ -160,7 +160,7 @@ def _editions(entry: Entry) -> set[str]:
     if entry.scenario.lower().endswith(_STORYBOARD):
         return set()
     try:
-        return {one.edition for one in load(entry.scenario).matrix}
+        return {grid.edition for grid in load(entry.scenario).matrix}
     except BridgeGenError:
         return set()
 
@@ -216,7 +216,7 @@ def _near(path: Path, beside: Path) -> Path:
 
 def _named(entries: list[Entry]) -> tuple[Entry, ...]:
     """Return entries with names of their own: the shortest ends of their paths that are unique."""
-    paths = [Path(one.distribution or one.scenario).with_suffix("") for one in entries]
+    paths = [Path(entry.distribution or entry.scenario).with_suffix("") for entry in entries]
     depth = dict.fromkeys(range(len(paths)), 1)
     names = [path.name for path in paths]
     for _ in range(64):

@@ -171,8 +171,10 @@ def pipeline_of(job: Job) -> Pipeline:
 
 def _further_criteria(job: Job, scenario: SearchedScenario) -> list[Mapping[str, Any]]:
     """Return the criteria of the index whose ids neither the options nor the scenario have."""
-    known = {one.id for one in scenario.criteria} | {one["id"] for one in job.options.criteria}
-    return [one for one in job.entry.criteria if one["id"] not in known]
+    known = {criterion.id for criterion in scenario.criteria} | {
+        criterion["id"] for criterion in job.options.criteria
+    }
+    return [criterion for criterion in job.entry.criteria if criterion["id"] not in known]
 
 
 def rows_of_job(job: Job, pipeline: Pipeline) -> np.ndarray:
@@ -220,11 +222,11 @@ def _evaluated(job: Job, found: EntryResult) -> EntryResult:
     if job.entry.is_failure:  # it is about that conflict: one that stops for it has met it
         happening = replace(happening, stuck=0)
     units = dict(zip(space.names, space.units, strict=True))
-    labels = [one.label for one in given.grids]
+    labels = [grid.label for grid in given.grids]
     if labels:
         rows = [
-            one.model_copy(update={"x": [labels[number], *one.x]})
-            for one, number in zip(rows, given.grid, strict=True)
+            row.model_copy(update={"x": [labels[number], *row.x]})
+            for row, number in zip(rows, given.grid, strict=True)
         ]
     return found.model_copy(
         update={
@@ -234,17 +236,17 @@ def _evaluated(job: Job, found: EntryResult) -> EntryResult:
             "units": [*(["1"] if labels else []), *(units[name] for name in names)],
             "grids": [
                 GridResult(
-                    label=one.label,
-                    edition=one.edition,
-                    score=one.score,
-                    points=one.points,
-                    graded=one.graded,
+                    label=grid.label,
+                    edition=grid.edition,
+                    score=grid.score,
+                    points=grid.points,
+                    graded=grid.graded,
                 )
-                for one in given.grids
+                for grid in given.grids
             ],
             "sampled": bool(space.n_var) and not labels and is_sample(pipeline.scenario),
-            "criteria": [one.to_dict() for one in pipeline.monitor],
-            "clauses": [one.to_dict() for one in pipeline.scenario.clauses],
+            "criteria": [criterion.to_dict() for criterion in pipeline.monitor],
+            "clauses": [clause.to_dict() for clause in pipeline.scenario.clauses],
             "rows": rows,
             "notes": notes,
             "not_happened": list(happening.reasons),
@@ -259,7 +261,7 @@ def _shown(names: Sequence[str], space: SearchSpace) -> list[str]:
     sets = [
         i
         for i, name in enumerate(names)
-        if isinstance(one := space.parameters.get(name), FileParameter) and one.is_set
+        if isinstance(parameter := space.parameters.get(name), FileParameter) and parameter.is_set
     ]
     for k, i in enumerate(sets, start=1):
         made[i] = f"value set {k}" if len(sets) > 1 else "value set"
@@ -275,20 +277,22 @@ def _rows(
     scenario = pipeline.scenario
     of_file = scenario.texts if isinstance(scenario, FileScenario) else {}
     metrics = {name: evaluation.metrics[:, pipeline.metrics.index(name)] for name in QUANTITIES}
-    margins = [evaluation.metrics[:, pipeline.metrics.index(one)] for one in pipeline.monitor.names]
+    margins = [
+        evaluation.metrics[:, pipeline.metrics.index(item)] for item in pipeline.monitor.names
+    ]
     unsafe = is_unsafe_start(evaluation.findings, metrics["harm"])
     rows = []
     for i in range(len(X)):
         x: list[float | str] = []
-        for name, column, one in zip(names, columns, parameters, strict=True):
+        for name, column, parameter in zip(names, columns, parameters, strict=True):
             value = float(X[i, column])
             if name in of_file:  # of a set of values, too, which has no parameter of its own
                 x.append(of_file[name][round(value)])
                 continue
-            if isinstance(one, FileParameter) and one.is_set:
-                x.append(f"{round(value) + 1} of {round(one.high) + 1}")
+            if isinstance(parameter, FileParameter) and parameter.is_set:
+                x.append(f"{round(value) + 1} of {round(parameter.high) + 1}")
                 continue
-            written = value if one is None else one.kind.written(value)
+            written = value if parameter is None else parameter.kind.written(value)
             x.append(written if isinstance(written, str) else float(written))
         if evaluation.status[i]:
             text = STATUS_MESSAGES[int(evaluation.status[i])]
@@ -313,7 +317,7 @@ def _rows(
                 partner=texts["partner"],
                 implausible=texts["implausible"],
                 unsafe_start=bool(unsafe[i]),
-                margins=[float(one[i]) for one in margins],
+                margins=[float(margin[i]) for margin in margins],
             )
         )
     return rows

@@ -75,14 +75,14 @@ def ways(pipeline: Pipeline, X: Float) -> list[Way]:
     places = pipeline.try_all(X).place.tolist()
     causes = [""] * len(X) if found.cause is None else [Cause(k).label for k in found.cause]
     keys = keys_of(found.findings, pipeline.runner.kinds, places, causes)
-    margins = found.metrics[:, [pipeline.metrics.index(one) for one in pipeline.monitor.names]]
+    margins = found.metrics[:, [pipeline.metrics.index(name) for name in pipeline.monitor.names]]
     made = []
     for i, key in enumerate(keys):
         metrics = dict(zip(pipeline.metrics, found.metrics[i].tolist(), strict=True))
         harm = float(np.nan_to_num(metrics[pipeline.objective.harm]))
         violates = tuple(
-            one.to_dict()
-            for one, margin in zip(pipeline.monitor, margins[i], strict=True)
+            criterion.to_dict()
+            for criterion, margin in zip(pipeline.monitor, margins[i], strict=True)
             if margin < 0.0
         )
         problem, rule = "", str(found.findings.rule[i])
@@ -95,7 +95,7 @@ def ways(pipeline: Pipeline, X: Float) -> list[Way]:
                 why = found.findings.implausible[i]
                 problem = f"it is no failure of the ego: harm {harm:.2g} of {NEAR_MISS:g}"
                 problem = f"its traffic is implausible: {why}" if why else problem
-        ids = ", ".join(one["id"] for one in violates)
+        ids = ", ".join(violate["id"] for violate in violates)
         words = f"violates {ids}"
         if key is not NO_KEY:
             words = title(key, [rule], pipeline.objective.count)
@@ -212,7 +212,7 @@ def _of_run(
         criteria=settings.criteria, count=run.triage.count,
         ideal=settings.ideal if ego else (), vehicle=settings.vehicle,
     )  # fmt: skip
-    exported = {one.name: one.evaluation for one in exported_scenarios(folder)}
+    exported = {item.name: item.evaluation for item in exported_scenarios(folder)}
     moded = {name for mode in run.modes for name in mode.exports}
 
     def failing(name: str, found: str) -> Failing:
@@ -234,7 +234,7 @@ def _of_run(
         if name in moded or only not in (None, name):
             continue
         metrics = _recorded(folder, name)
-        violates = any(key.startswith(PREFIX) and one < 0.0 for key, one in metrics.items())
+        violates = any(key.startswith(PREFIX) and metric < 0.0 for key, metric in metrics.items())
         if violates or name == only:
             made = failing(name, f"evaluation {evaluation + 1}")
             yield replace(made, metrics=metrics)
@@ -284,7 +284,7 @@ def _of_mode(
 def _recorded(folder: Path, name: str) -> dict[str, float]:
     """Return the metrics of an exported scenario as the run recorded them, as far as finite."""
     facts = read_facts(folder / FOLDER / f"{name}.json")
-    return {key: one.value for key, one in facts.metrics.items() if one.value is not None}
+    return {key: metric.value for key, metric in facts.metrics.items() if metric.value is not None}
 
 
 # ---- of a suite, and of files ----
@@ -292,19 +292,19 @@ def _recorded(folder: Path, name: str) -> dict[str, float]:
 
 def _of_suite(folder: Path, egos: Sequence[str]) -> Iterator[Failing | NotFailing]:
     suite = read_suite(folder)
-    known = [one for one in suite.egos if one]
+    known = [name for name in suite.egos if name]
     for ego in egos:
         if ego not in known:
             raise UnknownNameError(f"driver of {folder}", ego, known)
-    results = [one for one in suite.results if not egos or one.ego in egos]
+    results = [result for result in suite.results if not egos or result.ego in egos]
     refuse_code(results, egos, f"bridgegen suite add {folder}")
-    for one in results:
-        job = job_of(suite, one)
-        source = f"{folder}, {one.entry}"
-        if one.verdict == "failed" and job.entry.digest != one.digest:
+    for result in results:
+        job = job_of(suite, result)
+        source = f"{folder}, {result.entry}"
+        if result.verdict == "failed" and job.entry.digest != result.digest:
             yield NotFailing(source, "it is not what it was when the suite was run")
-        elif one.verdict == "failed":
-            yield from _of_rows(job, one, source)
+        elif result.verdict == "failed":
+            yield from _of_rows(job, result, source)
 
 
 def _of_rows(job: Job, result: EntryResult, source: str) -> Iterator[Failing | NotFailing]:
@@ -326,7 +326,7 @@ def _of_rows(job: Job, result: EntryResult, source: str) -> Iterator[Failing | N
     order = sorted(range(len(failed)), key=lambda k: (-found[k].harm, failed[k]))
     for k in order:
         way, number = found[k], failed[k] + 1
-        if (same := (way.key, tuple(one["id"] for one in way.violates))) in seen:
+        if (same := (way.key, tuple(violate["id"] for violate in way.violates))) in seen:
             continue
         seen.add(same)
         where = f"{source}, variation {number}" if several else source

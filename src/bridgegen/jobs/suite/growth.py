@@ -40,7 +40,7 @@ MINIMAL = "-minimal"
 """Ending of the name of a minimal form."""
 
 _STAGING = ".adding"
-_CAUSES = tuple(one.label for one in CAUSES)
+_CAUSES = tuple(cause.label for cause in CAUSES)
 
 
 @dataclass(frozen=True)
@@ -77,7 +77,7 @@ def add_failures(
     *,
     egos: Sequence[str] = (),
     replace_worse: bool = False,
-    progress: Callable[[Addition], None] = lambda one: None,
+    progress: Callable[[Addition], None] = lambda item: None,
 ) -> tuple[Addition, ...]:
     """Keep failures in the folder of a suite that grows.
 
@@ -100,11 +100,11 @@ def add_failures(
         raise StorageError(f"{to}: holds results ({held[0]}); choose another folder with --to")
     read_failures(to)  # refuses a damaged one before anything is run
     made = []
-    for one in given:
-        inside = Path(one).resolve()
+    for path in given:
+        inside = Path(path).resolve()
         if inside.exists() and to.resolve() in (inside, inside.parent):
-            raise InputError(f"{one}: is in the suite {to} already")
-        for found in failing_in(one, egos):
+            raise InputError(f"{path}: is in the suite {to} already")
+        for found in failing_in(path, egos):
             made.append(_add(found, to, replace_worse))
             progress(made[-1])
     return tuple(made)
@@ -151,7 +151,7 @@ def _add(found: Failing | NotFailing, to: Path, replace_worse: bool) -> Addition
 
 def identity(scenario: str, key: Key, way: Way) -> str:
     """Return the id of a failure: of its scenario and mode, whatever found it and when."""
-    ids = sorted(str(one["id"]) for one in way.violates)
+    ids = sorted(str(violate["id"]) for violate in way.violates)
     parts = ["violates", *ids] if key == NO_KEY else list(key)
     digest = hashlib.sha256(json.dumps([scenario, *parts]).encode()).hexdigest()[:8]
     what = "-".join(parts[:2]) if key == NO_KEY else key.conflict_type
@@ -196,7 +196,7 @@ def _kept(found: Failing, way: Way, id: str, to: Path) -> tuple[Failure, str, bo
         conflict=key.conflict, type=key.conflict_type,
         responsible=key.responsible, rule=way.rule, partner=key.partner, place=key.place,
         cause=key.cause, minimal=_cut(needs),
-        violates=[CriterionSection.model_validate(one) for one in way.violates],
+        violates=[CriterionSection.model_validate(violated) for violated in way.violates],
         count="any" if found.job.options.count == "any" else "ego", driver=_cut(way.driver),
         found=found.found, seed=found.seed, version=version("bridgegen"), harm=there.harm,
         severity=float(np.nan_to_num(metrics["severity"])), files=files,
@@ -232,7 +232,9 @@ def _put(job: Job, way: Way, folder: Path, name: str) -> Way:
     there = _way(seeking_causes(Job(entry, ego, options, EMBEDDED, 0, 0)))
     if way.key.way != there.key.way:
         raise _Refused(f"it fails otherwise in {folder.parent}: {_other(way.key, there.key)}")
-    missing = {str(one["id"]) for one in way.violates} - {str(one["id"]) for one in there.violates}
+    missing = {str(violate["id"]) for violate in way.violates} - {
+        str(violate["id"]) for violate in there.violates
+    }
     if missing and name.endswith(MINIMAL) and way.key != NO_KEY:
         missing = set()  # it needs to fail in its mode alone
     if missing:
@@ -243,7 +245,9 @@ def _put(job: Job, way: Way, folder: Path, name: str) -> Way:
 def _is_same(way: Way, metrics: Mapping[str, float]) -> bool:
     """Return whether metrics are those of a row to the bit, as far as both are known."""
     both = way.metrics.keys() & metrics.keys()
-    return all(way.metrics[one] == metrics[one] for one in both if metrics[one] == metrics[one])
+    return all(
+        way.metrics[name] == metrics[name] for name in both if metrics[name] == metrics[name]
+    )
 
 
 def _remove(scenario: Path) -> None:

@@ -35,9 +35,10 @@ class KnownFailures:
         """
         read = dict[Path, FailureFile]()
         found = {
-            one.entry: failure
-            for one in results
-            if (failure := failure_of(one.scenario, one.distribution or None, read)) is not None
+            result.entry: failure
+            for result in results
+            if (failure := failure_of(result.scenario, result.distribution or None, read))
+            is not None
         }
         return cls(found)
 
@@ -46,51 +47,51 @@ class KnownFailures:
         found = self.failures.get(entry)
         return None if found is None else found[1].status
 
-    def is_excused(self, one: EntryResult, row: RowResult) -> bool:
+    def is_excused(self, entry_result: EntryResult, row: RowResult) -> bool:
         """Return whether a conflict of a critical variation is the one that is known."""
-        failure = self._excuse(one)
+        failure = self._excuse(entry_result)
         way = (row.conflict, row.conflict_type, row.responsible)
         return failure is not None and way == (
             failure.conflict, failure.type, failure.responsible,
         )  # fmt: skip
 
-    def is_criterion_excused(self, one: EntryResult, criterion: int) -> bool:
+    def is_criterion_excused(self, entry_result: EntryResult, criterion: int) -> bool:
         """Return whether it is known that an entry violates a criterion, by its number."""
-        failure = self._excuse(one)
-        id = one.criteria[criterion]["id"]
+        failure = self._excuse(entry_result)
+        id = entry_result.criteria[criterion]["id"]
         return failure is not None and any(id == each.id for each in failure.violates)
 
-    def standing(self, one: EntryResult, row: RowResult) -> Standing:
+    def standing(self, entry_result: EntryResult, row: RowResult) -> Standing:
         """Return how a variation of an entry stands."""
         verdict = row.verdict
         if verdict != "failed":
             return verdict
-        found = self.failures.get(one.entry)
+        found = self.failures.get(entry_result.entry)
         if found is None:
             return "new"
         status = found[1].status
         if status == "fixed":
             return "regression"
-        known = not row.critical or self.is_excused(one, row)
-        known &= all(self.is_criterion_excused(one, i) for i in row.violated)
+        known = not row.critical or self.is_excused(entry_result, row)
+        known &= all(self.is_criterion_excused(entry_result, i) for i in row.violated)
         return status if known else "new"
 
-    def worst(self, one: EntryResult) -> Standing:
+    def worst(self, entry_result: EntryResult) -> Standing:
         """Return how an entry stands: as its worst variation does."""
-        found = {self.standing(one, row) for row in one.rows}
+        found = {self.standing(entry_result, row) for row in entry_result.rows}
         order: tuple[Standing, ...] = (
             "regression", "new", "not run", "known", "accepted", "passed",
         )  # fmt: skip
-        if one.problem or not one.rows:
+        if entry_result.problem or not entry_result.rows:
             return "not run"
-        if one.verdict == "not judged":
+        if entry_result.verdict == "not judged":
             return "not judged"
         return next(each for each in order if each in found)
 
     def counts(self, results: Sequence[EntryResult]) -> Counter[Standing]:
         """Return the numbers of variations by how they stand; entries without count as one."""
-        found = Counter(self.standing(one, row) for one in results for row in one.rows)
-        found["not run"] += sum(bool(one.problem) for one in results)
+        found = Counter(self.standing(result, row) for result in results for row in result.rows)
+        found["not run"] += sum(bool(result.problem) for result in results)
         return found
 
     def sentence(self, results: Sequence[EntryResult]) -> str:
@@ -100,7 +101,7 @@ class KnownFailures:
             results: with one ego.
         """
         count = self.counts(results)
-        known = sum(count[one] for one in EXCUSED)
+        known = sum(count[name] for name in EXCUSED)
         if not self.failures or not known + count["new"] + count["regression"]:
             return ""
         again = count["regression"]
@@ -111,7 +112,7 @@ class KnownFailures:
 
     def regressions(self, results: Sequence[EntryResult]) -> list[str]:
         """Return the ids of the failures that were fixed, and are there again."""
-        again = (one.entry for one in results if self.worst(one) == "regression")
+        again = (result.entry for result in results if self.worst(result) == "regression")
         return sorted({self.failures[name][0] for name in again})
 
     def gone(self, results: Sequence[EntryResult]) -> list[str]:
@@ -120,16 +121,16 @@ class KnownFailures:
         Of all egos together: all of its files pass.
         """
         stand: dict[str, set[Standing]] = {}
-        for one in results:
-            if one.entry in self.failures:
-                stand.setdefault(self.failures[one.entry][0], set()).add(self.worst(one))
-        status = {id: one.status for id, one in self.failures.values()}
+        for result in results:
+            if result.entry in self.failures:
+                stand.setdefault(self.failures[result.entry][0], set()).add(self.worst(result))
+        status = {id: failure.status for id, failure in self.failures.values()}
         return sorted(
             id for id, each in stand.items() if each == {"passed"} and status[id] != "fixed"
         )
 
-    def _excuse(self, one: EntryResult) -> Failure | None:
-        found = self.failures.get(one.entry)
+    def _excuse(self, entry_result: EntryResult) -> Failure | None:
+        found = self.failures.get(entry_result.entry)
         return found[1] if found is not None and found[1].status in EXCUSED else None
 
 

@@ -75,21 +75,21 @@ def _folder(scenario: LogicalScenario, egos: list[str]) -> str:
     return f"{scenario.name}-{digest[:8]}"
 
 
-def picture_payload(one: PreventabilityMap, folder: Path) -> dict[str, Any]:
+def picture_payload(preventability_map: PreventabilityMap, folder: Path) -> dict[str, Any]:
     """Return what the suite's page shows of a map, as plain data.
 
     Args:
-        one: the map.
+        preventability_map: the map.
         folder: of the page.
     """
-    grid = one.grid
+    grid = preventability_map.grid
     third = grid.values[2] if len(grid.shape) > 2 else np.zeros(1)
     columns = sorted({round(i) for i in np.linspace(0, len(third) - 1, COLUMNS).tolist()})
     labels = [f"{grid.names[2]} {third[k]:.3g} {grid.units[2]}" for k in columns]
     further = (-1,) * max(0, len(grid.shape) - 3)  # the last values, the highest speeds say
     return {
-        "title": one.scenario.title,
-        "page": one.page.relative_to(folder).as_posix(),
+        "title": preventability_map.scenario.title,
+        "page": preventability_map.page.relative_to(folder).as_posix(),
         "axes": [
             f"{name} {values[0]:.3g} to {values[-1]:.3g} {unit}"
             for name, values, unit in zip(grid.names[:2], grid.values, grid.units, strict=False)
@@ -101,16 +101,20 @@ def picture_payload(one: PreventabilityMap, folder: Path) -> dict[str, Any]:
             )
         ],
         "columns": labels,
-        "classes": [[one.label, COLOURS[one]] for one in CellClass],
+        "classes": [[class_.label, COLOURS[class_]] for class_ in CellClass],
         "drivers": [
             {
                 "name": name,
-                "counts": list(one.counts(name).values()),
+                "counts": list(preventability_map.counts(name).values()),
                 "pictures": [
-                    data_uri(one.classes[name][(slice(None), slice(None), k, *further)].T[::-1])
+                    data_uri(
+                        preventability_map.classes[name][(slice(None), slice(None), k, *further)].T[
+                            ::-1
+                        ]
+                    )
                     for k in columns
                 ],
             }
-            for name in one.drivers
+            for name in preventability_map.drivers
         ],
     }

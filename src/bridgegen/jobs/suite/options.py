@@ -21,7 +21,7 @@ SAMPLES, MAX_SAMPLES = 100, 10**7
 
 def _of_search(name: str) -> Mapping[str, Any]:
     """Return the declaration of an option that searches have, too."""
-    (declared,) = (one.metadata for one in fields(CommonOptions) if one.name == name)
+    (declared,) = (item.metadata for item in fields(CommonOptions) if item.name == name)
     return declared
 
 
@@ -109,7 +109,7 @@ class ScenariosOptions(SimulatingOptions):
     @property
     def more_figures(self) -> Sequence[str]:
         """The figures that these options add to those of the job."""
-        return [f"criterion:{one['id']}" for one in self.criteria]
+        return [f"criterion:{criterion['id']}" for criterion in self.criteria]
 
 
 @dataclass(frozen=True, kw_only=True)

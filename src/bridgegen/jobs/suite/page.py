@@ -56,9 +56,9 @@ def write_suite_page(
     """
     by_key = {(job.entry.name, job.ego or ""): job for job in jobs}
     commands = {
-        key_of(one): command_of(suite.folder, by_key[key_of(one)], one)
-        for one in suite.results
-        if one.verdict == "failed" and key_of(one) in by_key
+        key_of(result): command_of(suite.folder, by_key[key_of(result)], result)
+        for result in suite.results
+        if result.verdict == "failed" and key_of(result) in by_key
     }
     return _write(suite, dict(_playbacks(suite, by_key)), commands, searches, maps)
 
@@ -73,12 +73,12 @@ def write_replay_page(made: Replayed) -> Path:
         StorageError: it cannot be written.
     """
     name = f"{made.result.entry}, variation {made.number}"
-    one = made.result.model_copy(update={"entry": name})
-    suite = SuiteRun(made.folder, (one.ego,), (one,), {})
+    result = made.result.model_copy(update={"entry": name})
+    suite = SuiteRun(made.folder, (result.ego,), (result,), {})
     job = replace(made.job, entry=replace(made.job.entry, name=name))
-    playback = _playback(job, one, 0)
-    played = {} if playback is None else {key_of(one): playback}
-    return _write(suite, played, {key_of(one): made.command})
+    playback = _playback(job, result, 0)
+    played = {} if playback is None else {key_of(result): playback}
+    return _write(suite, played, {key_of(result): made.command})
 
 
 def _write(
@@ -88,7 +88,7 @@ def _write(
     searches: Sequence[WorseThan] = (),
     maps: Sequence[PreventabilityMap] = (),
 ) -> Path:
-    pictures = [picture_payload(one, suite.folder) for one in maps]
+    pictures = [picture_payload(map_, suite.folder) for map_ in maps]
     data = payload(suite, played, commands, searches=searches, maps=pictures, code=code_of(_MODULE))
     path = suite.folder / FILE
     title = f"{suite.folder.resolve().name}: suite"
@@ -107,9 +107,9 @@ def command_of(folder: Path, job: Job, result: EntryResult) -> str:
         return replay_command(folder, result, result.worst or 0)
     words = ["bridgegen", "simulate", entry.scenario]
     words += ["--ego", job.ego] if job.ego else []
-    for one in options_of(CommonOptions):
-        if one.name in _SIMULATE:
-            words += one.words(getattr(job.options, one.name))
+    for option in options_of(CommonOptions):
+        if option.name in _SIMULATE:
+            words += option.words(getattr(job.options, option.name))
     if job.simulator.name != EMBEDDED.name:
         words += ["--simulator", job.simulator.name]
     return shlex.join(words)
@@ -117,17 +117,20 @@ def command_of(folder: Path, job: Job, result: EntryResult) -> str:
 
 def _playbacks(suite: SuiteRun, jobs: Mapping[Key, Job]) -> Iterator[tuple[Key, Playback]]:
     """Yield the playbacks of the worst failed rows, the most severe first."""
-    failed = [one for one in suite.results if one.worst is not None]
+    failed = [result for result in suite.results if result.worst is not None]
     failed.sort(
-        key=lambda one: (-one.rows[one.worst or 0].severity, *rank(one.rows[one.worst or 0]))
+        key=lambda result: (
+            -result.rows[result.worst or 0].severity,
+            *rank(result.rows[result.worst or 0]),
+        )
     )
-    for one in failed[:MOST_PLAYBACKS]:
-        job = jobs.get(key_of(one))
-        others = [jobs.get((one.entry, ego)) for ego in suite.egos if ego != one.ego]
+    for result in failed[:MOST_PLAYBACKS]:
+        job = jobs.get(key_of(result))
+        others = [jobs.get((result.entry, ego)) for ego in suite.egos if ego != result.ego]
         shown = [other for other in others if other is not None]
-        playback = None if job is None else _playback(job, one, one.worst or 0, shown)
+        playback = None if job is None else _playback(job, result, result.worst or 0, shown)
         if playback is not None:
-            yield key_of(one), playback
+            yield key_of(result), playback
 
 
 def _playback(
@@ -152,7 +155,7 @@ def _playback(
     except (BridgeGenError, OSError):
         return None  # its results stand, and the page has the command
     try:
-        beside = {one.ego or one.name: pipeline_of(one) for one in others}
+        beside = {other.ego or other.name: pipeline_of(other) for other in others}
         return beside_others(played, X, beside)[0]
     except (BridgeGenError, OSError):
         return played[0]

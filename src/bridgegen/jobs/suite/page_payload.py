@@ -81,8 +81,8 @@ def payload(
     """
     labels = [label_of(suite, ego) for ego in suite.egos]
     by_entry: dict[str, dict[str, EntryResult]] = {}
-    for one in suite.results:
-        by_entry.setdefault(one.entry, {})[one.ego] = one
+    for result in suite.results:
+        by_entry.setdefault(result.entry, {})[result.ego] = result
     criteria = _criteria(suite)
     motions, at = _motions(played)
     entries = [_entry(suite, name, of_it, labels, criteria, at) for name, of_it in by_entry.items()]
@@ -106,12 +106,12 @@ def payload(
                 [text for text in (outcomes(suite.of_ego(ego)), points(suite.of_ego(ego))) if text]
                 for ego in suite.egos
             ],
-            "differences": differences([one for one in complete if len(one) > 1], labels),
+            "differences": differences([group for group in complete if len(group) > 1], labels),
             "changes": _changes(suite, labels),
             "facts": _facts(suite),
             "entries": entries,
             "criteria": _matrix(suite, criteria),
-            "searches": [_search(suite, one) for one in searches],
+            "searches": [_search(suite, search) for search in searches],
             "clauses": _clauses(suite),
             "maps": list(maps),
             "motions": motions,
@@ -128,7 +128,7 @@ def _changes(suite: SuiteRun, labels: Sequence[str]) -> str:
     if len(suite.egos) != 2:
         return ""
     first, second = (suite.of_ego(ego) for ego in suite.egos)
-    if [one.entry for one in first] != [one.entry for one in second]:  # it was stopped
+    if [result.entry for result in first] != [result.entry for result in second]:  # it was stopped
         return ""
     return changes(variations_compared(first, second, (labels[0], labels[1])))
 
@@ -153,7 +153,7 @@ def _entry(
     whole = len(verdicts) == len(labels)
     return {
         "name": name,
-        "title": next((one.title for one in of_it.values() if one.title), ""),
+        "title": next((result.title for result in of_it.values() if result.title), ""),
         "differ": difference(verdicts, labels) if whole else "",
         "results": [
             _result(suite, of_it[ego], criteria, at.get((name, ego))) if ego in of_it else None
@@ -163,55 +163,61 @@ def _entry(
 
 
 def _result(
-    suite: SuiteRun, one: EntryResult, criteria: Mapping[str, int], motion: int | None
+    suite: SuiteRun, entry_result: EntryResult, criteria: Mapping[str, int], motion: int | None
 ) -> dict[str, Any]:
     """Return a cell of the table; what is absent is not said."""
     found: dict[str, Any] = {
-        "v": _LETTER[one.verdict],
-        "n": [one.count(verdict) for verdict in _LETTER],
+        "v": _LETTER[entry_result.verdict],
+        "n": [entry_result.count(verdict) for verdict in _LETTER],
     }
-    lost = one.problem or next((row.problem for row in one.rows if row.problem), "")
-    if lost or not one.rows:
+    lost = entry_result.problem or next(
+        (row.problem for row in entry_result.rows if row.problem), ""
+    )
+    if lost or not entry_result.rows:
         found["problem"] = lost or "it has no variations"
-    if one.verdict == "not judged":
-        found["unjudged"] = one.unjudged
-    blameless = sum(row.verdict == "passed" and row.collisions > 0 for row in one.rows)
+    if entry_result.verdict == "not judged":
+        found["unjudged"] = entry_result.unjudged
+    blameless = sum(row.verdict == "passed" and row.collisions > 0 for row in entry_result.rows)
     if blameless:
         found["blameless"] = blameless
-    _, mitigated, unavoided = one.outcomes().values()
+    _, mitigated, unavoided = entry_result.outcomes().values()
     if mitigated or unavoided:
         found["hits"] = [mitigated, unavoided]
     if motion is not None:
         found["motion"] = motion
-    if one.worst is None:
+    if entry_result.worst is None:
         return found
     stated = suite.known_failures
-    if said := words(stated.worst(one), stated.failures.get(one.entry)):
+    if said := words(stated.worst(entry_result), stated.failures.get(entry_result.entry)):
         found["standing"] = said
-        found["excused"] = stated.worst(one) in EXCUSED
-        found["comment"] = stated.failures[one.entry][1].comment
-    row = one.rows[one.worst]
-    found["severity"] = _short(max(one.severity for one in one.rows if one.verdict == "failed"))
+        found["excused"] = stated.worst(entry_result) in EXCUSED
+        found["comment"] = stated.failures[entry_result.entry][1].comment
+    row = entry_result.rows[entry_result.worst]
+    found["severity"] = _short(
+        max(result.severity for result in entry_result.rows if result.verdict == "failed")
+    )
     if row.critical or row.conflict in _HAPPENED:
         found["conflict"] = [row.conflict, row.conflict_type, row.partner]
-    violated = {i for each in one.rows for i in each.violated if i < len(one.criteria)}
+    violated = {
+        i for each in entry_result.rows for i in each.violated if i < len(entry_result.criteria)
+    }
     if violated:
-        found["violated"] = [criteria[_text(one.criteria[i])] for i in sorted(violated)]
+        found["violated"] = [criteria[_text(entry_result.criteria[i])] for i in sorted(violated)]
     return found
 
 
 # ---- criteria ----
 
 
-def _search(suite: SuiteRun, one: WorseThan) -> dict[str, Any]:
-    report = one.folder / "report.html"
+def _search(suite: SuiteRun, worse_than: WorseThan) -> dict[str, Any]:
+    report = worse_than.folder / "report.html"
     return {
-        "entry": one.entry,
-        "worse": one.worse,
-        "evaluations": one.evaluations,
-        "sentence": one.problem or one.sentence,
-        "problem": bool(one.problem),
-        "modes": list(one.modes[:MOST_MODES]),
+        "entry": worse_than.entry,
+        "worse": worse_than.worse,
+        "evaluations": worse_than.evaluations,
+        "sentence": worse_than.problem or worse_than.sentence,
+        "problem": bool(worse_than.problem),
+        "modes": list(worse_than.modes[:MOST_MODES]),
         "report": report.relative_to(suite.folder).as_posix() if report.exists() else "",
     }
 
@@ -223,10 +229,10 @@ def _text(criterion: Mapping[str, Any]) -> str:
 def _criteria(suite: SuiteRun) -> dict[str, int]:
     """Return all criteria with their numbers; the most severe, then the most violated first."""
     seen: dict[str, int] = {}
-    for one in suite.results:
-        for i, criterion in enumerate(one.criteria):
+    for result in suite.results:
+        for i, criterion in enumerate(result.criteria):
             text = _text(criterion)
-            seen[text] = seen.get(text, 0) + sum(i in row.violated for row in one.rows)
+            seen[text] = seen.get(text, 0) + sum(i in row.violated for row in result.rows)
 
     def order(text: str) -> tuple[bool, int, int, str]:
         criterion = json.loads(text)
@@ -243,11 +249,11 @@ def _matrix(suite: SuiteRun, criteria: Mapping[str, int]) -> list[dict[str, Any]
     ]
     for ego in suite.egos:
         of = [{"entries": [0, 0, 0], "rows": [0, 0, 0]} for _ in criteria]
-        for one in suite.of_ego(ego):
-            for i, criterion in enumerate(one.criteria):
+        for result in suite.of_ego(ego):
+            for i, criterion in enumerate(result.criteria):
                 known = [
                     row.margins[i]
-                    for row, verdict in zip(one.rows, one.verdicts, strict=True)
+                    for row, verdict in zip(result.rows, result.verdicts, strict=True)
                     if i < len(row.margins) and verdict != "not judged"
                 ]
                 violated = sum(margin < 0.0 for margin in known)
@@ -255,7 +261,7 @@ def _matrix(suite: SuiteRun, criteria: Mapping[str, int]) -> list[dict[str, Any]
                 which = 0 if violated else 1 if known else 2
                 table["entries"][which] += 1
                 for k, n in enumerate(
-                    (violated, len(known) - violated, len(one.rows) - len(known))
+                    (violated, len(known) - violated, len(result.rows) - len(known))
                 ):
                     table["rows"][k] += n
         for criterion, table in zip(found, of, strict=True):
@@ -268,12 +274,12 @@ def _clauses(suite: SuiteRun) -> list[dict[str, Any]]:
     by_ego = [clause_results(suite.results, ego) for ego in suite.egos]
     found: dict[str, dict[str, Any]] = {}
     for e, clauses in enumerate(by_ego):
-        for one in clauses:
-            shown = {"id": one.id, "text": one.text, "entries": one.entries, "of": {}}
-            found.setdefault(one.id, shown)["of"][str(e)] = {
-                "v": _LETTER[one.verdict],
-                "words": clause_in_words(one),
-                "rows": [one.passed, one.failed, one.not_run, one.not_applicable],
+        for clause in clauses:
+            shown = {"id": clause.id, "text": clause.text, "entries": clause.entries, "of": {}}
+            found.setdefault(clause.id, shown)["of"][str(e)] = {
+                "v": _LETTER[clause.verdict],
+                "words": clause_in_words(clause),
+                "rows": [clause.passed, clause.failed, clause.not_run, clause.not_applicable],
             }
     return list(found.values())
 
@@ -313,7 +319,7 @@ def _details(
     room: int,
 ) -> list[str]:
     """Return each entry's variations, deflated; as many as there is room for."""
-    most = min(MOST_ROWS, max((len(one.rows) for one in suite.results), default=0))
+    most = min(MOST_ROWS, max((len(result.rows) for result in suite.results), default=0))
     while True:
         texts = [
             _packed(_of_entry([of_it.get(ego) for ego in suite.egos], criteria, commands, most))
@@ -337,32 +343,34 @@ def _of_entry(
 ) -> dict[str, Any]:
     """Return what the page shows of an entry when it is opened."""
     words = _Words()
-    same = len({len(one.rows) for one in results if one is not None and one.rows}) == 1
+    same = len({len(result.rows) for result in results if result is not None and result.rows}) == 1
     found: dict[str, Any] = {"results": []}
-    for one in results:
-        if one is None:
+    for result in results:
+        if result is None:
             found["results"].append(None)
             continue
-        verdicts = [_LETTER[verdict] for verdict in one.verdicts]
-        ranks = [("fnup".index(v), *rank(row)) for v, row in zip(verdicts, one.rows, strict=True)]
-        kept = sorted(range(len(one.rows)), key=lambda i: (*ranks[i], i))[:most]
-        rows = [one.rows[i] for i in kept]
-        colours = colours_of(one)
+        verdicts = [_LETTER[verdict] for verdict in result.verdicts]
+        ranks = [
+            ("fnup".index(v), *rank(row)) for v, row in zip(verdicts, result.rows, strict=True)
+        ]
+        kept = sorted(range(len(result.rows)), key=lambda i: (*ranks[i], i))[:most]
+        rows = [result.rows[i] for i in kept]
+        colours = colours_of(result)
         found["results"].append(
             {
-                "driver": one.driver,
-                "files": [file for file in (one.scenario, one.distribution) if file],
-                "notes": one.notes,
-                "command": commands.get(key_of(one), ""),
-                "worst": one.worst,
-                "parameters": list(zip(one.parameters, one.units, strict=False)),
-                "criteria": [criteria[_text(criterion)] for criterion in one.criteria],
-                "total": len(one.rows),
+                "driver": result.driver,
+                "files": [file for file in (result.scenario, result.distribution) if file],
+                "notes": result.notes,
+                "command": commands.get(key_of(result), ""),
+                "worst": result.worst,
+                "parameters": list(zip(result.parameters, result.units, strict=False)),
+                "criteria": [criteria[_text(criterion)] for criterion in result.criteria],
+                "total": len(result.rows),
                 "at": kept,
                 "verdict": "".join(verdicts[i] for i in kept),
                 "critical": "".join("01"[row.critical] for row in rows),
-                "x": _columns([row.x for row in rows], len(one.parameters)),
-                "margins": _columns([row.margins for row in rows], len(one.criteria)),
+                "x": _columns([row.x for row in rows], len(result.parameters)),
+                "margins": _columns([row.margins for row in rows], len(result.criteria)),
                 "severity": [_short(row.severity) for row in rows],
                 "d_min": [_short(row.d_min) for row in rows],
                 "outcome": "".join(_OUTCOME[row.outcome] for row in rows),
@@ -374,7 +382,7 @@ def _of_entry(
                 "partner": words.at(row.partner for row in rows),
                 "responsible": words.at(row.responsible for row in rows),
                 "note": words.at(row.problem or row.implausible or row.unjudged for row in rows),
-                "beside": _beside(results, one, kept) if same else [],
+                "beside": _beside(results, result, kept) if same else [],
             }
         )
     found["words"] = list(words.number)
@@ -387,19 +395,25 @@ def _columns(rows: Sequence[Sequence[float | str]], width: int) -> list[list[flo
 
 
 def _beside(
-    results: Sequence[EntryResult | None], one: EntryResult, kept: Sequence[int]
+    results: Sequence[EntryResult | None], entry_result: EntryResult, kept: Sequence[int]
 ) -> list[str]:
     """Return the verdicts of all egos on the same variations, a letter each."""
     verdicts = [[] if other is None else other.verdicts for other in results]
-    return [
-        "".join(
-            _LETTER[theirs[i]]
-            if other is not None and i < len(other.rows) and other.rows[i].x == one.rows[i].x
-            else "-"
-            for other, theirs in zip(results, verdicts, strict=True)
-        )
-        for i in kept
-    ] if len(results) > 1 else []  # fmt: skip
+    return (
+        [
+            "".join(
+                _LETTER[theirs[i]]
+                if other is not None
+                and i < len(other.rows)
+                and other.rows[i].x == entry_result.rows[i].x
+                else "-"
+                for other, theirs in zip(results, verdicts, strict=True)
+            )
+            for i in kept
+        ]
+        if len(results) > 1
+        else []
+    )
 
 
 def _short(value: float | str | None) -> float | str | None:
@@ -419,10 +433,10 @@ def _motions(played: Mapping[Key, Playback]) -> tuple[dict[str, Any], dict[Key, 
     names, on, texts = list[str](), list[int](), list[str]()
     at: dict[Key, int] = {}
     room = MOTIONS
-    for key, one in played.items():
-        road = road_key(one)
-        new = "" if road in number else _packed(road_payload(one))
-        whole = playback_payload(one, 0, None)
+    for key, playback in played.items():
+        road = road_key(playback)
+        new = "" if road in number else _packed(road_payload(playback))
+        whole = playback_payload(playback, 0, None)
         text = _packed({name: value for name, value in whole.items() if name not in OF_ROW})
         if len(new) + len(text) > room:
             continue
@@ -431,7 +445,7 @@ def _motions(played: Mapping[Key, Playback]) -> tuple[dict[str, Any], dict[Key, 
             number[road] = len(roads)
             roads.append(new)
         at[key] = len(texts)
-        names.append(one.name)
+        names.append(playback.name)
         on.append(number[road])
         texts.append(text)
     return {"names": names, "roads": roads, "on": on, "texts": texts}, at

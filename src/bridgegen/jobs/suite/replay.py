@@ -126,9 +126,14 @@ def replay(
 def _of_file(job: Job, pipeline: Pipeline, file: Path) -> EntryResult:
     """Return the result of an exported scenario."""
     options = replace(
-        job.options, criteria=[one.to_dict() for one in pipeline.monitor], critical=None,
-        objective=None, count=pipeline.objective.count, others=None, empty_trigger=None,
-    )  # fmt: skip
+        job.options,
+        criteria=[criterion.to_dict() for criterion in pipeline.monitor],
+        critical=None,
+        objective=None,
+        count=pipeline.objective.count,
+        others=None,
+        empty_trigger=None,
+    )
     return evaluate(replace(job, entry=Entry(file.stem, str(file)), options=options, only=None))
 
 
@@ -139,10 +144,10 @@ def _moves_alike(row: RowResult, exported: EntryResult) -> bool:
     return len(rows) == 1 and rows[0].model_copy(update=bare) == row.model_copy(update=bare)
 
 
-def replay_command(folder: Path, one: EntryResult, row: int) -> str:
+def replay_command(folder: Path, entry_result: EntryResult, row: int) -> str:
     """Return the command that runs a variation again, by its row from 0 on."""
-    words = ["bridgegen", "suite", "replay", str(folder), one.entry, str(row + 1)]
-    return shlex.join([*words, *(["--ego", one.ego] if one.ego else [])])
+    words = ["bridgegen", "suite", "replay", str(folder), entry_result.entry, str(row + 1)]
+    return shlex.join([*words, *(["--ego", entry_result.ego] if entry_result.ego else [])])
 
 
 def job_of(suite: SuiteRun, result: EntryResult, simulator: SimulatorChoice | None = None) -> Job:
@@ -187,13 +192,13 @@ def refuse_code(results: Sequence[EntryResult], named: Sequence[str], command: s
     Raises:
         InputError: which they are, and how to name them.
     """
-    code = {one.ego for one in results if is_spec(one.ego)} - {*named}
+    code = {result.ego for result in results if is_spec(result.ego)} - {*named}
     if code:
         raise InputError(
             *(
-                f"the ego is driven by {one}, which is code; to run it, name it: "
-                f"{command} --ego {shlex.quote(one)}"
-                for one in sorted(code)
+                f"the ego is driven by {name}, which is code; to run it, name it: "
+                f"{command} --ego {shlex.quote(name)}"
+                for name in sorted(code)
             )
         )
 
@@ -205,17 +210,17 @@ def slug(text: str) -> str:
 
 def _result(suite: SuiteRun, entry: str, ego: str | None) -> EntryResult:
     """Return the result of an entry with an ego."""
-    found = [one for one in suite.results if one.entry == entry]
+    found = [result for result in suite.results if result.entry == entry]
     if not found:
         raise UnknownNameError(
-            f"scenario of {suite.folder}", entry, {one.entry for one in suite.results}
+            f"scenario of {suite.folder}", entry, {result.entry for result in suite.results}
         )
     if ego is not None:
-        if ego not in (names := [one.ego for one in found if one.ego]):
+        if ego not in (names := [result.ego for result in found if result.ego]):
             raise UnknownNameError(f"driver of {suite.folder}", ego, names)
-        return next(one for one in found if one.ego == ego)
+        return next(result for result in found if result.ego == ego)
     if len(found) > 1:
-        egos = ", ".join(one.ego for one in found)
+        egos = ", ".join(result.ego for result in found)
         raise InputError(f"{entry} was run with several drivers: name one with --ego: {egos}")
     refuse_code(found, (), f"bridgegen suite replay {suite.folder} {entry}")
     return found[0]

@@ -185,7 +185,7 @@ class EntryResult(Strict):
     @property
     def verdict(self) -> Verdict:
         """The worst of its rows: failed, else not run; else whether it is judged."""
-        verdicts = {one.verdict for one in self.rows}
+        verdicts = {row.verdict for row in self.rows}
         if "failed" in verdicts:
             return "failed"
         if self.problem or not self.rows or "not run" in verdicts:
@@ -195,8 +195,8 @@ class EntryResult(Strict):
     @property
     def verdicts(self) -> list[Verdict]:
         """The verdict of each row; none passes where nothing says anything of the ego."""
-        found = [one.verdict for one in self.rows]
-        return ["not judged" if one == "passed" and self._says_nothing else one for one in found]
+        found = [row.verdict for row in self.rows]
+        return ["not judged" if name == "passed" and self._says_nothing else name for name in found]
 
     @property
     def _says_nothing(self) -> bool:
@@ -207,7 +207,7 @@ class EntryResult(Strict):
         """Why rows without a failure say nothing of the ego, as those of a run; "" if they do."""
         if not self.rows:
             return ""
-        reasons = Counter(one.unjudged for one in self.rows if one.verdict == "not judged")
+        reasons = Counter(row.unjudged for row in self.rows if row.verdict == "not judged")
         judged, n = len(self.rows) - reasons.total(), len(self.rows)
         if few := too_few(judged, n, "variations could be judged"):
             why = ", ".join(f"{rows} × {why}" for why, rows in reasons.most_common())
@@ -223,13 +223,13 @@ class EntryResult(Strict):
 
     def outcomes(self) -> dict[Outcome, int]:
         """Return the numbers of rows by outcome."""
-        found = [one.outcome for one in self.rows]
-        return {one: found.count(one) for one in OUTCOMES}
+        found = [row.outcome for row in self.rows]
+        return {outcome: found.count(outcome) for outcome in OUTCOMES}
 
     @property
     def worst(self) -> int | None:
         """The number of the worst failed row: by harm, then by the least margin."""
-        failed = [i for i, one in enumerate(self.rows) if one.verdict == "failed"]
+        failed = [i for i, row in enumerate(self.rows) if row.verdict == "failed"]
         return min(failed, key=lambda i: (*rank(self.rows[i]), i), default=None)
 
     def letters(self, clause: int) -> str:
@@ -248,9 +248,9 @@ class EntryResult(Strict):
     def worst_of(self, criterion: int) -> int | None:
         """Return the number of the row that violates a criterion the most, or None."""
         margins = [
-            (one.margins[criterion], i)
-            for i, one in enumerate(self.rows)
-            if criterion < len(one.margins) and one.margins[criterion] < 0.0
+            (row.margins[criterion], i)
+            for i, row in enumerate(self.rows)
+            if criterion < len(row.margins) and row.margins[criterion] < 0.0
         ]
         return min(margins)[1] if margins else None
 
@@ -267,9 +267,13 @@ class Header(Strict):
     settings: dict[str, Any]
 
 
-def rank(one: RowResult) -> tuple[float, float, float]:
+def rank(row_result: RowResult) -> tuple[float, float, float]:
     """Return a key that is less for a worse failure: by harm, severity, then the least margin."""
-    return -float(one.critical) * one.harm, -one.severity, min(one.margins, default=0.0)
+    return (
+        -float(row_result.critical) * row_result.harm,
+        -row_result.severity,
+        min(row_result.margins, default=0.0),
+    )
 
 
 def finite(value: float) -> float | None:
@@ -279,4 +283,4 @@ def finite(value: float) -> float | None:
 
 def counts(results: Sequence[EntryResult]) -> dict[Verdict, int]:
     """Return the numbers of rows by verdict."""
-    return {one: sum(each.count(one) for each in results) for one in VERDICTS}
+    return {verdict: sum(each.count(verdict) for each in results) for verdict in VERDICTS}

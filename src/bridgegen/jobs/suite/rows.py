@@ -52,7 +52,7 @@ def matrix_of(scenario: SearchedScenario, edition: str | None) -> tuple[Grid, ..
     """Return the grids of an edition, of all if it is None; none if rows are drawn instead."""
     if not isinstance(scenario, LogicalScenario) or edition == NO_MATRIX:
         return ()
-    return tuple(one for one in scenario.matrix if edition in (None, one.edition))
+    return tuple(grid for grid in scenario.matrix if edition in (None, grid.edition))
 
 
 def rows_of(
@@ -85,11 +85,11 @@ def rows_of(
 
 def _of_matrix(scenario: SearchedScenario, space: SearchSpace, grids: Sequence[Grid]) -> Rows:
     """Return all combinations of some grids that keep the scenario's constraints."""
-    X = np.concatenate([space.rows(one.columns(), len(one)) for one in grids])
-    grid = np.repeat(np.arange(len(grids)), [len(one) for one in grids])
+    X = np.concatenate([space.rows(item.columns(), len(item)) for item in grids])
+    grid = np.repeat(np.arange(len(grids)), [len(item) for item in grids])
     excluded = np.zeros(len(X), np.bool_)
-    excluded[[one.row for one in space.violations(X)]] = True
-    set_by_it = {name for one in grids for name in one.names}
+    excluded[[violation.row for violation in space.violations(X)]] = True
+    set_by_it = {name for item in grids for name in item.names}
     names = tuple(name for name in space.names if name in set_by_it)
     kept = _some(X, excluded, scenario)
     return Rows(kept, names, int(excluded.sum()), tuple(grids), tuple(grid[~excluded].tolist()))
@@ -135,8 +135,8 @@ def _combinations(scenario: FileScenario, space: SearchSpace) -> Float:
     choices = [_values(space.parameters[name]) for name in space.variables]
     _check(math.prod(map(len, choices)), scenario.place)
     rows = []
-    for one in product(*choices):
-        table: dict[str, Float | float] = dict(zip(space.variables, one, strict=True))
+    for pair in product(*choices):
+        table: dict[str, Float | float] = dict(zip(space.variables, pair, strict=True))
         for name in space.order:
             if name in space.derived:
                 table[name] = float(space.derived[name].value.evaluate(table))
@@ -146,9 +146,9 @@ def _combinations(scenario: FileScenario, space: SearchSpace) -> Float:
     return np.array(rows, dtype=np.float64)
 
 
-def _values(one: Parameter) -> list[float]:
+def _values(parameter: Parameter) -> list[float]:
     """Return the values that a parameter of a deterministic distribution takes."""
-    if isinstance(one, FileParameter) and isinstance(one.distribution, Discrete):
-        return list(one.distribution.values)
-    assert one.kind is INTEGER, one.name  # which set of a joint distribution
-    return [float(value) for value in range(int(one.low), int(one.high) + 1)]
+    if isinstance(parameter, FileParameter) and isinstance(parameter.distribution, Discrete):
+        return list(parameter.distribution.values)
+    assert parameter.kind is INTEGER, parameter.name  # which set of a joint distribution
+    return [float(value) for value in range(int(parameter.low), int(parameter.high) + 1)]

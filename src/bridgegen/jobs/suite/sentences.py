@@ -75,7 +75,7 @@ def _within(value: float, bands: Iterable[tuple[float, Colour]], beyond: Colour)
 
 def grid_of(result: EntryResult, row: RowResult) -> GridResult | None:
     """Return the grid that a row belongs to; None if its entry has no matrix."""
-    return next((one for one in result.grids if row.x and row.x[0] == one.label), None)
+    return next((grid for grid in result.grids if row.x and row.x[0] == grid.label), None)
 
 
 def colours_of(result: EntryResult) -> list[Colour | None]:
@@ -141,7 +141,7 @@ def label_of(suite: SuiteRun, ego: str) -> str:
     """Return how an ego is called; of the scenarios' own drivers, the one that all have."""
     if ego:
         return ego
-    drivers = {one.driver for one in suite.of_ego(ego) if one.driver}
+    drivers = {result.driver for result in suite.of_ego(ego) if result.driver}
     return drivers.pop() if len(drivers) == 1 else "the scenarios' own drivers"
 
 
@@ -152,8 +152,8 @@ def headline(results: Sequence[EntryResult], label: str) -> str:
         results: with one ego.
         label: how the ego is called.
     """
-    n, rows = len(results), sum(len(one.rows) for one in results)
-    number = Counter(one.verdict for one in results)
+    n, rows = len(results), sum(len(result.rows) for result in results)
+    number = Counter(result.verdict for result in results)
     of = f"all {n:,} scenarios" if number["passed"] == n > 1 else f"{number['passed']:,} of {n:,}"
     if not of.startswith("all"):
         of += " scenario" if n == 1 else " scenarios"
@@ -165,7 +165,7 @@ def headline(results: Sequence[EntryResult], label: str) -> str:
     words = f"{label[:1].upper() + label[1:] if some else label} pass{'' if some else 'es'} {of}"
     if number["failed"]:
         words += f" and fail{'' if some else 's'} {number['failed']:,}"
-    partly = sum(one.verdict == "not run" and one.count("passed") > 0 for one in results)
+    partly = sum(result.verdict == "not run" and result.count("passed") > 0 for result in results)
     unjudged = number["not judged"]
     said = [f"{unjudged:,} {'is' if unjudged == 1 else 'are'} not judged"] if unjudged else []
     lost = [f"{number['not run'] - partly:,} did not run"] if number["not run"] > partly else []
@@ -178,12 +178,12 @@ def outcomes(results: Sequence[EntryResult]) -> str:
 
     Empty if it touches nothing in any.
     """
-    number = Counter(one.outcome for each in results for one in each.rows if one.outcome)
+    number = Counter(row.outcome for each in results for row in each.rows if row.outcome)
     n = number.total()
     if number["avoided"] == n:
         return ""
-    hit = [one for each in results for one in each.rows if one.outcome in OUTCOMES[1:]]
-    speeds = [one.impact_speed for one in hit]
+    hit = [row for each in results for row in each.rows if row.outcome in OUTCOMES[1:]]
+    speeds = [result.impact_speed for result in hit]
     mean, slowed = sum(speeds) / len(speeds), number["mitigated"]
     return (
         f"Collisions: {len(hit):,} of {n:,} ({len(hit) / n:.1%}), {slowed:,} of them after slowing "
@@ -194,19 +194,27 @@ def outcomes(results: Sequence[EntryResult]) -> str:
 def points(results: Sequence[EntryResult]) -> str:
     """Return what an ego reaches of a matrix's points, as a sentence; empty without points."""
     found = points_of(results)
-    parts = [f"{one.reached:.2f} of {one.most:.2f} ({one.edition})" for one in found]
+    parts = [f"{item.reached:.2f} of {item.most:.2f} ({item.edition})" for item in found]
     return f"Points by colour: {', '.join(parts)}" if parts else ""
 
 
-def clause_in_words(one: ClauseResult) -> str:
+def clause_in_words(clause_result: ClauseResult) -> str:
     """Return what an ego makes of a clause: "3 of 101 fail, 2 collisions not preventable" say."""
-    n = one.passed + one.failed
-    parts = [f"{one.failed:,} of {n:,} fail"] if one.failed else [f"pass ({n:,})"] if n else []
-    if one.unpreventable:
-        some = "collision" if one.unpreventable == 1 else "collisions"
-        parts.append(f"{one.unpreventable:,} {some} not preventable")
-    parts += [f"{one.not_run:,} not run"] if one.not_run else []
-    parts += [f"{one.not_applicable:,} not applicable"] if one.not_applicable else []
+    n = clause_result.passed + clause_result.failed
+    parts = (
+        [f"{clause_result.failed:,} of {n:,} fail"]
+        if clause_result.failed
+        else [f"pass ({n:,})"]
+        if n
+        else []
+    )
+    if clause_result.unpreventable:
+        some = "collision" if clause_result.unpreventable == 1 else "collisions"
+        parts.append(f"{clause_result.unpreventable:,} {some} not preventable")
+    parts += [f"{clause_result.not_run:,} not run"] if clause_result.not_run else []
+    parts += (
+        [f"{clause_result.not_applicable:,} not applicable"] if clause_result.not_applicable else []
+    )
     return ", ".join(parts)
 
 
@@ -234,8 +242,8 @@ def differences(of_entries: Sequence[Sequence[Verdict]], labels: Sequence[str]) 
     if len(labels) < 2:
         return ""
     two = len(labels) == 2
-    same = Counter(one[0] for one in of_entries if len(set(one)) == 1)
-    differ = Counter(words for one in of_entries if (words := difference(one, labels)))
+    same = Counter(entry[0] for entry in of_entries if len(set(entry)) == 1)
+    differ = Counter(words for entry in of_entries if (words := difference(entry, labels)))
     often = differ.most_common(MOST_DIFFERENCES)
     rest = sum(differ.values()) - sum(count for _, count in often)
     parts = [f"in {count:,} {words}" for words, count in often]

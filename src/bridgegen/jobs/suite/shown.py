@@ -27,34 +27,39 @@ def json_of_suite(suite: SuiteRun) -> dict[str, Any]:
         "egos": list(suite.egos),
         "counts": {ego: counts(suite.of_ego(ego)) for ego in suite.egos},
         "points": {
-            ego: {one.edition: [one.reached, one.most] for one in points_of(suite.of_ego(ego))}
+            ego: {
+                point.edition: [point.reached, point.most] for point in points_of(suite.of_ego(ego))
+            }
             for ego in suite.egos
         },
         "clauses": [
-            {"verdict": one.verdict, **asdict(one)}
+            {"verdict": result.verdict, **asdict(result)}
             for ego in suite.egos
-            for one in clause_results(suite.results, ego)
+            for result in clause_results(suite.results, ego)
         ],
         "entries": [
             {
-                "entry": one.entry,
-                "ego": one.ego or one.driver,
-                "verdict": one.verdict,
-                "variations": len(one.rows),
-                "failed": one.count("failed"),
-                "not_judged": one.count("not judged"),
-                "not_run": one.count("not run"),
-                "unjudged": one.unjudged if one.verdict == "not judged" else None,
-                "outcomes": one.outcomes(),
-                "problem": one.problem or None,
-                "status": suite.known_failures.status_of(one.entry),
-                "standing": suite.known_failures.worst(one),
+                "entry": result.entry,
+                "ego": result.ego or result.driver,
+                "verdict": result.verdict,
+                "variations": len(result.rows),
+                "failed": result.count("failed"),
+                "not_judged": result.count("not judged"),
+                "not_run": result.count("not run"),
+                "unjudged": result.unjudged if result.verdict == "not judged" else None,
+                "outcomes": result.outcomes(),
+                "problem": result.problem or None,
+                "status": suite.known_failures.status_of(result.entry),
+                "standing": suite.known_failures.worst(result),
             }
-            for one in suite.results
+            for result in suite.results
         ],
         "maps": [
-            {"scenario": one.scenario.name, "drivers": [one.figures(name) for name in one.drivers]}
-            for one in suite.maps
+            {
+                "scenario": map_.scenario.name,
+                "drivers": [map_.figures(name) for name in map_.drivers],
+            }
+            for map_ in suite.maps
         ],
     }
 
@@ -62,15 +67,15 @@ def json_of_suite(suite: SuiteRun) -> dict[str, Any]:
 def suite_shown(suite: SuiteRun) -> list[str | Table]:
     """Return the entries that do not pass, others if there is room; then clauses and totals."""
     by_entry: dict[str, list[EntryResult]] = {}
-    for one in suite.results:
-        by_entry.setdefault(one.entry, []).append(one)
+    for result in suite.results:
+        by_entry.setdefault(result.entry, []).append(result)
     passed = [name for name, some in by_entry.items() if {o.verdict for o in some} == {"passed"}]
     failed = [name for name in by_entry if name not in passed]
     left = max(0, MOST_ROWS - len(failed))
     listed = {*failed[:MOST_ROWS], *passed[:left]}
     egos = [ego or "ego's own driver" for ego in suite.egos]
     rows = [
-        (name, *(_verdict(suite, one) for one in some), _worst(some))
+        (name, *(_verdict(suite, result) for result in some), _worst(some))
         for name, some in by_entry.items()
         if name in listed
     ]
@@ -80,14 +85,14 @@ def suite_shown(suite: SuiteRun) -> list[str | Table]:
     by_ego = [clause_results(suite.results, ego) for ego in suite.egos]
     if any(by_ego):
         clauses = [
-            (one[0].id, *map(clause_in_words, one), one[0].text)
-            for one in zip(*by_ego, strict=True)
+            (pair[0].id, *map(clause_in_words, pair), pair[0].text)
+            for pair in zip(*by_ego, strict=True)
         ]
         found += ["", Table(("clause", *egos, "requirement"), clauses)]
     found += ["", *(line for ego in suite.egos for line in _totals(suite, ego))]
     if gone := suite.known_failures.gone(suite.results):
         found.append(f"no longer fail, set their status to fixed: {', '.join(gone)}")
-    found += [f"map         {one.page}" for one in suite.maps]
+    found += [f"map         {map_.page}" for map_ in suite.maps]
     return [*found, f"page        {suite.page}"]
 
 
@@ -95,8 +100,8 @@ def _totals(suite: SuiteRun, ego: str) -> Iterator[str]:
     """Yield what an ego makes of the suite, and how its failures stand where indexes name some."""
     results = suite.of_ego(ego)
     number = counts(results)
-    entries = sum(one.verdict == "passed" for one in results)
-    unjudged = sum(one.verdict == "not judged" for one in results)
+    entries = sum(result.verdict == "passed" for result in results)
+    unjudged = sum(result.verdict == "not judged" for result in results)
     yield (
         f"{ego or 'the own drivers'}: {entries} of {len(results)} scenarios pass"
         + (f", {unjudged} {'is' if unjudged == 1 else 'are'} not judged" if unjudged else "")
@@ -111,28 +116,29 @@ def _totals(suite: SuiteRun, ego: str) -> Iterator[str]:
         yield f"  regression: {id} was fixed, and fails again"
 
 
-def _verdict(suite: SuiteRun, one: EntryResult) -> str:
+def _verdict(suite: SuiteRun, entry_result: EntryResult) -> str:
     said = known_words(
-        suite.known_failures.worst(one), suite.known_failures.failures.get(one.entry)
+        suite.known_failures.worst(entry_result),
+        suite.known_failures.failures.get(entry_result.entry),
     )
-    return f"{_counted(one)} ({said})" if said else _counted(one)
+    return f"{_counted(entry_result)} ({said})" if said else _counted(entry_result)
 
 
-def _counted(one: EntryResult) -> str:
-    if one.problem:
+def _counted(entry_result: EntryResult) -> str:
+    if entry_result.problem:
         return "not run"
-    n = len(one.rows)
-    failed, unjudged, lost = (one.count(v) for v in ("failed", "not judged", "not run"))
+    n = len(entry_result.rows)
+    failed, unjudged, lost = (entry_result.count(v) for v in ("failed", "not judged", "not run"))
     if not failed and not unjudged and not lost:
         return "pass" if n == 1 else f"pass ({n})"
     parts = [f"{failed} of {n} fail"] if failed else []
-    if one.verdict == "not judged":
+    if entry_result.verdict == "not judged":
         parts.append("NOT JUDGED")
     elif unjudged:
         parts += [] if failed or lost else [f"pass ({n - unjudged})"]
         parts.append(f"{unjudged} not judged")
     parts += [f"{lost} not run"] if lost else []
-    _, slowed, unslowed = one.outcomes().values()
+    _, slowed, unslowed = entry_result.outcomes().values()
     if slowed + unslowed:
         parts.append(f"{slowed + unslowed} collide, {slowed} after slowing down")
     return ", ".join(parts)
@@ -140,17 +146,19 @@ def _counted(one: EntryResult) -> str:
 
 def _worst(some: Sequence[EntryResult]) -> str:
     """Return the worst thing that happens in an entry."""
-    for one in some:
-        if one.worst is not None:
-            row = one.rows[one.worst]
-            violated = ", ".join(str(one.criteria[i]["id"]) for i in row.violated)
+    for result in some:
+        if result.worst is not None:
+            row = result.rows[result.worst]
+            violated = ", ".join(str(result.criteria[i]["id"]) for i in row.violated)
             happened = row.critical and row.conflict
             texts = [with_whom(row.conflict, row.partner)] if happened else []
             texts += [f"impact at {row.impact_speed:.1f} m/s"] if row.impact_speed else []
             texts += [f"MAIS3+ {row.severity:.2%}"] if row.severity else []
             texts += [f"violates {violated}"] if violated else []
             return "; ".join(texts)
-    lost = [one.problem or next((r.problem for r in one.rows if r.problem), "") for one in some]
+    lost = [
+        result.problem or next((r.problem for r in result.rows if r.problem), "") for result in some
+    ]
     return next(filter(None, [*lost, *(o.unjudged for o in some if o.verdict == "not judged")]), "")
 
 
@@ -163,8 +171,8 @@ def json_of_difference(found: DriverDifference) -> dict[str, Any]:
         "counts": made.counts,
         "p_value": made.p_value,
         "unjudged": made.unjudged,
-        "rows": [vars(one) for one in made.rows if one.change in ("broken", "fixed")],
-        "searches": [{**vars(one), "folder": str(one.folder)} for one in found.searches],
+        "rows": [vars(row) for row in made.rows if row.change in ("broken", "fixed")],
+        "searches": [{**vars(search), "folder": str(search.folder)} for search in found.searches],
     }
 
 
@@ -173,9 +181,9 @@ def difference_shown(found: DriverDifference) -> list[str | Table]:
     made = found.difference
     number = made.counts
     by_entry: dict[str, dict[str, int]] = {}
-    for one in made.rows:
-        of_it = by_entry.setdefault(one.entry, dict.fromkeys(number, 0))
-        of_it[one.change] += 1
+    for row in made.rows:
+        of_it = by_entry.setdefault(row.entry, dict.fromkeys(number, 0))
+        of_it[row.change] += 1
     changed = [
         (name, *map(str, of_it.values()))
         for name, of_it in by_entry.items()
@@ -194,8 +202,8 @@ def difference_shown(found: DriverDifference) -> list[str | Table]:
     lines.append(f"  {'both pass':<16}{number['both pass']}")
     if number["not comparable"]:
         lines.append(f"  {'not comparable':<16}{number['not comparable']}")
-    compared = [one.severity for one in made.rows if one.change != "not comparable"]
-    worse, better = (sum(sign * one > 0.0 for one in compared) for sign in (1.0, -1.0))
+    compared = [row.severity for row in made.rows if row.change != "not comparable"]
+    worse, better = (sum(sign * value > 0.0 for value in compared) for sign in (1.0, -1.0))
     lines.append(f"  {'severity':<16}higher in {worse}, lower in {better}")
     if made.sampled:
         lines.append(f"  {'by chance':<16}p = {made.p_value:.3g} (McNemar's exact test)")
@@ -208,15 +216,15 @@ def _of_searches(found: DriverDifference) -> Iterator[str]:
         return
     made = found.difference
     yield f"\nsearches for scenarios that {made.second} fails and {made.first} passes"
-    for one in found.searches:
-        if one.problem:
-            yield f"  {one.entry}: no result: {one.problem}"
-        elif one.worse:
-            yield f"  {one.entry}: {one.sentence}"
-            yield from (f"    {title}" for title in one.modes[:MOST_MODES])
-            yield f"    {one.folder / 'report.html'}"
-    if none := [one for one in found.searches if not one.worse and not one.problem]:
-        evaluations = sum(one.evaluations for one in none)
+    for search in found.searches:
+        if search.problem:
+            yield f"  {search.entry}: no result: {search.problem}"
+        elif search.worse:
+            yield f"  {search.entry}: {search.sentence}"
+            yield from (f"    {title}" for title in search.modes[:MOST_MODES])
+            yield f"    {search.folder / 'report.html'}"
+    if none := [search for search in found.searches if not search.worse and not search.problem]:
+        evaluations = sum(than.evaluations for than in none)
         others = "other" if len(none) == 1 else "others"
         yield f"  none in {len(none)} {others} ({evaluations} evaluations)"
     yield ""

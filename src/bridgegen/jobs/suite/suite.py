@@ -75,11 +75,11 @@ class SuiteRun:
     @property
     def work(self) -> str:
         """How many variations have a result."""
-        return f"{sum(len(one.rows) for one in self.results):,} variations"
+        return f"{sum(len(result.rows) for result in self.results):,} variations"
 
     def of_ego(self, ego: str) -> tuple[EntryResult, ...]:
         """Return the results with one ego."""
-        return tuple(one for one in self.results if one.ego == ego)
+        return tuple(result for result in self.results if result.ego == ego)
 
     def to_json(self) -> Any:
         """Return the verdicts, counts, points, clauses and maps as JSON's types."""
@@ -157,7 +157,7 @@ def run_entries(job: frame.Job, given: ScenariosOptions) -> SuiteRun:
     settings = _settings(given, simulator)
     jobs = [
         Job(
-            one,
+            entry,
             ego or None,
             given.of_each,
             simulator,
@@ -165,7 +165,7 @@ def run_entries(job: frame.Job, given: ScenariosOptions) -> SuiteRun:
             given.seed,
             given.matrix,
         )
-        for one in entries
+        for entry in entries
         for ego in drivers
     ]
     path = folder / FILE
@@ -198,7 +198,7 @@ def read_suite(folder: Path) -> SuiteRun:
     header, results, _ = _read(folder / FILE)
     if header is None:
         raise StorageError(f"{folder}: holds no results of a suite ({FILE})")
-    egos = tuple(dict.fromkeys(one.ego for one in results))
+    egos = tuple(dict.fromkeys(result.ego for result in results))
     return SuiteRun(folder, egos, tuple(results), header.settings)
 
 
@@ -219,9 +219,9 @@ def _check(given: ScenariosOptions, simulator: SimulatorChoice) -> None:
 
 def _folder(files: Sequence[str | Path]) -> Path:
     """Return the folder of results by default: none of those that hold the scenarios."""
-    names = [Path(one).resolve().stem for one in files]
+    names = [Path(file).resolve().stem for file in files]
     folder = Path("suites") / ("-".join(names[:3]) + ("-and-more" if len(names) > 3 else ""))
-    if folder.resolve() in {Path(one).resolve() for one in files}:
+    if folder.resolve() in {Path(file).resolve() for file in files}:
         return folder.with_name(f"{folder.name}-results")
     return folder
 
@@ -234,7 +234,7 @@ def _settings(options: ScenariosOptions, simulator: SimulatorChoice) -> dict[str
         "seed": options.seed,
         "simulator": simulator.name,
         "simulator_settings": dict(simulator.settings),
-        "criteria": [dict(one) for one in options.criteria],
+        "criteria": [dict(criterion) for criterion in options.criteria],
         "critical": options.critical,
         "objective": None,  # each scenario's own; earlier versions took one for all
         "count": options.count,
@@ -259,7 +259,7 @@ def _run(
     number: Counter[str] = Counter()
 
     def show() -> None:
-        facts = [f"{number[one]} {one}" for one in ("not judged", "not run") if number[one]]
+        facts = [f"{number[name]} {name}" for name in ("not judged", "not run") if number[name]]
         facts = [f"{number['failed']} failed", *facts]
         given.callbacks.progress("scenarios", len(done), total, ", ".join(facts))
 
@@ -319,14 +319,14 @@ def _done(
         )
     wanted = {(job.entry.name, job.ego or ""): job for job in jobs}
     found = {}
-    for one in results:
-        job = wanted.get((one.entry, one.ego))
+    for result in results:
+        job = wanted.get((result.entry, result.ego))
         # Earlier versions did not record what happened: such an entry is run again.
-        is_whole = {"not_happened", "outside"} <= one.model_fields_set
-        if job is not None and job.is_of(one) and is_whole:
-            found[one.entry, one.ego] = one
+        is_whole = {"not_happened", "outside"} <= result.model_fields_set
+        if job is not None and job.is_of(result) and is_whole:
+            found[result.entry, result.ego] = result
     if torn or len(found) < len(results):  # what has changed is run again, and said once
-        lines = [header.model_dump_json(), *(one.model_dump_json() for one in found.values())]
+        lines = [header.model_dump_json(), *(result.model_dump_json() for result in found.values())]
         write_whole(path, [("\n".join(lines) + "\n").encode()])
     return found
 
@@ -354,10 +354,10 @@ def _read(path: Path) -> tuple[Header | None, list[EntryResult], bool]:
     try:
         header = Header.model_validate(parse_json(lines[0]))
         results = [EntryResult.model_validate(parse_json(line)) for line in lines[1:]]
-        for one in results:
-            for criterion in one.criteria:
+        for result in results:
+            for criterion in result.criteria:
                 read_criterion(criterion)
-            for clause in one.clauses:
+            for clause in result.clauses:
                 read_clause(clause)
     except ValidationError as error:
         first = error.errors(include_input=False, include_url=False)[0]

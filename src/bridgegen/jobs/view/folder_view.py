@@ -38,12 +38,12 @@ class FolderView:
 
     def _find(self) -> None:
         known = set(self._runs)  # a run keeps its number
-        self._runs += [one for one in find_runs(self.folder) if one not in known]
+        self._runs += [run for run in find_runs(self.folder) if run not in known]
 
     def page(self) -> bytes:
         """Return the list of all runs, as HTML."""
         self._find()
-        lines = [_facts(k, read_line(self.folder, one)) for k, one in enumerate(self._runs)]
+        lines = [_facts(k, read_line(self.folder, run)) for k, run in enumerate(self._runs)]
         data = script_json({"folder": str(self.folder), "runs": lines})
         return page_of("runs.js", f"{self.folder.name}: runs", data)
 
@@ -75,7 +75,7 @@ class FolderView:
 
 def _facts(number: int, line: RunLine) -> Mapping[str, Any]:
     bound = line.triage.bound if line.triage else None
-    worst = max(line.modes, key=lambda one: (not one.knife_edge, one.harm), default=None)
+    worst = max(line.modes, key=lambda item: (not item.knife_edge, item.harm), default=None)
     return {
         "number": number, "path": line.path, "problem": line.problem, "changed": line.changed,
         "size": line.size, "scenario": line.scenario, "ego": line.ego,
@@ -84,7 +84,7 @@ def _facts(number: int, line: RunLine) -> Mapping[str, Any]:
         "modes": len(line.modes) + (line.triage.unrecorded_modes if line.triage else 0),
         "worst": worst.title if worst else "",
         "judged": headline(line.ego, line.criteria),
-        "violated": any(one.violated for one in line.criteria),
+        "violated": any(criterion.violated for criterion in line.criteria),
         "failures": bound.failures if bound else None,
         "unjudged": bound is None or not bound.judged,
         "share": bound.space.share if bound else None,
@@ -111,16 +111,18 @@ def _share(line: RunLine) -> str:
 
 
 _FIGURES: dict[str, Callable[[RunLine], str]] = {
-    "scenario": lambda one: one.scenario,
-    "driver": lambda one: one.ego,
-    "algorithm": lambda one: f"{one.algorithm}, seed {one.seed}",
-    "evaluations": lambda one: f"{one.evaluations:,}" + ("" if one.finished else ", not finished"),
-    "pass criteria": lambda one: headline(one.ego, one.criteria) or "–",
-    "failures": lambda one: _failures(one),
-    "failure modes": lambda one: f"{len(one.modes):,}" if _is_judged(one) else "–",
+    "scenario": lambda line: line.scenario,
+    "driver": lambda line: line.ego,
+    "algorithm": lambda line: f"{line.algorithm}, seed {line.seed}",
+    "evaluations": lambda line: (
+        f"{line.evaluations:,}" + ("" if line.finished else ", not finished")
+    ),
+    "pass criteria": lambda line: headline(line.ego, line.criteria) or "–",
+    "failures": lambda line: _failures(line),
+    "failure modes": lambda line: f"{len(line.modes):,}" if _is_judged(line) else "–",
     "harmful share of the space": _share,
-    "worst severity (MAIS3+)": lambda one: (
-        share(max((mode.severity for mode in one.modes), default=0.0)) if _is_judged(one) else "–"
+    "worst severity (MAIS3+)": lambda line: (
+        share(max((mode.severity for mode in line.modes), default=0.0)) if _is_judged(line) else "–"
     ),
 }
 
@@ -137,19 +139,19 @@ def _matched(a: RunLine, b: RunLine) -> Iterator[tuple[str, list[str]]]:
         ],
     )  # fmt: skip
     for line, own, other in ((a, ours, theirs), (b, theirs, ours)):
-        alone = [one for key, one in own.items() if key not in other]
-        words = [f"{one[0].title}: {_count(one)} evaluations" for one in alone]
+        alone = [group for key, group in own.items() if key not in other]
+        words = [f"{group[0].title}: {_count(group)} evaluations" for group in alone]
         yield f"Only in {line.path}", words
 
 
 def _by_key(line: RunLine) -> dict[tuple[str, ...], list[Mode]]:
     """Return the modes of a run by what makes two of different runs the same, in their order."""
     found: dict[tuple[str, ...], list[Mode]] = {}
-    for one in line.modes:
-        key = (one.conflict, one.conflict_type, one.responsible, one.rule, one.partner)
-        found.setdefault(key, []).append(one)
+    for item in line.modes:
+        key = (item.conflict, item.conflict_type, item.responsible, item.rule, item.partner)
+        found.setdefault(key, []).append(item)
     return found
 
 
 def _count(modes: list[Mode]) -> str:
-    return f"{sum(one.count for one in modes):,}"
+    return f"{sum(item.count for item in modes):,}"

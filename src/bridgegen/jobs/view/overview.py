@@ -85,14 +85,14 @@ def find_folders(folder: Path, is_wanted: Callable[[Path], bool]) -> list[Path]:
     level, seen = [folder], 0
     for _ in range(DEEPEST + 2):
         below: list[Path] = []
-        for one in level:
+        for path in level:
             seen += 1
             if len(found) >= MOST_RUNS or seen > MOST_FOLDERS:
                 return sorted(found)
-            if one != folder and is_wanted(one):
-                found.append(one)
+            if path != folder and is_wanted(path):
+                found.append(path)
             else:
-                below += _folders_in(one)
+                below += _folders_in(path)
         level = below
     return sorted(found)
 
@@ -100,10 +100,10 @@ def find_folders(folder: Path, is_wanted: Callable[[Path], bool]) -> list[Path]:
 def _folders_in(folder: Path) -> list[Path]:
     try:
         with os.scandir(folder) as entries:
-            inner = [one.path for one in entries if one.is_dir(follow_symlinks=False)]
+            inner = [entry.path for entry in entries if entry.is_dir(follow_symlinks=False)]
     except OSError:
         return []  # not ours to read
-    return [Path(one) for one in sorted(inner) if not Path(one).name.startswith(".")]
+    return [Path(name) for name in sorted(inner) if not Path(name).name.startswith(".")]
 
 
 def read_line(
@@ -143,10 +143,10 @@ def read_line(
 def _sizes(folder: Path, depth: int = 2) -> Iterator[int]:
     try:
         with os.scandir(folder) as entries:
-            for one in entries:
-                if one.is_file(follow_symlinks=False):
-                    yield one.stat(follow_symlinks=False).st_size
-                elif depth and one.is_dir(follow_symlinks=False):
-                    yield from _sizes(Path(one.path), depth - 1)
+            for entry in entries:
+                if entry.is_file(follow_symlinks=False):
+                    yield entry.stat(follow_symlinks=False).st_size
+                elif depth and entry.is_dir(follow_symlinks=False):
+                    yield from _sizes(Path(entry.path), depth - 1)
     except OSError:
         return

@@ -80,7 +80,7 @@ class RunView:
             state = {
                 "finished": store.finished is not None,
                 "kept": len(self._run.exported()) + len(self._run.fresh_scenarios),
-                "elsewhere": sum(len(one.scenarios) for one in self._elsewhere(rows)),
+                "elsewhere": sum(len(record.scenarios) for record in self._elsewhere(rows)),
             }
             if len(rows) == after:
                 return state
@@ -93,12 +93,15 @@ class RunView:
             rows = self._read(store)
             if evaluation >= len(rows) or rows.status[evaluation] != 0:
                 return None
-            known = {one.evaluation: one for one in self._run.exported()}
+            known = {exported.evaluation: exported for exported in self._run.exported()}
             return motion_payload(self._pipeline, rows, evaluation, known.get(evaluation))
 
     def file(self, name: str) -> bytes | None:
         """Return an exported file, or a record of a later command; None for any other name."""
-        names = {name for one in self._run.exported() for name in one.files} | {JSON_FILE, OWL_FILE}
+        names = {name for exported in self._run.exported() for name in exported.files} | {
+            JSON_FILE,
+            OWL_FILE,
+        }
         names |= {file_name(name) for name in SIMULATORS}
         names |= {TRIAGE_FILE, *further_files(self.folder)}
         try:

@@ -199,17 +199,17 @@ class _Handler(BaseHTTPRequestHandler):
         except OSError:
             return True
 
-    def _send(self, one: Answer | None, *, body: bool = True) -> None:
-        if one is None:
+    def _send(self, item: Answer | None, *, body: bool = True) -> None:
+        if item is None:
             self.close_connection = True
             return
-        self.send_response(one.status)
-        for name, value in {**HEADERS, "Content-Type": one.kind}.items():
+        self.send_response(item.status)
+        for name, value in {**HEADERS, "Content-Type": item.kind}.items():
             self.send_header(name, value)
-        self.send_header("Content-Length", str(len(one.body)))
+        self.send_header("Content-Length", str(len(item.body)))
         self.end_headers()
         if body:
-            self.wfile.write(one.body)
+            self.wfile.write(item.body)
 
     def log_message(self, format: str, *args: object) -> None:
         """Say nothing: the terminal is the user's."""

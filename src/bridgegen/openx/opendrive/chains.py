@@ -71,7 +71,7 @@ def runs(road: Road) -> list[Run]:
 
 def _leads_on(section: LaneSection, following: LaneSection, ids: tuple[int, ...]) -> bool:
     """Return whether lanes of one section are those of the next: each by itself."""
-    pairs = [(section.lane(one), following.lane(one)) for one in ids]
+    pairs = [(section.lane(number), following.lane(number)) for number in ids]
     return all(
         lane is not None
         and onward is not None
@@ -115,9 +115,9 @@ def _arm_road(run: Run, end: str, inbound: set[int], meets: bool) -> ArmRoad:
             "in" if lane_id in inbound else "out",
             float(widths[lane_id][at] if meets else widths[lane_id].min()),
         )
-        for lane_id in sorted(run.ids, key=lambda one: (one not in inbound, abs(one)))
+        for lane_id in sorted(run.ids, key=lambda number: (number not in inbound, abs(number)))
     ]
-    sides: dict[bool, Direction] = {one.lane_id > 0: one.direction for one in lanes}
+    sides: dict[bool, Direction] = {lane.lane_id > 0: lane.direction for lane in lanes}
     speeds = [kind.speed for kind in road.types if kind.speed is not None]
     kinds = [kind.type for kind in road.types if kind.type in ROAD_TYPES]
     touches: JunctionEnd = "start" if end == "start" else "end"
@@ -150,15 +150,15 @@ def _strips(run: Run, widths: dict[int, Float], sides: dict[bool, Direction]) ->
     first, last = run.sections
     sections = run.road.sections[first : last + 1]
     for is_left, direction in sides.items():
-        outermost = max(abs(one) for one in run.ids if (one > 0) == is_left)
+        outermost = max(abs(number) for number in run.ids if (number > 0) == is_left)
         seen: set[LaneType] = set()
-        for lane in sorted(sections[0].lanes, key=lambda one: abs(one.id)):
+        for lane in sorted(sections[0].lanes, key=lambda item: abs(item.id)):
             kind = _STRIPS.get(lane.type)
             if kind is None or kind in seen or (lane.id > 0) != is_left:
                 continue
             same = [section.lane(lane.id) for section in sections]
             width = float(widths[lane.id].min())
-            goes_on = all(one is not None and one.type == lane.type for one in same)
+            goes_on = all(item is not None and item.type == lane.type for item in same)
             if abs(lane.id) > outermost and goes_on and width > 0.0:
                 seen.add(kind)
                 yield SiteLane(lane.id, direction, width, kind)

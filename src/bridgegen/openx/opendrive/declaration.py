@@ -129,17 +129,17 @@ def plan(cls: type) -> tuple[Field, ...]:
     """Return the fields of a class of the model, in the order of the declaration."""
     hints = get_type_hints(cls)
     found = []
-    for one in fields(cls):
-        form: Form = one.metadata["form"]
-        types = _types(hints[one.name])
+    for item in fields(cls):
+        form: Form = item.metadata["form"]
+        types = _types(hints[item.name])
         found.append(
             Field(
-                name=one.name,
+                name=item.name,
                 form=form,
                 types=types,
                 tags={kind.TAG: kind for kind in types} if form.role == "choice" else {},
-                required=one.default is MISSING,
-                default=None if one.default is MISSING else one.default,
+                required=item.default is MISSING,
+                default=None if item.default is MISSING else item.default,
             )
         )
     return tuple(found)

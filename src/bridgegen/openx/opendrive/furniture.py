@@ -88,9 +88,9 @@ class Object:
         if outline is None:
             return []
         cos, sin = math.cos(self.hdg or 0.0), math.sin(self.hdg or 0.0)
-        return [(one.s, one.t) for one in outline.corners_road] + [
-            (self.s + one.u * cos - one.v * sin, self.t + one.u * sin + one.v * cos)
-            for one in outline.corners_local
+        return [(road.s, road.t) for road in outline.corners_road] + [
+            (self.s + local.u * cos - local.v * sin, self.t + local.u * sin + local.v * cos)
+            for local in outline.corners_local
         ]
 
 

@@ -116,27 +116,27 @@ def evaluate(geometry: Geometry, u: Float) -> Curve:
 def geometry_index(road: Road, s: float) -> int:
     """Return which geometry of a road holds at ``s`` [m]: the last one that starts before it."""
     index = 0
-    for index, one in enumerate(road.plan_view):
-        if one.s > s:
+    for index, geometry in enumerate(road.plan_view):
+        if geometry.s > s:
             return max(index - 1, 0)
     return index
 
 
 def reference_pose(road: Road, s: float) -> Pose:
     """Return where a road's reference line is at ``s`` [m]."""
-    one = road.plan_view[geometry_index(road, s)]
-    return pose(one, s - one.s)
+    geometry = road.plan_view[geometry_index(road, s)]
+    return pose(geometry, s - geometry.s)
 
 
 def reference_line(road: Road, s: Float) -> Curve:
     """Return a road's reference line at many s [m], ascending or not; ``(P,)`` float64."""
-    starts = np.array([one.s for one in road.plan_view])
+    starts = np.array([geometry.s for geometry in road.plan_view])
     which = np.maximum(np.searchsorted(starts, s, side="right") - 1, 0)
     out = Curve(*(np.empty_like(s) for _ in Curve._fields))
     for index in np.unique(which):
         at = which == index
-        one = road.plan_view[index]
-        for target, values in zip(out, evaluate(one, s[at] - one.s), strict=True):
+        item = road.plan_view[index]
+        for target, values in zip(out, evaluate(item, s[at] - item.s), strict=True):
             target[at] = values
     return out
 

@@ -51,8 +51,8 @@ def plan_with_changes(model: OpenDrive, places: Sequence[tuple[str, int, float]]
         InputError: a place is not on the road network, or there is no way from one to the next.
     """
     stops = [Place(*place) for place in places]
-    for one in stops:
-        lane_at(model.road(one.road_id), one.lane_id, one.s)
+    for stop in stops:
+        lane_at(model.road(stop.road_id), stop.lane_id, stop.s)
     steps: list[Step] = []
     for start, end in pairwise(stops):
         try:
@@ -72,8 +72,8 @@ def change_lanes(model: OpenDrive, start: Place, end: Place) -> list[Step]:
         InputError: there is none, or too little room for its lane changes.
     """
     first, last = (
-        Stretch(one.road_id, section_index(model.road(one.road_id), one.s), one.lane_id)
-        for one in (start, end)
+        Stretch(place.road_id, section_index(model.road(place.road_id), place.s), place.lane_id)
+        for place in (start, end)
     )
     road = model.road(end.road_id)
     way = road.direction(end.lane_id)
@@ -93,7 +93,7 @@ def change_lanes(model: OpenDrive, start: Place, end: Place) -> list[Step]:
 
 def _steps(model: OpenDrive, chain: list[Stretch], start: Place, end: Place) -> list[Step]:
     steps: list[Step] = []
-    groups = [list(same) for _, same in groupby(chain, key=lambda one: one[:2])]
+    groups = [list(same) for _, same in groupby(chain, key=lambda stretch: stretch[:2])]
     for number, lanes in enumerate(groups):
         road = model.road(lanes[0].road_id)
         entry, leave = _ends(road, lanes[0])
@@ -110,7 +110,7 @@ def _chain(
 
     A change costs the more, the less room there is for it.
     """
-    sections = {one[:2] for one in targets}
+    sections = {target[:2] for target in targets}
     come_from: dict[Stretch, Stretch | None] = {}
     queue: list[tuple[float, int, Stretch, Stretch | None]] = [(0.0, 0, first, None)]
     count, found = 0, None
@@ -125,10 +125,10 @@ def _chain(
         entry = start.s if stretch[:2] == first[:2] else entry
         rest = abs(leave - entry)
         room = abs(end.s - entry) if stretch[:2] in sections else rest
-        onward = [(rest, one) for one in next_stretches(model, stretch)]
+        onward = [(rest, item) for item in next_stretches(model, stretch)]
         if room >= SHORTEST:
             change = _COST * (1.0 + 2.0 * USUAL / room)
-            onward += [(change, one) for one in _beside(model, stretch)]
+            onward += [(change, item) for item in _beside(model, stretch)]
         for more, following in onward:
             if following not in come_from:
                 count += 1
@@ -168,18 +168,18 @@ def _within(road: Road, lanes: list[Stretch], entry: float, leave: float) -> Ite
             f"a lane change needs {SHORTEST:g} m of road, but there are {room:.3g} m on road "
             f"{road.id} from s={entry:g} m to s={leave:g} m"
         )
-    for one, other in pairwise(lanes):
+    for stretch, other in pairwise(lanes):
         until = at + way * min(USUAL, room)
-        yield from _change(road, one, other, at, until)
+        yield from _change(road, stretch, other, at, until)
         at = until
     if at != leave or len(lanes) == 1:
         yield Step(road.id, lanes[-1].lane_id, at, leave)
 
 
-def _change(road: Road, one: Stretch, other: Stretch, s: float, s_end: float) -> Iterator[Step]:
+def _change(road: Road, item: Stretch, other: Stretch, s: float, s_end: float) -> Iterator[Step]:
     """Yield a change from one lane to the next: half of it on either."""
     low, high = min(s, s_end), max(s, s_end)
-    at_low, at_high = (one, other) if s < s_end else (other, one)
+    at_low, at_high = (item, other) if s < s_end else (other, item)
     a, b = _centre(road, at_low, low, high)
     c, d = _centre(road, at_high, high, low)
     span = high - low
@@ -189,7 +189,7 @@ def _change(road: Road, one: Stretch, other: Stretch, s: float, s_end: float) ->
         (2.0 * (a - c) / span + b + d) / span**2,
     )  # fmt: skip
     middle = 0.5 * (s + s_end)
-    for stretch, first, last in ((one, s, middle), (other, middle, s_end)):
+    for stretch, first, last in ((item, s, middle), (other, middle, s_end)):
         across = shifted(cubic, min(first, last) - low)
         yield Step(road.id, stretch.lane_id, first, last, across)
 
@@ -248,16 +248,16 @@ def marking(section: LaneSection, lane_id: int, s: float) -> RoadMark | None:
     """
     lane = section.lane(lane_id) if lane_id else next(iter(section.center), None)
     held = None
-    for one in sorted(lane.road_marks if lane else (), key=lambda each: each.s):
-        if one.s <= s or held is None:
-            held = one
+    for mark in sorted(lane.road_marks if lane else (), key=lambda each: each.s):
+        if mark.s <= s or held is None:
+            held = mark
     return held
 
 
 def changes(section: LaneSection) -> list[float]:
     """Return where any marking of a section changes [m from its start]."""
     lanes = (*section.lanes, *section.center)
-    return sorted({one.s for lane in lanes for one in lane.road_marks if one.s > 0.0})
+    return sorted({mark.s for lane in lanes for mark in lane.road_marks if mark.s > 0.0})
 
 
 def allows_change(mark: RoadMark | None, border: int, lane_id: int, other: int) -> bool:

@@ -128,7 +128,7 @@ class LaneGraph:
             elif onward:
                 heading = self._heading(number)
                 turns = [
-                    abs(math.remainder(self._heading(one) - heading, math.tau)) for one in onward
+                    abs(math.remainder(self._heading(item) - heading, math.tau)) for item in onward
                 ]
                 found[number] = onward[int(np.argmin(np.round(turns, 6)))]
         return found

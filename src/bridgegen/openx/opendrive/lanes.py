@@ -34,10 +34,10 @@ class LanePose(NamedTuple):
 def rebased(records: Sequence[Cubic], s: float, inside: float) -> Coefficients:
     """Return the cubic that holds at ``inside``, as coefficients over the distance from ``s``."""
     held: Cubic | None = None
-    for one in records:
-        if one.s > inside:
+    for record in records:
+        if record.s > inside:
             break
-        held = one
+        held = record
     if held is None:
         return ZERO
     return shifted((held.a, held.b, held.c, held.d), s - held.s)
@@ -135,19 +135,19 @@ def centre_of(
     """
     side = 1.0 if lane.id > 0 else -1.0
     a, b, c, d = rebased(road.lane_offsets, s, inside)
-    parts = [(side, one) for one in inner_lanes(section, lane.id)]
-    for share, one in (*parts, (0.5 * side, lane)):
-        wa, wb, wc, wd = width_of(section, one, s, inside)
+    parts = [(side, item) for item in inner_lanes(section, lane.id)]
+    for share, part in (*parts, (0.5 * side, lane)):
+        wa, wb, wc, wd = width_of(section, part, s, inside)
         a, b, c, d = a + share * wa, b + share * wb, c + share * wc, d + share * wd
     return a, b, c, d
 
 
 def breaks(road: Road, section: LaneSection, lane: Lane) -> Iterable[float]:
     """Yield every s [m] at which the formula of a lane's centre may change."""
-    yield from (one.s for one in road.plan_view)
-    yield from (one.s for one in road.lane_offsets)
+    yield from (geometry.s for geometry in road.plan_view)
+    yield from (offset.s for offset in road.lane_offsets)
     for each in (lane, *inner_lanes(section, lane.id)):
-        yield from (section.s + one.s for one in each.widths)
+        yield from (section.s + width.s for width in each.widths)
 
 
 def lane_pose(road: Road, lane_id: int, s: float) -> LanePose:
@@ -180,7 +180,7 @@ def values(records: Sequence[Cubic], s: Float) -> Float:
     """Return the values of a list of cubics at many s; 0 before the first; ``(P,)`` float64."""
     if not records:
         return np.zeros_like(s)
-    table = np.array([(one.s, one.a, one.b, one.c, one.d) for one in records])
+    table = np.array([(record.s, record.a, record.b, record.c, record.d) for record in records])
     which = np.searchsorted(table[:, 0], s, side="right") - 1
     start, a, b, c, d = table[np.maximum(which, 0)].T
     ds = s - start
@@ -203,7 +203,7 @@ def borders(road: Road, index: int, s: Float) -> dict[int, Float]:
     found = {0: offset}
     for side, lanes in ((1.0, section.left), (-1.0, section.right)):
         t = offset
-        for lane in sorted(lanes, key=lambda one: abs(one.id)):
+        for lane in sorted(lanes, key=lambda item: abs(item.id)):
             t = t + side * values(lane.widths, s - section.s)
             found[lane.id] = t
     return found

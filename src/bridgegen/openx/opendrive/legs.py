@@ -30,7 +30,9 @@ def junction_end(road: Road) -> str:
 def governs(road: Road, signal: Signal | SignalReference, lane_id: int) -> bool:
     """Return whether a signal is for the traffic of a lane."""
     if signal.validity:
-        return any(one.from_lane <= lane_id <= one.to_lane for one in signal.validity)
+        return any(
+            validity.from_lane <= lane_id <= validity.to_lane for validity in signal.validity
+        )
     way = {"+": 1, "-": -1}.get(signal.orientation)
     return way in (None, road.direction(lane_id))
 

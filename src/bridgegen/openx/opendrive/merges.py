@@ -56,7 +56,7 @@ def merges(model: OpenDrive, map_name: str | None = None) -> Iterator[Site]:
             )
             from_ramp = legs[1].heading_deg - legs[0].heading_deg
             onwards = legs[2].heading_deg - legs[0].heading_deg + 180.0
-            if max(abs(math.remainder(one, 360.0)) for one in (from_ramp, onwards)) < ASIDE:
+            if max(abs(math.remainder(value, 360.0)) for value in (from_ramp, onwards)) < ASIDE:
                 sites.append(Site(map_stem(model, map_name), map_name, "", None, legs, "Merge"))
         for number, site in enumerate(sites, start=1):
             place_id = junction.id if len(sites) == 1 else f"{junction.id}.{number}"
@@ -66,7 +66,7 @@ def merges(model: OpenDrive, map_name: str | None = None) -> Iterator[Site]:
 def through(model: OpenDrive, site: Site) -> float:
     """Return how far the ramp's lane leads through the junction of an entry [m]."""
     _, ramp, after = (leg.roads[0] for leg in site.legs)
-    (lane,) = (one.lane_id for one in ramp.along("in"))
+    (lane,) = (site_lane.lane_id for site_lane in ramp.along("in"))
     last = after.along("out")[-1].lane_id
     start, end = (ramp.road_id, lane, ramp.near), (after.road_id, last, after.near)
     steps = plan_route(model, start, (), end).steps

@@ -367,7 +367,7 @@ class OpenDrive:
     def _back(self, junction_id: str, connection: Connection) -> Connection:
         """Return the same link of two roads, seen from the other one."""
         touching = self.roads_by_id[connection.incoming_road].ends_at(junction_id)
-        links = tuple(LaneLink(one.to_lane, one.from_lane) for one in connection.lane_links)
+        links = tuple(LaneLink(link.to_lane, link.from_lane) for link in connection.lane_links)
         return Connection(
             connection.id, connection.entered_road, None, touching[0], links,
             connection.incoming_road,

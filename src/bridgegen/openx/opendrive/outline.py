@@ -43,8 +43,8 @@ class Light:
 
 def crosswalk_stripes(road: Road) -> Iterator[Float]:
     """Yield the stripes of a road's crosswalks, each as its four corners ``(4, 2)`` [m]."""
-    for one in road.objects:
-        corners = outline_of(road, one) if one.type == "crosswalk" else None
+    for obj in road.objects:
+        corners = outline_of(road, obj) if obj.type == "crosswalk" else None
         if corners is None or len(corners) != _CORNERS:
             continue
         a, b, c, d = corners
@@ -60,44 +60,49 @@ def crosswalk_stripes(road: Road) -> Iterator[Float]:
 
 def stop_lines(road: Road) -> Iterator[tuple[float, Float]]:
     """Yield the stop lines that a road's objects are: s [m], and both ends ``(2, 2)`` [m]."""
-    for one in road.objects:
-        t = [corner for _, corner in one.corners]
-        if t and (one.subtype or "").lower() == "stopline":
-            yield one.s, points(road, np.array([one.s, one.s]), np.array([min(t), max(t)]))
+    for obj in road.objects:
+        t = [corner for _, corner in obj.corners]
+        if t and (obj.subtype or "").lower() == "stopline":
+            yield obj.s, points(road, np.array([obj.s, obj.s]), np.array([min(t), max(t)]))
 
 
 def signs(road: Road) -> Iterator[Float]:
     """Yield the signs beside a road as they look from above: a line across, ``(2, 2)`` [m]."""
-    for one in road.signals:
-        if one.dynamic == "no":
-            half = 0.5 * (one.width or _SIGN_WIDTH)
-            yield points(road, np.array([one.s, one.s]), np.array([one.t - half, one.t + half]))
+    for signal in road.signals:
+        if signal.dynamic == "no":
+            half = 0.5 * (signal.width or _SIGN_WIDTH)
+            yield points(
+                road, np.array([signal.s, signal.s]), np.array([signal.t - half, signal.t + half])
+            )
 
 
 def lights(model: OpenDrive) -> list[Light]:
     """Return the traffic lights of a road network."""
     return [
-        _light(road, one) for road in model.roads for one in road.signals if one.dynamic == "yes"
+        _light(road, signal)
+        for road in model.roads
+        for signal in road.signals
+        if signal.dynamic == "yes"
     ]
 
 
-def _light(road: Road, one: Signal) -> Light:
-    ((x, y),) = points(road, np.array([one.s]), np.array([one.t]))
-    h = reference_pose(road, min(max(one.s, 0.0), road.length)).h
-    return Light(one.id, float(x), float(y), h if one.orientation != "-" else h + math.pi)
+def _light(road: Road, signal: Signal) -> Light:
+    ((x, y),) = points(road, np.array([signal.s]), np.array([signal.t]))
+    h = reference_pose(road, min(max(signal.s, 0.0), road.length)).h
+    return Light(signal.id, float(x), float(y), h if signal.orientation != "-" else h + math.pi)
 
 
-def outline_of(road: Road, one: Object) -> Float | None:
+def outline_of(road: Road, obj: Object) -> Float | None:
     """Return the corners of an object's outline, ``(P, 2)`` [m]; None if it has none."""
-    outline = one.outline or (one.outlines[0] if one.outlines else None)
+    outline = obj.outline or (obj.outlines[0] if obj.outlines else None)
     if outline is None:
         return None
     if outline.corners_road:
         s, t = (np.array([getattr(each, name) for each in outline.corners_road]) for name in "st")
         found = points(road, np.clip(s, 0.0, road.length), t)
     elif outline.corners_local:
-        ((x, y),) = points(road, np.array([min(one.s, road.length)]), np.array([one.t]))
-        h = reference_pose(road, min(one.s, road.length)).h + (one.hdg or 0.0)
+        ((x, y),) = points(road, np.array([min(obj.s, road.length)]), np.array([obj.t]))
+        h = reference_pose(road, min(obj.s, road.length)).h + (obj.hdg or 0.0)
         u, v = (np.array([getattr(each, name) for each in outline.corners_local]) for name in "uv")
         found = np.stack(
             [x + u * math.cos(h) - v * math.sin(h), y + u * math.sin(h) + v * math.cos(h)], axis=1
@@ -158,9 +163,9 @@ def outline(
     junctions, roads = list(model.junctions), list(model.roads)
     if along:
         touched = dict.fromkeys(_junctions_at(model, along))
-        junctions = [model.junction(one) for one in touched]
-        beside = {road.id: road for one in touched for road in _legs(model, one)}
-        roads = list((beside | {one: model.road(one) for one in along}).values())
+        junctions = [model.junction(name) for name in touched]
+        beside = {road.id: road for name in touched for road in _legs(model, name)}
+        roads = list((beside | {name: model.road(name) for name in along}).values())
     elif junction_id:
         junctions, roads = [model.junction(junction_id)], _legs(model, junction_id)
     shapes = [
@@ -246,11 +251,13 @@ def _waits(model: OpenDrive, road: Road, contact: str) -> bool:
     Not on motorways; if some of a junction's roads have lights or signs, only on those.
     """
     link = road.link(contact)
-    if link is None or any(one.type == "motorway" for one in road.types):
+    if link is None or any(kind.type == "motorway" for kind in road.types):
         return False
-    legs = [one for one in model.roads if one.ends_at(link.element_id) and not one.is_connecting]
+    legs = [
+        item for item in model.roads if item.ends_at(link.element_id) and not item.is_connecting
+    ]
     signed = [
-        one for one in legs if any(s.dynamic == "yes" or s.type in _WAIT for s in one.signals)
+        leg for leg in legs if any(s.dynamic == "yes" or s.type in _WAIT for s in leg.signals)
     ]
     return not signed or road in signed
 

@@ -91,7 +91,7 @@ def _complain(place: str, reader: "_Reader") -> None:
 
 
 def _sentences(place: str, problems: list[tuple[int, str]]) -> Iterator[str]:
-    for line, problem in sorted(problems, key=lambda one: one[0])[:SHOWN]:
+    for line, problem in sorted(problems, key=lambda pair: pair[0])[:SHOWN]:
         yield f"{place}, line {line}: {problem}"
     if len(problems) > SHOWN:
         yield f"{place}: and {len(problems) - SHOWN} more such problems"
@@ -122,29 +122,29 @@ class _Reader:
         before = len(self.problems)
         attributes, below, tree = _table(cls)
         values: dict[str, Any] = {}
-        for one, key in attributes:
+        for attribute, key in attributes:
             raw = element.get(key)
             if raw is not None:
-                values[one.name] = self._value(one, str(raw), element, decoration)
-            elif one.form.fallback is not None:
-                values[one.name] = self._fallback(element, one, "missing")
-            elif one.required:
+                values[attribute.name] = self._value(attribute, str(raw), element, decoration)
+            elif attribute.form.fallback is not None:
+                values[attribute.name] = self._fallback(element, attribute, "missing")
+            elif attribute.required:
                 self._note(element, f"attribute {key} is required")
         found: dict[str, list[Any]] = {}
         if len(element):
             self._collect(element, tree, found)
-        for one in below:
-            items = found.get(one.name, [])
-            if one.form.role in ("children", "ids"):
-                self._require(element, one, len(items) >= one.form.least)
-                values[one.name] = tuple(items)
+        for field in below:
+            items = found.get(field.name, [])
+            if field.form.role in ("children", "ids"):
+                self._require(element, field, len(items) >= field.form.least)
+                values[field.name] = tuple(items)
             else:
-                if one.form.fallback is not None and not items:
-                    items = [self._fallback(element, one, "missing")]
-                self._require(element, one, bool(items) or not one.required)
+                if field.form.fallback is not None and not items:
+                    items = [self._fallback(element, field, "missing")]
+                self._require(element, field, bool(items) or not field.required)
                 if len(items) > 1:
-                    self._note(element, f"only one <{_name(one)}> is allowed, got {len(items)}")
-                values[one.name] = items[0] if items else None
+                    self._note(element, f"only one <{_name(field)}> is allowed, got {len(items)}")
+                values[field.name] = items[0] if items else None
         if len(self.problems) > before:
             return self._left_out(element, before) if decoration else None
         record = cls(**values)
@@ -164,11 +164,11 @@ class _Reader:
         )
         return _LEFT_OUT
 
-    def _fallback(self, element: etree._Element, one: Field, problem: str) -> Any:
-        value = one.form.fallback
-        name = _name(one)
+    def _fallback(self, element: etree._Element, field: Field, problem: str) -> Any:
+        value = field.form.fallback
+        name = _name(field)
         what = f"{name} is {problem}"
-        if one.form.role == "attribute":
+        if field.form.role == "attribute":
             what += f", read as {value}"
         else:
             what = f"<{name}> is {problem}"
@@ -181,7 +181,7 @@ class _Reader:
             impossible = impossible_shape(record) if record.length > 0.0 else None
             if impossible:
                 self._note(element, impossible)
-            sharpest = max((abs(one) for one in _curvatures(record)), default=0.0)
+            sharpest = max((abs(curvature) for curvature in _curvatures(record)), default=0.0)
             if sharpest > SHARP_CURVATURE:
                 self.notes.add(
                     "sharp",
@@ -190,7 +190,9 @@ class _Reader:
                     f"{1.0 / sharpest:.2g} m, which no vehicle does",
                 )
         elif isinstance(record, Road | Junction | Connection):
-            if isinstance(record, Road) and not any(one.length > 0.0 for one in record.plan_view):
+            if isinstance(record, Road) and not any(
+                geometry.length > 0.0 for geometry in record.plan_view
+            ):
                 self._note(element, "length [m] of a geometry must be > 0, got 0")
             self.lines[id(record)] = _line(element)
 
@@ -210,43 +212,43 @@ class _Reader:
                 what = f"{_where(item)} is passed over: the signal stands at its s and t"
                 self.notes.add("positionInertial", _line(item), what)
 
-    def _item(self, one: Field, item: etree._Element) -> Any:
-        role = one.form.role
+    def _item(self, field: Field, item: etree._Element) -> Any:
+        role = field.form.role
         if role == "text":
             return (item.text or "").strip()
         if role == "ids":
             return self._value(ID, str(item.get("id", "")), item)
-        if one.types[0] is Junction and item.get("type", "default") not in JUNCTION_TYPES:
+        if field.types[0] is Junction and item.get("type", "default") not in JUNCTION_TYPES:
             self.beyond.append((_line(item), f"{_where(item)}: type '{item.get('type')}'"))
             return None
         before = len(self.problems)
-        made = self.record(one.tags[_tag(item)] if role == "choice" else one.types[0], item)
-        if made is None and one.form.decoration:
+        made = self.record(field.tags[_tag(item)] if role == "choice" else field.types[0], item)
+        if made is None and field.form.decoration:
             return self._left_out(item, before)
         return made
 
     def _value(
-        self, one: Field, raw: str, element: etree._Element, decoration: bool = False
+        self, field: Field, raw: str, element: etree._Element, decoration: bool = False
     ) -> Any:
         try:
-            return _parse(one, raw)
+            return _parse(field, raw)
         except ValueError as error:
-            unit = f" [{one.form.unit}]" if one.form.unit else ""
+            unit = f" [{field.form.unit}]" if field.form.unit else ""
             shown = raw if len(raw) <= 40 else raw[:40] + "…"
-            problem = f"{one.form.path[0]}{unit} must be {error}, got '{shown}'"
-            if one.form.fallback is not None:
-                return self._fallback(element, one, f"'{shown}'")
-            optional_number = one.default is None and str not in one.types
-            if not one.required and (decoration or optional_number):
-                key = f"{_tag(element)} {one.name}"
+            problem = f"{field.form.path[0]}{unit} must be {error}, got '{shown}'"
+            if field.form.fallback is not None:
+                return self._fallback(element, field, f"'{shown}'")
+            optional_number = field.default is None and str not in field.types
+            if not field.required and (decoration or optional_number):
+                key = f"{_tag(element)} {field.name}"
                 self.notes.add(key, _line(element), f"{_where(element)}: {problem}; passed over")
-                return one.default
+                return field.default
             self._note(element, problem)
 
-    def _require(self, element: etree._Element, one: Field, there: bool) -> None:
+    def _require(self, element: etree._Element, field: Field, there: bool) -> None:
         if not there:
             got = ", ".join(_tag(item) for item in element) or "nothing"
-            self._note(element, f"<{_name(one)}> is required, got {got}")
+            self._note(element, f"<{_name(field)}> is required, got {got}")
 
     def _note(self, element: etree._Element, problem: str) -> None:
         self.problems.append((_line(element), f"{_where(element)}: {problem}"))
@@ -267,29 +269,31 @@ def _curvatures(geometry: Geometry) -> tuple[float, ...]:
 @cache
 def _table(cls: type) -> tuple[list[tuple[Field, str]], list[Field], _Tree]:
     """Return a class's attributes with their names, its other fields, and these by their tags."""
-    attributes = [(one, one.form.path[0]) for one in plan(cls) if one.form.role == "attribute"]
-    below = [one for one in plan(cls) if one.form.role != "attribute"]
+    attributes = [
+        (field, field.form.path[0]) for field in plan(cls) if field.form.role == "attribute"
+    ]
+    below = [field for field in plan(cls) if field.form.role != "attribute"]
     tree: _Tree = {}
-    for one in below:
-        paths: list[tuple[str, ...]] = [(tag,) for tag in one.tags]
-        for path in paths or [one.form.path]:
+    for field in below:
+        paths: list[tuple[str, ...]] = [(tag,) for tag in field.tags]
+        for path in paths or [field.form.path]:
             level = tree
             for tag in path[:-1]:
                 branch = level.setdefault(tag, {})
                 assert isinstance(branch, dict)
                 level = branch
-            level[path[-1]] = one
+            level[path[-1]] = field
     return attributes, below, tree
 
 
-def _parse(one: Field, raw: str) -> float | int | bool | str:
+def _parse(field: Field, raw: str) -> float | int | bool | str:
     """Return the value of a text; a ValueError states the valid form."""
-    form = one.form
-    if form.words and (float not in one.types or raw in form.words):
+    form = field.form
+    if form.words and (float not in field.types or raw in form.words):
         if raw not in form.words:
             raise ValueError(f"one of {', '.join(form.words)}")
         return raw
-    kind = one.types[0]
+    kind = field.types[0]
     if kind is str:
         return raw
     if kind is bool:
@@ -323,8 +327,8 @@ def _tag(element: etree._Element) -> str:
     return tag.rpartition("}")[2] if "}" in tag else tag
 
 
-def _name(one: Field) -> str:
-    return "> or <".join(one.tags) or "/".join(one.form.path)
+def _name(field: Field) -> str:
+    return "> or <".join(field.tags) or "/".join(field.form.path)
 
 
 def _line(element: etree._Element) -> int:
@@ -334,6 +338,6 @@ def _line(element: etree._Element) -> int:
 def _where(element: etree._Element) -> str:
     """Return what to call an element: the things with an id that it is in, and its own tag."""
     around = [element, *element.iterancestors()]
-    named = [f"{_tag(one)} {one.get('id')}" for one in reversed(around) if one.get("id")]
+    named = [f"{_tag(item)} {item.get('id')}" for item in reversed(around) if item.get("id")]
     own = [] if element.get("id") else [f"<{_tag(element)}>"]
     return ", ".join(named + own)

@@ -49,7 +49,7 @@ def repair(model: OpenDrive, lines: Lines, notes: Notes) -> OpenDrive:
 
 
 def _reference_line(road: Road, line: int, notes: Notes) -> Road:
-    pieces = tuple(one for one in road.plan_view if one.length > 0.0)
+    pieces = tuple(geometry for geometry in road.plan_view if geometry.length > 0.0)
     if len(pieces) < len(road.plan_view):
         notes.add("no length", line, f"road {road.id}: a geometry of length 0 m is left out")
         road = replace(road, plan_view=pieces)
@@ -77,7 +77,9 @@ def _widths(road: Road, line: int, notes: Notes) -> Road:
         for side in (section.left, section.right):
             kept = []
             for lane in side:
-                within = tuple(one for one in lane.widths if one.s <= max(length, 0.0) + SLACK)
+                within = tuple(
+                    width for width in lane.widths if width.s <= max(length, 0.0) + SLACK
+                )
                 if len(within) < len(lane.widths):
                     beyond = lane.widths[-1].s
                     notes.add(
@@ -122,7 +124,7 @@ def _counted(
 ) -> tuple[Lane, ...]:
     """Return the lanes of a side with a lane of no width for each number that is missing."""
     ids = {lane.id for lane in lanes}
-    if len(ids) < len(lanes) or any(one * side <= 0 for one in ids):
+    if len(ids) < len(lanes) or any(number * side <= 0 for number in ids):
         return lanes  # not a matter of counting: the reader says so
     missing = [side * k for k in range(1, max(map(abs, ids), default=0)) if side * k not in ids]
     if not missing or len(missing) > MISSING_LANES:
@@ -134,7 +136,7 @@ def _counted(
         f"{sorted(ids, key=abs)}: read with lanes of no width in the gaps",
     )
     none = (Width(0.0, 0.0, 0.0, 0.0, 0.0),)
-    filled = [*lanes, *(Lane(one, "none", widths=none) for one in missing)]
+    filled = [*lanes, *(Lane(number, "none", widths=none) for number in missing)]
     return tuple(sorted(filled, key=lambda lane: -lane.id))
 
 
@@ -144,11 +146,11 @@ def _from_borders(lanes: tuple[Lane, ...], side: float) -> tuple[Lane, ...]:
         return lanes
     made: dict[int, Lane] = {}
     inner: tuple[Cubic, ...] = ()  # |t| of the border so far
-    for lane in sorted(lanes, key=lambda one: abs(one.id)):
+    for lane in sorted(lanes, key=lambda item: abs(item.id)):
         if lane.borders and not lane.widths:
             outer: tuple[Cubic, ...] = tuple(
-                Width(one.s, side * one.a, side * one.b, side * one.c, side * one.d)
-                for one in lane.borders
+                Width(border.s, side * border.a, side * border.b, side * border.c, side * border.d)
+                for border in lane.borders
             )
             made[lane.id] = replace(lane, widths=_sum(outer, inner, -1.0), borders=())
             inner = outer
@@ -158,11 +160,11 @@ def _from_borders(lanes: tuple[Lane, ...], side: float) -> tuple[Lane, ...]:
     return tuple(made[lane.id] for lane in lanes)
 
 
-def _sum(one: Sequence[Cubic], other: Sequence[Cubic], share: float) -> tuple[Width, ...]:
+def _sum(group: Sequence[Cubic], other: Sequence[Cubic], share: float) -> tuple[Width, ...]:
     """Return the sum of two lists of cubics, the second times ``share``."""
-    starts = sorted({each.s for each in (*one, *other)})
+    starts = sorted({each.s for each in (*group, *other)})
     found = []
     for s in starts:
-        both = zip(rebased(one, s, s), rebased(other, s, s), strict=True)
+        both = zip(rebased(group, s, s), rebased(other, s, s), strict=True)
         found.append(Width(s, *(x + share * y for x, y in both)))
     return tuple(found)

@@ -31,7 +31,10 @@ def repair_links(model: OpenDrive, lines: Lines, notes: Notes) -> OpenDrive:
         lines: where its roads, junctions and connections stand; those of repaired ones are added.
         notes: takes a sentence for each repair.
     """
-    ids = Counter(road.id for road in model.roads), Counter(one.id for one in model.junctions)
+    ids = (
+        Counter(road.id for road in model.roads),
+        Counter(junction.id for junction in model.junctions),
+    )
     if any(count > 1 for some in ids for count in some.values()):
         return model  # the reader refuses ids that occur twice
     return _Links(model, lines, notes).repaired()
@@ -46,7 +49,7 @@ class _Links:
     def repaired(self) -> OpenDrive:
         for road in self._model.roads:
             self._road(road)
-        junctions = tuple(self._junction(one) for one in self._model.junctions)
+        junctions = tuple(self._junction(junction) for junction in self._model.junctions)
         roads = tuple(self._roads[road.id] for road in self._model.roads)
         if (roads, junctions) == (self._model.roads, self._model.junctions):
             return self._model

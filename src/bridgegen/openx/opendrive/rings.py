@@ -53,7 +53,7 @@ def rings(model: OpenDrive) -> Iterator[Ring]:
                 continue
             seen.add(key)
             whole = math.tau if model.road(road_id).rule == "RHT" else -math.tau
-            if abs(sum(_turning(model.road(one), ways[one]) for one in cycle) - whole) < _SLACK:
+            if abs(sum(_turning(model.road(name), ways[name]) for name in cycle) - whole) < _SLACK:
                 ring = _ring(model, cycle)
                 if len(ring.ends) > 1:
                     yield ring
@@ -80,7 +80,7 @@ def _onward(model: OpenDrive, road_id: str, ways: dict[str, int]) -> Iterator[st
         if lane.drivable
         for following in next_stretches(model, Stretch(road_id, last, lane.id))
     )
-    yield from (one for one in found if one in ways and one != road_id)
+    yield from (name for name in found if name in ways and name != road_id)
 
 
 def _cycles(
@@ -110,7 +110,7 @@ def _turning(road: Road, way: int) -> float:
 
 
 def _ring(model: OpenDrive, cycle: tuple[str, ...]) -> Ring:
-    roads = [model.road(one) for one in cycle]
+    roads = [model.road(name) for name in cycle]
     junctions: dict[str, None] = {}
     for road in roads:
         if road.is_connecting:

@@ -45,7 +45,7 @@ def map_path(path: Path) -> Path:
     rule = f"{path}: neither a file nor the name of a map of CARLA"
     if not root:
         raise FileFormatError(f"{rule}, as neither --maps nor {ROOT} says where CARLA is")
-    if not all(one.isalnum() or one in "_-" for one in path.name):
+    if not all(name.isalnum() or name in "_-" for name in path.name):
         raise FileFormatError(f"{rule}, which has letters, digits, _ and - only")
     for place in _PLACES:
         found = sorted(Path(root).glob(place.format(name=path.name)))
@@ -138,9 +138,9 @@ def map_of(owl: Path) -> tuple[Path, str]:
     individuals = load(owl)
     networks = individuals.of_class("RoadNetwork")
     named = [
-        (individuals.optional_text(one, "has_map_file"),
-         individuals.optional_text(one, "has_map_digest"))
-        for one in networks
+        (individuals.optional_text(network, "has_map_file"),
+         individuals.optional_text(network, "has_map_digest"))
+        for network in networks
     ]  # fmt: skip
     if len(named) != 1 or named[0][0] is None or individuals.of_class("Scenario"):
         raise FileFormatError(

@@ -117,7 +117,7 @@ class Route:
             InputError: the route does not use the road.
         """
         on_road = self._on_road(road_id)
-        away = np.array([[_away(piece, one) for piece in on_road] for one in s.tolist()])
+        away = np.array([[_away(piece, item) for piece in on_road] for item in s.tolist()])
         away = away.reshape(len(s), len(on_road))  # also of no places
         nearest, found = away.argmin(axis=1), np.empty(len(s))
         for i, piece in enumerate(on_road):
@@ -259,7 +259,7 @@ def leg(model: OpenDrive, start: Place, end: Place) -> list[Step]:
         chain.append(at)
         at = come_from[at]
     steps = [Step(start.road_id, start.lane_id, start.s, _ends(model, first)[1])]
-    steps += [Step(one.road_id, one.lane_id, *_ends(model, one)) for one in chain[:0:-1]]
+    steps += [Step(item.road_id, item.lane_id, *_ends(model, item)) for item in chain[:0:-1]]
     return [*steps, Step(end.road_id, end.lane_id, _ends(model, last)[0], end.s)]
 
 

@@ -126,7 +126,7 @@ def _turned(
         found = dict(zip(names, ends[k:] + ends[:k], strict=True))
         legs = tuple(Leg(leg, heading(*found[leg]), arms[id(found[leg])]) for leg in headings)
         sites.append(replace(site, legs=legs))
-    return sorted(sites, key=lambda one: unlikeness(headings, one))
+    return sorted(sites, key=lambda item: unlikeness(headings, item))
 
 
 def unlikeness(headings: Mapping[str, float], site: Site) -> float:
@@ -141,9 +141,9 @@ def unlikeness(headings: Mapping[str, float], site: Site) -> float:
     """
     legs = sorted(site.legs, key=lambda leg: headings[leg.name] % 360.0)
     turned = [leg.heading_deg - headings[leg.name] for leg in legs]
-    beside = [math.remainder(one - turned[0], 360.0) for one in turned]
+    beside = [math.remainder(value - turned[0], 360.0) for value in turned]
     middle = sum(beside) / len(beside)
-    shape = sum((one - middle) ** 2 for one in beside)
+    shape = sum((value - middle) ** 2 for value in beside)
     return _SHAPE * shape + len(legs) * math.remainder(turned[0] + middle, 360.0) ** 2
 
 
@@ -213,7 +213,7 @@ def stretches(model: OpenDrive, map_name: str | None = None) -> Iterator[Site]:
         if road.is_connecting:
             continue
         for run in runs(road):
-            lanes = [road.sections[run.sections[0]].lane(one) for one in run.ids]
+            lanes = [road.sections[run.sections[0]].lane(number) for number in run.ids]
             for end in ("start", "end"):
                 if all(lane is None or leads_to(road, lane, end) for lane in lanes):
                     continue  # all traffic comes towards one

@@ -47,7 +47,7 @@ def adapted(
         site: the place, with its legs named as the scenario's.
     """
     notes: list[str] = []
-    lights = sum(one.cls == "TrafficLight" for one in site.facilities)
+    lights = sum(facility.cls == "TrafficLight" for facility in site.facilities)
     if lights and scenario.roads.signals == "none":
         notes.append(
             f"the traffic lights of {site.where} ({lights}) are off: the scenario has none"
@@ -55,10 +55,10 @@ def adapted(
     if site.kind in (None, "Merge"):
         scenario = _along(scenario, site, notes)
     participants = tuple(scenario.story.participants)
-    if not any(isinstance(one, LaneChange) for one in _actions(scenario.story)):
+    if not any(isinstance(action, LaneChange) for action in _actions(scenario.story)):
         participants = tuple(_on_lanes(participants, site, notes))
-    participants = tuple(_routed(one, model, site, notes) for one in participants)
-    participants = tuple(_shortened(one, site, notes) for one in participants)
+    participants = tuple(_routed(participant, model, site, notes) for participant in participants)
+    participants = tuple(_shortened(participant, site, notes) for participant in participants)
     if not notes:
         return scenario, notes
     story = replace(scenario.story, participants=participants)
@@ -104,31 +104,31 @@ def _moved(story: Story, moved: Callable[[Waypoint], Waypoint]) -> Story:
         story,
         participants=tuple(
             replace(
-                one,
-                start=moved(one.start),
-                end=None if one.end is None else moved(one.end),
-                path=tuple(map(moved, one.path)),
+                participant,
+                start=moved(participant.start),
+                end=None if participant.end is None else moved(participant.end),
+                path=tuple(map(moved, participant.path)),
             )
-            for one in story.participants
+            for participant in story.participants
         ),
-        jams=tuple(replace(one, tail=moved(one.tail)) for one in story.jams),
+        jams=tuple(replace(jam, tail=moved(jam.tail)) for jam in story.jams),
         works=tuple(
             replace(
-                one,
-                start=moved(one.start),
-                cones=tuple(map(moved, one.cones)),
-                sign=moved(one.sign),
+                work,
+                start=moved(work.start),
+                cones=tuple(map(moved, work.cones)),
+                sign=moved(work.sign),
             )
-            for one in story.works
+            for work in story.works
         ),
         events=tuple(
             replace(
                 event,
                 actions=tuple(
-                    replace(one, at=moved(one.at), place=moved(one.place))
-                    if isinstance(one, Arrival)
-                    else one
-                    for one in event.actions
+                    replace(action, at=moved(action.at), place=moved(action.place))
+                    if isinstance(action, Arrival)
+                    else action
+                    for action in event.actions
                 ),
             )
             for event in story.events
@@ -145,38 +145,43 @@ def _on_lanes(
     participants: tuple[Participant, ...], site: Site, notes: list[str]
 ) -> Iterator[Participant]:
     """Yield participants on lanes that are there, as long as each has one of its own."""
-    starts = Counter((one.start.leg, one.start.way, one.start.lane) for one in participants)
-    for one in participants:
-        start, leg = one.start, site.leg(one.start.leg)
+    starts = Counter(
+        (participant.start.leg, participant.start.way, participant.start.lane)
+        for participant in participants
+    )
+    for participant in participants:
+        start, leg = participant.start, site.leg(participant.start.leg)
         lanes = len(leg.roads[0].along(start.way)) if leg is not None else 0
-        if isinstance(start.lane, int) and not one.path and start.lane > lanes > 0:
+        if isinstance(start.lane, int) and not participant.path and start.lane > lanes > 0:
             outermost = (start.leg, start.way, lanes)
             if starts[outermost] == 0 and starts[start.leg, start.way, start.lane] == 1:
                 starts[outermost] += 1
-                notes.append(_said(f"{one.name} starts", start, lanes))
-                one = replace(one, start=replace(start, lane=lanes))
-        yield one
+                notes.append(_said(f"{participant.name} starts", start, lanes))
+                participant = replace(participant, start=replace(start, lane=lanes))
+        yield participant
 
 
-def _routed(one: Participant, model: OpenDrive, site: Site, notes: list[str]) -> Participant:
+def _routed(
+    participant: Participant, model: OpenDrive, site: Site, notes: list[str]
+) -> Participant:
     """Return a participant whose route ends on the lane nearest to its own that it reaches."""
-    start, end = one.start, one.end
-    if end is None or one.path or not isinstance(end.lane, int) or start.leg == end.leg:
-        return one
+    start, end = participant.start, participant.end
+    if end is None or participant.path or not isinstance(end.lane, int) or start.leg == end.leg:
+        return participant
     leg, own = site.leg(end.leg), site.leg(start.leg)
     if leg is None or own is None or not isinstance(start.lane, int):
-        return one
+        return participant
     if start.lane > len(own.roads[0].along(start.way)):
-        return one
+        return participant
     wanted = end.lane
     lanes = range(1, len(leg.roads[0].along(end.way)) + 1)
     for lane in sorted(lanes, key=lambda lane: (abs(lane - wanted), lane)):
         there = replace(end, lane=lane)
         if has_way(model, site, start, there):
             if lane != wanted:
-                notes.append(_said(f"the route of {one.name} ends", end, lane))
-            return replace(one, end=there)
-    return one
+                notes.append(_said(f"the route of {participant.name} ends", end, lane))
+            return replace(participant, end=there)
+    return participant
 
 
 def _said(what: str, place: Waypoint, lane: int) -> str:
@@ -201,20 +206,20 @@ def _on_lane(site: Site, place: Waypoint) -> tuple[str, int, float]:
     return road.road_id, road.along(place.way)[place.lane - 1].lane_id, 0.5 * road.length
 
 
-def _shortened(one: Participant, site: Site, notes: list[str]) -> Participant:
+def _shortened(participant: Participant, site: Site, notes: list[str]) -> Participant:
     """Return a participant whose route ends on the leg of a site."""
-    end = one.end
+    end = participant.end
     leg = site.leg(end.leg) if end is not None else None
     if end is None or leg is None or isinstance(end.distance, str):
-        return one
+        return participant
     last = max(leg.length - END_MARGIN, 0.5 * leg.length)
     if end.distance <= last:
-        return one
+        return participant
     notes.append(
-        f"the route of {one.name} ends {last:.4g} m along leg {leg.name} instead of "
+        f"the route of {participant.name} ends {last:.4g} m along leg {leg.name} instead of "
         f"{end.distance:g} m: the leg has {leg.length:.4g} m"
     )
-    return replace(one, end=replace(end, distance=last))
+    return replace(participant, end=replace(end, distance=last))
 
 
 # --- What stands and lies at a place of a map: crosswalks, stop lines, signs and traffic lights ---
@@ -235,12 +240,12 @@ def furnished(model: OpenDrive, site: Site, roads: RoadsSpec) -> Site:
         site: a junction, or a stretch of road.
         roads: of the scenario that takes place there.
     """
-    found = [one for leg in site.legs for one in _on_leg(model, leg)]
+    found = [facility for leg in site.legs for facility in _on_leg(model, leg)]
     if site.kind is not None:
-        lights = [one for leg in site.legs for one in _lights(model, site, leg)]
+        lights = [light for leg in site.legs for light in _lights(model, site, leg)]
         found += lights
         if lights and roads.signals != "none":
-            lit = {one.leg for one in lights}
+            lit = {light.leg for light in lights}
             offset = roads.knobs["signal_offset"]
             assert not isinstance(offset, str)  # `knob_problems` refuses it
             headings = {leg.name: leg.heading_deg for leg in site.legs if leg.name in lit}
@@ -252,9 +257,9 @@ def furnished(model: OpenDrive, site: Site, roads: RoadsSpec) -> Site:
 def _numbered(found: list[Facility]) -> Iterator[Facility]:
     """Yield facilities that are told apart by a number where a leg has several of a class."""
     seen: dict[tuple[str, str], int] = {}
-    for one in found:
-        seen[one.cls, one.leg] = number = seen.get((one.cls, one.leg), 0) + 1
-        yield replace(one, number=number)
+    for facility in found:
+        seen[facility.cls, facility.leg] = number = seen.get((facility.cls, facility.leg), 0) + 1
+        yield replace(facility, number=number)
 
 
 def _on_leg(model: OpenDrive, leg: Leg) -> Iterator[Facility]:
@@ -289,26 +294,37 @@ def _lights(model: OpenDrive, site: Site, leg: Leg) -> Iterator[Facility]:
 
     They stand on the leg, or on the junction's roads that lead from it.
     """
-    dynamic = {one.id: one for road in model.roads for one in road.signals if one.dynamic == "yes"}
+    dynamic = {
+        signal.id: signal
+        for road in model.roads
+        for signal in road.signals
+        if signal.dynamic == "yes"
+    }
     arm = leg.roads[0]
     road = model.road(arm.road_id)
     inbound = [lane.lane_id for lane in arm.along("in")]
     seen: set[str] = set()
-    for one in signals_on(road):
-        at = arm.distance(one.s)
-        if one.id not in dynamic or one.id in seen or at is None or at > NEAR:
+    for signal in signals_on(road):
+        at = arm.distance(signal.s)
+        if signal.id not in dynamic or signal.id in seen or at is None or at > NEAR:
             continue
-        if _is_for(road, one, inbound):
-            seen.add(one.id)
-            yield Facility("TrafficLight", leg.name, at, governs=("in",), object_id=one.id, s=one.s)
+        if _is_for(road, signal, inbound):
+            seen.add(signal.id)
+            yield Facility(
+                "TrafficLight", leg.name, at, governs=("in",), object_id=signal.id, s=signal.s
+            )
     within = site.place_id.split("+") if site.kind != "Merge" else ()
-    for inside in (road for one in within for road in model.connecting_roads(one)):
-        for one in signals_on(inside):
-            if one.id in dynamic and one.id not in seen and _comes_from(inside, one, road.id):
-                seen.add(one.id)
+    for inside in (road for name in within for road in model.connecting_roads(name)):
+        for signal in signals_on(inside):
+            if (
+                signal.id in dynamic
+                and signal.id not in seen
+                and _comes_from(inside, signal, road.id)
+            ):
+                seen.add(signal.id)
                 edge = arm.near
                 yield Facility(
-                    "TrafficLight", leg.name, 0.0, governs=("in",), object_id=one.id, s=edge
+                    "TrafficLight", leg.name, 0.0, governs=("in",), object_id=signal.id, s=edge
                 )
 
 

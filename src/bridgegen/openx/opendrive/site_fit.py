@@ -37,12 +37,12 @@ def missing(scenario: LogicalScenario, model: OpenDrive, site: Site) -> list[str
         model: the road network.
         site: the place, with its legs named as the scenario's.
     """
-    if chosen := [one for one in scenario.participants if one.ways]:
+    if chosen := [participant for participant in scenario.participants if participant.ways]:
         by = f"{chosen[0].place_by} chooses where {chosen[0].name} starts"
         return [f"roads of the scenario's own ({by}, and a map is found for one place only)"]
     scenario, _ = adapted(scenario, model, site)
-    found = sorted({_missing(site, *one, False) for one in _places(scenario)} - {""})
-    found += sorted({_missing(site, one, 0.0, True) for one in ends_of(scenario)} - {""})
+    found = sorted({_missing(site, *place, False) for place in _places(scenario)} - {""})
+    found += sorted({_missing(site, end, 0.0, True) for end in ends_of(scenario)} - {""})
     first, last = within = reach(scenario)
     wanted, there = turning(scenario, *within), site.legs[0].turning(*within)
     if there < SHARE_OF_TURN * wanted:
@@ -53,17 +53,23 @@ def missing(scenario: LogicalScenario, model: OpenDrive, site: Site) -> list[str
     found += [*_crosses(scenario, site), *_unlit(scenario, site), *_works(scenario, site)]
     if found:
         return found
-    for one in scenario.story.participants:
-        if one.end is not None and isinstance(one.start.lane, int) and not one.path:
-            found.append(_no_way(scenario, model, site, one.name, one.start, one.end))
+    for participant in scenario.story.participants:
+        if (
+            participant.end is not None
+            and isinstance(participant.start.lane, int)
+            and not participant.path
+        ):
+            found.append(
+                _no_way(scenario, model, site, participant.name, participant.start, participant.end)
+            )
     return sorted(set(found) - {""})
 
 
 def _crosses(scenario: LogicalScenario, site: Site) -> Iterator[str]:
     """Yield the crosswalks that pedestrians cross on, and that are not there."""
-    for one in scenario.participants:
-        place = one.start
-        if len({(point.leg, point.way) for point in one.path}) < 2:
+    for participant in scenario.participants:
+        place = participant.start
+        if len({(point.leg, point.way) for point in participant.path}) < 2:
             continue
         there = [
             walk
@@ -74,14 +80,17 @@ def _crosses(scenario: LogicalScenario, site: Site) -> Iterator[str]:
         ]
         if not there:
             where = f"at {place.distance} m on leg {place.leg}"
-            yield f"a crosswalk where {one.name} crosses, {where}"
+            yield f"a crosswalk where {participant.name} crosses, {where}"
 
 
 def _unlit(scenario: LogicalScenario, site: Site) -> Iterator[str]:
     """Yield the legs that a scenario has lights on, and the place has not."""
     if scenario.roads.signals != "none":
-        lit = {one.leg for one in site.facilities if one.cls == "TrafficLight"}
-        legs = sorted({one.start.leg for one in scenario.participants if not one.path} - lit)
+        lit = {facility.leg for facility in site.facilities if facility.cls == "TrafficLight"}
+        legs = sorted(
+            {participant.start.leg for participant in scenario.participants if not participant.path}
+            - lit
+        )
         yield from (f"a traffic light on leg {leg}" for leg in legs)
 
 
@@ -96,8 +105,8 @@ def _works(scenario: LogicalScenario, site: Site) -> Iterator[str]:
         outermost = scenario.roads.lanes(start.leg, start.way)
         if lanes > 0 and start.lane == outermost and start.lane != lanes:
             yield f"{works.name} on the outermost lane (leg {start.leg} {start.way} has {lanes})"
-        places = [one.distance for one in (works.start, works.sign, *works.cones)]
-        farthest = max((one for one in places if not isinstance(one, str)), default=0.0)
+        places = [cone.distance for cone in (works.start, works.sign, *works.cones)]
+        farthest = max((place for place in places if not isinstance(place, str)), default=0.0)
         if leg is not None and farthest > leg.roads[0].length:
             yield (
                 f"room for {works.name} on one road, {farthest:g} m (road {leg.roads[0].road_id} "
@@ -144,9 +153,9 @@ def _is_lht(model: OpenDrive, site: Site) -> bool:
 
 def ends_of(scenario: LogicalScenario) -> Iterator[Waypoint]:
     """Yield where routes end."""
-    for one in scenario.story.participants:
-        if one.end is not None:
-            yield one.end
+    for participant in scenario.story.participants:
+        if participant.end is not None:
+            yield participant.end
 
 
 def all_places(scenario: LogicalScenario) -> Iterator[Waypoint]:
@@ -158,9 +167,9 @@ def all_places(scenario: LogicalScenario) -> Iterator[Waypoint]:
 def _places(scenario: LogicalScenario) -> Iterator[tuple[Waypoint, float]]:
     """Yield where participants and things stand, and how wide they are [m]."""
     story = scenario.story
-    for one in story.participants:
-        yield one.start, max(body.width for body in one.bodies)
-        for point in one.path:
+    for participant in story.participants:
+        yield participant.start, max(body.width for body in participant.bodies)
+        for point in participant.path:
             yield point, 0.0
     for jam in story.jams:
         yield jam.tail, 0.0
@@ -185,7 +194,9 @@ def _missing(site: Site, place: Waypoint, width: float, ends: bool) -> str:
     road = leg.roads[0]
     if not isinstance(place.lane, int):
         strips = [
-            one for one in road.strips if (one.type, one.direction) == (place.lane, place.way)
+            strip
+            for strip in road.strips
+            if (strip.type, strip.direction) == (place.lane, place.way)
         ]
         if not strips:
             return f"{place} (road {road.road_id})"
@@ -211,7 +222,7 @@ def value(quantity: str | float, values: dict[str, float]) -> float:
 def reach(scenario: LogicalScenario) -> tuple[float, float]:
     """Return the nearest and the farthest place at which somebody starts, at the defaults [m]."""
     values = scenario.usual_values()
-    starts = [value(one.start.distance, values) for one in scenario.participants]
+    starts = [value(participant.start.distance, values) for participant in scenario.participants]
     return min(starts, default=0.0), max(starts, default=0.0)
 
 
@@ -221,11 +232,11 @@ def turning(scenario: LogicalScenario, first: float, last: float) -> float:
     Bend by bend [rad]; its curvature is linear along each segment.
     """
     values, found, begin = scenario.usual_values(), 0.0, 0.0
-    for one in scenario.roads.segments:
-        length = value(one.length, values)
+    for segment in scenario.roads.segments:
+        length = value(segment.length, values)
         low, high = max(first, begin), min(last, begin + length)
         if low < high:
-            ends = (value(one.curvature, values), value(one.end_curvature, values))
+            ends = (value(segment.curvature, values), value(segment.end_curvature, values))
             middle = (0.5 * (low + high) - begin) / length
             found += (high - low) * abs(ends[0] + middle * (ends[1] - ends[0]))
         begin += length
@@ -415,7 +426,7 @@ def _unlikeness(scenario: LogicalScenario, site: Site) -> float:
         abs(len(road.along(way)) - value(scenario.roads.lanes("main", way), values))
         for way in ("in", "out")
     )
-    farthest = max((value(one.distance, values) for one in all_places(scenario)), default=0.0)
+    farthest = max((value(place.distance, values) for place in all_places(scenario)), default=0.0)
     short = max(0.0, 1.0 - site.legs[0].length / max(farthest, 1.0))
     wanted = value(scenario.roads.knobs["speed_limit"], values)
     limit = math.log2(max(road.speed_limit or wanted, 1.0) / wanted)

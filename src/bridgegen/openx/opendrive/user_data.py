@@ -32,7 +32,7 @@ def user_datum(name: str, value: str | float) -> UserData:
 
 def values_of(data: Sequence[UserData], name: str) -> list[str]:
     """Return all values of a name, in the file's order."""
-    return [one.value for one in data if one.code == PREFIX + name]
+    return [user_data.value for user_data in data if user_data.code == PREFIX + name]
 
 
 def number(data: Sequence[UserData], name: str) -> float | None:

@@ -166,8 +166,8 @@ def _reference_line(road: Road) -> Iterator[str]:
     if abs(road.length - s) > SLACK:
         got = f"got {road.length:.6g}"
         yield f"road {road.id}: length must be that of its geometry, {s:.6g} m, {got}"
-    for index, (one, following) in enumerate(pairwise(road.plan_view), start=1):
-        end = pose(one, one.length)
+    for index, (item, following) in enumerate(pairwise(road.plan_view), start=1):
+        end = pose(item, item.length)
         gap = math.dist(end[:2], (following.x, following.y))
         kink = abs(math.remainder(end.h - following.hdg, math.tau))
         if gap > GAP or kink > KINK:
@@ -230,8 +230,8 @@ def _least(cubic: tuple[float, float, float, float], end: float) -> float:
 
 def _along(road: Road) -> Iterator[str]:
     """Yield broken links between the lane sections of a road."""
-    for one, following in pairwise(road.sections):
-        for a, b, ahead in ((one, following, True), (following, one, False)):
+    for section, following in pairwise(road.sections):
+        for a, b, ahead in ((section, following, True), (following, section, False)):
             for lane in a.lanes:
                 for target in lane.successors if ahead else lane.predecessors:
                     other = b.lane(target)
@@ -253,9 +253,9 @@ def _along(road: Road) -> Iterator[str]:
 def _things(road: Road) -> Iterator[str]:
     """Yield objects and signals that are not on their road."""
     kinds: tuple[tuple[str, Iterable[tuple[str, float]]], ...] = (
-        ("object", ((one.id, one.s) for one in road.objects)),
-        ("signal", ((one.id, one.s) for one in road.signals)),
-        ("signalReference", ((one.id, one.s) for one in road.signal_references)),
+        ("object", ((obj.id, obj.s) for obj in road.objects)),
+        ("signal", ((signal.id, signal.s) for signal in road.signals)),
+        ("signalReference", ((reference.id, reference.s) for reference in road.signal_references)),
     )
     for kind, things in kinds:
         for name, s in things:

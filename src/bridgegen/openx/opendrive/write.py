@@ -26,11 +26,11 @@ def to_xml(model: OpenDrive) -> bytes:
 def _fill(element: etree._Element, record: Any) -> None:
     wrappers: dict[tuple[str, ...], etree._Element] = {(): element}
     cls: type = type(record)
-    for one in plan(cls):
-        value = getattr(record, one.name)
+    for field in plan(cls):
+        value = getattr(record, field.name)
         if value is None or value == ():
             continue
-        role, path = one.form.role, one.form.path
+        role, path = field.form.role, field.form.path
         if role == "attribute":
             element.set(path[0], _text(value))
             continue

@@ -150,7 +150,11 @@ def kind_of(body: Element, resolve: Resolve = _literal) -> ParticipantKind | Non
         return PARTICIPANTS["pedestrian"] if found is None else found
     if isinstance(body, osc.MiscObject):
         name = str(resolve(body.name)).lower()
-        named = (one for one in _written_as(body) if one.written.name == name)
+        named = (
+            participant_kind
+            for participant_kind in _written_as(body)
+            if participant_kind.written.name == name
+        )
         return next(named, None) or _by_category(body, body.misc_object_category, resolve)
     return None
 
@@ -160,9 +164,10 @@ def object_class_of(body: Element) -> ObjectClass:
     if isinstance(body, osc.Vehicle) and _stated_kind(body, _literal) is None:
         category = _literal(body.vehicle_category)
         alike = (
-            one.seen_as
-            for one in _written_as(body)
-            if one.written.is_exact and category in (one.written.category, *one.written.also)
+            participant_kind.seen_as
+            for participant_kind in _written_as(body)
+            if participant_kind.written.is_exact
+            and category in (participant_kind.written.category, *participant_kind.written.also)
         )
         return next(alike, PARTICIPANTS["obstacle"].seen_as)
     kind = kind_of(body)
@@ -171,14 +176,16 @@ def object_class_of(body: Element) -> ObjectClass:
 
 def _written_as(body: Element) -> Iterator[ParticipantKind]:
     tag = type(body).__name__
-    return (one for one in PARTICIPANTS.values() if one.written.element == tag)
+    return (
+        participant for participant in PARTICIPANTS.values() if participant.written.element == tag
+    )
 
 
 def _stated_kind(body: Element, resolve: Resolve) -> ParticipantKind | None:
     properties = getattr(body, "properties", None)
     said = None if properties is None else properties.get(KIND)
     name = None if said is None else resolve(said)
-    return next((one for one in _written_as(body) if one.name == name), None)
+    return next((kind for kind in _written_as(body) if kind.name == name), None)
 
 
 def _by_category(
@@ -186,8 +193,8 @@ def _by_category(
 ) -> ParticipantKind | None:
     name = resolve(category)
     exact = (
-        one
-        for one in _written_as(body)
-        if one.takes_part and one.written.is_exact and one.written.role is None
+        kind
+        for kind in _written_as(body)
+        if kind.takes_part and kind.written.is_exact and kind.written.role is None
     )
-    return next((one for one in exact if one.written.category == name), None)
+    return next((kind for kind in exact if kind.written.category == name), None)

@@ -137,7 +137,9 @@ class Catalogs:
 
     def _read(self, node: etree._Element, cls: type[Element], file: str) -> Element:
         entry = element_of(cls, node, file, self._skipped)
-        return rewritten(entry, lambda one: replace(one, line=CatalogLine(one.line, file)))
+        return rewritten(
+            entry, lambda element: replace(element, line=CatalogLine(element.line, file))
+        )
 
 
 def _tidy(path: Path) -> Path:

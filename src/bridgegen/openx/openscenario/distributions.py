@@ -257,10 +257,10 @@ def distribution_of(
     """
     match given:
         case DistributionSet():
-            return Discrete.of([number(one.value) for one in given.elements])
+            return Discrete.of([number(element.value) for element in given.elements])
         case ProbabilityDistributionSet():
-            values = [number(one.value) for one in given.elements]
-            return Discrete.of(values, [one.weight for one in given.elements])
+            values = [number(element.value) for element in given.elements]
+            return Discrete.of(values, [element.weight for element in given.elements])
         case DistributionRange():
             return _steps(given)
         case UniformDistribution():
@@ -273,8 +273,8 @@ def distribution_of(
         case PoissonDistribution():
             return Discrete.poisson(given.expected_value, _optional(given.range))
         case Histogram():
-            bins = [_limits(one.range) for one in given.bins]
-            return Bins.of(bins, [one.weight for one in given.bins])
+            bins = [_limits(bin_.range) for bin_ in given.bins]
+            return Bins.of(bins, [bin_.weight for bin_ in given.bins])
 
 
 def _steps(given: DistributionRange) -> Discrete:

@@ -288,14 +288,14 @@ def children_of(element: Element) -> Iterator[tuple[str, Element]]:
     """Yield an element's children with their tags, in the standard's order."""
     for child in declaration(type(element)).children:
         value = getattr(element, child.field)
-        for one in value if child.many else () if value is None else (value,):
-            yield child.tags[type(one)], one
+        for item in value if child.many else () if value is None else (value,):
+            yield child.tags[type(item)], item
 
 
 def is_wrapper(element: Element, child: Element) -> bool:
     """Return whether what a child of an element holds may stand there without the child."""
-    wrappers = (one.wrapper for one in declaration(type(element)).children)
-    return any(one is not None and isinstance(child, one) for one in wrappers)
+    wrappers = (item.wrapper for item in declaration(type(element)).children)
+    return any(wrapper is not None and isinstance(child, wrapper) for wrapper in wrappers)
 
 
 def walk(element: Element) -> Iterator[Element]:
@@ -327,7 +327,7 @@ def rewritten(element: E, change: Callable[[Element], Element]) -> E:
     for child in declaration(type(element)).children:
         value = getattr(element, child.field)
         if child.many:
-            changes[child.field] = tuple(rewritten(one, change) for one in value)
+            changes[child.field] = tuple(rewritten(item, change) for item in value)
         elif value is not None:
             changes[child.field] = rewritten(value, change)
     return cast(E, change(replace(element, **changes)))
@@ -337,8 +337,8 @@ def references(element: Element) -> frozenset[str]:
     """Return the names of all parameters that an element and all below it refer to."""
     return frozenset(
         name
-        for one in walk(element)
-        for _, value in values_of(one)
+        for node in walk(element)
+        for _, value in values_of(node)
         if isinstance(value, ParameterRef | Expr)
         for name in value.names
     )

@@ -73,14 +73,14 @@ def without_selections(scenario: OpenScenario) -> OpenScenario:
         return scenario
     objects = scenario.entities.scenario_objects
     members: dict[Any, tuple[Any, ...]] = {}
-    for one in selections:
+    for selection in selections:
         found: dict[Any, None] = {}
-        for member in one.members.members:
+        for member in selection.members.members:
             if isinstance(member, EntityRef):
                 found |= dict.fromkeys(members.get(member.entity_ref, (member.entity_ref,)))
             else:
                 found |= dict.fromkeys(_of_kind(objects, member.object_type))
-        members[one.name] = tuple(found)
+        members[selection.name] = tuple(found)
 
     def change(element: Element) -> Element:
         if isinstance(element, InitActions):
@@ -106,7 +106,7 @@ def without_selections(scenario: OpenScenario) -> OpenScenario:
 
 
 def _of_kind(objects: tuple[ScenarioObject, ...], kind: Any) -> list[Any]:
-    return [one.name for one in objects if _KINDS[type(one.entity_object)] == kind]
+    return [obj.name for obj in objects if _KINDS[type(obj.entity_object)] == kind]
 
 
 # --- Vehicles that tow others: each trailer an entity of its own ---
@@ -119,43 +119,43 @@ def with_trailers_apart(scenario: OpenScenario) -> OpenScenario:
     then its towing vehicle's stands before it ("Lorry.trailer").
     """
     objects = scenario.entities.scenario_objects
-    if not any(_towed(one) for one in objects):
+    if not any(_towed(obj) for obj in objects):
         return scenario
-    taken = {str(one.name) for one in objects}
+    taken = {str(obj.name) for obj in objects}
     apart: list[ScenarioObject] = []
     trailers: list[ScenarioObject] = []
-    for one in objects:
-        first, *others = _uncoupled(one, taken)
+    for obj in objects:
+        first, *others = _uncoupled(obj, taken)
         apart.append(first)
         trailers += others
     entities = Entities((*apart, *trailers), scenario.entities.entity_selections)
     return replace(scenario, entities=entities)
 
 
-def _towed(one: ScenarioObject) -> ScenarioObject | None:
+def _towed(scenario_object: ScenarioObject) -> ScenarioObject | None:
     """Return the trailer that an entity contains, if it contains one."""
-    vehicle = one.entity_object
+    vehicle = scenario_object.entity_object
     if not isinstance(vehicle, Vehicle) or vehicle.trailer is None:
         return None
     inner = vehicle.trailer.trailer
     return inner if isinstance(inner, ScenarioObject) else None
 
 
-def _uncoupled(one: ScenarioObject, taken: set[str]) -> Iterator[ScenarioObject]:
+def _uncoupled(scenario_object: ScenarioObject, taken: set[str]) -> Iterator[ScenarioObject]:
     """Yield an entity, and those that it tows, one behind the other."""
-    inner, vehicle = _towed(one), one.entity_object
+    inner, vehicle = _towed(scenario_object), scenario_object.entity_object
     if inner is None:
-        yield one
+        yield scenario_object
         return
     assert isinstance(vehicle, Vehicle)
     assert vehicle.trailer is not None
     name, number = str(inner.name), 1
     while name in taken:
-        name = f"{one.name}.{inner.name}" + (f"_{number}" if number > 1 else "")
+        name = f"{scenario_object.name}.{inner.name}" + (f"_{number}" if number > 1 else "")
         number += 1
     taken.add(name)
     named = Trailer(EntityRef(name, line=inner.line), line=vehicle.trailer.line)
-    yield replace(one, entity_object=replace(vehicle, trailer=named))
+    yield replace(scenario_object, entity_object=replace(vehicle, trailer=named))
     yield from _uncoupled(replace(inner, name=name), taken)
 
 
@@ -258,14 +258,24 @@ class _Expander:
         made = self._element(replace(self._file, parameter_declarations=None), self._scope, 0)
         made = self._without_missing(made)
         if self._problems or self._elsewhere:
-            problems = sorted(dict.fromkeys(self._problems), key=lambda one: int(one[0]))
+            problems = sorted(dict.fromkeys(self._problems), key=lambda problem: int(problem[0]))
             texts = [f"{self._place}: {text} (line {line})" for line, text in problems]
             raise FileFormatError(*shorten([*texts, *dict.fromkeys(self._elsewhere)]))
         if self._unsupported:
             raise UnsupportedError(*shorten(list(dict.fromkeys(self._unsupported))))
-        own = (one for one in self._declared if one.name in self._scope.own)
-        literal = {one.name: self._scope.constrained(one) for one in own}
-        declarations = (*literal.values(), *(one for _, one in self._named.values()))
+        own = (
+            parameter_declaration
+            for parameter_declaration in self._declared
+            if parameter_declaration.name in self._scope.own
+        )
+        literal = {
+            parameter_declaration.name: self._scope.constrained(parameter_declaration)
+            for parameter_declaration in own
+        }
+        declarations = (
+            *literal.values(),
+            *(parameter_declaration for _, parameter_declaration in self._named.values()),
+        )
         return replace(
             made,
             parameter_declarations=ParameterDeclarations(declarations) if declarations else None,
@@ -278,11 +288,11 @@ class _Expander:
         Without its ego, which is the entity of that name or else the first, it would be another.
         """
         left = without(scenario, self._missing)
-        names = [str(one.name) for one in scenario.entities.scenario_objects]
+        names = [str(obj.name) for obj in scenario.entities.scenario_objects]
         ego = min(names, key=lambda name: name.lower() != "ego", default="")
-        kept = {str(one.name) for one in left.entities.scenario_objects}
+        kept = {str(obj.name) for obj in left.entities.scenario_objects}
         for reference in self._missing:
-            if (names and ego not in kept) or any(one is reference for one in walk(left)):
+            if (names and ego not in kept) or any(node is reference for node in walk(left)):
                 self.wrong(reference, f"'{reference.entry_name}' cannot be left out")
         return left
 
@@ -313,11 +323,11 @@ class _Expander:
             if child.field == _DECLARED or held is None:
                 continue
             if child.many:
-                new = tuple(self._child(one, child, scope, depth + 1) for one in held)
+                new = tuple(self._child(candidate, child, scope, depth + 1) for candidate in held)
                 if any(a is not b for a, b in zip(new, held, strict=True)):
                     changes[child.field] = new
-            elif (one := self._child(held, child, scope, depth + 1)) is not held:
-                changes[child.field] = None if _is_no_trailer(one) else one
+            elif (item := self._child(held, child, scope, depth + 1)) is not held:
+                changes[child.field] = None if _is_no_trailer(item) else item
         return replace(element, **changes) if changes else element
 
     def _child(self, element: Element, child: Child, scope: Scope, depth: int) -> Element:
@@ -357,9 +367,11 @@ class _Expander:
             name = scope.text(attributes["entryName"], reference.entry_name)
             assigned = self._assigned(reference, scope)
         except FileFormatError as error:
-            raise NoEntryError(*(f"CatalogReference {one}" for one in error.problems)) from None
+            raise NoEntryError(
+                *(f"CatalogReference {problem}" for problem in error.problems)
+            ) from None
         entry = self._catalogs.entry(catalog, name, child.tags)
-        if any(entry is one for one in self._open):
+        if any(entry is element for element in self._open):
             raise NoEntryError(f"catalogue '{catalog}': the entry '{name}' holds itself")
         if depth + _height(entry) > MAX_DEPTH:
             raise NoEntryError(
@@ -371,7 +383,9 @@ class _Expander:
                 f"catalogue '{catalog}': entries may add {MAX_ELEMENTS} elements, there are more"
             )
         declared = getattr(entry, _DECLARED, None)
-        known = {one.name for one in declared.parameters} if declared is not None else set()
+        known = (
+            {parameter.name for parameter in declared.parameters} if declared is not None else set()
+        )
         for unknown in sorted(assigned.keys() - known):
             self.odd(
                 reference,
@@ -387,9 +401,9 @@ class _Expander:
         """Return the values that an entry gets, by the scenario's own parameters."""
         given = reference.parameter_assignments
         return {
-            one.parameter_ref: scope.value(attribute, value)
-            for one in (() if given is None else given.assignments)
-            for attribute, value in values_of(one)
+            assignment.parameter_ref: scope.value(attribute, value)
+            for assignment in (() if given is None else given.assignments)
+            for attribute, value in values_of(assignment)
             if attribute.field == "value"
         }
 
@@ -399,7 +413,10 @@ class _Expander:
         if self._scope.own.get(name) is bound:
             return name
         if id(bound) not in self._named:
-            taken = {*self._scope.own, *(one.name for _, one in self._named.values())}
+            taken = {
+                *self._scope.own,
+                *(parameter_declaration.name for _, parameter_declaration in self._named.values()),
+            }
             number, free = 1, name
             while free in taken:
                 number += 1
@@ -416,8 +433,8 @@ def _is_no_trailer(element: Element) -> bool:
 
 
 def _height(element: Element) -> int:
-    below = [_height(one) for child in declaration(type(element)).children
-             for one in _held(element, child)]  # fmt: skip
+    below = [_height(item) for child in declaration(type(element)).children
+             for item in _held(element, child)]  # fmt: skip
     return 1 + max(below, default=0)
 
 

@@ -36,8 +36,8 @@ def distribution_xml(exposure: Exposure, *, runs: int = 1000, date: str) -> byte
     """
     parameters = exposure.scenario.parameters
     made = tuple(
-        dst.StochasticDistribution(name, _element(one, parameters[name]))
-        for name, one in exposure.marginals.items()
+        dst.StochasticDistribution(name, _element(marginal, parameters[name]))
+        for name, marginal in exposure.marginals.items()
     )
     header = FileHeader(
         1, 3, date, f"Distribution of the parameters of {exposure.scenario.name}", "BridgeGen"
@@ -74,36 +74,36 @@ _Element = (
 )
 
 
-def _element(one: Marginal | Conditional, parameter: Parameter) -> _Element:
-    if isinstance(one, Conditional):
+def _element(marginal: Marginal | Conditional, parameter: Parameter) -> _Element:
+    if isinstance(marginal, Conditional):
         raise UnsupportedError(
             f"OpenSCENARIO has no distribution that depends on other parameters, as that of "
-            f"{one.label} does"
+            f"{marginal.label} does"
         )
-    if isinstance(one, Shared) and isinstance(one.distribution, Discrete):
-        given = one.distribution
+    if isinstance(marginal, Shared) and isinstance(marginal.distribution, Discrete):
+        given = marginal.distribution
         return dst.ProbabilityDistributionSet(
             tuple(
                 dst.ProbabilityDistributionSetElement(str(parameter.kind.written(value)), weight)
                 for value, weight in zip(given.values, given.weights, strict=True)
             )
         )
-    within = dst.Range(one.low, one.high)
-    if isinstance(one, Shared) and isinstance(one.distribution, Uniform):
+    within = dst.Range(marginal.low, marginal.high)
+    if isinstance(marginal, Shared) and isinstance(marginal.distribution, Uniform):
         return dst.UniformDistribution(within)
-    if isinstance(one, Truncated) and one.family is Normal:
-        mean, deviation = (float(number) for number in one.numbers)
+    if isinstance(marginal, Truncated) and marginal.family is Normal:
+        mean, deviation = (float(number) for number in marginal.numbers)
         return dst.NormalDistribution(mean, deviation**2, within)
-    if isinstance(one, Truncated) and one.family is LogNormal and one.low > 0.0:
-        median, deviation = (float(number) for number in one.numbers)
+    if isinstance(marginal, Truncated) and marginal.family is LogNormal and marginal.low > 0.0:
+        median, deviation = (float(number) for number in marginal.numbers)
         mean = median * math.exp(0.5 * deviation**2)
         return dst.LogNormalDistribution(mean, mean**2 * math.expm1(deviation**2), within)
-    return _histogram(one)
+    return _histogram(marginal)
 
 
-def _histogram(one: Marginal) -> dst.Histogram:
-    edges = np.linspace(one.low, one.high, BINS + 1)
-    below, above = one.tails(edges)
+def _histogram(marginal: Marginal) -> dst.Histogram:
+    edges = np.linspace(marginal.low, marginal.high, BINS + 1)
+    below, above = marginal.tails(edges)
     weights: Float = np.where(below[1:] <= 0.5, below[1:] - below[:-1], above[:-1] - above[1:])
     return dst.Histogram(
         tuple(

@@ -33,28 +33,28 @@ def fixed_texts(
         where nothing is left.
     """
     header = scenario.file_header.properties
-    said = " ".join(str(one.value) for one in header.properties) if header else ""
+    said = " ".join(str(property_.value) for property_ in header.properties) if header else ""
     declared = scenario.parameter_declarations
     texts = {
-        one.name
-        for one in (declared.parameters if declared else ())
-        if kind_of(one.parameter_type) in _TEXTS and one.name not in said
+        parameter.name
+        for parameter in (declared.parameters if declared else ())
+        if kind_of(parameter.parameter_type) in _TEXTS and parameter.name not in said
     }
     given: dict[str, set[str]] = {}
-    for one in definition.distributions:
-        for name, values in _texts(one):
+    for distribution in definition.distributions:
+        for name, values in _texts(distribution):
             given.setdefault(name, set()).update(values)
     fixed = {
         name: min(values) for name, values in given.items() if name in texts and len(values) == 1
     }
-    left = (_without(one, fixed) for one in definition.distributions)
-    kept: Any = tuple(one for one in left if one is not None)
+    left = (_without(distribution, fixed) for distribution in definition.distributions)
+    kept: Any = tuple(element for element in left if element is not None)
     return fixed, replace(definition, distributions=kept) if kept else None
 
 
-def _texts(one: Element) -> Iterator[tuple[str, list[str]]]:
-    if isinstance(one, dst.DeterministicMultiParameterDistribution):
-        sets = one.distribution.sets
+def _texts(element: Element) -> Iterator[tuple[str, list[str]]]:
+    if isinstance(element, dst.DeterministicMultiParameterDistribution):
+        sets = element.distribution.sets
         names = {each.parameter_ref for given in sets for each in given.assignments}
         for name in names:
             found = [
@@ -67,16 +67,16 @@ def _texts(one: Element) -> Iterator[tuple[str, list[str]]]:
                 yield name, found
         return
     assert isinstance(
-        one, dst.DeterministicSingleParameterDistribution | dst.StochasticDistribution
+        element, dst.DeterministicSingleParameterDistribution | dst.StochasticDistribution
     )
-    if isinstance(one.distribution, dst.DistributionSet | dst.ProbabilityDistributionSet):
-        yield one.parameter_name, [str(each.value) for each in one.distribution.elements]
+    if isinstance(element.distribution, dst.DistributionSet | dst.ProbabilityDistributionSet):
+        yield element.parameter_name, [str(each.value) for each in element.distribution.elements]
 
 
-def _without(one: Element, fixed: dict[str, str]) -> Element | None:
+def _without(element: Element, fixed: dict[str, str]) -> Element | None:
     """Return a distribution without some parameters, None where no other is left."""
-    if not isinstance(one, dst.DeterministicMultiParameterDistribution):
-        return None if getattr(one, "parameter_name", None) in fixed else one
+    if not isinstance(element, dst.DeterministicMultiParameterDistribution):
+        return None if getattr(element, "parameter_name", None) in fixed else element
     sets = tuple(
         replace(
             given,
@@ -84,8 +84,8 @@ def _without(one: Element, fixed: dict[str, str]) -> Element | None:
                 each for each in given.assignments if each.parameter_ref not in fixed
             ),
         )
-        for given in one.distribution.sets
+        for given in element.distribution.sets
     )
     if not all(given.assignments for given in sets):
         return None
-    return replace(one, distribution=replace(one.distribution, sets=sets))
+    return replace(element, distribution=replace(element.distribution, sets=sets))

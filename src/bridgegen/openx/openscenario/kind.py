@@ -29,7 +29,7 @@ def files_named_in(path: Path) -> tuple[Path, ...]:
                 continue
             named = path.parent / text
             some = sorted(named.glob("*.xosc")) if named.is_dir() else [named]
-            found.update(dict.fromkeys(one for one in some if one.is_file()))
+            found.update(dict.fromkeys(item for item in some if item.is_file()))
     return tuple(found)
 
 

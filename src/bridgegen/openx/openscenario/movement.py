@@ -236,6 +236,6 @@ def is_uniform(knots: Sequence[float], order: int) -> bool:
     usual = uniform_knots(order, len(knots) - order)
     span = knots[-1] - knots[0]
     return span > 0.0 and all(
-        abs((knot - knots[0]) / span - one / usual[-1]) < 1e-9
-        for knot, one in zip(knots, usual, strict=True)
+        abs((knot - knots[0]) / span - value / usual[-1]) < 1e-9
+        for knot, value in zip(knots, usual, strict=True)
     )

@@ -71,12 +71,18 @@ def values(scenario: OpenScenario) -> dict[str, Literal]:
         FileFormatError: a value is not of its parameter's type; `bridgegen.openx.openscenario.
             read` has made sure that it is.
     """
-    return {one.name: value_of(one) for one in _declarations(scenario)}
+    return {
+        parameter_declaration.name: value_of(parameter_declaration)
+        for parameter_declaration in _declarations(scenario)
+    }
 
 
 def numbers(scenario: OpenScenario) -> dict[str, float]:
     """Return the values of the parameters that take part in arithmetic."""
-    kinds = {one.name: kind_of(one.parameter_type) for one in _declarations(scenario)}
+    kinds = {
+        parameter_declaration.name: kind_of(parameter_declaration.parameter_type)
+        for parameter_declaration in _declarations(scenario)
+    }
     return {name: float(value) for name, value in values(scenario).items() if kinds[name].is_number}
 
 
@@ -90,24 +96,24 @@ def problems(scenario: OpenScenario) -> list[str]:
     found: list[tuple[int, str]] = []
     first: dict[str, ParameterDeclaration] = {}
     declared: dict[str, tuple[Kind, Literal]] = {}
-    for one in _declarations(scenario):
-        name = one.name
-        if problem := name_problem(name) or clash(one, first.get(name)):
-            found.append((one.line, problem))
+    for parameter_declaration in _declarations(scenario):
+        name = parameter_declaration.name
+        if problem := name_problem(name) or clash(parameter_declaration, first.get(name)):
+            found.append((parameter_declaration.line, problem))
             continue
-        first[name] = one
-        kind = kind_of(one.parameter_type)
+        first[name] = parameter_declaration
+        kind = kind_of(parameter_declaration.parameter_type)
         try:
-            value = value_of(one)
+            value = value_of(parameter_declaration)
         except FileFormatError as error:
-            found.append((one.line, f"the value of parameter {name} {error}"))
-            value = one.value
+            found.append((parameter_declaration.line, f"the value of parameter {name} {error}"))
+            value = parameter_declaration.value
         declared[name] = kind, value
     known_values = {name: value for name, (_, value) in declared.items()}
-    for name, one in first.items():
+    for name, parameter_declaration in first.items():
         if not isinstance(declared[name][1], str) or declared[name][0] is Kind.STRING:
-            reasons = broken(one, declared[name][1], known_values)
-            found += [(one.line, f"parameter {name} {text}") for text in reasons]
+            reasons = broken(parameter_declaration, declared[name][1], known_values)
+            found += [(parameter_declaration.line, f"parameter {name} {text}") for text in reasons]
     known = {
         Meaning.PARAMETER: declared.keys(),
         Meaning.VARIABLE: _names(scenario.variable_declarations, "variables"),
@@ -115,9 +121,9 @@ def problems(scenario: OpenScenario) -> list[str]:
     }
     judged = {
         id(below)
-        for one in walk(scenario)
-        if isinstance(one, Condition) and one.is_criterion
-        for below in walk(one)
+        for node in walk(scenario)
+        if isinstance(node, Condition) and node.is_criterion
+        for below in walk(node)
     }
     for element in walk(scenario):
         for attribute, value in values_of(element):
@@ -134,7 +140,7 @@ def problems(scenario: OpenScenario) -> list[str]:
 
 
 def _names(declarations: Element | None, field: str) -> Set[str]:
-    return {one.name for one in getattr(declarations, field, ())}
+    return {item.name for item in getattr(declarations, field, ())}
 
 
 def name_problem(name: str) -> str | None:
@@ -144,11 +150,19 @@ def name_problem(name: str) -> str | None:
     return f"a parameter's name must be an identifier, got '{name}'"
 
 
-def clash(one: ParameterDeclaration, other: ParameterDeclaration | None) -> str | None:
+def clash(
+    parameter_declaration: ParameterDeclaration, other: ParameterDeclaration | None
+) -> str | None:
     """Return what is wrong with declaring a parameter twice; saying the same again is not."""
-    if other is None or (one.parameter_type, one.value) == (other.parameter_type, other.value):
+    if other is None or (parameter_declaration.parameter_type, parameter_declaration.value) == (
+        other.parameter_type,
+        other.value,
+    ):
         return None
-    return f"parameter {one.name} is declared twice, as {other.value} and as {one.value}"
+    return (
+        f"parameter {parameter_declaration.name} is declared twice, as {other.value} and as "
+        f"{parameter_declaration.value}"
+    )
 
 
 def _declarations(scenario: OpenScenario) -> tuple[ParameterDeclaration, ...]:
@@ -233,7 +247,9 @@ def broken(
     reasons: list[str] = []
     for group in declaration.constraint_groups:
         found = [
-            text for one in group.constraints for text in _violates(declaration, one, value, known)
+            text
+            for constraint in group.constraints
+            for text in _violates(declaration, constraint, value, known)
         ]
         if not found:
             return []
@@ -280,7 +296,7 @@ def _limit(kind: Kind, text: str, known: Mapping[str, Literal]) -> Literal:
         raise FileFormatError(f"refers to ${unknown[0]}, which is not declared")
     if isinstance(value, ParameterRef):
         return parse_literal(kind, str(known[value.name]))
-    numbers = {name: one for name in value.names if isinstance(one := known[name], int | float)}
+    numbers = {name: item for name in value.names if isinstance(item := known[name], int | float)}
     if texts := sorted(value.names - numbers.keys()):
         raise FileFormatError(f"computes with ${texts[0]}, which is no number")
     with np.errstate(all="ignore"):
@@ -310,7 +326,7 @@ EGO = "ego"
 
 def ego_of(storyboard: osc.OpenScenario) -> str:
     """Return the name of the entity under test: the one called so, else the first."""
-    names = [str(one.name) for one in storyboard.entities.scenario_objects]
+    names = [str(obj.name) for obj in storyboard.entities.scenario_objects]
     return next((name for name in names if name.lower() == EGO), names[0])
 
 
@@ -320,7 +336,7 @@ def rename_entity(scenario: osc.OpenScenario, old: str, new: str) -> osc.OpenSce
     Raises:
         InputError: there is no entity of the old name, or one that has the new one already.
     """
-    names = [str(one.name) for one in scenario.entities.scenario_objects]
+    names = [str(obj.name) for obj in scenario.entities.scenario_objects]
     if old not in names:
         raise InputError(f"no entity has the name '{old}'; there are {', '.join(names) or 'none'}")
     if new in names and new != old:
@@ -338,7 +354,7 @@ def _renamed(element: T, old: str, new: str) -> T:
     for child in declared.children:
         value = getattr(element, child.field)
         if child.many:
-            changed[child.field] = tuple(_renamed(one, old, new) for one in value)
+            changed[child.field] = tuple(_renamed(item, old, new) for item in value)
         elif value is not None:
             changed[child.field] = _renamed(value, old, new)
     return replace(element, **changed)

@@ -76,7 +76,7 @@ def without(scenario: OpenScenario, culprits: Iterable[Element]) -> OpenScenario
         scenario: stays as it is.
         culprits: elements of it, by identity.
     """
-    wanted = {id(one) for one in culprits}
+    wanted = {id(culprit) for culprit in culprits}
     gone: set[int] = set()
     for path in _paths(scenario):
         if id(path[-1]) in wanted:
@@ -87,15 +87,15 @@ def without(scenario: OpenScenario, culprits: Iterable[Element]) -> OpenScenario
 
 def strays(scenario: OpenScenario) -> list[Element]:
     """Return what names an entity that the scenario does not have, and groups of none but such."""
-    names = {one.name for one in walk(scenario.entities) if isinstance(one, ScenarioObject)}
-    names |= {one.name for one in scenario.entities.entity_selections}
+    names = {node.name for node in walk(scenario.entities) if isinstance(node, ScenarioObject)}
+    names |= {selection.name for selection in scenario.entities.entity_selections}
     found: list[Element] = []
     for element in walk(scenario):
         for attribute, value in values_of(element):
             if attribute.is_entity and isinstance(value, str) and value not in names:
                 found.append(element)
         refs = element.actors.entity_refs if isinstance(element, ManeuverGroup) else ()
-        if refs and not names & {one.entity_ref for one in refs}:
+        if refs and not names & {ref.entity_ref for ref in refs}:
             found.append(element)
     return found
 
@@ -112,10 +112,10 @@ def _whole(path: tuple[Element, ...]) -> Element:
     whole = path[-1]
     if isinstance(whole, Trailer):  # a car without its trailer is one
         return whole
-    for one in reversed(path[1:]):
-        name = type(one).__name__
+    for element in reversed(path[1:]):
+        name = type(element).__name__
         if name in _WHOLES:
-            whole = one
+            whole = element
             if name in _ENDS:
                 break
     return whole
@@ -129,7 +129,7 @@ def _left(element: E, gone: set[int]) -> E | None:
     for child in declaration(type(element)).children:
         held = getattr(element, child.field)
         before = held if child.many else () if held is None else (held,)
-        after = [made for one in before if (made := _left(one, gone)) is not None]
+        after = [made for item in before if (made := _left(item, gone)) is not None]
         if all(a is b for a, b in zip(after, before, strict=False)) and len(after) == len(before):
             continue
         if len(after) < child.at_least:

@@ -139,8 +139,8 @@ def ranges_of(
             it at once, with its line.
     """
     builder = _Builder(scenario, place)
-    for one in definition.distributions if definition else ():
-        builder.add(one)
+    for distribution in definition.distributions if definition else ():
+        builder.add(distribution)
     if builder.problems:
         raise FileFormatError(*(f"{place}: {problem}" for problem in builder.problems))
     return builder.ranges()
@@ -152,14 +152,14 @@ def _fixed(group: osc.ValueConstraintGroup) -> osc.ValueConstraintGroup:
     return replace(group, constraints=fixed)
 
 
-def _bounds(one: osc.ParameterDeclaration, known: Collection[str]) -> Iterator[Bound]:
+def _bounds(declaration: osc.ParameterDeclaration, known: Collection[str]) -> Iterator[Bound]:
     """Yield the limits of a parameter that depend on others.
 
     Of several groups one must hold, which is no limit that holds by itself.
     """
-    if len(one.constraint_groups) != 1 or not kind_of(one.parameter_type).is_number:
+    if len(declaration.constraint_groups) != 1 or not kind_of(declaration.parameter_type).is_number:
         return
-    for limit in one.constraint_groups[0].constraints:
+    for limit in declaration.constraint_groups[0].constraints:
         if not refers(limit):
             continue
         value = parse_value(Kind.DOUBLE, limit.value, expressions=True)
@@ -171,16 +171,19 @@ def _bounds(one: osc.ParameterDeclaration, known: Collection[str]) -> Iterator[B
         high = parse(text, place) if limit.rule in _AT_MOST else None
         if low is not None or high is not None:
             why = "The file constrains it so."
-            yield Bound(one.name, low, high, why, "its ValueConstraint", place)
+            yield Bound(declaration.name, low, high, why, "its ValueConstraint", place)
 
 
-def _is_text(one: osc.ParameterDeclaration | None) -> bool:
-    return one is not None and kind_of(one.parameter_type) in (Kind.STRING, Kind.BOOLEAN)
+def _is_text(declaration: osc.ParameterDeclaration | None) -> bool:
+    return declaration is not None and kind_of(declaration.parameter_type) in (
+        Kind.STRING,
+        Kind.BOOLEAN,
+    )
 
 
-def _referred(one: Element) -> Iterator[str]:
+def _referred(element: Element) -> Iterator[str]:
     """Yield the parameters that an element refers to itself."""
-    for _, value in values_of(one):
+    for _, value in values_of(element):
         if isinstance(value, ParameterRef | Expr):
             yield from value.names
 
@@ -196,43 +199,51 @@ class _Builder:
     def __init__(self, scenario: osc.OpenScenario, place: str) -> None:
         self._place = place
         declared = scenario.parameter_declarations
-        self._declared = {one.name: one for one in declared.parameters} if declared else {}
+        self._declared = (
+            {parameter.name: parameter for parameter in declared.parameters} if declared else {}
+        )
         self._numbers, self._values = numbers(scenario), values(scenario)
         header = scenario.file_header.properties
-        self._said = {str(one.name): str(one.value) for one in header.properties} if header else {}
+        self._said = (
+            {str(property_.name): str(property_.value) for property_ in header.properties}
+            if header
+            else {}
+        )
         self._single: dict[str, Distribution] = {}
         self._categories: dict[str, FileParameter] = {}
         self._words: dict[str, tuple[str, ...]] = {}
-        self._used = {name for one in walk(scenario) for name in _referred(one)}
+        self._used = {name for node in walk(scenario) for name in _referred(node)}
         self._joint: list[dict[str, list[float]]] = []
         self.problems: list[str] = []
         self.notes: list[str] = []
 
     def add(
         self,
-        one: dst.DeterministicMultiParameterDistribution
+        distribution: dst.DeterministicMultiParameterDistribution
         | dst.DeterministicSingleParameterDistribution
         | dst.StochasticDistribution,
     ) -> None:
         """Add one distribution, or report why not."""
-        if isinstance(one, dst.DeterministicMultiParameterDistribution):
-            self._add_sets(one.distribution)
+        if isinstance(distribution, dst.DeterministicMultiParameterDistribution):
+            self._add_sets(distribution.distribution)
             return
-        name = one.parameter_name
-        with self._saying(one.distribution):
+        name = distribution.parameter_name
+        with self._saying(distribution.distribution):
             if _is_text(self._declared.get(name)) and isinstance(
-                one.distribution, dst.DistributionSet | dst.ProbabilityDistributionSet
+                distribution.distribution, dst.DistributionSet | dst.ProbabilityDistributionSet
             ):
-                self._add_category(name, one.distribution)
+                self._add_category(name, distribution.distribution)
                 return
             kind = self._kind(name)
-            found = dst.distribution_of(one.distribution)
+            found = dst.distribution_of(distribution.distribution)
             if kind.is_integer and not isinstance(found, Discrete | Uniform):
                 raise InputError(
                     f"parameter {name} is a whole number ({kind.value}), and a "
-                    f"{type(one.distribution).__name__} gives others, too"
+                    f"{type(distribution.distribution).__name__} gives others, too"
                 )
-            if isinstance(one.distribution, dst.DistributionRange | dst.UniformDistribution):
+            if isinstance(
+                distribution.distribution, dst.DistributionRange | dst.UniformDistribution
+            ):
                 found = self._without_open_ends(name, found)
             if isinstance(found, Discrete):
                 for value in found.values:
@@ -247,10 +258,11 @@ class _Builder:
         ASAM's own examples vary from −1.75 to 1.75 what must be greater than −1.75.
         """
         limits = {
-            float(one.value): str(one.rule)
+            float(constraint.value): str(constraint.rule)
             for group in self._declared[name].constraint_groups
-            for one in group.constraints
-            if one.rule in (osc.Rule.GREATER_THAN, osc.Rule.LESS_THAN) and not refers(one)
+            for constraint in group.constraints
+            if constraint.rule in (osc.Rule.GREATER_THAN, osc.Rule.LESS_THAN)
+            and not refers(constraint)
         }
         ends = [end for end in (found.low, found.high) if end in limits]
         if not ends or found.low == found.high:
@@ -277,10 +289,10 @@ class _Builder:
         Raises:
             InputError: a value that the scenario does not allow, or a second distribution.
         """
-        words = [str(one.value) for one in given.elements]
+        words = [str(element.value) for element in given.elements]
         codes = self._codes(name, words)
         weights = (
-            [one.weight for one in given.elements]
+            [element.weight for element in given.elements]
             if isinstance(given, dst.ProbabilityDistributionSet)
             else None
         )
@@ -305,10 +317,10 @@ class _Builder:
             if reasons := broken(declaration, word, self._values):
                 raise InputError(f"parameter {name} {reasons[0]}")
         allowed = [
-            one.value
+            constraint.value
             for group in declaration.constraint_groups
-            for one in group.constraints
-            if one.rule is osc.Rule.EQUAL_TO
+            for constraint in group.constraints
+            if constraint.rule is osc.Rule.EQUAL_TO
         ]
         names = tuple(dict.fromkeys(map(str, [*allowed, *words, declaration.value])))
         self._words[name] = names
@@ -322,7 +334,9 @@ class _Builder:
                 yield place, text
 
     def _add_sets(self, given: dst.ValueSetDistribution) -> None:
-        names = dict.fromkeys(one.parameter_ref for each in given.sets for one in each.assignments)
+        names = dict.fromkeys(
+            assignment.parameter_ref for each in given.sets for assignment in each.assignments
+        )
         columns: dict[str, list[float]] = {}
         for name in names:
             with self._saying(given):
@@ -347,7 +361,11 @@ class _Builder:
 
     @staticmethod
     def _given(given: dst.ParameterValueSet, name: str) -> str | None:
-        texts = [str(one.value) for one in given.assignments if one.parameter_ref == name]
+        texts = [
+            str(assignment.value)
+            for assignment in given.assignments
+            if assignment.parameter_ref == name
+        ]
         if len(texts) > 1:
             raise InputError(f"a set must give {name} one value (line {given.line})")
         return texts[0] if texts else None
@@ -372,14 +390,14 @@ class _Builder:
                 )
                 for name, values in columns.items()
             ]  # fmt: skip
-        derived = [*joint, *self._formulas({one.name for one in joint})]
-        following = {one.name for one in derived}
+        derived = [*joint, *self._formulas({parameter.name for parameter in joint})]
+        following = {item.name for item in derived}
         own = {name: self._parameter(name) for name in self._numbers if name not in following}
         made = own | self._categories | parameters
         bounds = [
             bound
-            for name, one in self._declared.items()
-            for bound in _bounds(one, self._numbers.keys())
+            for name, declaration in self._declared.items()
+            for bound in _bounds(declaration, self._numbers.keys())
             if bound.names & made.keys()
         ]
         names, combinations = self._combinations()
@@ -401,11 +419,11 @@ class _Builder:
         }
         names: list[str] = []
         choices: list[list[tuple[float, ...]]] = []
-        for name, one in self._categories.items():
+        for name, category in self._categories.items():
             if name in self._used or name not in compared:
-                assert isinstance(one.distribution, Discrete)
+                assert isinstance(category.distribution, Discrete)
                 names.append(name)
-                choices.append([(value,) for value in one.distribution.values])
+                choices.append([(value,) for value in category.distribution.values])
         for columns in self._joint:
             if together := [name for name in columns if name in self._words]:
                 names += together
@@ -491,7 +509,10 @@ class _Builder:
         groups = [_fixed(group) for group in declaration.constraint_groups]
         alone = [replace(declaration, constraint_groups=(group,)) for group in groups]
         known = self._values
-        if groups and not any(all(not broken(one, end, known) for end in ends) for one in alone):
+        if groups and not any(
+            all(not broken(parameter_declaration, end, known) for end in ends)
+            for parameter_declaration in alone
+        ):
             whole = replace(declaration, constraint_groups=tuple(groups))
             reasons = [text for end in ends for text in broken(whole, end, known)]
             reason = reasons[0] if reasons else f"may not have all values from {low:g} to {high:g}"

@@ -68,8 +68,9 @@ def read(
     scenario = expanded(file, folder, place, skipped, warnings)
     while skipped is not None and (astray := strays(scenario)):
         skipped += [
-            f"{place}: {type(one).__name__} of an entity that is not there (line {one.line})"
-            for one in astray
+            f"{place}: {type(element).__name__} of an entity that is not there (line "
+            f"{element.line})"
+            for element in astray
         ]
         scenario = without(scenario, astray)
     if problems := parameters.problems(scenario):
@@ -83,7 +84,8 @@ def _with_texts(scenario: OpenScenario, texts: dict[str, str]) -> OpenScenario:
     if declared is None or not texts:
         return scenario
     parameters = tuple(
-        replace(one, value=texts.get(one.name, one.value)) for one in declared.parameters
+        replace(parameter, value=texts.get(parameter.name, parameter.value))
+        for parameter in declared.parameters
     )
     return replace(scenario, parameter_declarations=replace(declared, parameters=parameters))
 

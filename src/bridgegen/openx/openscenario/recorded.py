@@ -94,15 +94,15 @@ def recorded(scenario: osc.OpenScenario, recording: Recording) -> osc.OpenScenar
     start = replace(
         board.init.actions,
         global_actions=tuple(
-            one
-            for one in board.init.actions.global_actions
-            if not isinstance(one.action, osc.EntityAction)
+            action
+            for action in board.init.actions.global_actions
+            if not isinstance(action.action, osc.EntityAction)
         ),
         privates=tuple(_private(recording, e) for e in range(len(recording.names))),
     )
     bodies = [
-        replace(one, object_controllers=(), entity_object=_turning(one.entity_object))
-        for one in scenario.entities.scenario_objects
+        replace(obj, object_controllers=(), entity_object=_turning(obj.entity_object))
+        for obj in scenario.entities.scenario_objects
     ]
     return replace(
         scenario,
@@ -217,8 +217,8 @@ def _stories(board: osc.Storyboard, recording: Recording) -> Iterator[osc.Story]
                 maneuvers = []
                 for maneuver in group.maneuvers:
                     events = [
-                        one for event in maneuver.events
-                        for one in _event(event, next(began) * recording.time_step)
+                        item for event in maneuver.events
+                        for item in _event(event, next(began) * recording.time_step)
                     ]  # fmt: skip
                     if events:
                         maneuvers.append(replace(maneuver, events=tuple(events)))
@@ -235,10 +235,10 @@ def _stories(board: osc.Storyboard, recording: Recording) -> Iterator[osc.Story]
 def _event(event: osc.Event, seconds: float) -> Iterator[osc.Event]:
     """Yield the event with its actions that concern all, if it began and has any."""
     actions = tuple(
-        one
-        for one in event.actions
-        if isinstance(one.action, osc.GlobalAction)
-        and not isinstance(one.action.action, osc.EntityAction)
+        action
+        for action in event.actions
+        if isinstance(action.action, osc.GlobalAction)
+        and not isinstance(action.action.action, osc.EntityAction)
     )
     if actions and seconds >= 0.0:
         yield replace(event, actions=actions, start_trigger=at(seconds, f"{event.name}_began"))
@@ -250,7 +250,7 @@ def _stop(board: osc.Storyboard, recording: Recording) -> osc.Trigger:
     kept = [
         group
         for group in groups
-        if not any(isinstance(one, osc.StoryboardElementStateCondition) for one in walk(group))
+        if not any(isinstance(node, osc.StoryboardElementStateCondition) for node in walk(group))
     ]
     end = at((recording.x.shape[1] - 1) * recording.time_step, "recording_ends")
     return osc.Trigger((*kept, *end.condition_groups))

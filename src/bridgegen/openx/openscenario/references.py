@@ -25,26 +25,31 @@ def to_storyboard(scenario: osc.OpenScenario, value_of: ValueOf) -> set[str]:
     """Return the names of the storyboard's parts that are referred to."""
     return {
         part
-        for one in walk(scenario)
-        if isinstance(one, osc.StoryboardElementStateCondition)
-        for part in str(value_of(one.storyboard_element_ref)).split("::")
+        for node in walk(scenario)
+        if isinstance(node, osc.StoryboardElementStateCondition)
+        for part in str(value_of(node.storyboard_element_ref)).split("::")
     }
 
 
 def of_storyboard(scenario: osc.OpenScenario, value_of: ValueOf) -> Iterator[Problem]:
     """Yield references to parts of the storyboard that it does not have."""
-    wanted = [one for one in walk(scenario) if isinstance(one, osc.StoryboardElementStateCondition)]
+    wanted = [
+        node for node in walk(scenario) if isinstance(node, osc.StoryboardElementStateCondition)
+    ]
     if not wanted:
         return
     paths = list(_paths(scenario.storyboard, value_of))
-    for one in wanted:
-        tag = _TAGS[osc.StoryboardElementType(value_of(one.storyboard_element_type))]
-        name = str(value_of(one.storyboard_element_ref))
+    for condition in wanted:
+        tag = _TAGS[osc.StoryboardElementType(value_of(condition.storyboard_element_type))]
+        name = str(value_of(condition.storyboard_element_ref))
         names = tuple(name.split("::"))
         if not any(kind == tag and path[-len(names) :] == names for kind, path in paths):
             known = ", ".join(path[-1] for kind, path in paths if kind == tag) or "none"
             what = "storyboardElementRef of StoryboardElementStateCondition"
-            yield one.line, f"{what} must name one of the elements {tag} {known}, got '{name}'"
+            yield (
+                condition.line,
+                f"{what} must name one of the elements {tag} {known}, got '{name}'",
+            )
 
 
 def _paths(
@@ -63,50 +68,50 @@ def of_controllers(
     """Yield references to controllers of lights, and to phases, that are declared nowhere."""
     signals = scenario.road_network.traffic_signals
     phases = {
-        value_of(one.name): {value_of(phase.name) for phase in one.phases}
-        for one in (() if signals is None else signals.controllers)
+        value_of(controller.name): {value_of(phase.name) for phase in controller.phases}
+        for controller in (() if signals is None else signals.controllers)
     }
-    on_map = set() if roads is None else {one.id for one in roads.controllers}
-    for one in walk(scenario):
+    on_map = set() if roads is None else {controller.id for controller in roads.controllers}
+    for node in walk(scenario):
         if not isinstance(
-            one, osc.TrafficSignalControllerAction | osc.TrafficSignalControllerCondition
+            node, osc.TrafficSignalControllerAction | osc.TrafficSignalControllerCondition
         ):
             continue
-        what, name = type(one).__name__, value_of(one.traffic_signal_controller_ref)
+        what, name = type(node).__name__, value_of(node.traffic_signal_controller_ref)
         if name in phases:
-            if (phase := value_of(one.phase)) not in phases[name]:
+            if (phase := value_of(node.phase)) not in phases[name]:
                 known = ", ".join(sorted(phases[name])) or "none"
-                yield one.line, f"phase of {what} must be one of {known}, got '{phase}'"
+                yield node.line, f"phase of {what} must be one of {known}, got '{phase}'"
         elif name not in on_map:
             known = ", ".join(sorted(phases)) or "none"
             said = f"must be one of {known}, got '{name}'"
-            yield one.line, f"trafficSignalControllerRef of {what} {said}"
+            yield node.line, f"trafficSignalControllerRef of {what} {said}"
 
 
 def of_map(scenario: osc.OpenScenario, roads: OpenDrive, value_of: ValueOf) -> Iterator[Problem]:
     """Yield roads and lights that the map does not have, and places beyond a road's end."""
     lights = {signal.id for road in roads.roads for signal in road.signals}
-    for one in walk(scenario):
-        what = type(one).__name__
-        if isinstance(one, osc.TrafficSignalStateAction | osc.TrafficSignalCondition):
-            if (name := value_of(one.name)) not in lights:
-                yield one.line, f"name of {what} must be a light of the map, got '{name}'"
-        elif isinstance(one, osc.TrafficSignalState):
-            if (name := value_of(one.traffic_signal_id)) not in lights:
+    for node in walk(scenario):
+        what = type(node).__name__
+        if isinstance(node, osc.TrafficSignalStateAction | osc.TrafficSignalCondition):
+            if (name := value_of(node.name)) not in lights:
+                yield node.line, f"name of {what} must be a light of the map, got '{name}'"
+        elif isinstance(node, osc.TrafficSignalState):
+            if (name := value_of(node.traffic_signal_id)) not in lights:
                 said = f"must be a light of the map, got '{name}'"
-                yield one.line, f"trafficSignalId of {what} {said}"
-        elif not isinstance(one, osc.LanePosition):  # a lane's place is checked with its lane
-            yield from _on_road(one, roads, value_of)
+                yield node.line, f"trafficSignalId of {what} {said}"
+        elif not isinstance(node, osc.LanePosition):  # a lane's place is checked with its lane
+            yield from _on_road(node, roads, value_of)
 
 
-def _on_road(one: Element, roads: OpenDrive, value_of: ValueOf) -> Iterator[Problem]:
-    for attribute, raw in values_of(one):
+def _on_road(element: Element, roads: OpenDrive, value_of: ValueOf) -> Iterator[Problem]:
+    for attribute, raw in values_of(element):
         if attribute.means is not ROAD:
             continue
-        what, road_id = type(one).__name__, str(value_of(raw))
+        what, road_id = type(element).__name__, str(value_of(raw))
         road = roads.roads_by_id.get(road_id)
         if road is None:
-            yield one.line, f"{what}: road '{road_id}' is not in the road network"
-        elif (s := value_of(getattr(one, "s", None))) is not None and not s <= road.length:
+            yield element.line, f"{what}: road '{road_id}' is not in the road network"
+        elif (s := value_of(getattr(element, "s", None))) is not None and not s <= road.length:
             said = f"0 <= s [m] <= {road.length:g} must hold on road {road_id}, got s={s:g}"
-            yield one.line, f"{what}: {said}"
+            yield element.line, f"{what}: {said}"

@@ -41,7 +41,9 @@ def part_resolved(part: E, scenario: osc.OpenScenario, place: str) -> E:
         FileFormatError: as of `resolved`.
     """
     declared = scenario.parameter_declarations
-    texts = {one.name: one.value for one in declared.parameters} if declared else {}
+    texts = (
+        {parameter.name: parameter.value for parameter in declared.parameters} if declared else {}
+    )
     values, numbers = parameters.values(scenario), parameters.numbers(scenario)
     found: list[str] = []
 
@@ -86,7 +88,9 @@ def texts_resolved(scenario: osc.OpenScenario) -> tuple[osc.OpenScenario, dict[s
         what the first of these is.
     """
     declared = scenario.parameter_declarations
-    texts = {one.name: one.value for one in declared.parameters} if declared else {}
+    texts = (
+        {parameter.name: parameter.value for parameter in declared.parameters} if declared else {}
+    )
     values, numbers = parameters.values(scenario), parameters.numbers(scenario)
     used: dict[str, str] = {}
 

@@ -94,10 +94,13 @@ class Scope:
     ) -> "Scope":
         """Return the scope of a scenario's declarations; see `inner`."""
         declarations = list(declarations)
-        literal = [one for one in declarations if not is_made(one)]
+        literal = [declaration for declaration in declarations if not is_made(declaration)]
         found = cls().inner(literal, problems, checks=False).names
-        own = {name: replace(one, value=ParameterRef(f"${name}")) for name, one in found.items()}
-        made = [one for one in declarations if is_made(one)]
+        own = {
+            name: replace(binding, value=ParameterRef(f"${name}"))
+            for name, binding in found.items()
+        }
+        made = [declaration for declaration in declarations if is_made(declaration)]
         scope = cls(own, own).inner(made, problems, checks=False)
         scope._check(declarations, problems)
         return scope
@@ -121,43 +124,47 @@ class Scope:
         names = dict(self.names)
         made = Scope(names, self.own)
         seen: dict[str, ParameterDeclaration] = {}
-        for one in declarations:
-            if problem := name_problem(one.name):
-                problems.wrong(one, problem)
+        for declaration in declarations:
+            if problem := name_problem(declaration.name):
+                problems.wrong(declaration, problem)
                 continue
-            if problem := clash(one, seen.get(one.name)):
-                problems.doubtful(one, problem)
-            seen[one.name] = one
-            is_given = assigned is not None and one.name in assigned
-            value = assigned[one.name] if assigned is not None and is_given else one.value
+            if problem := clash(declaration, seen.get(declaration.name)):
+                problems.doubtful(declaration, problem)
+            seen[declaration.name] = declaration
+            is_given = assigned is not None and declaration.name in assigned
+            value = (
+                assigned[declaration.name]
+                if assigned is not None and is_given
+                else declaration.value
+            )
             scope = Scope(self.own, self.own) if is_given else made
             try:
-                names[one.name] = scope._bind(one, value)
+                names[declaration.name] = scope._bind(declaration, value)
             except FileFormatError as error:
-                said = f"the value of parameter {one.name} {error}"
-                as_text = replace(one, parameter_type=ParameterType.STRING)
+                said = f"the value of parameter {declaration.name} {error}"
+                as_text = replace(declaration, parameter_type=ParameterType.STRING)
                 try:
-                    names[one.name] = scope._bind(as_text, value)
+                    names[declaration.name] = scope._bind(as_text, value)
                 except FileFormatError:
-                    problems.doubtful(one, said)
+                    problems.doubtful(declaration, said)
                 else:
                     if "$" in str(value):
-                        problems.doubtful(one, said)
+                        problems.doubtful(declaration, said)
                     else:
-                        problems.odd(one, f"{said}; taken as a text")
+                        problems.odd(declaration, f"{said}; taken as a text")
         if checks:
             made._check(seen.values(), problems)
         return made
 
     def _check(self, declarations: Iterable[ParameterDeclaration], problems: Problems) -> None:
         """Compare parameters with their constraints, which may refer to one another."""
-        known = {name: one.now for name, one in self.names.items()}
-        for one in declarations:
-            bound = self.names.get(one.name)
-            if bound is None or bound.kind is not kind_of(one.parameter_type):
+        known = {name: binding.now for name, binding in self.names.items()}
+        for declaration in declarations:
+            bound = self.names.get(declaration.name)
+            if bound is None or bound.kind is not kind_of(declaration.parameter_type):
                 continue  # it has no value of its type, which has been said
-            for text in broken(one, bound.now, known):
-                problems.wrong(one, f"parameter {one.name} {text}")
+            for text in broken(declaration, bound.now, known):
+                problems.wrong(declaration, f"parameter {declaration.name} {text}")
 
     def _bind(self, declaration: ParameterDeclaration, value: Value) -> Binding:
         kind = kind_of(declaration.parameter_type)
@@ -184,21 +191,23 @@ class Scope:
         if not isinstance(value, ParameterRef | Expr):
             return value
         bound = {name: self.names[name] for name in value.names if name in self.names}
-        kinds = {name: (one.kind, one.now) for name, one in bound.items()}
+        kinds = {name: (item.kind, item.now) for name, item in bound.items()}
         for text in misfits(attribute, value, kinds, texts=True):
             raise FileFormatError(text)
         as_text = attribute.kind in _TEXTS and isinstance(value, ParameterRef)
         if not as_text:  # a text that reads as a number is that number
             fixed = (*_TEXTS, Kind.BOOLEAN) if isinstance(value, Expr) else _TEXTS
             bound |= {n: replace(b, value=b.now) for n, b in bound.items() if b.kind in fixed}
-        depends = all(self.own.get(name) is one for name, one in bound.items())
+        depends = all(self.own.get(name) is item for name, item in bound.items())
         if depends and not (isinstance(value, Expr) and attribute.kind is Kind.BOOLEAN):
             return value
         if isinstance(value, ParameterRef):
-            one = bound[value.name]
-            made = one.value
+            binding = bound[value.name]
+            made = binding.value
             if not isinstance(made, ParameterRef | Expr):
-                return attribute.enum(str(made)) if attribute.enum else _typed(one, attribute.kind)
+                return (
+                    attribute.enum(str(made)) if attribute.enum else _typed(binding, attribute.kind)
+                )
         else:
             made = _put_in(value, bound)
         if isinstance(made, ParameterRef) or (made.names and attribute.takes_expressions):
@@ -225,9 +234,9 @@ class Scope:
             return bool(number)
         return int(number) if kind.is_integer else number
 
-    def constrained(self, one: ParameterDeclaration) -> ParameterDeclaration:
+    def constrained(self, declaration: ParameterDeclaration) -> ParameterDeclaration:
         """Return one of the scenario's own declarations with constraints on its own parameters."""
-        kind = kind_of(one.parameter_type)
+        kind = kind_of(declaration.parameter_type)
         takes = Attribute("value", "value", kind, None, True, False, True, None, None)
 
         def limited(limit: ValueConstraint) -> ValueConstraint:
@@ -240,10 +249,10 @@ class Scope:
         with suppress(FileFormatError):  # which has been said
             groups = (
                 replace(group, constraints=tuple(map(limited, group.constraints)))
-                for group in one.constraint_groups
+                for group in declaration.constraint_groups
             )
-            return replace(one, constraint_groups=tuple(groups))
-        return one
+            return replace(declaration, constraint_groups=tuple(groups))
+        return declaration
 
     def text(self, attribute: Attribute, value: Any) -> str:
         """Return the text that an attribute is at the scenario's declared values.
@@ -272,10 +281,10 @@ def _put_in(value: Expr, bound: Mapping[str, Binding]) -> Expr:
     """Return an expression in which parameters stand for what they are."""
 
     def stands(name: str) -> str:
-        one = bound[name].value
-        if isinstance(one, Expr):
-            return f"({one.text[2:-1]})"
-        return one.text if isinstance(one, ParameterRef) else f"({text_of(one)})"
+        flag = bound[name].value
+        if isinstance(flag, Expr):
+            return f"({flag.text[2:-1]})"
+        return flag.text if isinstance(flag, ParameterRef) else f"({text_of(flag)})"
 
     text = _NAMES.sub(lambda found: stands(found[1]), value.text)
     if len(text) > MAX_LENGTH:

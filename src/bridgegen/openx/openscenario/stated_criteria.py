@@ -30,11 +30,11 @@ def stated_criteria(scenario: osc.OpenScenario) -> tuple[tuple[Criterion, ...], 
     trigger = getattr(scenario.storyboard, "stop_trigger", None)
     found: dict[str, Criterion] = {}
     unknown: list[str] = []
-    for one in walk(trigger) if trigger is not None else ():
-        if not (isinstance(one, osc.Condition) and one.is_criterion):
+    for node in walk(trigger) if trigger is not None else ():
+        if not (isinstance(node, osc.Condition) and node.is_criterion):
             continue
-        name = str(one.name).removeprefix(osc.CRITERIA)
-        made = _criterion(name, one)
+        name = str(node.name).removeprefix(osc.CRITERIA)
+        made = _criterion(name, node)
         if made is None:
             unknown.append(name)
         else:

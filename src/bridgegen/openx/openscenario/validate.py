@@ -61,9 +61,9 @@ class _Check:
         self.values = parameters.values(scenario)
         self.numbers = parameters.numbers(scenario)
         self.entities = [
-            str(self.value(one.name))
-            for one in walk(scenario.entities)
-            if isinstance(one, osc.ScenarioObject)
+            str(self.value(node.name))
+            for node in walk(scenario.entities)
+            if isinstance(node, osc.ScenarioObject)
         ]
 
     def value(self, value: Value) -> Any:

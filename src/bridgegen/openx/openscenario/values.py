@@ -360,7 +360,7 @@ def _is_truth(node: ast.expr, is_boolean: Mapping[str, bool]) -> bool:
 def _all(nodes: list[ast.expr], is_boolean: Mapping[str, bool], *, truth: bool) -> bool:
     for node in nodes:
         if _is_truth(node, is_boolean) is not truth:
-            names = sorted(one.id for one in ast.walk(node) if isinstance(one, ast.Name))
+            names = sorted(item.id for item in ast.walk(node) if isinstance(item, ast.Name))
             of = f" of ${', $'.join(names)}" if names else ""
             what = ("not, and, or", "number") if truth else ("arithmetic", "boolean")
             raise _MixedError(f"takes a {what[1]}{of} for {what[0]}")

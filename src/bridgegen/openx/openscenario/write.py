@@ -79,8 +79,8 @@ def fill(node: etree._Element, tag: str, element: Element, *, bare: bool) -> Non
             raise ValueError(f"{tag} must have at least {child.at_least} {names}")
     for name, below in children_of(element):
         wrapped = bare and is_wrapper(element, below)
-        for each, one in children_of(below) if wrapped else ((name, below),):
-            fill(etree.SubElement(node, each), each, one, bare=bare)
+        for each, item in children_of(below) if wrapped else ((name, below),):
+            fill(etree.SubElement(node, each), each, item, bare=bare)
 
 
 # --- Other versions of the standard: what was renamed, and what was required when ---

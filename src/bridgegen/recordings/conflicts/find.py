@@ -77,16 +77,22 @@ def conflicts_of(traffic: RecordedTraffic) -> tuple[RecordedConflict, ...]:
     clock = clock_of(traffic)
     best: dict[tuple[int, int], RecordedConflict] = {}
     for ego, others in candidates(traffic, clock).items():
-        for one in _of_ego(traffic, clock, ego, others):
-            pair = (min(one.ego, one.other), max(one.ego, one.other))
-            if pair not in best or one.urgency > best[pair].urgency:
-                best[pair] = one
+        for conflict in _of_ego(traffic, clock, ego, others):
+            pair = (min(conflict.ego, conflict.other), max(conflict.ego, conflict.other))
+            if pair not in best or conflict.urgency > best[pair].urgency:
+                best[pair] = conflict
     return tuple(sorted(best.values(), key=order))
 
 
-def order(one: RecordedConflict) -> tuple[bool, bool, float, int, int]:
+def order(recorded_conflict: RecordedConflict) -> tuple[bool, bool, float, int, int]:
     """Return what sorts conflicts: near misses, then doubtful ones, then contacts; by harm."""
-    return one.is_contact, one.doubt != "", -one.found.harm, one.ego, one.other
+    return (
+        recorded_conflict.is_contact,
+        recorded_conflict.doubt != "",
+        -recorded_conflict.found.harm,
+        recorded_conflict.ego,
+        recorded_conflict.other,
+    )
 
 
 def candidates(traffic: RecordedTraffic, clock: Clock) -> dict[int, list[int]]:
@@ -137,12 +143,12 @@ def _of_ego(
         last = min(first + span - 1, end)
         around = max(first - context, begin), min(last + context, end)
         there = [
-            one for one in others
-            if clock.begin[one] <= around[1] and clock.end[one] >= around[0]
+            other for other in others
+            if clock.begin[other] <= around[1] and clock.end[other] >= around[0]
         ]  # fmt: skip
-        for one in _of_part(traffic, clock, ego, there, *around):
-            if first <= one.instant <= last:
-                yield one
+        for conflict in _of_part(traffic, clock, ego, there, *around):
+            if first <= conflict.instant <= last:
+                yield conflict
 
 
 def _of_part(

@@ -101,10 +101,10 @@ def mark_crossings(
                     if abs(cross) < least_sine * math.hypot(ux, uy) * math.hypot(vx, vy):
                         continue
                     dx, dy = x[a[j]] - x[a[k]], y[a[j]] - y[a[k]]
-                    one, other = (dx * vy - dy * vx) / cross, (dx * uy - dy * ux) / cross
-                    if not (0.0 <= one <= 1.0 and 0.0 <= other <= 1.0):
+                    item, other = (dx * vy - dy * vx) / cross, (dx * uy - dy * ux) / cross
+                    if not (0.0 <= item <= 1.0 and 0.0 <= other <= 1.0):
                         continue
-                    at_one = passed(x, y, a[k], b[k], one) - a[k] + instant[a[k]]
+                    at_one = passed(x, y, a[k], b[k], item) - a[k] + instant[a[k]]
                     at_other = passed(x, y, a[j], b[j], other) - a[j] + instant[a[j]]
                     if abs(at_one - at_other) > window:
                         continue

@@ -43,7 +43,7 @@ def foot(x: Float, y: Float, first: int, last: int, at: int, px: float, py: floa
 
 @kernel
 def joined(
-    x: Float, y: Float, one: int, first: int, other: int, other_first: int, other_last: int,
+    x: Float, y: Float, number: int, first: int, other: int, other_first: int, other_last: int,
     near: float,
 ) -> tuple[int, float, int]:  # fmt: skip
     """Return where a line comes nearer than a distance to another, and stays so up to a vertex.
@@ -51,7 +51,7 @@ def joined(
     Args:
         x: of the vertices of all lines [m].
         y: likewise.
-        one: that vertex.
+        number: that vertex.
         first: of its line.
         other: vertex of the other line near it.
         other_first: of that line.
@@ -62,12 +62,12 @@ def joined(
         The last vertex before, or -1 if it has been near from its beginning; the share of the way
         to the next one; the other line's vertex next to it.
     """
-    inside, other = foot(x, y, other_first, other_last, other, x[one], y[one])
-    while one > first:
-        outside, at = foot(x, y, other_first, other_last, other, x[one - 1], y[one - 1])
+    inside, other = foot(x, y, other_first, other_last, other, x[number], y[number])
+    while number > first:
+        outside, at = foot(x, y, other_first, other_last, other, x[number - 1], y[number - 1])
         if outside > near:
-            return one - 1, (outside - near) / max(outside - inside, 1e-12), other
-        one, inside, other = one - 1, outside, at
+            return number - 1, (outside - near) / max(outside - inside, 1e-12), other
+        number, inside, other = number - 1, outside, at
     return -1, 0.0, other
 
 
@@ -149,10 +149,10 @@ def mark_joins(
                         break
                     end, at = end + 1, onward
                 until[q] = end
-                one, share, at = joined(x, y, k, p_first, j, q_first, q_last, near)
-                if one < 0:
+                item, share, at = joined(x, y, k, p_first, j, q_first, q_last, near)
+                if item < 0:
                     continue
-                begin = one + 1
+                begin = item + 1
                 while at < q_last:
                     apart, begin = foot(x, y, p_first, p_last, begin, x[at], y[at])
                     if apart <= near:
@@ -163,12 +163,12 @@ def mark_joins(
                     continue
                 if count < len(pairs):
                     pairs[count, 0], pairs[count, 1] = p, q
-                    s, t = vertex[one], vertex[one + 1]
+                    s, t = vertex[item], vertex[item + 1]
                     places[count, 0] = passed(state_x, state_y, s, t, share) - s + instant[s]
                     s, t = vertex[other], vertex[other + 1]
                     places[count, 1] = passed(state_x, state_y, s, t, other_share) - s + instant[s]
                     places[count, 2] = (
-                        length[one] + share * (length[one + 1] - length[one]) - length[p_first]
+                        length[item] + share * (length[item + 1] - length[item]) - length[p_first]
                     )
                     places[count, 3] = (
                         length[other]

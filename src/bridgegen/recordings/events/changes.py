@@ -122,13 +122,13 @@ def lane_changes(scene: Scene) -> LaneChanges:
 def _sides(lanes: RecordedLanes, a: Int, b: Int) -> Int:
     """Return 1 for a step to the left, -1 to the right, `ONWARD` or `ELSEWHERE`."""
     found = np.full(len(a), ELSEWHERE, np.int64)
-    for i, (one, other) in enumerate(zip(a.tolist(), b.tolist(), strict=True)):
-        onward = lanes.successors[one]
+    for i, (item, other) in enumerate(zip(a.tolist(), b.tolist(), strict=True)):
+        onward = lanes.successors[item]
         if other in onward:
             found[i] = ONWARD
-        elif lanes.left[one] == other or any(lanes.left[to] == other for to in onward):
+        elif lanes.left[item] == other or any(lanes.left[to] == other for to in onward):
             found[i] = 1
-        elif lanes.right[one] == other or any(lanes.right[to] == other for to in onward):
+        elif lanes.right[item] == other or any(lanes.right[to] == other for to in onward):
             found[i] = -1
     return found
 

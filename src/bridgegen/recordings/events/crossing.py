@@ -18,18 +18,20 @@ from bridgegen.recordings.events.scene import Scene
 def find(scene: Scene, changes: LaneChanges) -> Events:
     """Return the crossings of a recording; of two that go straight on, from both views."""
     met = [
-        one for one in meetings(scene, scene.is_ego, scene.is_ego)
-        if CROSSING[0] <= one.angle <= CROSSING[1]
-        and one.approach_angle < OPPOSITE
-        and abs(one.ego_turn) <= STRAIGHT
+        meeting for meeting in meetings(scene, scene.is_ego, scene.is_ego)
+        if CROSSING[0] <= meeting.angle <= CROSSING[1]
+        and meeting.approach_angle < OPPOSITE
+        and abs(meeting.ego_turn) <= STRAIGHT
     ]  # fmt: skip
     paces = paces_of(scene, met)
-    return events_of_meetings("crossing", scene, met, lambda one: _more(scene, one) | paces[one])
+    return events_of_meetings(
+        "crossing", scene, met, lambda meeting: _more(scene, meeting) | paces[meeting]
+    )
 
 
-def _more(scene: Scene, one: Meeting) -> dict[str, float]:
+def _more(scene: Scene, meeting: Meeting) -> dict[str, float]:
     return {
-        "other_turn": one.other_turn,
-        "ego_ran_red": ran_red(scene, one.ego, one.ego_at),
-        "other_ran_red": ran_red(scene, one.other, one.other_at),
+        "other_turn": meeting.other_turn,
+        "ego_ran_red": ran_red(scene, meeting.ego, meeting.ego_at),
+        "other_ran_red": ran_red(scene, meeting.other, meeting.other_at),
     }

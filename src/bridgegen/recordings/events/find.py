@@ -106,8 +106,8 @@ def named(
     They are numbered by kind, through all recordings.
     """
     counts: Counter[str] = Counter()
-    for one in found:
-        for events in one.kinds:
+    for found_events in found:
+        for events in found_events.kinds:
             kind, first = events.kind.name, counts[events.kind.name] + 1
-            yield one, events, tuple(f"{kind}-{first + i}" for i in range(len(events)))
+            yield found_events, events, tuple(f"{kind}-{first + i}" for i in range(len(events)))
             counts[kind] += len(events)

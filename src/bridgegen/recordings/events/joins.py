@@ -64,14 +64,14 @@ def path_joins(scene: Scene) -> Iterator[Join]:
     paths, found = scene.paths, scene.joins
     crossing = _crossing_pairs(scene)
     columns = (values.tolist() for values in vars(found).values())
-    for one, other, one_at, other_at, one_length, other_length, shared in zip(
+    for item, other, first_at, other_at, first_length, other_length, shared in zip(
         *columns, strict=True
     ):
-        if shared < LEAST_SHARED or (one, other) in crossing:
+        if shared < LEAST_SHARED or (item, other) in crossing:
             continue
-        if abs(one_at - other_at) * scene.step > WINDOW:
+        if abs(first_at - other_at) * scene.step > WINDOW:
             continue
-        who, lengths = (one, other), (one_length, other_length)
+        who, lengths = (item, other), (first_length, other_length)
         before = [
             paths.course(p, max(length - LOOK_BACK, 0.0))
             for p, length in zip(who, lengths, strict=True)
@@ -89,7 +89,7 @@ def path_joins(scene: Scene) -> Iterator[Join]:
         backwards = first - np.radians(bend) * (0.5 * span + LOOK_BACK)
         merging = int(abs(_degrees(before[1] - backwards)) > abs(_degrees(before[0] - backwards)))
         main = 1 - merging
-        at = (one_at, other_at)
+        at = (first_at, other_at)
         yield Join(
             who[main], who[merging], at[main], at[merging], angle,
             _side(paths, who[main], lengths[main], who[merging], lengths[merging]),
@@ -100,16 +100,16 @@ def path_joins(scene: Scene) -> Iterator[Join]:
 def _crossing_pairs(scene: Scene) -> set[tuple[int, int]]:
     """Return the pairs whose paths cross at `CROSSES` or more."""
     paths, met, found = scene.paths, scene.crossings, set()
-    for one, other, one_at, other_at in zip(
-        met.one.tolist(), met.other.tolist(), met.one_at.tolist(), met.other_at.tolist(),
+    for item, other, first_at, other_at in zip(
+        met.first.tolist(), met.other.tolist(), met.first_at.tolist(), met.other_at.tolist(),
         strict=True,
     ):  # fmt: skip
         courses = [
             paths.course(who, paths.length(who, at))
-            for who, at in ((one, one_at), (other, other_at))
+            for who, at in ((item, first_at), (other, other_at))
         ]
         if CROSSES <= abs(_degrees(courses[1] - courses[0])) <= 180.0 - CROSSES:
-            found.add((one, other))
+            found.add((item, other))
     return found
 
 
@@ -154,8 +154,8 @@ def length_left(lanes: RecordedLanes, lane: int) -> float:
         length += float(ends[-1] - ends[0])
         onward = lanes.successors[lane]
         if not onward:
-            beside = [int(one[lane]) for one in (lanes.left, lanes.right)]
-            goes_on = any(one != NONE and lanes.successors[one] for one in beside)
+            beside = [int(array[lane]) for array in (lanes.left, lanes.right)]
+            goes_on = any(number != NONE and lanes.successors[number] for number in beside)
             return length if goes_on else np.nan
         if len(onward) > 1 or length > FARTHEST_END:
             return np.nan
@@ -208,8 +208,8 @@ def _of_two_lanes(scene: Scene) -> Iterator[Join]:
     """Yield who comes to a lane from a lane other than the one before or after it did."""
     lanes, lane, who = scene.lanes, scene.placed.lane.astype(np.int64), scene.participant
     led = np.zeros(len(lanes), np.int64)
-    for one, onward in enumerate(lanes.successors):
-        if lanes.kinds[one] == "driving":
+    for number, onward in enumerate(lanes.successors):
+        if lanes.kinds[number] == "driving":
             led[list(onward)] += 1
     moves = (lane[1:] != lane[:-1]) & (who[1:] == who[:-1]) & scene.drives[1:] & scene.drives[:-1]
     steps = np.flatnonzero(moves & scene.is_ego[who[1:]])
@@ -246,12 +246,12 @@ def _entered(scene: Scene, steps: Int) -> Float:
     return scene.clock.instant[steps + 1] - back
 
 
-def _is_main(lanes: RecordedLanes, one: int, other: int, onward: int) -> bool:
+def _is_main(lanes: RecordedLanes, number: int, other: int, onward: int) -> bool:
     """Return whether the first of two lanes is the one that goes on, and the other joins it."""
-    same = [bool(lanes.carriageway[lane] == lanes.carriageway[onward]) for lane in (one, other)]
+    same = [bool(lanes.carriageway[lane] == lanes.carriageway[onward]) for lane in (number, other)]
     if same[0] != same[1]:
         return same[0]
-    turns = [_turn(lanes, lane) for lane in (one, other)]
+    turns = [_turn(lanes, lane) for lane in (number, other)]
     return turns[0] <= turns[1]
 
 

@@ -85,14 +85,14 @@ def meetings(scene: Scene, egos: Bool, others: Bool) -> list[Meeting]:
         others: ``(P,)`` who can be the other.
     """
     met, found = scene.crossings, []
-    for one, other, one_at, other_at in zip(
-        met.one.tolist(), met.other.tolist(), met.one_at.tolist(), met.other_at.tolist(),
+    for item, other, first_at, other_at in zip(
+        met.first.tolist(), met.other.tolist(), met.first_at.tolist(), met.other_at.tolist(),
         strict=True,
     ):  # fmt: skip
-        if egos[one] and others[other]:
-            found.append(meeting(scene, one, other, one_at, other_at))
-        if egos[other] and others[one]:
-            found.append(meeting(scene, other, one, other_at, one_at))
+        if egos[item] and others[other]:
+            found.append(meeting(scene, item, other, first_at, other_at))
+        if egos[other] and others[item]:
+            found.append(meeting(scene, other, item, other_at, first_at))
     return found
 
 
@@ -137,20 +137,20 @@ def events_of_meetings(
         roles: participants besides the other, by role.
         refused: further reasons for which meetings are no events.
     """
-    off = set_off_instants(scene, [one.other for one in met], [one.other_at for one in met])
+    off = set_off_instants(scene, [item.other for item in met], [item.other_at for item in met])
     rows = [
-        dict(_quantities(scene, one, at)) | more(one)
-        for one, at in zip(met, off.tolist(), strict=True)
+        dict(_quantities(scene, item, at)) | more(item)
+        for item, at in zip(met, off.tolist(), strict=True)
     ]
     table = {
         name: np.array([row[name] for row in rows], np.float64)
         for name in EVENT_KINDS[kind].quantities
     }
     ego, other = (
-        np.array([getattr(one, key) for one in met], np.int64) for key in ("ego", "other")
+        np.array([getattr(item, key) for item in met], np.int64) for key in ("ego", "other")
     )
     begin, first, last = (
-        np.array([getattr(one, key) for one in met], np.float64)
+        np.array([getattr(item, key) for item in met], np.float64)
         for key in ("begin", "first_at", "last_at")
     )
     return events_of(
@@ -168,45 +168,45 @@ def events_of_meetings(
 def paces_of(scene: Scene, met: Sequence[Meeting]) -> dict[Meeting, dict[str, float]]:
     """Return of meetings how the other changes its pace before it passes the point."""
     found = pace_changes(
-        scene, [one.other for one in met], [one.other_at for one in met], LEAST_PACE
+        scene, [item.other for item in met], [item.other_at for item in met], LEAST_PACE
     )  # fmt: skip
     paces = {}
-    for i, one in enumerate(met):
+    for i, item in enumerate(met):
         begin = float(found.begin[i])
-        ways, distance = _ways_left(scene, one, begin)
-        paces[one] = {
+        ways, distance = _ways_left(scene, item, begin)
+        paces[item] = {
             "pace_before": float(found.before[i]), "pace_after": float(found.after[i]),
             "pace_distance": ways[0], "pace_ego_distance": ways[1], "pace_apart": distance,
         }  # fmt: skip
     return paces
 
 
-def _ways_left(scene: Scene, one: Meeting, at: float) -> tuple[list[float], float]:
+def _ways_left(scene: Scene, item: Meeting, at: float) -> tuple[list[float], float]:
     """Return how far other and ego have to go at an instant, and how far apart they are [m]."""
     paths, clock = scene.paths, scene.clock
-    if not clock.begin[one.ego] <= at <= clock.end[one.ego]:
+    if not clock.begin[item.ego] <= at <= clock.end[item.ego]:
         return [np.nan, np.nan], np.nan
     ways = [
         paths.length(who, end) - paths.length(who, at)
-        for who, end in ((one.other, one.other_at), (one.ego, one.ego_at))
+        for who, end in ((item.other, item.other_at), (item.ego, item.ego_at))
     ]
-    return ways, apart(scene, one.ego, one.other, at)
+    return ways, apart(scene, item.ego, item.other, at)
 
 
-def _quantities(scene: Scene, one: Meeting, set_off: float) -> Iterator[tuple[str, float]]:
+def _quantities(scene: Scene, item: Meeting, set_off: float) -> Iterator[tuple[str, float]]:
     paths = scene.paths
-    for name, who, at in (("ego", one.ego, one.ego_at), ("other", one.other, one.other_at)):
-        yield f"{name}_speed", _speed(scene, who, one.begin)
+    for name, who, at in (("ego", item.ego, item.ego_at), ("other", item.other, item.other_at)):
+        yield f"{name}_speed", _speed(scene, who, item.begin)
         yield f"{name}_crossing_speed", crossing_speed(scene, who, at)
-        yield f"{name}_distance", paths.length(who, at) - paths.length(who, one.begin)
-    yield "time_gap", (one.last_at - one.first_at) * scene.step
-    yield "pet", _pet(scene, one)
-    yield "angle", one.angle
-    yield "approach_angle", one.approach_angle
-    yield "side", one.side
-    yield "ego_first", float(one.ego_at < one.other_at)
-    yield "seen_time", (one.first_at - one.begin) * scene.step
-    ways, distance = _ways_left(scene, one, set_off)
+        yield f"{name}_distance", paths.length(who, at) - paths.length(who, item.begin)
+    yield "time_gap", (item.last_at - item.first_at) * scene.step
+    yield "pet", _pet(scene, item)
+    yield "angle", item.angle
+    yield "approach_angle", item.approach_angle
+    yield "side", item.side
+    yield "ego_first", float(item.ego_at < item.other_at)
+    yield "seen_time", (item.first_at - item.begin) * scene.step
+    ways, distance = _ways_left(scene, item, set_off)
     yield "set_off_distance", ways[0]
     yield "set_off_ego_distance", ways[1]
     yield "set_off_apart", distance
@@ -226,11 +226,11 @@ def crossing_speed(scene: Scene, who: int, at: float) -> float:
     return way / ((high - low) * scene.step)
 
 
-def _pet(scene: Scene, one: Meeting) -> float:
+def _pet(scene: Scene, item: Meeting) -> float:
     """Return the least time between the instants at which both bodies cover a point [s]."""
-    late, early = (one.ego, one.other) if one.ego_at > one.other_at else (one.other, one.ego)
-    begin = int(np.ceil(one.begin))
-    end = min(int(one.last_at + AFTER / scene.step) + 1, int(scene.clock.end[late]))
+    late, early = (item.ego, item.other) if item.ego_at > item.other_at else (item.other, item.ego)
+    begin = int(np.ceil(item.begin))
+    end = min(int(item.last_at + AFTER / scene.step) + 1, int(scene.clock.end[late]))
     if end <= begin:
         return np.nan
     return float(pet(excerpt(scene.traffic, scene.clock, late, [early], begin, end))[0])

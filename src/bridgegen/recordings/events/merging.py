@@ -43,8 +43,8 @@ def find(scene: Scene, changes: LaneChanges) -> Events:
             met.append(view)
     return events_of_meetings(
         "merging", scene, met,
-        lambda one: _more(scene, one, of[one], gaps[of[one]]) | paces[of[one]],
-        refused={NO_CHANGE: [not of[one].is_change for one in met]},
+        lambda item: _more(scene, item, of[item], gaps[of[item]]) | paces[of[item]],
+        refused={NO_CHANGE: [not of[item].is_change for item in met]},
     )  # fmt: skip
 
 
@@ -58,27 +58,29 @@ def _next_ones(scene: Scene, joins: Iterable[Join]) -> Iterator[Join]:
     most = AT_ONCE / scene.step
     for group in _by_source(joins):
         before = frozenset(pairs)
-        for one in sorted(group, key=lambda one: (abs(one.main_at - one.merging_at), one.main_at)):
-            is_first = one.merging_at < one.main_at
+        for join in sorted(
+            group, key=lambda join: (abs(join.main_at - join.merging_at), join.main_at)
+        ):
+            is_first = join.merging_at < join.main_at
             places = {
-                (one.merging, True, is_first): one.merging_at,
-                (one.main, False, is_first): one.main_at,
+                (join.merging, True, is_first): join.merging_at,
+                (join.main, False, is_first): join.main_at,
             }
-            if (min(one.main, one.merging), max(one.main, one.merging)) in before:
+            if (min(join.main, join.merging), max(join.main, join.merging)) in before:
                 continue
             if any(abs(at - other) <= most
                    for key, at in places.items() for other in kept.get(key, [])):  # fmt: skip
                 continue
             for key, at in places.items():
                 kept.setdefault(key, []).append(at)
-            pairs.add((min(one.main, one.merging), max(one.main, one.merging)))
-            yield one
+            pairs.add((min(join.main, join.merging), max(join.main, join.merging)))
+            yield join
 
 
 def _by_source(joins: Iterable[Join]) -> tuple[list[Join], list[Join]]:
     of_paths, of_lanes = list[Join](), list[Join]()
-    for one in joins:
-        (of_paths if one.is_of_paths else of_lanes).append(one)
+    for join in joins:
+        (of_paths if join.is_of_paths else of_lanes).append(join)
     return of_paths, of_lanes
 
 
@@ -102,32 +104,32 @@ def _gaps(scene: Scene, joins: list[Join]) -> dict[Join, _Gaps]:
     """Return of each join the gaps of the one that merges."""
     most, found = AT_ONCE / scene.step, {}
     of_merging: dict[int, list[Join]] = {}
-    for one in joins:
-        of_merging.setdefault(one.merging, []).append(one)
-    for one in joins:
+    for join in joins:
+        of_merging.setdefault(join.merging, []).append(join)
+    for join in joins:
         gaps = {
             other.main_at < other.merging_at: _gap(scene, other)
-            for other in of_merging[one.merging]
-            if abs(other.merging_at - one.merging_at) <= most
+            for other in of_merging[join.merging]
+            if abs(other.merging_at - join.merging_at) <= most
         }
-        found[one] = _Gaps(gaps.get(True, np.nan), gaps.get(False, np.nan))
+        found[join] = _Gaps(gaps.get(True, np.nan), gaps.get(False, np.nan))
     return found
 
 
 def _paces(scene: Scene, joins: list[Join]) -> dict[Join, dict[str, float]]:
     """Return of each join how the one that merges speeds up before, and where both are then."""
     found = pace_changes(
-        scene, [one.merging for one in joins], [one.merging_at for one in joins], LEAST_SPEEDING
+        scene, [join.merging for join in joins], [join.merging_at for join in joins], LEAST_SPEEDING
     )  # fmt: skip
     paces = {}
-    for i, one in enumerate(joins):
+    for i, join in enumerate(joins):
         begin = float(found.begin[i]) if found.after[i] > found.before[i] else np.nan
-        paces[one] = {
+        paces[join] = {
             "speeding_rate": float(found.rate[i]) if np.isfinite(begin) else np.nan,
             "slow_speed": float(found.before[i]) if np.isfinite(begin) else np.nan,
             "fast_speed": float(found.after[i]) if np.isfinite(begin) else np.nan,
-            "speeding_distance": _way(scene, one.merging, begin, one.merging_at),
-            "speeding_main_distance": _way(scene, one.main, begin, one.main_at),
+            "speeding_distance": _way(scene, join.merging, begin, join.merging_at),
+            "speeding_main_distance": _way(scene, join.main, begin, join.main_at),
         }
     return paces
 
@@ -139,11 +141,11 @@ def _way(scene: Scene, who: int, begin: float, end: float) -> float:
     return scene.paths.length(who, end) - scene.paths.length(who, begin)
 
 
-def _more(scene: Scene, one: Meeting, join: Join, gaps: _Gaps) -> dict[str, float]:
+def _more(scene: Scene, item: Meeting, join: Join, gaps: _Gaps) -> dict[str, float]:
     return {
-        "ego_merges": float(one.ego == join.merging),
-        "ego_joining_speed": crossing_speed(scene, one.ego, one.ego_at),
-        "other_joining_speed": crossing_speed(scene, one.other, one.other_at),
+        "ego_merges": float(item.ego == join.merging),
+        "ego_joining_speed": crossing_speed(scene, item.ego, item.ego_at),
+        "other_joining_speed": crossing_speed(scene, item.other, item.other_at),
         "gap": _gap(scene, join), "lead_gap": gaps.lead, "follower_gap": gaps.follower,
         "lane_left": join.lane_left, "change_time": join.change_time,
         "change_distance": _way(scene, join.merging, join.change_begin, join.merging_at),

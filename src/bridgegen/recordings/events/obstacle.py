@@ -55,8 +55,8 @@ def obstacle_ahead(scene: Scene, other: int, instant: float) -> Obstacle:
     near &= aside < beside + 0.5 * traffic.width[other] + CLEAR
     steps = max(round(STANDS_TIME / scene.step), 1)
     for i in np.flatnonzero(near)[np.argsort(gap[near], kind="stable")].tolist():
-        one = int(who[i])
-        begin = max(k - steps, int(clock.begin[one]))
-        if stands(scene, one, begin, min(begin + steps, int(clock.end[one]))):
-            return Obstacle(one, float(gap[i]), apart(scene, other, one, float(instant)))
+        number = int(who[i])
+        begin = max(k - steps, int(clock.begin[number]))
+        if stands(scene, number, begin, min(begin + steps, int(clock.end[number]))):
+            return Obstacle(number, float(gap[i]), apart(scene, other, number, float(instant)))
     return Obstacle()

@@ -117,22 +117,26 @@ def recorded_scenarios(paths: Sequence[Path] = ()) -> tuple[Sought, ...]:
         ScenarioError: it breaks rules.
         InputError: a file declares no events, or has the name of another scenario.
     """
-    shipped = [one for one in (*names(), *pack_names()) if b"\nrecorded:" in shipped_text(one)]
+    shipped = [item for item in (*names(), *pack_names()) if b"\nrecorded:" in shipped_text(item)]
     found = []
     sources: list[str | Path] = [*shipped, *paths]
     for source in sources:
         document, folder = document_of(source)
-        one = build(document, folder)
-        if one.recorded is None:
+        scenario = build(document, folder)
+        if scenario.recorded is None:
             raise InputError(
                 f"{source}: a scenario to look for must have the key 'recorded', which says what "
                 "its parameters are in recorded events"
             )
         found.append(
-            Sought(one, one.recorded, document, source if isinstance(source, Path) else None)
+            Sought(
+                scenario, scenario.recorded, document, source if isinstance(source, Path) else None
+            )
         )
     twice = [
-        name for name, count in Counter(one.scenario.name for one in found).items() if count > 1
+        name
+        for name, count in Counter(sought.scenario.name for sought in found).items()
+        if count > 1
     ]
     if twice:
         raise InputError(f"two scenarios to look for have the name '{twice[0]}': rename yours")
@@ -157,8 +161,8 @@ def encounters_of(
         None if there was no such driving.
     """
     share = whole_share(found, kind)
-    driving = [one.driving(kind, needs_lights=needs_lights) for one in found]
-    hours, km = (share * sum(one[i] for one in driving) for i in range(2))
+    driving = [events.driving(kind, needs_lights=needs_lights) for events in found]
+    hours, km = (share * sum(pair[i] for pair in driving) for i in range(2))
     if hours <= 0.0:
         return None
     return Encounters(count, hours, km if km > 0.0 else None, "recorded traffic")
@@ -166,9 +170,9 @@ def encounters_of(
 
 def whole_share(found: Sequence[FoundEvents], kind: str) -> float:
     """Return the share of the events of a kind that are recorded from begin to end."""
-    same = [one for each in found for one in each.kinds if one.kind.name == kind]
-    whole = sum(len(one) for one in same)
-    cut_off = sum(one.refused.get(NOT_WHOLE, 0) for one in same)
+    same = [events for each in found for events in each.kinds if events.kind.name == kind]
+    whole = sum(len(events) for events in same)
+    cut_off = sum(events.refused.get(NOT_WHOLE, 0) for events in same)
     return whole / (whole + cut_off) if whole else 1.0
 
 
@@ -192,7 +196,7 @@ def scenario_events(
             names += [name for name, counts_it in zip(called, kept.tolist(), strict=True)
                       if counts_it]  # fmt: skip
     table = {
-        name: np.concatenate([np.empty(0), *(one[name] for one in columns)])
+        name: np.concatenate([np.empty(0), *(column[name] for column in columns)])
         for name in spec.parameters
     }
     whole = np.isfinite(np.array(list(table.values()))).all(axis=0)
@@ -213,13 +217,21 @@ def scenario_events(
 def _outside(scenario: LogicalScenario, rows: dict[str, Float]) -> list[Outside]:
     found = []
     for name, values in rows.items():
-        one = scenario.parameters[name]
-        below, above = int((values < one.low).sum()), int((values > one.high).sum())
+        parameter = scenario.parameters[name]
+        below, above = int((values < parameter.low).sum()), int((values > parameter.high).sum())
         if below or above:
-            found.append(Outside(
-                name, one.unit, one.low, one.high, below, above, float(values.min()),
-                float(values.max()),
-            ))  # fmt: skip
+            found.append(
+                Outside(
+                    name,
+                    parameter.unit,
+                    parameter.low,
+                    parameter.high,
+                    below,
+                    above,
+                    float(values.min()),
+                    float(values.max()),
+                )
+            )
     return found
 
 

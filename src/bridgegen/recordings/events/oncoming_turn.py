@@ -20,18 +20,18 @@ be cut off."""
 def find(scene: Scene, changes: LaneChanges) -> Events:
     """Return the oncoming left turns of a recording, from both views."""
     met = [
-        one for one in meetings(scene, scene.is_ego, scene.is_ego)
-        if CROSSING[0] <= one.angle <= CROSSING[1]
-        and one.approach_angle >= OPPOSITE
-        and max(abs(one.ego_turn), abs(one.other_turn)) > TURNS
-        and min(abs(one.ego_turn), abs(one.other_turn)) <= STRAIGHT
+        meeting for meeting in meetings(scene, scene.is_ego, scene.is_ego)
+        if CROSSING[0] <= meeting.angle <= CROSSING[1]
+        and meeting.approach_angle >= OPPOSITE
+        and max(abs(meeting.ego_turn), abs(meeting.other_turn)) > TURNS
+        and min(abs(meeting.ego_turn), abs(meeting.other_turn)) <= STRAIGHT
     ]  # fmt: skip
     return events_of_meetings("oncoming-left-turn", scene, met, _turn)
 
 
-def _turn(one: Meeting) -> dict[str, float]:
-    ego_turns = abs(one.ego_turn) > abs(one.other_turn)
+def _turn(meeting: Meeting) -> dict[str, float]:
+    ego_turns = abs(meeting.ego_turn) > abs(meeting.other_turn)
     return {
         "ego_turns": float(ego_turns),
-        "turn": abs(one.ego_turn if ego_turns else one.other_turn),
+        "turn": abs(meeting.ego_turn if ego_turns else meeting.other_turn),
     }

@@ -158,17 +158,17 @@ def set_off_instants(scene: Scene, who: Sequence[int], until: Sequence[float]) -
 def _last_still(scene: Scene, first: int, last: int) -> int | None:
     """Return the last state until which somebody has stood, but not that at the end."""
     steps = max(round(STANDS_TIME / scene.step), 1)
-    x, y = (one[first : last + 1] for one in (scene.traffic.x, scene.traffic.y))
+    x, y = (array[first : last + 1] for array in (scene.traffic.x, scene.traffic.y))
     still = np.flatnonzero(np.hypot(x[steps:] - x[:-steps], y[steps:] - y[:-steps]) < STANDS)
     if not len(still) or first + int(still[-1]) + steps >= last:
         return None
     return first + int(still[-1]) + steps
 
 
-def apart(scene: Scene, one: int, other: int, instant: float) -> float:
+def apart(scene: Scene, number: int, other: int, instant: float) -> float:
     """Return the straight distance of two reference points [m]; NaN if one is not recorded."""
     points = []
-    for who in (one, other):
+    for who in (number, other):
         at = np.array([instant])
         ahead = centre_ahead(int(scene.traffic.kind[who]), float(scene.traffic.length[who]))
         x, y, c, s = (

@@ -43,20 +43,20 @@ class Joins:
     is none.
 
     Attributes:
-        one: ``(K,)`` participant.
+        first: ``(K,)`` participant.
         other: ``(K,)`` participant, a greater number.
-        one_at: ``(K,)`` instant at which its centre comes to the shared part.
+        first_at: ``(K,)`` instant at which its centre comes to the shared part.
         other_at: ``(K,)``.
-        one_length: ``(K,)`` of its path until there [m].
+        first_length: ``(K,)`` of its path until there [m].
         other_length: ``(K,)`` [m].
         shared: ``(K,)`` length of the shared part [m].
     """
 
-    one: Int
+    first: Int
     other: Int
-    one_at: Float
+    first_at: Float
     other_at: Float
-    one_length: Float
+    first_length: Float
     other_length: Float
     shared: Float
 
@@ -66,15 +66,15 @@ class Crossings:
     """Where paths of two cross: of each pair the crossing with the least time between them.
 
     Attributes:
-        one: ``(K,)`` participant.
+        first: ``(K,)`` participant.
         other: ``(K,)`` participant, a greater number.
-        one_at: ``(K,)`` instant at which its centre passes the point.
+        first_at: ``(K,)`` instant at which its centre passes the point.
         other_at: ``(K,)``.
     """
 
-    one: Int
+    first: Int
     other: Int
-    one_at: Float
+    first_at: Float
     other_at: Float
 
 

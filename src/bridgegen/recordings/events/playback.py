@@ -76,16 +76,16 @@ def closest(
     made: list[PlayedEvent] = []
     for events in found.kinds:
         kind = events.kind.name
-        earlier = [one for one in kept if one.kind == kind]
+        earlier = [event for event in kept if event.kind == kind]
         gaps = _time_gaps(events)
-        worst = max((one.time_gap for one in earlier), default=np.inf)
+        worst = max((event.time_gap for event in earlier), default=np.inf)
         limit = worst if len(earlier) >= SHOWN else np.inf
         more = []
         for i in np.argsort(gaps, kind="stable")[:SHOWN].tolist():
             if not gaps[i] > limit:
                 name = f"{kind}-{before[kind] + i + 1}"
                 more += list(_played(traffic, clock, events, i, name, float(gaps[i])))
-        made += sorted([*earlier, *more], key=lambda one: one.time_gap)[:SHOWN]
+        made += sorted([*earlier, *more], key=lambda event: event.time_gap)[:SHOWN]
     return made
 
 
@@ -119,15 +119,20 @@ def _played(
         )  # fmt: skip
 
 
-def caption(one: PlayedEvent) -> str:
+def caption(played_event: PlayedEvent) -> str:
     """Return what a picture of an event shows: whose, where, and how close it was."""
-    quantities = EVENT_KINDS[one.kind].quantities
+    quantities = EVENT_KINDS[played_event.kind].quantities
     gap = ""
     if MEETING in quantities:
-        gap = f"; {one.time_gap:.2f} s between them"
+        gap = f"; {played_event.time_gap:.2f} s between them"
     elif "gap" in quantities:
-        gap = f"; {one.time_gap:.2f} s behind" if np.isfinite(one.time_gap) else "; no leader"
+        gap = (
+            f"; {played_event.time_gap:.2f} s behind"
+            if np.isfinite(played_event.time_gap)
+            else "; no leader"
+        )
     return (
-        f"{one.name}: ego {one.ego} of {one.recording}, from {one.seconds:.2f} s by the "
+        f"{played_event.name}: ego {played_event.ego} of {played_event.recording}, from "
+        f"{played_event.seconds:.2f} s by the "
         f"recording's clock{gap}"
     )

@@ -25,17 +25,20 @@ RIGHT_ON_RED = "it turns right after a stop, which is legal in places"
 
 def find(scene: Scene, changes: LaneChanges) -> Events:
     """Return the red-light violations of a recording."""
-    ran = [one for one in scene.passings if red_time(scene, one) > RED_FOR]
-    ego = np.array([one.who for one in ran], np.int64)
-    at = np.array([one.at for one in ran], np.float64)
+    ran = [passing for passing in scene.passings if red_time(scene, passing) > RED_FOR]
+    ego = np.array([passing.who for passing in ran], np.int64)
+    at = np.array([passing.at for passing in ran], np.float64)
     begin = np.maximum(at - AHEAD / scene.step, scene.clock.begin[ego])
-    red = np.array([red_time(scene, one) for one in ran], np.float64)
+    red = np.array([red_time(scene, passing) for passing in ran], np.float64)
     turned = at - red / scene.step
     seen = np.array(
-        [one.light.is_seen_to_turn_red(one.light.red_since(one.at * scene.step)) for one in ran],
+        [
+            passing.light.is_seen_to_turn_red(passing.light.red_since(passing.at * scene.step))
+            for passing in ran
+        ],
         np.bool_,
     )
-    turn = np.array([_turn(scene, one) for one in ran], np.float64)
+    turn = np.array([_turn(scene, passing) for passing in ran], np.float64)
     least = np.array([_least_speed(scene, who, a, b) for who, a, b in zip(
         ego.tolist(), begin.tolist(), at.tolist(), strict=True)], np.float64)  # fmt: skip
     return events_of(
@@ -50,16 +53,16 @@ def find(scene: Scene, changes: LaneChanges) -> Events:
         },
         {
             NOT_WHOLE: ((at - begin) * scene.step < LEAST_SEEN)
-            | np.array([one.followed < LEAST_FOLLOWED for one in ran], np.bool_),
+            | np.array([passing.followed < LEAST_FOLLOWED for passing in ran], np.bool_),
             RIGHT_ON_RED: (turn < -TURNS) & (least < HALTS),
         },
     )  # fmt: skip
 
 
-def red_time(scene: Scene, one: Passing) -> float:
+def red_time(scene: Scene, passing: Passing) -> float:
     """Return for how long the light had been red [s]; NaN if it was not."""
-    time = one.at * scene.step
-    return time - one.light.red_since(time)
+    time = passing.at * scene.step
+    return time - passing.light.red_since(time)
 
 
 def ran_red(scene: Scene, who: int, at: float) -> float:
@@ -67,12 +70,12 @@ def ran_red(scene: Scene, who: int, at: float) -> float:
 
     NaN where no light is recorded with its stop line.
     """
-    if not any(len(one.path) for one in scene.traffic.facts.lights.values()):
+    if not any(len(light.path) for light in scene.traffic.facts.lights.values()):
         return np.nan
     return float(any(
-        one.who == who and one.at <= at and red_time(scene, one) > RED_FOR
-        and scene.paths.length(who, at) - scene.paths.length(who, one.at) <= JUNCTION
-        for one in scene.passings
+        passing.who == who and passing.at <= at and red_time(scene, passing) > RED_FOR
+        and scene.paths.length(who, at) - scene.paths.length(who, passing.at) <= JUNCTION
+        for passing in scene.passings
     ))  # fmt: skip
 
 
@@ -86,11 +89,11 @@ def _ways(scene: Scene, who: Int, begin: Float, end: Float) -> Float:
     return found
 
 
-def _turn(scene: Scene, one: Passing) -> float:
+def _turn(scene: Scene, passing: Passing) -> float:
     """Return by how much it turns at the junction, to the left positive [deg]."""
-    length = scene.paths.length(one.who, one.at)
+    length = scene.paths.length(passing.who, passing.at)
     before, after = (
-        scene.paths.course(one.who, max(length + way, 0.0)) for way in (-BEFORE, BEYOND)
+        scene.paths.course(passing.who, max(length + way, 0.0)) for way in (-BEFORE, BEYOND)
     )
     return float(np.degrees(wrap(np.array([after - before]))[0]))
 

@@ -25,24 +25,27 @@ ANGLES = (15.0, 160.0)
 def find(scene: Scene, changes: LaneChanges) -> Events:
     """Return the right turns of a recording across the path of a bicycle."""
     met = [
-        one for one in meetings(scene, scene.is_ego, scene.traffic.kind == BICYCLE)
-        if one.ego_turn < -TURNS and abs(one.other_turn) <= STRAIGHT
-        and one.approach_angle <= SAME_WAY and ANGLES[0] <= one.angle <= ANGLES[1]
+        meeting for meeting in meetings(scene, scene.is_ego, scene.traffic.kind == BICYCLE)
+        if meeting.ego_turn < -TURNS and abs(meeting.other_turn) <= STRAIGHT
+        and meeting.approach_angle <= SAME_WAY and ANGLES[0] <= meeting.angle <= ANGLES[1]
     ]  # fmt: skip
     paces = paces_of(scene, met)
     return events_of_meetings(
-        "right-turn-with-bicycle", scene, met, lambda one: _more(scene, one) | paces[one]
+        "right-turn-with-bicycle",
+        scene,
+        met,
+        lambda meeting: _more(scene, meeting) | paces[meeting],
     )
 
 
-def _more(scene: Scene, one: Meeting) -> dict[str, float]:
+def _more(scene: Scene, meeting: Meeting) -> dict[str, float]:
     """Return the quantities that only these have; places hold at the beginning."""
-    who, at = np.array([one.ego, one.other]), np.full(2, one.begin)
+    who, at = np.array([meeting.ego, meeting.other]), np.full(2, meeting.begin)
     x, y = (scene.at(values, who, at) for values in (scene.traffic.x, scene.traffic.y))
-    course = scene.paths.course(one.ego, scene.paths.length(one.ego, one.begin))
+    course = scene.paths.course(meeting.ego, scene.paths.length(meeting.ego, meeting.begin))
     dx, dy = float(x[1] - x[0]), float(y[1] - y[0])
     return {
-        "ego_turn": one.ego_turn,
+        "ego_turn": meeting.ego_turn,
         "ahead": dx * np.cos(course) + dy * np.sin(course),
         "aside": dx * np.sin(course) - dy * np.cos(course),
     }

@@ -168,9 +168,9 @@ class Scene:
         """Return a column at instants between states, ``(N,)``; NaN where it is not recorded."""
         low = np.floor(instant)
         share = instant - low
-        one, other = self.state(who, low), self.state(who, low + (share > 0.0))
-        found = values[one] * (1.0 - share) + values[other] * share
-        return np.where((one != NONE) & (other != NONE), found, np.nan)
+        array, other = self.state(who, low), self.state(who, low + (share > 0.0))
+        found = values[array] * (1.0 - share) + values[other] * share
+        return np.where((array != NONE) & (other != NONE), found, np.nan)
 
     def gap(self, behind: Int, ahead: Int, instant: Float) -> Float:
         """Return the gap between two along their carriageway, ``(N,)``; NaN if they share none."""
@@ -203,9 +203,9 @@ class Scene:
         before = (instant - since) * self.step
         return np.where(is_led, np.minimum(before, LONGEST_LEAD), np.nan)
 
-    def together(self, one: Int, other: Int, instant: Float) -> Float:
+    def together(self, array: Int, other: Int, instant: Float) -> Float:
         """Return how long two have been recorded [s], ``(N,)``."""
-        first = np.maximum(self.clock.begin[one], self.clock.begin[other])
+        first = np.maximum(self.clock.begin[array], self.clock.begin[other])
         return np.clip((instant - first) * self.step, 0.0, LONGEST_LEAD)
 
     def seconds(self, instant: Float) -> Float:

@@ -100,10 +100,10 @@ def _improved(t: Float, y: Float, valid: Bool, theta: Float, shape: Shape) -> tu
         columns = (weight, value * weight, by_begin, by_duration)
         normal = np.empty((len(t), 4, 4))
         right = np.empty((len(t), 4, 1))
-        for i, one in enumerate(columns):
-            right[:, i, 0] = (one * rest).sum(axis=1)
+        for i, column in enumerate(columns):
+            right[:, i, 0] = (column * rest).sum(axis=1)
             for j, other in enumerate(columns[: i + 1]):
-                normal[:, i, j] = normal[:, j, i] = (one * other).sum(axis=1)
+                normal[:, i, j] = normal[:, j, i] = (column * other).sum(axis=1)
         for i in range(4):
             normal[:, i, i] += DAMPING * count
         change = np.linalg.solve(normal, right)[:, :, 0]

@@ -55,7 +55,11 @@ def passings(paths: Paths, is_ego: Bool) -> list[Passing]:
         is_ego: ``(P,)`` of whom it is looked for.
     """
     traffic = paths.traffic
-    lights = [one for one in traffic.facts.lights.values() if len(one.path) >= 2]
+    lights = [
+        recorded_light
+        for recorded_light in traffic.facts.lights.values()
+        if len(recorded_light.path) >= 2
+    ]
     who = traffic.participant[paths.vertices]
     looked = (is_ego & paths.clock.is_whole)[who]
     vertices, who = paths.vertices[looked], who[looked]
@@ -65,8 +69,8 @@ def passings(paths: Paths, is_ego: Bool) -> list[Passing]:
     found = list[Passing]()
     for light in lights:
         near = np.array(tree.query_ball_point(light.path[0], LOOKED), np.int64)
-        for one in np.unique(who[near]).tolist():
-            found += _passings_of(paths, one, light)
+        for item in np.unique(who[near]).tolist():
+            found += _passings_of(paths, item, light)
     return list(_taken(found, SAME_LINE / traffic.facts.time_step))
 
 
@@ -109,10 +113,10 @@ def _off_lane(track: Float, path: Float) -> tuple[float, float]:
 def _taken(found: list[Passing], together: float) -> Iterator[Passing]:
     """Yield of passings over the lines of several lights that of the lane which is taken."""
     group: list[Passing] = []
-    for one in sorted(found, key=lambda one: (one.who, one.at)):
-        if group and (one.who != group[0].who or one.at - group[0].at > together):
-            yield min(group, key=lambda one: one.off)
+    for passing in sorted(found, key=lambda passing: (passing.who, passing.at)):
+        if group and (passing.who != group[0].who or passing.at - group[0].at > together):
+            yield min(group, key=lambda passing: passing.off)
             group = []
-        group.append(one)
+        group.append(passing)
     if group:
-        yield min(group, key=lambda one: one.off)
+        yield min(group, key=lambda passing: passing.off)

@@ -75,9 +75,9 @@ def find(scene: Scene, changes: LaneChanges) -> Events:
     near = _near(scene)
     lines = {ego: _smooth_line(scene, ego) for ego in sorted({ego for ego, _ in near})}
     pairs = [pair for ego, other in near for pair in _together(scene, ego, other, lines[ego])]
-    lengths = np.array([len(one.offset) for one in pairs], np.int64)
+    lengths = np.array([len(item.offset) for item in pairs], np.int64)
     first = np.concatenate([[0], np.cumsum(lengths)]).astype(np.int64)
-    offsets = np.concatenate([np.empty(0), *(one.offset for one in pairs)])
+    offsets = np.concatenate([np.empty(0), *(item.offset for item in pairs)])
     picked, guess = _guesses(scene, pairs, first)
     low, high = first[picked], first[picked + 1] - 1
     fit = fit_steps(offsets, low, high, guess, scene.step, "cosine")
@@ -99,9 +99,9 @@ def _near(scene: Scene) -> list[tuple[int, int]]:
         return []
     near = KDTree(points[egos]).query_ball_point(points[rides], FARTHEST)
     pairs = {
-        (int(one), other)
+        (int(item), other)
         for other, found in zip(who[rides].tolist(), near, strict=True)
-        for one in who[egos][found]
+        for item in who[egos][found]
     }
     return sorted(pairs)
 
@@ -141,7 +141,7 @@ def _smooth_line(scene: Scene, ego: int) -> Float | None:
     if whole < SHORTEST_PATH:
         return None
     wanted = np.arange(0.0, whole, 1.0)
-    points = np.array([scene.paths.point(ego, float(one)) for one in wanted])
+    points = np.array([scene.paths.point(ego, float(float64)) for float64 in wanted])
     half = min(round(SMOOTHED), (len(points) - 1) // 2)
     line: Float = savgol_filter(points, 2 * half + 1, 2, axis=0)
     reach = min(round(0.5 * SMOOTHED), half)
@@ -178,15 +178,15 @@ def _guesses(scene: Scene, pairs: list[_Pair], first: Int) -> tuple[Int, tuple[F
     """Return the pairs in which the bicycle comes from beside into the path, and a first guess."""
     picked, begin, duration = [], [], []
     half = max(round(SHORTEST / scene.step), 1)
-    for i, one in enumerate(pairs):
-        offset = one.offset - one.own
-        clear = np.abs(offset) > _half_widths(scene, one)
+    for i, pair in enumerate(pairs):
+        offset = pair.offset - pair.own
+        clear = np.abs(offset) > _half_widths(scene, pair)
         low, high = np.arange(len(clear)) - half, np.arange(len(clear)) + half
         inside = ~clear
         enters = np.flatnonzero(clear[:-1] & inside[1:])
         if not len(enters):
             continue
-        slope = one.offset[np.minimum(high, len(clear) - 1)] - one.offset[np.maximum(low, 0)]
+        slope = pair.offset[np.minimum(high, len(clear) - 1)] - pair.offset[np.maximum(low, 0)]
         towards = -slope * np.sign(offset)
         at = int(enters[int(towards[enters].argmax())])
         rate = max(float(towards[at]) / (2.0 * half), 1e-3)
@@ -198,9 +198,9 @@ def _guesses(scene: Scene, pairs: list[_Pair], first: Int) -> tuple[Int, tuple[F
     return np.array(picked, np.int64), (np.array(begin), np.array(duration))
 
 
-def _half_widths(scene: Scene, one: _Pair) -> float:
+def _half_widths(scene: Scene, pair: _Pair) -> float:
     width = scene.traffic.width
-    return 0.5 * float(width[one.ego] + width[one.other])
+    return 0.5 * float(width[pair.ego] + width[pair.other])
 
 
 def _events(scene: Scene, pairs: list[_Pair], low: Int, high: Int, fit: Float) -> Events:
@@ -208,18 +208,18 @@ def _events(scene: Scene, pairs: list[_Pair], low: Int, high: Int, fit: Float) -
     at = np.clip(begin, low, high)
     centres, own = (
         np.array([
-            np.interp(place - origin, np.arange(len(one.apart)), getattr(one, column))
-            for place, origin, one in zip(at.tolist(), low.tolist(), pairs, strict=True)
+            np.interp(place - origin, np.arange(len(pair.apart)), getattr(pair, column))
+            for place, origin, pair in zip(at.tolist(), low.tolist(), pairs, strict=True)
         ])
         for column in ("apart", "own")
     )  # fmt: skip
     before, after = level - own, level + height - own
-    near = np.array([_half_widths(scene, one) for one in pairs])
+    near = np.array([_half_widths(scene, pair) for pair in pairs])
     moves = (np.abs(before) > near) & (np.abs(after) < near) & (np.abs(height) >= LEAST_MOVE)
     ego, other = (
-        np.array([getattr(one, key) for one in pairs], np.int64) for key in ("ego", "other")
+        np.array([getattr(pair, key) for pair in pairs], np.int64) for key in ("ego", "other")
     )
-    instant = np.array([one.begin for one in pairs], np.float64) - low
+    instant = np.array([pair.begin for pair in pairs], np.float64) - low
     length = scene.traffic.length
     gap = centres - 0.5 * (length[ego] + length[other])
     start = at + instant
@@ -235,20 +235,28 @@ def _events(scene: Scene, pairs: list[_Pair], low: Int, high: Int, fit: Float) -
     whole = (begin >= low - cut) & (begin + duration <= high + cut)
     fits = (rms <= WORST_FIT * np.abs(height)) & (seconds >= SHORTEST) & (seconds <= LONGEST)
     return events_of(
-        "bicycle-swings-out", ego[kept],
-        {"other": other[kept], "obstacle": np.array([one.who for one in standing], np.int64)},
+        "bicycle-swings-out",
+        ego[kept],
+        {
+            "other": other[kept],
+            "obstacle": np.array([obstacle.who for obstacle in standing], np.int64),
+        },
         (scene.seconds(start[kept]), scene.seconds((start + duration)[kept])),
         {
-            "ego_speed": speed[kept], "other_speed": its[kept],
-            "relative_speed": (speed - its)[kept], "gap": gap[kept],
-            "offset_before": before[kept], "offset_after": after[kept],
-            "change_time": seconds[kept], "lateral_speed": np.abs(height / seconds)[kept],
+            "ego_speed": speed[kept],
+            "other_speed": its[kept],
+            "relative_speed": (speed - its)[kept],
+            "gap": gap[kept],
+            "offset_before": before[kept],
+            "offset_after": after[kept],
+            "change_time": seconds[kept],
+            "lateral_speed": np.abs(height / seconds)[kept],
             "side": -np.sign(before[kept]),
-            "obstacle_gap": np.array([one.gap for one in standing], np.float64),
-            "obstacle_apart": np.array([one.apart for one in standing], np.float64),
+            "obstacle_gap": np.array([obstacle.gap for obstacle in standing], np.float64),
+            "obstacle_apart": np.array([obstacle.apart for obstacle in standing], np.float64),
         },
         {NO_CHANGE: ~fits[kept], NOT_WHOLE: ~whole[kept]},
-    )  # fmt: skip
+    )
 
 
 def _bend(scene: Scene, ego: int, instant: float, ahead: float) -> float:

@@ -19,8 +19,8 @@ from bridgegen.scenario.language.event_kinds import EVENT_KINDS
 TABLE, FOLDER = "events.csv", "events"
 NAMES_SHOWN = 3
 """Number of events that break a constraint and are named."""
-QUANTITIES = tuple(dict.fromkeys(name for one in EVENT_KINDS.values() for name in one.quantities))
-ROLES = tuple(dict.fromkeys(role for one in EVENT_KINDS.values() for role in one.roles))
+QUANTITIES = tuple(dict.fromkeys(name for kind in EVENT_KINDS.values() for name in kind.quantities))
+ROLES = tuple(dict.fromkeys(role for kind in EVENT_KINDS.values() for role in kind.roles))
 HEAD = ("name", "recording", "file", "event", "ego", *ROLES, "begin", "end", *QUANTITIES)
 
 
@@ -37,23 +37,30 @@ def write_events(
         (out / FOLDER).mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise StorageError(f"{out / FOLDER}: cannot be made: {error.strerror}") from None
-    for one in scenarios:
-        rows = zip(*(values.tolist() for values in one.rows.values()), strict=True)
-        path = out / FOLDER / f"{one.scenario}.csv"
-        write_whole(path, _csv(one.rows, ([f"{v:.7g}" for v in row] for row in rows)))
+    for scenario in scenarios:
+        rows = zip(*(values.tolist() for values in scenario.rows.values()), strict=True)
+        path = out / FOLDER / f"{scenario.scenario}.csv"
+        write_whole(path, _csv(scenario.rows, ([f"{v:.7g}" for v in row] for row in rows)))
 
 
 def _rows(found: Sequence[FoundEvents]) -> Iterator[list[object]]:
-    for one, events, names in named(found):
+    for found_events, events, names in named(found):
         for i, (name, ego) in enumerate(zip(names, events.ego.tolist(), strict=True)):
             others = {role: int(who[i]) for role, who in events.others.items()}
             yield [
-                name, one.recording, one.source, events.kind.name, one.names[ego],
-                *(_name(one.names, others.get(role, ABSENT)) for role in ROLES),
-                f"{events.begin[i]:.10g}", f"{events.end[i]:.10g}",
-                *(_number(events.quantities[name][i]) if name in events.quantities else ""
-                  for name in QUANTITIES),
-            ]  # fmt: skip
+                name,
+                found_events.recording,
+                found_events.source,
+                events.kind.name,
+                found_events.names[ego],
+                *(_name(found_events.names, others.get(role, ABSENT)) for role in ROLES),
+                f"{events.begin[i]:.10g}",
+                f"{events.end[i]:.10g}",
+                *(
+                    _number(events.quantities[name][i]) if name in events.quantities else ""
+                    for name in QUANTITIES
+                ),
+            ]
 
 
 def _name(names: Sequence[str], who: int) -> str:
@@ -75,11 +82,11 @@ def _csv(head: Iterable[str], rows: Iterable[Iterable[object]]) -> Iterator[byte
 def kind_rows(found: Sequence[FoundEvents]) -> Iterator[tuple[str, int, str, str, str]]:
     """Yield per kind: its name, how many, rates per hour and per 1000 km, what was refused."""
     for kind in EVENT_KINDS:
-        same = [one for each in found for one in each.kinds if one.kind.name == kind]
-        count = sum(len(one) for one in same)
+        same = [events for each in found for events in each.kinds if events.kind.name == kind]
+        count = sum(len(events) for events in same)
         refused: Counter[str] = Counter()
-        for one in same:
-            refused.update(one.refused)
+        for events in same:
+            refused.update(events.refused)
         yield (
             kind, count, *rates_in_words(encounters_of(count, found, kind)),
             "; ".join(f"{number:,} {reason}" for reason, number in refused.items()),
@@ -106,18 +113,18 @@ def _three_digits(value: float) -> str:
     return f"{value:,.0f}" if value >= 999.5 else f"{value:.3g}"
 
 
-def against_in_words(one: ScenarioEvents) -> tuple[str, ...]:
+def against_in_words(scenario_events: ScenarioEvents) -> tuple[str, ...]:
     """Return what events say against the ranges and constraints of a scenario, a text each."""
     texts = [
         f"{each.parameter} [{each.unit}]: {each.below:,} below {each.low:g}, {each.above:,} above "
         f"{each.high:g}; seen {each.least:.4g} to {each.most:.4g}"
-        for each in one.outside
+        for each in scenario_events.outside
     ]
-    return (*texts, *(broken_in_words(each) for each in one.broken))
+    return (*texts, *(broken_in_words(each) for each in scenario_events.broken))
 
 
-def broken_in_words(one: Broken) -> str:
+def broken_in_words(broken: Broken) -> str:
     """Return how many events break a constraint, and the first of them."""
-    more = ", …" if len(one.events) > NAMES_SHOWN else ""
-    first = ", ".join(one.events[:NAMES_SHOWN])
-    return f"{len(one.events):,} break {one.rule} ({first}{more})"
+    more = ", …" if len(broken.events) > NAMES_SHOWN else ""
+    first = ", ".join(broken.events[:NAMES_SHOWN])
+    return f"{len(broken.events):,} break {broken.rule} ({first}{more})"

@@ -63,40 +63,40 @@ class Hiding:
         return self.by != ABSENT
 
 
-def hiding(scene: Scene, one: Meeting) -> Hiding:
+def hiding(scene: Scene, meeting: Meeting) -> Hiding:
     """Return who hid the other of a meeting within `LATELY` before it crossed the ego's path."""
-    end = int(one.other_at)
-    begin = max(end - round(LATELY / scene.step), int(np.ceil(one.begin)))
+    end = int(meeting.other_at)
+    begin = max(end - round(LATELY / scene.step), int(np.ceil(meeting.begin)))
     if end <= begin:
         return Hiding()
     last, found = -1, Hiding()
-    for who in _beside(scene, one, begin, end).tolist():
+    for who in _beside(scene, meeting, begin, end).tolist():
         if not stands(scene, who, begin, end):
             continue
         seen = motion(
-            excerpt(scene.traffic, scene.clock, one.ego, [one.other, who], begin, end)
+            excerpt(scene.traffic, scene.clock, meeting.ego, [meeting.other, who], begin, end)
         )  # fmt: skip
         bodies = Bodies(
             seen.half, seen.x[0], seen.y[0], seen.cosine[0], seen.sine[0], seen.distance[0]
         )
         hides = [k for k in range(end - begin + 1) if hidden(bodies, 1, k)]
         if hides and hides[-1] > last:
-            last, found = hides[-1], Hiding(who, _gap(bodies, one.course))
+            last, found = hides[-1], Hiding(who, _gap(bodies, meeting.course))
     return found
 
 
-def _beside(scene: Scene, one: Meeting, begin: int, end: int) -> Int:
+def _beside(scene: Scene, meeting: Meeting, begin: int, end: int) -> Int:
     """Return the vehicles that are recorded from begin to end, near the line of sight."""
     clock, traffic = scene.clock, scene.traffic
     there = (clock.begin <= begin) & (clock.end >= end) & ~np.isin(traffic.kind, WALKS)
-    there[[one.ego, one.other]] = False
+    there[[meeting.ego, meeting.other]] = False
     who = np.flatnonzero(there)
     at = traffic.first[who] + begin - clock.begin[who]
     near = np.ones(len(who), np.bool_)
     for values in (traffic.x, traffic.y):
         ends = [
             values[traffic.first[p] + k - clock.begin[p]]
-            for p in (one.ego, one.other) for k in (begin, end)
+            for p in (meeting.ego, meeting.other) for k in (begin, end)
         ]  # fmt: skip
         near &= (values[at] >= min(ends) - BESIDE) & (values[at] <= max(ends) + BESIDE)
     return who[near]
@@ -121,23 +121,26 @@ def find(scene: Scene, changes: LaneChanges) -> Events:
     """Return who crosses an ego's path on foot or by bicycle, before the ego comes."""
     kind = scene.traffic.kind
     met = [
-        one for one in meetings(scene, scene.is_ego, np.isin(kind, (PEDESTRIAN, BICYCLE)))
-        if one.other_at < one.ego_at and _crosses(one, int(kind[one.other]))
+        meeting for meeting in meetings(scene, scene.is_ego, np.isin(kind, (PEDESTRIAN, BICYCLE)))
+        if meeting.other_at < meeting.ego_at and _crosses(meeting, int(kind[meeting.other]))
     ]  # fmt: skip
-    hidden = {one: hiding(scene, one) for one in met}
+    hidden = {meeting: hiding(scene, meeting) for meeting in met}
     return events_of_meetings(
-        "vru-crossing", scene, met, lambda one: _more(one, int(kind[one.other]), hidden[one]),
-        {"occluder": [hidden[one].by for one in met]},
-    )  # fmt: skip
+        "vru-crossing",
+        scene,
+        met,
+        lambda meeting: _more(meeting, int(kind[meeting.other]), hidden[meeting]),
+        {"occluder": [hidden[meeting].by for meeting in met]},
+    )
 
 
-def _crosses(one: Meeting, kind: int) -> bool:
+def _crosses(meeting: Meeting, kind: int) -> bool:
     low, high = WALKING if kind == PEDESTRIAN else RIDING
-    return low <= one.angle <= high
+    return low <= meeting.angle <= high
 
 
-def _more(one: Meeting, kind: int, hidden: Hiding) -> dict[str, float]:
+def _more(meeting: Meeting, kind: int, hidden: Hiding) -> dict[str, float]:
     return {
-        "ego_turn": one.ego_turn, "is_bicycle": float(kind == BICYCLE),
+        "ego_turn": meeting.ego_turn, "is_bicycle": float(kind == BICYCLE),
         "hidden": float(hidden.is_hidden), "occluder_gap": hidden.gap,
     }  # fmt: skip

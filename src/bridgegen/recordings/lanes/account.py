@@ -74,7 +74,7 @@ def account_of(located: Located, low: Float, high: Float) -> LanesFound:
             float(np.sqrt(np.average(fit.rms[on] ** 2, weights=states))),
             float(fit.p95[on].max()),
         ))  # fmt: skip
-    found.sort(key=lambda one: (-one.states, one.number))
+    found.sort(key=lambda carriageway: (-carriageway.states, carriageway.number))
     return LanesFound(
         lanes.source, tuple(found), fit.vehicle_share, fit.km_on, fit.km_off, lanes.notes,
         tuple(_borders(located, low, high)),

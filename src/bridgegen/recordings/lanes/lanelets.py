@@ -23,19 +23,19 @@ def lanes_of_lanelets(lanelets: Sequence[Lanelet]) -> RecordedLanes:
     Raises:
         FileFormatError: they are too long.
     """
-    used = [one for one in lanelets if _is_lane(one)]
-    length_in_all = sum(along(one.left)[-1] for one in used)
+    used = [lanelet for lanelet in lanelets if _is_lane(lanelet)]
+    length_in_all = sum(along(lanelet.left)[-1] for lanelet in used)
     if length_in_all > MOST_POINTS * STEP:
         raise FileFormatError(
             f"lanelets may have {MOST_POINTS * STEP / 1000:,.0f} km in all, got "
             f"{length_in_all / 1000:,.0f}"
         )
-    number = {one.name: index for index, one in enumerate(used)}
-    kinds = [_kind(one) for one in used]
+    number = {lanelet.name: index for index, lanelet in enumerate(used)}
+    kinds = [_kind(lanelet) for lanelet in used]
     group = _groups(used, number)
     members: dict[int, list[Lanelet]] = {}
-    for one, of in zip(used, group, strict=True):
-        members.setdefault(of, []).append(one)
+    for lanelet, of in zip(used, group, strict=True):
+        members.setdefault(of, []).append(lanelet)
     length = {of: _middle_length(some, number) for of, some in members.items()}
 
     def beside(index: int, name: str) -> int:
@@ -43,26 +43,26 @@ def lanes_of_lanelets(lanelets: Sequence[Lanelet]) -> RecordedLanes:
         return other if other != NONE and kinds[other] == kinds[index] else NONE
 
     strips = []
-    for index, one in enumerate(used):
-        share, left, right = _bounds(one)
+    for index, lanelet in enumerate(used):
+        share, left, right = _bounds(lanelet)
         strips.append(Strip(
-            name=one.name, kind=kinds[index], group=group[index], points=0.5 * (left + right),
+            name=lanelet.name, kind=kinds[index], group=group[index], points=0.5 * (left + right),
             width=np.hypot(*(left - right).T), station=share * length[group[index]],
-            left=beside(index, one.left_same), right=beside(index, one.right_same),
-            opposite=beside(index, one.left_opposite),
-            successors=tuple(number[name] for name in one.successors if name in number),
+            left=beside(index, lanelet.left_same), right=beside(index, lanelet.right_same),
+            opposite=beside(index, lanelet.left_opposite),
+            successors=tuple(number[name] for name in lanelet.successors if name in number),
         ))  # fmt: skip
-    is_marked = bool(used) and all(one.is_marked for one in used)
+    is_marked = bool(used) and all(lanelet.is_marked for lanelet in used)
     return assemble("markings" if is_marked else "lanelets", strips)
 
 
-def _kind(one: Lanelet) -> Kind:
-    return next((KINDS[kind] for kind in one.kinds if kind in KINDS), "driving")
+def _kind(lanelet: Lanelet) -> Kind:
+    return next((KINDS[kind] for kind in lanelet.kinds if kind in KINDS), "driving")
 
 
-def _is_lane(one: Lanelet) -> bool:
-    shorter = min(along(side)[-1] for side in (one.left, one.right))
-    return not PASSED_OVER.intersection(one.kinds) and shorter > SHORTEST
+def _is_lane(lanelet: Lanelet) -> bool:
+    shorter = min(along(side)[-1] for side in (lanelet.left, lanelet.right))
+    return not PASSED_OVER.intersection(lanelet.kinds) and shorter > SHORTEST
 
 
 def _groups(used: Sequence[Lanelet], number: dict[str, int]) -> list[int]:
@@ -75,8 +75,8 @@ def _groups(used: Sequence[Lanelet], number: dict[str, int]) -> list[int]:
             index = group[index]
         return index
 
-    for index, one in enumerate(used):
-        for name in (one.left_same, one.right_same):
+    for index, lanelet in enumerate(used):
+        for name in (lanelet.left_same, lanelet.right_same):
             if name in number:
                 a, b = sorted((head(index), head(number[name])))
                 group[b] = a
@@ -85,17 +85,17 @@ def _groups(used: Sequence[Lanelet], number: dict[str, int]) -> list[int]:
 
 def _middle_length(members: list[Lanelet], number: dict[str, int]) -> float:
     """Return the length of the line midway between a cross-section's outer bounds [m]."""
-    left = next((one for one in members if one.left_same not in number), members[0])
-    right = next((one for one in members if one.right_same not in number), members[0])
+    left = next((member for member in members if member.left_same not in number), members[0])
+    right = next((member for member in members if member.right_same not in number), members[0])
     share = np.linspace(0.0, 1.0, 101)
     return float(along(0.5 * (_at(left.left, share) + _at(right.right, share)))[-1])
 
 
-def _bounds(one: Lanelet) -> tuple[Float, Float, Float]:
+def _bounds(lanelet: Lanelet) -> tuple[Float, Float, Float]:
     """Return shares of the way along a lanelet, and its bounds there."""
-    length = along(one.left)[-1]
+    length = along(lanelet.left)[-1]
     share = np.linspace(0.0, 1.0, math.ceil(length / STEP) + 1)
-    return share, _at(one.left, share), _at(one.right, share)
+    return share, _at(lanelet.left, share), _at(lanelet.right, share)
 
 
 def _at(line: Float, share: Float) -> Float:

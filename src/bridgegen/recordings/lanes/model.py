@@ -24,14 +24,14 @@ def stations_of_groups(strips: "Sequence[Strip]") -> tuple[dict[int, int], dict[
     """
     length: dict[int, float] = {}
     turn: dict[int, float] = {}
-    for one in strips:
-        length[one.group] = max(length.get(one.group, 0.0), float(one.station[-1]))
-        turn.setdefault(one.group, _turn(one))
+    for strip in strips:
+        length[strip.group] = max(length.get(strip.group, 0.0), float(strip.station[-1]))
+        turn.setdefault(strip.group, _turn(strip))
     links: Counter[tuple[int, int]] = Counter(
-        (one.group, strips[to].group)
-        for one in strips
-        for to in one.successors
-        if one.kind == "driving" and strips[to].group != one.group
+        (strip.group, strips[to].group)
+        for strip in strips
+        for to in strip.successors
+        if strip.kind == "driving" and strips[to].group != strip.group
     )
     onward: dict[int, list[int]] = defaultdict(list)
     before: dict[int, list[int]] = defaultdict(list)
@@ -193,22 +193,22 @@ class RecordedLanes:
 def assemble(source: Source, strips: Sequence[Strip], notes: Sequence[str] = ()) -> RecordedLanes:
     """Make the lanes of strips: number them, and chain cross-sections to carriageways."""
     carriageway, begin = stations_of_groups(strips)
-    counts = [len(one.points) for one in strips]
-    points = np.concatenate([np.empty((0, 2)), *(one.points for one in strips)])
-    station = [one.station + begin[one.group] for one in strips]
+    counts = [len(strip.points) for strip in strips]
+    points = np.concatenate([np.empty((0, 2)), *(strip.points for strip in strips)])
+    station = [strip.station + begin[strip.group] for strip in strips]
     return RecordedLanes(
-        source=source, names=tuple(one.name for one in strips),
-        kinds=tuple(one.kind for one in strips),
-        carriageway=np.array([carriageway[one.group] for one in strips], np.int64),
+        source=source, names=tuple(strip.name for strip in strips),
+        kinds=tuple(strip.kind for strip in strips),
+        carriageway=np.array([carriageway[strip.group] for strip in strips], np.int64),
         number=_numbers(strips),
-        left=np.array([one.left for one in strips], np.int64),
-        right=np.array([one.right for one in strips], np.int64),
-        opposite=np.array([one.opposite for one in strips], np.int64),
-        successors=tuple(one.successors for one in strips),
+        left=np.array([strip.left for strip in strips], np.int64),
+        right=np.array([strip.right for strip in strips], np.int64),
+        opposite=np.array([strip.opposite for strip in strips], np.int64),
+        successors=tuple(strip.successors for strip in strips),
         first=np.concatenate([[0], np.cumsum(counts)]).astype(np.int64),
         x=points[:, 0].copy(), y=points[:, 1].copy(),
-        heading=np.concatenate([np.empty(0), *(headings_along(one.points) for one in strips)]),
-        width=np.concatenate([np.empty(0), *(one.width for one in strips)]),
+        heading=np.concatenate([np.empty(0), *(headings_along(strip.points) for strip in strips)]),
+        width=np.concatenate([np.empty(0), *(strip.width for strip in strips)]),
         station=np.concatenate([np.empty(0), *station]), notes=tuple(notes),
     )  # fmt: skip
 
@@ -235,8 +235,8 @@ def along(points: Float) -> Float:
 def _numbers(strips: Sequence[Strip]) -> Int:
     """Return the numbers of driving lanes from the right."""
     found = np.zeros(len(strips), np.int64)
-    for index, one in enumerate(strips):
-        if one.kind == "driving" and one.right == NONE:
+    for index, strip in enumerate(strips):
+        if strip.kind == "driving" and strip.right == NONE:
             at, number = index, 1
             while at != NONE and not found[at]:
                 found[at] = number

@@ -95,8 +95,8 @@ def carriageways(pieces: Pieces) -> list[Pieces]:
     graph = coo_array((np.ones(len(a)), (a, b)), shape=(len(cells), len(cells)))
     label = connected_components(graph, directed=False)[1][of]
     label[crossing[of]] = -1
-    found = [pieces.take(label == one) for one in np.unique(label[label >= 0])]
-    found = [one for one in found if len(np.unique(one.participant)) >= LEAST_VEHICLES]
+    found = [pieces.take(label == item) for item in np.unique(label[label >= 0])]
+    found = [item for item in found if len(np.unique(item.participant)) >= LEAST_VEHICLES]
     return sorted(found, key=len, reverse=True)
 
 

@@ -152,5 +152,5 @@ def place(traffic: RecordedTraffic, lanes: RecordedLanes) -> Placed:
 
 def flattened(lists: tuple[tuple[int, ...], ...]) -> tuple[Int, Int]:
     """Return lists of numbers as one: where each begins, ``(L + 1,)``, and their numbers."""
-    first = np.cumsum([0, *(len(one) for one in lists)]).astype(np.int64)
-    return first, np.array([one for each in lists for one in each], np.int64)
+    first = np.cumsum([0, *(len(list_) for list_ in lists)]).astype(np.int64)
+    return first, np.array([number for each in lists for number in each], np.int64)

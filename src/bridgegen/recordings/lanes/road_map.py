@@ -31,7 +31,9 @@ def lanes_of_map(model: OpenDrive, place: str) -> RecordedLanes:
     Raises:
         InputError: it has no driving lane, or is too large.
     """
-    most = (road.length * max(len(one.lanes) for one in road.sections) for road in model.roads)
+    most = (
+        road.length * max(len(section.lanes) for section in road.sections) for road in model.roads
+    )
     if sum(most) > MOST_POINTS * STEP:
         raise InputError(f"{place}: a map may have {MOST_POINTS * STEP / 1000:,.0f} km of lanes")
     graph = LaneGraph(model)
@@ -57,7 +59,7 @@ def lanes_of_map(model: OpenDrive, place: str) -> RecordedLanes:
         )
         for node, lane, of, centre, width, station in found
     ]  # fmt: skip
-    if not any(one.kind == "driving" for one in strips):
+    if not any(strip.kind == "driving" for strip in strips):
         raise InputError(f"{place}: the map has no driving lane")
     return assemble("map", strips)
 
@@ -65,24 +67,26 @@ def lanes_of_map(model: OpenDrive, place: str) -> RecordedLanes:
 def _section(road: Road, index: int, way: int) -> Iterator[tuple[Lane, Float, Float, Float]]:
     """Yield the lanes of one direction of a section: centre, width, station along their middle."""
     section = road.sections[index]
-    lanes = [one for one in section.lanes if one.type in KINDS and road.direction(one.id) == way]
+    lanes = [
+        lane for lane in section.lanes if lane.type in KINDS and road.direction(lane.id) == way
+    ]
     length = section_end(road, index) - section.s
     if not lanes or length < SHORTEST:
         return
     s = section.s + np.linspace(0.0, length, max(2, math.ceil(length / STEP) + 1))
     edges = borders(road, index, s)
     sides = {
-        one.id: (edges[one.id - int(math.copysign(1, one.id))], edges[one.id]) for one in lanes
+        lane.id: (edges[lane.id - int(math.copysign(1, lane.id))], edges[lane.id]) for lane in lanes
     }
-    driving = [one.id for one in lanes if KINDS[one.type] == "driving"] or list(sides)
-    outer = np.array([side for one in driving for side in sides[one]])
+    driving = [lane.id for lane in lanes if KINDS[lane.type] == "driving"] or list(sides)
+    outer = np.array([side for number in driving for side in sides[number]])
     middle = points(road, s, 0.5 * (outer.min(axis=0) + outer.max(axis=0)))
     station = along(middle[::way])
-    for one in lanes:
-        inner, border = sides[one.id]
+    for lane in lanes:
+        inner, border = sides[lane.id]
         centre = points(road, s, 0.5 * (inner + border))
         if along(centre)[-1] > SHORTEST:
-            yield one, centre[::way], np.abs(border - inner)[::way], station
+            yield lane, centre[::way], np.abs(border - inner)[::way], station
 
 
 def _beside(model: OpenDrive, node: Node, lane: Lane, known: dict[Node, int], side: int) -> int:

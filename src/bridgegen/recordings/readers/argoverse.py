@@ -56,7 +56,7 @@ def _read(path: Path) -> Iterator[RecordedTraffic]:
             data = file.read(columns=list(columns))
         values = {name: data[name].cast(pa.float64()).to_numpy() for name in NUMBERS}
         texts = {
-            name: [str(one) for one in data[name].to_pylist()]
+            name: [str(item) for item in data[name].to_pylist()]
             for name in ("track_id", "object_type", "scenario_id", "city")
         }
     except (pa.ArrowException, OSError) as error:

@@ -40,11 +40,11 @@ def read_lanelets(path: Path) -> tuple[Lanelet, ...]:
     if not isinstance(segments, dict):
         raise FileFormatError(f"{path}: lane_segments must be an object")
     bounds: dict[str, tuple[Float, Float]] = {}
-    for name, one in segments.items():
+    for name, segment in segments.items():
         place = f"{path}, lane segment '{name[:40]}'"
-        if not isinstance(one, dict):
+        if not isinstance(segment, dict):
             raise FileFormatError(f"{place} must be an object")
-        left, right = (_points(place, one.get(f"{side}_lane_boundary")) for side in _SIDES)
+        left, right = (_points(place, segment.get(f"{side}_lane_boundary")) for side in _SIDES)
         bounds[name] = left, right
     return tuple(_lanelet(name, segments[name], bounds) for name in bounds)
 
@@ -52,21 +52,21 @@ def read_lanelets(path: Path) -> tuple[Lanelet, ...]:
 _SIDES = ("left", "right")
 
 
-def _lanelet(name: str, one: dict[str, Any], bounds: dict[str, tuple[Float, Float]]) -> Lanelet:
-    beside = {side: str(one.get(f"{side}_neighbor_id")) for side in _SIDES}
+def _lanelet(name: str, record: dict[str, Any], bounds: dict[str, tuple[Float, Float]]) -> Lanelet:
+    beside = {side: str(record.get(f"{side}_neighbor_id")) for side in _SIDES}
     same = {
         side: other
         for side, other in beside.items()
         if other in bounds and _course(bounds[name]) @ _course(bounds[other]) > 0.0
     }
     other = beside["left"]
-    successors = one.get("successors")
+    successors = record.get("successors")
     return Lanelet(
         name=name, left=bounds[name][0], right=bounds[name][1],
         left_same=same.get("left", ""), right_same=same.get("right", ""),
         left_opposite=other if other in bounds and "left" not in same else "",
         successors=tuple(map(str, successors)) if isinstance(successors, list) else (),
-        kinds=KINDS.get(str(one.get("lane_type")), ()),
+        kinds=KINDS.get(str(record.get("lane_type")), ()),
     )  # fmt: skip
 
 
@@ -77,7 +77,7 @@ def _course(bounds: tuple[Float, Float]) -> Float:
 
 def _points(place: str, value: Any) -> Float:
     try:
-        points = np.array([[float(one["x"]), float(one["y"])] for one in value])
+        points = np.array([[float(item["x"]), float(item["y"])] for item in value])
     except (TypeError, KeyError, ValueError):
         points = np.empty((0, 2))
     if len(points) < 2 or not (np.abs(points) <= FARTHEST).all():

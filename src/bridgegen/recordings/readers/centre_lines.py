@@ -47,17 +47,17 @@ def lanelets_of_centre_lines(
     Raises:
         FileFormatError: the map is too large, or a point is no number.
     """
-    used = [one for one in lines if _length(one.points, place, one.name) > SHORTEST]
+    used = [line for line in lines if _length(line.points, place, line.name) > SHORTEST]
     if not used:
         return (), ()
     edges = [(name, points) for name, points in road.items() if _length(points, place, name) > 0.0]
     outlines = [
-        (f"outline {k}", one.outline)
-        for k, one in enumerate(used)
-        if one.outline is not None and _length(one.outline, place, one.name) > 0.0
+        (f"outline {k}", line.outline)
+        for k, line in enumerate(used)
+        if line.outline is not None and _length(line.outline, place, line.name) > 0.0
     ]
-    total = sum(_length(one, place, "") for _, one in (*edges, *outlines))
-    total += sum(_length(one.points, place, "") for one in used)
+    total = sum(_length(edge, place, "") for _, edge in (*edges, *outlines))
+    total += sum(_length(line.points, place, "") for line in used)
     if total > MOST_POINTS * STEP:
         raise FileFormatError(
             f"{place}: a map's lines may have {MOST_POINTS * STEP / 1000:,.0f} km in all, got "
@@ -179,9 +179,9 @@ def _followers(field: LineField, lines: Sequence[CentreLine]) -> list[tuple[str,
     starts = field.first[:-1]
     tree = cKDTree(field.points[starts])
     found = []
-    for k, one in enumerate(lines):
-        if one.successors is not None:
-            found.append(one.successors)
+    for k, line in enumerate(lines):
+        if line.successors is not None:
+            found.append(line.successors)
             continue
         end = int(field.first[k + 1]) - 1
         at = sorted(tree.query_ball_point(field.points[end], JOINED))

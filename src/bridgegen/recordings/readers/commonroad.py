@@ -63,13 +63,13 @@ def _read(path: Path) -> Iterator[RecordedTraffic]:
             sets += 1
             continue
         states = [*element.iterfind("initialState"), *element.iterfind("trajectory/state")]
-        found.append((element, [(_line(one), _state(path, one)) for one in states]))
+        found.append((element, [(_line(item), _state(path, item)) for item in states]))
     last = max((state[0] for _, states in found for _, state in states), default=1.0)
     for element in _obstacles(root, "static"):
-        for one in element.iterfind("initialState"):
-            state = _state(path, one)
+        for item in element.iterfind("initialState"):
+            state = _state(path, item)
             steps = range(int(state[0]), max(int(last), int(state[0]) + 1) + 1)
-            rows = [(_line(one), (float(k), *state[1:4], 0.0, 0.0)) for k in steps]
+            rows = [(_line(item), (float(k), *state[1:4], 0.0, 0.0)) for k in steps]
             found.append((element, rows))
     found = [(element, rows) for element, rows in found if rows]
     if not found:
@@ -80,11 +80,15 @@ def _read(path: Path) -> Iterator[RecordedTraffic]:
     ids = np.repeat(np.arange(len(found)), [len(rows) for _, rows in found])
     notes = [f"{sets} obstacles with an occupancy set only are left out"] if sets else []
     facts = Facts(
-        name=root.get("benchmarkID") or path.stem, format=FORMAT.name, source=str(path),
-        time_step=step, frame="the scenario's",
+        name=root.get("benchmarkID") or path.stem,
+        format=FORMAT.name,
+        source=str(path),
+        time_step=step,
+        frame="the scenario's",
         map="lanelets of the file" if root.find("lanelet") is not None else "",
-        notes=tuple(notes), lanelets=tuple(_lanelet(path, one) for one in root.iterfind("lanelet")),
-    )  # fmt: skip
+        notes=tuple(notes),
+        lanelets=tuple(_lanelet(path, item) for item in root.iterfind("lanelet")),
+    )
     heading, speed = table[:, 3], table[:, 4]
     yield build(
         facts, ids,
@@ -117,16 +121,16 @@ def _lanelet(path: Path, element: etree._Element) -> Lanelet:
             f"{path}, line {_line(element)}: x and y [m] of a lanelet must be within ±{FARTHEST:g}"
         )
     beside = {
-        f"{side}{one.get('drivingDir')}": one.get("ref") or ""
+        f"{side}{item.get('drivingDir')}": item.get("ref") or ""
         for side in ("Left", "Right")
-        for one in element.iterfind(f"adjacent{side}")
+        for item in element.iterfind(f"adjacent{side}")
     }
     return Lanelet(
         name=element.get("id") or "", left=left, right=right,
         left_same=beside.get("Leftsame", ""), right_same=beside.get("Rightsame", ""),
         left_opposite=beside.get("Leftopposite", ""),
-        successors=tuple(one.get("ref") or "" for one in element.iterfind("successor")),
-        kinds=tuple((one.text or "").strip() for one in element.iterfind("laneletType")),
+        successors=tuple(item.get("ref") or "" for item in element.iterfind("successor")),
+        kinds=tuple((item.text or "").strip() for item in element.iterfind("laneletType")),
     )  # fmt: skip
 
 
@@ -199,8 +203,8 @@ def _box(path: Path, element: etree._Element) -> tuple[float, float]:
             return 2.0 * radius, 2.0 * radius
         if shape.tag == "polygon":
             points = [
-                [_number(path, one, one.findtext(axis), axis) for axis in ("x", "y")]
-                for one in shape.iterfind("point")
+                [_number(path, item, item.findtext(axis), axis) for axis in ("x", "y")]
+                for item in shape.iterfind("point")
             ]
             if points:
                 size = np.ptp(np.array(points), axis=0)

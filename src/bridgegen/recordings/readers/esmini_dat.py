@@ -147,23 +147,23 @@ class _Log:
             self._change(code, data, at, size)
 
     def _change(self, code: int, data: bytes, at: int, size: int) -> None:
-        one = self.alive.get(self.current) if self.current is not None else None
-        if one is None or math.isnan(self.time):
+        entity = self.alive.get(self.current) if self.current is not None else None
+        if entity is None or math.isnan(self.time):
             raise FileFormatError(
                 f"{self.source}, byte {at - 8}: packet {code} must follow a time and an entity"
             )
         if code == _POSE:
-            one.pose = struct.unpack_from("<6d", data, at)
+            entity.pose = struct.unpack_from("<6d", data, at)
         elif code == _SPEED:
-            (one.speed,) = struct.unpack_from("<d", data, at)
+            (entity.speed,) = struct.unpack_from("<d", data, at)
         elif code == _BOX:
-            one.box = struct.unpack_from("<6d", data, at)
+            entity.box = struct.unpack_from("<6d", data, at)
         elif code == _TYPE:
-            one.kind = struct.unpack_from("<i", data, at)[0], one.kind[1]
+            entity.kind = struct.unpack_from("<i", data, at)[0], entity.kind[1]
         elif code == _CATEGORY:
-            one.kind = one.kind[0], struct.unpack_from("<i", data, at)[0]
+            entity.kind = entity.kind[0], struct.unpack_from("<i", data, at)[0]
         elif code == _NAME:
-            one.name = data[at + 4 : at + size].decode("utf-8", errors="replace")[:LONGEST_NAME]
+            entity.name = data[at + 4 : at + size].decode("utf-8", errors="replace")[:LONGEST_NAME]
         else:
             self.alive.pop(self.current or 0, None)
 
@@ -172,7 +172,7 @@ class _Log:
 
         An instant at which nothing changes is not written.
         """
-        seen = [one for one in self.alive.values() if one.pose]
+        seen = [entity for entity in self.alive.values() if entity.pose]
         if math.isnan(self.time) or not seen:
             return
         unwritten = 0
@@ -181,11 +181,11 @@ class _Log:
         if len(self.rows) + (1 + unwritten) * len(seen) > MOST_STATES:
             raise FileFormatError(f"{self.source}: may hold {MOST_STATES:,} states, got more")
         for k in range(1 + unwritten):
-            for one in seen:
-                x, y, heading = one.pose[0], one.pose[1], one.pose[3]
+            for entity in seen:
+                x, y, heading = entity.pose[0], entity.pose[1], entity.pose[3]
                 self.rows.append((
-                    one.number, self.time + k * self.step if k else self.time, x, y, heading,
-                    one.speed, one.box[0], one.box[1],
+                    entity.number, self.time + k * self.step if k else self.time, x, y, heading,
+                    entity.speed, entity.box[0], entity.box[1],
                 ))  # fmt: skip
                 self.places.append(self.at)
 
@@ -202,22 +202,31 @@ class _Log:
         first = np.searchsorted(ids[order], np.arange(len(entities) + 1))
         return build(
             Facts(
-                name=path.stem, format=FORMAT.name, source=self.source,
-                time_step=median_step(time[order], first), frame="OpenDRIVE's", map=road,
+                name=path.stem,
+                format=FORMAT.name,
+                source=self.source,
+                time_step=median_step(time[order], first),
+                frame="OpenDRIVE's",
+                map=road,
             ),
             ids,
             {
                 "time": time,
                 "x": x + ahead * cos - aside * sin,
                 "y": y + ahead * sin + aside * cos,
-                "heading": heading, "vx": speed * cos, "vy": speed * sin,
+                "heading": heading,
+                "vx": speed * cos,
+                "vy": speed * sin,
             },
             lambda i: f"{self.source}, byte {self.places[i]}",
-            names=_distinct([one.name or str(one.number) for one in entities]),
-            kind=[KINDS.get(one.kind, OTHER if one.kind[0] == 3 else UNKNOWN_KIND)
-                  for one in entities],
-            length=[one.box[3] for one in entities], width=[one.box[4] for one in entities],
-        )  # fmt: skip
+            names=_distinct([entity.name or str(entity.number) for entity in entities]),
+            kind=[
+                KINDS.get(entity.kind, OTHER if entity.kind[0] == 3 else UNKNOWN_KIND)
+                for entity in entities
+            ],
+            length=[entity.box[3] for entity in entities],
+            width=[entity.box[4] for entity in entities],
+        )
 
 
 def _distinct(names: list[str]) -> list[str]:

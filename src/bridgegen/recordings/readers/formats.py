@@ -45,7 +45,7 @@ ARCHIVES = {
 
 def recognise(head: Head) -> Format | None:
     """Return the format of a file, by its content; None if it is of none."""
-    return next((one for one in FORMATS if one.recognises(head)), None)
+    return next((format_ for format_ in FORMATS if format_.recognises(head)), None)
 
 
 def read(path: Path) -> Iterator[RecordedTraffic]:
@@ -69,12 +69,12 @@ def read(path: Path) -> Iterator[RecordedTraffic]:
         raise FileFormatError(
             f"{path}: is a Git LFS pointer, not the file that it stands for: run 'git lfs pull'"
         )
-    for one in FORMATS:
-        if one.companion(head):
+    for format_ in FORMATS:
+        if format_.companion(head):
             raise FileFormatError(
-                f"{path}: belongs to a recording ({one.title}) and is none itself"
+                f"{path}: belongs to a recording ({format_.title}) and is none itself"
             )
-    names = ", ".join(one.title for one in FORMATS)
+    names = ", ".join(format_.title for format_ in FORMATS)
     raise FileFormatError(f"{path}: is a recording of no known format; known: {names}")
 
 
@@ -91,7 +91,7 @@ def files_of(path: Path) -> tuple[list[Path], list[Path]]:
     if not path.is_dir():
         return [path], []
     try:
-        files = sorted(one for one in path.iterdir() if one.is_file())
+        files = sorted(item for item in path.iterdir() if item.is_file())
     except OSError as error:
         raise FileFormatError(f"{path}: cannot be read: {error.strerror}") from None
     recordings, others = [], []
@@ -103,7 +103,7 @@ def files_of(path: Path) -> tuple[list[Path], list[Path]]:
             continue
         if recognise(head) is not None:
             recordings.append(file)
-        elif not any(one.companion(head) for one in FORMATS):
+        elif not any(format_.companion(head) for format_ in FORMATS):
             others.append(file)
     if not recordings:
         raise FileFormatError(f"{path}: the folder holds no recording of a known format")

@@ -125,7 +125,7 @@ def _read_highd(path: Path, stem: str, rate: float, about: dict[str, Float]) -> 
     lanelets = _lanes(path.with_name(stem + RECORDING_META), ends)
     return build(
         _facts(path, rate, about, frame, lanelets=lanelets), ids, columns, line_of_table(str(path)),
-        names=[str(one) for one in tracks], kind=kinds, length=length, width=width,
+        names=[str(track) for track in tracks], kind=kinds, length=length, width=width,
     )  # fmt: skip
 
 
@@ -141,8 +141,8 @@ def _headings(
     begin = order[first[:-1]]
     moves = np.hypot(vx[begin], vy[begin]) > STANDING
     arm = np.array([
-        centre_ahead(CAR if kind == UNKNOWN_KIND else kind, one)
-        for kind, one in zip(kinds.tolist(), length.tolist(), strict=True)
+        centre_ahead(CAR if kind == UNKNOWN_KIND else kind, item)
+        for kind, item in zip(kinds.tolist(), length.tolist(), strict=True)
     ])  # fmt: skip
     found = np.empty(len(ids))
     found[order] = headings_of_centres(
@@ -166,7 +166,7 @@ def _lanes(path: Path, ends: tuple[float, float]) -> tuple[Lanelet, ...]:
     for name, is_leftwards in (("upperLaneMarkings", True), ("lowerLaneMarkings", False)):
         text = texts[name][0][0]
         try:
-            y = -np.array([float(one) for one in text.split(";")])
+            y = -np.array([float(part) for part in text.split(";")])
         except ValueError:
             y = np.full(1, np.nan)
         if not (np.isfinite(y).all() and (np.diff(y) < 0.0).all()):
@@ -177,7 +177,7 @@ def _lanes(path: Path, ends: tuple[float, float]) -> tuple[Lanelet, ...]:
         x = ends[::-1] if is_leftwards else ends
         last = number + len(y) - 2
         for k in range(len(y) - 1):
-            upper, lower = (np.column_stack([x, np.full(2, one)]) for one in (y[k], y[k + 1]))
+            upper, lower = (np.column_stack([x, np.full(2, item)]) for item in (y[k], y[k + 1]))
             left, right = (lower, upper) if is_leftwards else (upper, lower)
             above = str(number + k - 1) if k else ""
             below = str(number + k + 1) if number + k < last else ""
@@ -206,7 +206,7 @@ def _read_others(path: Path, stem: str, rate: float, about: dict[str, Float]) ->
     frame = "the recording's, east and north of its UTM origin"
     return build(
         _facts(path, rate, about, frame), ids, columns, line_of_table(str(path)),
-        names=[str(one) for one in tracks], kind=_kinds(meta, rows),
+        names=[str(track) for track in tracks], kind=_kinds(meta, rows),
         length=meta.numbers["length"][rows], width=meta.numbers["width"][rows],
     )  # fmt: skip
 
@@ -218,14 +218,14 @@ def _ids(path: Path, name: str, values: Float) -> tuple[Int, Int]:
 
 def _rows(path: Path, stem: str, key: str, meta: Columns, tracks: Int) -> Int:
     """Return each track's row of the metadata."""
-    row_of = {int(one): row for row, one in enumerate(meta.numbers[key])}
-    missing = [str(one) for one in tracks.tolist() if one not in row_of]
+    row_of = {int(number): row for row, number in enumerate(meta.numbers[key])}
+    missing = [str(item) for item in tracks.tolist() if item not in row_of]
     if missing:
         raise FileFormatError(
             f"{path.with_name(stem + META)}: says nothing of {len(missing)} tracks of {path.name}: "
             f"{', '.join(missing[:5])}{' …' if len(missing) > 5 else ''}"
         )
-    return np.array([row_of[one] for one in tracks.tolist()], dtype=np.int64)
+    return np.array([row_of[item] for item in tracks.tolist()], dtype=np.int64)
 
 
 def _kinds(meta: Columns, rows: Int) -> Int:

@@ -90,12 +90,12 @@ def _recording(path: Path, place: str, values: dict[str, Float], lines: Int) -> 
     classes = per_participant(ids, values["v_Class"])
     bounds = np.searchsorted(ids, np.arange(len(keys) + 1))
     kinds = np.array([
-        UNKNOWN_KIND if np.isnan(one) else CLASSES.get(int(one), UNKNOWN_KIND) for one in classes
+        UNKNOWN_KIND if np.isnan(item) else CLASSES.get(int(item), UNKNOWN_KIND) for item in classes
     ])  # fmt: skip
     length = np.nan_to_num(sizes["v_length"]) * FOOT
     arm = 0.5 * length + np.array([
-        centre_ahead(CAR if kind == UNKNOWN_KIND else kind, one)
-        for kind, one in zip(kinds.tolist(), length.tolist(), strict=True)
+        centre_ahead(CAR if kind == UNKNOWN_KIND else kind, item)
+        for kind, item in zip(kinds.tolist(), length.tolist(), strict=True)
     ])  # fmt: skip
     quiet = _without_noise(time, x, y, bounds)
     heading = headings_behind(*quiet, bounds, np.maximum(arm, SHORTEST_ARM))

@@ -68,8 +68,8 @@ def lanelets_of(truth: Message) -> tuple[tuple[Lanelet, ...], tuple[str, ...]]:
     names = _BOUNDARY.read(truth, spans[LANE_BOUNDARY])["id"]
     road: dict[str, list[Float]] = {}
     for name, (begin, end) in zip(names.tolist(), spans[LANE_BOUNDARY].tolist(), strict=True):
-        one = truth.part(begin, end)
-        points = _points(_BOUNDARY_POINT.read(one, one.find(2)[2]))
+        message = truth.part(begin, end)
+        points = _points(_BOUNDARY_POINT.read(message, message.find(2)[2]))
         road.setdefault(str(name), []).append(points)
     lines, without = [], 0
     about = _LANE.read(truth, spans[LANE])
@@ -104,7 +104,7 @@ def _points(columns: dict[str, Float]) -> Float:
 
 
 def _texts(ids: Iterable[int]) -> tuple[str, ...]:
-    return tuple(str(one) for one in ids if one >= 0)
+    return tuple(str(number) for number in ids if number >= 0)
 
 
 MOST_MESSAGE = 256 * 2**20
@@ -166,12 +166,15 @@ def _read(path: Path) -> Iterator[RecordedTraffic]:
         return
     traces: dict[str, _Trace] = {}
     left_out: Counter[str] = Counter()
-    for one in mcap.read_messages(path):
-        if one.encoding == "protobuf" and one.schema in ("osi3.GroundTruth", "osi3.SensorView"):
-            trace = traces.setdefault(one.topic, _Trace(path, one.topic))
-            trace.add(Message.of(one.data, one.source, one.offset), one.time)
+    for stored in mcap.read_messages(path):
+        if stored.encoding == "protobuf" and stored.schema in (
+            "osi3.GroundTruth",
+            "osi3.SensorView",
+        ):
+            trace = traces.setdefault(stored.topic, _Trace(path, stored.topic))
+            trace.add(Message.of(stored.data, stored.source, stored.offset), stored.time)
         else:
-            left_out[f"{one.topic} ({one.schema})"] += 1
+            left_out[f"{stored.topic} ({stored.schema})"] += 1
     with_states = [trace for trace in traces.values() if trace.count]
     if not with_states:
         raise FileFormatError(f"{path}: holds no osi3.GroundTruth or SensorView with objects")
@@ -256,10 +259,12 @@ class _Trace:
             raise FileFormatError(f"{self.path}: holds no states")
         ordered = sorted(range(len(self.order)), key=self.order.__getitem__)
         each = [self.objects[k] for k in ordered]
-        counts = [len(one["id"]) for one in each]
+        counts = [len(record["id"]) for record in each]
         message = np.repeat(ordered, counts)
         columns = {
-            name: np.concatenate([one[name] for one in each]) for name in each[0] if name != "time"
+            name: np.concatenate([record[name] for record in each])
+            for name in each[0]
+            if name != "time"
         }
         at, places = columns["at"], self.places
 
@@ -270,12 +275,12 @@ class _Trace:
         nameless = np.flatnonzero(columns["id"] < 0)
         if len(nameless):
             raise FileFormatError(f"{where(int(nameless[0]))}: a moving object must have an id")
-        begin = min(one["time"] for one in (*each, *self.lights))
+        begin = min(light["time"] for light in (*each, *self.lights))
         start = begin // 10**9 * 10**9 if begin >= LONGEST_CLOCK * 10**9 else 0
         notes = [*self.notes, *notes]
         if start:
             notes.append(f"times count from {start // 10**9} s of the recording's clock")
-        time = np.repeat([(one["time"] - start) * 1e-9 for one in each], counts)
+        time = np.repeat([(record["time"] - start) * 1e-9 for record in each], counts)
         identifiers, ids = numbered(columns["id"])
         heading = columns["heading"]
         first = np.searchsorted(np.sort(ids), np.arange(len(identifiers) + 1))
@@ -296,7 +301,7 @@ class _Trace:
                 "lane": np.where((lane >= 0) & (lane < 2**31), lane, NO_LANE),
             },
             where,
-            names=[str(one) for one in identifiers.tolist()],
+            names=[str(item) for item in identifiers.tolist()],
             kind=_kinds(ids, columns["type"], columns["vehicle"]),
             length=per_participant(ids, columns["length"]),
             width=per_participant(ids, columns["width"]),
@@ -305,10 +310,10 @@ class _Trace:
     def _lights(self, start: int) -> dict[str, RecordedLight]:
         """Return when each light changes [s], and to what; a light is one lamp."""
         changes: dict[int, list[tuple[float, str]]] = {}
-        for one in sorted(self.lights, key=lambda each: int(each["time"])):
-            time = (one["time"] - start) * 1e-9
+        for light in sorted(self.lights, key=lambda each: int(each["time"])):
+            time = (light["time"] - start) * 1e-9
             for name, color, mode in zip(
-                one["id"].tolist(), one["color"].tolist(), one["mode"].tolist(), strict=True
+                light["id"].tolist(), light["color"].tolist(), light["mode"].tolist(), strict=True
             ):
                 word = f"{MODES.get(mode, '')} {COLORS.get(color, 'unknown')}".strip()
                 word = "off" if word.startswith("off") else word

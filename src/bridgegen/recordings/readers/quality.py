@@ -165,7 +165,7 @@ def _over(traffic: RecordedTraffic, lag: int) -> tuple[Float, Float]:
     """
     each = 0.5 * (traffic.speed[1:] + traffic.speed[:-1]) * np.diff(traffic.time)
     driven, unknown = (
-        np.append(0.0, np.cumsum(one)) for one in (np.nan_to_num(each), np.isnan(each))
+        np.append(0.0, np.cumsum(array)) for array in (np.nan_to_num(each), np.isnan(each))
     )
     who = traffic.participant
     same = who[lag:] == who[:-lag]

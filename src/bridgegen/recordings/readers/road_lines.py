@@ -67,21 +67,21 @@ class LineField:
         self, lines: Sequence[CentreLine], edges: Sequence[tuple[str, Float]],
         outlines: Sequence[tuple[str, Float]], place: str,
     ) -> None:  # fmt: skip
-        parts = [_resampled(one.points, STEP) for one in lines]
-        counts = [len(one) for one in parts]
+        parts = [_resampled(line.points, STEP) for line in lines]
+        counts = [len(part) for part in parts]
         self.first = np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
         self.centres = int(self.first[-1])
-        parts += [_resampled(one, STEP / 2) for _, one in (*edges, *outlines)]
+        parts += [_resampled(edge, STEP / 2) for _, edge in (*edges, *outlines)]
         self.points = np.concatenate(parts)
-        self.along = np.concatenate([_directions(one) for one in parts])
-        self.line = np.repeat(np.arange(len(parts)), [len(one) for one in parts])
+        self.along = np.concatenate([_directions(part) for part in parts])
+        self.line = np.repeat(np.arange(len(parts)), [len(part) for part in parts])
         others, own = cKDTree(self.points), self.points[: self.centres]
         reach = NEIGHBOURS[1] + STEP
         pairs = int(cKDTree(own).count_neighbors(others, reach))
         if pairs > MOST_PAIRS:
             raise FileFormatError(f"{place}: too many lines of the map lie upon each other")
         found: list[list[int]] = list(others.query_ball_point(own, reach))  # type: ignore[arg-type]
-        p = np.repeat(np.arange(self.centres), [len(one) for one in found])
+        p = np.repeat(np.arange(self.centres), [len(group) for group in found])
         q = np.fromiter(itertools.chain.from_iterable(found), dtype=np.int64, count=len(p))
         apart = self.line[p] != self.line[q]
         p, q = p[apart], q[apart]
@@ -96,8 +96,8 @@ class LineField:
         number = {name: len(lines) + k for k, (name, _) in enumerate((*edges, *outlines))}
         allowed = [
             (k, number[name])
-            for k, one in enumerate(lines)
-            for name in (*one.borders, f"outline {k}")
+            for k, line in enumerate(lines)
+            for name in (*line.borders, f"outline {k}")
             if name in number
         ]
         count = len(parts)
@@ -166,7 +166,7 @@ def cuts_of(field: LineField) -> list[list[int]]:
             if min(abs(other - cut) for cut in there) >= least:
                 there.append(other)
                 waiting.append(other)
-    return [sorted(one) for one in cuts]
+    return [sorted(group) for group in cuts]
 
 
 def _resampled(points: Float, step: float) -> Float:

@@ -27,24 +27,24 @@ def lanelets_of(place: str, features: Any) -> tuple[tuple[Lanelet, ...], tuple[s
         raise FileFormatError(f"{place}: map_features must be a dictionary")
     lines: list[CentreLine] = []
     road: dict[str, Float] = {}
-    for name, one in features.items():
+    for name, feature in features.items():
         at = f"{place}, map feature '{str(name)[:40]}'"
-        if not isinstance(one, dict):
+        if not isinstance(feature, dict):
             raise FileFormatError(f"{at} must be a dictionary")
-        kind = str(one.get("type"))
-        if kind.startswith(("ROAD_LINE", "ROAD_EDGE")) and "polyline" in one:
-            road[str(name)] = _points(at, one["polyline"])
-        elif kind.startswith("LANE_") and "polyline" in one:
-            exits = one.get("exit_lanes")
+        kind = str(feature.get("type"))
+        if kind.startswith(("ROAD_LINE", "ROAD_EDGE")) and "polyline" in feature:
+            road[str(name)] = _points(at, feature["polyline"])
+        elif kind.startswith("LANE_") and "polyline" in feature:
+            exits = feature.get("exit_lanes")
             lines.append(CentreLine(
-                name=str(name)[:200], points=_points(at, one["polyline"]),
+                name=str(name)[:200], points=_points(at, feature["polyline"]),
                 borders=tuple(
                     str(border.get("boundary_feature_id"))
                     for side in ("left_boundaries", "right_boundaries")
-                    for border in _listed(one.get(side))
+                    for border in _listed(feature.get(side))
                     if isinstance(border, dict)
                 ),
-                outline=_closed(_points(at, one["polygon"])) if "polygon" in one else None,
+                outline=_closed(_points(at, feature["polygon"])) if "polygon" in feature else None,
                 successors=tuple(str(exit)[:200] for exit in exits)
                 if isinstance(exits, list) else None,
                 kinds=KINDS.get(kind, ()),

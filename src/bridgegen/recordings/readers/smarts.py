@@ -65,12 +65,12 @@ def _recording(path: Path, base: sqlite3.Connection) -> RecordedTraffic:
     vehicles = _rows(
         path, base, "Vehicle", MOST_PARTICIPANTS, ("id", "type", "length", "width"), "id"
     )
-    row_of = {one: row for row, one in enumerate(vehicles[:, 0].tolist())}
+    row_of = {item: row for row, item in enumerate(vehicles[:, 0].tolist())}
     distinct, ids = numbered(states[:, 0])
-    missing = [one for one in distinct.tolist() if one not in row_of]
+    missing = [item for item in distinct.tolist() if item not in row_of]
     if missing:
         raise FileFormatError(f"{path}: Vehicle says nothing of vehicle_id {missing[0]:g}")
-    about = vehicles[[row_of[one] for one in distinct.tolist()]]
+    about = vehicles[[row_of[item] for item in distinct.tolist()]]
     heading, speed, lane = states[:, 4] + math.pi / 2, states[:, 5], states[:, 6]
     first = np.searchsorted(ids, np.arange(len(distinct) + 1))
     facts = Facts(
@@ -85,8 +85,8 @@ def _recording(path: Path, base: sqlite3.Connection) -> RecordedTraffic:
             "lane": np.where(np.abs(lane) < 1e6, lane, NO_LANE),
         },
         lambda i: f"{path}, Trajectory of vehicle_id {states[i, 0]:g} at {states[i, 1]:g} s",
-        names=[f"{one:g}" for one in distinct.tolist()],
-        kind=[CLASSES.get(int(one), UNKNOWN_KIND) for one in np.nan_to_num(about[:, 1])],
+        names=[f"{item:g}" for item in distinct.tolist()],
+        kind=[CLASSES.get(int(item), UNKNOWN_KIND) for item in np.nan_to_num(about[:, 1])],
         length=about[:, 2], width=about[:, 3],
     )  # fmt: skip
 

@@ -137,7 +137,7 @@ def headings_of_centres(
         arm: ``(P,)`` from the rear axle to the centre [m], above 0.
         begin: ``(P,)`` heading of the first state [rad].
     """
-    mean_x, mean_y = (0.5 * (one + np.concatenate([one[:1], one[:-1]])) for one in (vx, vy))
+    mean_x, mean_y = (0.5 * (array + np.concatenate([array[:1], array[:-1]])) for array in (vx, vy))
     way = np.hypot(mean_x, mean_y) * np.maximum(np.diff(time, prepend=time[0]), 0.0)
     found: Float = following_headings(np.arctan2(mean_y, mean_x), way, first, arm, begin)
     return wrap(found)
@@ -147,7 +147,10 @@ def headings_of_centres(
 
 
 _USUAL = {
-    name: next(one for one in PARTICIPANTS.values() if one.seen_as.name == name) for name in NAMES
+    name: next(
+        participant for participant in PARTICIPANTS.values() if participant.seen_as.name == name
+    )
+    for name in NAMES
 }
 """The first participant of each class, which is the one that gave the class its name."""
 

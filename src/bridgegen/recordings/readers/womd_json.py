@@ -50,16 +50,16 @@ def _read(path: Path) -> Iterator[RecordedTraffic]:
     names: list[str] = []
     kinds: list[int] = []
     boxes: list[list[float]] = []
-    for number, one in enumerate(objects):
-        states = _states(f"{path}, objects[{number}]", one)
+    for number, obj in enumerate(objects):
+        states = _states(f"{path}, objects[{number}]", obj)
         if not states:
             continue
         ids += [len(names)] * len(states)
         rows += states
         places += [(number, int(state[0])) for state in states]
-        names.append(str(one.get("id", number)))
-        kinds.append(KINDS.get(str(one.get("type")), UNKNOWN_KIND))
-        boxes.append([_size(one.get(name)) for name in ("length", "width")])
+        names.append(str(obj.get("id", number)))
+        kinds.append(KINDS.get(str(obj.get("type")), UNKNOWN_KIND))
+        boxes.append([_size(obj.get(name)) for name in ("length", "width")])
     if not rows:
         raise FileFormatError(f"{path}: holds no states")
     table = np.array(rows)
@@ -92,33 +92,33 @@ def _lanelets(path: Path, roads: Any) -> tuple[tuple[Lanelet, ...], tuple[str, .
         raise FileFormatError(f"{path}: roads must be a list")
     lines: list[CentreLine] = []
     road: dict[str, Float] = {}
-    for number, one in enumerate(roads):
-        kind = one.get("type") if isinstance(one, dict) else None
+    for number, record in enumerate(roads):
+        kind = record.get("type") if isinstance(record, dict) else None
         if kind not in ("lane", "road_line", "road_edge"):
             continue
-        points = _line(f"{path}, roads[{number}]", one.get("geometry"))
+        points = _line(f"{path}, roads[{number}]", record.get("geometry"))
         if kind != "lane":
             road[str(number)] = points
             continue
-        is_bicycle = one.get("map_element_id") == BICYCLE_LANE
-        name = str(one.get("id", f"roads[{number}]"))[:200]
+        is_bicycle = record.get("map_element_id") == BICYCLE_LANE
+        name = str(record.get("id", f"roads[{number}]"))[:200]
         lines.append(CentreLine(name, points, kinds=("bicycleLane",) if is_bicycle else ()))
     return lanelets_of_centre_lines(lines, road, str(path))
 
 
 def _line(place: str, geometry: Any) -> Float:
     try:
-        points = np.array([[float(one["x"]), float(one["y"])] for one in geometry])
+        points = np.array([[float(item["x"]), float(item["y"])] for item in geometry])
     except (TypeError, KeyError, ValueError):
         raise FileFormatError(f"{place}: geometry must be a list of points x, y") from None
     return points.reshape(-1, 2)
 
 
-def _states(place: str, one: Any) -> list[list[float]]:
+def _states(place: str, value: Any) -> list[list[float]]:
     """Return the valid states of an object: step, x, y, heading, vx, vy."""
-    if not isinstance(one, dict):
+    if not isinstance(value, dict):
         raise FileFormatError(f"{place} must be an object")
-    lists = [one.get(name) for name in ("position", "heading", "velocity", "valid")]
+    lists = [value.get(name) for name in ("position", "heading", "velocity", "valid")]
     if not all(isinstance(each, list) for each in lists):
         raise FileFormatError(f"{place}: position, heading, velocity and valid must be lists")
     position, heading, velocity, valid = (list(each or []) for each in lists)

@@ -48,8 +48,8 @@ def along(x: Float, y: Float, h: Float) -> tuple[OpenDrive, float]:
     """
     knots = list(_knots(x, y, h))
     pieces = [Geometry(0.0, *_behind(knots[0], BEFORE), BEFORE, Line())]
-    for one, two in pairwise(knots):
-        pieces.append(_cubic(_end(pieces), one, two))
+    for pair, two in pairwise(knots):
+        pieces.append(_cubic(_end(pieces), pair, two))
     last = knots[-1]
     pieces.append(Geometry(_end(pieces), *last, BEYOND, Line()))
     lanes = LaneSection(
@@ -85,9 +85,9 @@ def _knots(x: Float, y: Float, h: Float) -> Iterator[Knot]:
             last = k
 
 
-def _cubic(s: float, one: Knot, two: Knot) -> Geometry:
+def _cubic(s: float, knot: Knot, two: Knot) -> Geometry:
     """Return the cubic with both points and both directions."""
-    x, y, h = one
+    x, y, h = knot
     dx, dy, turn = two[0] - x, two[1] - y, two[2] - h
     u = dx * np.cos(h) + dy * np.sin(h)
     v = -dx * np.sin(h) + dy * np.cos(h)
@@ -207,9 +207,9 @@ def driven(
         ),
     )
     bodies = tuple(
-        replace(one, object_controllers=(osc.ObjectController(controller),))
-        if one.name == EGO else one
-        for one in scenario.entities.scenario_objects
+        replace(obj, object_controllers=(osc.ObjectController(controller),))
+        if obj.name == EGO else obj
+        for obj in scenario.entities.scenario_objects
     )  # fmt: skip
     place, goal = (
         osc.Position(osc.LanePosition(ROAD, str(LANE), s)) for s in (start, length - 1.0)
@@ -227,8 +227,8 @@ def driven(
     init = replace(
         board.init.actions,
         privates=tuple(
-            osc.Private(EGO, actions) if one.entity_ref == EGO else one
-            for one in board.init.actions.privates
+            osc.Private(EGO, actions) if private.entity_ref == EGO else private
+            for private in board.init.actions.privates
         ),
     )
     stories = board.stories

@@ -92,14 +92,14 @@ def prepare(traffic: RecordedTraffic, clock: Clock, event: RecordedConflict) -> 
     )  # fmt: skip
 
 
-def write(one: Prepared, stem: Path, ego: str | None = None) -> Replay:
+def write(prepared: Prepared, stem: Path, ego: str | None = None) -> Replay:
     """Write an event as ``.xosc``, ``.xodr`` and ``.owl``.
 
     The file that replays what was recorded is simulated first, also where a driver takes the ego's
     place in what is written.
 
     Args:
-        one: the event.
+        prepared: the event.
         stem: path of the files without ending.
         ego: a driver that takes the ego's place.
 
@@ -107,19 +107,21 @@ def write(one: Prepared, stem: Path, ego: str | None = None) -> Replay:
         StorageError: a file cannot be written.
     """
     road, file, ontology = (stem.with_suffix(end) for end in (".xodr", ".xosc", ".owl"))
-    scenario = with_map(one.scenario, road.name)
-    write_whole(road, [opendrive.to_xml(one.roads)])
+    scenario = with_map(prepared.scenario, road.name)
+    write_whole(road, [opendrive.to_xml(prepared.roads)])
     write_whole(file, [openscenario.to_xml(scenario)])
-    off, too_fast, problem = _compared(file, one.states)
+    off, too_fast, problem = _compared(file, prepared.states)
     if ego is not None:
-        scenario = driven(scenario, one.motion, ego, one.start, one.roads.roads[0].length)
+        scenario = driven(
+            scenario, prepared.motion, ego, prepared.start, prepared.roads.roads[0].length
+        )
         write_whole(file, [openscenario.to_xml(scenario)])
     ontology.unlink(missing_ok=True)
     try:
         _, lacks = import_file(file, ontology, partial=True)
     except InputError as error:
         lacks = list(error.problems)
-    return Replay(one, file, off, too_fast, problem, tuple(lacks))
+    return Replay(prepared, file, off, too_fast, problem, tuple(lacks))
 
 
 def _compared(file: Path, states: Recording) -> tuple[float, float, str]:
@@ -241,7 +243,7 @@ def _moving(
     turns = ";".join(f"{value:.1f}" for value in np.degrees(np.unwrap(h)))
     yield f"<g><title>{escape(name)}</title>"
     if not there.all():
-        shows = ";".join("visible" if one else "hidden" for one in there)
+        shows = ";".join("visible" if item else "hidden" for item in there)
         yield f'<animate attributeName="visibility" calcMode="discrete" values="{shows}" {timing}/>'
     yield (
         f'<animateTransform attributeName="transform" type="translate" values="{moves}" {timing}/>'

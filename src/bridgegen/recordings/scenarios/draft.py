@@ -100,16 +100,16 @@ def draft(sought: Sought, rows: Mapping[str, Float], names: Sequence[str], about
             ]
             if not left:
                 raise
-            named = [one for one in left if any(one[0] in text for text in error.problems)]
-            for one in named or left:
+            named = [pair for pair in left if any(pair[0] in text for text in error.problems)]
+            for pair in named or left:
                 with suppress(InputError):
-                    return _attempt(sought, rows, names, about, [*cut, one])
+                    return _attempt(sought, rows, names, about, [*cut, pair])
             cut.append((named or left)[0])
 
 
 def _is_wider(scenario: LogicalScenario, name: str, end: str, rows: Mapping[str, Float]) -> bool:
-    one, seen = scenario.parameters[name], seen_range(rows[name])
-    return seen.low < one.low if end == "low" else seen.high > one.high
+    parameter, seen = scenario.parameters[name], seen_range(rows[name])
+    return seen.low < parameter.low if end == "low" else seen.high > parameter.high
 
 
 def _attempt(
@@ -119,17 +119,21 @@ def _attempt(
     scenario, own = sought.scenario, _own_parameters(sought)
     wanted: dict[str, Range] = {}
     for name in names:
-        one, seen = scenario.parameters[name], seen_range(rows[name])
+        parameter, seen = scenario.parameters[name], seen_range(rows[name])
         if name not in own:
-            seen = Range(max(seen.low, one.low), min(seen.high, one.high))
+            seen = Range(max(seen.low, parameter.low), min(seen.high, parameter.high))
         wanted[name] = Range(
-            max(seen.low, one.low) if (name, "low") in cut else seen.low,
-            min(seen.high, one.high) if (name, "high") in cut else seen.high,
+            max(seen.low, parameter.low) if (name, "low") in cut else seen.low,
+            min(seen.high, parameter.high) if (name, "high") in cut else seen.high,
         )
         if not wanted[name].low < wanted[name].high:
             raise InputError(f"no value of {name} is both in its range and seen")
     inside = np.all(
-        [(one.low <= rows[name]) & (rows[name] <= one.high) for name, one in wanted.items()], axis=0
+        [
+            (range_.low <= rows[name]) & (rows[name] <= range_.high)
+            for name, range_ in wanted.items()
+        ],
+        axis=0,
     )
     if inside.sum() < LEAST_ROWS:
         raise InputError(f"{inside.sum()} events are in ranges that it can hold; "
@@ -140,11 +144,11 @@ def _attempt(
     tightened = bounds_of_speeds(scenario, kept, names, EVENTS_SOURCE)
     parameters = {
         name: replace(
-            one, low=wanted[name].low, high=wanted[name].high,
+            item, low=wanted[name].low, high=wanted[name].high,
             default=float(np.clip(usual[name], wanted[name].low, wanted[name].high)),
         )
-        if name in wanted else one
-        for name, one in scenario.parameters.items()
+        if name in wanted else item
+        for name, item in scenario.parameters.items()
     }  # fmt: skip
     parameters = with_room(
         parameters, [*scenario.bounds, *tightened], scenario.derived, scenario.space().variables
@@ -162,7 +166,7 @@ def _attempt(
 def _ranged(
     name: str, scenario: LogicalScenario, rows: Mapping[str, Float], mined: Range, is_own: bool
 ) -> MinedRange:
-    one, seen = scenario.parameters[name], seen_range(rows[name])
+    parameter, seen = scenario.parameters[name], seen_range(rows[name])
     remarks = []
     if mined.low < seen.low or mined.high > seen.high:
         remarks.append("extended, because a constraint asks for it where other parameters are at "
@@ -170,10 +174,10 @@ def _ranged(
     if mined.low > seen.low or mined.high < seen.high:
         remarks.append("cut to the source's, because the scenario cannot hold more" if is_own else
                        "cut to that of the fragment that declares it")  # fmt: skip
-    if mined.low < one.low or mined.high > one.high:
-        remarks.append(f"beyond the source's {one.low:g} to {one.high:g}")
+    if mined.low < parameter.low or mined.high > parameter.high:
+        remarks.append(f"beyond the source's {parameter.low:g} to {parameter.high:g}")
     return MinedRange(
-        name, one.unit, Range(one.low, one.high), seen, mined, "; ".join(remarks)
+        name, parameter.unit, Range(parameter.low, parameter.high), seen, mined, "; ".join(remarks)
     )  # fmt: skip
 
 
@@ -195,27 +199,38 @@ def _data(
         data.pop(key, None)
     defaults = dict(data.get("defaults", {}))
     own = _own_parameters(sought)
-    changed = {one.parameter: one for one in ranges}
+    changed = {range_.parameter: range_ for range_ in ranges}
     for name, value in usual.items():
-        one = parameters[name]
+        parameter = parameters[name]
         if name in own and name in changed:
             seen = changed[name]
             remark = f" ({seen.remark})" if seen.remark else ""
             data["parameters"][name] |= {
-                "low": one.low, "high": one.high, "default": one.default,
+                "low": parameter.low, "high": parameter.high, "default": parameter.default,
                 "source": f"Seen: {seen.seen.low:g} to {seen.seen.high:g}{remark}.",
             }  # fmt: skip
-        elif one.kind.name == FLOAT.name and one.low <= value <= one.high:
+        elif parameter.kind.name == FLOAT.name and parameter.low <= value <= parameter.high:
             (data["parameters"][name].__setitem__("default", value) if name in own
              else defaults.__setitem__(name, value))  # fmt: skip
     if defaults:
         data["defaults"] = defaults
     if tightened:
-        data["bounds"] = [*data.get("bounds", []), *(
-            {"target": one.target, **{key: str(end) for key, end in (("lo", one.lo), ("hi", one.hi))
-                                      if end is not None}, "why": one.why, "source": one.source}
-            for one in tightened
-        )]  # fmt: skip
+        data["bounds"] = [
+            *data.get("bounds", []),
+            *(
+                {
+                    "target": bound.target,
+                    **{
+                        key: str(end)
+                        for key, end in (("lo", bound.lo), ("hi", bound.hi))
+                        if end is not None
+                    },
+                    "why": bound.why,
+                    "source": bound.source,
+                }
+                for bound in tightened
+            ),
+        ]
     return data
 
 
@@ -255,6 +270,6 @@ def files_of(sought: Sought) -> str:
     data = sought.document.data
     assert isinstance(data, dict)
     included = [name.partition(" as ")[0] for name in data.get("include", [])]
-    functions = [one["function"].partition(":")[0] for one in data.get("effects", [])]
+    functions = [item["function"].partition(":")[0] for item in data.get("effects", [])]
     files = [name for name in (*included, *functions) if name.endswith((".yaml", ".yml", ".py"))]
     return files[0] if files else ""

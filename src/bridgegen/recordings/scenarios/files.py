@@ -29,11 +29,11 @@ QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
 def mined_individuals(mined: Sequence[MinedScenario]) -> Individuals:
     """Return an individual for each scenario, and for each of its statistics."""
     builder = Builder("mined", {})
-    for one in mined:
-        node = builder.node(one.name, "MinedScenario")
-        builder.put(node, "has_name", one.name)
-        for number, (name, unit, value) in enumerate(_statistics(one), 1):
-            statistic = builder.node(f"{one.name}_{number}", "Statistic")
+    for scenario in mined:
+        node = builder.node(scenario.name, "MinedScenario")
+        builder.put(node, "has_name", scenario.name)
+        for number, (name, unit, value) in enumerate(_statistics(scenario), 1):
+            statistic = builder.node(f"{scenario.name}_{number}", "Statistic")
             builder.put(statistic, "has_name", name)
             builder.put(statistic, "has_measured_unit", unit)
             builder.put(statistic, "has_estimate", value)
@@ -41,10 +41,10 @@ def mined_individuals(mined: Sequence[MinedScenario]) -> Individuals:
     return Individuals(builder.quads)
 
 
-def _statistics(one: MinedScenario) -> Iterator[tuple[str, str, float]]:
+def _statistics(scenario: MinedScenario) -> Iterator[tuple[str, str, float]]:
     """Yield name, unit and value of all that sums up a scenario's events."""
-    yield "events fitted", "count", float(one.fit.used)
-    met = one.fit.exposure.encounters
+    yield "events fitted", "count", float(scenario.fit.used)
+    met = scenario.fit.exposure.encounters
     if met is not None:
         yield "encounters", "count", float(met.count)
         for name, unit, amount, rate in (
@@ -55,8 +55,8 @@ def _statistics(one: MinedScenario) -> Iterator[tuple[str, str, float]]:
                 yield f"encounters per {unit}", f"1/{unit}", rate.estimate
                 yield f"encounters per {unit}, 2.5 %", f"1/{unit}", rate.low
                 yield f"encounters per {unit}, 97.5 %", f"1/{unit}", rate.high
-    for each in one.ranges:
-        values = one.fit.parameters[each.parameter].values
+    for each in scenario.ranges:
+        values = scenario.fit.parameters[each.parameter].values
         yield f"{each.parameter}, low", each.unit, each.mined.low
         yield f"{each.parameter}, high", each.unit, each.mined.high
         yield f"{each.parameter}, mean", each.unit, float(values.mean())
@@ -96,19 +96,19 @@ def write_mined(
         StorageError: a file cannot be written.
     """
     folder = out / FOLDER
-    _emptied(folder, [mined_name(one.scenario) for one in sought])
+    _emptied(folder, [mined_name(item.scenario) for item in sought])
     made: list[MinedScenario | Unmade] = []
-    for number, (one, events) in enumerate(zip(sought, scenarios, strict=True)):
+    for number, (item, events) in enumerate(zip(sought, scenarios, strict=True)):
         fitting(number, len(scenarios))
         table = out / EVENTS / f"{events.scenario}.csv"
-        result = mined_scenario(one, events, found, table, time_step)
+        result = mined_scenario(item, events, found, table, time_step)
         if isinstance(result, MinedScenario):
             scenario, _, distribution = (folder / f"{result.name}{end}" for end in ENDINGS)
             write_whole(scenario, [result.text.encode()])
             write_whole(distribution, [distribution_xml(result.fit.exposure, date=DATE)])
         made.append(result)
     fitting(len(scenarios), len(scenarios))
-    if scenarios_made := [one for one in made if isinstance(one, MinedScenario)]:
+    if scenarios_made := [item for item in made if isinstance(item, MinedScenario)]:
         save(mined_individuals(scenarios_made), folder / FILE)
     return tuple(made)
 
@@ -128,23 +128,30 @@ def _emptied(folder: Path, names: Sequence[str]) -> None:
 # --- Mined scenarios in the terminal, and as plain data ---
 
 
-def made_row(one: MinedScenario) -> tuple[str, int, str, str]:
+def made_row(scenario: MinedScenario) -> tuple[str, int, str, str]:
     """Return what the terminal shows of a scenario."""
-    met = one.fit.exposure.encounters
+    met = scenario.fit.exposure.encounters
     rate = met.per_hour if met else None
-    beyond = [each.parameter for each in one.ranges if each.remark]
+    beyond = [each.parameter for each in scenario.ranges if each.remark]
     return (
-        one.name, one.fit.used, rate.in_words("h") if rate else "–", ", ".join(beyond) or "–",
-    )  # fmt: skip
+        scenario.name,
+        scenario.fit.used,
+        rate.in_words("h") if rate else "–",
+        ", ".join(beyond) or "–",
+    )
 
 
-def made_as_json(one: MinedScenario | Unmade, out: Path) -> dict[str, object]:
+def made_as_json(scenario: MinedScenario | Unmade, out: Path) -> dict[str, object]:
     """Return a scenario as plain data, or why there is none."""
-    if isinstance(one, Unmade):
-        return {"of": one.source, "scenario": None, "reason": one.reason}
-    met = one.fit.exposure.encounters
+    if isinstance(scenario, Unmade):
+        return {"of": scenario.source, "scenario": None, "reason": scenario.reason}
+    met = scenario.fit.exposure.encounters
     return {
-        "of": one.source, "scenario": str(out / FOLDER / f"{one.name}{ENDINGS[0]}"), "reason": None,
-        "events": one.fit.used, "encounters": asdict(met) if met else None,
-        "ranges": [asdict(each) for each in one.ranges], "tightened": one.tightened,
-    }  # fmt: skip
+        "of": scenario.source,
+        "scenario": str(out / FOLDER / f"{scenario.name}{ENDINGS[0]}"),
+        "reason": None,
+        "events": scenario.fit.used,
+        "encounters": asdict(met) if met else None,
+        "ranges": [asdict(each) for each in scenario.ranges],
+        "tightened": scenario.tightened,
+    }

@@ -107,7 +107,7 @@ def mined_scenario(
     block = fitted.text[fitted.text.index("\nexposure:") + 1 :]
     return MinedScenario(
         made.scenario.name, scenario.name, f"{HEAD}\n{dumped(made.data)}{block}", made.ranges,
-        tuple(str(one) for one in made.tightened), fitted,
+        tuple(str(bound) for bound in made.tightened), fitted,
     )  # fmt: skip
 
 
@@ -117,15 +117,15 @@ def _rest(scenario: LogicalScenario, names: Sequence[str]) -> list[str]:
 
 def _about(events: ScenarioEvents, found: Sequence[FoundEvents], time_step: float) -> str:
     """Return where the events come from, and what was left out."""
-    recordings = [one.recording for one in found]
+    recordings = [found_events.recording for found_events in found]
     shown = ", ".join(recordings[:NAMES_SHOWN]) + (", …" if recordings[NAMES_SHOWN:] else "")
     count = "1 recording" if len(recordings) == 1 else f"{len(recordings)} recordings"
     refused: Counter[str] = Counter()
-    for one in (each for every in found for each in every.kinds if each.kind.name == events.kind):
-        refused.update(one.refused)
+    for item in (each for every in found for each in every.kinds if each.kind.name == events.kind):
+        refused.update(item.refused)
     reasons = "; ".join(f"{number} {reason}" for reason, number in refused.items())
     left_out = f"candidates refused: {reasons or 'none'}"
-    hours, km = np.sum([one.driving(events.kind) for one in found], axis=0)
+    hours, km = np.sum([found_events.driving(events.kind) for found_events in found], axis=0)
     text = (
         f"{events.count} events of the kind {events.kind} in {count} ({shown}), resampled to "
         f"{time_step:g} s; {hours:.4g} h and {km:.4g} km of motor vehicles, each of which may be "

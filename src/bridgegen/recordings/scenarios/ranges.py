@@ -100,34 +100,34 @@ def bounds_of_speeds(
         names: the parameters whose ranges are what was seen.
         source: of the bounds, for the file.
     """
-    speeds = {value for one in scenario.participants if not one.exceeds_limit
-              for value in speeds_of(one, scenario.story)}  # fmt: skip
-    factors = [one.name.removesuffix(_FACTOR) for one in scenario.derived
-               if one.name.endswith(_FACTOR)]  # fmt: skip
+    speeds = {value for participant in scenario.participants if not participant.exceeds_limit
+              for value in speeds_of(participant, scenario.story)}  # fmt: skip
+    factors = [derived.name.removesuffix(_FACTOR) for derived in scenario.derived
+               if derived.name.endswith(_FACTOR)]  # fmt: skip
     limit = cap(scenario.roads.knobs["speed_limit"], sorted(factors))
     made: list[Bound] = []
-    for one in scenario.derived:
-        if one.name not in speeds or len(one.names) < 2 or not one.names <= set(names):
+    for derived in scenario.derived:
+        if derived.name not in speeds or len(derived.names) < 2 or not derived.names <= set(names):
             continue
-        seen = seen_range(np.asarray(one.value.evaluate(rows)))
-        beyond = any(_is_beyond(scenario.parameters[name], rows[name]) for name in one.names)
-        for target in sorted(one.names, key=list(names).index, reverse=True):
-            k = _slope(one, target, rows)
+        seen = seen_range(np.asarray(derived.value.evaluate(rows)))
+        beyond = any(_is_beyond(scenario.parameters[name], rows[name]) for name in derived.names)
+        for target in sorted(derived.names, key=list(names).index, reverse=True):
+            k = _slope(derived, target, rows)
             if k is None:
                 continue
             bounds = [
                 _solved(
-                    one,
+                    derived,
                     target,
                     k,
                     f"{seen.low:g}",
                     f"{seen.high:g}",
-                    _SEEN.format(name=one.name),
+                    _SEEN.format(name=derived.name),
                     source,
                 )
             ]
             if beyond:
-                bounds.append(_solved(one, target, k, None, limit, _LIMIT, _ROAD))
+                bounds.append(_solved(derived, target, k, None, limit, _LIMIT, _ROAD))
             parameters, others = scenario.parameters.values(), [*scenario.bounds, *made]
             if not problems_of(parameters, [*others, *bounds], scenario.derived):
                 made += bounds
@@ -135,14 +135,14 @@ def bounds_of_speeds(
     return made
 
 
-def _is_beyond(one: Parameter, values: Float) -> bool:
-    return bool(values.min() < one.low or values.max() > one.high)
+def _is_beyond(parameter: Parameter, values: Float) -> bool:
+    return bool(values.min() < parameter.low or values.max() > parameter.high)
 
 
-def _slope(one: Derived, target: str, rows: Mapping[str, Float]) -> float | None:
+def _slope(derived: Derived, target: str, rows: Mapping[str, Float]) -> float | None:
     """Return by how much a quantity grows with a parameter; None if that is no constant."""
     at = [
-        np.asarray(one.value.evaluate({**rows, target: np.full_like(rows[target], value)}))
+        np.asarray(derived.value.evaluate({**rows, target: np.full_like(rows[target], value)}))
         for value in _STEEPNESS
     ]
     slope = at[1] - at[0]
@@ -153,10 +153,10 @@ def _slope(one: Derived, target: str, rows: Mapping[str, Float]) -> float | None
 
 
 def _solved(
-    one: Derived, target: str, k: float, low: str | None, high: str, why: str, source: str
+    derived: Derived, target: str, k: float, low: str | None, high: str, why: str, source: str
 ) -> Bound:
     """Return the bound on a parameter that keeps a quantity, k times it and a rest, in a range."""
-    rest = re.sub(rf"\b{re.escape(target)}\b", "0", one.value.source)
+    rest = re.sub(rf"\b{re.escape(target)}\b", "0", derived.value.source)
     rest = rest.removesuffix(" - 0").removesuffix(" + 0")
     rest = rest if rest.isidentifier() else f"({rest})"
     ends = (low, high) if k > 0.0 else (high, low)
@@ -189,8 +189,8 @@ def with_room(
         InputError: constraints of one parameter contradict each other.
     """
     made = dict(parameters)
-    steps = order((*made, *(one.name for one in derived)), bounds, derived)
-    formulas = {one.name: one.value for one in derived}
+    steps = order((*made, *(item.name for item in derived)), bounds, derived)
+    formulas = {item.name: item.value for item in derived}
     shares = dict(zip(variables, probes(len(variables)).T, strict=True))
     for _ in range(_ROUNDS):
         table: dict[str, Float | float] = {}
@@ -201,9 +201,12 @@ def with_room(
                 continue
             lo, hi = _left(made[name], [b for b in bounds if b.target == name], table)
             if name in variables:
-                made[name] = one = _extended(made[name], lo, hi)
-                lo, hi = np.clip(lo, one.low, one.high), np.clip(hi, one.low, one.high)
-                table[name] = one.at(shares[name], lo, np.maximum(lo, hi))
+                made[name] = parameter = _extended(made[name], lo, hi)
+                lo, hi = (
+                    np.clip(lo, parameter.low, parameter.high),
+                    np.clip(hi, parameter.low, parameter.high),
+                )
+                table[name] = parameter.at(shares[name], lo, np.maximum(lo, hi))
             else:
                 table[name] = np.clip(made[name].default, lo, np.maximum(lo, hi))
         if made == before:
@@ -212,10 +215,10 @@ def with_room(
 
 
 def _left(
-    one: Parameter, bounds: Sequence[Bound], table: Mapping[str, Float | float]
+    parameter: Parameter, bounds: Sequence[Bound], table: Mapping[str, Float | float]
 ) -> tuple[Float, Float]:
     """Return what bounds leave to a parameter; where they ask for no range, its own ends."""
-    lo, hi = np.asarray(one.low), np.asarray(one.high)
+    lo, hi = np.asarray(parameter.low), np.asarray(parameter.high)
     for bound in bounds:
         if bound.lo is not None:
             lo = np.asarray(np.fmax(lo, bound.lo.evaluate(table)))
@@ -224,12 +227,12 @@ def _left(
     return lo, hi
 
 
-def _extended(one: Parameter, lo: Float, hi: Float) -> Parameter:
-    low, high = min(one.low, float(hi.min())), max(one.high, float(lo.max()))
-    if (low, high) == (one.low, one.high):
-        return one
+def _extended(parameter: Parameter, lo: Float, hi: Float) -> Parameter:
+    low, high = min(parameter.low, float(hi.min())), max(parameter.high, float(lo.max()))
+    if (low, high) == (parameter.low, parameter.high):
+        return parameter
     wide = around(low, high)
     return replace(
-        one, low=one.low if low == one.low else wide.low,
-        high=one.high if high == one.high else wide.high,
+        parameter, low=parameter.low if low == parameter.low else wide.low,
+        high=parameter.high if high == parameter.high else wide.high,
     )  # fmt: skip

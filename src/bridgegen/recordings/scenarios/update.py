@@ -99,7 +99,7 @@ def proposed_update(sought: Sought, events: ScenarioEvents) -> Update:
         for name, values in kept.items()
     )
     after = replaced(text, ends, str(path))
-    broken = tuple(broken_in_words(one) for one in events.broken)
+    broken = tuple(broken_in_words(item) for item in events.broken)
     return Update(path, events.complete, int(good.sum()), ranges, broken, _diff(path, text, after))
 
 
@@ -112,18 +112,18 @@ def _ends(
     refused: dict[str, str] = {}
     texts: dict[tuple[str | int, ...], str] = {}
     for name, values in kept.items():
-        one = sought.scenario.parameters[name]
+        parameter = sought.scenario.parameters[name]
         for end, value in zip(_ENDS, (float(values.min()), float(values.max())), strict=True):
-            if (value >= one.low) if end == "low" else (value <= one.high):
+            if (value >= parameter.low) if end == "low" else (value <= parameter.high):
                 continue
             at = found.get(("parameters", name, end))
             if at is None:
                 refused[name] = "its range is declared in a fragment, not in this file"
-            elif one.kind.name not in ("float", "integer"):
-                refused[name] = f"a range of kind {one.kind.name} is not changed"
+            elif parameter.kind.name not in ("float", "integer"):
+                refused[name] = f"a range of kind {parameter.kind.name} is not changed"
             else:
                 texts["parameters", name, end], wanted[name, end] = _written(
-                    at.text, value, one, end
+                    at.text, value, parameter, end
                 )
     while (problem := _problem(sought, text, texts)) is not None:
         paths = list(texts)
@@ -148,15 +148,17 @@ def _problem(sought: Sought, text: str, texts: Mapping[tuple[str | int, ...], st
     return None
 
 
-def _written(text: str, value: float, one: Parameter, end: str) -> tuple[str, float]:
+def _written(text: str, value: float, parameter: Parameter, end: str) -> tuple[str, float]:
     """Return an end of a range, rounded outwards, in the unit of the old text, and its value."""
     zero, factor, unit = 0.0, 1.0, ""
     if has_unit(text):
         unit = re.sub(r"^\s*[-+.0-9eE]+", "", text).rstrip()
-        zero = in_unit(f"0{unit}", one.unit)
-        factor = in_unit(f"1{unit}", one.unit) - zero
-    low, high = ((each - zero) / factor for each in (min(value, one.low), max(value, one.high)))
-    if one.kind.name == "integer":
+        zero = in_unit(f"0{unit}", parameter.unit)
+        factor = in_unit(f"1{unit}", parameter.unit) - zero
+    low, high = (
+        (each - zero) / factor for each in (min(value, parameter.low), max(value, parameter.high))
+    )
+    if parameter.kind.name == "integer":
         rounded = float(math.floor(low) if end == "low" else math.ceil(high))
     else:
         wide = around(low, high)
@@ -165,14 +167,20 @@ def _written(text: str, value: float, one: Parameter, end: str) -> tuple[str, fl
 
 
 def _proposed(
-    one: Parameter, values: Float, new: Mapping[tuple[str, str], float], remark: str
+    parameter: Parameter, values: Float, new: Mapping[tuple[str, str], float], remark: str
 ) -> Proposed:
-    outside = int(((values < one.low) | (values > one.high)).sum())
+    outside = int(((values < parameter.low) | (values > parameter.high)).sum())
     seen = Range(float(values.min()), float(values.max()))
-    proposed = (new.get((one.name, end), getattr(one, end)) for end in _ENDS)
+    proposed = (new.get((parameter.name, end), getattr(parameter, end)) for end in _ENDS)
     return Proposed(
-        one.name, one.unit, Range(one.low, one.high), seen, outside, Range(*proposed), remark
-    )  # fmt: skip
+        parameter.name,
+        parameter.unit,
+        Range(parameter.low, parameter.high),
+        seen,
+        outside,
+        Range(*proposed),
+        remark,
+    )
 
 
 def _diff(path: Path, before: str, after: str) -> str:
@@ -182,11 +190,11 @@ def _diff(path: Path, before: str, after: str) -> str:
     )
 
 
-def in_words(one: Update) -> list[str]:
+def in_words(update: Update) -> list[str]:
     """Return what events say of a file, a sentence each."""
-    texts = [f"{one.events:,} events, {one.kept:,} of which keep all constraints"]
-    texts += one.broken
-    for each in one.ranges:
+    texts = [f"{update.events:,} events, {update.kept:,} of which keep all constraints"]
+    texts += update.broken
+    for each in update.ranges:
         text = (
             f"{each.parameter} [{each.unit}]: seen {each.seen.low:.4g} to {each.seen.high:.4g}, "
             f"{each.outside:,} outside {each.declared.low:g} to {each.declared.high:g}"
@@ -212,10 +220,10 @@ def write_updates(
         StorageError: one cannot be written.
     """
     made = []
-    for one, events in zip(sought, scenarios, strict=True):
-        if one.path not in paths:
+    for item, events in zip(sought, scenarios, strict=True):
+        if item.path not in paths:
             continue
-        update = proposed_update(one, events)
+        update = proposed_update(item, events)
         place = out / f"{update.path.name}{ENDING}"
         if update.diff:
             write_whole(place, [update.diff.encode()])

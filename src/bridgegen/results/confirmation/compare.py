@@ -81,7 +81,7 @@ def compare(here: Rollout, there: Rollout, i: int = 0, j: int = 0, partner: str 
         (here.names[e], _states(here, i, e, times), _states(there, j, f, times)) for e, f in bodies
     ]
     partings = [_parting(name, a, b, times) for name, a, b in pairs]
-    parted = sorted(filter(None, partings), key=lambda one: one.time)
+    parted = sorted(filter(None, partings), key=lambda parting: parting.time)
     closest = closest_approach(here, i, partner)
     return Comparison(
         step=step,
@@ -116,7 +116,7 @@ def tracks(here: Rollout, there: Rollout, i: int = 0, j: int = 0) -> tuple[Track
         off = np.flatnonzero(_apart(a, b) | (a.present != b.present))
         if off.size:
             k = int(off[0])
-            x, y = (np.where(b.present, one, np.nan)[k:] for one in (b.x, b.y))
+            x, y = (np.where(b.present, array, np.nan)[k:] for array in (b.x, b.y))
             found.append(Track(here.names[e], k, x, y, b.h[k:]))
     return tuple(found)
 
@@ -156,11 +156,11 @@ def _states(rollout: Rollout, row: int, entity: int, times: Float) -> _States:
     after = np.minimum(before + 1, int(rollout.n_steps[row]) - 1)
 
     def of(array: Float) -> Float:
-        one = array[row, entity]
+        item = array[row, entity]
         if not rest.any():
-            exact: Float = one[before]
+            exact: Float = item[before]
             return exact
-        between: Float = one[before] + rest * (one[after] - one[before])
+        between: Float = item[before] + rest * (item[after] - item[before])
         return between
 
     present = np.ones(len(times), dtype=np.bool_)
@@ -235,7 +235,7 @@ def _diverged(
                 only=off_by.only,
             )
         )
-    return tuple(sorted(found, key=lambda one: one.since))
+    return tuple(sorted(found, key=lambda divergence: divergence.since))
 
 
 def _off_by(a: _States, b: _States, k: int) -> _OffBy:
@@ -260,7 +260,7 @@ def _offsets(
     k = int(np.searchsorted(times, first.time - _EPSILON))
     gaps = [(name, float(_gap(a, b)[k])) for name, a, b in pairs if name != first.entity]
     off = [Offset(name, gap) for name, gap in gaps if gap > SLIGHT]
-    return tuple(sorted(off, key=lambda one: -one.gap))
+    return tuple(sorted(off, key=lambda offset: -offset.gap))
 
 
 def _turn(a: _States, b: _States, k: int) -> float | None:
@@ -310,11 +310,11 @@ def _events(here: Rollout, there: Rollout, i: int, j: int, step: float) -> tuple
         if a is not None and b is not None:
             differs = abs(b - a) > step + _EPSILON
         else:  # an event after the end of the other rollout is no difference
-            begun = [one for one in (a, b) if one is not None]
-            differs = any(one < end - step - _EPSILON for one in begun)
+            begun = [value for value in (a, b) if value is not None]
+            differs = any(value < end - step - _EPSILON for value in begun)
         if differs:
             found.append(EventTimes(here.event_names[u], a, b))
-    return tuple(sorted(found, key=lambda one: one.first))
+    return tuple(sorted(found, key=lambda times: times.first))
 
 
 def _began(rollout: Rollout, row: int, event: int) -> float | None:
@@ -330,7 +330,7 @@ def _lights(here: Rollout, there: Rollout, i: int, j: int, times: Float) -> tupl
         if lasting.size:
             k = int(lasting[0]) - 1
             found.append(LightTimes(here.light_names[s], float(times[k]), int(a[k]), int(b[k])))
-    return tuple(sorted(found, key=lambda one: one.time))
+    return tuple(sorted(found, key=lambda light_times: light_times.time))
 
 
 def _shown(rollout: Rollout, row: int, light: int, times: Float) -> npt.NDArray[np.int8]:

@@ -136,7 +136,7 @@ class EventTimes(_Checked):
     @property
     def first(self) -> float:
         """Its earlier start [s]."""
-        return min(one for one in (self.here, self.there) if one is not None)
+        return min(value for value in (self.here, self.there) if value is not None)
 
 
 @dataclass(frozen=True)

@@ -212,7 +212,7 @@ class Scenario(_Model):
 
     @model_validator(mode="after")
     def _whole(self) -> "Scenario":
-        if len({one is None for one in (self.there, self.change, self.differences)}) > 1:
+        if len({outcome is None for outcome in (self.there, self.change, self.differences)}) > 1:
             raise ValueError("there, change and differences must be together")
         return self
 
@@ -270,7 +270,7 @@ def _minus(a: float | None, b: float | None) -> float | None:
 
 
 def _units(values: Float) -> tuple[int | None, ...]:
-    return tuple(int(one) if math.isfinite(one) else None for one in np.round(values).tolist())
+    return tuple(int(item) if math.isfinite(item) else None for item in np.round(values).tolist())
 
 
 PREFIX, SUFFIX = "confirmation-", ".json"
@@ -353,9 +353,9 @@ def check_rows(path: Path, scenarios: Iterable[Scenario], X: Numbers, metrics: N
     Raises:
         FileFormatError: it belongs to another run.
     """
-    for one in scenarios:
-        k = one.evaluation
-        if k >= len(X) or one.row != digest_of(X[k], metrics[k]):
+    for scenario in scenarios:
+        k = scenario.evaluation
+        if k >= len(X) or scenario.row != digest_of(X[k], metrics[k]):
             raise FileFormatError(
                 f"{path}: is of another run: evaluation {k + 1} is not the one that was "
                 "confirmed; confirm it with --again, or delete the file"

@@ -26,7 +26,7 @@ class Spread:
     @classmethod
     def of(cls, values: Iterable[float | None]) -> "Spread":
         """Return the spread of numbers; None is skipped."""
-        there = [abs(one) for one in values if one is not None]
+        there = [abs(value) for value in values if value is not None]
         return cls(len(there), median(there) if there else None, max(there, default=None))
 
 
@@ -88,12 +88,12 @@ def summarise(scenarios: Iterable[Scenario]) -> ConfirmationSummary:
     """Return the key figures of scenarios."""
     every = list(scenarios)
     ran = [
-        (one.here, one.there, one.change, one.differences)
-        for one in every
-        if one.there and one.change and one.differences
+        (scenario.here, scenario.there, scenario.change, scenario.differences)
+        for scenario in every
+        if scenario.there and scenario.change and scenario.differences
     ]
     contacts = [(here.contact is not None, there.contact is not None) for here, there, *_ in ran]
-    change = [one for _, _, one, _ in ran]
+    change = [item for _, _, item, _ in ran]
     partings = [found.partings for *_, found in ran]
     return ConfirmationSummary(
         scenarios=len(every),
@@ -106,11 +106,11 @@ def summarise(scenarios: Iterable[Scenario]) -> ConfirmationSummary:
         ),
         robust=_of_tested(every, knife_edge=False),
         knife_edge=_of_tested(every, knife_edge=True),
-        harm=Spread.of(one.harm for one in change),
-        d_min=Spread.of(one.d_min for one in change),
-        v_d=Spread.of(one.v_d for one in change),
-        F=Spread.of(one.F[0] for one in change if len(one.F) == 1),
-        contact=Spread.of(one.contact for one in change),
+        harm=Spread.of(item.harm for item in change),
+        d_min=Spread.of(item.d_min for item in change),
+        v_d=Spread.of(item.v_d for item in change),
+        F=Spread.of(item.F[0] for item in change if len(item.F) == 1),
+        contact=Spread.of(item.contact for item in change),
         parted=Spread.of(each[0].time for each in partings if each),
     )
 
@@ -118,9 +118,9 @@ def summarise(scenarios: Iterable[Scenario]) -> ConfirmationSummary:
 def _of_tested(every: Iterable[Scenario], *, knife_edge: bool) -> tuple[int, int]:
     """Return how many robust, or knife-edge, scenarios ran, and how many are confirmed."""
     ran = [
-        one.confirmed
-        for one in every
-        if one.there and one.robustness is not None and one.knife_edge == knife_edge
+        scenario.confirmed
+        for scenario in every
+        if scenario.there and scenario.robustness is not None and scenario.knife_edge == knife_edge
     ]
     return len(ran), sum(map(bool, ran))
 
@@ -130,9 +130,9 @@ def to_json(summary: ConfirmationSummary) -> dict[str, Any]:
     low, high = summary.interval
     both, here, there = summary.contacts
     spreads = {
-        name: {"n": one.n, "median": one.median, "max": one.max}
+        name: {"n": item.n, "median": item.median, "max": item.max}
         for name in ("harm", "d_min", "v_d", "F", "contact", "parted")
-        for one in [getattr(summary, name)]
+        for item in [getattr(summary, name)]
     }
     return {
         "scenarios": summary.scenarios,

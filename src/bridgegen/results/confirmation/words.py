@@ -72,15 +72,15 @@ def _verdict(here: Outcome, there: Outcome, limits: Thresholds, rule: Rule) -> l
     if rule == "criteria":
         return [
             f"{name} is met there: its margin is {_margin(there.margins[name])} there, "
-            f"{_margin(one)} here."
-            for name, one in here.margins.items()
-            if one.value < 0.0 and name in there.margins
+            f"{_margin(margin)} here."
+            for name, margin in here.margins.items()
+            if margin.value < 0.0 and name in there.margins
         ]
     return [_less_harm(here, there) if rule == "harm" else _miss(here, there, limits)]
 
 
-def _margin(one: Margin) -> str:
-    return margin_in_words(one.value, one.unit, 3)
+def _margin(margin: Margin) -> str:
+    return margin_in_words(margin.value, margin.unit, 3)
 
 
 def _less_harm(here: Outcome, there: Outcome) -> str:
@@ -149,11 +149,11 @@ def _contacts(here: Outcome, there: Outcome) -> list[str]:
     return []
 
 
-def _closest(one: Approach) -> str:
-    what = f"first contact here is with {one.entity}"
-    if one.distance > 0.0:
-        what = f"closest approach here is to {one.entity}, {_length(one.distance)} m,"
-    return f"The {what} at {one.time:.2f} s."
+def _closest(approach: Approach) -> str:
+    what = f"first contact here is with {approach.entity}"
+    if approach.distance > 0.0:
+        what = f"closest approach here is to {approach.entity}, {_length(approach.distance)} m,"
+    return f"The {what} at {approach.time:.2f} s."
 
 
 def _until(found: Differences, time: float) -> list[str]:
@@ -161,32 +161,38 @@ def _until(found: Differences, time: float) -> list[str]:
     sentences = _always(found)
     if not found.diverged:
         sentences.append(f"Until then no entity deviates by more than {TRACE:g} m.")
-    before = [(one.since, 1, _divergence(one, first=not k)) for k, one in enumerate(found.diverged)]
-    before += [(one.first, 0, _event(one)) for one in found.events if one.first <= time]
-    before += [(one.time, 0, _light(one)) for one in found.lights if one.time <= time]
-    return [*sentences, *(text for *_, text in sorted(before, key=lambda one: one[:2]))]
+    before = [
+        (divergence.since, 1, _divergence(divergence, first=not k))
+        for k, divergence in enumerate(found.diverged)
+    ]
+    before += [(event.first, 0, _event(event)) for event in found.events if event.first <= time]
+    before += [(light.time, 0, _light(light)) for light in found.lights if light.time <= time]
+    return [*sentences, *(text for *_, text in sorted(before, key=lambda pair: pair[:2]))]
 
 
-def _divergence(one: Divergence, *, first: bool) -> str:
-    sentences = f"{one.entity} diverges{' first,' if first else ''} from {one.since:.2f} s on: "
-    if one.only is not None:
-        return f"{sentences}at {one.time:.2f} s it is present only {one.only}."
-    assert one.gap is not None
-    assert one.along is not None
-    assert one.across is not None
-    assert one.speed is not None
-    ahead = abs(one.along) >= abs(one.across)
+def _divergence(divergence: Divergence, *, first: bool) -> str:
+    sentences = (
+        f"{divergence.entity} diverges{' first,' if first else ''} from {divergence.since:.2f} s "
+        "on: "
+    )
+    if divergence.only is not None:
+        return f"{sentences}at {divergence.time:.2f} s it is present only {divergence.only}."
+    assert divergence.gap is not None
+    assert divergence.along is not None
+    assert divergence.across is not None
+    assert divergence.speed is not None
+    ahead = abs(divergence.along) >= abs(divergence.across)
     parts = [
-        (abs(one.along), "behind" if one.along < 0.0 else "ahead"),
-        (abs(one.across), "to the right" if one.across < 0.0 else "to the left"),
+        (abs(divergence.along), "behind" if divergence.along < 0.0 else "ahead"),
+        (abs(divergence.across), "to the right" if divergence.across < 0.0 else "to the left"),
     ]
     largest, other = parts if ahead else parts[::-1]
     shown = (largest, *([other] if other[0] >= 0.005 else []))
     where = ", ".join(f"{by:.2f} m {side}" for by, side in shown)
     return (
-        f"{sentences}at {one.time:.2f} s it deviates by {one.gap:.2f} m, mainly "
-        f"{'longitudinally' if ahead else 'laterally'} ({where}), and {_pace(one.speed)}"
-        f"{_direction(one.turn)}."
+        f"{sentences}at {divergence.time:.2f} s it deviates by {divergence.gap:.2f} m, mainly "
+        f"{'longitudinally' if ahead else 'laterally'} ({where}), and {_pace(divergence.speed)}"
+        f"{_direction(divergence.turn)}."
     )
 
 
@@ -194,7 +200,7 @@ def _always(found: Differences) -> list[str]:
     """Return the differences from the start."""
     sentences = [f"{name} does not exist there." for name in found.only_here]
     sentences += [f"{name} exists only there." for name in found.only_there]
-    return sentences + [_box(one) for one in found.boxes]
+    return sentences + [_box(box) for box in found.boxes]
 
 
 def _story(found: Differences) -> list[str]:
@@ -204,63 +210,71 @@ def _story(found: Differences) -> list[str]:
         return [*sentences, f"No entity deviates by more than {PARTED:g} m."]
     first = found.partings[0]
     before: list[tuple[float, str]] = []
-    before += [(one.first, _event(one)) for one in found.events if one.first <= first.time]
-    before += [(one.time, _light(one)) for one in found.lights if one.time <= first.time]
+    before += [(event.first, _event(event)) for event in found.events if event.first <= first.time]
+    before += [(light.time, _light(light)) for light in found.lights if light.time <= first.time]
     sentences += [text for _, text in sorted(before)]
     if not before:
         sentences.append("No event and no light differs before the first divergence.")
     sentences.append(_parting(first))
-    together = {one.entity for one in found.partings[1:] if one.time <= first.time}
-    if off := [one for one in found.offsets if one.entity not in together][:MOST_OFF]:
-        others = [f"{one.entity} deviated by {one.gap:.2f} m" for one in off]
+    together = {parting.entity for parting in found.partings[1:] if parting.time <= first.time}
+    if off := [offset for offset in found.offsets if offset.entity not in together][:MOST_OFF]:
+        others = [f"{offset.entity} deviated by {offset.gap:.2f} m" for offset in off]
         sentences.append(f"By then {', '.join(others)}.")
     if first.entity != found.partings[-1].entity:
-        later = [f"{one.entity} at {one.time:.2f} s" for one in found.partings[1:]]
+        later = [f"{parting.entity} at {parting.time:.2f} s" for parting in found.partings[1:]]
         sentences.append(f"Then {', '.join(later)}.")
     return sentences
 
 
-def _box(one: BoxSizes) -> str:
-    (a, b, c), (p, q, r) = one.here, one.there
+def _box(box_sizes: BoxSizes) -> str:
+    (a, b, c), (p, q, r) = box_sizes.here, box_sizes.there
     return (
-        f"{one.entity} is a box of {p:.2f} m × {q:.2f} m, centre {r:.2f} m ahead, there; "
+        f"{box_sizes.entity} is a box of {p:.2f} m × {q:.2f} m, centre {r:.2f} m ahead, there; "
         f"{a:.2f} m × {b:.2f} m, {c:.2f} m here."
     )
 
 
-def _event(one: EventTimes) -> str:
-    if one.there is None:
-        return f"{one.name} began at {one.here:.2f} s here and never there."
-    if one.here is None:
-        return f"{one.name} began at {one.there:.2f} s there and never here."
-    late = one.there - one.here
+def _event(event_times: EventTimes) -> str:
+    if event_times.there is None:
+        return f"{event_times.name} began at {event_times.here:.2f} s here and never there."
+    if event_times.here is None:
+        return f"{event_times.name} began at {event_times.there:.2f} s there and never here."
+    late = event_times.there - event_times.here
     return (
-        f"{one.name} began {abs(late):.2f} s {'later' if late > 0.0 else 'earlier'} there, "
-        f"at {one.there:.2f} s."
+        f"{event_times.name} began {abs(late):.2f} s {'later' if late > 0.0 else 'earlier'} there, "
+        f"at {event_times.there:.2f} s."
     )
 
 
-def _light(one: LightTimes) -> str:
+def _light(light_times: LightTimes) -> str:
     here, there = (
         LIGHTS[state] if 0 <= state < len(LIGHTS) else f"state {state}"
-        for state in (one.here, one.there)
+        for state in (light_times.here, light_times.there)
     )
-    return f"The light {one.name} is {there} there and {here} here from {one.time:.2f} s on."
-
-
-def _parting(one: Parting) -> str:
-    if one.only is not None:
-        return f"{one.entity} diverges first: at {one.time:.2f} s it is present only {one.only}."
-    assert one.gap is not None
-    assert one.along is not None
-    assert one.across is not None
-    assert one.speed is not None
-    along = abs(one.along) >= abs(one.across)
-    sides = ("ahead", "behind") if along else ("to the left", "to the right")
-    where = sides[(one.along if along else one.across) < 0.0]
     return (
-        f"{one.entity} diverges first: at {one.time:.2f} s it is {one.gap:.2f} m away there, "
-        f"{where}, and {_pace(one.speed)}{_direction(one.turn)}; deviating since {one.since:.2f} s."
+        f"The light {light_times.name} is {there} there and {here} here from "
+        f"{light_times.time:.2f} s on."
+    )
+
+
+def _parting(parting: Parting) -> str:
+    if parting.only is not None:
+        return (
+            f"{parting.entity} diverges first: at {parting.time:.2f} s it is present only "
+            f"{parting.only}."
+        )
+    assert parting.gap is not None
+    assert parting.along is not None
+    assert parting.across is not None
+    assert parting.speed is not None
+    along = abs(parting.along) >= abs(parting.across)
+    sides = ("ahead", "behind") if along else ("to the left", "to the right")
+    where = sides[(parting.along if along else parting.across) < 0.0]
+    return (
+        f"{parting.entity} diverges first: at {parting.time:.2f} s it is {parting.gap:.2f} m away "
+        "there, "
+        f"{where}, and {_pace(parting.speed)}{_direction(parting.turn)}; deviating since "
+        f"{parting.since:.2f} s."
     )
 
 
@@ -286,9 +300,9 @@ NAMED = 10
 """Maximum number of scenarios that are named."""
 
 
-def name_of(one: Scenario) -> str:
+def name_of(scenario: Scenario) -> str:
     """Return the name of a scenario: that of its files, or its evaluation, counted from 1."""
-    return one.name or f"evaluation {one.evaluation + 1}"
+    return scenario.name or f"evaluation {scenario.evaluation + 1}"
 
 
 def sentences(label: str, scenarios: Sequence[Scenario]) -> list[str]:
@@ -304,9 +318,9 @@ def sentences(label: str, scenarios: Sequence[Scenario]) -> list[str]:
     low, high = (f"{100.0 * end:.0f}" for end in s.interval)
     line = f"{s.confirmed} of {s.ran} confirmed in {label} (95 %: {low}–{high} %)"
     lost = [
-        name_of(one) + (" (knife-edge)" if one.knife_edge else "")
-        for one in scenarios
-        if one.confirmed is False
+        name_of(scenario) + (" (knife-edge)" if scenario.knife_edge else "")
+        for scenario in scenarios
+        if scenario.confirmed is False
     ]
     if lost:
         more = ", …" if len(lost) > NAMED else ""
@@ -355,7 +369,7 @@ def _differences(s: ConfirmationSummary) -> list[str]:
     return lines
 
 
-def _spread(name: str, one: Spread, unit: str) -> str:
-    if one.median is None or one.max is None:
+def _spread(name: str, spread: Spread, unit: str) -> str:
+    if spread.median is None or spread.max is None:
         return ""
-    return f"{name} {one.median:.3f} ({one.max:.3f}) {unit}".rstrip()
+    return f"{name} {spread.median:.3f} ({spread.max:.3f}) {unit}".rstrip()

@@ -162,7 +162,7 @@ class Recorded:
                 critical[part] = column(found, "critical", end + 1, np.bool_)
                 if len(last) > 2:
                     named = [row[end + 2] for row in found]
-                    cause[part] = [Cause.named(one) if one else Cause.NONE for one in named]
+                    cause[part] = [Cause.named(item) if item else Cause.NONE for item in named]
                 if len(last) > 3:
                     findings.append(unpacked([row[end + 3 :] for row in found]))
                 else:

@@ -101,7 +101,7 @@ class Rows:
         """Concatenate the rows of several parts, at least one."""
         if len(parts) == 1:
             return parts[0]
-        names = [one.name for one in fields(cls) if one.name != "findings"]
+        names = [field.name for field in fields(cls) if field.name != "findings"]
         return cls(
             **{name: np.concatenate([getattr(p, name) for p in parts]) for name in names},
             findings=Findings.join([part.findings for part in parts]),
@@ -116,7 +116,7 @@ class Rows:
 
     def take(self, at: Int) -> "Rows":
         """Return the rows at some positions, in that order."""
-        names = [one.name for one in fields(self) if one.name != "findings"]
+        names = [field.name for field in fields(self) if field.name != "findings"]
         return Rows(
             **{name: getattr(self, name)[at] for name in names}, findings=self.findings.take(at)
         )
@@ -223,8 +223,8 @@ class Columns:
             numbers.tolist(),
             status.astype(np.int64).tolist(),
             critical.astype(np.int64).tolist(),
-            [Cause(one).label or None for one in cause.tolist()],
-            *([one or None for one in texts.tolist()] for texts in findings.columns().values()),
+            [Cause(item).label or None for item in cause.tolist()],
+            *([item or None for item in texts.tolist()] for texts in findings.columns().values()),
             strict=True,
         )
         width = len(self.last)
@@ -260,7 +260,9 @@ class Columns:
             F=np.ascontiguousarray(F),
             status=column(rows, names[last], last, np.int64),
             critical=column(rows, names[last + 1], last + 1, np.bool_),
-            cause=np.array([Cause.named(one) if one else Cause.NONE for one in causes], np.int8),
+            cause=np.array(
+                [Cause.named(cause) if cause else Cause.NONE for cause in causes], np.int8
+            ),
             findings=unpacked([row[last + 3 :] for row in rows])
             if len(self.last) > 3
             else Findings.none(n),

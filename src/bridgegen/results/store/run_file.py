@@ -179,8 +179,8 @@ def _check_values(run: Mapping[str, Any], n_columns: int) -> None:
     for key in ("parameters", "metrics"):
         if type(run[key]) is not list or not all(isinstance(name, str) for name in run[key]):
             raise InputError(f"bad or missing {key}: it must be a list of names")
-    for name, one in run.get("labels", {}).items():
-        words = one.get("words", []) if isinstance(one, dict) else None
+    for name, record in run.get("labels", {}).items():
+        words = record.get("words", []) if isinstance(record, dict) else None
         if (
             name not in run["parameters"]
             or type(words) is not list

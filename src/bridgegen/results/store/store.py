@@ -478,10 +478,10 @@ class Store:
             for name in ("batch", "seconds", "status", "critical"):
                 data[name][at] = getattr(rows, name)
             labels: dict[str, Any] = {
-                name: [text or None for text in one.tolist()]
-                for name, one in rows.findings.columns().items()
+                name: [text or None for text in array.tolist()]
+                for name, array in rows.findings.columns().items()
             }
-            labels["cause"] = [Cause(one).label or None for one in rows.cause.tolist()]
+            labels["cause"] = [Cause(item).label or None for item in rows.cause.tolist()]
             for name in texts:
                 data[name][at] = labels[name]
             for part, values in ((columns.X, rows.X), (columns.metrics, rows.metrics),

@@ -53,7 +53,7 @@ def summarise(
     seconds: float,
 ) -> Summary:
     """Return a run's figures from ``(N,)`` columns in the order of evaluation."""
-    counts = {one.label: int(np.count_nonzero(cause == one)) for one in CAUSES}
+    counts = {item.label: int(np.count_nonzero(cause == item)) for item in CAUSES}
     if not counts[Cause.VEHICLE_DYNAMICS.label]:  # of vehicles with dynamics alone
         del counts[Cause.VEHICLE_DYNAMICS.label]
     n, hits = len(critical), np.flatnonzero(critical)

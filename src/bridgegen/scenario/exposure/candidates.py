@@ -42,7 +42,7 @@ def usual_bandwidth(values: Float) -> float:
     """
     quarters = np.quantile(values, [0.25, 0.75])
     spreads = [float(np.std(values, ddof=1)), float(quarters[1] - quarters[0]) / 1.34]
-    spread = min(one for one in spreads if one > 0.0)
+    spread = min(value for value in spreads if value > 0.0)
     return 0.9 * spread / math.pow(len(values), 0.2)
 
 
@@ -138,8 +138,8 @@ class Recipe:
         """The form in words."""
         tails = [
             f"{name} tail"
-            for name, one in (("lower", self.lower), ("upper", self.upper))
-            if one is not None
+            for name, value in (("lower", self.lower), ("upper", self.upper))
+            if value is not None
         ]
         body = "kernel density" if self.body == "kde" else self.body
         return " + ".join((body, *tails))
@@ -164,7 +164,7 @@ class Candidate:
     def numbers(self) -> float:
         """See above."""
         body = {"uniform": 0, "kde": math.inf}.get(self.recipe.body)
-        tails = sum(one is not None for one in (self.recipe.lower, self.recipe.upper))
+        tails = sum(value is not None for value in (self.recipe.lower, self.recipe.upper))
         return 3 * tails + (len(_KEYS[self.recipe.body]) if body is None else body)
 
 
@@ -188,18 +188,18 @@ def candidates(values: Float, low: float, high: float) -> list[Candidate]:
             if len(np.unique(inside)) < 2:
                 continue
             bandwidth = _rounded(usual_bandwidth(inside)) if body == "kde" else None
-            one = fit(values, Recipe(body, lower, upper, bandwidth), low, high)
-            if one is not None:
-                bodies.append(one)
+            candidate = fit(values, Recipe(body, lower, upper, bandwidth), low, high)
+            if candidate is not None:
+                bodies.append(candidate)
         if lower is None and upper is None:
             found += bodies
         elif bodies:
-            found.append(min(bodies, key=lambda one: one.criterion))
-    least = min(one.criterion for one in found)
-    found.sort(key=lambda one: one.criterion)
-    alike = [one for one in found if one.criterion <= least + SUPPORT]
-    taken = min(alike, key=lambda one: one.numbers)
-    return [taken, *(one for one in found if one is not taken)]
+            found.append(min(bodies, key=lambda candidate: candidate.criterion))
+    least = min(item.criterion for item in found)
+    found.sort(key=lambda candidate: candidate.criterion)
+    alike = [item for item in found if item.criterion <= least + SUPPORT]
+    taken = min(alike, key=lambda candidate: candidate.numbers)
+    return [taken, *(item for item in found if item is not taken)]
 
 
 def fit(
@@ -250,7 +250,7 @@ def fit(
 def _tails(values: Float, low: float, high: float) -> Iterator[tuple[float | None, float | None]]:
     """Yield the thresholds of the tails that the values support, none first."""
     yield None, None
-    lower, upper = (_rounded(one) for one in np.quantile(values, [TAIL_SHARE, 1.0 - TAIL_SHARE]))
+    lower, upper = (_rounded(item) for item in np.quantile(values, [TAIL_SHARE, 1.0 - TAIL_SHARE]))
     has_lower = (values < lower).sum() >= LEAST_EXCEEDANCES and low < lower
     has_upper = (values > upper).sum() >= LEAST_EXCEEDANCES and upper < high
     if has_upper:
@@ -288,7 +288,7 @@ def _fit_body(
         return None
     numbers, log_likelihood = found
     section: Section = {"distribution": recipe.body}
-    section |= {key: _rounded(one) for key, one in zip(family.keys, numbers, strict=True)}
+    section |= {key: _rounded(number) for key, number in zip(family.keys, numbers, strict=True)}
     return section, 2.0 * len(numbers) - 2.0 * log_likelihood
 
 
@@ -304,7 +304,7 @@ def _fit_family(
     logs = np.array([key in family.positive for key in _KEYS[family.name]])
     ends = (low, high) if family.name == "beta" else ()
     threshold = (0.0,) if family is Pareto else ()
-    lowest, highest, first = (_logged(one, logs) for one in (least, most, guess))
+    lowest, highest, first = (_logged(group, logs) for group in (least, most, guess))
 
     def numbers_at(point: Float) -> tuple[float, ...]:
         return (*threshold, *np.where(logs, np.exp(np.where(logs, point, 0.0)), point).tolist())

@@ -197,7 +197,7 @@ class Exposure:
     place: str = field(default="", compare=False, repr=False)
 
     def __post_init__(self) -> None:
-        single = [name for name, one in self.marginals.items() if one.apart]
+        single = [name for name, marginal in self.marginals.items() if marginal.apart]
         for number, name in enumerate(self.copula.names):
             row = self.copula.rows[number]
             if name in single and any(row[k] for k in range(len(row)) if k != number):
@@ -257,7 +257,7 @@ class Exposure:
             for rule, bad in self.broken(X):
                 broken[rule] = broken.get(rule, 0) + int(bad.sum())
             tried, kept = tried + len(X), kept + int(good.sum())
-        most = dict(sorted(broken.items(), key=lambda one: -one[1]))
+        most = dict(sorted(broken.items(), key=lambda pair: -pair[1]))
         shares = {rule: count / tried for rule, count in most.items() if count}
         if kept < LEAST_SHARE * tried:
             rule, share = next(iter(shares.items()))
@@ -366,8 +366,8 @@ class Exposure:
             graph.add(name)
         for bound in free:
             graph.add(bound.target, *sorted(bound.names))
-        for one in space.constraints.derived:
-            graph.add(one.name, *sorted(one.names))
+        for derived in space.constraints.derived:
+            graph.add(derived.name, *sorted(derived.names))
         for name, marginal in self.marginals.items():
             if isinstance(marginal, Conditional):
                 graph.add(name, *sorted(marginal.names))
@@ -404,8 +404,8 @@ class Exposure:
         return np.ascontiguousarray(result.T)
 
     def _given(self, name: str, table: Mapping[str, Float | float]) -> Marginal:
-        one = self.marginals[name]
-        return one.given(table) if isinstance(one, Conditional) else one
+        marginal = self.marginals[name]
+        return marginal.given(table) if isinstance(marginal, Conditional) else marginal
 
     def _proposed(self, seed: int, block: int) -> tuple[Float, Bool]:
         """Return a block of rows of the unconditioned distribution, and which are feasible."""
@@ -428,8 +428,8 @@ class Exposure:
 
     def _limits(self, name: str, table: Mapping[str, Float | float]) -> tuple[Float, Float]:
         """Return the interval that bounds leave to a parameter; NaN limits nothing."""
-        one = self.space.parameters[name]
-        lo, hi = np.asarray(one.low), np.asarray(one.high)
+        parameter = self.space.parameters[name]
+        lo, hi = np.asarray(parameter.low), np.asarray(parameter.high)
         for bound in self.space.bounds[name]:
             if bound.lo is not None:
                 lo = np.asarray(np.fmax(lo, bound.lo.evaluate(table)))
@@ -457,11 +457,11 @@ class Exposure:
             for derived in self.space.constraints.derived:
                 rule = f"{derived} has a value{at(derived.place)}"
                 yield rule, ~np.isfinite(table[derived.name])
-            for name, one in self.space.parameters.items():
+            for name, parameter in self.space.parameters.items():
                 value = table[name]
-                outside = (value < one.low - slack(np.asarray(one.low))) | (
-                    value > one.high + slack(np.asarray(one.high))
+                outside = (value < parameter.low - slack(np.asarray(parameter.low))) | (
+                    value > parameter.high + slack(np.asarray(parameter.high))
                 )
-                yield one.kind.rule(name, one.low, one.high), outside
+                yield parameter.kind.rule(name, parameter.low, parameter.high), outside
             for rule, bad in self.scenario.broken(table).items():
                 yield rule, bad

@@ -366,5 +366,6 @@ class Pareto(Family):
 
 
 FAMILIES: dict[str, type[Family]] = {
-    one.name: one for one in (Normal, LogNormal, Exponential, Gamma, Weibull, Beta, Pareto)
+    function.name: function
+    for function in (Normal, LogNormal, Exponential, Gamma, Weibull, Beta, Pareto)
 }

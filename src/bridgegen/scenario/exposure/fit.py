@@ -188,7 +188,7 @@ def fit_exposure(
             f"fewer leave the distribution function unknown by more than {WIDEST:g} (95 %)",
             *outside,
         )
-    columns = {name: np.ascontiguousarray(one[inside]) for name, one in columns.items()}
+    columns = {name: np.ascontiguousarray(column[inside]) for name, column in columns.items()}
     _refuse_constant(scenario, columns)
     fitted: dict[str, ParameterFit] = {}
     refits: dict[str, list[Form]] = {}
@@ -210,7 +210,7 @@ def fit_exposure(
         "exposure": {
             "source": _source(source, origin, used),
             **({"others": others} if others else {}),
-            "parameters": {name: one.section for name, one in fitted.items()},
+            "parameters": {name: parameter_fit.section for name, parameter_fit in fitted.items()},
             "dependence": {"correlation": _pairs(correlated, correlation)},
         },
     }
@@ -219,7 +219,7 @@ def fit_exposure(
         given = {"hours": hours, "km": km}
         data["exposure"]["encounters"] = {
             "count": used - sum(infeasible.values()),
-            **{key: float(one) for key, one in given.items() if one is not None},
+            **{key: float(value) for key, value in given.items() if value is not None},
             "source": f"Events in the scenario's ranges that keep its constraints, {origin}.",
         }
         exposure, _ = _built(data, scenario, columns)
@@ -288,18 +288,20 @@ def _inside(
     good = np.ones(count, np.bool_)
     sentences = []
     for name, values in columns.items():
-        one = scenario.parameters[name]
+        parameter = scenario.parameters[name]
         if len(values) != count:
             raise InputError(f"columns must have the same length, got {count} and {len(values)}")
-        mine = (one.low <= values) & (values <= one.high)
-        kept = one.kind.kept(values)
+        mine = (parameter.low <= values) & (values <= parameter.high)
+        kept = parameter.kind.kept(values)
         if kept is not None and not kept[0].all():
             raise InputError(f"{name} must be {kept[1]}, got {values[~kept[0]][0]:g}")
         if not mine.all():
-            low, high = min(one.low, values.min()), max(one.high, values.max())
+            low, high = min(parameter.low, values.min()), max(parameter.high, values.max())
             sentences.append(
-                f"{name} [{one.unit}]: {count - int(mine.sum())} of {count} values are outside "
-                f"{one.low:g} to {one.high:g}; low: {low:g}, high: {high:g} would hold them"
+                f"{name} [{parameter.unit}]: {count - int(mine.sum())} of {count} values are "
+                "outside "
+                f"{parameter.low:g} to {parameter.high:g}; low: {low:g}, high: {high:g} would hold "
+                "them"
             )
         good &= mine
     return good, tuple(sentences)
@@ -340,18 +342,26 @@ def _fit_parameter(
         distances.append(_distance(sample, _form(again.section, parameter) if again else marginal))
         sorted_samples.append(sample)
     distance = _distance(ordered, marginal)
-    larger = sum(one >= distance for one in distances)
+    larger = sum(value >= distance for value in distances)
     at = np.linspace(low, high, GRID)
     return ParameterFit(
-        name=parameter.name, unit=parameter.unit, values=ordered, section=best.section,
-        marginal=marginal, form=best.recipe.text,
-        ranking=tuple((one.recipe.text, one.criterion) for one in found),
-        distance=distance, p=(1 + larger) / (1 + len(draws)),
-        at=at, density=np.exp(marginal.log_density(at)),
-        band=np.quantile([np.exp(one.log_density(at)) for one in refits], [0.025, 0.975], axis=0),
+        name=parameter.name,
+        unit=parameter.unit,
+        values=ordered,
+        section=best.section,
+        marginal=marginal,
+        form=best.recipe.text,
+        ranking=tuple((candidate.recipe.text, candidate.criterion) for candidate in found),
+        distance=distance,
+        p=(1 + larger) / (1 + len(draws)),
+        at=at,
+        density=np.exp(marginal.log_density(at)),
+        band=np.quantile(
+            [np.exp(shared.log_density(at)) for shared in refits], [0.025, 0.975], axis=0
+        ),
         quantiles=_at_share(marginal, shares),
         envelope=np.quantile(sorted_samples, [0.025, 0.975], axis=0),
-    ), refits  # fmt: skip
+    ), refits
 
 
 def _refits(best: Candidate, parameter: Parameter, samples: Any) -> list[Form]:
@@ -370,7 +380,7 @@ def _fit_single(
 
     def section(sample: Float) -> dict[str, Any]:
         seen, counts = np.unique(np.round(sample), return_counts=True)
-        written = [parameter.kind.written(one) for one in seen.tolist()]
+        written = [parameter.kind.written(item) for item in seen.tolist()]
         return {"distribution": "discrete", "values": written, "weights": counts.tolist()}
 
     best = section(values)
@@ -378,7 +388,7 @@ def _fit_single(
     marginal = _form(best, parameter)
     refits = [_form(section(values[rows]), parameter) for rows in draws]
     with np.errstate(divide="ignore"):
-        densities = [np.exp(one.log_density(at)) for one in refits]
+        densities = [np.exp(refit.log_density(at)) for refit in refits]
     nothing = np.empty(0)
     return ParameterFit(
         name=parameter.name, unit=parameter.unit, values=np.sort(values), section=best,
@@ -467,8 +477,8 @@ def _replicated(
         whole = np.eye(len(names))
         whole[np.ix_(places, places)] = matrix
         marginals = {
-            name: refits[name][k] if name in refits else one
-            for name, one in exposure.marginals.items()
+            name: refits[name][k] if name in refits else marginal
+            for name, marginal in exposure.marginals.items()
         }
         copula = GaussianCopula(names, tuple(map(tuple, whole.tolist())))
         made.append(replace(exposure, marginals=marginals, copula=copula))

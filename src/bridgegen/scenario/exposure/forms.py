@@ -33,7 +33,7 @@ _RANGE = ("low", "high")
 _TAILS = ("upper_tail", "lower_tail")
 _KEYS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "uniform": ((), _RANGE),
-    **{name: (one.keys, (*_RANGE, *_TAILS)) for name, one in FAMILIES.items()},
+    **{name: (family.keys, (*_RANGE, *_TAILS)) for name, family in FAMILIES.items()},
     "histogram": (("edges",), ("weights",)),
     "discrete": (("values",), ("weights",)),
     "polygon": (("at", "density"), _TAILS),
@@ -137,7 +137,7 @@ class _Builder:
         return Shared(Discrete.of(whole.tolist()))
 
     def discrete(self) -> Shared:
-        values = [self.parameter.read(one) for one in self.given.values or ()]
+        values = [self.parameter.read(item) for item in self.given.values or ()]
         for value, given in zip(values, self.given.values or (), strict=True):
             self.inside(value, f"the value {given}")
             kept = self.parameter.kind.kept(np.array([value]))
@@ -147,21 +147,21 @@ class _Builder:
         return Shared(Discrete.of(values, self.given.weights))
 
     def histogram(self) -> Shared:
-        edges = [self.number("edges", one) for one in self.given.edges or ()]
+        edges = [self.number("edges", edge) for edge in self.given.edges or ()]
         self.ascending("edges", edges)
         self.same_number("edges less one", len(edges) - 1)
         weights = self.given.weights or [1.0] * (len(edges) - 1)
         return Shared(Histogram.of(list(pairwise(edges)), weights))
 
     def polygon(self) -> Polygon:
-        at = [self.number("at", one) for one in self.given.at or ()]
+        at = [self.number("at", value) for value in self.given.at or ()]
         heights = self.given.density or []
         self.ascending("at", at)
         if len(heights) != len(at):
             raise InputError(
                 f"density must have as many numbers as at, got {len(heights)} and {len(at)}"
             )
-        if not all(0.0 <= one < np.inf for one in heights):
+        if not all(0.0 <= height < np.inf for height in heights):
             raise InputError("density must be at least 0 and finite everywhere")
         with np.errstate(over="ignore"):
             area = float(np.trapezoid(heights, at))
@@ -193,10 +193,12 @@ class _Builder:
         numbers: list[float] = []
         formulas: list[Expression] = []
         for key in family.keys:
-            one = self.formula(key, getattr(self.given, key), measured=key in family.measured)
-            formulas.append(one)
-            if not one.names:
-                numbers.append(float(one.evaluate({})))
+            expression = self.formula(
+                key, getattr(self.given, key), measured=key in family.measured
+            )
+            formulas.append(expression)
+            if not expression.names:
+                numbers.append(float(expression.evaluate({})))
         if len(numbers) == len(formulas):
             return Truncated(family, tuple(numbers), low, high)
         return Conditional(family, tuple(formulas), low, high, f"{self.label} ({self.place})")
@@ -208,16 +210,16 @@ class _Builder:
             if part.distribution in ("discrete", "mixture"):
                 raise InputError(f"part {number} of a mixture must be no {part.distribution}")
             try:
-                one = build_marginal(part, self.parameter, self.naming, self.place)
+                shared = build_marginal(part, self.parameter, self.naming, self.place)
             except InputError as error:
                 raise InputError(*(f"part {number}: {text}" for text in error.problems)) from None
-            if isinstance(one, Conditional):
+            if isinstance(shared, Conditional):
                 raise InputError(f"part {number} of a mixture must have numbers, not formulas")
             if not 0.0 < part.weight < np.inf:
                 raise InputError(f"weight of part {number} must be above 0, got {part.weight:g}")
-            made.append((one, part.weight))
+            made.append((shared, part.weight))
         total = sum(weight for _, weight in made)
-        return Mixture(tuple((one, weight / total) for one, weight in made))
+        return Mixture(tuple((marginal, weight / total) for marginal, weight in made))
 
     def with_tails(self, body: Form | Conditional) -> Form | Conditional:
         upper, lower = (getattr(self.given, key, None) for key in _TAILS)
@@ -226,11 +228,11 @@ class _Builder:
         if isinstance(body, Conditional):
             raise InputError("a distribution with formulas has no tails of its own")
         pieces: list[tuple[Marginal, float]] = []
-        shares = [one.share for one in (upper, lower) if one is not None]
-        if not (all(one > 0.0 for one in shares) and sum(shares) < 1.0):
+        shares = [item.share for item in (upper, lower) if item is not None]
+        if not (all(share > 0.0 for share in shares) and sum(shares) < 1.0):
             raise InputError(
                 f"the shares of tails must be above 0, and below 1 together, got "
-                f"{', '.join(f'{one:g}' for one in shares)}"
+                f"{', '.join(f'{share:g}' for share in shares)}"
             )
         start, end = self.range()
         if lower is not None:
@@ -263,12 +265,12 @@ class _Builder:
         text = given if isinstance(given, str) else repr(given)
         if isinstance(given, str) and measured and has_unit(given):
             text = repr(self.number(key, given))
-        one = parse(text, "", self.naming.categories)
-        for name in sorted(one.names - self.naming.names):
+        expression = parse(text, "", self.naming.categories)
+        for name in sorted(expression.names - self.naming.names):
             raise InputError(f"{key} names the unknown '{name}'{nearest(name, self.naming.names)}")
-        if self.parameter.name in one.names:
+        if self.parameter.name in expression.names:
             raise InputError(f"{key} depends on {self.parameter.name} itself")
-        return one
+        return expression
 
     def number(self, key: str, given: float | str | None) -> float:
         """Return a number in the parameter's unit."""

@@ -152,7 +152,7 @@ class Truncated:
     def text(self) -> str:
         """See `Marginal`."""
         given = zip(self.family.keys, self.numbers, strict=True)
-        numbers = ", ".join(f"{key} {float(np.ravel(one)[0]):.4g}" for key, one in given)
+        numbers = ", ".join(f"{key} {float(np.ravel(array)[0]):.4g}" for key, array in given)
         return f"{self.family.name} ({numbers})"
 
     @property
@@ -252,7 +252,7 @@ class Clipped:
     @cached_property
     def _ends(self) -> tuple[float, float, float, float, float]:
         """As of `Truncated`."""
-        below, above = (one.tolist() for one in self.whole.tails(np.array([self.low, self.high])))
+        below, above = (tail.tolist() for tail in self.whole.tails(np.array([self.low, self.high])))
         between = above[0] - above[1] if below[0] > 0.5 else below[1] - below[0]
         return below[0], above[0], below[1], above[1], between
 
@@ -346,7 +346,7 @@ class Spliced:
     @property
     def text(self) -> str:
         """See `Marginal`."""
-        return ", ".join(f"{share:.3g} of {one.text}" for one, share in self.pieces)
+        return ", ".join(f"{share:.3g} of {piece.text}" for piece, share in self.pieces)
 
     @cached_property
     def _beside(self) -> tuple[Float, Float]:
@@ -363,19 +363,19 @@ class Spliced:
         lower_at = np.searchsorted(below[1:], tail, side="right")
         upper_at = len(above) - 1 - np.searchsorted(above[-2::-1], tail, side="right")
         at = np.where(upper, upper_at, lower_at)
-        for k, (one, share) in enumerate(self.pieces):
+        for k, (marginal, share) in enumerate(self.pieces):
             mine = at == k
             part = (tail[mine] - np.where(upper[mine], above[k], below[k])) / share
-            result[mine] = one.value(np.clip(part, 0.0, 1.0), upper[mine])
+            result[mine] = marginal.value(np.clip(part, 0.0, 1.0), upper[mine])
         return result
 
     def tails(self, value: Float) -> tuple[Float, Float]:
         """See `Marginal`."""
         lower, upper = np.empty(len(value)), np.empty(len(value))
         at = self._at(value)
-        for k, (one, share) in enumerate(self.pieces):
+        for k, (marginal, share) in enumerate(self.pieces):
             mine = at == k
-            below, above = one.tails(value[mine])
+            below, above = marginal.tails(value[mine])
             lower[mine] = self._beside[0][k] + share * below
             upper[mine] = self._beside[1][k] + share * above
         return lower, upper
@@ -384,13 +384,13 @@ class Spliced:
         """See `Marginal`."""
         result = np.empty(len(value))
         at = self._at(value)
-        for k, (one, share) in enumerate(self.pieces):
+        for k, (marginal, share) in enumerate(self.pieces):
             mine = at == k
-            result[mine] = np.log(share) + one.log_density(value[mine])
+            result[mine] = np.log(share) + marginal.log_density(value[mine])
         return result
 
     def _at(self, value: Float) -> "np.typing.NDArray[np.int64]":
-        starts = np.array([one.low for one, _ in self.pieces])
+        starts = np.array([piece.low for piece, _ in self.pieces])
         return np.maximum(np.searchsorted(starts, value, side="right") - 1, 0)
 
 
@@ -485,21 +485,21 @@ class Mixture:
     @property
     def low(self) -> float:
         """See `Marginal`."""
-        return min(one.low for one, _ in self.parts)
+        return min(part.low for part, _ in self.parts)
 
     @property
     def high(self) -> float:
         """See `Marginal`."""
-        return max(one.high for one, _ in self.parts)
+        return max(part.high for part, _ in self.parts)
 
     @property
     def text(self) -> str:
         """See `Marginal`."""
-        return "mixture of " + ", ".join(f"{share:.3g} {one.text}" for one, share in self.parts)
+        return "mixture of " + ", ".join(f"{share:.3g} {part.text}" for part, share in self.parts)
 
     def value(self, tail: Float, upper: Bool) -> Float:
         """See `Marginal`; by halving the interval between the parts' values."""
-        each = [one.value(tail, upper) for one, _ in self.parts]
+        each = [part.value(tail, upper) for part, _ in self.parts]
         below, above = np.minimum.reduce(each), np.maximum.reduce(each)
         for _ in range(_HALVINGS):
             middle = below + 0.5 * (above - below)
@@ -514,17 +514,17 @@ class Mixture:
     def tails(self, value: Float) -> tuple[Float, Float]:
         """See `Marginal`."""
         lower, upper = np.zeros(len(value)), np.zeros(len(value))
-        for one, share in self.parts:
-            below, above = one.tails(value)
-            lower += share * np.where(value > one.high, 1.0, below)
-            upper += share * np.where(value < one.low, 1.0, above)
+        for part, share in self.parts:
+            below, above = part.tails(value)
+            lower += share * np.where(value > part.high, 1.0, below)
+            upper += share * np.where(value < part.low, 1.0, above)
         return lower, upper
 
     def log_density(self, value: Float) -> Float:
         """See `Marginal`."""
         density = np.zeros(len(value))
-        for one, share in self.parts:
-            density += share * _exp(one.log_density(value))
+        for part, share in self.parts:
+            density += share * _exp(part.log_density(value))
         with np.errstate(divide="ignore"):
             log: Float = _log(density)
         return log
@@ -554,12 +554,14 @@ class Conditional:
     def text(self) -> str:
         """See `Marginal`."""
         given = zip(self.family.keys, self.formulas, strict=True)
-        return f"{self.family.name} ({', '.join(f'{key} {one}' for key, one in given)})"
+        return (
+            f"{self.family.name} ({', '.join(f'{key} {expression}' for key, expression in given)})"
+        )
 
     @property
     def names(self) -> frozenset[str]:
         """The parameters and derived quantities that it depends on."""
-        return frozenset().union(*(one.names for one in self.formulas))
+        return frozenset().union(*(formula.names for formula in self.formulas))
 
     def given(self, table: Mapping[str, Float | float]) -> Truncated:
         """Return the distribution in each row.
@@ -570,7 +572,7 @@ class Conditional:
         Raises:
             InputError: a formula gives a number that the family does not take, somewhere.
         """
-        numbers = tuple(one.evaluate(table) for one in self.formulas)
+        numbers = tuple(formula.evaluate(table) for formula in self.formulas)
         try:
             return Truncated(self.family, numbers, self.low, self.high)
         except InputError as error:

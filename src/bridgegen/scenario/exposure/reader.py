@@ -33,9 +33,9 @@ def example_names() -> tuple[str, ...]:
     """Return the names of the example exposures that ship."""
     return tuple(
         sorted(
-            one.name.removesuffix(".yaml")
-            for one in resources.files(_EXAMPLES).iterdir()
-            if one.name.endswith(".yaml")
+            path.name.removesuffix(".yaml")
+            for path in resources.files(_EXAMPLES).iterdir()
+            if path.name.endswith(".yaml")
         )
     )
 
@@ -107,9 +107,14 @@ def build_exposure(document: Document, scenario: SearchedScenario, folder: Path 
     copula = _copula(given, document, tuple(marginals), problems)
     encounters = None
     if given.encounters is not None:
-        one = given.encounters
+        encounters_section = given.encounters
         try:
-            encounters = Encounters(one.count, one.hours, one.km, one.source)
+            encounters = Encounters(
+                encounters_section.count,
+                encounters_section.hours,
+                encounters_section.km,
+                encounters_section.source,
+            )
         except InputError as error:
             place = document.at(("encounters",))
             problems += [f"encounters: {text} ({place})" for text in error.problems]
@@ -155,11 +160,13 @@ def _marginals(
 ) -> dict[str, Marginal | Conditional]:
     """Return the distributions in the scenario's order, and note what is wrong."""
     parameters = scenario.parameters
-    derived = {one.name: one for one in scenario.derived}
-    categories = {name: one.kind.names for name, one in parameters.items() if one.kind.names}
+    derived = {item.name: item for item in scenario.derived}
+    categories = {
+        name: parameter.kind.names for name, parameter in parameters.items() if parameter.kind.names
+    }
     naming = Naming(frozenset({*parameters, *derived}), categories, folder)
     made: dict[str, Marginal | Conditional] = {}
-    for name, one in given.parameters.items():
+    for name, parameter in given.parameters.items():
         place = document.at(("parameters", name))
         if name in derived:
             problems.append(f"{name} follows from '{derived[name]}': distribute that ({place})")
@@ -170,7 +177,7 @@ def _marginals(
             problems.append(f"{name} does not vary, and has no distribution ({place})")
         else:
             try:
-                made[name] = build_marginal(one, parameters[name], naming, place)
+                made[name] = build_marginal(parameter, parameters[name], naming, place)
             except InputError as error:
                 problems += [f"parameters.{name}: {text} ({place})" for text in error.problems]
     rest = [name for name in scenario.space().variables if name not in given.parameters]
@@ -192,24 +199,27 @@ def _copula(
     matrix = np.eye(len(names_))
     seen: set[frozenset[str]] = set()
     wrong = False
-    for number, one in enumerate(given.dependence.correlation):
+    for number, correlation_section in enumerate(given.dependence.correlation):
         place = document.at(("dependence", "correlation", number))
-        pair = frozenset(one.between)
-        unknown = [name for name in one.between if name not in names_]
+        pair = frozenset(correlation_section.between)
+        unknown = [name for name in correlation_section.between if name not in names_]
         if unknown and unknown[0] in given.parameters:
             continue  # its distribution is wrong, which is said already
         if unknown:
             hint = nearest(unknown[0], names_)
             rule = f"must be between distributed parameters, got '{unknown[0]}'{hint}"
         elif len(pair) < 2:
-            rule = f"must be between two parameters, got {one.between[0]} twice"
+            rule = f"must be between two parameters, got {correlation_section.between[0]} twice"
         elif pair in seen:
-            rule = f"of {' and '.join(one.between)} is given twice"
-        elif not -1.0 < one.value < 1.0:
-            rule = f"of {' and '.join(one.between)} must be above -1 and below 1, got {one.value:g}"
+            rule = f"of {' and '.join(correlation_section.between)} is given twice"
+        elif not -1.0 < correlation_section.value < 1.0:
+            rule = (
+                f"of {' and '.join(correlation_section.between)} must be above -1 and below 1, got "
+                f"{correlation_section.value:g}"
+            )
         else:
-            i, j = (names_.index(name) for name in one.between)
-            matrix[i, j] = matrix[j, i] = one.value
+            i, j = (names_.index(name) for name in correlation_section.between)
+            matrix[i, j] = matrix[j, i] = correlation_section.value
             seen.add(pair)
             continue
         problems.append(f"a correlation {rule} ({place})")
@@ -269,7 +279,7 @@ def evenly(exposure: Exposure) -> Exposure:
 
     One that takes single values of its range takes each of them equally often.
     """
-    even = {name: _even(one) for name, one in exposure.marginals.items()}
+    even = {name: _even(marginal) for name, marginal in exposure.marginals.items()}
     node = {"source": "Uniform over the ranges.", "others": "default", "parameters": even}
     text = json.dumps(node).encode()
     return build_exposure(read_plain_yaml(text, UNIFORM), exposure.scenario, None)

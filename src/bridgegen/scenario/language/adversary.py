@@ -37,7 +37,7 @@ def first_speed(adversary: Adversary, values: Mapping[str, float]) -> float:
 
 def top_speed(adversary: Adversary, values: Mapping[str, float]) -> float:
     """Return the participant's highest speed [m/s]."""
-    return max(_value(one, values) for one in adversary.speeds)
+    return max(_value(speed, values) for speed in adversary.speeds)
 
 
 def limits(adversary: Adversary, values: Mapping[str, float]) -> tuple[float, float]:
@@ -70,7 +70,7 @@ def adversarial(scenario: SearchedScenario, participant: str | None = None) -> L
             f"{scenario.name}: an adversary drives participants of a scenario of five layers (a "
             "YAML file), and this is an OpenSCENARIO file"
         )
-    able = [one.name for one in scenario.participants if _can_be_driven(one, scenario.story)]
+    able = [item.name for item in scenario.participants if _can_be_driven(item, scenario.story)]
     if participant is None:
         if not able:
             raise InputError(
@@ -78,7 +78,7 @@ def adversarial(scenario: SearchedScenario, participant: str | None = None) -> L
                 "lanes and may move"
             )
         participant = able[0]
-    names = [one.name for one in scenario.participants]
+    names = [item.name for item in scenario.participants]
     if participant not in names:
         raise UnknownNameError("participant", participant, names)
     if participant not in able:
@@ -95,8 +95,8 @@ def adversarial(scenario: SearchedScenario, participant: str | None = None) -> L
     story = replace(
         scenario.story,
         participants=tuple(
-            replace(one, driver="scripted") if one is driven else one
-            for one in scenario.participants
+            replace(item, driver="scripted") if item is driven else item
+            for item in scenario.participants
         ),
         events=rest,
     )
@@ -104,20 +104,28 @@ def adversarial(scenario: SearchedScenario, participant: str | None = None) -> L
     own_limits = (*adversary.speeds, adversary.lane_width, adversary.rate)
     needed = {quantity for quantity in own_limits if isinstance(quantity, str)}
     idle = _quantities(own) - _quantities(rest) - needed - _elsewhere(left)
-    kept = {name: one for name, one in left.parameters.items() if name not in idle}
+    kept = {name: parameter for name, parameter in left.parameters.items() if name not in idle}
     return replace(
         left,
-        parameters=kept | {one.name: one for one in _controls(adversary)},
+        parameters=kept | {control.name: control for control in _controls(adversary)},
         bounds=tuple(bound for bound in left.bounds if bound.target not in idle),
         axes=tuple(axis for axis in Axis if axis in {*left.axes, Axis.EXTENSION}),
         adversary=adversary,
     )
 
 
-def _can_be_driven(one: Participant, story: Story) -> bool:
-    on_lanes = one.conduct in ("vehicle", "bicycle") and not one.path and not one.ways
-    on_lanes = on_lanes and not PARTICIPANTS[one.type].on_rails
-    return on_lanes and one.name != "ego" and any(speed != 0.0 for speed in speeds_of(one, story))
+def _can_be_driven(participant: Participant, story: Story) -> bool:
+    on_lanes = (
+        participant.conduct in ("vehicle", "bicycle")
+        and not participant.path
+        and not participant.ways
+    )
+    on_lanes = on_lanes and not PARTICIPANTS[participant.type].on_rails
+    return (
+        on_lanes
+        and participant.name != "ego"
+        and any(speed != 0.0 for speed in speeds_of(participant, story))
+    )
 
 
 def _adversary(
@@ -125,7 +133,7 @@ def _adversary(
 ) -> Adversary:
     body = driven.body
     changes = [a.change for event in own for a in event.actions if isinstance(a, SpeedChange)]
-    rates = [one.rate for one in changes if one.rate is not None]
+    rates = [change.rate for change in changes if change.rate is not None]
     numbers = [f"{k:02d}" for k in range(1, ceil(scenario.duration / PERIOD) + 1)]
     return Adversary(
         participant=driven.name,
@@ -181,20 +189,21 @@ def _quantities(events: Iterable[EventSpec]) -> set[str]:
             found |= {getattr(action, "speed", None)}
             if (change := getattr(action, "change", None)) is not None:
                 found |= {change.rate, change.time, change.distance}
-    return {one for one in found if isinstance(one, str)}
+    return {name for name in found if isinstance(name, str)}
 
 
 def _elsewhere(scenario: LogicalScenario) -> set[str]:
     """Return the parameters that anything but events reads."""
     found: set[Quantity] = set(scenario.roads.knobs.values())
-    for one in scenario.participants:
-        found.add(one.speed)
-        for point in (one.start, one.end, *one.path):
+    for participant in scenario.participants:
+        found.add(participant.speed)
+        for point in (participant.start, participant.end, *participant.path):
             if point is not None:
                 found |= {point.distance, point.offset}
-    names = {one for one in found if isinstance(one, str)}
+    names = {name for name in found if isinstance(name, str)}
     return names.union(
-        *(bound.names for bound in scenario.bounds), *(one.names for one in scenario.derived)
+        *(bound.names for bound in scenario.bounds),
+        *(derived.names for derived in scenario.derived),
     )
 
 
@@ -238,13 +247,13 @@ def driven(
     """
     acting = {event.participant for event in events}
     return tuple(
-        replace(one, driver=others)
-        if not one.driver
-        and one.name != EGO
-        and one.conduct in ABLE
-        and (one.speed != 0.0 or one.name in acting)
-        else one
-        for one in participants
+        replace(participant, driver=others)
+        if not participant.driver
+        and participant.name != EGO
+        and participant.conduct in ABLE
+        and (participant.speed != 0.0 or participant.name in acting)
+        else participant
+        for participant in participants
     )
 
 
@@ -263,8 +272,8 @@ def with_others(scenario: LogicalScenario, others: str) -> LogicalScenario:
     adversary = scenario.adversary.participant if scenario.adversary else None
     story = scenario.story
     bare = [
-        one if one.name in (EGO, adversary) else replace(one, driver="")
-        for one in story.participants
+        participant if participant.name in (EGO, adversary) else replace(participant, driver="")
+        for participant in story.participants
     ]
     changed = driven(bare, story.events, others)
     return replace(scenario, story=replace(story, participants=changed))

@@ -25,9 +25,9 @@ from bridgegen.scenario.weather import PARAMETERS
 
 MAX_STEPS = 100_000
 
-NEEDED = {one.name: one.unit for one in PARAMETERS.values() if one.is_declared} | {
-    "speed_factor": "1"
-}
+NEEDED = {
+    parameter.name: parameter.unit for parameter in PARAMETERS.values() if parameter.is_declared
+} | {"speed_factor": "1"}
 """Units of the weather's parameters and of its effect on speeds, by name: every scenario has
 these."""
 
@@ -72,13 +72,13 @@ def use_problems(
             problems.append(f"{name} [{unit}] must be of kind float{at(found.place)}")
     needed = set(NEEDED)
     rules: list[Bound | Derived] = [*bounds]
-    rules += (one for one in declared.values() if isinstance(one, Derived))
+    rules += (parameter for parameter in declared.values() if isinstance(parameter, Derived))
     read = set(used).union(*(rule.names for rule in rules))
-    for name, one in declared.items():
-        if name not in needed | read and one.axis is not Axis.EXTENSION:
+    for name, parameter in declared.items():
+        if name not in needed | read and parameter.axis is not Axis.EXTENSION:
             problems.append(
-                f"nothing in {place} uses {name} [{one.unit}] of the axis {one.axis}"
-                f"{nearest(name, needed - declared.keys())}{at(one.place)}"
+                f"nothing in {place} uses {name} [{parameter.unit}] of the axis {parameter.axis}"
+                f"{nearest(name, needed - declared.keys())}{at(parameter.place)}"
             )
     return problems
 
@@ -122,7 +122,7 @@ def try_out(scenario: LogicalScenario) -> None:
         raise ScenarioError(
             f"the axes {', '.join(scenario.axes)} hold nothing to search ({scenario.place})"
         )
-    defaults = {one.name: one.default for one in scenario.parameters.values()}
+    defaults = {parameter.name: parameter.default for parameter in scenario.parameters.values()}
     try:
         whole.row(defaults)
     except ScenarioError as error:
@@ -144,7 +144,11 @@ def _placed(
     scenario: LogicalScenario, columns: Mapping[str, Float]
 ) -> Iterator[tuple[tuple[Participant, ...], Mapping[str, Float]]]:
     """Yield the participants at the places that categories choose, and the rows of that choice."""
-    names = list(dict.fromkeys(one.place_by for one in scenario.participants if one.place_by))
+    names = list(
+        dict.fromkeys(
+            participant.place_by for participant in scenario.participants if participant.place_by
+        )
+    )
     if not names:
         yield scenario.participants, columns
         return
@@ -154,8 +158,10 @@ def _placed(
         rows = np.flatnonzero((chosen == key).all(axis=1))
         yield (
             tuple(
-                one.at_each_place[at[one.place_by]] if one.place_by else one
-                for one in scenario.participants
+                participant.at_each_place[at[participant.place_by]]
+                if participant.place_by
+                else participant
+                for participant in scenario.participants
             ),
             {name: column[rows] for name, column in columns.items()},
         )
@@ -167,14 +173,14 @@ def _places(
     columns: Mapping[str, Float],
 ) -> Iterator[str]:
     """Yield participants that may leave a leg's end, or start inside another."""
-    for one in participants:
-        ends = [(one.start, 0.0), *((point, 0.0) for point in one.path[1:])]
-        for end, least in [*ends, *([(one.end, 0.0)] if one.end else [])]:
+    for participant in participants:
+        ends = [(participant.start, 0.0), *((point, 0.0) for point in participant.path[1:])]
+        for end, least in [*ends, *([(participant.end, 0.0)] if participant.end else [])]:
             length = scenario.roads.length(end.leg)
             at_ = _metres(end.distance, columns)
             if at_.min() < least - slack(0.0):
                 yield (
-                    f"{one.name} must stay on leg {end.leg}: distance >= 0 [m], "
+                    f"{participant.name} must stay on leg {end.leg}: distance >= 0 [m], "
                     f"'{end.distance}' can be {at_.min():.3g} m ({scenario.place})"
                 )
             if length is None:
@@ -184,27 +190,32 @@ def _places(
             if beyond.max() > slack(0.0):
                 limit = length if isinstance(length, str) else "its length"
                 yield (
-                    f"{one.name} must stay on leg {end.leg}: distance <= {limit} [m], "
+                    f"{participant.name} must stay on leg {end.leg}: distance <= {limit} [m], "
                     f"'{end.distance}' can lie {beyond.max():.3g} m beyond ({scenario.place})"
                 )
-    for one in participants:
-        if one.end is None or (one.start.leg, one.start.way) != (one.end.leg, one.end.way):
+    for participant in participants:
+        if participant.end is None or (participant.start.leg, participant.start.way) != (
+            participant.end.leg,
+            participant.end.way,
+        ):
             continue
-        behind = _metres(one.start.distance, columns) - _metres(one.end.distance, columns)
-        behind = behind if one.start.way == "out" else -behind
+        behind = _metres(participant.start.distance, columns) - _metres(
+            participant.end.distance, columns
+        )
+        behind = behind if participant.start.way == "out" else -behind
         if behind.max() >= 0.0:
             yield (
-                f"the route of {one.name} must lead on along its lane: its end can lie "
+                f"the route of {participant.name} must lead on along its lane: its end can lie "
                 f"{behind.max():.3g} m behind its start, and vehicles follow their lane's "
                 f"direction (one that drives against it has heading 180 and no end) "
                 f"({scenario.place})"
             )
-    on_lanes = [one for one in participants if not one.path]
-    for one, other in combinations(on_lanes, 2):
-        a, b = one.start, other.start
+    on_lanes = [participant for participant in participants if not participant.path]
+    for combination, other in combinations(on_lanes, 2):
+        a, b = combination.start, other.start
         if (a.leg, a.way, a.lane) != (b.leg, b.way, b.lane):
             continue
-        body, others = (_room(each, columns) for each in (one, other))
+        body, others = (_room(each, columns) for each in (combination, other))
         ahead = _metres(a.distance, columns) - _metres(b.distance, columns)
         ahead = ahead if a.way == "out" else -ahead
         aside = np.abs(_metres(a.offset, columns) - _metres(b.offset, columns))
@@ -217,23 +228,23 @@ def _places(
         worst = int(lacking.argmax())
         if lacking[worst] > slack(0.0):
             yield (
-                f"{one.name} and {other.name} start {gap[worst]:.3g} m apart on {a}, "
+                f"{combination.name} and {other.name} start {gap[worst]:.3g} m apart on {a}, "
                 f"at least {needed[worst]:g} m is needed ({scenario.place})"
             )
 
 
 def _hull(bodies: tuple[Body, ...]) -> Body:
     """Return a body that takes as much room as each of some about the reference point."""
-    front, rear = (max(getattr(one, end) for one in bodies) for end in ("front", "rear"))
-    width = max(one.width for one in bodies)
+    front, rear = (max(getattr(body, end) for body in bodies) for end in ("front", "rear"))
+    width = max(body.width for body in bodies)
     ahead = 0.5 * (front - rear)
     return replace(bodies[0], length=front + rear, width=width, center_ahead=ahead)
 
 
-def _room(one: Participant, columns: Mapping[str, Float]) -> Body:
+def _room(participant: Participant, columns: Mapping[str, Float]) -> Body:
     """Return the body of a participant; of one that is turned, what holds it however it is."""
-    body = _hull(one.bodies)
-    heading = _metres(one.heading, columns)
+    body = _hull(participant.bodies)
+    heading = _metres(participant.heading, columns)
     if not heading.any():
         return body
     if (np.abs(heading) == 180.0).all():
@@ -248,25 +259,26 @@ def _fast(scenario: LogicalScenario, columns: Mapping[str, Float]) -> Iterator[s
         name.removesuffix("speed_factor") for name in columns if name.endswith("speed_factor")
     )
     limit = parse(cap(scenario.roads.knobs["speed_limit"], prefixes)).evaluate(columns)
-    for one in scenario.participants:
-        for value in speeds_of(one, scenario.story):
+    for participant in scenario.participants:
+        for value in speeds_of(participant, scenario.story):
             speed = _metres(value, columns)
-            allowed = np.asarray(min(body.max_speed for body in one.bodies))
-            why = f"a {' or '.join(one.types) or one.type} can do"
-            if one.conduct == "vehicle" and value != 0.0 and not one.exceeds_limit:
+            allowed = np.asarray(min(body.max_speed for body in participant.bodies))
+            why = f"a {' or '.join(participant.types) or participant.type} can do"
+            if participant.conduct == "vehicle" and value != 0.0 and not participant.exceeds_limit:
                 if np.min(limit) <= allowed:
                     why = "road and weather allow"
                 allowed = np.minimum(limit, allowed)
             over = speed - allowed
             if over.max() > slack(float(np.max(allowed))):
                 yield (
-                    f"{one.name} must be no faster than {why}, the speed {value} [m/s] exceeds "
+                    f"{participant.name} must be no faster than {why}, the speed {value} [m/s] "
+                    "exceeds "
                     f"that by up to {over.max():.3g} m/s ({scenario.place})"
                 )
 
 
 def _segments_length(scenario: LogicalScenario, columns: Mapping[str, Float]) -> Float:
-    parts = [_metres(one.length, columns) for one in scenario.roads.segments]
+    parts = [_metres(segment.length, columns) for segment in scenario.roads.segments]
     return np.asarray(sum(parts[1:], parts[0]))
 
 

@@ -23,11 +23,11 @@ class Choices:
     def types(self, given: ParticipantSection) -> tuple[str, ...]:
         """Return the types and models that a category gives; empty without one."""
         known = (*TYPES, *MODELS)
-        return tuple(one for one in self._names(given.type_by) if one in known)
+        return tuple(name for name in self._names(given.type_by) if name in known)
 
     def places(self, given: ParticipantSection) -> tuple[str, ...]:
         """Return the names of the places that a category gives, in its order; empty without one."""
-        return tuple(one for one in self._names(given.place_by) if one in given.places)
+        return tuple(name for name in self._names(given.place_by) if name in given.places)
 
     def check_types(self, name: str, given: ParticipantSection, path: Path) -> None:
         """Check the category that gives a participant's type, if there is one."""

@@ -49,11 +49,13 @@ def problems_of(
     problems: list[str] = []
     declared: dict[str, Parameter | Derived] = {}
     ones: list[Parameter | Derived] = [*parameters, *derived]
-    for one in ones:
-        if one.name in declared:
-            first = at(declared[one.name].place)
-            problems.append(f"'{one.name}' is declared twice{at(one.place)}, first{first}")
-        declared.setdefault(one.name, one)
+    for parameter in ones:
+        if parameter.name in declared:
+            first = at(declared[parameter.name].place)
+            problems.append(
+                f"'{parameter.name}' is declared twice{at(parameter.place)}, first{first}"
+            )
+        declared.setdefault(parameter.name, parameter)
     known = [*declared, *also]
     for bound in bounds:
         target = declared.get(bound.target)
@@ -106,8 +108,8 @@ def _graph(
     graph: TopologicalSorter[str] = TopologicalSorter(dict.fromkeys(names, ()))
     for bound in bounds:
         graph.add(bound.target, *sorted(bound.names))
-    for one in derived:
-        graph.add(one.name, *sorted(one.names))
+    for item in derived:
+        graph.add(item.name, *sorted(item.names))
     return graph
 
 
@@ -149,8 +151,8 @@ def violations(constraints: Constraints, table: Mapping[str, Float]) -> list[Vio
         table: ``(N,)`` for each parameter and derived quantity; NaN and inf break every rule.
     """
     found: list[Violation] = []
-    units = {one.name: one.unit for one in constraints.parameters.values()}
-    units |= {one.name: one.unit for one in constraints.derived}
+    units = {item.name: item.unit for item in constraints.parameters.values()}
+    units |= {item.name: item.unit for item in constraints.derived}
 
     def report(name: str, kept: Bool, rule: str, limit: Float | None = None, why: str = "") -> None:
         for row in np.flatnonzero(~kept).tolist():
@@ -180,7 +182,7 @@ def violations(constraints: Constraints, table: Mapping[str, Float]) -> list[Vio
             limit = _column(derived.value, table, table[name])
             kept = np.abs(table[name] - limit) <= slack(limit)
             report(name, kept, str(derived), limit, why)
-    return sorted(found, key=lambda one: one.row)
+    return sorted(found, key=lambda violation: violation.row)
 
 
 def _column(expression: Expression, table: Mapping[str, Float], like: Float) -> Float:

@@ -71,7 +71,7 @@ class BinnedRows:
         self.space = space
         self.names = tuple(name for name in space.variables if name not in space.decisions)
         self.edges = [_edges(space, name, bins) for name in self.names]
-        self.sizes = [len(one) - 1 for one in self.edges]
+        self.sizes = [len(edge) - 1 for edge in self.edges]
         self.n_rows, self.n_critical = len(X), int(hit.sum())
         # Sorted into critical rows, other rows, sample: each is a stretch of columns.
         kind = np.min_scalar_type(max(self.sizes, default=0))
@@ -139,7 +139,7 @@ class BinnedRows:
         """
         rows, road = self._codes(chosen), self._codes_of(self._met, chosen)
         found = (np.isin(road, np.unique(rows[:end])).mean() for end in self._ends[:2])
-        critical, evaluated = (float(one) for one in found)
+        critical, evaluated = (float(item) for item in found)
         return critical, evaluated
 
     def _bin(self, X: Float) -> npt.NDArray[np.int32]:
@@ -171,8 +171,8 @@ class BinnedRows:
 
 
 def _edges(space: SearchSpace, name: str, bins: int) -> Float:
-    one = space.parameters[name]
-    return one.kind.edges(one.low, one.high, bins)
+    parameter = space.parameters[name]
+    return parameter.kind.edges(parameter.low, parameter.high, bins)
 
 
 SAMPLE = 200_000
@@ -377,16 +377,18 @@ def _check(bins: int, strength: int) -> None:
 def _parameters(rows: BinnedRows) -> tuple[ParameterBins, ...]:
     found = []
     for number, name in enumerate(rows.names):
-        one = rows.space.parameters[name]
+        parameter = rows.space.parameters[name]
         critical, evaluated, met = rows.counts([number])
         found.append(
             ParameterBins(
                 name,
-                one.unit,
-                str(one.axis),
-                one.kind.apart,
-                one.kind.labels(),
-                one.kind.span_text(one.low, one.high, "{:g}".format, f" {one.unit}"),
+                parameter.unit,
+                str(parameter.axis),
+                parameter.kind.apart,
+                parameter.kind.labels(),
+                parameter.kind.span_text(
+                    parameter.low, parameter.high, "{:g}".format, f" {parameter.unit}"
+                ),
                 rows.edges[number],
                 evaluated=evaluated,
                 critical=critical,
@@ -417,7 +419,7 @@ def _pair(rows: BinnedRows, i: int, j: int) -> PairBins:
         return PairBins(first, second, Ways(2, total, met, seen, hit), None, None, None)
     counts = rows.counts([i, j])
     critical, evaluated, feasible = counts
-    hit, seen, met = (int(np.count_nonzero(one)) for one in counts)
+    hit, seen, met = (int(np.count_nonzero(count)) for count in counts)
     ways = Ways(2, total, met, seen, hit)
     return PairBins(first, second, ways, evaluated, critical, feasible > 0)
 
@@ -426,8 +428,8 @@ def _sum(ways: list[Ways]) -> Ways:
     """Return the sum over all pairs of parameters, of which there is one at least."""
     return Ways(
         2,
-        sum(one.total for one in ways),
-        sum(one.feasible for one in ways),
-        sum(one.evaluated for one in ways),
-        sum(one.critical for one in ways),
+        sum(way.total for way in ways),
+        sum(way.feasible for way in ways),
+        sum(way.evaluated for way in ways),
+        sum(way.critical for way in ways),
     )

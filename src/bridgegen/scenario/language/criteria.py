@@ -52,7 +52,9 @@ class Criterion:
         try:
             object.__setattr__(self, "formula", parse(self.states))
         except InputError as error:
-            problems = (f"criterion {self.id}: {one}{at(self.place)}" for one in error.problems)
+            problems = (
+                f"criterion {self.id}: {problem}{at(self.place)}" for problem in error.problems
+            )
             raise InputError(*problems) from None
 
     @property
@@ -102,10 +104,17 @@ def read_sections(
 ) -> tuple[tuple[Criterion, ...], list[str]]:
     """Return the criteria of a file's sections, and what is wrong with others."""
     found, problems = list[Criterion](), list[str]()
-    for one, place in zip(given, places, strict=True):
+    for criterion_section, place in zip(given, places, strict=True):
         try:
-            tags = tuple(one.tags)
-            made = Criterion(one.id, one.formula, one.text or "", one.severity, tags, place)
+            tags = tuple(criterion_section.tags)
+            made = Criterion(
+                criterion_section.id,
+                criterion_section.formula,
+                criterion_section.text or "",
+                criterion_section.severity,
+                tags,
+                place,
+            )
         except InputError as error:
             problems += error.problems
             continue
@@ -117,12 +126,13 @@ def twice(criteria: Iterable[Criterion]) -> list[str]:
     """Return which ids occur more than once, a sentence each."""
     known: dict[str, Criterion] = {}
     problems = []
-    for one in criteria:
-        if one.id in known:
+    for criterion in criteria:
+        if criterion.id in known:
             problems.append(
-                f"each criterion has an id of its own, '{one.id}' occurs twice{at(one.place)}"
+                f"each criterion has an id of its own, '{criterion.id}' occurs "
+                f"twice{at(criterion.place)}"
             )
-        known[one.id] = one
+        known[criterion.id] = criterion
     return problems
 
 
@@ -132,7 +142,7 @@ def joined(*groups: Iterable[Criterion]) -> tuple[Criterion, ...]:
     Raises:
         InputError: different ones have one id.
     """
-    found = tuple(dict.fromkeys(one for group in groups for one in group))
+    found = tuple(dict.fromkeys(criterion for group in groups for criterion in group))
     if problems := twice(found):
         raise InputError(*problems)
     return found
@@ -155,9 +165,10 @@ def unknown_entities(criteria: Iterable[Criterion], names: Sequence[str]) -> lis
     """Return which formulas name a participant that a scenario has not, a sentence each."""
     known = (*names, ANY)
     return [
-        f"criterion {one.id}: unknown participant '{name}'{nearest(name, known)}{at(one.place)}"
-        for one in criteria
-        for reading in readings(one.formula)
+        f"criterion {criterion.id}: unknown participant "
+        f"'{name}'{nearest(name, known)}{at(criterion.place)}"
+        for criterion in criteria
+        for reading in readings(criterion.formula)
         for name in reading.of
         if name not in known
     ]
@@ -254,11 +265,11 @@ def read_criteria_file(path: FilePath) -> tuple[Criterion, ...]:
     return found
 
 
-def in_words(one: Criterion) -> str:
+def in_words(criterion: Criterion) -> str:
     """Return a criterion as one word of a command line, which ``read_criteria`` reads."""
-    given = one.to_dict()
+    given = criterion.to_dict()
     if given.keys() == {"id", "formula"}:
-        return f"{one.id}: {one.states}"
+        return f"{criterion.id}: {criterion.states}"
     text: str = yaml.safe_dump(
         given, default_flow_style=True, allow_unicode=True, sort_keys=False, width=10**6
     )

@@ -170,8 +170,8 @@ class Normal:
     @cached_property
     def _ends(self) -> tuple[float, float]:
         """The probability below the lower of the (mirrored) limits, and below the upper."""
-        ends = sorted(self._sign * (one - self.mean) for one in (self.low, self.high))
-        below, above = (float(scipy.special.ndtr(one / self.deviation)) for one in ends)
+        ends = sorted(self._sign * (value - self.mean) for value in (self.low, self.high))
+        below, above = (float(scipy.special.ndtr(end / self.deviation)) for end in ends)
         return below, above
 
     def value(self, share: Float) -> Float:
@@ -373,7 +373,7 @@ class Histogram:
                 nothing above 0.
         """
         _check_weights(weights)
-        both = sorted(one for one in zip(bins, weights, strict=True) if one[1] > 0.0)
+        both = sorted(pair for pair in zip(bins, weights, strict=True) if pair[1] > 0.0)
         for (low, high), _ in both:
             if not (math.isfinite(low) and low < high < math.inf):
                 raise InputError(f"low < high must hold for a bin, got {low:g} and {high:g}")
@@ -383,7 +383,7 @@ class Histogram:
                     f"bins must not overlap, got {low:g} to {high:g} and {after[0]:g} to "
                     f"{after[1]:g}"
                 )
-        return cls(tuple(one for one, _ in both), tuple(weight for _, weight in both))
+        return cls(tuple(pair for pair, _ in both), tuple(weight for _, weight in both))
 
     @property
     def low(self) -> float:

@@ -11,5 +11,5 @@ from bridgegen.scenario.language.path_event_kinds import PATH_KINDS
 
 __all__ = ["EVENT_KINDS", "EventKind", "EventQuantity"]
 
-EVENT_KINDS = {one.name: one for one in (*LANE_KINDS, *PATH_KINDS)}
+EVENT_KINDS = {kind.name: kind for kind in (*LANE_KINDS, *PATH_KINDS)}
 """Kinds of recorded events by name."""

@@ -273,7 +273,9 @@ class _Numbers(ast.NodeTransformer):
 
     def visit_Compare(self, node: ast.Compare) -> ast.AST:
         sides = [node.left, *node.comparators]
-        of = [one.id for one in sides if isinstance(one, ast.Name) and one.id in self._categories]
+        of = [
+            side.id for side in sides if isinstance(side, ast.Name) and side.id in self._categories
+        ]
         if len(sides) != 2 or not of:
             return self.generic_visit(node)
         name, values = of[0], self._categories[of[0]]

@@ -49,7 +49,7 @@ def schema(kind: Kind = "scenario") -> dict[str, Any]:
         "$id": f"{_ID}{kind}",
         "title": f"BridgeGen {kind}",
         **_plain(sections.pop(model.__name__)),
-        "definitions": {name: _plain(one) for name, one in sections.items()},
+        "definitions": {name: _plain(section) for name, section in sections.items()},
     }
 
 
@@ -69,9 +69,9 @@ def schema_of(kind: str) -> dict[str, Any]:
     Raises:
         UnknownNameError: no such kind.
     """
-    for one in get_args(Kind):
-        if kind == one:
-            return schema(one)
+    for arg in get_args(Kind):
+        if kind == arg:
+            return schema(arg)
     raise UnknownNameError("kind of files", kind, (*get_args(Kind), "run", "safety-case"))
 
 
@@ -102,20 +102,20 @@ def write_schema(path: Path, made: Kind | Mapping[str, Any] = "scenario") -> Non
     write_whole(path, [(schema_text(made) if isinstance(made, str) else as_text(made)).encode()])
 
 
-def _plain(one: Any) -> Any:
+def _plain(group: Any) -> Any:
     """Return a part without pydantic's titles and empty defaults, and as draft 7 has it.
 
     There, what stands beside a ``$ref`` does not count.
     """
-    if isinstance(one, list):
-        return [_plain(each) for each in one]
-    if not isinstance(one, dict):
-        return one
+    if isinstance(group, list):
+        return [_plain(each) for each in group]
+    if not isinstance(group, dict):
+        return group
     kept = {
         key: {name: _plain(each) for name, each in value.items()}
         if key == "properties"
         else _plain(value)
-        for key, value in one.items()
+        for key, value in group.items()
         if key != "title" and not (key == "default" and isinstance(value, dict | list | NoneType))
     }
     if "$ref" in kept and len(kept) > 1:
@@ -134,10 +134,10 @@ def _between_keys(sections: dict[str, Any]) -> None:
         }
     if "ParameterSection" in sections:
         sections["ParameterSection"]["allOf"] = [_of_kind(kind) for kind in KINDS]
-    for one in sections.values():
-        if "parameters" in one["properties"]:
-            for key in {"parameters", "derived"} & one["properties"].keys():
-                one["properties"][key]["propertyNames"] = {"pattern": "^[a-z][a-z0-9_]{0,63}$"}
+    for section in sections.values():
+        if "parameters" in section["properties"]:
+            for key in {"parameters", "derived"} & section["properties"].keys():
+                section["properties"][key]["propertyNames"] = {"pattern": "^[a-z][a-z0-9_]{0,63}$"}
     if "ScenarioFile" not in sections:
         return
     scenario = sections["ScenarioFile"]
@@ -175,7 +175,8 @@ def _between_keys(sections: dict[str, Any]) -> None:
     }
     condition = sections["ConditionSection"]
     condition["properties"]["kind"]["description"] = "; ".join(
-        f"{kind} [{one.unit}] {one.rule}: {one.meaning}" for kind, one in CONDITIONS.items()
+        f"{kind} [{condition_kind.unit}] {condition_kind.rule}: {condition_kind.meaning}"
+        for kind, condition_kind in CONDITIONS.items()
     )
     condition["anyOf"] = [{"required": ["kind"]}, {"required": ["all"]}]
     condition["allOf"] = [_condition(kind) for kind in CONDITIONS]
@@ -220,8 +221,10 @@ def _knobs() -> dict[str, str]:
     """Return what each measure is: unit, usual value, range; by template where they differ."""
     found: dict[str, dict[str, list[str]]] = {}
     for template, knobs in KNOBS.items():
-        for name, one in knobs.items():
-            text = f"[{one.unit}] usually {one.usual:g}, {one.low:g} to {one.high:g}. {one.why}"
+        for name, knob in knobs.items():
+            text = (
+                f"[{knob.unit}] usually {knob.usual:g}, {knob.low:g} to {knob.high:g}. {knob.why}"
+            )
             found.setdefault(name, {}).setdefault(text, []).append(template)
     return {
         name: " ".join(f"{', '.join(where)}: {text}" for text, where in texts.items())

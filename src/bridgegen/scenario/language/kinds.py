@@ -380,12 +380,12 @@ class Category(Whole):
         """See `Kind`."""
         found = [
             f"a value of the category {label} must be a word of letters, digits and '_', "
-            f"64 at most, that means nothing else in formulas, got '{one}'"
-            for one in self.names
-            if not _NAME.fullmatch(one) or keyword.iskeyword(one) or one in RESERVED
+            f"64 at most, that means nothing else in formulas, got '{name}'"
+            for name in self.names
+            if not _NAME.fullmatch(name) or keyword.iskeyword(name) or name in RESERVED
         ]
-        twice = sorted({one for one in self.names if self.names.count(one) > 1})
-        found += [f"the category {label} must have each value once, got '{one}'" for one in twice]
+        twice = sorted({name for name in self.names if self.names.count(name) > 1})
+        found += [f"the category {label} must have each value once, got '{name}'" for name in twice]
         if not 2 <= len(self.names) <= MOST_NAMES:
             found.append(
                 f"the category {label} must have 2 to {MOST_NAMES} values, got {len(self.names)}"
@@ -458,7 +458,7 @@ class Category(Whole):
 
     def sparql_inside(self, raw: str) -> str | None:
         """See `Kind`."""
-        names = ", ".join([f'"{one}"' for one in self.names])
+        names = ", ".join([f'"{name}"' for name in self.names])
         return f"STR({raw}) IN ({names})"
 
     def sparql_kept(self, x: str) -> tuple[str, str] | None:
@@ -557,7 +557,7 @@ class Angle(Kind):
 FLOAT, INTEGER = Number(), Whole()
 
 KINDS: Mapping[str, type[Kind]] = MappingProxyType(
-    {one.name: one for one in (Number, Whole, Category, Angle)}
+    {function.name: function for function in (Number, Whole, Category, Angle)}
 )
 """Kinds of parameters by the name that a scenario file gives."""
 

@@ -44,7 +44,7 @@ def read_objective(given: ObjectiveSection, report: Callable[[str, Path], None])
         if not 0.0 <= value < math.inf:
             report(f"{key} must be at least 0 and finite, got {value}", (*_CRITICAL, key))
             del limits[key]
-    terms = tuple(Term(one.metric, one.weight) for one in given.terms)
+    terms = tuple(Term(section.metric, section.weight) for section in given.terms)
     rule: Literal["harm", "thresholds", "criteria"] = "thresholds"
     if isinstance(given.critical, str):
         rule = given.critical

@@ -59,21 +59,25 @@ class Quantities:
                 self.report(f"{rule}{extra}, got {value}", path)
             return
         self.used.add(value)
-        one = self.parameters.get(value) or self.derived.get(value)
-        if one is None:
+        parameter = self.parameters.get(value) or self.derived.get(value)
+        if parameter is None:
             if value not in self.declared:
                 hint = nearest(value, [*self.parameters, *self.derived])
                 self.report(f"{label} names the unknown parameter '{value}'{hint}", path)
             return
-        if isinstance(one, Parameter) and one.kind.names:
+        if isinstance(parameter, Parameter) and parameter.kind.names:
             self.report(
                 f"{label} needs a number, '{value}' is a category: derive a number from it", path
             )
-        elif one.unit != unit:
-            self.report(f"{label} needs a parameter in {unit}, '{value}' is in {one.unit}", path)
-        elif isinstance(one, Parameter) and (one.low < low or (above and one.low == low)):
-            self.report(f"{rule}, '{value}' goes down to {one.low:g}", path)
-        if one.axis is Axis.STATIC:
+        elif parameter.unit != unit:
+            self.report(
+                f"{label} needs a parameter in {unit}, '{value}' is in {parameter.unit}", path
+            )
+        elif isinstance(parameter, Parameter) and (
+            parameter.low < low or (above and parameter.low == low)
+        ):
+            self.report(f"{rule}, '{value}' goes down to {parameter.low:g}", path)
+        if parameter.axis is Axis.STATIC:
             self.report(
                 f"{label} must not depend on the static axis, '{value}' does: "
                 "one storyboard serves every road network",
@@ -151,25 +155,25 @@ class Places:
         """Return the least and the greatest value that a constant or a parameter has."""
         if not isinstance(value, str):
             return value, value
-        one = self._quantities.parameters.get(value)
-        return (one.low, one.high) if one else (-math.inf, math.inf)
+        parameter = self._quantities.parameters.get(value)
+        return (parameter.low, parameter.high) if parameter else (-math.inf, math.inf)
 
     def check_crossing(self, name: str, points: tuple[Waypoint, ...], path: Path) -> None:
         """Report where a pedestrian leaves the sidewalks and crosswalks (paper, Section III-B)."""
         roads = self._roads
         half = roads.knobs["crosswalk_width"]
         reach = 0.5 * (half if isinstance(half, float) else 0.0)
-        for one, other in pairwise(points):
-            if one.lane == other.lane == "sidewalk" and (one.leg, one.way) == (
+        for waypoint, other in pairwise(points):
+            if waypoint.lane == other.lane == "sidewalk" and (waypoint.leg, waypoint.way) == (
                 other.leg, other.way
             ):  # fmt: skip
                 continue
-            at = roads.crosswalk(one.leg)
+            at = roads.crosswalk(waypoint.leg)
             rule = "pedestrians cross on crosswalks only"
-            if at is None or one.leg != other.leg:
-                self._report(f"{rule}: there is none where {name} crosses leg {one.leg}", path)
+            if at is None or waypoint.leg != other.leg:
+                self._report(f"{rule}: there is none where {name} crosses leg {waypoint.leg}", path)
                 return
-            for point in (one, other):
+            for point in (waypoint, other):
                 low, high = self._range(point.distance)
                 if low < at - reach - 1e-9 or high > at + reach + 1e-9:
                     got = f"{low:g}" if low == high else f"{low:g} to {high:g}"
@@ -317,7 +321,7 @@ class TemporaryChanges:
         sign = 1.0 if start.way == "out" else -1.0
         distance: Quantity
         known = self._quantities.parameters.keys() | self._quantities.derived.keys()
-        if any(isinstance(one, str) and one not in known for one in (start.distance, gap)):
+        if any(isinstance(item, str) and item not in known for item in (start.distance, gap)):
             return start  # reported as unknown already
         if isinstance(start.distance, str) or (isinstance(gap, str) and gaps):
             between = f"{gaps}*{gap}" if isinstance(gap, str) else repr(gaps * gap)

@@ -213,7 +213,7 @@ def replaced(text: str, values: Mapping[Path, str], place: str) -> str:
     """
     found = read_plain_yaml(text.encode(), place).scalars
     mark = len(text) - len(text.removeprefix("\ufeff"))
-    for path in sorted(values, key=lambda one: -found[one].start):
+    for path in sorted(values, key=lambda value: -found[value].start):
         at = found[path]
         text = text[: mark + at.start] + values[path] + text[mark + at.end :]
     return text

@@ -94,7 +94,7 @@ class Grid:
             [((name, value),) for value in values] for name, values in self.values
         ]
         choices += [self.sets] if self.sets else []
-        rows = [dict(pair for one in some for pair in one) for some in product(*choices)]
+        rows = [dict(pair for item in some for pair in item) for some in product(*choices)]
         return {name: np.array([row[name] for row in rows]) for name in self.names}
 
 
@@ -116,11 +116,11 @@ def read_matrix(
     """
     declared: dict[str, Parameter | Derived] = {**derived, **parameters}
     found = [
-        _read_grid(one, ("matrix", number), declared, report)
+        _read_grid(grid_section, ("matrix", number), declared, report)
         for number, data in entries(document, "matrix")
-        if (one := section(GridSection, data)) is not None
+        if (grid_section := section(GridSection, data)) is not None
     ]
-    labels = [one.label for one in found]
+    labels = [grid.label for grid in found]
     for number, label in enumerate(labels):
         if label in labels[:number]:
             report(f"two grids are called '{label}': their names must differ", ("matrix", number))
@@ -137,7 +137,7 @@ def _read_grid(
 ) -> Grid:
     values = []
     for name, some in given.values.items():
-        inner = _numbers([(name, one) for one in some], declared, (*path, "values", name), report)
+        inner = _numbers([(name, item) for item in some], declared, (*path, "values", name), report)
         if len(set(inner)) < len(inner):
             report(f"{name} has a value twice", (*path, "values", name))
         values.append((name, tuple(value for _, value in inner)))
@@ -181,19 +181,22 @@ def _value(
     name: str, given: float | str, declared: Mapping[str, Parameter | Derived]
 ) -> float | str:
     """Return a parameter's inner value, or in words why it has none."""
-    one = declared.get(name)
-    if one is None:
+    parameter = declared.get(name)
+    if parameter is None:
         return f"there is no parameter '{name}'{nearest(name, declared)}"
-    if isinstance(one, Derived):
+    if isinstance(parameter, Derived):
         return f"{name} is derived, and cannot be set"
     try:
-        value = one.read(given)
+        value = parameter.read(given)
     except InputError as error:
         return "; ".join(error.problems)
-    if not one.low <= value <= one.high:
-        return f"{one.kind.rule(name, one.low, one.high)} [{one.unit}] must hold, got {given!r}"
-    if (kept := one.kind.kept(np.array([value]))) and value != round(value):
-        return f"{name} [{one.unit}] must be {kept[1]}, got {given!r}"
+    if not parameter.low <= value <= parameter.high:
+        return (
+            f"{parameter.kind.rule(name, parameter.low, parameter.high)} [{parameter.unit}] must "
+            f"hold, got {given!r}"
+        )
+    if (kept := parameter.kind.kept(np.array([value]))) and value != round(value):
+        return f"{name} [{parameter.unit}] must be {kept[1]}, got {given!r}"
     return value
 
 
@@ -269,26 +272,29 @@ def read_clauses_in(
         document: the file.
         criteria: its pass criteria.
     """
-    known = [one.id for one in criteria]
+    known = [criterion.id for criterion in criteria]
     found, problems = list[Clause](), list[str]()
     for number, data in entries(document, "clauses"):
         given = section(ClauseSection, data)
         if given is None:
             continue
-        one = _clause(given, document.at(("clauses", number)))
-        where = f"clause {one.id}:"
-        if not one.collisions and not one.criteria:
+        clause = _clause(given, document.at(("clauses", number)))
+        where = f"clause {clause.id}:"
+        if not clause.collisions and not clause.criteria:
             problems.append(
-                f"{where} nothing can violate it, state 'collisions' or 'criteria'{at(one.place)}"
+                f"{where} nothing can violate it, state 'collisions' or "
+                f"'criteria'{at(clause.place)}"
             )
         problems += [
-            f"{where} unknown criterion '{name}'{nearest(name, known)}{at(one.place)}"
-            for name in one.criteria
+            f"{where} unknown criterion '{name}'{nearest(name, known)}{at(clause.place)}"
+            for name in clause.criteria
             if name not in known
         ]
-        if one.id in [other.id for other in found]:
-            problems.append(f"{where} it is there twice, each has an id of its own{at(one.place)}")
-        found.append(one)
+        if clause.id in [other.id for other in found]:
+            problems.append(
+                f"{where} it is there twice, each has an id of its own{at(clause.place)}"
+            )
+        found.append(clause)
     return tuple(found), problems
 
 

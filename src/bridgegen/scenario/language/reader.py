@@ -227,13 +227,13 @@ class _Declarations:
 
     def number_categories(self) -> None:
         """Read the formulas in which categories are compared with their values."""
-        named = [one for one in self.parameters if one.kind.names]
-        categories = {one.name: one.kind.names for one in named}
+        named = [parameter for parameter in self.parameters if parameter.kind.names]
+        categories = {parameter.name: parameter.kind.names for parameter in named}
         self.problems += [
-            f"'{value}' is a value of the category {one.name}, and cannot name a parameter"
-            f"{at(one.place)}"
-            for one in named
-            for value in sorted(self.names.intersection(one.kind.names))
+            f"'{value}' is a value of the category {parameter.name}, and cannot name a parameter"
+            f"{at(parameter.place)}"
+            for parameter in named
+            for value in sorted(self.names.intersection(parameter.kind.names))
         ]
         bounds, self.bounds = self.bounds, []
         for bound in bounds:
@@ -241,9 +241,9 @@ class _Declarations:
                 lo, hi = (_numbered(side, bound, categories) for side in (bound.lo, bound.hi))
                 self.bounds.append(replace(bound, lo=lo, hi=hi))
         derived, self.derived = self.derived, []
-        for one in derived:
+        for item in derived:
             with self._noting():
-                self.derived.append(replace(one, value=_numbered(one.value, one, categories)))
+                self.derived.append(replace(item, value=_numbered(item.value, item, categories)))
 
     @contextmanager
     def _noting(self) -> Iterator[None]:
@@ -255,7 +255,7 @@ class _Declarations:
     def set_defaults(self, document: Document) -> None:
         """Give included parameters the defaults that the scenario wants."""
         own = {name for name, _ in entries(document, "parameters")}
-        at_ = {one.name: number for number, one in enumerate(self.parameters)}
+        at_ = {item.name: number for number, item in enumerate(self.parameters)}
         for key, value in entries(document, "defaults"):
             place, name = document.at(("defaults", key)), str(key)
             if name in own:
@@ -271,14 +271,14 @@ class _Declarations:
                 else:
                     self.problems.append(f"{name} is derived: it has no default{at(place)}")
             elif isinstance(value, int | float | str) and not isinstance(value, bool):
-                one = self.parameters[at_[name]]
+                parameter = self.parameters[at_[name]]
                 try:
-                    default = one.read(value)
+                    default = parameter.read(value)
                 except InputError as error:
                     self.problems += [f"defaults.{text}{at(place)}" for text in error.problems]
                     continue
                 with self._noting():
-                    self.parameters[at_[name]] = replace(one, default=default, place=place)
+                    self.parameters[at_[name]] = replace(parameter, default=default, place=place)
 
     def _parameter(self, name: str, given: ParameterSection, place: str) -> None:
         if problems := _key_problems(name, given):
@@ -387,8 +387,8 @@ def build(document: Document, folder: Path | None) -> LogicalScenario:
     if not declarations.complete or not isinstance(document.data, dict):
         raise ScenarioError(*problems, *declarations.problems)  # others would be consequences
     declarations.number_categories()
-    parameters = {one.name: one for one in declarations.parameters}
-    derived = {one.name: one for one in declarations.derived}
+    parameters = {parameter.name: parameter for parameter in declarations.parameters}
+    derived = {item.name: item for item in declarations.derived}
     declared: dict[str, Parameter | Derived] = {**derived, **parameters}
     quantities = Quantities(document, parameters, derived, declarations.names)
     roads = _roads(document, quantities)
@@ -404,18 +404,20 @@ def build(document: Document, folder: Path | None) -> LogicalScenario:
     story = Story(participants, board.events, changes.jams, changes.works)
     objective = _objective(document.data.get("objective", "harm"), quantities)
     criteria, wrong = read_criteria_in(document)
-    problems += wrong + unknown_entities(criteria, [one.name for one in story.participants])
+    problems += wrong + unknown_entities(
+        criteria, [participant.name for participant in story.participants]
+    )
     matrix = read_matrix(document, parameters, derived, quantities.report)
     clauses, wrong = read_clauses_in(document, criteria)
     problems += wrong
     recorded, wrong = read_recorded(document, parameters, derived)
     problems += wrong
     declarations.derived += changes.derived
-    derived |= {one.name: one for one in changes.derived}
+    derived |= {item.name: item for item in changes.derived}
     between = bounds_between_layers(roads, story, parameters, declarations.prefixes, document.place)
     if not quantities.problems:
         declarations.bounds += between
-    used = quantities.used | roads.parameters | {one.name for one in changes.derived}
+    used = quantities.used | roads.parameters | {item.name for item in changes.derived}
     used |= {prefix + name for prefix in story.later_weathers for name in NEEDED}
     if problems or quantities.problems:  # a section that cannot be read uses what it names
         used |= _texts([document.data.get(key) for key in _USING])
@@ -442,7 +444,7 @@ def build(document: Document, folder: Path | None) -> LogicalScenario:
         roads=roads,
         story=story,
         driver=given.driver,
-        effects=tuple(one.function for one in given.effects),
+        effects=tuple(effect.function for effect in given.effects),
         axes=read_axes(given.axes),
         parameters=parameters,
         bounds=tuple(declarations.bounds),
@@ -470,7 +472,7 @@ def _roads(document: Document, quantities: Quantities) -> RoadsSpec | None:
     """Return the file's roads; None if that section is not of the right shape."""
     data = document.data if isinstance(document.data, dict) else {}
     template = data.get("template")
-    kind = next((one for one in KNOBS if one == template), None)
+    kind = next((knob for knob in KNOBS if knob == template), None)
     given = section(RoadsSection, data.get("roads", {}))
     if kind is None or given is None:
         return None

@@ -189,7 +189,11 @@ class RoadsSpec:
     @property
     def parameters(self) -> frozenset[str]:
         """The static parameters that it is built from."""
-        bends = [q for one in self.segments for q in (one.length, one.curvature, one.end_curvature)]
+        bends = [
+            q
+            for segment in self.segments
+            for q in (segment.length, segment.curvature, segment.end_curvature)
+        ]
         return frozenset(q for q in (*self.knobs.values(), *bends) if isinstance(q, str))
 
     @property
@@ -247,8 +251,8 @@ def knobs_of(
     """Return every knob of a template: as given, a static parameter of its name, or its default."""
     found: dict[str, Quantity] = {}
     for name, knob in KNOBS[template].items():
-        one = declared.get(name)
-        own = name if one is not None and one.axis is Axis.STATIC else knob.usual
+        parameter = declared.get(name)
+        own = name if parameter is not None and parameter.axis is Axis.STATIC else knob.usual
         found[name] = given.get(name, own)
     return found
 
@@ -287,23 +291,23 @@ def knob_problems(
                 "storyboard, and one storyboard serves every road network",
             )
             continue
-        one = declared.get(value)
-        if one is None:
+        parameter = declared.get(value)
+        if parameter is None:
             if value not in names:
                 hint = nearest(value, declared)
                 yield name, f"{name} names the unknown parameter '{value}'{hint}"
-        elif isinstance(one, Derived) or one.axis is not Axis.STATIC:
+        elif isinstance(parameter, Derived) or parameter.axis is not Axis.STATIC:
             yield name, f"{name} must be a number or a parameter of the static axis, got '{value}'"
-        elif one.kind.names:
+        elif parameter.kind.names:
             yield name, f"{name} needs a number, '{value}' is a category"
-        elif one.unit != knob.unit:
-            share = " (a share: 5 % is 0.05)" if (knob.unit, one.unit) == ("1", "%") else ""
+        elif parameter.unit != knob.unit:
+            share = " (a share: 5 % is 0.05)" if (knob.unit, parameter.unit) == ("1", "%") else ""
             yield (
                 name,
-                f"{name} needs a parameter in {knob.unit}{share}, '{value}' is in {one.unit}",
+                f"{name} needs a parameter in {knob.unit}{share}, '{value}' is in {parameter.unit}",
             )
-        elif one.low < knob.low or one.high > knob.high:
-            yield name, f"{rule}, '{value}' goes from {one.low:g} to {one.high:g}"
-        elif one.kind.apart != (knob.unit == "count"):
+        elif parameter.low < knob.low or parameter.high > knob.high:
+            yield name, f"{rule}, '{value}' goes from {parameter.low:g} to {parameter.high:g}"
+        elif parameter.kind.apart != (knob.unit == "count"):
             kind = "integer" if knob.unit == "count" else "float"
             yield name, f"{name} needs a parameter of kind {kind}, '{value}' is not one"

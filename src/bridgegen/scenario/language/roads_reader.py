@@ -64,17 +64,17 @@ def read_roads(
         report(f"template {template} has no signals", ("roads", "signals"))
     segments = tuple(
         Segment(
-            one.length,
-            one.curvature,
-            one.curvature if one.end_curvature is None else one.end_curvature,
+            segment.length,
+            segment.curvature,
+            segment.curvature if segment.end_curvature is None else segment.end_curvature,
         )
-        for one in given.segments
+        for segment in given.segments
     )
-    for number, one in enumerate(segments):
+    for number, segment in enumerate(segments):
         for key, value, low, high in (
-            ("length", one.length, 1.0, 5000.0),
-            ("curvature", one.curvature, -_TIGHTEST, _TIGHTEST),
-            ("end_curvature", one.end_curvature, -_TIGHTEST, _TIGHTEST),
+            ("length", segment.length, 1.0, 5000.0),
+            ("curvature", segment.curvature, -_TIGHTEST, _TIGHTEST),
+            ("end_curvature", segment.end_curvature, -_TIGHTEST, _TIGHTEST),
         ):
             for problem in _measure(key, value, low, high, known, declared):
                 report(problem, ("roads", "segments", number))
@@ -101,10 +101,10 @@ def read_roads(
 def _legs(template: Template, given: RoadsSection, report: Say) -> dict[str, LegSpec]:
     """Return the legs of a junction: the usual ones, or those with a given heading."""
     headings = dict(HEADINGS[template])
-    if any(one.heading is not None for one in given.legs.values()):
+    if any(leg.heading is not None for leg in given.legs.values()):
         headings = {
-            name: one.heading if one.heading is not None else headings.get(name, math.nan)
-            for name, one in given.legs.items()
+            name: leg.heading if leg.heading is not None else headings.get(name, math.nan)
+            for name, leg in given.legs.items()
         }
     for name in given.legs:
         if not headings and not HEADINGS[template]:
@@ -127,22 +127,24 @@ def _legs(template: Template, given: RoadsSection, report: Say) -> dict[str, Leg
     return legs
 
 
-def _leg(name: str, heading: float, one: LegSection, given: RoadsSection, report: Say) -> LegSpec:
+def _leg(
+    name: str, heading: float, leg_section: LegSection, given: RoadsSection, report: Say
+) -> LegSpec:
     path: Path = ("roads", "legs", name)
-    lanes_in = None if one.lanes_in is None else int(one.lanes_in)
-    if one.turns and lanes_in != len(one.turns):
+    lanes_in = None if leg_section.lanes_in is None else int(leg_section.lanes_in)
+    if leg_section.turns and lanes_in != len(leg_section.turns):
         report(
             f"turns of leg {name} must be one list per lane in (lanes_in), innermost first", path
         )
-    if any(not turns for turns in one.turns):
+    if any(not turns for turns in leg_section.turns):
         report(f"each lane in of leg {name} must lead somewhere, got an empty list in turns", path)
     return LegSpec(
         heading,
         lanes_in,
-        None if one.lanes_out is None else int(one.lanes_out),
-        tuple(tuple(turns) for turns in one.turns),
-        one.sign,
-        given.crosswalks if one.crosswalk is None else one.crosswalk,
+        None if leg_section.lanes_out is None else int(leg_section.lanes_out),
+        tuple(tuple(turns) for turns in leg_section.turns),
+        leg_section.sign,
+        given.crosswalks if leg_section.crosswalk is None else leg_section.crosswalk,
     )
 
 
@@ -155,13 +157,13 @@ def _angles(template: Template, legs: Mapping[str, LegSpec]) -> Iterator[str]:
             f"got {len(legs)}"
         )
         return
-    around = sorted((one.heading % 360.0, name) for name, one in legs.items())
+    around = sorted((leg.heading % 360.0, name) for name, leg in legs.items())
     around.append((around[0][0] + 360.0, around[0][1]))
-    for (one, name), (other, following) in pairwise(around):
-        if other - one < LEAST_ANGLE - 1e-9:
+    for (value, name), (other, following) in pairwise(around):
+        if other - value < LEAST_ANGLE - 1e-9:
             yield (
                 f"legs must be {LEAST_ANGLE:g}° apart at least, {name} and {following} are "
-                f"{other - one:g}°"
+                f"{other - value:g}°"
             )
 
 
@@ -178,14 +180,14 @@ def _measure(
         if not low <= value <= high:
             yield f"{key} [{unit}] must be {low:.4g} to {high:.4g}, got {value:g}"
         return
-    one = known.get(value)
-    if one is None:
+    parameter = known.get(value)
+    if parameter is None:
         if value not in declared:
             yield f"{key} names the unknown parameter '{value}'{nearest(value, known)}"
-    elif isinstance(one, Derived) or one.axis != "static":
+    elif isinstance(parameter, Derived) or parameter.axis != "static":
         yield f"{key} must be a number or a parameter of the static axis, got '{value}'"
-    elif one.unit != unit or one.low < low or one.high > high:
+    elif parameter.unit != unit or parameter.low < low or parameter.high > high:
         yield (
             f"{key} needs a parameter in {unit} within {low:.4g} to {high:.4g}, '{value}' is in "
-            f"{one.unit}, {one.low:g} to {one.high:g}"
+            f"{parameter.unit}, {parameter.low:g} to {parameter.high:g}"
         )

@@ -52,12 +52,12 @@ def bounds_between_layers(
     """
     weathers = ("", *prefixes)
     yield from speed_bounds(roads.knobs["speed_limit"], story, parameters, prefixes, place)
-    for one in story.participants:
-        if one.conduct != "vehicle" or one.name == "ego":
+    for participant in story.participants:
+        if participant.conduct != "vehicle" or participant.name == "ego":
             continue  # the ego's driver is under test: what it dares is its own affair
-        radii = [bend(roads, at) for at in one.at_each_place]
-        for radius in dict.fromkeys(one for one in radii if one is not None):
-            yield from bend_bounds(radius, one, story, parameters, prefixes, place)
+        radii = [bend(roads, at) for at in participant.at_each_place]
+        for radius in dict.fromkeys(item for item in radii if item is not None):
+            yield from bend_bounds(radius, participant, story, parameters, prefixes, place)
     for name, limit in roads.closes.items():
         for prefix in weathers:
             if f"{prefix}{name}" in parameters:
@@ -80,7 +80,7 @@ def speed_bounds(
 
 def bend_bounds(
     radius: str,
-    one: Participant,
+    participant: Participant,
     story: Story,
     parameters: Mapping[str, Parameter],
     prefixes: Iterable[str],
@@ -89,10 +89,10 @@ def bend_bounds(
     """Yield what the tightest bend on a participant's way demands, by the formula of its radius."""
     friction = _least([f"{prefix}friction" for prefix in ("", *prefixes)])
     most = f"{GRIP_FORMULA} * {friction}"
-    if not one.exceeds_limit:
+    if not participant.exceeds_limit:
         most = f"min({most}, {MOST_LATERAL})"
     hi = parse(f"sqrt({most} * ({radius}))")
-    for name in sorted(_speeds_of(one, story) & parameters.keys()):
+    for name in sorted(_speeds_of(participant, story) & parameters.keys()):
         yield Bound(name, None, hi, _BEND_WHY, _BEND_SOURCE, place)
 
 
@@ -102,7 +102,7 @@ def cap(limit: Quantity, weathers: Iterable[str] = ("",)) -> str:
     return f"{_text(limit)} * {factor}"
 
 
-def bend(roads: RoadsSpec, one: Participant) -> str | None:
+def bend(roads: RoadsSpec, participant: Participant) -> str | None:
     """Return the formula of the tightest radius [m] on a participant's way; None if straight."""
     if roads.template == "road":
         bends = [q for part in roads.segments for q in (part.curvature, part.end_curvature)]
@@ -112,18 +112,22 @@ def bend(roads: RoadsSpec, one: Participant) -> str | None:
         tightest = sharp[0] if len(sharp) == 1 else f"max({', '.join(sharp)})"
         return f"1 / max({tightest}, 1e-6)"
     if roads.template == "roundabout":
-        return None if one.end is None else _text(roads.knobs["radius"])
-    if one.end is None or one.start.leg not in roads.legs or one.end.leg not in roads.legs:
+        return None if participant.end is None else _text(roads.knobs["radius"])
+    if (
+        participant.end is None
+        or participant.start.leg not in roads.legs
+        or participant.end.leg not in roads.legs
+    ):
         return None
-    inward = roads.legs[one.start.leg].heading + 180.0
-    turn = math.remainder(roads.legs[one.end.leg].heading - inward, 360.0)
+    inward = roads.legs[participant.start.leg].heading + 180.0
+    turn = math.remainder(roads.legs[participant.end.leg].heading - inward, 360.0)
     if abs(turn) < STRAIGHT:
         return None
     # Lane centres lie half a width beside the leg's axis: outside in a left turn, inside in a
     # right one. Legs at the angle φ have their tangent points half the junction from its centre.
     half = 0.5 / math.tan(math.radians(abs(turn)) / 2.0)
     size, width = _text(roads.knobs["intersection_size"]), _text(roads.knobs["lane_width"])
-    lane = one.start.lane if isinstance(one.start.lane, int) else 1
+    lane = participant.start.lane if isinstance(participant.start.lane, int) else 1
     sign = "+" if turn > 0.0 else "-"
     return f"max({half:.10g}*{size} {sign} {lane - 0.5:g}*{width}, 2)"
 
@@ -131,21 +135,23 @@ def bend(roads: RoadsSpec, one: Participant) -> str | None:
 def _speeds(story: Story) -> set[str]:
     """Return the parameters that are speeds of motor vehicles."""
     vehicles = [
-        one for one in story.participants if one.conduct == "vehicle" and not one.exceeds_limit
+        participant
+        for participant in story.participants
+        if participant.conduct == "vehicle" and not participant.exceeds_limit
     ]
-    return set().union(*(_speeds_of(one, story) for one in vehicles))
+    return set().union(*(_speeds_of(vehicle, story) for vehicle in vehicles))
 
 
-def _speeds_of(one: Participant, story: Story) -> set[str]:
-    return {value for value in speeds_of(one, story) if isinstance(value, str)}
+def _speeds_of(participant: Participant, story: Story) -> set[str]:
+    return {value for value in speeds_of(participant, story) if isinstance(value, str)}
 
 
-def speeds_of(one: Participant, story: Story) -> list[Quantity]:
+def speeds_of(participant: Participant, story: Story) -> list[Quantity]:
     """Return every speed [m/s] that a participant is told to have."""
     actions = [
         action
         for event in story.events
-        if event.participant == one.name
+        if event.participant == participant.name
         for action in event.actions
     ]
     later = [action.speed for action in actions if isinstance(action, SpeedChange)]
@@ -154,7 +160,7 @@ def speeds_of(one: Participant, story: Story) -> list[Quantity]:
         for action in actions
         if isinstance(action, KeepDistance) and action.max_speed is not None
     ]
-    return [one.speed, *later, *kept]
+    return [participant.speed, *later, *kept]
 
 
 def _least(names: list[str]) -> str:

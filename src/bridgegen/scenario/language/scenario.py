@@ -235,19 +235,47 @@ class LogicalScenario(SearchedScenario):
         """See `SearchedScenario`; what a scenario does without has no part in it."""
         content = content_of(self)
         bare = ("", "scripted")
-        drivers = {one.name: one.driver for one in self.participants if one.driver not in bare}
-        headings = {one.name: one.heading for one in self.participants if one.heading != 0.0}
-        lifted = {one.name: one.exceeds_limit for one in self.participants if one.exceeds_limit}
-        sirens = [one.name for one in self.participants if one.siren]
-        bodies = {one.name: one.own_body for one in self.participants if one.own_body}
-        types = {one.name: (one.type_by, one.types) for one in self.participants if one.type_by}
-        ways = {one.name: (one.place_by, one.ways) for one in self.participants if one.ways}
-        models = {one.name: one.model for one in self.participants if one.model}
+        drivers = {
+            participant.name: participant.driver
+            for participant in self.participants
+            if participant.driver not in bare
+        }
+        headings = {
+            participant.name: participant.heading
+            for participant in self.participants
+            if participant.heading != 0.0
+        }
+        lifted = {
+            participant.name: participant.exceeds_limit
+            for participant in self.participants
+            if participant.exceeds_limit
+        }
+        sirens = [participant.name for participant in self.participants if participant.siren]
+        bodies = {
+            participant.name: participant.own_body
+            for participant in self.participants
+            if participant.own_body
+        }
+        types = {
+            participant.name: (participant.type_by, participant.types)
+            for participant in self.participants
+            if participant.type_by
+        }
+        ways = {
+            participant.name: (participant.place_by, participant.ways)
+            for participant in self.participants
+            if participant.ways
+        }
+        models = {
+            participant.name: participant.model
+            for participant in self.participants
+            if participant.model
+        }
         parts = (
             drivers, headings, lifted, sirens, bodies, types, models, ways, self.criteria,
             self.clauses, self.matrix,
         )  # fmt: skip
-        more = "".join(repr(one) for one in parts if one)
+        more = "".join(repr(part) for part in parts if part)
         return sha256((content + more).encode()).hexdigest()
 
     @property
@@ -276,13 +304,13 @@ class LogicalScenario(SearchedScenario):
         Raises:
             KeyError: no such participant.
         """
-        return {one.name: one for one in self.participants}[name]
+        return {item.name: item for item in self.participants}[name]
 
     def usual_values(self) -> dict[str, float]:
         """Return the defaults of the parameters, and the derived quantities that follow."""
-        values = {name: one.default for name, one in self.parameters.items()}
-        for one in self.derived:
-            values[one.name] = float(one.value.evaluate(values))
+        values = {name: parameter.default for name, parameter in self.parameters.items()}
+        for derived in self.derived:
+            values[derived.name] = float(derived.value.evaluate(values))
         return values
 
     def measured(self, values: Mapping[str, float]) -> "LogicalScenario":
@@ -293,10 +321,10 @@ class LogicalScenario(SearchedScenario):
                 here has no say over a map; what they limit, they limit still.
         """
         parameters = {
-            name: replace(one, low=values[name], high=values[name], default=values[name])
+            name: replace(parameter, low=values[name], high=values[name], default=values[name])
             if name in values
-            else one
-            for name, one in self.parameters.items()
+            else parameter
+            for name, parameter in self.parameters.items()
         }
         bounds = tuple(bound for bound in self.bounds if bound.target not in values)
         return replace(self, parameters=parameters, bounds=bounds)

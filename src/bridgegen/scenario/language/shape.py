@@ -216,7 +216,7 @@ def shape_problems(model: type[ShapedSection], document: Document) -> list[str]:
     try:
         model.model_validate(document.data)
     except ValidationError as error:
-        return [_describe(model, document, one) for one in error.errors(include_url=False)]
+        return [_describe(model, document, item) for item in error.errors(include_url=False)]
     return []
 
 

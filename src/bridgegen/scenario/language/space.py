@@ -92,7 +92,7 @@ class SearchSpace:
         self.decisions = frozenset(decisions)
         self.defaults = {p.name: p.default for p in parameters.values()} | fixed
         self._columns = {name: number for number, name in enumerate(self.names)}
-        self.derived = {one.name: one for one in constraints.derived}
+        self.derived = {derived.name: derived for derived in constraints.derived}
         self.bounds: dict[str, tuple[Bound, ...]] = {
             name: tuple(b for b in constraints.bounds if b.target == name) for name in parameters
         }
@@ -112,15 +112,17 @@ class SearchSpace:
         """
         searched = [self.parameters[name] for name in self.variables]
         return tuple(
-            round(one.high - one.low) + 1 if one.kind.apart and not self.bounds[one.name] else 0
-            for one in searched
+            round(parameter.high - parameter.low) + 1
+            if parameter.kind.apart and not self.bounds[parameter.name]
+            else 0
+            for parameter in searched
         )
 
     @property
     def labels(self) -> dict[str, dict[str, Any]]:
         """How the values of its parameters are read, of those that are no plain numbers."""
-        labels = {name: one.kind.labels() for name, one in self.parameters.items()}
-        return {name: one for name, one in labels.items() if one}
+        labels = {name: parameter.kind.labels() for name, parameter in self.parameters.items()}
+        return {name: label for name, label in labels.items() if label}
 
     def index(self, name: str) -> int:
         """Return the column of X that holds ``name``.
@@ -228,7 +230,7 @@ class SearchSpace:
         row = np.array([table[name] for name in self.names], dtype=np.float64)
         broken = self.violations(row[None, :])
         if broken:
-            raise ScenarioError(*(one.reason for one in broken))
+            raise ScenarioError(*(violation.reason for violation in broken))
         return row
 
     def rows(self, columns: Mapping[str, Float], count: int) -> Float:
@@ -284,9 +286,9 @@ class SearchSpace:
             out = result[self._columns[name]]
             if name in self.derived:
                 out[:] = self.derived[name].value.evaluate(table)
-                one = self.derived[name]
-                problem = f"'{one}'{at(one.place)} has no value"
-                self._refuse(problem, one.names, table, ~np.isfinite(out))
+                derived = self.derived[name]
+                problem = f"'{derived}'{at(derived.place)} has no value"
+                self._refuse(problem, derived.names, table, ~np.isfinite(out))
                 table[name] = out
                 continue
             if name not in shares and not self.bounds[name]:
@@ -364,7 +366,7 @@ def _read_fixed(
 def _fixed_problems(fixed: Mapping[str, float], constraints: Constraints) -> list[str]:
     problems = []
     parameters = constraints.parameters
-    derived = {one.name: one for one in constraints.derived}
+    derived = {item.name: item for item in constraints.derived}
     for name, value in fixed.items():
         if name in derived:
             problems.append(f"cannot fix '{name}', which follows from '{derived[name]}'")
@@ -372,12 +374,12 @@ def _fixed_problems(fixed: Mapping[str, float], constraints: Constraints) -> lis
         if name not in parameters:
             problems.append(f"cannot fix the unknown parameter '{name}'{nearest(name, parameters)}")
             continue
-        one = parameters[name]
-        if not one.low <= value <= one.high:
-            rule = one.kind.rule(name, one.low, one.high)
-            problems.append(f"{rule} [{one.unit}] must hold, got {value!r}")
-        elif (kept := one.kind.kept(np.array([value]))) and value != round(value):
-            problems.append(f"{name} [{one.unit}] must be {kept[1]}, got {value!r}")
+        parameter = parameters[name]
+        if not parameter.low <= value <= parameter.high:
+            rule = parameter.kind.rule(name, parameter.low, parameter.high)
+            problems.append(f"{rule} [{parameter.unit}] must hold, got {value!r}")
+        elif (kept := parameter.kind.kept(np.array([value]))) and value != round(value):
+            problems.append(f"{name} [{parameter.unit}] must be {kept[1]}, got {value!r}")
     return problems
 
 

@@ -109,7 +109,7 @@ class Participant:
     @property
     def bodies(self) -> tuple[Body, ...]:
         """All that its body may be."""
-        return tuple(body_of(one) for one in self.types) or (self.body,)
+        return tuple(body_of(kind) for kind in self.types) or (self.body,)
 
     @property
     def at_each_place(self) -> "tuple[Participant, ...]":
@@ -245,7 +245,10 @@ class Arrival:
 
     def __str__(self) -> str:
         """Return what the participant does, to be said after its name."""
-        here, there = (f"{one} at {in_words(one.distance, 'm')}" for one in (self.at, self.place))
+        here, there = (
+            f"{waypoint} at {in_words(waypoint.distance, 'm')}"
+            for waypoint in (self.at, self.place)
+        )
         return f"arrives at {here} when {self.other} arrives at {there}"
 
 
@@ -403,7 +406,7 @@ class Story:
     def later_weathers(self) -> tuple[str, ...]:
         """The prefixes of the weathers that events change to."""
         actions = (action for event in self.events for action in event.actions)
-        found = (one.prefix for one in actions if isinstance(one, WeatherChange))
+        found = (change.prefix for change in actions if isinstance(change, WeatherChange))
         return tuple(dict.fromkeys(found))
 
 

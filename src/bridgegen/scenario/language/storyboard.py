@@ -90,7 +90,7 @@ class Storyboard:
         self._events_read = list(entries(document, "events"))
         self._event_names = [str(name) for name, _ in self._events_read]
         self.participants = tuple(self._participants())
-        self._acting = {one.name: one for one in self.participants}
+        self._acting = {participant.name: participant for participant in self.participants}
         self.events = tuple(self._events())
 
     # -- participants --------------------------------------------------------------------------
@@ -137,10 +137,10 @@ class Storyboard:
     def _at_places(self, name: str, given: ParticipantSection, path: Path) -> Participant:
         """Return a participant whose start and end a category chooses."""
         usual, found = self._choices.default_place(given), {}
-        for key, one in given.places.items():
-            at = given.model_copy(update={"start": one.start, "end": one.end})
+        for key, place_section in given.places.items():
+            at = given.model_copy(update={"start": place_section.start, "end": place_section.end})
             place = (*path, "places", key)
-            found[key] = self._driver(name, at, one.start, place)
+            found[key] = self._driver(name, at, place_section.start, place)
             self._check_heading(name, at, place)
         chosen = found[usual or next(iter(found))]
         ways = tuple((found[key].start, found[key].end) for key in self._choices.places(given))
@@ -149,8 +149,8 @@ class Storyboard:
     def _off_lanes(self, name: str, given: ParticipantSection, path: Path) -> Participant:
         """Return a participant with a path of its own."""
         points = tuple(
-            self._places.waypoint(one, (*path, "path", number))
-            for number, one in enumerate(given.path)
+            self._places.waypoint(waypoint_section, (*path, "path", number))
+            for number, waypoint_section in enumerate(given.path)
         )
         if given.start is not None or given.end is not None:
             self._report(f"{name} must have a path, or a start and an end, not both", path)
@@ -233,8 +233,8 @@ class Storyboard:
         if heading == 0.0:
             return
         self._check(heading, "deg", place, low=-180.0)
-        one = self._quantities.parameters.get(heading) if isinstance(heading, str) else None
-        most = one.high if one else heading
+        parameter = self._quantities.parameters.get(heading) if isinstance(heading, str) else None
+        most = parameter.high if parameter else heading
         if not isinstance(most, str) and most > 180.0:
             self._report(f"heading of {name} [deg] must be -180 to 180, got {most:g}", place)
         if name == EGO:
@@ -255,12 +255,12 @@ class Storyboard:
 
     def _moves(self, name: str, given: ParticipantSection) -> bool:
         """Return whether a participant is given a speed, at the start or by an event."""
-        events = (section(EventSection, one) for _, one in self._events_read)
+        events = (section(EventSection, value) for _, value in self._events_read)
         return given.speed != 0.0 or any(
-            one is not None
-            and one.participant == name
-            and (one.speed not in (None, 0.0) or one.keep_distance or one.arrive)
-            for one in events
+            event is not None
+            and event.participant == name
+            and (event.speed not in (None, 0.0) or event.keep_distance or event.arrive)
+            for event in events
         )
 
     def _check_driver(self, name: str, given: ParticipantSection, path: Path) -> None:
@@ -335,8 +335,8 @@ class Storyboard:
                 if given.participant == EGO:
                     self._report("events move the others; the ego's driver is under test", path)
             when = tuple(
-                tuple(self._conditions(given, one, (*path, "when", number)))
-                for number, one in enumerate(given.when)
+                tuple(self._conditions(given, condition_section, (*path, "when", number)))
+                for number, condition_section in enumerate(given.when)
             )
             yield EventSpec(name, given.participant, actions, when)
 
@@ -364,15 +364,23 @@ class Storyboard:
                     self._report("a jerk is for a rate, without a shape", (*path, "jerk"))
             change = self._change(given.rate, given.time, given.distance, given.shape, path)
             yield SpeedChange(given.speed, replace(change, jerk=given.jerk))
-        elif any(one is not None for one in (given.rate, given.jerk, given.time, given.distance)):
+        elif any(
+            value is not None for value in (given.rate, given.jerk, given.time, given.distance)
+        ):
             self._report(f"{name} has a change of speed without its target (speed)", path)
         if given.lane_change is not None:
-            one = given.lane_change
-            if one.lanes == 0.0:
+            lane_change = given.lane_change
+            if lane_change.lanes == 0.0:
                 self._report("lane_change must not be 0 lanes", (*path, "lane_change"))
-            if one.time is None and one.distance is None:
+            if lane_change.time is None and lane_change.distance is None:
                 self._report("a lane change takes a time or a distance", (*path, "lane_change"))
-            change = self._change(None, one.time, one.distance, one.shape, (*path, "lane_change"))
+            change = self._change(
+                None,
+                lane_change.time,
+                lane_change.distance,
+                lane_change.shape,
+                (*path, "lane_change"),
+            )
             actor = self._acting.get(str(given.participant))
             if actor is not None and (actor.end is not None or actor.path):
                 self._report(f"{actor.name} changes lane, so it has no end and no path", path)
@@ -380,7 +388,7 @@ class Storyboard:
                 self._report(
                     f"{actor.name}, a {actor.type}, runs on rails and changes no lane", path
                 )
-            yield LaneChange(int(one.lanes), change)
+            yield LaneChange(int(lane_change.lanes), change)
         yield from self._moves_aside(name, given, path)
         yield from self._beside_others(name, given, path)
         if given.indicate is not None:
@@ -396,8 +404,8 @@ class Storyboard:
         if aside is None:
             return
         self._check(aside.offset, "m", (*place, "offset"), low=-MOST_ASIDE)
-        one = self._quantities.parameters.get(str(aside.offset))
-        most = one.high if one else aside.offset
+        parameter = self._quantities.parameters.get(str(aside.offset))
+        most = parameter.high if parameter else aside.offset
         if not isinstance(most, str) and most > MOST_ASIDE:
             self._report(
                 f"offset of {name} [m] must be {-MOST_ASIDE:g} to {MOST_ASIDE:g}, beyond that it "
@@ -413,7 +421,7 @@ class Storyboard:
     def _beside_others(self, name: str, given: EventSection, path: Path) -> Iterator[Action]:
         """Yield the actions whose speed depends on another participant."""
         keeps, arrives = given.keep_distance, given.arrive
-        if sum(one is not None for one in (given.speed, keeps, arrives)) > 1:
+        if sum(item is not None for item in (given.speed, keeps, arrives)) > 1:
             self._report(
                 f"{name} must have one of speed, keep_distance and arrive: each sets the speed",
                 path,
@@ -453,8 +461,8 @@ class Storyboard:
             )  # fmt: skip
         if arrives is not None:
             places = [
-                self._places.waypoint(one, (*path, "arrive", key))
-                for one, key in ((arrives.at, "at"), (arrives.place, "place"))
+                self._places.waypoint(waypoint_section, (*path, "arrive", key))
+                for waypoint_section, key in ((arrives.at, "at"), (arrives.place, "place"))
             ]
             yield Arrival(places[0], arrives.other, places[1])
 
@@ -475,13 +483,13 @@ class Storyboard:
         return Change(rate, time, distance, shape)  # type: ignore[arg-type]
 
     def _conditions(
-        self, event: EventSection, one: ConditionSection, path: Path
+        self, event: EventSection, condition_section: ConditionSection, path: Path
     ) -> Iterator[ConditionSpec]:
         """Yield the conditions of one alternative."""
-        if one.all:
-            if one.kind is not None:
+        if condition_section.all:
+            if condition_section.kind is not None:
                 self._report("an alternative is a condition, or 'all' of several, not both", path)
-            for number, each in enumerate(one.all):
+            for number, each in enumerate(condition_section.all):
                 if each.kind == "began":
                     self._report(
                         "a 'began' condition holds for an instant, so it stands alone, not in "
@@ -490,37 +498,60 @@ class Storyboard:
                     )
                 yield from self._conditions(event, each, (*path, "all", number))
             return
-        if one.kind is None:
+        if condition_section.kind is None:
             self._report(f"a condition must have a kind: {', '.join(CONDITIONS)}", path)
             return
-        kind, subject = CONDITIONS[one.kind], one.of or event.participant
-        self._check(one.value, kind.unit, (*path, "value"))
-        if one.kind == "contact" and one.value != 0.0:
-            self._report(f"a contact condition has no value, got {one.value}", (*path, "value"))
-        if one.kind in _OF_EVENTS and isinstance(one.value, str):
+        kind, subject = (
+            CONDITIONS[condition_section.kind],
+            condition_section.of or event.participant,
+        )
+        self._check(condition_section.value, kind.unit, (*path, "value"))
+        if condition_section.kind == "contact" and condition_section.value != 0.0:
             self._report(
-                f"value of an '{one.kind}' condition [s] must be a constant, got '{one.value}': "
+                f"a contact condition has no value, got {condition_section.value}", (*path, "value")
+            )
+        if condition_section.kind in _OF_EVENTS and isinstance(condition_section.value, str):
+            self._report(
+                f"value of an '{condition_section.kind}' condition [s] must be a constant, got "
+                f"'{condition_section.value}': "
                 "delays are part of the storyboard, which is the same for all rows",
                 (*path, "value"),
             )
-        if not kind.pair and one.to is not None:
-            self._report(f"a {one.kind} condition has no 'to', got '{one.to}'", path)
-        if kind.pair and one.to is None:
-            self._report(f"a {one.kind} condition needs 'to', the other participant", path)
+        if not kind.pair and condition_section.to is not None:
+            self._report(
+                f"a {condition_section.kind} condition has no 'to', got '{condition_section.to}'",
+                path,
+            )
+        if kind.pair and condition_section.to is None:
+            self._report(
+                f"a {condition_section.kind} condition needs 'to', the other participant", path
+            )
         elif kind.pair:
-            self._check_participant(str(one.to), (*path, "to"))
-            if one.to == subject:
-                self._report(f"a {one.kind} is to another participant, got '{one.to}' twice", path)
-        if one.of is not None:
-            self._check_participant(one.of, (*path, "of"))
-        elif subject is None and one.kind not in ("time", *_OF_EVENTS):
-            self._report(f"a {one.kind} condition needs 'of', whose it is", path)
-        if (one.kind in _OF_EVENTS) != (one.event is not None):
+            self._check_participant(str(condition_section.to), (*path, "to"))
+            if condition_section.to == subject:
+                self._report(
+                    f"a {condition_section.kind} is to another participant, got "
+                    f"'{condition_section.to}' twice",
+                    path,
+                )
+        if condition_section.of is not None:
+            self._check_participant(condition_section.of, (*path, "of"))
+        elif subject is None and condition_section.kind not in ("time", *_OF_EVENTS):
+            self._report(f"a {condition_section.kind} condition needs 'of', whose it is", path)
+        if (condition_section.kind in _OF_EVENTS) != (condition_section.event is not None):
             self._report("an 'after' or 'began' condition, and no other, names an event", path)
-        elif one.event is not None and one.event not in self._event_names:
-            hint = nearest(one.event, self._event_names)
-            self._report(f"unknown event '{one.event}'{hint}", path)
-        yield ConditionSpec(one.kind, one.value, one.to, one.of, one.event)
+        elif (
+            condition_section.event is not None and condition_section.event not in self._event_names
+        ):
+            hint = nearest(condition_section.event, self._event_names)
+            self._report(f"unknown event '{condition_section.event}'{hint}", path)
+        yield ConditionSpec(
+            condition_section.kind,
+            condition_section.value,
+            condition_section.to,
+            condition_section.of,
+            condition_section.event,
+        )
 
     def _check_participant(self, name: str, path: Path) -> None:
         if name not in self.known:
@@ -529,8 +560,8 @@ class Storyboard:
 
 def _slowest(name: str, kind: str) -> float:
     """Return the least speed that a participant may be given [m/s]; below 0 it reverses."""
-    one = PARTICIPANTS[kind]
-    reverses = name != EGO and one.seen_as.conduct == "vehicle" and not one.on_rails
+    participant = PARTICIPANTS[kind]
+    reverses = name != EGO and participant.seen_as.conduct == "vehicle" and not participant.on_rails
     return FASTEST_REVERSE if reverses else 0.0
 
 
@@ -598,8 +629,8 @@ class RecordedSpec:
         """Return the parameters of events, ``(N,)`` each; NaN where a quantity is missing."""
         n = len(next(iter(quantities.values())))
         return {
-            name: np.broadcast_to(one.evaluate(quantities), (n,)).copy()
-            for name, one in self.parameters.items()
+            name: np.broadcast_to(parameter.evaluate(quantities), (n,)).copy()
+            for name, parameter in self.parameters.items()
         }
 
 
@@ -641,9 +672,9 @@ def read_recorded(
             f"recorded.parameters{problem}{at(line)}"
             for problem in _target_problems(name, parameters, derived)
         ]
-        one = _formula(str(formula), f"recorded.parameters.{name}", kind, line, problems)
-        if one is not None:
-            formulas[name] = one
+        expression = _formula(str(formula), f"recorded.parameters.{name}", kind, line, problems)
+        if expression is not None:
+            formulas[name] = expression
     condition = None
     if given.where is not None:
         line = document.at(("recorded", "where"))
@@ -656,7 +687,9 @@ def unmapped(
 ) -> tuple[str, ...]:
     """Return the parameters of an axis that the events do not give."""
     return tuple(
-        name for name, one in parameters.items() if one.axis is axis and name not in spec.parameters
+        name
+        for name, parameter in parameters.items()
+        if parameter.axis is axis and name not in spec.parameters
     )
 
 
@@ -676,13 +709,13 @@ def _formula(
     text: str, label: str, kind: EventKind, line: str, problems: list[str]
 ) -> Expression | None:
     try:
-        one = parse(text, line)
+        expression = parse(text, line)
     except InputError as error:
         problems += error.problems
         return None
     problems += [
         f"{label} names '{name}', which is no quantity of '{kind.name}'"
         f"{nearest(name, kind.quantities) or '; it has ' + ', '.join(kind.quantities)}{at(line)}"
-        for name in sorted(one.names - kind.quantities.keys())
+        for name in sorted(expression.names - kind.quantities.keys())
     ]
-    return one
+    return expression

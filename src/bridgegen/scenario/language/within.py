@@ -118,14 +118,14 @@ def _narrowed(space: SearchSpace, U: Float, low: Float, high: Float) -> tuple[Fl
         if k is None:
             table[name] = np.clip(space.defaults[name], lo, hi)
             continue
-        one = space.parameters[name]
-        if low[k] > one.low or high[k] < one.high:
-            first, last = one.shares(float(low[k]), float(high[k]), lo, hi)
+        parameter = space.parameters[name]
+        if low[k] > parameter.low or high[k] < parameter.high:
+            first, last = parameter.shares(float(low[k]), float(high[k]), lo, hi)
             part = np.maximum(last - first, 0.0)
             V[:, k] = np.clip(first + U[:, k] * part, 0.0, 1.0)
             if part.ndim == 0:
                 certain *= float(part)
             else:
                 chance *= part
-        table[name] = one.at(V[:, k], lo, hi)
+        table[name] = parameter.at(V[:, k], lo, hi)
     return V, certain, chance

@@ -178,7 +178,7 @@ def rounded(course: Float) -> Float:
         course: ``(V, 4)``: time [s], x, y [m], heading [rad].
     """
     degrees = np.round(np.degrees(course[:, 3]), DIGITS).tolist()
-    headings = [math.radians(one) for one in degrees]  # as the files' reader does
+    headings = [math.radians(degree) for degree in degrees]  # as the files' reader does
     times, places = np.round(course[:, 0], DIGITS), np.round(course[:, 1:3], DIGITS)
     return np.column_stack((times, places, headings)) + 0.0
 

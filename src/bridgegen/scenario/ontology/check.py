@@ -50,13 +50,13 @@ def check(individuals: Individuals, scenario: "LogicalScenario | None" = None) -
         found = {}
     else:
         found = {
-            (one.nodes, one.message): one
+            (violation.nodes, violation.message): violation
             for finding in compiled.validate(store, terms)
-            for one in violations_of(individuals, scenario, compiled.rules, finding)
+            for violation in violations_of(individuals, scenario, compiled.rules, finding)
         }
     if not found:
         _keep(compiled.conforming, quads, True)
-    return sorted(found.values(), key=lambda one: (one.individual, one.message))
+    return sorted(found.values(), key=lambda violation: (violation.individual, violation.message))
 
 
 def constraints_in_words(scenario: "LogicalScenario | None" = None) -> str:
@@ -148,7 +148,7 @@ class _Compiled:
         validator = Validator(
             DataGraph.from_oxigraph_store(store),
             shacl_graph=self._shapes.graph,
-            options={"use_shapes": [one for one, needs in self._needs.items() if needs <= terms]},
+            options={"use_shapes": [item for item, needs in self._needs.items() if needs <= terms]},
         )
         validator.shacl_graph = self._shapes
         with _quiet():

@@ -96,7 +96,7 @@ def _load(spec: str, folder: str) -> Effect:
 
 def _offered(spec: str) -> Effect:
     """Return the function that an installed package offers by a name."""
-    offered = {one.name: one for one in entry_points(group=GROUP)}
+    offered = {point.name: point for point in entry_points(group=GROUP)}
     if spec not in offered:
         raise InputError(
             f"no installed package offers the effect '{spec}'{nearest(spec, offered)}; a function "

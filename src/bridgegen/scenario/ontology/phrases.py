@@ -89,7 +89,8 @@ class _Speaker:
         if unit is None:
             unit = unit_of(term)
         return (
-            ", ".join(value_text(one, unit) for one in found if isinstance(one, ox.Literal)) or "?"
+            ", ".join(value_text(item, unit) for item in found if isinstance(item, ox.Literal))
+            or "?"
         )
 
     def link(self, node: Subject, name: str) -> str:
@@ -99,11 +100,11 @@ class _Speaker:
 
     def links(self, node: Subject, name: str) -> list[Subject]:
         values = self.members.values(node).get(bg(name), [])
-        return [one for one in values if isinstance(one, Subject)]
+        return [value for value in values if isinstance(value, Subject)]
 
     def inner(self, node: Subject, name: str) -> str:
         """Return what a property points to in words; "?" where it points to nothing."""
-        return ", ".join(self.node(one) for one in self.links(node, name)) or "?"
+        return ", ".join(self.node(link) for link in self.links(node, name)) or "?"
 
     def has(self, node: Subject, name: str) -> bool:
         return bool(self.members.values(node).get(bg(name)))
@@ -121,9 +122,9 @@ def _anything(speaker: _Speaker, node: Subject) -> str:
         if isinstance(values[0], ox.Literal):
             text = speaker.value(node, local_name(term))
         elif members.layer(values[0]) is not None:
-            text = ", ".join(members.name(one) for one in values if isinstance(one, Subject))
+            text = ", ".join(members.name(value) for value in values if isinstance(value, Subject))
         else:
-            text = ", ".join(speaker.node(one) for one in values if isinstance(one, Subject))
+            text = ", ".join(speaker.node(value) for value in values if isinstance(value, Subject))
         parts.append(f"{property_label(term)} {text}")
     label = members.class_label(members.class_of(node)) if any(members.classes(node)) else ""
     return f"{label or members.name(node)}{': ' if parts else ''}{', '.join(parts)}"
@@ -161,19 +162,19 @@ def _lane_change(speaker: _Speaker, node: Subject) -> str:
 
 
 def _trajectory(speaker: _Speaker, node: Subject) -> str:
-    vertices = [v for one in speaker.links(node, "has_trajectory")
-                for v in speaker.links(one, "has_vertex")]  # fmt: skip
+    vertices = [v for link in speaker.links(node, "has_trajectory")
+                for v in speaker.links(link, "has_vertex")]  # fmt: skip
     speaker.phrase.nodes += speaker.links(node, "has_trajectory") + vertices
 
     def index(vertex: Subject) -> float:
         found = speaker.members.values(vertex).get(bg("has_index"), [])
         return next((as_number(v) or 0.0 for v in found if isinstance(v, ox.Literal)), 0.0)
 
-    places = [speaker.inner(one, "has_position") for one in sorted(vertices, key=index)]
+    places = [speaker.inner(item, "has_position") for item in sorted(vertices, key=index)]
     if len(places) > _MOST_PLACES:
         places = [places[0], f"{len(places) - 2} points between", places[-1]]
     smooth = any(
-        speaker.has(one, "has_spline_order") for one in speaker.links(node, "has_trajectory")
+        speaker.has(link, "has_spline_order") for link in speaker.links(node, "has_trajectory")
     )
     return f"along {'a smooth curve by ' * smooth}{' → '.join(places) or '?'}"
 
@@ -191,7 +192,7 @@ def _lane_position(speaker: _Speaker, node: Subject) -> str:
 
 def _rule(speaker: _Speaker, node: Subject, usual: str) -> str:
     found = speaker.members.values(node).get(bg("has_rule"), [])
-    given = [_RULES.get(one.value, one.value) for one in found if isinstance(one, ox.Literal)]
+    given = [_RULES.get(item.value, item.value) for item in found if isinstance(item, ox.Literal)]
     return given[0] if given else usual
 
 

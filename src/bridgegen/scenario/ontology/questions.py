@@ -146,7 +146,7 @@ def ask_file(owl: Path, question: str | None = None, sparql: Path | None = None)
         return ask(individuals, question)
     return Answer(
         ("question", "what it asks"),
-        tuple((one.name, one.description) for one in questions().values()),
+        tuple((item.name, item.description) for item in questions().values()),
     )
 
 

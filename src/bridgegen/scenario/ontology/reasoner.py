@@ -126,10 +126,10 @@ def _reason(java: "_Java", individuals: Individuals, timeout: float) -> Reasoned
             contradiction=(),
             unsatisfiable=tuple(sorted(map(_local, bottom))),
             types={
-                str(one.getIRI()): tuple(
-                    sorted(map(_local, reasoner.getTypes(one, True).getFlattened()))
+                str(item.getIRI()): tuple(
+                    sorted(map(_local, reasoner.getTypes(item, True).getFlattened()))
                 )
-                for one in sorted(ontology.getIndividualsInSignature(), key=str)
+                for item in sorted(ontology.getIndividualsInSignature(), key=str)
             },
         )
     finally:

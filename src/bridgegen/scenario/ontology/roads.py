@@ -158,7 +158,7 @@ def _add_controller(builder: Builder, site: Site) -> ox.NamedNode:
     put(controller, "has_name", "signals")
     put(controller, "has_object_id", "1")
     builder.quantity(controller, "has_offset", site.signal_offset)
-    lights = [one for one in site.facilities if one.cls == "TrafficLight"]
+    lights = [facility for facility in site.facilities if facility.cls == "TrafficLight"]
     for light in lights:
         put(controller, "has_light", builder.iri(facility_name(light)))
     for number, phase in enumerate(site.phases, start=1):
@@ -169,7 +169,7 @@ def _add_controller(builder: Builder, site: Site) -> ox.NamedNode:
         builder.quantity(node, "has_duration", phase.duration)
         for link, legs in (("gives_green_to", phase.green), ("gives_yellow_to", phase.yellow)):
             for leg in legs:
-                for light in (one for one in lights if one.leg == leg):
+                for light in (facility for facility in lights if facility.leg == leg):
                     put(node, link, builder.iri(facility_name(light)))
     return controller
 

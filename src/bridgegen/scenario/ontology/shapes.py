@@ -78,7 +78,9 @@ def required(scenario: "LogicalScenario | None" = None) -> tuple[tuple[str, str]
 
 
 def _required_weather(scenario: "LogicalScenario | None") -> tuple[tuple[str, str], ...]:
-    has_weather = scenario is not None and any(one in WEATHER_PATHS for one in scenario.parameters)
+    has_weather = scenario is not None and any(
+        parameter in WEATHER_PATHS for parameter in scenario.parameters
+    )
     return (("Scenario", "has_weather"),) if has_weather else ()
 
 

@@ -96,7 +96,11 @@ class ArmRoad:
 
     def along(self, direction: Direction) -> tuple[SiteLane, ...]:
         """Return the driving lanes of a direction, the innermost (nearest to the centre) first."""
-        lanes = [one for one in self.lanes if one.direction == direction and one.type == "driving"]
+        lanes = [
+            site_lane
+            for site_lane in self.lanes
+            if site_lane.direction == direction and site_lane.type == "driving"
+        ]
         return tuple(sorted(lanes, key=lambda lane: abs(lane.lane_id)))
 
     @property

@@ -33,7 +33,7 @@ from bridgegen.scenario.weather import PARTS
 WEATHER = tuple(
     (part.link, part.owl_class, names)
     for part, parameters in PARTS.items()
-    if (names := tuple(one.name for one in parameters if one.is_declared))
+    if (names := tuple(parameter.name for parameter in parameters if parameter.is_declared))
 )
 """The parts of the weather that scenario files describe: link, class, parameters."""
 
@@ -63,28 +63,28 @@ SMOOTH = 4
 
 
 def add_participant(
-    builder: Builder, one: Participant, site: Site, driver: str, ideal: str
+    builder: Builder, participant: Participant, site: Site, driver: str, ideal: str
 ) -> ox.NamedNode:
     """Add a participant with its body, route and init actions, and its driver if it has one.
 
     Args:
         builder: takes the individuals.
-        one: the participant.
+        participant: the participant.
         site: where it is.
         driver: the ego's.
         ideal: the stages of that which are ideal, separated by commas.
     """
-    put, name = builder.put, one.name
-    node = builder.node(name, PARTICIPANTS[one.type].owl_class)
+    put, name = builder.put, participant.name
+    node = builder.node(name, PARTICIPANTS[participant.type].owl_class)
     put(node, "has_name", name)
-    if one.model:
-        put(node, "has_model", one.model)
-    if one.siren:
+    if participant.model:
+        put(node, "has_model", participant.model)
+    if participant.siren:
         put(node, "has_siren", "on")
-    if one.exceeds_limit:
-        put(node, "has_reason_to_exceed", one.exceeds_limit)
-    _add_body(builder, node, one.body)
-    driver = driver if name == EGO else one.driver
+    if participant.exceeds_limit:
+        put(node, "has_reason_to_exceed", participant.exceeds_limit)
+    _add_body(builder, node, participant.body)
+    driver = driver if name == EGO else participant.driver
     if name == EGO or driver in LOOKING:
         controller = builder.node(f"{name}_controller", "Controller")
         put(controller, "has_name", f"{name}_driver")
@@ -92,22 +92,26 @@ def add_participant(
         if ideal and name == EGO:
             put(controller, "has_ideal_stages", ideal)
         put(node, "has_controller", controller)
-    start = add_position(builder, f"{name}_start", one.start, site)
-    if one.heading != 0.0:
-        builder.quantity(start, "has_relative_heading", one.heading)
+    start = add_position(builder, f"{name}_start", participant.start, site)
+    if participant.heading != 0.0:
+        builder.quantity(start, "has_relative_heading", participant.heading)
     teleport = builder.node(f"{name}_teleport", "TeleportAction")
     put(teleport, "has_position", start)
     put(node, "has_init_action", teleport)
-    if one.conduct != "obstacle":
+    if participant.conduct != "obstacle":
         speed = builder.node(f"{name}_init_speed", "SpeedAction")
-        builder.quantity(speed, "has_target_speed", one.speed)
+        builder.quantity(speed, "has_target_speed", participant.speed)
         put(node, "has_init_action", speed)
-    if one.path:
-        put(node, "has_init_action", _add_trajectory(builder, one, start, site))
-    if one.end is not None:
+    if participant.path:
+        put(node, "has_init_action", _add_trajectory(builder, participant, start, site))
+    if participant.end is not None:
         route = builder.node(f"{name}_route", "Route")
         put(route, "has_start", start)
-        put(route, "has_destination", add_position(builder, f"{name}_destination", one.end, site))
+        put(
+            route,
+            "has_destination",
+            add_position(builder, f"{name}_destination", participant.end, site),
+        )
         put(node, "has_route", route)
     return node
 
@@ -132,17 +136,17 @@ def _add_body(builder: Builder, node: ox.NamedNode, body: Body) -> None:
 
 
 def _add_trajectory(
-    builder: Builder, one: Participant, start: ox.NamedNode, site: Site
+    builder: Builder, participant: Participant, start: ox.NamedNode, site: Site
 ) -> ox.NamedNode:
     """Add the following of a participant's own path, at the speed that it has at each time."""
-    put, name = builder.put, one.name
+    put, name = builder.put, participant.name
     action = builder.node(f"{name}_follow", "FollowTrajectoryAction")
     trajectory = builder.node(f"{name}_path", "Trajectory")
     put(action, "has_trajectory", trajectory)
     put(trajectory, "has_name", f"{name}_path")
-    if one.conduct == "vehicle":
-        put(trajectory, "has_spline_order", min(SMOOTH, len(one.path)))
-    for number, point in enumerate(one.path, start=1):
+    if participant.conduct == "vehicle":
+        put(trajectory, "has_spline_order", min(SMOOTH, len(participant.path)))
+    for number, point in enumerate(participant.path, start=1):
         vertex = builder.node(f"{name}_vertex_{number}", "Vertex")
         put(trajectory, "has_vertex", vertex)
         put(vertex, "has_index", number)

@@ -86,7 +86,7 @@ class PropertyShape:
         found = set().union(*values.values())
         if not self.is_data:
             return found <= structure.instances(self.kind)
-        return all(isinstance(one, ox.Literal) and self._surely_takes(one) for one in found)
+        return all(isinstance(node, ox.Literal) and self._surely_takes(node) for node in found)
 
     def _surely_takes(self, value: ox.Literal) -> bool:
         text = value.value
@@ -160,7 +160,7 @@ class Structure:
         """Return the individuals of a class and of those that the ontology has below it."""
         if cls not in self._instances:
             below = tbox().subclasses.get(cls, frozenset({cls}))
-            found = (self._of_type.get(one, set()) for one in below)
+            found = (self._of_type.get(node, set()) for node in below)
             self._instances[cls] = set().union(*found)
         return self._instances[cls]
 
@@ -255,21 +255,21 @@ class Members:
                 yield cls
 
     def _layer_of_class(self, cls: ox.NamedNode) -> int | None:
-        for one in self._above(cls):
-            for value in self._statements.get(one, {}).get(bg("layer"), ()):
+        for node in self._above(cls):
+            for value in self._statements.get(node, {}).get(bg("layer"), ()):
                 number = as_number(value) if isinstance(value, ox.Literal) else None
                 if number in LAYERS:
                     return int(number)
-            if one == bg(local_name(one)) and local_name(one) in tbox().layers:
-                return tbox().layers[local_name(one)]
+            if node == bg(local_name(node)) and local_name(node) in tbox().layers:
+                return tbox().layers[local_name(node)]
         return None
 
     def _above(self, cls: ox.NamedNode) -> list[ox.NamedNode]:
         """Return a class and all above it, the nearest first."""
         if cls not in self._known_above:
             found = [cls]
-            for one in found:  # grows meanwhile
-                found += [up for up in self._parents.get(one, ()) if up not in found]
+            for node in found:  # grows meanwhile
+                found += [up for up in self._parents.get(node, ()) if up not in found]
             self._known_above[cls] = found
         return self._known_above[cls]
 
@@ -296,4 +296,4 @@ def _class_pairs(quads: Iterable[ox.Quad]) -> Iterator[tuple[ox.NamedNode, ox.Na
 
 def texts(values: Iterable[object]) -> list[str]:
     """Return the texts among some values, numbers as they are written."""
-    return [one.value for one in values if isinstance(one, ox.Literal)]
+    return [value.value for value in values if isinstance(value, ox.Literal)]

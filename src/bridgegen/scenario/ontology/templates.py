@@ -122,15 +122,15 @@ class _Template:
         """Return a road that meets no junction."""
         segments = tuple(
             SiteSegment(
-                self.measure(one.length),
-                self.measure(one.curvature),
-                self.measure(one.end_curvature),
+                self.measure(segment.length),
+                self.measure(segment.curvature),
+                self.measure(segment.end_curvature),
             )
-            for one in self.roads.segments
+            for segment in self.roads.segments
         )
         length = self.knobs["length"]
         if segments:
-            length = sum(float(one.length) for one in segments)
+            length = sum(float(segment.length) for segment in segments)
         counts = {way: self.count("main", way) for way in _WAYS}
         return Leg("main", 0.0, (self.arm_road("1", length, "none", counts, segments=segments),))
 

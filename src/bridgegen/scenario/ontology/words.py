@@ -147,7 +147,7 @@ def _about_parameter(
     individuals: Individuals, scenario: "LogicalScenario", rule: Rule, focus: Subject
 ) -> Iterator[Violation]:
     declared = scenario.parameters.get(rule.target) or next(
-        one for one in scenario.derived if one.name == rule.target
+        derived for derived in scenario.derived if derived.name == rule.target
     )
     what = f"{rule.target} [{declared.unit}]"
     places = _places(individuals, carriers(individuals, rule.target))

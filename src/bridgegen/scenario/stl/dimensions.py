@@ -123,17 +123,17 @@ def check_units(
         return [], dimension_of(formula)
     found = [check_units(part, dimension_of) for part in f.parts(formula)]
     problems = [problem for some, _ in found for problem in some]
-    dimensions = [one for _, one in found]
+    dimensions = [dimension for _, dimension in found]
     if isinstance(formula, f.Arithmetic) and formula.sign in "*/":
         left, right = dimensions
         if left is None and right is None:
             return problems, None
         left, right = left or NONE, right or NONE
         return problems, left * right if formula.sign == "*" else left / right
-    known = [one for one in dimensions if one is not None]
+    known = [dimension for dimension in dimensions if dimension is not None]
     if isinstance(formula, f.Arithmetic | f.Function | f.Comparison) and len({*known}) > 1:
         what = "compared" if isinstance(formula, f.Comparison) else "combined"
-        units = " and ".join(f"[{one}]" for one in dict.fromkeys(known))
+        units = " and ".join(f"[{dimension}]" for dimension in dict.fromkeys(known))
         problems.append(f"quantities of different units cannot be {what}: {units}")
     if isinstance(formula, f.Junction | f.Until) and len({*known}) > 1:
         return problems, None

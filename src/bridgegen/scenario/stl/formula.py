@@ -45,7 +45,7 @@ class Reading:
     def __str__(self) -> str:
         if not self.of:
             return self.name
-        quoted = [one if one.isidentifier() else f'"{one}"' for one in self.of]
+        quoted = [name if name.isidentifier() else f'"{name}"' for name in self.of]
         return f"{self.name} to {quoted[1]}" if len(quoted) > 1 else f"{quoted[0]}.{self.name}"
 
 
@@ -139,22 +139,22 @@ Formula: TypeAlias = Comparison | Not | Junction | Temporal | Until
 Part: TypeAlias = Formula | Term
 
 
-def parts(one: Part) -> tuple[Part, ...]:
+def parts(part: Part) -> tuple[Part, ...]:
     """Return the parts that a part consists of."""
-    if isinstance(one, Arithmetic | Comparison | Junction | Until):
-        return one.left, one.right
-    if isinstance(one, Not | Temporal):
-        return (one.formula,)
-    if isinstance(one, Function):
-        return one.terms
-    return (one.term,) if isinstance(one, Whole) else ()
+    if isinstance(part, Arithmetic | Comparison | Junction | Until):
+        return part.left, part.right
+    if isinstance(part, Not | Temporal):
+        return (part.formula,)
+    if isinstance(part, Function):
+        return part.terms
+    return (part.term,) if isinstance(part, Whole) else ()
 
 
-def readings(one: Part) -> Iterator[Reading]:
+def readings(comparison: Part) -> Iterator[Reading]:
     """Yield the quantities that a formula reads, in the order of its text."""
-    if isinstance(one, Reading):
-        yield one
-    for part in parts(one):
+    if isinstance(comparison, Reading):
+        yield comparison
+    for part in parts(comparison):
         yield from readings(part)
 
 
@@ -163,13 +163,17 @@ def joined(sign: Literal["and", "or"], formulas: "list[Formula]") -> "Formula":
     return reduce(lambda left, right: Junction(sign, left, right), formulas)
 
 
-def horizon(one: Part) -> float:
+def horizon(temporal: Part) -> float:
     """Return how far ahead a formula looks at least [s].
 
     Of intervals inside one another the ends add up; of an interval without an end the beginning.
     """
-    inside = max((horizon(part) for part in parts(one)), default=0.0)
-    if isinstance(one, Temporal | Until) and one.name in ("always", "eventually", "until"):
-        high = one.interval.high
-        return inside + (one.interval.low if high == inf else high)
+    inside = max((horizon(part) for part in parts(temporal)), default=0.0)
+    if isinstance(temporal, Temporal | Until) and temporal.name in (
+        "always",
+        "eventually",
+        "until",
+    ):
+        high = temporal.interval.high
+        return inside + (temporal.interval.low if high == inf else high)
     return inside

@@ -36,7 +36,7 @@ _WORDS = {
     *_TEMPORAL, *_BINARY, *_FUNCTIONS, "and", "or", "not", "implies", "while", "to", "any",
 }  # fmt: skip
 
-_UNIT = "|".join(re.escape(one) for one in sorted(SYMBOLS, key=len, reverse=True))
+_UNIT = "|".join(re.escape(symbol) for symbol in sorted(SYMBOLS, key=len, reverse=True))
 _TOKEN = re.compile(
     rf"""\s*(?:
     (?P<number>(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]{{1,3}})?)
@@ -75,25 +75,27 @@ def parse(text: str) -> Formula:
     return found
 
 
-def _check_times(one: f.Part, text: str, *, inside: bool) -> None:
+def _check_times(reading: f.Part, text: str, *, inside: bool) -> None:
     """Check that signals are read inside temporal operators, and metrics outside.
 
     Raises:
         InputError: they are not.
     """
-    if isinstance(one, Reading) and one.is_signal != inside:
-        if one.is_signal:
+    if isinstance(reading, Reading) and reading.is_signal != inside:
+        if reading.is_signal:
             raise InputError(
-                f"{one} changes over time, so a formula says when it is compared: "
+                f"{reading} changes over time, so a formula says when it is compared: "
                 f"always(...), eventually(...), min(...), max(...), first(...) or last(...), "
-                f"got '{text}' (column {one.column})"
+                f"got '{text}' (column {reading.column})"
             )
         raise InputError(
-            f"{one.name} is one number of the whole scenario, so it is compared outside "
-            f"always(...), eventually(...) and the like, got '{text}' (column {one.column})"
+            f"{reading.name} is one number of the whole scenario, so it is compared outside "
+            f"always(...), eventually(...) and the like, got '{text}' (column {reading.column})"
         )
-    for part in f.parts(one):
-        _check_times(part, text, inside=inside or isinstance(one, f.Temporal | f.Until | f.Whole))
+    for part in f.parts(reading):
+        _check_times(
+            part, text, inside=inside or isinstance(reading, f.Temporal | f.Until | f.Whole)
+        )
 
 
 class _Reader:
@@ -294,12 +296,12 @@ class _Reader:
         minus = 0
         while self._is("+", "-"):
             minus += self._take().text == "-"
-        one = self._primary()
+        comparison = self._primary()
         if not minus % 2:
-            return one
-        if isinstance(one, f.Constant):
-            return replace(one, value=-one.value)
-        return f.Arithmetic("*", f.Constant(-1.0, NONE), self._term(one, "-"))
+            return comparison
+        if isinstance(comparison, f.Constant):
+            return replace(comparison, value=-comparison.value)
+        return f.Arithmetic("*", f.Constant(-1.0, NONE), self._term(comparison, "-"))
 
     def _primary(self) -> f.Part:
         token = self._now

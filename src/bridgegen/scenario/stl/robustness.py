@@ -55,56 +55,56 @@ class _Evaluation:
         self._padded = bool(self._padding.any())
         self._known: dict[tuple[str, tuple[str, ...]], Float] = {}
 
-    def formula(self, one: f.Formula) -> Float:
+    def formula(self, comparison: f.Formula) -> Float:
         """Return the margins at each instant."""
-        return np.broadcast_to(self._margins(one), self._shape)
+        return np.broadcast_to(self._margins(comparison), self._shape)
 
-    def _margins(self, one: f.Formula) -> Float:
+    def _margins(self, formula: f.Formula) -> Float:
         """Return the margins at each instant, or at all alike, ``(1, N)`` or ``(1, 1)``."""
-        if isinstance(one, f.Comparison):
-            return self._comparison(one)
-        if isinstance(one, f.Not):
-            return -self._margins(one.formula)
-        if isinstance(one, f.Junction):
-            join = np.minimum if one.sign == "and" else np.maximum
-            joined: Float = join(self._margins(one.left), self._margins(one.right))
+        if isinstance(formula, f.Comparison):
+            return self._comparison(formula)
+        if isinstance(formula, f.Not):
+            return -self._margins(formula.formula)
+        if isinstance(formula, f.Junction):
+            join = np.minimum if formula.sign == "and" else np.maximum
+            joined: Float = join(self._margins(formula.left), self._margins(formula.right))
             return joined
-        if isinstance(one, f.Temporal):
-            return self._temporal(one)
-        return self._until(one)
+        if isinstance(formula, f.Temporal):
+            return self._temporal(formula)
+        return self._until(formula)
 
-    def _term(self, one: f.Term) -> Float:
+    def _term(self, term: f.Term) -> Float:
         """Return the values, of a shape as those of ``_margins``."""
-        if isinstance(one, f.Constant):
-            return np.full((1, 1), one.value)
-        if isinstance(one, f.Reading):
-            key = (one.name, one.of)
+        if isinstance(term, f.Constant):
+            return np.full((1, 1), term.value)
+        if isinstance(term, f.Reading):
+            key = (term.name, term.of)
             if key not in self._known:
-                given = self._given(one)[:, : self._shape[0]]
+                given = self._given(term)[:, : self._shape[0]]
                 self._known[key] = np.ascontiguousarray(given.T)
             return self._known[key]
-        if isinstance(one, f.Arithmetic):
-            return self._arithmetic(one)
-        if isinstance(one, f.Function):
-            values = [self._term(each) for each in one.terms]
-            if one.name == "abs":
+        if isinstance(term, f.Arithmetic):
+            return self._arithmetic(term)
+        if isinstance(term, f.Function):
+            values = [self._term(each) for each in term.terms]
+            if term.name == "abs":
                 return np.abs(values[0])
-            return reduce(np.minimum if one.name == "min" else np.maximum, values)
-        return self._whole(one)
+            return reduce(np.minimum if term.name == "min" else np.maximum, values)
+        return self._whole(term)
 
-    def _arithmetic(self, one: f.Arithmetic) -> Float:
-        left, right = self._term(one.left), self._term(one.right)
+    def _arithmetic(self, arithmetic: f.Arithmetic) -> Float:
+        left, right = self._term(arithmetic.left), self._term(arithmetic.right)
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-            found = _ARITHMETIC[one.sign](left, right)
+            found = _ARITHMETIC[arithmetic.sign](left, right)
         return np.where(np.isnan(found), inf, found)  # of 0/0, and of differences of infinities
 
-    def _whole(self, one: f.Whole) -> Float:
-        values = np.broadcast_to(self._term(one.term), self._shape)
-        if one.name == "first":
+    def _whole(self, whole: f.Whole) -> Float:
+        values = np.broadcast_to(self._term(whole.term), self._shape)
+        if whole.name == "first":
             return values[:1]
-        if one.name == "last":
+        if whole.name == "last":
             return np.take_along_axis(values, self._n_steps[np.newaxis] - 1, axis=0)
-        least = one.name == "min"
+        least = whole.name == "min"
         kept = self._filled(values, inf if least else -inf)
         found: Float = (np.min if least else np.max)(kept, axis=0, keepdims=True)
         return found
@@ -113,18 +113,18 @@ class _Evaluation:
         """Return values that have no part behind the end of a recording."""
         return np.where(self._padding, neutral, values) if self._padded else values
 
-    def _comparison(self, one: f.Comparison) -> Float:
-        left, right = self._term(one.left), self._term(one.right)
-        if one.sign in ("<", "<="):
+    def _comparison(self, comparison: f.Comparison) -> Float:
+        left, right = self._term(comparison.left), self._term(comparison.right)
+        if comparison.sign in ("<", "<="):
             left, right = right, left
         with np.errstate(invalid="ignore"):
             found = left - right
         if np.isnan(found.sum()):  # equal infinities
             found[left == right] = 0.0
-        if one.sign in ("==", "!="):
+        if comparison.sign in ("==", "!="):
             found = np.abs(found)
-        zero = TINY if one.sign in ("<=", ">=", "==") else -TINY
-        if one.sign == "==":
+        zero = TINY if comparison.sign in ("<=", ">=", "==") else -TINY
+        if comparison.sign == "==":
             found = -found
         found[found == 0.0] = zero
         return found
@@ -139,18 +139,18 @@ class _Evaluation:
             return low, most
         return low, floor(interval.high / self._time_step + _ROUNDING)
 
-    def _temporal(self, one: f.Temporal) -> Float:
-        low, high = self._window(one.interval)
-        least = one.name in ("always", "historically")
-        neutral, values = inf if least else -inf, self.formula(one.formula)
-        if one.name in ("historically", "once"):
+    def _temporal(self, temporal: f.Temporal) -> Float:
+        low, high = self._window(temporal.interval)
+        least = temporal.name in ("always", "historically")
+        neutral, values = inf if least else -inf, self.formula(temporal.formula)
+        if temporal.name in ("historically", "once"):
             return _over_window(values[::-1], low, high, neutral)[::-1]
         return _over_window(self._filled(values, neutral), low, high, neutral)
 
-    def _until(self, one: f.Until) -> Float:
-        low, high = self._window(one.interval)
-        left, right = self.formula(one.left), self.formula(one.right)
-        if one.name == "since":
+    def _until(self, until: f.Until) -> Float:
+        low, high = self._window(until.interval)
+        left, right = self.formula(until.left), self.formula(until.right)
+        if until.name == "since":
             return _until(left[::-1], right[::-1], low, high)[::-1]
         return _until(left, self._filled(right, -inf), low, high)
 

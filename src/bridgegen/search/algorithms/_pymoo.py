@@ -116,7 +116,7 @@ class Generations:
         U: Float = np.clip(asked.get("X").astype(np.float64), *self._box)
         asked.set("X", U)
         self._size = self._size or len(asked)
-        self._untold.extend(_Asked(one, *self._phase) for one in asked)
+        self._untold.extend(_Asked(item, *self._phase) for item in asked)
         return U
 
     @property
@@ -132,18 +132,18 @@ class Generations:
         """
         n = len(U) if self._asynchronous else len(self._untold)
         asked = list(islice(self._untold, n))
-        if not asked or not np.array_equal(U, [one.individual.X for one in asked]):
+        if not asked or not np.array_equal(U, [item.individual.X for item in asked]):
             raise ValueError("U must be the first rows that were asked for and are not told")
         for _ in asked:
             self._untold.popleft()
         finite, failed = self._penalty.apply(results.F, results.ok)
         told = []
-        for one, F, is_failed in zip(asked, finite, failed.tolist(), strict=True):
-            one.individual.F = F
-            one.individual.set("failed", is_failed)
-            one.individual.set("unscaled", F)
-            if (one.start, one.has_population) == self._phase:
-                told.append(one.individual)
+        for item, F, is_failed in zip(asked, finite, failed.tolist(), strict=True):
+            item.individual.F = F
+            item.individual.set("failed", is_failed)
+            item.individual.set("unscaled", F)
+            if (item.start, item.has_population) == self._phase:
+                told.append(item.individual)
         if not self.algorithm.is_initialized:
             self._first += told
             if len(self._first) < self._size:
@@ -157,10 +157,10 @@ class Generations:
         living = self.algorithm.pop if self.algorithm.is_initialized else ()
         # A failed row has the penalty of its batch; worse finite rows may have followed, and any of
         # them must count as better.
-        for one in living:
-            if one.get("failed"):
-                one.F = self._penalty.value
-                one.set("unscaled", one.F)
+        for item in living:
+            if item.get("failed"):
+                item.F = self._penalty.value
+                item.set("unscaled", item.F)
         if self._scaled:
             _scale([*living, *told])
         self.algorithm.tell(infills=Population.create(*told))
@@ -172,7 +172,9 @@ class Generations:
 def _scale(individuals: list[Any]) -> None:
     """Set F to the unscaled objectives, each scaled to [0, 1] over all individuals."""
     # Half, so that the range fits float64.
-    F = 0.5 * np.array([one.get("unscaled") for one in individuals])
+    F = 0.5 * np.array([individual.get("unscaled") for individual in individuals])
     low, span = F.min(axis=0), np.ptp(F, axis=0)
-    for one, values in zip(individuals, (F - low) / np.where(span > 0.0, span, 1.0), strict=True):
-        one.F = values
+    for individual, values in zip(
+        individuals, (F - low) / np.where(span > 0.0, span, 1.0), strict=True
+    ):
+        individual.F = values

@@ -278,4 +278,4 @@ def generators(seed: int | Sequence[int] | None, n: int) -> list[np.random.Gener
         seeds = [seed + k for k in range(n)] if isinstance(seed, int) else list(seed)
     if len(seeds) != n:
         raise InputError(f"a seed for each of {n} environments is needed, got {len(seeds)}")
-    return [seeding.np_random(one)[0] for one in seeds]
+    return [seeding.np_random(number)[0] for number in seeds]

@@ -86,27 +86,29 @@ class MAPElites:
             n = self._values["initial" if archive is None else "population"]
             return latin_hypercube(rng, n, n_var)
         n = self._values["population"]
-        one, other = archive.U[archive.filled[rng.integers(len(archive.filled), size=(2, n))]]
+        item, other = archive.U[archive.filled[rng.integers(len(archive.filled), size=(2, n))]]
         anywhere = self._values["near"] * rng.standard_normal((n, n_var))
-        along = self._values["line"] * rng.standard_normal((n, 1)) * (other - one)
-        rows: Float = np.clip(one + anywhere + along, 0.0, 1.0)
+        along = self._values["line"] * rng.standard_normal((n, 1)) * (other - item)
+        rows: Float = np.clip(item + anywhere + along, 0.0, 1.0)
         return rows
 
     def tell(self, U: Float, results: Results) -> None:
         """Put each row into its cell, if nothing more critical is there."""
         F = results.F[:, 0]
-        behaviour = np.stack([one.of(U, results) for one in self._descriptors], axis=1)
+        behaviour = np.stack(
+            [descriptor.of(U, results) for descriptor in self._descriptors], axis=1
+        )
         good = results.ok & np.isfinite(F) & ~np.isnan(behaviour).any(axis=1)
         if self._archive is None:
             columns = zip(self._descriptors, behaviour[good].T, strict=True)
-            spans = np.array([one.span(column) for one, column in columns])
+            spans = np.array([descriptor.span(column) for descriptor, column in columns])
             self._archive = _Archive(spans, self._values["cells"], self._problem.n_var)
         self._archive.add(U[good], F[good], behaviour[good], results.critical[good])
         self._worst = max(self._worst, float(F[good].max(initial=-np.inf)))
 
     def notes(self) -> Mapping[str, JSON]:
         """Return the archive's filled share, and its elites, the most critical first."""
-        names = [one.name for one in self._descriptors]
+        names = [descriptor.name for descriptor in self._descriptors]
         if self._archive is None:
             return {"descriptors": list(names), "cells filled": 0}
         archive, filled = self._archive, self._archive.filled
@@ -219,7 +221,7 @@ def _parse(text: str, problem: Problem) -> tuple[_Descriptor, ...]:
     parts = parts or list(problem.parameters[:2])
     found = []
     for part in parts:
-        name, equals, span = (one.strip() for one in part.partition("="))
+        name, equals, span = (item.strip() for item in part.partition("="))
         known = (*problem.metrics, *problem.parameters)
         if name not in known:
             raise UnknownNameError("descriptor of map-elites", name, known)
@@ -237,7 +239,7 @@ def _parse(text: str, problem: Problem) -> tuple[_Descriptor, ...]:
                 )
         place = problem.metrics if is_metric else problem.parameters
         found.append(_Descriptor(name, place.index(name), is_metric, low, high))
-    names = [one.name for one in found]
+    names = [descriptor.name for descriptor in found]
     if len(set(names)) < len(names):
         raise InputError(f"map-elites: descriptors must be unique, got {', '.join(names)}")
     return tuple(found)

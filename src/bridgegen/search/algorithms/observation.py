@@ -38,8 +38,8 @@ class Observer:
 
         self._seen = [j for j, name in enumerate(problem.metrics) if name not in MEASURED]
         known = [METRICS.get(problem.metrics[j]) for j in self._seen]
-        self._sign = np.array([1.0 if one is None else one.sign for one in known])
-        floor = [-np.inf if one is None else one.sign * one.cap for one in known]
+        self._sign = np.array([1.0 if metric is None else metric.sign for metric in known])
+        floor = [-np.inf if metric is None else metric.sign * metric.cap for metric in known]
         self._floor = np.array(floor, dtype=np.float64)
         self.size = problem.n_var + len(known)
 

@@ -174,4 +174,4 @@ class Surrogate(Saved):
         return [packed(self._of_objective), packed(self._of_label)]
 
     def _take(self, more: Any) -> None:
-        self._of_objective, self._of_label = (unpacked(one, self._n_var) for one in more)
+        self._of_objective, self._of_label = (unpacked(item, self._n_var) for item in more)

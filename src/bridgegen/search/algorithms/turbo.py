@@ -126,14 +126,16 @@ class TuRBO(Saved):
         if self._known.exhausted:
             return np.empty((0, self._n_var)), []
         waiting = [
-            one for one in self._regions if one.pending and not any(one is r for r in self._asked)
+            region
+            for region in self._regions
+            if region.pending and not any(region is r for r in self._asked)
         ]
         if waiting:
-            counts = [one.pending for one in waiting]
+            counts = [region.pending for region in waiting]
             asked = self._rng.permutation(np.repeat(np.arange(len(waiting)), counts))
             rows = latin_hypercube(self._rng, len(asked), self._n_var)
             return self._known.columns.snapped(self._away(rows)), [waiting[k] for k in asked]
-        ready = [one for one in self._regions if not one.pending]
+        ready = [region for region in self._regions if not region.pending]
         if ready:
             return self._batch(ready)
         rows = self._known.anywhere(self._values["batch"], self._rng)
@@ -160,7 +162,7 @@ class TuRBO(Saved):
             for region, rows in zip(ready, found, strict=True)
         ]
         rows, values = np.concatenate(found), np.concatenate(paths, axis=1)
-        regions = np.repeat(np.arange(len(found)), [len(one) for one in found])
+        regions = np.repeat(np.arange(len(found)), [len(array) for array in found])
         new = self._known.new(rows)
         rows, values, regions = rows[new], values[:, new], regions[new]
         taken: list[int] = []
@@ -208,7 +210,7 @@ class TuRBO(Saved):
         self._known.add(U, results.F[:, 0], results.ok, results.critical)
         told, self._asked = self._asked[: len(U)], self._asked[len(U) :]
         for k, region in enumerate(self._regions):
-            own = first + np.flatnonzero([one is region for one in told])
+            own = first + np.flatnonzero([item is region for item in told])
             if not len(own):
                 continue
             if region.pending:
@@ -236,22 +238,26 @@ class TuRBO(Saved):
 
     def _more(self) -> Any:
         return [
-            asdict(one) | {"own": one.own.tolist(), "parameters": packed(one.parameters)}
-            for one in self._regions
+            asdict(region) | {"own": region.own.tolist(), "parameters": packed(region.parameters)}
+            for region in self._regions
         ]
 
     def _take(self, more: Any) -> None:
         n, regions = len(self._known), []
-        for one in more:
-            own = np.array(one["own"], np.int64).reshape(-1)
-            counts = [one[key] for key in ("avoided", "pending", "successes", "failures")]
+        for item in more:
+            own = np.array(item["own"], np.int64).reshape(-1)
+            counts = [item[key] for key in ("avoided", "pending", "successes", "failures")]
             right = all(type(count) is int and count >= 0 for count in counts)
-            if not right or not 0.0 < one["length"] <= LONGEST or bool(len(own)) is bool(counts[1]):
+            if (
+                not right
+                or not 0.0 < item["length"] <= LONGEST
+                or bool(len(own)) is bool(counts[1])
+            ):
                 raise ValueError("its regions are not those of a search")
             if len(own) and not 0 <= own.min() <= own.max() < n:
                 raise ValueError("its regions have rows that it does not know")
-            parameters = unpacked(one["parameters"], self._n_var)
-            regions.append(_Region(**one | {"own": own, "parameters": parameters}))
+            parameters = unpacked(item["parameters"], self._n_var)
+            regions.append(_Region(**item | {"own": own, "parameters": parameters}))
         if len(regions) != self._values["regions"]:
             raise ValueError("it has another number of regions")
         self._regions = regions

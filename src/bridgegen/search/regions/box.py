@@ -43,7 +43,8 @@ def whole(space: SearchSpace) -> Box:
     """Return the box of all rows: every searched parameter's declared range."""
     parameters = [space.parameters[name] for name in space.variables]
     return Box(
-        np.array([one.low for one in parameters]), np.array([one.high for one in parameters])
+        np.array([parameter.low for parameter in parameters]),
+        np.array([parameter.high for parameter in parameters]),
     )
 
 
@@ -57,11 +58,13 @@ def readable(leaf: Leaf, space: SearchSpace, outer: Box) -> Box:
     """
     low, high = leaf.low.copy(), leaf.high.copy()
     for k, name in enumerate(space.variables):
-        one = space.parameters[name]
-        if ends := one.ends(float(low[k]), float(high[k])):
+        parameter = space.parameters[name]
+        if ends := parameter.ends(float(low[k]), float(high[k])):
             low[k], high[k] = ends
             continue
-        step = min((high[k] - low[k]) / _STEPS_IN_BOX, (one.high - one.low) / _STEPS_IN_RANGE)
+        step = min(
+            (high[k] - low[k]) / _STEPS_IN_BOX, (parameter.high - parameter.low) / _STEPS_IN_RANGE
+        )
         if not step > 0.0:
             continue  # the range is a single value
         digits = -math.floor(math.log10(step))
@@ -88,16 +91,16 @@ def joined(leaves: Sequence[Leaf]) -> list[Leaf]:
     return kept
 
 
-def _together(one: Leaf, other: Leaf) -> Leaf | None:
+def _together(item: Leaf, other: Leaf) -> Leaf | None:
     """Return the union of two leaves if they differ in one column and are adjacent there."""
-    (columns,) = np.nonzero((one.low != other.low) | (one.high != other.high))
+    (columns,) = np.nonzero((item.low != other.low) | (item.high != other.high))
     if len(columns) != 1:
         return None
     column = int(columns[0])
-    lower, upper = sorted((one, other), key=lambda leaf: float(leaf.low[column]))
+    lower, upper = sorted((item, other), key=lambda leaf: float(leaf.low[column]))
     if np.nextafter(lower.high[column], np.inf) != upper.low[column]:
         return None
-    rows, critical = one.rows + other.rows, one.critical + other.critical
+    rows, critical = item.rows + other.rows, item.critical + other.critical
     return Leaf(lower.low, upper.high, rows, critical)
 
 

@@ -86,7 +86,7 @@ class Found:
     @property
     def confirmed(self) -> tuple[Region, ...]:
         """The confirmed regions."""
-        return tuple(one for one in self.regions if one.confirmed)
+        return tuple(region for region in self.regions if region.confirmed)
 
 
 def find_regions(
@@ -235,7 +235,7 @@ class _Search:
             low[columns], high[columns] = leaf.low, leaf.high
             inner.append(Leaf(low, high, leaf.rows, leaf.critical))
         boxes = self._readable(inner, box)
-        return [one for one in boxes if one.narrows(box).any()]
+        return [item for item in boxes if item.narrows(box).any()]
 
 
 def _by_weight(region: Region) -> tuple[bool, float]:

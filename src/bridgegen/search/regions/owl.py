@@ -145,7 +145,7 @@ def _paths(individuals: Individuals) -> dict[Subject, tuple[str, ...]]:
 def statable(region: Region, space: SearchSpace, carried: Mapping[str, Carrier]) -> bool:
     """Return whether the ontology contains every parameter that a region's rule names."""
     named = region.box.narrows(whole(space))
-    return all(name in carried for name, one in zip(space.variables, named, strict=True) if one)
+    return all(name in carried for name, item in zip(space.variables, named, strict=True) if item)
 
 
 def classes(
@@ -167,8 +167,8 @@ def classes(
     """
     writer = _Writer(space, carried)
     digest = hashlib.sha256(repr([space.name, driver]).encode())
-    for one in regions.values():
-        digest.update(one.box.low.tobytes() + one.box.high.tobytes())
+    for item in regions.values():
+        digest.update(item.box.low.tobytes() + item.box.high.tobytes())
     # Regions of several runs may be loaded together, so the names contain the run's digest.
     name = quote(space.name, safe="")
     header = ox.NamedNode(f"{REGIONS}/{name}/{digest.hexdigest()[:12]}")
@@ -268,10 +268,10 @@ class _Writer:
         facets = []
         for facet, end in (("minInclusive", low), ("maxInclusive", high)):
             if end is not None:
-                one = self._anonymous()
+                item = self._anonymous()
                 number = int(end) if datatype == INTEGER else end
-                self.put(one, ox.NamedNode(XSD + facet), ox.Literal(number))
-                facets.append(one)
+                self.put(item, ox.NamedNode(XSD + facet), ox.Literal(number))
+                facets.append(item)
         node = self._anonymous()
         self.put(node, TYPE, ox.NamedNode(RDFS + "Datatype"))
         self.put(node, ox.NamedNode(OWL + "onDatatype"), datatype)
@@ -282,7 +282,9 @@ class _Writer:
         """Return the data range of a list of texts."""
         node = self._anonymous()
         self.put(node, TYPE, ox.NamedNode(RDFS + "Datatype"))
-        self.put(node, ox.NamedNode(OWL + "oneOf"), self._list([ox.Literal(one) for one in names]))
+        self.put(
+            node, ox.NamedNode(OWL + "oneOf"), self._list([ox.Literal(name) for name in names])
+        )
         return node
 
     def _list(

@@ -23,13 +23,16 @@ def read_record(path: Path) -> Mapping[str, Any] | None:
     """
     try:
         record = parse_json(read_bytes(path))
-        for one in record["regions"]:
-            _check(one)
+        for item in record["regions"]:
+            _check(item)
         _whole(*(record[key] for key in ("evaluations", "critical", "critical_held")))
         _number(*(record[key] for key in ("confidence", "at_least", "space_share")))
         if "exposure" in record:
             _of(str, record["exposure"])
-            for told in (record["exposure_share"], *(one["exposure"] for one in record["regions"])):
+            for told in (
+                record["exposure_share"],
+                *(item["exposure"] for item in record["regions"]),
+            ):
                 low, high = told["interval"]
                 _number(told["share"], low, high)
     except FileNotFoundError:
@@ -42,17 +45,19 @@ def read_record(path: Path) -> Mapping[str, Any] | None:
     return record  # type: ignore[no-any-return]
 
 
-def _check(one: Mapping[str, Any]) -> None:
+def _check(record: Mapping[str, Any]) -> None:
     """Raise a KeyError, TypeError or ValueError if a region lacks data that a page needs."""
-    _whole(one["number"])
-    _of(bool, one["confirmed"])
-    _of(str, one["rule"], one["sentence"], *_of(list, one["named"])[0])
-    ends = [end for name in one["named"] for end in (one["box"][name][k] for k in ("low", "high"))]
-    for evidence in (one["fresh"], one["search"]):
+    _whole(record["number"])
+    _of(bool, record["confirmed"])
+    _of(str, record["rule"], record["sentence"], *_of(list, record["named"])[0])
+    ends = [
+        end for name in record["named"] for end in (record["box"][name][k] for k in ("low", "high"))
+    ]
+    for evidence in (record["fresh"], record["search"]):
         _whole(evidence["rows"], evidence["critical"])
         low, high = evidence["interval"]
         ends += [low, high]
-    _number(*ends, one["space_share"])
+    _number(*ends, record["space_share"])
 
 
 def _of(kind: type, *values: Any) -> tuple[Any, ...]:
@@ -102,8 +107,8 @@ def to_json(found: Found, space: SearchSpace, driver: str) -> dict[str, Any]:
         ],
         "confidence": CONFIDENCE,
         "regions": [
-            _region(number, one, space, driver, outer)
-            for number, one in enumerate(found.regions, start=1)
+            _region(number, region, space, driver, outer)
+            for number, region in enumerate(found.regions, start=1)
         ],
         "rows": found.rows,
         "critical": found.critical,
@@ -114,21 +119,21 @@ def to_json(found: Found, space: SearchSpace, driver: str) -> dict[str, Any]:
 
 
 def _region(
-    number: int, one: Region, space: SearchSpace, driver: str, outer: Box
+    number: int, region: Region, space: SearchSpace, driver: str, outer: Box
 ) -> dict[str, Any]:
-    named = zip(space.variables, one.box.narrows(outer), strict=True)
-    edges = _edges(one.box, space)
+    named = zip(space.variables, region.box.narrows(outer), strict=True)
+    edges = _edges(region.box, space)
     return {
         "number": number,
-        "confirmed": one.confirmed,
-        "narrowed": one.narrowed,
-        "rule": rule(one.box, space),
-        "sentence": sentence(one.box, space, driver, one.fresh),
+        "confirmed": region.confirmed,
+        "narrowed": region.narrowed,
+        "rule": rule(region.box, space),
+        "sentence": sentence(region.box, space, driver, region.fresh),
         "named": [name for name, narrower in named if narrower],
         "box": {name: {"low": low, "high": high} for name, (low, high) in edges.items()},
-        "fresh": _evidence(one.fresh),
-        "search": _evidence(one.search),
-        "space_share": one.space_share,
+        "fresh": _evidence(region.fresh),
+        "search": _evidence(region.search),
+        "space_share": region.space_share,
     }
 
 
@@ -137,11 +142,11 @@ def _edges(box: Box, space: SearchSpace) -> dict[str, tuple[float, float]]:
     return dict(zip(space.variables, both, strict=True))
 
 
-def _evidence(one: Evidence) -> dict[str, Any]:
+def _evidence(evidence: Evidence) -> dict[str, Any]:
     return {
-        "rows": one.rows,
-        "critical": one.critical,
-        "failed": one.failed,
-        "share": one.share,
-        "interval": list(one.interval),
+        "rows": evidence.rows,
+        "critical": evidence.critical,
+        "failed": evidence.failed,
+        "share": evidence.share,
+        "interval": list(evidence.interval),
     }

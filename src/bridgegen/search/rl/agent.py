@@ -145,7 +145,7 @@ class Saved:
             array[...] = part
 
     def _header(self) -> bytes:
-        shapes = [[key, one.dtype.str, one.shape] for key, one in self._arrays.items()]
+        shapes = [[key, array.dtype.str, array.shape] for key, array in self._arrays.items()]
         return json.dumps([self.name, self._values, shapes]).encode() + b"\n"
 
 

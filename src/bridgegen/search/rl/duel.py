@@ -70,4 +70,6 @@ class Duel:
 
 def _even(total: int, most: int) -> int:
     """Return the largest divisor of a total from 2 to ``most``."""
-    return max((one for one in range(2, min(most, total) + 1) if total % one == 0), default=total)
+    return max(
+        (number for number in range(2, min(most, total) + 1) if total % number == 0), default=total
+    )

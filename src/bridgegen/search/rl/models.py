@@ -74,7 +74,7 @@ def arrays_of(policy: torch.nn.Module, optimizers: Iterable[torch.optim.Optimize
         policy: with all its networks, the target ones included.
         optimizers: Adam optimisers of its parameters.
     """
-    arrays = {f"net {name}": one.numpy() for name, one in policy.state_dict().items()}
+    arrays = {f"net {name}": item.numpy() for name, item in policy.state_dict().items()}
     for i, optimizer in enumerate(optimizers):
         for j, group in enumerate(optimizer.param_groups):
             for k, parameter in enumerate(group["params"]):
@@ -85,7 +85,9 @@ def arrays_of(policy: torch.nn.Module, optimizers: Iterable[torch.optim.Optimize
                     "exp_avg_sq": torch.zeros_like(parameter),
                 }
                 optimizer.state[parameter] = own
-                arrays |= {f"adam {i} {j} {k} {name}": one.numpy() for name, one in own.items()}
+                arrays |= {
+                    f"adam {i} {j} {k} {name}": tensor.numpy() for name, tensor in own.items()
+                }
     return arrays
 
 

@@ -121,7 +121,7 @@ def rank_correlation(x: Float, y: Float) -> float | None:
 
     if len(x) < 2 or np.ptp(x) == 0.0 or np.ptp(y) == 0.0:
         return None
-    a, b = (rankdata(one) - (len(one) + 1) / 2 for one in (x, y))
+    a, b = (rankdata(array) - (len(array) + 1) / 2 for array in (x, y))
     return float((a * b).sum() / np.sqrt((a * a).sum() * (b * b).sum()))
 
 
@@ -143,7 +143,7 @@ def place_of(parameters: Sequence[str], U: Float, difference: Float) -> Place | 
     best, least = None, SIGNIFICANT / len(parameters)
     for j in range(len(parameters)):
         groups = [difference[part[:, j] == k] for k in range(PARTS)]
-        full = [one for one in groups if len(one)]
+        full = [group for group in groups if len(group)]
         if len(full) < 2:
             continue
         p = float(kruskal(*full).pvalue)
@@ -152,7 +152,7 @@ def place_of(parameters: Sequence[str], U: Float, difference: Float) -> Place | 
     if best is None:
         return None
     inside = [difference[part[:, best] == k] for k in range(PARTS)]
-    means = [float(one.mean()) if len(one) else 0.0 for one in inside]
+    means = [float(item.mean()) if len(item) else 0.0 for item in inside]
     top = int(np.argmax(means))
     rest = difference[part[:, best] != top]
     return Place(parameters[best], top / PARTS, (top + 1) / PARTS, means[top], float(rest.mean()))
@@ -161,8 +161,8 @@ def place_of(parameters: Sequence[str], U: Float, difference: Float) -> Place | 
 def counts(screened: Bool, critical: Bool) -> tuple[int, int, int]:
     """Return how many rows are critical in both, in the screen only, in the other one only."""
     parts = screened & critical, screened & ~critical, ~screened & critical
-    both, one, other = (int(np.count_nonzero(part)) for part in parts)
-    return both, one, other
+    both, number, other = (int(np.count_nonzero(part)) for part in parts)
+    return both, number, other
 
 
 # --- Rows with the results of the screen, and of the run's simulator ---
@@ -203,12 +203,12 @@ class Compared:
     @classmethod
     def join(cls, *parts: "Compared") -> Self:
         """Return the rows of several parts, at least one, in their order."""
-        names = [one.name for one in fields(cls)]
-        return cls(*(np.concatenate([getattr(one, name) for one in parts]) for name in names))
+        names = [field.name for field in fields(cls)]
+        return cls(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))
 
     def take(self, rows: Bool | Int) -> Self:
         """Return some of the rows, by a mask or by their positions."""
-        return type(self)(*(getattr(self, one.name)[rows] for one in fields(self)))
+        return type(self)(*(getattr(self, field.name)[rows] for field in fields(self)))
 
     def told(self, results: Results) -> Self:
         """Return the rows with the results of the run's simulator."""

@@ -140,7 +140,7 @@ def _kernel(distance: Float, width: float) -> Float:
 def _means(weight: Float, values: Float) -> Float:
     """Return the weighted means of columns, drawn to 0 by the prior; ``(N, n_obj)``."""
     total = PRIOR + weight.sum(axis=1)
-    columns = [(weight * one).sum(axis=1) / total for one in values.T]
+    columns = [(weight * item).sum(axis=1) / total for item in values.T]
     return np.stack(columns, axis=1)
 
 

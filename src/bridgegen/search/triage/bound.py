@@ -151,12 +151,12 @@ class NotCounted:
     def sentence(self) -> str:
         """In words; "" if all counts."""
         parts = []
-        for kind, (one, many) in _KIND.items():
+        for kind, (name, many) in _KIND.items():
             rules = {rule: n for (what, rule), n in self.conflicts.items() if what == kind}
             if rules:
                 total = sum(rules.values())
                 also = f"; {self.by_foresight}" if kind == CONTACT and self.avoided else ""
-                parts.append(f"{total} {one if total == 1 else many} ({_listed(rules)}{also})")
+                parts.append(f"{total} {name if total == 1 else many} ({_listed(rules)}{also})")
         if self.implausible:
             total = sum(self.implausible.values())
             also = f"; {self.collisions} of them collisions" if self.collisions else ""
@@ -176,7 +176,7 @@ JUDGED = 0.5
 
 def _listed(counts: Mapping[str, int]) -> str:
     """Return numbers by name, the largest first."""
-    ordered = sorted(counts.items(), key=lambda one: (-one[1], one[0]))
+    ordered = sorted(counts.items(), key=lambda pair: (-pair[1], pair[0]))
     return ", ".join(f"{name or 'no rule'} {n}" for name, n in ordered)
 
 
@@ -263,12 +263,12 @@ def _of_the_space(space: Estimate, such: str) -> str:
 
 
 def _margin(least: Sequence[Least]) -> str:
-    of = {one.quantity: one for one in least}
+    of = {element.quantity: element for element in least}
     parts = []
     for name, words in _MARGIN.items():
-        one = of.get(name)
-        if one is not None and one.value is not None and one.evaluation is not None:
-            parts.append(f"{words.format(one.value)} (evaluation {one.evaluation + 1})")
+        item = of.get(name)
+        if item is not None and item.value is not None and item.evaluation is not None:
+            parts.append(f"{words.format(item.value)} (evaluation {item.evaluation + 1})")
     return "closest: " + ", ".join(parts) if parts else "no margin is known"
 
 

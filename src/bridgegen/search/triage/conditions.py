@@ -122,7 +122,11 @@ class Conditions:
         conditions = [self._condition(i, confirmed.get(i)) for i in self._named]
         rows = [self._x[np.newaxis], *([self._region] if confirmed else [])]
         X = nearest(self._space, np.concatenate(rows))
-        return conditions, inside, others(self._space, X, [one.name for one in conditions])
+        return (
+            conditions,
+            inside,
+            others(self._space, X, [condition.name for condition in conditions]),
+        )
 
     def _harmful(self, V: Float) -> tuple[Bool, Float]:
         """Return which rows are harmful, in any mode, and their feasible values ``(n, n_var)``."""
@@ -143,18 +147,18 @@ class Conditions:
     def _spans(self, needed: Sequence[int]) -> dict[int, _Span]:
         """Return where each parameter's harm ends, if it has ended with the nominal value."""
         harmless = ~self._harmful(self._moved([(i, self._nominal[i]) for i in needed]))[0]
-        asked = [i for i, one in zip(needed, harmless.tolist(), strict=True) if one]
+        asked = [i for i, item in zip(needed, harmless.tolist(), strict=True) if item]
         single = [i for i in asked if self._kinds[i].names]
         spans = {i: _Span(self._v[i], self._v[i], below=True, above=True) for i in single}
         ways = [(i, way) for i in asked if i not in spans for way in (-1.0, 1.0)]
         ends = self._bisected(self._scanned(ways))
-        for i in (one for one in asked if one not in single):
+        for i in (number for number in asked if number not in single):
             (low, below), (high, above) = ends[i, -1.0], ends[i, 1.0]
             if not (below if self._v[i] > self._nominal[i] else above):
                 continue  # the nominal value cannot be had without moving other parameters
-            one = self._space.parameters[self._space.variables[i]]
-            least = not below and low > one.low + 1e-9 * self._steps[i]
-            most = not above and high < one.high - 1e-9 * self._steps[i]
+            parameter = self._space.parameters[self._space.variables[i]]
+            least = not below and low > parameter.low + 1e-9 * self._steps[i]
+            most = not above and high < parameter.high - 1e-9 * self._steps[i]
             low = self._rounded(i, low, 1.0) if below or least else low
             high = self._rounded(i, high, -1.0) if above or most else high
             spans[i] = _Span(low, high, below, above, closed=least or most)
@@ -168,9 +172,9 @@ class Conditions:
         The latter is None where the harm persists to the end of what the parameter can be.
         """
         found: dict[tuple[int, float], tuple[float, float | None]] = {}
-        last = {one: float(self._v[one[0]]) for one in ways}
+        last = {pair: float(self._v[pair[0]]) for pair in ways}
         while len(found) < len(ways):
-            open_ = [one for one in ways if one not in found]
+            open_ = [pair for pair in ways if pair not in found]
             moves = [
                 (i, last[i, way] + way * k * self._steps[i])
                 for i, way in open_
@@ -194,15 +198,15 @@ class Conditions:
         self, ends: Mapping[tuple[int, float], tuple[float, float | None]]
     ) -> dict[tuple[int, float], tuple[float, bool]]:
         """Return the last harmful value of each, and whether the harm ends beyond it."""
-        inner = {one: inside for one, (inside, _) in ends.items()}
-        outer = {one: outside for one, (_, outside) in ends.items() if outside is not None}
-        fine = [one for one in outer if not self._kinds[one[0]].apart]
+        inner = {name: inside for name, (inside, _) in ends.items()}
+        outer = {name: outside for name, (_, outside) in ends.items() if outside is not None}
+        fine = [pair for pair in outer if not self._kinds[pair[0]].apart]
         for _ in range(_HALVINGS if fine else 0):
             halves = [(i, 0.5 * (inner[i, way] + outer[i, way])) for i, way in fine]
             harmful, values = self._harmful(self._moved(halves))
             for k, (i, way) in enumerate(fine):
                 (inner if harmful[k] else outer)[i, way] = float(values[k, i])
-        return {one: (value, one in outer) for one, value in inner.items()}
+        return {name: (value, name in outer) for name, value in inner.items()}
 
     def _rounded(self, i: int, value: float, inwards: float) -> float:
         """Return a bound of few digits, moved inwards by less than half a step, not past ``v``."""
@@ -268,9 +272,9 @@ class Conditions:
     def _drawn(self, spans: Mapping[int, _Span], n: int) -> Float:
         """Return random values that meet all conditions, ``(n, n_var)``, feasible or not."""
         V = np.tile(self._v, (n, 1))
-        for i, one in spans.items():
+        for i, span in spans.items():
             share = self._random.random(n)
-            V[:, i] = one.low + share * (one.high - one.low)
+            V[:, i] = span.low + share * (span.high - span.low)
         return V
 
     def _inside(self, spans: Mapping[int, _Span]) -> Float:
@@ -283,8 +287,8 @@ class Conditions:
         if len(which) > _CORNERS:
             which = which[self._random.choice(len(which), _CORNERS, replace=False)]
         V = np.tile(self._v, (len(which), 1))
-        for (i, one), high in zip(spans.items(), which.T, strict=True):
-            V[:, i] = np.where(high, one.high, one.low)
+        for (i, span), high in zip(spans.items(), which.T, strict=True):
+            V[:, i] = np.where(high, span.high, span.low)
         return np.unique(self._meeting(V, spans), axis=0)
 
     def _meeting(self, V: Float, spans: Mapping[int, _Span]) -> Float:
@@ -303,25 +307,25 @@ class Conditions:
         Returns:
             The probes, and the harmful share of the random ones; 1 if another one is harmful.
         """
-        one, step = spans[i], self._steps[i]
+        span, step = spans[i], self._steps[i]
         parameter = self._space.parameters[self._space.variables[i]]
         V = self._drawn(spans, OUTSIDE)
         fixed = [(i, self._nominal[i])]
         if parameter.kind.names:
-            others = [k for k in range(len(parameter.kind.names)) if k != one.low]
+            others = [k for k in range(len(parameter.kind.names)) if k != span.low]
             V[:, i] = self._random.choice(others, OUTSIDE)
         else:
             beyond = []
-            if one.below:
-                fixed.append((i, one.low - step))
-                beyond.append((parameter.low, max(parameter.low, one.low - step)))
-            if one.above:
-                fixed.append((i, one.high + step))
-                beyond.append((min(parameter.high, one.high + step), parameter.high))
+            if span.below:
+                fixed.append((i, span.low - step))
+                beyond.append((parameter.low, max(parameter.low, span.low - step)))
+            if span.above:
+                fixed.append((i, span.high + step))
+                beyond.append((min(parameter.high, span.high + step), parameter.high))
             V[:, i] = self._within(beyond)
         harmful, values = self._harmful(np.concatenate([self._moved(fixed), V]))
         # What other parameters leave no room for is no probe.
-        is_outside = (values[:, i] < one.low) | (values[:, i] > one.high)
+        is_outside = (values[:, i] < span.low) | (values[:, i] > span.high)
         harmful &= is_outside
         probes = Probes(rows=int(is_outside.sum()), harmful=int(harmful.sum()))
         if harmful[: len(fixed)].any():
@@ -354,13 +358,13 @@ class Conditions:
 
 def _words(space: SearchSpace, name: str, span: _Span) -> str:
     """Return the values of a span as people read them: "≥ 3.4 m/s", "from 3.4 to 7 m/s"."""
-    one = space.parameters[name]
-    unit = "" if one.unit in _UNITLESS or one.kind.names else f" {one.unit}"
-    text = one.kind.text(span.low, _number), one.kind.text(span.high, _number)
+    parameter = space.parameters[name]
+    unit = "" if parameter.unit in _UNITLESS or parameter.kind.names else f" {parameter.unit}"
+    text = parameter.kind.text(span.low, _number), parameter.kind.text(span.high, _number)
     if text[0] == text[1]:
         return f"= {text[0]}{unit}"
     both = (span.below and span.above) or span.closed
-    if both or one.kind.turn is not None:  # neither end of a turn is lower
+    if both or parameter.kind.turn is not None:  # neither end of a turn is lower
         return f"from {text[0]} to {text[1]}{unit}"
     return f"≥ {text[0]}{unit}" if span.below else f"≤ {text[1]}{unit}"
 
@@ -381,12 +385,14 @@ def others(space: SearchSpace, X: Float, named: Sequence[str]) -> str:
     """
     moved: list[str] = []
     fixed: list[str] = []
-    for name, one in space.parameters.items():
-        unit = "" if one.unit in _UNITLESS or one.kind.names else f" {one.unit}"
-        values, default = X[:, space.index(name)], one.kind.text(one.default, _number)
-        if name in named or all(one.kind.text(v, _number) == default for v in np.unique(values)):
+    for name, parameter in space.parameters.items():
+        unit = "" if parameter.unit in _UNITLESS or parameter.kind.names else f" {parameter.unit}"
+        values, default = X[:, space.index(name)], parameter.kind.text(parameter.default, _number)
+        if name in named or all(
+            parameter.kind.text(v, _number) == default for v in np.unique(values)
+        ):
             continue
-        value = one.kind.text(values[0], _number)
+        value = parameter.kind.text(values[0], _number)
         text = name if value == default else f"{name} {value}{unit}"
         (fixed if name in space.fixed else moved).append(text)
     allowed = f" or as near as bounds allow ({', '.join(moved)})" if moved else ""
@@ -404,8 +410,12 @@ def sentence(conditions: Sequence[Condition], rest: str = "", *, draws: bool = F
     noise = f", {_NOISE}" if draws else ""
     if not conditions:
         return f"fails already with all parameters at their defaults{rest}{noise}"
-    needs = [f"{one.name} {one.needs}" for one in conditions if one.confirmed]
-    examples = [f"{one.name} {one.needs}" for one in conditions if not one.confirmed]
+    needs = [
+        f"{condition.name} {condition.needs}" for condition in conditions if condition.confirmed
+    ]
+    examples = [
+        f"{condition.name} {condition.needs}" for condition in conditions if not condition.confirmed
+    ]
     end = f", other parameters at default{rest}{noise}"
     if not needs:
         return f"fails, for example, with {_listed(examples)}{end}"

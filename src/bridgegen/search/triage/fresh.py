@@ -38,7 +38,7 @@ def failing_draws(space: SearchSpace, found: Triage | None, keep: int) -> dict[s
     """
     if found is None or found.fresh is None or found.bound.harmful:
         return {}
-    harm = np.array([one or 0.0 for one in found.fresh.harm])
+    harm = np.array([item or 0.0 for item in found.fresh.harm])
     _, X = draw(space, found.seed, len(harm))
     worst = np.argsort(-harm, kind="stable")[:keep].tolist()
     return {f"{FRESH}{k:02d}": X[i] for k, i in enumerate(worst, 1) if harm[i] >= NEAR_MISS}

@@ -49,36 +49,40 @@ def influences(space: SearchSpace, X: Numbers, fails: Bool, ok: Bool) -> tuple[I
     V, W = searched(space, bad), searched(space, good)
     found = []
     for k, name in enumerate(space.variables):
-        one = space.parameters[name]
+        parameter = space.parameters[name]
         distance, p = ks_2samp(V[:, k], W[:, k], method="asymp")
         p = min(1.0, float(p) * space.n_var)
         if p >= SIGNIFICANT:
             continue
         low = high = 0
-        if not one.kind.names and one.kind.turn is None:
-            end = END * (one.high - one.low)
-            low = int((V[:, k] <= one.low + end).sum())
-            high = int((V[:, k] >= one.high - end).sum())
+        if not parameter.kind.names and parameter.kind.turn is None:
+            end = END * (parameter.high - parameter.low)
+            low = int((V[:, k] <= parameter.low + end).sum())
+            high = int((V[:, k] >= parameter.high - end).sum())
         found.append(
             Influence(
                 name=name, distance=float(distance), p=p, failures=len(V), at_low=low, at_high=high
             )
         )
-    return tuple(sorted(found, key=lambda one: (-one.distance, one.name)))
+    return tuple(sorted(found, key=lambda influence: (-influence.distance, influence.name)))
 
 
 def ends_in_words(found: Sequence[Influence]) -> list[str]:
     """Return of each parameter at whose end many failures lie, how many; the most first."""
     said = []
-    for one in found:
-        for n, end in ((one.at_low, "lower"), (one.at_high, "upper")):
-            if n >= AT_END * one.failures:
+    for influence in found:
+        for n, end in ((influence.at_low, "lower"), (influence.at_high, "upper")):
+            if n >= AT_END * influence.failures:
                 said.append(
-                    (n, f"{n} of {one.failures} failures lie at the {end} end of {one.name}")
+                    (
+                        n,
+                        f"{n} of {influence.failures} failures lie at the {end} end of "
+                        f"{influence.name}",
+                    )
                 )
     return [text for _, text in sorted(said, key=lambda each: -each[0])]
 
 
 def in_words(found: Sequence[Influence], most: int = 3) -> str:
     """Return in one line which parameters matter most; "" if none does."""
-    return ", ".join(f"{one.name} ({one.distance:.2f})" for one in found[:most])
+    return ", ".join(f"{influence.name} ({influence.distance:.2f})" for influence in found[:most])

@@ -64,7 +64,7 @@ def _unavoidable(tested: Neighbourhood | None, preventable: bool | None, respons
     where, which = _IN_ONE_REPLAY, ""
     if tested is not None:
         where = "in a significant share of nearby scenarios"
-        which = f" ({', '.join(one.name for one in tested.fixes)})"
+        which = f" ({', '.join(fix.name for fix in tested.fixes)})"
     none = f"none of the fixes that were tried{which}"
     if preventable:
         return f"root cause not found: {BRAKING} would have avoided it, but {none} does {where}"

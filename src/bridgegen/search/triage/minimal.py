@@ -62,7 +62,9 @@ class Ladder:
     def of(cls, space: SearchSpace, x: Float) -> "Ladder":
         """Return the ladder of a row of X."""
         chosen = [space.parameters[name] for name in space.variables]
-        step = np.array([one.kind.step(one.low, one.high, RADIUS) for one in chosen])
+        step = np.array(
+            [parameter.kind.step(parameter.low, parameter.high, RADIUS) for parameter in chosen]
+        )
         start = searched(space, x[np.newaxis])[0]
         nominal = searched(space, space.row({})[np.newaxis])[0]
         rungs = np.ceil(np.abs(nominal - start) / step - 1e-9).astype(np.int64)
@@ -149,7 +151,7 @@ class Minimiser:
                 for i in np.flatnonzero(left).tolist():
                     sizes = {max(1, int(left[i]) // share) for share in shares}
                     jumps[m] += [(i, size) for size in sorted(sizes, reverse=True)]
-                tried[m] = np.array([_jumped(here[m], [one]) for one in jumps[m]], dtype=np.int64)
+                tried[m] = np.array([_jumped(here[m], [jump]) for jump in jumps[m]], dtype=np.int64)
                 tried[m] = tried[m].reshape(len(jumps[m]), self._space.n_var)
             alone = holds(ladders, ways, tried)
             allowed: dict[int, list[tuple[int, int]]] = {}
@@ -232,7 +234,10 @@ class Minimiser:
             ).find(_needed(ladders[m], here[m]))  # fmt: skip
             width = dict(zip(space.variables, ranges(space).tolist(), strict=True))
             conditions.sort(
-                key=lambda one: (-abs(one.value - one.nominal) / width[one.name], one.name)
+                key=lambda condition: (
+                    -abs(condition.value - condition.nominal) / width[condition.name],
+                    condition.name,
+                )
             )
             share, hits, rows = shares[k]
             found[m] = Minimal(

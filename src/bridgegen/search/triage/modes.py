@@ -86,9 +86,9 @@ def keys_of(
     """
     partner = [kinds.get(name, "") for name in findings.partner.tolist()]
     texts = (findings.conflict, findings.conflict_type, findings.responsible)
-    columns = zip(*(one.tolist() for one in texts), partner, place, cause, strict=True)
+    columns = zip(*(text.tolist() for text in texts), partner, place, cause, strict=True)
     known: dict[tuple[str, ...], Key] = {}
-    return [known.setdefault(one, Key(*one)) for one in columns]
+    return [known.setdefault(column, Key(*column)) for column in columns]
 
 
 def by_harm(harm: Float, U: Float) -> Int:
@@ -116,7 +116,7 @@ def group(keys: Sequence[Key], harm: Float, U: Float) -> list[Group]:
         labels = clusters(U[rows])
         parts = [rows[labels == k] for k in range(int(labels.max(initial=0)) + 1)]
         found += [Group(key, part, k if len(parts) > 1 else 0) for k, part in enumerate(parts, 1)]
-    rank = by_harm(harm[[one.rows[0] for one in found]], U[[one.rows[0] for one in found]])
+    rank = by_harm(harm[[item.rows[0] for item in found]], U[[item.rows[0] for item in found]])
     return [found[k] for k in rank.tolist()]
 
 
@@ -130,8 +130,8 @@ def rekeyed(groups: Sequence[Group], keys: Sequence[Key], harm: Float, U: Float)
         U: likewise.
     """
     held: dict[tuple[Key, int], list[Int]] = {}
-    for one, key in zip(groups, keys, strict=True):
-        held.setdefault((key, one.part), []).append(one.rows)
+    for item, key in zip(groups, keys, strict=True):
+        held.setdefault((key, item.part), []).append(item.rows)
     found = []
     for (key, part), rows in held.items():
         joined = np.concatenate(rows)
@@ -147,9 +147,9 @@ def clusters(U: Float) -> Int:
     Args:
         U: ``(n, n_var)``, the worst first.
     """
-    one = np.zeros(len(U), dtype=np.int64)
+    array = np.zeros(len(U), dtype=np.int64)
     if len(U) < 2 * LEAST_ROWS or not U.shape[1]:
-        return one
+        return array
     from scipy.cluster.hierarchy import fcluster, linkage
     from scipy.spatial import cKDTree
 
@@ -161,7 +161,7 @@ def clusters(U: Float) -> Int:
     numbers, counts = np.unique(labels, return_counts=True)
     large = numbers[counts >= max(LEAST_ROWS, LEAST_SHARE * len(some))]
     if len(large) < 2:
-        return one
+        return array
     core = np.flatnonzero(np.isin(labels, large))
     nearest = np.asarray(cKDTree(some[core]).query(scaled)[1])
     found = labels[core][nearest]
@@ -200,7 +200,7 @@ _RESPONSIBLE = {
 def by_frequency(rules: Iterable[str]) -> tuple[tuple[str, int], ...]:
     """Return rules with their numbers, the most frequent first; equal ones by name."""
     counts = Counter(rules)
-    return tuple(sorted(counts.items(), key=lambda one: (-one[1], one[0])))
+    return tuple(sorted(counts.items(), key=lambda pair: (-pair[1], pair[0])))
 
 
 def title(key: Key, rules: Sequence[str] = (), count: str = "ego") -> str:
@@ -212,7 +212,7 @@ def title(key: Key, rules: Sequence[str] = (), count: str = "ego") -> str:
         count: whose conflicts count, "ego" or "any": with the latter the ego need not be able to
             prevent them.
     """
-    kinds = {one.label: one for one in ConflictType}
+    kinds = {type_.label: type_ for type_ in ConflictType}
     contact, near = _TITLES[kinds.get(key.conflict_type, ConflictType.NONE)]
     partner = _ARTICLES.get(key.partner, f"a {key.partner}")
     if (*rules[:1], key.responsible) == (Rule.EMERGENCY_VEHICLE.label, "ego"):  # a car by its kind
@@ -221,7 +221,7 @@ def title(key: Key, rules: Sequence[str] = (), count: str = "ego") -> str:
     if key.place:
         text += f" {key.place}"
     known = {rule.label: words for rule, (words, _) in RULES.items()}
-    reason = "; or ".join(known.get(one, one) for one in rules if one)
+    reason = "; or ".join(known.get(name, name) for name in rules if name)
     responsible = _RESPONSIBLE.get(key.responsible, key.responsible)
     if count == "any":
         responsible = responsible.removesuffix(", preventable by the ego")

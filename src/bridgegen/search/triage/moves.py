@@ -51,7 +51,7 @@ def searched(space: SearchSpace, X: Float) -> Float:
 def ranges(space: SearchSpace) -> Float:
     """Return high − low of every searched parameter, ``(n_var,)``, > 0."""
     parameters = (space.parameters[name] for name in space.variables)
-    return np.array([one.high - one.low for one in parameters])
+    return np.array([parameter.high - parameter.low for parameter in parameters])
 
 
 def around(space: SearchSpace, x: Float, seed: int, number: int, n: int, radius: float) -> Float:
@@ -80,4 +80,6 @@ def around(space: SearchSpace, x: Float, seed: int, number: int, n: int, radius:
 def _reaches(space: SearchSpace) -> Float:
     """Return the range of which each searched parameter of a neighbour moves by a share."""
     parameters = (space.parameters[name] for name in space.variables)
-    return np.array([one.kind.reach(one.low, one.high) for one in parameters])
+    return np.array(
+        [parameter.kind.reach(parameter.low, parameter.high) for parameter in parameters]
+    )

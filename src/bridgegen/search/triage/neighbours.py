@@ -62,7 +62,7 @@ def neighbourhoods(
     """
     known: AsIs = {} if as_is is None else as_is
     ids = evaluations.tolist()
-    new = np.array([k for k, one in enumerate(ids) if one not in known], dtype=np.int64)
+    new = np.array([k for k, item in enumerate(ids) if item not in known], dtype=np.int64)
     harmful, ok, until = _simulate(pipeline, X[new], evaluations[new], seed, [_AS_IS])
     known |= {
         ids[k]: (harmful[j, :, 0], ok[j, :, 0], until[j, :, 0]) for j, k in enumerate(new.tolist())
@@ -71,13 +71,13 @@ def neighbourhoods(
     variants = [_MOVED, *range(len(tried))] if tried else []
     harmful, ok, until = _simulate(pipeline, X, evaluations, seed, variants)
     made = []
-    for k, one in enumerate(ids):
-        before, has, when = known[one]
+    for k, item in enumerate(ids):
+        before, has, when = known[item]
         # With the conflict, what followed is gone: harmless up to its time is enough.
         ok[k] |= (before & has)[:, np.newaxis] & (until[k] >= when[:, np.newaxis])
         made.append(
             _neighbourhood(
-                one,
+                item,
                 np.concatenate([before[:, np.newaxis], harmful[k]], axis=1),
                 np.concatenate([has[:, np.newaxis], ok[k]], axis=1),
                 tried, sampled,
@@ -103,7 +103,7 @@ def _simulate(
         ]
     )  # (K, 2, NEIGHBOURS, n)
     # Neighbour by neighbour, so that those of one road network are simulated by one worker.
-    rows = np.stack([near[:, int(one == _MOVED)] for one in variants], axis=2)
+    rows = np.stack([near[:, int(variant == _MOVED)] for variant in variants], axis=2)
     noise = np.broadcast_to(X[:, np.newaxis, np.newaxis], rows.shape)
     fix = np.broadcast_to(np.maximum(variants, _AS_IS), shape)
     n = len(space.names)
@@ -163,10 +163,10 @@ def cause_of(harmful: int, rows: int, fixes: Sequence[Treatment], placebo: Treat
         return ""
     if harmful < ROBUST * rows:
         return "sensitive"
-    for one in fixes:
-        if one.works and one.exceeds(placebo):
-            return one.cause
-    if any(one.rows < ENOUGH for one in fixes):
+    for fix in fixes:
+        if fix.works and fix.exceeds(placebo):
+            return fix.cause
+    if any(fix.rows < ENOUGH for fix in fixes):
         return UNKNOWN
     return Cause.UNAVOIDABLE.label
 

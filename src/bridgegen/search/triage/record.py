@@ -161,7 +161,11 @@ class Neighbourhood(_Model):
         """The fix that the cause was found by, if one was."""
         if self.placebo is None or self.cause in ("sensitive", "unavoidable", "not known", ""):
             return None
-        works = (one for one in self.fixes if one.works and one.exceeds(self.placebo))
+        works = (
+            treatment
+            for treatment in self.fixes
+            if treatment.works and treatment.exceeds(self.placebo)
+        )
         return next(works, None)
 
 
@@ -438,31 +442,31 @@ class Triage(_Model):
     @model_validator(mode="after")
     def _consistent(self) -> "Triage":
         if self.fresh is not None:
-            known = [one for one in self.fresh.harm if one is not None]
-            harmful = sum(one >= NEAR_MISS for one in known)
+            known = [value for value in self.fresh.harm if value is not None]
+            harmful = sum(value >= NEAR_MISS for value in known)
             if (self.bound.space.rows, self.bound.space.harmful) != (len(known), harmful):
                 raise ValueError("the fresh rows must be those that the share is estimated from")
             if len(self.fresh.mode) != len(self.fresh.harm):
                 raise ValueError("each fresh row must have its mode")
-        if [one.number for one in self.modes] != list(range(1, len(self.modes) + 1)):
+        if [mode.number for mode in self.modes] != list(range(1, len(self.modes) + 1)):
             raise ValueError("modes must be numbered 1, 2, …")
-        if sum(one.count for one in self.modes) > self.bound.harmful:
+        if sum(mode.count for mode in self.modes) > self.bound.harmful:
             raise ValueError("modes must not hold more rows than are harmful")
-        named = [i for one in self.modes for i in (one.worst, one.shown, *one.examples)]
-        named += [one.evaluation for one in self.neighbourhoods]
+        named = [i for mode in self.modes for i in (mode.worst, mode.shown, *mode.examples)]
+        named += [neighbourhood.evaluation for neighbourhood in self.neighbourhoods]
         if max(named, default=-1) >= self.bound.evaluations:
             raise ValueError(f"evaluation {max(named)} must be one of the run's")
         return self
 
     def neighbourhood(self, evaluation: int) -> Neighbourhood | None:
         """Return the results of an evaluation's neighbours, if they were tested."""
-        found = (one for one in self.neighbourhoods if one.evaluation == evaluation)
+        found = (item for item in self.neighbourhoods if item.evaluation == evaluation)
         return next(found, None)
 
     @property
     def robust(self) -> int:
         """How many modes are not knife-edge; those that were not tested count."""
-        return sum(not one.knife_edge for one in self.modes)
+        return sum(not mode.knife_edge for mode in self.modes)
 
 
 def write_record(folder: Path, triage: Triage) -> Path:

@@ -162,13 +162,13 @@ class _Triage:
         rows, tests = self._rows, self._tests
         U, harm = self._U, self._harm[self._at]
         place = self._places(U) if tests else [""] * len(self._at)
-        quick = [Cause(one).label for one in rows.cause[self._at].tolist()]
+        quick = [Cause(item).label for item in rows.cause[self._at].tolist()]
         kinds = self._pipeline.runner.kinds
         keys = keys_of(rows.findings.take(self._at), kinds, place, quick)
         every = group(keys, harm, U)
         self._unrecorded = len(every[MOST_MODES:])
         groups = every[:MOST_MODES]
-        shown = [int(one.rows[0]) for one in groups]
+        shown = [int(item.rows[0]) for item in groups]
         if tests:
             shown = self._test_robustness(groups, U, harm)
         exports = self._choose(shown, U, harm)
@@ -221,7 +221,7 @@ class _Triage:
     def _test_robustness(self, groups: Sequence[Group], U: Float, harm: Float) -> list[int]:
         """Simulate neighbours of the worst rows; return the row that represents each mode."""
         events = self._happened()
-        worst = [distinct(events, one.rows, self._effort.per_mode) for one in groups]
+        worst = [distinct(events, item.rows, self._effort.per_mode) for item in groups]
         every = by_harm(harm, U)
         several = distinct(events, every, self._effort.spare * max(self._keep, 1))
         self._simulate(dict.fromkeys(i for some in (*worst, several) for i in some), fixes=False)
@@ -282,13 +282,13 @@ class _Triage:
     ) -> tuple[list[Group], list[int]]:
         """Give modes the tested cause; modes that are then equal are merged."""
         keys = []
-        for one, i in zip(groups, shown, strict=True):
+        for item, i in zip(groups, shown, strict=True):
             cause = self._found[i].cause if i in self._found else ""
-            keys.append(one.key._replace(cause=cause) if cause else one.key)
+            keys.append(item.key._replace(cause=cause) if cause else item.key)
         joined = rekeyed(groups, keys, harm, U)
         held = np.zeros(len(harm), dtype=np.int64)
-        for k, one in enumerate(joined):
-            held[one.rows] = k
+        for k, item in enumerate(joined):
+            held[item.rows] = k
         of_each: list[list[int]] = [[] for _ in joined]
         for i in shown:
             of_each[int(held[i])].append(i)
@@ -301,8 +301,8 @@ class _Triage:
         """
         found: list[Minimal | None] = [None] * len(groups)
         first: dict[Any, int] = {}
-        for k, one in enumerate(groups if not self._space.decisions else ()):
-            first.setdefault((one.key.way, one.part), k)
+        for k, item in enumerate(groups if not self._space.decisions else ()):
+            first.setdefault((item.key.way, item.part), k)
         at = list(first.values())[: self._effort.minimal]
         if at:
             X = self._rows.X[self._at[np.array([shown[k] for k in at], dtype=np.int64)]]
@@ -318,7 +318,7 @@ class _Triage:
         fit = int(((rows.status == 0) & ~_implausible(rows)).sum())
         if self._algorithm in UNBIASED:
             drawn: Drawn = "sobol" if self._algorithm == "sobol" else "random"
-            each = [estimate(drawn, len(one.rows), fit) for one in groups]
+            each = [estimate(drawn, len(item.rows), fit) for item in groups]
             return estimate(drawn, len(self._at), fit), each, None
         n = self._effort.fresh
         is_possible = self._tests and self._pipeline.cause is None
@@ -331,13 +331,13 @@ class _Triage:
         mode = [0] * n
         own = self._U
         for i in np.flatnonzero(results.harmful).tolist():
-            same = [k for k, one in enumerate(groups) if one.key.way == keys[i]]
+            same = [k for k, item in enumerate(groups) if item.key.way == keys[i]]
             if same:  # of several that differ in cause, the one with the nearest row
                 gaps = [float(((own[groups[k].rows] - U[i]) ** 2).sum(axis=1).min()) for k in same]
                 mode[i] = same[int(np.argmin(gaps))] + 1
         ok = int(results.ok.sum())
         harm = zip(results.harm.tolist(), results.ok.tolist(), strict=True)
-        fresh = FreshRows(harm=tuple(one if has else None for one, has in harm), mode=tuple(mode))
+        fresh = FreshRows(harm=tuple(item if has else None for item, has in harm), mode=tuple(mode))
         each = [estimate("fresh", mode.count(k), ok) for k in range(1, len(groups) + 1)]
         return estimate("fresh", int(results.harmful.sum()), ok), each, fresh
 
@@ -357,22 +357,22 @@ class _Triage:
         self._judge([*tested, *sample, *shown])
         names = {i: f"{order.index(self._at[i]) + 1:04d}" for i in exports}
         modes = []
-        for k, (one, i) in enumerate(zip(groups, shown, strict=True), start=1):
-            members = np.isin(exports, one.rows).tolist()
+        for k, (item, i) in enumerate(zip(groups, shown, strict=True), start=1):
+            members = np.isin(exports, item.rows).tolist()
             kept = [names[j] for j, has in zip(exports, members, strict=True) if has and j != i]
             near = self._found.get(i)
-            rules = by_frequency(rows.findings.rule[self._at[one.rows]].tolist())
+            rules = by_frequency(rows.findings.rule[self._at[item.rows]].tolist())
             modes.append(
                 Mode(
-                    number=k, title=self._title(one, groups, [rule for rule, _ in rules]),
-                    **one.key._asdict(), rule=rules[0][0], rules=rules,
-                    judgement=self._judgement(i, one.key.cause),
+                    number=k, title=self._title(item, groups, [rule for rule, _ in rules]),
+                    **item.key._asdict(), rule=rules[0][0], rules=rules,
+                    judgement=self._judgement(i, item.key.cause),
                     tested=near is not None and near.cause != "",
-                    count=len(one.rows), space=shares[k - 1],
-                    harm=float(self._harm[self._at[one.rows]].max()),
-                    severity=self._severity(one), worst=int(ids[one.rows[0]]), shown=int(ids[i]),
+                    count=len(item.rows), space=shares[k - 1],
+                    harm=float(self._harm[self._at[item.rows]].max()),
+                    severity=self._severity(item), worst=int(ids[item.rows[0]]), shown=int(ids[i]),
                     robustness=None if near is None else near.robustness,
-                    examples=tuple(ids[one.rows[:MOST_EXAMPLES]].tolist()),
+                    examples=tuple(ids[item.rows[:MOST_EXAMPLES]].tolist()),
                     exports=(*([names[i]] if i in names else []), *kept),
                     minimal=minimal[k - 1],
                 )
@@ -439,23 +439,23 @@ class _Triage:
             responsible=str(self._rows.findings.responsible[self._at[i]]),
         )  # fmt: skip
 
-    def _severity(self, one: Group) -> float:
+    def _severity(self, item: Group) -> float:
         names = self._pipeline.metrics
         if "severity" not in names:
             return 0.0
-        column = self._rows.metrics[self._at[one.rows], names.index("severity")]
+        column = self._rows.metrics[self._at[item.rows], names.index("severity")]
         return float(np.nan_to_num(column, nan=0.0).max())
 
-    def _title(self, one: Group, groups: Sequence[Group], rules: Sequence[str]) -> str:
+    def _title(self, item: Group, groups: Sequence[Group], rules: Sequence[str]) -> str:
         """Return a mode in words; a cluster also with the parameter that separates it."""
-        text = title(one.key, rules, self._pipeline.objective.count)
-        others = [g.rows for g in groups if g is not one and g.key == one.key]
-        if not one.part or not others:
+        text = title(item.key, rules, self._pipeline.objective.count)
+        others = [g.rows for g in groups if g is not item and g.key == item.key]
+        if not item.part or not others:
             return text
         names, at = self._space.variables, self._at
         X, rest = (
             searched(self._space, self._rows.X[at[rows]])
-            for rows in (one.rows, np.concatenate(others))
+            for rows in (item.rows, np.concatenate(others))
         )
         found = where(X, rest, names)
         if found is None:

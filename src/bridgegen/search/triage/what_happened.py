@@ -51,8 +51,8 @@ def _coordinates(numbers: Float, least: Float, labels: Sequence[npt.NDArray[np.g
     width = np.maximum(high - low, least)
     shares = np.divide(numbers - low, width, out=np.zeros_like(numbers), where=finite & (width > 0))
     columns = [np.where(finite, shares, 2.0)]
-    for one in labels:
-        _, which = np.unique(one, return_inverse=True)
+    for label in labels:
+        _, which = np.unique(label, return_inverse=True)
         columns.append(np.eye(int(which.max(initial=0)) + 1)[which.reshape(-1)] / np.sqrt(2.0))
     # ``apart`` takes the mean of all columns: that of the numbers is meant, and each label alone.
     total = sum(part.shape[1] for part in columns)

@@ -34,7 +34,7 @@ def parameters_in_words(found: Triage) -> str:
     text, ends = in_words(found.influences), ends_in_words(found.influences)
     if text:
         text = f"{text}: distance of failures from other rows, 0 to 1"
-    return "; ".join([*([text] if text else []), *(f"{one}: widen the range?" for one in ends[:1])])
+    return "; ".join([*([text] if text else []), *(f"{end}: widen the range?" for end in ends[:1])])
 
 
 def shortly(mode: Mode) -> str:
@@ -42,7 +42,7 @@ def shortly(mode: Mode) -> str:
     often = f"{mode.count} evaluation" + "s" * (mode.count != 1)
     severe = f"MAIS3+ {percent(mode.severity)}" if mode.conflict == "contact" else ""
     cause = mode.judgement.partition(":")[0] or mode.cause
-    return f"{mode.title}: {', '.join(one for one in (often, severe, cause) if one)}"
+    return f"{mode.title}: {', '.join(name for name in (often, severe, cause) if name)}"
 
 
 def robustness_in_words(mode: Mode, found: Triage) -> str:

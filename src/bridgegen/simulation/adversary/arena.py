@@ -96,8 +96,8 @@ class Arena:
         U[:, self.decisions.ravel()] = 0.5
         X = space.decode(U)
         rows = [space.values(x) for x in X]
-        courses = [self._source.begin(one) for one in rows]
-        models = [self._source.roads(one) for one in rows]
+        courses = [self._source.begin(row) for row in rows]
+        models = [self._source.roads(row) for row in rows]
         told = [{who.participant: course.whole()} for course in courses]
         network = self._simulator.roads(models, told)
         columns = {name: X[:, i] for i, name in enumerate(space.names)}
@@ -117,7 +117,7 @@ class Arena:
                 values = space.decode(U)[:, at[number]]
                 for course, value in zip(courses, values.tolist(), strict=True):
                     course.decide(number, *value)
-                part = np.array([one.points[k : k + steps + 1] for one in courses])
+                part = np.array([item.points[k : k + steps + 1] for item in courses])
                 network.amend(who.participant, k, rounded(part.reshape(-1, 4)).reshape(part.shape))
             batch.before_driver(k)
             batch.after_driver(k, *batch.demand(k))
@@ -128,15 +128,17 @@ class Arena:
     ) -> Float:
         """Return what the adversary sees at instant k, ``(N, len(OBSERVED))``; see `OBSERVED`."""
         record, e = batch.record, self._entity
-        x, y, h, v = (one[:, e, k] for one in (record.x, record.y, record.h, record.v))
+        x, y, h, v = (array[:, e, k] for array in (record.x, record.y, record.h, record.v))
         dx, dy = record.x[:, 0, k] - x, record.y[:, 0, k] - y
         turned, ego_v = record.h[:, 0, k] - h, record.v[:, 0, k]
         ego_a = record.a[:, 0, k - 1] if k else np.zeros(len(x))
         zone = network.zones(self._source.adversary.participant)
-        way = zone[:, 2] - np.array([one.travelled for one in courses])
+        way = zone[:, 2] - np.array([course.travelled for course in courses])
         ego_way = zone[:, 0] - batch.state.station[:, 0]
-        top, room = (np.array([getattr(one, name) for one in courses]) for name in ("top", "room"))
-        aside = np.array([one.state[1] for one in courses])
+        top, room = (
+            np.array([getattr(course, name) for course in courses]) for name in ("top", "room")
+        )
+        aside = np.array([course.state[1] for course in courses])
         with np.errstate(invalid="ignore", divide="ignore"):
             seen = [
                 np.full(len(x), k / self._simulator.program.n_steps),

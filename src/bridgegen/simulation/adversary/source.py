@@ -134,8 +134,8 @@ class AdversarySource:
         self.adversary: Adversary = inner.constraints.adversary
         self._inner = inner
         left = {
-            name: one
-            for name, one in inner.constraints.parameters.items()
+            name: parameter
+            for name, parameter in inner.constraints.parameters.items()
             if name not in self.adversary.controls
         }
         self.constraints = replace(inner.constraints, parameters=left)

@@ -390,7 +390,7 @@ def states(n: int, sizes: Mapping[str, int], given: Mapping[str, np.ndarray]) ->
     arrays: dict[str, Any] = dict(given)
     for name, number, axes in _declared():
         if name not in arrays:
-            shape = (one if isinstance(one, int) else sizes[one] for one in axes)
+            shape = (axis if isinstance(axis, int) else sizes[axis] for axis in axes)
             arrays[name] = np.zeros((n, *shape), dtype=number)
     return State(**arrays)
 

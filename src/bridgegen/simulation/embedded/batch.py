@@ -202,11 +202,14 @@ class Batch:
             again := np.flatnonzero(self.state.ending[:, memory.STATUS] == memory.UNPLANNED)
         ).size:
             wanted = np.column_stack((self._rows[again], self.state.wanted[again]))
-            self._roads.plan(tuple(one) for one in wanted.tolist())
+            self._roads.plan(tuple(item) for item in wanted.tolist())
             state = _taken(_seen(before[0], self.state), again)
             record = _taken(self.record, again)
             record.began[:] = before[1][again]
-            mine = (one[again] if isinstance(one, np.ndarray) else one for one in arguments)
+            mine = (
+                argument[again] if isinstance(argument, np.ndarray) else argument
+                for argument in arguments
+            )
             messages = kernel(
                 *mine, self._plan, self._roads.tables, self._rows[again], state, record
             )

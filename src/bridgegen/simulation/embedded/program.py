@@ -369,7 +369,7 @@ class Program:
                 for action in self.actions[element[FIRST] : element[LAST]]:
                     if action[DOES] < FIRST_GLOBAL:
                         found[element[EVENT_NUMBER]].add(int(action[WHOM]))
-        return [frozenset(one) for one in found]
+        return [frozenset(group) for group in found]
 
     @property
     def switches_lamps(self) -> bool:

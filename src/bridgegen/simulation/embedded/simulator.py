@@ -71,7 +71,7 @@ def weathers(
     now = np.zeros(WEATHER)
     set_clear(now)
     found: list[tuple[int, Float]] = []
-    for k, environment in sorted(changes, key=lambda one: one[0]):
+    for k, environment in sorted(changes, key=lambda pair: pair[0]):
         change(now, program.weathers, environment, slots)
         if found and found[-1][0] == k:
             found.pop()

@@ -99,7 +99,7 @@ class ScenarioFile:
         """Return what esmini calls each event, in the order of the file."""
         root = etree.fromstring(self._data)
         return [
-            "::".join(str(one.get("name")) for one in reversed(_named(event)))
+            "::".join(str(element.get("name")) for element in reversed(_named(event)))
             for event in root.iter("Event")
         ]
 
@@ -128,8 +128,8 @@ class Template:
     def __init__(self, root: Node) -> None:
         self._root = root
         self._declared = {
-            str(one.get("name")): one
-            for one in root.iterfind("./ParameterDeclarations/ParameterDeclaration")
+            str(element.get("name")): element
+            for element in root.iterfind("./ParameterDeclarations/ParameterDeclaration")
         }
         self._expressions = [
             (node, str(name), expression)
@@ -190,7 +190,10 @@ def _named(event: Node) -> list[Node]:
     """Return an event and what it is part of, up to its story."""
     return [
         event,
-        *(one for one in event.iterancestors("Maneuver", "ManeuverGroup", "Act", "Story")),
+        *(
+            iterancestor
+            for iterancestor in event.iterancestors("Maneuver", "ManeuverGroup", "Act", "Story")
+        ),
     ]
 
 
@@ -228,7 +231,9 @@ def _assigned() -> Node:
 def _groups_of(root: Node, name: str) -> Iterator[Node]:
     """Yield the maneuver groups in which an entity acts."""
     for group in root.iter("ManeuverGroup"):
-        if any(one.get("entityRef") == name for one in group.iterfind("./Actors/EntityRef")):
+        if any(
+            element.get("entityRef") == name for element in group.iterfind("./Actors/EntityRef")
+        ):
             yield group
 
 

@@ -169,7 +169,7 @@ class EsminiProcess:
 # --- In the esmini process ------------------------------------------------------------------------
 
 REFUSALS: dict[str, type[BridgeGenError]] = {
-    one.__name__: one for one in (InputError, StorageError)
+    function.__name__: function for function in (InputError, StorageError)
 }
 """Errors that are passed to the user unchanged, whichever process raises them."""
 
@@ -211,7 +211,7 @@ class Answers:
         try:
             return answers[what](*rest)
         except tuple(REFUSALS.values()) as error:
-            kind = next(name for name, one in REFUSALS.items() if isinstance(error, one))
+            kind = next(name for name, refusal in REFUSALS.items() if isinstance(error, refusal))
             raise CallError(kind, str(error)) from None
 
     def _take(self, job: Job, layout: "Layout") -> None:

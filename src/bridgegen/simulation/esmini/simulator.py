@@ -166,7 +166,7 @@ class EsminiSimulator:
         if not (rows.min() >= 0 and rows.max() < roads.network.n_networks):
             raise InputError(f"rows must name one of {roads.network.n_networks} road networks")
         self.embedded.program.fill(values, n)  # checks that all values are finite
-        columns = {name: np.broadcast_to(one, n) for name, one in values.items()}
+        columns = {name: np.broadcast_to(value, n) for name, value in values.items()}
         parts: list[tuple[Int, Rollout]] = []
         with self._idle_process() as process:
             for i, network in enumerate(rows.tolist()):

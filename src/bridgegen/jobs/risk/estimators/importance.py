@@ -52,11 +52,11 @@ class Evidence:
         It is compared with subset simulation and then with exploration, unless these are in doubt.
         The first one that agrees raises the upper end by what it may have missed.
         """
-        believed = [one for one in (self.levels, self.spread) if not one.doubts]
+        believed = [weighted for weighted in (self.levels, self.spread) if not weighted.doubts]
         if not believed:
             believed = [self.spread if len(self.spread.Z) and not self.helped else self.levels]
         found = [self._compared(result, known, aim) for known in believed]
-        best = next((one for one in found if not one.doubts), found[0])
+        best = next((weighted for weighted in found if not weighted.doubts), found[0])
         return replace(best, facts={**best.facts, "spread": float(self.spread.rows)})
 
     def _compared(self, result: Weighted, known: Weighted, aim: Aim) -> Weighted:
@@ -177,7 +177,7 @@ def learn(
         points = np.concatenate(found)
         if not len(points):
             continue
-        weights = 1.0 / np.mean([1.0 / one.weights(points) for one in drawn], axis=0)
+        weights = 1.0 / np.mean([1.0 / item.weights(points) for item in drawn], axis=0)
         size = float(weights.sum() ** 2 / np.sum(weights * weights))
         proposals = replace(Proposals.of(points, weights, size, random), kernels=first.kernels)
         if size >= ENOUGH:
@@ -291,7 +291,7 @@ def _drawn(
 def _result(
     problem: Problem, kept: list[tuple[Float, Float, Float]], drawn: int, spent: int
 ) -> Weighted:
-    Z, found, weight = (np.concatenate(one) for one in zip(*kept, strict=True))
+    Z, found, weight = (np.concatenate(pair) for pair in zip(*kept, strict=True))
     low, share, high = problem.share
     factor = 1.0 / (drawn * share)
     return Weighted(

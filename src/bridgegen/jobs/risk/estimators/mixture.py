@@ -122,10 +122,10 @@ def _begin(Z: Float, weights: Float, count: int, random: np.random.Generator) ->
     """Return the responsibilities of components that begin far apart (k-means++)."""
     centres = [Z[random.choice(len(Z), p=weights)]]
     while len(centres) < count:
-        away = np.min([np.sum((Z - one) ** 2, axis=1) for one in centres], axis=0) * weights
+        away = np.min([np.sum((Z - centre) ** 2, axis=1) for centre in centres], axis=0) * weights
         total = away.sum()
         centres.append(Z[random.choice(len(Z), p=away / total if total > 0.0 else weights)])
-    distances = np.array([np.sum((Z - one) ** 2, axis=1) for one in centres])
+    distances = np.array([np.sum((Z - centre) ** 2, axis=1) for centre in centres])
     nearest: Int = np.argmin(distances, axis=0)
     found = np.zeros((len(Z), count))
     found[np.arange(len(Z)), nearest] = 1.0

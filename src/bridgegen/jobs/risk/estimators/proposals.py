@@ -74,6 +74,6 @@ class Proposals:
             (1.0 - DEFENSIVE - AROUND, self.fitted.log_density(Z)),
             (AROUND, self.kernels.log_density(Z)),
         )
-        ratio = sum(share * np.exp(np.minimum(one - road, 700.0)) for share, one in parts)
+        ratio = sum(share * np.exp(np.minimum(part - road, 700.0)) for share, part in parts)
         found: Float = 1.0 / (DEFENSIVE + ratio)
         return found

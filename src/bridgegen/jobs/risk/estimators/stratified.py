@@ -47,7 +47,7 @@ def estimate(problem: Problem, aim: Aim, seed: int) -> Weighted:
         hit = found[:, SCORE] >= aim.least
         weight = np.full(int(hit.sum()), masses[shell] / count / share[1])
         parts.append((Z[hit], found[hit], weight))
-    Z, found, weights = (np.concatenate(one) for one in zip(*parts, strict=True))
+    Z, found, weights = (np.concatenate(pair) for pair in zip(*parts, strict=True))
     low, middle, high = share
     largest = float(np.max(masses / counts)) / middle
     result = Weighted(

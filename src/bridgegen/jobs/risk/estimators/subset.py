@@ -134,7 +134,7 @@ class _Chains:
             active, Z, found = active[keep], Z[keep], found[keep]
             Z, found, _ = self.step(Z, found, level)
             parts.append((Z, found, owner[active]))
-        Z, found, owner = (np.concatenate(one) for one in zip(*parts, strict=True))
+        Z, found, owner = (np.concatenate(pair) for pair in zip(*parts, strict=True))
         return Z, found, owner
 
 
@@ -227,7 +227,7 @@ def repeat(
         weight *= passing
         Z, found, owner = chains.split(Z, found, owner, 1.0 / passing, level)
     kept.append((Z, found, np.full(len(Z), weight), owner))
-    Z, found, weights, owner = (np.concatenate(one) for one in zip(*kept, strict=True))
+    Z, found, weights, owner = (np.concatenate(pair) for pair in zip(*kept, strict=True))
     return Z, found, weights, owner, chains.evaluations
 
 
@@ -255,7 +255,7 @@ def simulate(problem: Problem, aim: Aim, seed: int) -> Weighted:
     """Run the pilot, then repetitions until the precision or the budget is reached."""
     first = pilot(problem, aim, seed)
     spent, rounds = first.evaluations, 0
-    cost = 1.0 + sum(1.0 - one for one in first.passing[:-1])  # evaluations a point, expected
+    cost = 1.0 + sum(1.0 - value for value in first.passing[:-1])  # evaluations a point, expected
     affordable = (aim.budget - spent) / (MARGIN * cost * TOGETHER)
     points = int(affordable / max(FEWEST_ROUNDS, math.ceil(affordable / POINTS)))
     parts: list[tuple[Float, Float, Float, Int]] = []
@@ -320,7 +320,9 @@ def _result(
         np.empty((0, problem.dimensions)), np.empty((0, problem.columns)), np.empty(0),
         np.empty(0, np.int64),
     )  # fmt: skip
-    Z, found, weights, owner = (np.concatenate(one) for one in zip(*(parts or [none]), strict=True))
+    Z, found, weights, owner = (
+        np.concatenate(pair) for pair in zip(*(parts or [none]), strict=True)
+    )
     share = weights / max(count, 1)
     largest = float(share.max(initial=0.0))
     return Weighted(Z, found, share, 0, owner, count, largest, (1.0, 1.0, 1.0), spent)

@@ -273,7 +273,7 @@ def _with_turns(arm: Arm, sections: tuple[LaneSection, ...]) -> tuple[LaneSectio
     (section,) = sections
     left = arm.lane_id(0, inbound=True) > 0
     lanes = tuple(
-        replace(lane, user_data=tuple(user_datum("allows_turn", one) for one in sorted(turns)))
+        replace(lane, user_data=tuple(user_datum("allows_turn", turn) for turn in sorted(turns)))
         for lane in (section.left if left else section.right)
         for turns in (arm.turns[abs(lane.id) - 1] if abs(lane.id) <= len(arm.turns) else (),)
     )

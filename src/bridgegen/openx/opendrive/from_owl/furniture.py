@@ -137,11 +137,11 @@ def signals_on(
 def ranges(ids: Sequence[int]) -> tuple[Validity, ...]:
     """Return lane ids as ranges without gaps, in ascending order; 0 is no lane and no gap."""
     found: list[Validity] = []
-    for one in sorted(set(ids)):
-        if found and one - found[-1].to_lane == (2 if found[-1].to_lane == -1 else 1):
-            found[-1] = Validity(found[-1].from_lane, one)
+    for number in sorted(set(ids)):
+        if found and number - found[-1].to_lane == (2 if found[-1].to_lane == -1 else 1):
+            found[-1] = Validity(found[-1].from_lane, number)
         else:
-            found.append(Validity(one, one))
+            found.append(Validity(number, number))
     return tuple(found)
 
 
@@ -177,7 +177,7 @@ def controllers_of(individuals: Individuals) -> tuple[Controller, ...]:
             groups.setdefault(tuple(shown), []).append(_id(individuals, light))
         for shown_to, lights in groups.items():
             number = str(len(found) + 1)
-            controls = tuple(Control(one, "0") for one in sorted(lights))
+            controls = tuple(Control(name, "0") for name in sorted(lights))
             about = _program(individuals, controller, dict(shown_to))
             found.append(Controller(number, f"signals {number}", len(found), controls, about))
     return tuple(found)
@@ -196,7 +196,7 @@ def _program(
     if offset is not None:
         data.append(user_datum("has_offset", offset))
     phases = individuals.links(controller, "has_phase")
-    for phase in sorted(phases, key=lambda one: individuals.integer(one, "has_index")):
+    for phase in sorted(phases, key=lambda node: individuals.integer(node, "has_index")):
         index = individuals.integer(phase, "has_index")
         state = STATES[shown[index]] if index in shown else "red"
         duration = individuals.number(phase, "has_duration")

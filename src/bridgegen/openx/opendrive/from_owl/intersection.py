@@ -166,7 +166,9 @@ def build(
         junction_id,
         name,
         tuple(connections),
-        controllers=tuple(JunctionController(one.id, type="0") for one in controllers),
+        controllers=tuple(
+            JunctionController(controller.id, type="0") for controller in controllers
+        ),
         user_data=user_data,
     )
     return OpenDrive(header, tuple(roads), controllers, (junction,))

@@ -116,17 +116,17 @@ class _Lanes:
         self._lanes: dict[str, dict[int, tuple[str, float, frozenset[str]]]] = {"in": {}, "out": {}}
         usual = individuals.optional_number(leg, "has_lane_width")
         lanes, strips = individuals.links(leg, "has_lane"), individuals.links(leg, "has_strip")
-        starts = {one: individuals.optional_number(one, "has_section_start") or 0.0
-                  for one in (*lanes, *strips)}  # fmt: skip
+        starts = {node: individuals.optional_number(node, "has_section_start") or 0.0
+                  for node in (*lanes, *strips)}  # fmt: skip
         if len(set(starts.values())) > 1 and not widens:
             problems.append(
                 f"{self._what}: a generated road must have one lane section, got "
                 f"{len(set(starts.values()))} (has_section_start)"
             )
         far = (min if junction_end == "end" else max)(starts.values(), default=0.0)
-        for lane in (one for one in lanes if starts[one] == far):
+        for lane in (node for node in lanes if starts[node] == far):
             self._take(lane, "driving", usual)
-        for strip in (one for one in strips if starts[one] == far):
+        for strip in (node for node in strips if starts[node] == far):
             kind = next((k for name, k in _STRIPS.items() if individuals.is_a(strip, name)), None)
             self._take(strip, kind or individuals.text(strip, "has_lane_type"), None)
         for direction, count in (("in", "has_inbound_lanes"), ("out", "has_outbound_lanes")):

@@ -104,11 +104,11 @@ def build(
         arm, lane = (main, k) if k < count else (ramp, 0)
         if k < count:
             y = -after.offset(k, inbound=False)
-            one, other = Ray(0.0, -main.offset(k, inbound=True), 0.0), Ray(NOSE, y, 0.0)
+            ray, other = Ray(0.0, -main.offset(k, inbound=True), 0.0), Ray(NOSE, y, 0.0)
             to_width = after.outbound[k]
         else:
-            one, other, to_width = start, end, width
-        road = _connecting(arm, lane, after, k, to_width, one, other, str(free + k), junction_id)
+            ray, other, to_width = start, end, width
+        road = _connecting(arm, lane, after, k, to_width, ray, other, str(free + k), junction_id)
         roads.append(road)
         connections.append(
             Connection(str(k), arm.road_id, road.id, "start", (LaneLink(-lane - 1, -1),))

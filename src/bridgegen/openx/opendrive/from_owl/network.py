@@ -181,8 +181,8 @@ def _measure(individuals: Individuals, node: Subject, name: str, problems: list[
 def _ids(junction_id: str, arms: Sequence[Arm]) -> list[str]:
     """Return ids that collide: CARLA finds no way into a junction that is called like a road."""
     counts = Counter([junction_id, *(arm.road_id for arm in arms)])
-    things = Counter(one.id for arm in arms for one in arm.objects)
-    things += Counter(one.id for arm in arms for one in arm.signals)
+    things = Counter(obj.id for arm in arms for obj in arm.objects)
+    things += Counter(signal.id for arm in arms for signal in arm.signals)
     return [
         f"road and junction ids must differ from each other, got '{value}' {count} times"
         for value, count in counts.items()

@@ -78,7 +78,7 @@ def build(
     free = max(int(ids[-1]), *(int(arm.road_id) for arm in arms)) + 1
     rings = [str(free + k) for k in range(len(around))]
     free += len(rings)
-    roads = [arm_road(arm, radius + APPROACH, one) for arm, one in zip(around, ids, strict=True)]
+    roads = [arm_road(arm, radius + APPROACH, item) for arm, item in zip(around, ids, strict=True)]
     junctions: list[Junction] = []
     for k, arm in enumerate(around):
         following = (k + 1) % len(around)

@@ -225,7 +225,7 @@ def _valid(road: Road, s: float, validity: Sequence[Validity]) -> list[int]:
     """Return the ids of the driving lanes at ``s`` that an element is valid for."""
     return [
         lane.id for lane in road.sections[section_index(road, s)].lanes
-        if lane.drivable and any(one.from_lane <= lane.id <= one.to_lane for one in validity)
+        if lane.drivable and any(item.from_lane <= lane.id <= item.to_lane for item in validity)
     ]  # fmt: skip
 
 

@@ -44,7 +44,7 @@ class Junctions:
 
     def __init__(self, builder: Builder, network: ox.NamedNode, model: OpenDrive) -> None:
         self._builder, self._network, self._model = builder, network, model
-        self.kinds = {one.id: kind for one in model.junctions if (kind := _kind(one))}
+        self.kinds = {item.id: kind for item in model.junctions if (kind := _kind(item))}
         self._whole = {
             junction.id: first
             for junction in model.junctions
@@ -68,19 +68,19 @@ class Junctions:
             raise UnsupportedError(f"{what} cannot be said in the ontology")
         put = self._builder.put
         parts = [
-            one for one in self._model.junctions
-            if self._whole.get(one.id, one.id) == junction.id
+            item for item in self._model.junctions
+            if self._whole.get(item.id, item.id) == junction.id
         ]  # fmt: skip
-        ids = [one.id for one in parts]
+        ids = [item.id for item in parts]
         inner, legs = [], []
         for road in self._model.roads:
-            touches = sum(len(road.ends_at(one)) for one in ids)
+            touches = sum(len(road.ends_at(item)) for item in ids)
             if road.junction in ids or (touches == 2 and len(ids) > 1):
                 inner.append(road)
             elif touches:
                 legs.append(road)
         if not legs:  # roads lead from one junction into another
-            legs = [road for road in inner if any(road.ends_at(one) for one in ids)]
+            legs = [road for road in inner if any(road.ends_at(name) for name in ids)]
         if not legs:
             return  # no road leads there
         kind = self.kinds.get(junction.id) or _BY_LEGS.get(len(legs), "Intersection")
@@ -127,7 +127,7 @@ class Junctions:
 def _kind(junction: Junction) -> str | None:
     """Return the class that our ``userData`` gives a junction, with all that it needs."""
     for name in values_of(junction.user_data, "class")[:1]:
-        needed = (number(junction.user_data, one) for one in _NEEDED.get(name, ()))
+        needed = (number(junction.user_data, item) for item in _NEEDED.get(name, ()))
         if name in KINDS and all(value is not None and value > 0.0 for value in needed):
             return name
     return None
@@ -367,7 +367,7 @@ def has_width(road: Road, index: int, lane: Lane) -> bool:
 
 def _speed_limit(road: Road) -> float | None:
     """Return the first speed limit of a road [m/s], where it has one above 0."""
-    speeds = [one.speed.metres_per_second for one in road.types if one.speed is not None]
+    speeds = [kind.speed.metres_per_second for kind in road.types if kind.speed is not None]
     return speeds[0] if speeds and speeds[0] else None
 
 
@@ -388,7 +388,9 @@ def losses(model: OpenDrive) -> Iterator[str]:
         name: frozenset(tbox().allowed[name]) for name in ("has_road_type", "has_marking_type")
     }
     curves = sum(
-        isinstance(one.shape, Poly3 | ParamPoly3) for road in model.roads for one in road.plan_view
+        isinstance(geometry.shape, Poly3 | ParamPoly3)
+        for road in model.roads
+        for geometry in road.plan_view
     )
     if curves:
         yield (
@@ -396,12 +398,12 @@ def losses(model: OpenDrive) -> Iterator[str]:
             "at both ends are kept, their course between is not"
         )
     objects = Counter(
-        one.type or "none" for road in model.roads for one in road.objects if class_of(one) is None
+        obj.type or "none" for road in model.roads for obj in road.objects if class_of(obj) is None
     )
     if objects:
         listed = ", ".join(f"{kind} ({count})" for kind, count in sorted(objects.items()))
         yield f"objects that the ontology has no class for are left out: {listed}"
-    several = sum(len({(one.type, one.speed) for one in road.types}) > 1 for road in model.roads)
+    several = sum(len({(kind.type, kind.speed) for kind in road.types}) > 1 for road in model.roads)
     if several:
         yield f"{several} roads change their type or speed limit: the first is kept"
     lines = Counter(
@@ -416,7 +418,7 @@ def losses(model: OpenDrive) -> Iterator[str]:
         listed = ", ".join(f"{kind} ({count})" for kind, count in sorted(lines.items()))
         yield f"lines of unknown kinds are left out: {listed}"
     types = sorted(
-        {one.type for road in model.roads for one in road.types} - known["has_road_type"]
+        {type_.type for road in model.roads for type_ in road.types} - known["has_road_type"]
     )
     if types:
         yield f"road types that the standard does not have are left out: {', '.join(types)}"

@@ -198,7 +198,7 @@ class Actions:
             )
         )  # fmt: skip
         limits = None
-        if any(one is not None for one in (faster, slower, fastest)):
+        if any(value is not None for value in (faster, slower, fastest)):
             limits = osc.DynamicConstraints(faster, slower, fastest)
         if (distance is None) == (time is None):
             raise OntologyError(
@@ -243,9 +243,9 @@ class Actions:
         ind = self._individuals
         trajectory = ind.link(node, "has_trajectory")
         vertices = sorted(
-            ind.links(trajectory, "has_vertex"), key=lambda one: ind.integer(one, "has_index")
+            ind.links(trajectory, "has_vertex"), key=lambda link: ind.integer(link, "has_index")
         )
-        times = [ind.optional_number(one, "has_time") for one in vertices]
+        times = [ind.optional_number(vertex, "has_time") for vertex in vertices]
         timed = all(time is not None for time in times)
         if not timed and any(time is not None for time in times):
             raise OntologyError(
@@ -257,8 +257,8 @@ class Actions:
             )
         del actor
         points = [
-            (self._places.position(ind.link(one, "has_position"), oriented=False), time)
-            for one, time in zip(vertices, times, strict=True)
+            (self._places.position(ind.link(vertex, "has_position"), oriented=False), time)
+            for vertex, time in zip(vertices, times, strict=True)
         ]
         line: osc.Polyline | osc.Nurbs
         order = ind.optional_integer(trajectory, "has_spline_order")

@@ -230,7 +230,7 @@ class Places:
             assert isinstance(made, osc.Position)
             return made
         if individuals.is_a(node, "WorldPosition"):
-            x, y = (self._quantities.get(node, f"has_world_{one}") for one in ("x", "y"))
+            x, y = (self._quantities.get(node, f"has_world_{item}") for item in ("x", "y"))
             turned = [
                 None
                 if (angle := individuals.optional_number(node, name)) is None
@@ -316,9 +316,9 @@ class Places:
         direction = individuals.text(lane, "has_direction")
         own, others = (
             sorted(
-                (abs(individuals.integer(one, "has_lane_id")), one.value, one)
-                for one in individuals.links(road.node, "has_lane")
-                if individuals.text(one, "has_direction") == direction
+                (abs(individuals.integer(link, "has_lane_id")), link.value, link)
+                for link in individuals.links(road.node, "has_lane")
+                if individuals.text(link, "has_direction") == direction
             )
             for road in (on, other)
         )

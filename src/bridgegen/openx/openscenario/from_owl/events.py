@@ -72,19 +72,19 @@ class Conditions:
             if not nodes:
                 raise OntologyError(f"{ind.describe(node)} must have has_condition, and has none")
         found = []
-        for k, one in enumerate(nodes, start=1):
+        for k, item in enumerate(nodes, start=1):
             label = name if len(nodes) == 1 else f"{name}_{k}"
-            made, delay = self._condition(actors, one)
-            if ind.optional_number(one, "has_delay") is not None:
-                delay = self._quantities.get(one, "has_delay")
-            found.append(osc.Condition(label, delay, self._edge(one), made))
+            made, delay = self._condition(actors, item)
+            if ind.optional_number(item, "has_delay") is not None:
+                delay = self._quantities.get(item, "has_delay")
+            found.append(osc.Condition(label, delay, self._edge(item), made))
         return osc.ConditionGroup(tuple(found))
 
     def _edge(self, node: Subject) -> osc.ConditionEdge:
         said = self._individuals.optional_text(node, "has_condition_edge")
         if said is None:
             return osc.ConditionEdge.NONE
-        known = {str(one.value): one for one in osc.ConditionEdge}
+        known = {str(edge.value): edge for edge in osc.ConditionEdge}
         if said not in known:
             raise OntologyError(
                 f"has_condition_edge of {self._individuals.describe(node)} must be one of "
@@ -241,7 +241,7 @@ class Events:
                 raise OntologyError(f"events must have different names, got {name} twice")
             seen.add(name)
             names = self._cast.names(node, "has_who")
-            actors = osc.Actors(False, tuple(osc.EntityRef(one) for one in names))
+            actors = osc.Actors(False, tuple(osc.EntityRef(item) for item in names))
             event = self._event(name, names, node)
             maneuver = individuals.optional_text(node, "in_maneuver")
             of_act = groups.setdefault(individuals.optional_link(node, "in_act"), {})
@@ -294,7 +294,7 @@ class Events:
         said = self._individuals.optional_text(node, "has_priority")
         if said is None:
             return osc.Priority.OVERRIDE
-        known = {one.value: one for one in _PRIORITIES}
+        known = {priority.value: priority for priority in _PRIORITIES}
         if said not in known:
             raise OntologyError(
                 f"has_priority of {self._individuals.describe(node)} must be one of "

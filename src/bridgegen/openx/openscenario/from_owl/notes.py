@@ -125,7 +125,7 @@ class Notes:
             if not ind.is_a(event, "TemporaryChange"):
                 continue
             name = f"{EVENT}.{plain_text(ind, event, 'has_name')}"
-            cls = next(one for one in CHANGES if ind.is_a(event, one))
+            cls = next(change for change in CHANGES if ind.is_a(event, change))
             yield osc.Property(f"{name}.class", cls)
             for link in ("who", "element"):
                 for k, node in enumerate(ind.links(event, f"has_{link}"), start=1):

@@ -131,7 +131,7 @@ class _Converter:
             quoted_element(self.individuals, node, {"VariableDeclaration": osc.VariableDeclaration})
             for node in self.individuals.links(self.node, "has_variable")
         ]
-        known = tuple(one for one in found if isinstance(one, osc.VariableDeclaration))
+        known = tuple(element for element in found if isinstance(element, osc.VariableDeclaration))
         return osc.VariableDeclarations(known) if known else None
 
     # -- start and end -------------------------------------------------------------------------
@@ -163,7 +163,7 @@ class _Converter:
         kinds = ("TeleportAction", "SpeedAction", "FollowTrajectoryAction", "")
         found: dict[str, list[osc.PrivateAction]] = {kind: [] for kind in kinds}
         for action in ind.links(node, "has_init_action"):
-            kind = next((one for one in kinds[:3] if ind.is_a(action, one)), kinds[3])
+            kind = next((item for item in kinds[:3] if ind.is_a(action, item)), kinds[3])
             found[kind].append(self.actions.private(name, action))
         counts = [len(found[kind]) for kind in kinds]
         comes_later = counts[0] == 0 and node in self._added()
@@ -215,8 +215,8 @@ def _stories(
         return ()
     begun = osc.SimulationTimeCondition(0.0, osc.Rule.GREATER_OR_EQUAL)
     start = osc.Trigger((_alternative("start", osc.ByValueCondition(begun)),))
-    taken = {one.name for one in later}
-    name = next(one for k in count(1) if (one := f"act_{k}" if k > 1 else "act") not in taken)
+    taken = {act.name for act in later}
+    name = next(item for k in count(1) if (item := f"act_{k}" if k > 1 else "act") not in taken)
     first = (osc.Act(name, groups, start),) if groups else ()
     return (osc.Story("story", (*first, *later)),)
 

@@ -86,7 +86,7 @@ class Signals:
         if not phases and ind.links(node, "has_light"):
             return set()  # as maps have them: who is switched together, not when
         durations = [ind.number(phase, "has_duration") for phase in phases]
-        if not phases or not all(0.0 < one < math.inf for one in durations):
+        if not phases or not all(0.0 < duration < math.inf for duration in durations):
             raise OntologyError(
                 f"{ind.describe(node)} must have phases, each with a has_duration [s] above 0"
             )
@@ -207,10 +207,10 @@ def environment(
         node = individuals.optional_link(weather, part.link)
         if node is not None:
             found |= {
-                one.name: quantities.get(node, one.owl_property)
-                for one in parameters
-                if one.is_required
-                or individuals.optional_number(node, one.owl_property) is not None
+                parameter.name: quantities.get(node, parameter.owl_property)
+                for parameter in parameters
+                if parameter.is_required
+                or individuals.optional_number(node, parameter.owl_property) is not None
             }
     if "precipitation" in found and "snowfall" in found:
         raise OntologyError(

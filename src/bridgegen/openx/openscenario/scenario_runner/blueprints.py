@@ -102,7 +102,7 @@ def ranked(
         body: of which its size is not looked at.
         size: length, width and height [m].
     """
-    return sorted(_alike(body), key=lambda one: math.dist(SIZES[one], size))
+    return sorted(_alike(body), key=lambda name: math.dist(SIZES[name], size))
 
 
 def _alike(body: osc.Vehicle | osc.Pedestrian | osc.MiscObject) -> tuple[str, ...]:

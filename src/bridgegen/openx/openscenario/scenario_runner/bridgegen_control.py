@@ -152,8 +152,8 @@ class BridgegenControl(BasicControl):  # type: ignore[misc]  # not typed
         """Return x, y [m] and yaw [deg], in CARLA's frame, at a time [s] since the start."""
         i = bisect.bisect_right(self._times, time)
         if i == 0 or i == len(self._times):
-            one = self._waypoints[min(i, len(self._times) - 1)]
-            return one.location.x, one.location.y, one.rotation.yaw
+            waypoint = self._waypoints[min(i, len(self._times) - 1)]
+            return waypoint.location.x, waypoint.location.y, waypoint.rotation.yaw
         a, b = self._waypoints[i - 1], self._waypoints[i]
         share = (time - self._times[i - 1]) / (self._times[i] - self._times[i - 1])
         return (

@@ -65,10 +65,10 @@ def for_scenario_runner(
     Raises:
         UnsupportedError: what ScenarioRunner or CARLA cannot do, by name, all of it at once.
     """
-    deleted = {one.entity_ref for one in walk(scenario) if isinstance(one, osc.EntityAction)}
-    recording = recording.until_left(but={str(one) for one in deleted})
-    by_name = {str(one.name): one.entity_object for one in scenario.entities.scenario_objects}
-    bodies = [by_name[one] for one in recording.names]
+    deleted = {node.entity_ref for node in walk(scenario) if isinstance(node, osc.EntityAction)}
+    recording = recording.until_left(but={str(item) for item in deleted})
+    by_name = {str(obj.name): obj.entity_object for obj in scenario.entities.scenario_objects}
+    bodies = [by_name[item] for item in recording.names]
     if wrong := list(_impossible(recording, bodies)):
         raise UnsupportedError(*wrong)
     names = (HERO, *recording.names[1:])
@@ -79,15 +79,15 @@ def for_scenario_runner(
     }
     weather = story.changes(scenario, recording, _weather(scenario))
     moved = {
-        one: courses[one]
-        for one, body in zip(names, bodies, strict=True)
-        if one != HERO and (courses[one].moves or not isinstance(body, osc.MiscObject))
+        item: courses[item]
+        for item, body in zip(names, bodies, strict=True)
+        if item != HERO and (courses[item].moves or not isinstance(body, osc.MiscObject))
     }
-    controllers = {one: _controller(one, {"duration": c.duration}) for one, c in moved.items()}
+    controllers = {item: _controller(item, {"duration": c.duration}) for item, c in moved.items()}
     controllers[HERO] = _controller(HERO, _world(recording, weather[0][1]))
     privates = tuple(
-        osc.Private(one, tuple(_start(one, float(recording.v[e, 0]), courses, controllers)))
-        for e, one in enumerate(names)
+        osc.Private(item, tuple(_start(item, float(recording.v[e, 0]), courses, controllers)))
+        for e, item in enumerate(names)
     )
     end = story.end(recording, _arrival(scenario, recording.names[0], bodies[0], roads))
     act = story.act(moved, recording, weather, roads, end)
@@ -151,17 +151,17 @@ def _entity(name: str, body: Any) -> osc.ScenarioObject:
 def _weather(scenario: osc.OpenScenario) -> osc.Environment:
     """Return the environment at the start."""
     now = CLEAR
-    for one in scenario.storyboard.init.actions.global_actions:
-        if isinstance(one.action, osc.EnvironmentAction):
-            now = environment(one.action.environment, now)
+    for action in scenario.storyboard.init.actions.global_actions:
+        if isinstance(action.action, osc.EnvironmentAction):
+            now = environment(action.action.environment, now)
     return now
 
 
 def _ground(scenario: osc.OpenScenario, name: str, roads: OpenDrive) -> float:
     """Return the road's height where an entity starts [m], as far as its start states it."""
     for private in scenario.storyboard.init.actions.privates:
-        for one in walk(private) if private.entity_ref == name else ():
-            place: Any = one.position.position if isinstance(one, osc.TeleportAction) else None
+        for node in walk(private) if private.entity_ref == name else ():
+            place: Any = node.position.position if isinstance(node, osc.TeleportAction) else None
             if isinstance(place, osc.LanePosition | osc.RoadPosition):
                 road = roads.road(str(place.road_id))
                 return float(values(road.elevations, np.array([place.s]))[0])
@@ -194,7 +194,7 @@ def _world(recording: Recording, weather: osc.Environment) -> dict[str, str | fl
 
 def _controller(name: str, properties: Mapping[str, str | float]) -> osc.ControllerAction:
     said = {"module": CONTROL, **properties}
-    held = osc.Properties(tuple(osc.Property(one, str(value)) for one, value in said.items()))
+    held = osc.Properties(tuple(osc.Property(item, str(value)) for item, value in said.items()))
     return osc.ControllerAction(
         osc.AssignControllerAction(osc.Controller(f"{name}_control", held)),
         osc.OverrideControllerValueAction(  # 1.0 must have it, ScenarioRunner takes no active one
@@ -214,8 +214,8 @@ def _arrival(
     """Return the position at which the ego ends the scenario; None if there is none."""
     stop = scenario.storyboard.stop_trigger
     for group in stop.condition_groups if stop else ():
-        reached = [one for one in walk(group) if isinstance(one, osc.ReachPositionCondition)]
-        whose = {str(one.entity_ref) for one in walk(group) if isinstance(one, osc.EntityRef)}
+        reached = [node for node in walk(group) if isinstance(node, osc.ReachPositionCondition)]
+        whose = {str(node.entity_ref) for node in walk(group) if isinstance(node, osc.EntityRef)}
         if len(group.conditions) != 1 or not reached or whose != {ego}:
             continue
         place: Any = reached[0].position.position

@@ -82,9 +82,9 @@ def _originals(environment: osc.Environment) -> dict[str, float]:
     road = environment.road_condition
     properties = road.properties.properties if road and road.properties else ()
     found = {}
-    for one in properties:
+    for property_ in properties:
         try:
-            found[str(one.name)] = float(str(one.value))
+            found[str(property_.name)] = float(str(property_.value))
         except ValueError:
             continue  # another tool's property
     return found

@@ -56,7 +56,7 @@ class Course:
     @property
     def moves(self) -> bool:
         """Whether it leaves its start."""
-        return any(np.ptp(one) > 0.0 for one in (self.x, self.y, self.h))
+        return any(np.ptp(array) > 0.0 for array in (self.x, self.y, self.h))
 
     @property
     def duration(self) -> float:
@@ -65,7 +65,7 @@ class Course:
 
     def position(self, k: int) -> osc.Position:
         """Return the place at an instant."""
-        x, y, h = (float(one[k]) for one in (self.x, self.y, self.h))
+        x, y, h = (float(array[k]) for array in (self.x, self.y, self.h))
         return osc.Position(osc.WorldPosition(x, y, z=self.z, h=h))
 
     def trajectory(self, name: str) -> osc.FollowTrajectoryAction:
@@ -125,9 +125,9 @@ def centred(body: Body, name: str) -> Body:
 
 
 def _moved(axles: osc.Axles, by: float) -> osc.Axles:
-    def moved(one: osc.Axle) -> osc.Axle:
-        x: Any = one.position_x
-        return replace(one, position_x=x + by)
+    def moved(axle: osc.Axle) -> osc.Axle:
+        x: Any = axle.position_x
+        return replace(axle, position_x=x + by)
 
     return osc.Axles(
         moved(axles.front or axles.rear), moved(axles.rear), tuple(map(moved, axles.additional))
@@ -167,8 +167,8 @@ def act(
     """
     start = _at(0.0, recording.time_step, "start")
     groups = [
-        _group(f"{name}_group", name, [_event(f"{name}_moves", start, [_follow(name, one)])])
-        for name, one in courses.items()
+        _group(f"{name}_group", name, [_event(f"{name}_moves", start, [_follow(name, item)])])
+        for name, item in courses.items()
     ]
     if events := list(_light_events(recording, roads)):
         groups.append(_group("traffic_lights", HERO, events))
@@ -179,9 +179,9 @@ def act(
         _event(
             f"weather_{i}",
             _at(time, recording.time_step, f"weather_{i}_at"),
-            [osc.GlobalAction(osc.EnvironmentAction(one))],
+            [osc.GlobalAction(osc.EnvironmentAction(item))],
         )
-        for i, (time, one) in enumerate(later, 1)
+        for i, (time, item) in enumerate(later, 1)
     ]:
         groups.append(_group("environment", HERO, events))
     return osc.Act("act", tuple(groups), start, stop)
@@ -192,10 +192,10 @@ def changes(
 ) -> list[tuple[float, osc.Environment]]:
     """Return the environment at the start and after each change, with their times [s]."""
     found = [(0.0, start)]
-    for one in walk(recorded(scenario, recording).storyboard):
-        if isinstance(one, osc.Event):
-            (time,) = (c for c in walk(one) if isinstance(c, osc.SimulationTimeCondition))
-            for below in walk(one):
+    for node in walk(recorded(scenario, recording).storyboard):
+        if isinstance(node, osc.Event):
+            (time,) = (c for c in walk(node) if isinstance(c, osc.SimulationTimeCondition))
+            for below in walk(node):
                 if isinstance(below, osc.EnvironmentAction):
                     found.append((float(time.value), below.environment))  # type: ignore[arg-type]
     found[1:] = sorted(found[1:], key=lambda change: change[0])
@@ -220,7 +220,7 @@ def criteria(roads: OpenDrive) -> osc.ConditionGroup:
     names = ["CollisionTest", "OffRoadTest"]
     if lights(roads):
         names.append("RunningRedLightTest")
-    if any(one.type == _STOP_SIGN for road in roads.roads for one in road.signals):
+    if any(signal.type == _STOP_SIGN for road in roads.roads for signal in road.signals):
         names.append("RunningStopTest")
     return osc.ConditionGroup(tuple(_criterion(name) for name in names))
 
@@ -267,7 +267,7 @@ def _event(
 
 def _light_events(recording: Recording, roads: OpenDrive) -> Iterator[osc.Event]:
     """Yield an event for each instant at which lights change, the first for the start."""
-    known = {one.id: one for one in lights(roads)}
+    known = {light.id: light for light in lights(roads)}
     wrong = list(_misplaced(recording, known))
     if wrong:
         raise UnsupportedError(*wrong)
@@ -296,14 +296,14 @@ def carla_name(light: Light) -> str:
 def _misplaced(recording: Recording, known: Mapping[str, Light]) -> Iterator[str]:
     """Yield why lights cannot be set."""
     for s, name in enumerate(recording.light_names):
-        one: Any = known.get(name)
-        if one is None:
+        value: Any = known.get(name)
+        if value is None:
             yield f"the traffic light {name} must be on the map, for it is found by its place"
             continue
         near = [
             other.id
             for other in known.values()
-            if other.id != name and math.hypot(other.x - one.x, other.y - one.y) < LIGHT_REACH
+            if other.id != name and math.hypot(other.x - value.x, other.y - value.y) < LIGHT_REACH
         ]
         if near:
             yield (

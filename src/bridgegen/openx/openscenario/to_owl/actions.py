@@ -135,10 +135,10 @@ def _change_with_jerk(
     """
     limits = action.dynamic_constraints or osc.DynamicConstraints()
     rate, jerk = limits.max_acceleration, limits.max_acceleration_rate
-    (one, *more) = action.entries
+    (entry, *more) = action.entries
     if (
         more
-        or one.time is not None
+        or entry.time is not None
         or action.entity_ref is not None
         or rate is None
         or jerk is None
@@ -148,7 +148,7 @@ def _change_with_jerk(
     ):
         raise UnsayableError(action, "SpeedProfileAction")
     node = builder.node(name, "SpeedAction")
-    builder.number(node, "has_target_speed", one.speed, one)
+    builder.number(node, "has_target_speed", entry.speed, entry)
     builder.number(node, "has_rate", rate, limits)
     builder.number(node, "has_max_jerk", jerk, limits)
     return node
@@ -183,7 +183,7 @@ def _keep_distance(
         raise UnsayableError(action, f"{what} that is not continuous and between the bodies")
     limits = action.dynamic_constraints or osc.DynamicConstraints()
     unsaid = (limits.max_acceleration_rate, limits.max_deceleration_rate)
-    if any(one is not None for one in unsaid):
+    if any(value is not None for value in unsaid):
         raise UnsayableError(limits, f"DynamicConstraints of {what} besides accelerations")
     side, axes = action.displacement, action.coordinate_system
     behind = osc.LongitudinalDisplacement.TRAILING_REFERENCED_ENTITY
@@ -260,13 +260,13 @@ def add_trajectory(
     Raises:
         UnsayableError: times that count are missing, or a vertex has no place.
     """
-    one = action.trajectory_ref.trajectory
+    item = action.trajectory_ref.trajectory
     trajectory = builder.node(f"{name}_path", "Trajectory")
     builder.put(node, "has_trajectory", trajectory)
-    called = builder.text(one.name)
+    called = builder.text(item.name)
     builder.put(trajectory, "has_name", plain_name(called) if builder.in_substance else called)
     timed = isinstance(action.time_reference.reference, osc.Timing)
-    vertices = _vertices(builder, trajectory, one.shape.shape)
+    vertices = _vertices(builder, trajectory, item.shape.shape)
     for k, (number, vertex) in enumerate(zip(numbered(len(vertices)), vertices, strict=True)):
         point = builder.node(f"{name}_vertex_{number}", "Vertex")
         builder.put(trajectory, "has_vertex", point)
@@ -293,8 +293,8 @@ def _vertices(
     if not isinstance(line, osc.Nurbs):
         raise UnsayableError(line, type(line).__name__)
     points, order = line.control_points, round(builder.now(line.order, line))
-    weights = [builder.now(one.weight, one) for one in points if one.weight is not None]
-    knots = [builder.now(one.value, one) for one in line.knots]
+    weights = [builder.now(point.weight, point) for point in points if point.weight is not None]
+    knots = [builder.now(knot.value, knot) for knot in line.knots]
     if any(weight != weights[0] for weight in weights) or 0 < len(weights) < len(points):
         raise UnsayableError(line, "a Nurbs whose weights differ")
     if len(knots) != len(points) + order or order > len(points) or not is_uniform(knots, order):

@@ -104,12 +104,12 @@ class StoryBuilder(Builder):
         self.variables: set[str] = set()
         self.starts: dict[str, ox.NamedNode] = {}
         self.cast: dict[str, ox.NamedNode] = {}
-        self.entities = {self.text(one.name) for one in scenario.entities.scenario_objects}
+        self.entities = {self.text(obj.name) for obj in scenario.entities.scenario_objects}
         self.added = {
-            self.text(one.entity_ref)
+            self.text(node.entity_ref)
             for story in scenario.storyboard.stories
-            for one in walk(story)
-            if isinstance(one, osc.EntityAction) and isinstance(one.action, osc.AddEntityAction)
+            for node in walk(story)
+            if isinstance(node, osc.EntityAction) and isinstance(node.action, osc.AddEntityAction)
         }
         self.acts: dict[str, ox.NamedNode] = {}
         self.element_names: dict[tuple[str, str], str] = {}
@@ -118,7 +118,7 @@ class StoryBuilder(Builder):
         self.problems: list[Lost] = []
         self.bindings: list[tuple[ox.NamedNode, str, str]] = []
         self.free: list[tuple[ox.NamedNode, str]] = []
-        self.parameters = {one: self.reserve(f"p_{one}") for one in self.numbers}
+        self.parameters = {number: self.reserve(f"p_{number}") for number in self.numbers}
         self._lights = {
             signal.id: self.iri(part_name("signal", road.id, index))
             for road in reversed(roads.roads)
@@ -335,7 +335,7 @@ def said_or_quoted(
     """
     if not builder.in_substance:
         return say()
-    if any(one.line in builder.quoted_lines for one in walk(element)):
+    if any(node.line in builder.quoted_lines for node in walk(element)):
         return quote(quoted(builder, name, cls, element))
     kept = builder.mark()
     try:
@@ -372,14 +372,14 @@ def quoted(builder: StoryBuilder, name: str, cls: str, element: Element) -> ox.N
         plain = rewritten(plain, partial(_renamed, builder))
     except InputError:
         raise UnsayableError(element, f"a value of {type(element).__name__}") from None
-    for one in walk(plain):
-        variable = getattr(one, "variable_ref", None)
-        if isinstance(one, _REFERRING) or (variable and variable not in builder.variables):
-            raise UnsayableError(element, type(one).__name__)
-        for attribute, value in values_of(one):
+    for item in walk(plain):
+        variable = getattr(item, "variable_ref", None)
+        if isinstance(item, _REFERRING) or (variable and variable not in builder.variables):
+            raise UnsayableError(element, type(item).__name__)
+        for attribute, value in values_of(item):
             if attribute.is_entity and str(value) not in builder.entities:
-                what = type(one).__name__
-                raise UnsayableError(one, f"{what} of {value}, an entity that is not stated")
+                what = type(item).__name__
+                raise UnsayableError(item, f"{what} of {value}, an entity that is not stated")
     try:
         text = fragment_of(plain)
     except (TypeError, ValueError):

@@ -91,25 +91,25 @@ def _stated(
 ) -> ox.NamedNode:
     if isinstance(wrapped.condition, osc.ByEntityCondition):
         return _by_entity(builder, name, actors, wrapped.condition)
-    one = wrapped.condition.condition
-    node = builder.node(name, type(one).__name__)
-    if isinstance(one, osc.SimulationTimeCondition):
-        builder.number(node, "has_value", one.value, one)
-        _put_rule(builder, node, one)
-    elif isinstance(one, osc.TrafficSignalCondition):
-        builder.put(node, "has_signal", builder.light(one.name, one))
-        builder.put(node, "has_signal_state", signal_state(builder, one.state, one))
-    elif not isinstance(one, osc.StoryboardElementStateCondition):
-        raise UnsayableError(one, type(one).__name__)
+    condition = wrapped.condition.condition
+    node = builder.node(name, type(condition).__name__)
+    if isinstance(condition, osc.SimulationTimeCondition):
+        builder.number(node, "has_value", condition.value, condition)
+        _put_rule(builder, node, condition)
+    elif isinstance(condition, osc.TrafficSignalCondition):
+        builder.put(node, "has_signal", builder.light(condition.name, condition))
+        builder.put(node, "has_signal_state", signal_state(builder, condition.state, condition))
+    elif not isinstance(condition, osc.StoryboardElementStateCondition):
+        raise UnsayableError(condition, type(condition).__name__)
     else:
-        kind = builder.text(one.storyboard_element_type)
-        event = builder.text(one.storyboard_element_ref)
+        kind = builder.text(condition.storyboard_element_type)
+        event = builder.text(condition.storyboard_element_ref)
         event = builder.element_names.get((kind, event), event)
-        state = builder.text(one.state)
+        state = builder.text(condition.state)
         known = ("completeState", "startTransition")
         if kind != "event" or state not in known or event not in builder.events:
             raise UnsayableError(
-                one, f"StoryboardElementStateCondition on {state} of the {kind} {event}"
+                condition, f"StoryboardElementStateCondition on {state} of the {kind} {event}"
             )
         builder.referred.add(event)
         builder.put(node, "has_event_ref", builder.events[event])
@@ -127,66 +127,70 @@ def _by_entity(
         raise UnsayableError(
             wrapped.triggering_entities, f"a condition on {len(refs)} TriggeringEntities"
         )
-    one = wrapped.entity_condition.condition
-    if not isinstance(one, _SAYABLE):
-        raise UnsayableError(one, type(one).__name__)
-    node = builder.node(name, type(one).__name__)
+    condition = wrapped.entity_condition.condition
+    if not isinstance(condition, _SAYABLE):
+        raise UnsayableError(condition, type(condition).__name__)
+    node = builder.node(name, type(condition).__name__)
     subject = builder.entity(refs[0].entity_ref, refs[0])
     if actors != (builder.text(refs[0].entity_ref),):
         builder.put(node, "has_subject", subject)
-    if isinstance(one, osc.CollisionCondition):
-        if not isinstance(one.target, osc.EntityRef):
-            raise UnsayableError(one.target, "ByType")
-        builder.put(node, "has_entity_ref", builder.entity(one.target.entity_ref, one.target))
-    elif isinstance(one, osc.StandStillCondition):
-        builder.number(node, "has_value", one.duration, one)
-    elif isinstance(one, osc.ReachPositionCondition):
-        builder.number(node, "has_value", one.tolerance, one)
-        put_place(builder, node, "has_position", f"{name}_place", one.position)
+    if isinstance(condition, osc.CollisionCondition):
+        if not isinstance(condition.target, osc.EntityRef):
+            raise UnsayableError(condition.target, "ByType")
+        builder.put(
+            node, "has_entity_ref", builder.entity(condition.target.entity_ref, condition.target)
+        )
+    elif isinstance(condition, osc.StandStillCondition):
+        builder.number(node, "has_value", condition.duration, condition)
+    elif isinstance(condition, osc.ReachPositionCondition):
+        builder.number(node, "has_value", condition.tolerance, condition)
+        put_place(builder, node, "has_position", f"{name}_place", condition.position)
     else:
-        builder.number(node, "has_value", one.value, one)
-        if isinstance(one, Relative):
-            if _is_gap(builder, one):
+        builder.number(node, "has_value", condition.value, condition)
+        if isinstance(condition, Relative):
+            if _is_gap(builder, condition):
                 builder.put(node, "has_distance_measure", "gap")
-            builder.put(node, "has_entity_ref", builder.entity(_other(builder, one), one))
-        if not isinstance(one, osc.TraveledDistanceCondition):
-            _put_rule(builder, node, one)
+            builder.put(
+                node, "has_entity_ref", builder.entity(_other(builder, condition), condition)
+            )
+        if not isinstance(condition, osc.TraveledDistanceCondition):
+            _put_rule(builder, node, condition)
     return node
 
 
-def _other(builder: StoryBuilder, one: Relative) -> str | osc.ParameterRef:
+def _other(builder: StoryBuilder, relative: Relative) -> str | osc.ParameterRef:
     """Return the entity that a condition measures to, in the one way that the ontology defines.
 
     Raises:
         UnsayableError: another distance, other axes, between boxes, or to a position.
     """
-    if _is_gap(builder, one):
-        assert isinstance(one, osc.RelativeDistanceCondition)
-        return one.entity_ref
-    what = type(one).__name__
-    distance, axes = one.relative_distance_type, one.coordinate_system
+    if _is_gap(builder, relative):
+        assert isinstance(relative, osc.RelativeDistanceCondition)
+        return relative.entity_ref
+    what = type(relative).__name__
+    distance, axes = relative.relative_distance_type, relative.coordinate_system
     if distance is not None and builder.text(distance) not in (
         osc.RelativeDistanceType.EUCLIDIAN_DISTANCE,
         osc.RelativeDistanceType.CARTESIAN_DISTANCE,
     ):
-        raise UnsayableError(one, f'relativeDistanceType="{distance}" of {what}')
+        raise UnsayableError(relative, f'relativeDistanceType="{distance}" of {what}')
     if axes is not None and builder.text(axes) != osc.CoordinateSystem.ENTITY:
-        raise UnsayableError(one, f'coordinateSystem="{axes}" of {what}')
-    if one.freespace is not False:
-        raise UnsayableError(one, f'freespace="{str(one.freespace).lower()}" of {what}')
-    if not isinstance(one, osc.TimeToCollisionCondition):
-        return one.entity_ref
-    target = one.target.target
+        raise UnsayableError(relative, f'coordinateSystem="{axes}" of {what}')
+    if relative.freespace is not False:
+        raise UnsayableError(relative, f'freespace="{str(relative.freespace).lower()}" of {what}')
+    if not isinstance(relative, osc.TimeToCollisionCondition):
+        return relative.entity_ref
+    target = relative.target.target
     if not isinstance(target, osc.EntityRef):
         raise UnsayableError(target, "TimeToCollisionCondition with a Position")
     return target.entity_ref
 
 
-def _is_gap(builder: StoryBuilder, one: Relative) -> bool:
+def _is_gap(builder: StoryBuilder, relative: Relative) -> bool:
     """Return whether a distance is measured along the lane and between the bodies."""
-    if not isinstance(one, osc.RelativeDistanceCondition) or one.freespace is not True:
+    if not isinstance(relative, osc.RelativeDistanceCondition) or relative.freespace is not True:
         return False
-    kind, axes = one.relative_distance_type, one.coordinate_system
+    kind, axes = relative.relative_distance_type, relative.coordinate_system
     return (
         kind is not None
         and builder.text(kind) == osc.RelativeDistanceType.LONGITUDINAL
@@ -195,7 +199,7 @@ def _is_gap(builder: StoryBuilder, one: Relative) -> bool:
     )
 
 
-def _put_rule(builder: StoryBuilder, node: ox.NamedNode, one: Element) -> None:
-    rule = builder.choice(osc.Rule, one.rule)  # type: ignore[attr-defined]
-    if rule is not USUAL_RULES[type(one).__name__]:
+def _put_rule(builder: StoryBuilder, node: ox.NamedNode, element: Element) -> None:
+    rule = builder.choice(osc.Rule, element.rule)  # type: ignore[attr-defined]
+    if rule is not USUAL_RULES[type(element).__name__]:
         builder.put(node, "has_rule", rule.value)

@@ -98,7 +98,7 @@ def _holds_pedals(element: object) -> bool:
     pedals = () if part is None else (
         part.throttle, part.brake, part.clutch, part.parking_brake, part.steering_wheel, part.gear
     )  # fmt: skip
-    return any(one is not None and one.active is not False for one in pedals)
+    return any(pedal is not None and pedal.active is not False for pedal in pedals)
 
 
 @dataclass(frozen=True)
@@ -113,23 +113,25 @@ class Differences:
     here: Mapping[str, Literal]
     there: Mapping[str, Literal]
 
-    def between(self, one: Element, other: Element | None) -> Iterator[Lost]:
+    def between(self, element: Element, other: Element | None) -> Iterator[Lost]:
         """Yield lines of the first, and what stands there and not in the second."""
-        tag = type(one).__name__
-        if other is None or type(other) is not type(one):
-            if not _is_nothing(one):
-                yield Lost(one.line, _called(one), is_detail(one))
+        tag = type(element).__name__
+        if other is None or type(other) is not type(element):
+            if not _is_nothing(element):
+                yield Lost(element.line, _called(element), is_detail(element))
             return
-        step = isinstance(one, osc.TransitionDynamics) and (
-            one.dynamics_shape == osc.DynamicsShape.STEP == getattr(other, "dynamics_shape", None)
+        step = isinstance(element, osc.TransitionDynamics) and (
+            element.dynamics_shape
+            == osc.DynamicsShape.STEP
+            == getattr(other, "dynamics_shape", None)
         )
-        for attribute in declaration(type(one)).attributes.values():
-            said = getattr(one, attribute.field)
+        for attribute in declaration(type(element)).attributes.values():
+            said = getattr(element, attribute.field)
             again = getattr(other, attribute.field)
-            usual = _DEFAULTS.get((type(one), attribute.field))
+            usual = _DEFAULTS.get((type(element), attribute.field))
             if (
                 said is None
-                or (type(one), attribute.field) in _LABELS
+                or (type(element), attribute.field) in _LABELS
                 or (step and attribute.field in ("dynamics_dimension", "value"))
                 or self._same(attribute, said, usual if again is None else again)
             ):
@@ -137,32 +139,34 @@ class Differences:
             shown = str(said).lower() if isinstance(said, bool) else said
             becomes = "" if again is None else f" (it would become {_text(again, self.there)})"
             detail = (
-                is_detail(one)
-                or (type(one), attribute.field) in _DETAIL_FIELDS
-                or self._is_size(one, other)
-                or self._is_called_out(one, other)
+                is_detail(element)
+                or (type(element), attribute.field) in _DETAIL_FIELDS
+                or self._is_size(element, other)
+                or self._is_called_out(element, other)
             )
             yield Lost(
-                one.line,
+                element.line,
                 f'{attribute.name}="{shown}" of {tag}{becomes}',
-                detail or self._is_equal(attribute, said, again) or self._is_clear(one, other),
+                detail or self._is_equal(attribute, said, again) or self._is_clear(element, other),
             )
-        text = declaration(type(one)).text
-        if text is not None and getattr(one, text) != getattr(other, text):
-            yield Lost(one.line, f"the text of {tag}", is_detail(one))
-        yield from self._below(one, other)
+        text = declaration(type(element)).text
+        if text is not None and getattr(element, text) != getattr(other, text):
+            yield Lost(element.line, f"the text of {tag}", is_detail(element))
+        yield from self._below(element, other)
 
-    def _below(self, one: Element, other: Element) -> Iterator[Lost]:
+    def _below(self, element: Element, other: Element) -> Iterator[Lost]:
         before: dict[tuple[str, Any], list[Element]] = {}
         for tag, child in children_of(other):
             before.setdefault((tag, self._key(child, self.there)), []).append(child)
-        for tag, child in children_of(one):
+        for tag, child in children_of(element):
             left = before.get((tag, self._key(child, self.here)))
             yield from self.between(child, left.pop(0) if left else None)
         for left in before.values():
             for child in left:
                 if isinstance(child, osc.ConditionGroup | osc.Condition):
-                    yield Lost(one.line, f"{type(one).__name__} without a further {_about(child)}")
+                    yield Lost(
+                        element.line, f"{type(element).__name__} without a further {_about(child)}"
+                    )
 
     def _key(self, child: Element, values: Mapping[str, Literal]) -> Any:
         """Return what an element is found by among its like: a property's name, a limit's rule."""
@@ -170,77 +174,82 @@ class Differences:
             return values[child.name.name] if isinstance(child.name, ParameterRef) else child.name
         return child.rule if isinstance(child, osc.ValueConstraint) else None
 
-    def _same(self, attribute: Attribute, one: Any, other: Any) -> bool:
-        if one == other:
+    def _same(self, attribute: Attribute, item: Any, other: Any) -> bool:
+        if item == other:
             return True
         if other is None:
             return False
         if attribute.kind is Kind.STRING or attribute.kind is Kind.DATE_TIME:
-            a, b = (_text(value, of) for value, of in ((one, self.here), (other, self.there)))
+            a, b = (_text(value, of) for value, of in ((item, self.here), (other, self.there)))
             return bool(_OLD_NAMES.get(a, a) == _OLD_NAMES.get(b, b)) or (
                 attribute.is_literal and _as_number(a) == _as_number(b) is not None
             )
         names = [
             value.names if isinstance(value, ParameterRef | Expr) else frozenset[str]()
-            for value in (one, other)
+            for value in (item, other)
         ]
-        return names[0] == names[1] and self._is_equal(attribute, one, other)
+        return names[0] == names[1] and self._is_equal(attribute, item, other)
 
-    def _is_size(self, one: Element, other: Element) -> bool:
+    def _is_size(self, element: Element, other: Element) -> bool:
         """Return whether two rates differ by their sign alone: they say how fast, not where to."""
         if not (
-            isinstance(one, osc.TransitionDynamics) and isinstance(other, osc.TransitionDynamics)
+            isinstance(element, osc.TransitionDynamics)
+            and isinstance(other, osc.TransitionDynamics)
         ):
             return False
         rate = osc.DynamicsDimension.RATE
-        sizes = abs(_number(one.value, self.here)), abs(_number(other.value, self.there))
-        return one.dynamics_dimension == other.dynamics_dimension == rate and math.isclose(*sizes)
+        sizes = abs(_number(element.value, self.here)), abs(_number(other.value, self.there))
+        return element.dynamics_dimension == other.dynamics_dimension == rate and math.isclose(
+            *sizes
+        )
 
-    def _is_called_out(self, one: Element, other: Element) -> bool:
+    def _is_called_out(self, element: Element, other: Element) -> bool:
         """Return whether both are emergency vehicles, whichever: all are of one class."""
         roles = (osc.Role.AMBULANCE, osc.Role.FIRE, osc.Role.POLICE)
         return (
-            isinstance(one, osc.Vehicle)
+            isinstance(element, osc.Vehicle)
             and isinstance(other, osc.Vehicle)
-            and one.role in roles
+            and element.role in roles
             and other.role in roles
         )
 
-    def _is_clear(self, one: Element, other: Element) -> bool:
+    def _is_clear(self, element: Element, other: Element) -> bool:
         """Return whether two fogs are none that a driver would notice."""
-        if not (isinstance(one, osc.Fog) and isinstance(other, osc.Fog)):
+        if not (isinstance(element, osc.Fog) and isinstance(other, osc.Fog)):
             return False
-        seen = _number(one.visual_range, self.here), _number(other.visual_range, self.there)
+        seen = _number(element.visual_range, self.here), _number(other.visual_range, self.there)
         return min(seen) >= _CLEAR
 
-    def _is_equal(self, attribute: Attribute, one: Any, other: Any) -> bool:
+    def _is_equal(self, attribute: Attribute, value: Any, other: Any) -> bool:
         """Return whether two numbers are equal at the parameters' values."""
         is_text = attribute.kind is Kind.STRING and not attribute.takes_expressions
         if is_text or attribute.kind is Kind.DATE_TIME or other is None:
             return False
         try:
-            a, b = _number(one, self.here), _number(other, self.there)
+            a, b = _number(value, self.here), _number(other, self.there)
         except (TypeError, ValueError):
             return False
         return math.isclose(a, b, rel_tol=_REL, abs_tol=_ABS)
 
 
-def _called(one: Element) -> str:
+def _called(element: Element) -> str:
     """Return an element's tag, with its name if it has one."""
-    name = getattr(one, "name", None)
-    return type(one).__name__ if name is None else f"{type(one).__name__} {name}"
+    name = getattr(element, "name", None)
+    return type(element).__name__ if name is None else f"{type(element).__name__} {name}"
 
 
 def _about(child: Element) -> str:
     if isinstance(child, osc.ConditionGroup):
-        return f"ConditionGroup ({', '.join(str(one.name) for one in child.conditions)})"
+        return (
+            f"ConditionGroup ({', '.join(str(condition.name) for condition in child.conditions)})"
+        )
     return type(child).__name__
 
 
-def _is_nothing(one: Element) -> bool:
+def _is_nothing(element: Element) -> bool:
     """Return whether an element's presence has no meaning."""
-    if isinstance(one, osc.Precipitation):
-        return one.precipitation_type == osc.PrecipitationType.DRY
+    if isinstance(element, osc.Precipitation):
+        return element.precipitation_type == osc.PrecipitationType.DRY
     silent = (
         osc.Properties
         | osc.TrafficSignals
@@ -248,7 +257,7 @@ def _is_nothing(one: Element) -> bool:
         | osc.VariableDeclarations
         | osc.MonitorDeclarations
     )
-    return isinstance(one, silent) and not list(children_of(one))
+    return isinstance(element, silent) and not list(children_of(element))
 
 
 def _text(value: Any, values: Mapping[str, Literal]) -> Any:

@@ -34,27 +34,35 @@ _AS_IN_EVENTS = (
     | osc.LaneChangeAction
     | osc.SynchronizeAction
 )
-_ROAD_WORKS = {one.written.name: one for one in PARTICIPANTS.values() if not one.takes_part}
+_ROAD_WORKS = {
+    participant.written.name: participant
+    for participant in PARTICIPANTS.values()
+    if not participant.takes_part
+}
 _FURNITURE = {osc.MiscObjectCategory.POLE: PARTICIPANTS["sign"]}
 
 
 def add_participant(
-    builder: StoryBuilder, one: osc.ScenarioObject, actions: tuple[osc.PrivateAction, ...]
+    builder: StoryBuilder,
+    scenario_object: osc.ScenarioObject,
+    actions: tuple[osc.PrivateAction, ...],
 ) -> ox.NamedNode:
     """Add a participant with its body, its driver and its init actions.
 
     Args:
         builder: where to.
-        one: the entity.
+        scenario_object: the entity.
         actions: its own of the storyboard's Init.
 
     Raises:
         UnsayableError: it is of a kind without a class, or starts nowhere.
     """
-    name = builder.text(one.name)
-    node = _add_body(builder, one, name, _class_of(builder, one.entity_object))
-    if len(one.object_controllers) == 1:
-        _add_controller(builder, node, name, one.object_controllers[0].controller)
+    name = builder.text(scenario_object.name)
+    node = _add_body(
+        builder, scenario_object, name, _class_of(builder, scenario_object.entity_object)
+    )
+    if len(scenario_object.object_controllers) == 1:
+        _add_controller(builder, node, name, scenario_object.object_controllers[0].controller)
     if name in builder.added and not any(
         isinstance(wrapped.action, osc.TeleportAction) for wrapped in actions
     ):
@@ -62,7 +70,7 @@ def add_participant(
         builder.put(standing, "has_target_speed", 0.0)
         builder.put(node, "has_init_action", standing)
         return node
-    first = _teleport(one, actions)
+    first = _teleport(scenario_object, actions)
     start = add_position(builder, f"{name}_start", first.position)
     teleport = builder.node(f"{name}_teleport", "TeleportAction")
     builder.put(teleport, "has_position", start)
@@ -72,23 +80,25 @@ def add_participant(
 
 
 def add_begun(
-    builder: StoryBuilder, one: osc.ScenarioObject, actions: tuple[osc.PrivateAction, ...]
+    builder: StoryBuilder,
+    scenario_object: osc.ScenarioObject,
+    actions: tuple[osc.PrivateAction, ...],
 ) -> None:
     """Add what a participant does from the start on; all of them have been stated.
 
     Args:
         builder: where to.
-        one: the entity.
+        scenario_object: the entity.
         actions: its own of the storyboard's Init.
     """
-    name = builder.text(one.name)
+    name = builder.text(scenario_object.name)
     node = builder.cast[name]
     if name not in builder.starts:  # it comes later
         for wrapped in actions:
             text = f"an initial action of {name}, which comes later,"
             builder.problems.append(Lost(wrapped.line, text))
         return
-    first = _teleport(one, actions)
+    first = _teleport(scenario_object, actions)
     begun: set[type[object]] = {osc.TeleportAction}
     left = [wrapped for wrapped in actions if wrapped.action is not first]
     start = builder.starts[name], first.position
@@ -104,21 +114,23 @@ def add_begun(
 
 
 def add_element(
-    builder: StoryBuilder, one: osc.ScenarioObject, actions: tuple[osc.PrivateAction, ...]
+    builder: StoryBuilder,
+    scenario_object: osc.ScenarioObject,
+    actions: tuple[osc.PrivateAction, ...],
 ) -> ox.NamedNode:
     """Add a cone or a sign of road works, at its place.
 
     Raises:
         UnsayableError: it is none, or stands nowhere.
     """
-    name, body = builder.text(one.name), one.entity_object
+    name, body = builder.text(scenario_object.name), scenario_object.entity_object
     if not isinstance(body, osc.MiscObject):
         raise UnsayableError(body, f"{type(body).__name__} {name} at road works")
     category = builder.choice(osc.MiscObjectCategory, body.misc_object_category)
     named = _ROAD_WORKS.get(builder.text(body.name))
     kind = named or _FURNITURE.get(category, PARTICIPANTS["cone"])
-    node = _add_body(builder, one, name, kind.owl_class)
-    place = add_position(builder, f"{name}_place", _teleport(one, actions).position)
+    node = _add_body(builder, scenario_object, name, kind.owl_class)
+    place = add_position(builder, f"{name}_place", _teleport(scenario_object, actions).position)
     builder.put(node, "has_position", place)
     for wrapped in actions:
         if not isinstance(wrapped.action, osc.TeleportAction):
@@ -143,8 +155,10 @@ def _class_of(builder: StoryBuilder, body: Body) -> str:
     return kind.owl_class
 
 
-def _add_body(builder: StoryBuilder, one: osc.ScenarioObject, name: str, cls: str) -> ox.NamedNode:
-    body, now = one.entity_object, builder.now
+def _add_body(
+    builder: StoryBuilder, scenario_object: osc.ScenarioObject, name: str, cls: str
+) -> ox.NamedNode:
+    body, now = scenario_object.entity_object, builder.now
     if isinstance(body, osc.ExternalObjectReference):
         raise UnsayableError(body, f"the ExternalObjectReference {body.name}")
     box = body.bounding_box
@@ -202,28 +216,30 @@ def as_number(
 
 
 def _add_controller(
-    builder: StoryBuilder, node: ox.NamedNode, name: str, one: osc.Controller
+    builder: StoryBuilder, node: ox.NamedNode, name: str, item: osc.Controller
 ) -> None:
     """Add a controller that names its driver; what is missing then, the comparison finds."""
-    driver = None if one.properties is None else one.properties.get(DRIVER)
+    driver = None if item.properties is None else item.properties.get(DRIVER)
     if driver is None:
         return
     controller = builder.node(f"{name}_controller", "Controller")
-    builder.put(controller, "has_name", builder.text(one.name))
+    builder.put(controller, "has_name", builder.text(item.name))
     builder.put(controller, "has_driver", builder.text(driver))
-    ideal = None if one.properties is None else one.properties.get(IDEAL)
+    ideal = None if item.properties is None else item.properties.get(IDEAL)
     if ideal is not None:
         builder.put(controller, "has_ideal_stages", builder.text(ideal))
     builder.put(node, "has_controller", controller)
 
 
 def _teleport(
-    one: osc.ScenarioObject, actions: tuple[osc.PrivateAction, ...]
+    scenario_object: osc.ScenarioObject, actions: tuple[osc.PrivateAction, ...]
 ) -> osc.TeleportAction:
     for wrapped in actions:
         if isinstance(wrapped.action, osc.TeleportAction):
             return wrapped.action
-    raise UnsayableError(one, f"the entity {one.name} without an initial TeleportAction")
+    raise UnsayableError(
+        scenario_object, f"the entity {scenario_object.name} without an initial TeleportAction"
+    )
 
 
 def _init(

@@ -60,7 +60,7 @@ def happenings(builder: StoryBuilder) -> Iterator[Happening]:
     named = named_elements(storyboard, builder.text)
     if len(storyboard.stories) == 1:
         names["story", builder.text(storyboard.stories[0].name)] = "story"
-    for act in (one for story in storyboard.stories for one in story.acts):
+    for act in (item for story in storyboard.stories for item in story.acts):
         name, stated = builder.text(act.name), None
         if not _begins_at_once(builder, act.start_trigger) or ("act", name) in named:
             if not builder.in_substance or ("act", name) in names:
@@ -100,9 +100,9 @@ def named_elements(
 ) -> set[tuple[str, str]]:
     """Return the kinds and names of the storyboard's elements whose state a condition looks at."""
     return {
-        (text(one.storyboard_element_type), text(one.storyboard_element_ref))
-        for one in walk(storyboard)
-        if isinstance(one, osc.StoryboardElementStateCondition)
+        (text(node.storyboard_element_type), text(node.storyboard_element_ref))
+        for node in walk(storyboard)
+        if isinstance(node, osc.StoryboardElementStateCondition)
     }
 
 
@@ -143,7 +143,7 @@ def _begins_at_once(builder: StoryBuilder, trigger: osc.Trigger | None) -> bool:
     if trigger is None:
         return True
     for group in trigger.condition_groups:
-        conditions = [one.condition for one in group.conditions]
+        conditions = [condition.condition for condition in group.conditions]
         if len(conditions) == 1 and isinstance(conditions[0], osc.ByValueCondition):
             time = conditions[0].condition
             if isinstance(time, osc.SimulationTimeCondition):
@@ -160,17 +160,23 @@ def add_events(builder: StoryBuilder, scenario: ox.NamedNode, all_: list[Happeni
     Returns:
         The names of those that are stated.
     """
-    for one in all_:
-        builder.events[one.name] = builder.reserve(one.name)
+    for happening in all_:
+        builder.events[happening.name] = builder.reserve(happening.name)
     waits: dict[str, set[str]] = {}
     awaited = {
         name: _add_act(builder, act)
-        for name, act in {builder.text(one.act.name): one.act for one in all_ if one.act}.items()
+        for name, act in {
+            builder.text(happening.act.name): happening.act for happening in all_ if happening.act
+        }.items()
     }
-    lines = {one.name: one.event.line for one in all_}
+    lines = {happening.name: happening.event.line for happening in all_}
     start = len(builder.problems)
     kept = builder.mark()
-    done = {one.name for one in all_ if _attempt(builder, scenario, one, waits, awaited)}
+    done = {
+        happening.name
+        for happening in all_
+        if _attempt(builder, scenario, happening, waits, awaited)
+    }
     lost = [name for name in lines if name not in done]
     if not lost:
         return done
@@ -187,9 +193,9 @@ def add_events(builder: StoryBuilder, scenario: ox.NamedNode, all_: list[Happeni
                 builder.problems.append(Lost(lines[name], text))
     problems = builder.problems[:]
     builder.take_back(kept)
-    for one in all_:
-        if one.name in done:
-            _attempt(builder, scenario, one, waits, awaited)
+    for happening in all_:
+        if happening.name in done:
+            _attempt(builder, scenario, happening, waits, awaited)
     builder.problems[start:] = problems[start:]
     return done
 
@@ -210,29 +216,29 @@ def _add_act(builder: StoryBuilder, act: osc.Act) -> set[str]:
 def _attempt(
     builder: StoryBuilder,
     scenario: ox.NamedNode,
-    one: Happening,
+    happening: Happening,
     waits: dict[str, set[str]],
     awaited: Mapping[str, set[str]],
 ) -> bool:
     builder.referred = set()
     before = len(builder.problems)
     with builder.attempt():
-        _add_event(builder, one)
-        builder.put(scenario, "has_event", builder.events[one.name])
-    act = set() if one.act is None else awaited[builder.text(one.act.name)]
-    waits[one.name] = builder.referred | act
+        _add_event(builder, happening)
+        builder.put(scenario, "has_event", builder.events[happening.name])
+    act = set() if happening.act is None else awaited[builder.text(happening.act.name)]
+    waits[happening.name] = builder.referred | act
     return len(builder.problems) == before
 
 
-def _add_event(builder: StoryBuilder, one: Happening) -> None:
-    actors = one.group.actors
+def _add_event(builder: StoryBuilder, happening: Happening) -> None:
+    actors = happening.group.actors
     if actors.select_triggering_entities is not False:
         raise UnsayableError(actors, "Actors by selectTriggeringEntities")
     nodes = {
         builder.text(ref.entity_ref): builder.entity(ref.entity_ref, ref)
         for ref in actors.entity_refs
     }
-    wrapped = [action.action for action in one.event.actions]
+    wrapped = [action.action for action in happening.event.actions]
     concerned = [
         action.action
         for action in wrapped
@@ -248,28 +254,30 @@ def _add_event(builder: StoryBuilder, one: Happening) -> None:
         for action in wrapped
     ]
     usual = "SignalChangeEvent" if all(signals) else "EnvironmentChangeEvent"
-    node = builder.state(builder.events[one.name], "StoryboardEvent" if nodes else usual)
-    builder.put(node, "has_name", one.name)
-    if one.act is not None:
-        if (act := builder.acts.get(builder.text(one.act.name))) is None:
-            raise UnsayableError(one.act, f"the Act {one.act.name}, which starts later,")
+    node = builder.state(builder.events[happening.name], "StoryboardEvent" if nodes else usual)
+    builder.put(node, "has_name", happening.name)
+    if happening.act is not None:
+        if (act := builder.acts.get(builder.text(happening.act.name))) is None:
+            raise UnsayableError(
+                happening.act, f"the Act {happening.act.name}, which starts later,"
+            )
         builder.put(node, "in_act", act)
-    if one.maneuver is not None:
-        priority = builder.choice(osc.Priority, one.event.priority)
+    if happening.maneuver is not None:
+        priority = builder.choice(osc.Priority, happening.event.priority)
         usual = osc.Priority.OVERRIDE if priority is osc.Priority.OVERWRITE else priority
-        builder.put(node, "in_maneuver", one.maneuver)
+        builder.put(node, "in_maneuver", happening.maneuver)
         builder.put(node, "has_priority", usual.value)
-    most = one.event.maximum_execution_count
-    if builder.in_substance and most is not None and builder.now(most, one.event) != 1.0:
-        builder.put(node, "has_execution_count", round(builder.now(most, one.event)))
+    most = happening.event.maximum_execution_count
+    if builder.in_substance and most is not None and builder.now(most, happening.event) != 1.0:
+        builder.put(node, "has_execution_count", round(builder.now(most, happening.event)))
     for actor in nodes.values():
         builder.put(node, "has_who", actor)
     names = tuple(sorted(nodes))
     for number, action in zip(numbered(len(wrapped)), wrapped, strict=True):
         suffix = "" if int(number) == 1 else f"_{number}"
-        name = f"{one.name}_action{suffix}"
-        builder.put(node, "has_what", add_action(builder, one.name, name, names, action))
-    trigger = add_trigger(builder, one.name, names, one.event.start_trigger)
+        name = f"{happening.name}_action{suffix}"
+        builder.put(node, "has_what", add_action(builder, happening.name, name, names, action))
+    trigger = add_trigger(builder, happening.name, names, happening.event.start_trigger)
     builder.put(node, "has_when", trigger)
 
 
@@ -308,26 +316,26 @@ def _add_change(
     node = builder.node(name, cls)
     builder.put(node, "has_name", name)
     for link in ("who", "element"):
-        for one in facts.get(link, ()):
-            target = builder.text(one.value)
+        for property_ in facts.get(link, ()):
+            target = builder.text(property_.value)
             if (link == "element") != (elements.get(target) == name):
-                raise UnsayableError(one, f"{target} as {link} of {name}")
-            builder.put(node, f"has_{link}", builder.entity(one.value, one))
+                raise UnsayableError(property_, f"{target} as {link} of {name}")
+            builder.put(node, f"has_{link}", builder.entity(property_.value, property_))
     for link in ("on_lane", "closes_lane"):
-        for one in facts.get(link, ()):
-            builder.put(node, link, _lane(builder, one))
-    for one in facts.get("on_road", ()):
-        road_id = builder.text(one.value)
+        for property_ in facts.get(link, ()):
+            builder.put(node, link, _lane(builder, property_))
+    for property_ in facts.get("on_road", ()):
+        road_id = builder.text(property_.value)
         if road_id not in builder.roads.roads_by_id:
-            raise UnsayableError(one, f"the road {road_id}, which the map lacks,")
+            raise UnsayableError(property_, f"the road {road_id}, which the map lacks,")
         builder.put(node, "on_road", builder.iri(road_name(road_id)))
-    for one in facts.get("time", ())[:1]:
-        builder.put(node, "has_time", as_number(builder, one.value, one))
+    for property_ in facts.get("time", ())[:1]:
+        builder.put(node, "has_time", as_number(builder, property_.value, property_))
     builder.put(scenario, "has_event", node)
 
 
-def _lane(builder: StoryBuilder, one: osc.Property) -> ox.NamedNode:
-    text = builder.text(one.value)
+def _lane(builder: StoryBuilder, property_: osc.Property) -> ox.NamedNode:
+    text = builder.text(property_.value)
     try:
         road_id, lane_id, start = text.split()
         road = builder.roads.road(unquote(road_id))
@@ -335,4 +343,4 @@ def _lane(builder: StoryBuilder, one: osc.Property) -> ox.NamedNode:
         lane_at(road, int(lane_id), s)
         return builder.iri(lane_name(road.id, section_index(road, s), int(lane_id)))
     except (ValueError, InputError):
-        raise UnsayableError(one, f"the lane '{text[:40]}', which the map lacks,") from None
+        raise UnsayableError(property_, f"the lane '{text[:40]}', which the map lacks,") from None

@@ -39,7 +39,7 @@ def stretches(roads: OpenDrive, ends: set[str]) -> dict[str, Stretch]:
     if len(ends) != 2:
         return {}
     legs = [_legs_of(roads, junction) for junction in roads.junctions]
-    found = [one for one in legs if ends <= one.keys()]
+    found = [leg for leg in legs if ends <= leg.keys()]
     return found[0] if len(found) == 1 else {}
 
 
@@ -55,10 +55,10 @@ def with_legs(
     """
     end, here = bg("has_junction_end"), set(nodes.values())
     yield from (quad for quad in quads if quad.predicate != end or quad.subject not in here)
-    for road_id, one in legs.items():
-        yield ox.Quad(nodes[road_id], end, ox.Literal(one.near))
-        if one.inner is not None:
-            yield ox.Quad(nodes[one.inner], bg("has_continuation"), nodes[road_id])
+    for road_id, leg in legs.items():
+        yield ox.Quad(nodes[road_id], end, ox.Literal(leg.near))
+        if leg.inner is not None:
+            yield ox.Quad(nodes[leg.inner], bg("has_continuation"), nodes[road_id])
 
 
 def _legs_of(roads: OpenDrive, junction: Junction) -> dict[str, Stretch]:
@@ -67,10 +67,10 @@ def _legs_of(roads: OpenDrive, junction: Junction) -> dict[str, Stretch]:
     for road in roads.roads:
         ends = [] if road.is_connecting else road.ends_at(junction.id)
         if len(ends) == 1 and road.id not in found:
-            for one, stretch in _chain(roads, road, ends[0]):
-                if one.id in found:
+            for item, stretch in _chain(roads, road, ends[0]):
+                if item.id in found:
                     break
-                found[one.id] = stretch
+                found[item.id] = stretch
     return found
 
 

@@ -36,18 +36,24 @@ def losses(
         yield Lost(here.file_header.license.line, "License", is_detail=True)
     if here.file_header.properties is not None:
         yield from compare(here.file_header.properties, again.file_header.properties)
-    declared = {one.name: one for one in _declarations(again)}
+    declared = {
+        parameter_declaration.name: parameter_declaration
+        for parameter_declaration in _declarations(again)
+    }
     for declaration in _declarations(here):
         yield from compare(declaration, declared.get(declaration.name))
     if here.road_network.scene_graph_file is not None:
         yield Lost(here.road_network.scene_graph_file.line, "SceneGraphFile", is_detail=True)
     for element in _unsaid(builder, here):
         yield from compare(element, None)
-    others = {str(one.name): one for one in _controllers(again)}
+    others = {
+        str(traffic_signal_controller.name): traffic_signal_controller
+        for traffic_signal_controller in _controllers(again)
+    }
     for controller in _controllers(here):
         if (name := builder.text(controller.name)) in controllers:
             yield from compare(controller, others.get(name))
-    entities = {str(one.name): one for one in again.entities.scenario_objects}
+    entities = {str(obj.name): obj for obj in again.entities.scenario_objects}
     for entity in here.entities.scenario_objects:
         if (name := builder.text(entity.name)) in builder.cast:
             yield from compare(entity, entities.get(name))
@@ -63,7 +69,7 @@ def _unsaid(builder: StoryBuilder, here: osc.OpenScenario) -> Iterator[Element]:
     """Yield the parts of a file that no individual stands for."""
     variables = None if builder.variables else here.variable_declarations
     parts = (variables, here.monitor_declarations, here.road_network.used_area)
-    yield from (one for one in parts if one is not None)
+    yield from (part for part in parts if part is not None)
     yield from here.entities.entity_selections
     yield from here.storyboard.init.actions.user_defined_actions
 
@@ -71,19 +77,19 @@ def _unsaid(builder: StoryBuilder, here: osc.OpenScenario) -> Iterator[Element]:
 def _in_init(builder: StoryBuilder, compare: Compare, there: osc.InitActions) -> Iterator[Lost]:
     here = builder.scenario_file.storyboard.init.actions
     left = list(there.global_actions)
-    for one in here.global_actions:
-        fitting = [other for other in left if not any(compare(one, other))] or [
+    for global_action in here.global_actions:
+        fitting = [other for other in left if not any(compare(global_action, other))] or [
             other
             for other in left
             if isinstance(other.action, osc.EnvironmentAction)
-            and isinstance(one.action, osc.EnvironmentAction)
+            and isinstance(global_action.action, osc.EnvironmentAction)
         ]
         if fitting:
             left.remove(fitting[0])
-            yield from compare(one, fitting[0])
+            yield from compare(global_action, fitting[0])
         else:
-            yield Lost(one.line, f"{type(one.action).__name__} of Init")
-    actions = {str(one.entity_ref): one.private_actions for one in there.privates}
+            yield Lost(global_action.line, f"{type(global_action.action).__name__} of Init")
+    actions = {str(item.entity_ref): item.private_actions for item in there.privates}
     for private in here.privates:
         name = builder.text(private.entity_ref)
         again = {_kind(action): action for action in actions.get(name, ())}
@@ -103,12 +109,12 @@ def _in_events(
         for maneuver in group.maneuvers
         for event in maneuver.events
     }
-    for one in stated:
-        count = one.group.maximum_execution_count
+    for happening in stated:
+        count = happening.group.maximum_execution_count
         if count != 1:
-            yield Lost(one.group.line, f'maximumExecutionCount="{count}" of ManeuverGroup')
-        if (event := events.get(one.name)) is not None:
-            yield from compare(rewritten(one.event, partial(_called, builder)), event)
+            yield Lost(happening.group.line, f'maximumExecutionCount="{count}" of ManeuverGroup')
+        if (event := events.get(happening.name)) is not None:
+            yield from compare(rewritten(happening.event, partial(_called, builder)), event)
 
 
 def _called(builder: StoryBuilder, element: Element) -> Element:

@@ -20,7 +20,7 @@ from bridgegen.scenario.language.parameters import Axis
 from bridgegen.scenario.ontology.vocabulary import bg, tbox
 from bridgegen.scenario.weather import PARAMETERS
 
-_WEATHER = frozenset(one.owl_property for one in PARAMETERS.values())
+_WEATHER = frozenset(parameter.owl_property for parameter in PARAMETERS.values())
 _LIMITS = {osc.Rule.GREATER_OR_EQUAL: "has_low", osc.Rule.LESS_OR_EQUAL: "has_high"}
 
 Facts = dict[str, dict[str, list[osc.Property]]]
@@ -43,29 +43,33 @@ class Notes:
         self.severity: osc.Property | None = None
         self.findings: dict[str, osc.Property] = {}
         self.of: dict[str, Facts] = {PARAMETER: {}, EVENT: {}, SIGNALS: {}}
-        for one in () if header.properties is None else header.properties.properties:
-            name = builder.text(one.name)
+        for property_ in () if header.properties is None else header.properties.properties:
+            name = builder.text(property_.name)
             kind, _, rest = name.partition(".")
             which, _, what = rest.rpartition(".")
             if what.isdecimal():  # one of several
                 which, _, what = which.rpartition(".")
             if name == TIME_STEP:
-                self.time_step = self.time_step or one
+                self.time_step = self.time_step or property_
             elif name == ROAD_END:
-                self.road_end = self.road_end or one
+                self.road_end = self.road_end or property_
             elif name == SEVERITY:
-                self.severity = self.severity or one
+                self.severity = self.severity or property_
             elif name in FINDINGS:
-                self.findings.setdefault(name, one)
+                self.findings.setdefault(name, property_)
             elif kind in self.of and which:
                 about = self.of[kind].setdefault(which, defaultdict(list))
-                about[what].append(one)
+                about[what].append(property_)
 
 
 def add_parameters(builder: StoryBuilder, scenario: ox.NamedNode, notes: Notes) -> None:
     """Add the parameters, after all that is bound to them."""
     declared = builder.scenario_file.parameter_declarations
-    ranges = {} if declared is None else {one.name: one for one in declared.parameters}
+    ranges = (
+        {}
+        if declared is None
+        else {declaration.name: declaration for declaration in declared.parameters}
+    )
     for name in _categories(notes, ranges):
         with builder.attempt():
             builder.put(
@@ -92,23 +96,23 @@ def add_parameters(builder: StoryBuilder, scenario: ox.NamedNode, notes: Notes) 
 def _categories(notes: Notes, declared: Mapping[str, osc.ParameterDeclaration]) -> Iterator[str]:
     """Yield the parameters that are categories: texts with an axis in the header."""
     for name in notes.of[PARAMETER]:
-        one = declared.get(name)
-        if one is not None and one.parameter_type is osc.ParameterType.STRING:
+        declaration = declared.get(name)
+        if declaration is not None and declaration.parameter_type is osc.ParameterType.STRING:
             yield name
 
 
 def _add_category(
-    builder: StoryBuilder, one: osc.ParameterDeclaration, notes: Notes
+    builder: StoryBuilder, declaration: osc.ParameterDeclaration, notes: Notes
 ) -> ox.NamedNode:
-    facts = notes.of[PARAMETER][one.name]
-    node = builder.state(builder.reserve(f"p_{one.name}"), "Parameter")
-    builder.put(node, "has_name", one.name)
+    facts = notes.of[PARAMETER][declaration.name]
+    node = builder.state(builder.reserve(f"p_{declaration.name}"), "Parameter")
+    builder.put(node, "has_name", declaration.name)
     builder.put(node, "has_axis", _said(builder, facts, "axis", str(Axis.PARTICIPANTS)))
     builder.put(node, "has_unit", _said(builder, facts, "unit", "1"))
-    for group in one.constraint_groups:
+    for group in declaration.constraint_groups:
         for limit in group.constraints:
             builder.put(node, "has_allowed_word", builder.text(limit.value))
-    builder.put(node, "has_word", builder.text(one.value))
+    builder.put(node, "has_word", builder.text(declaration.value))
     builder.put(node, "has_parameter", node)
     builder.put(node, "binds_property", "has_word")
     _constrain(builder, node, facts, ["has_word"])
@@ -132,10 +136,10 @@ def _add_parameter(
         builder.put(node, "has_value", value)
         builder.put(node, "has_parameter", node)
     names = sorted(bound) or ["has_value"]
-    for one in names:
-        builder.put(node, "binds_property", one)
+    for item in names:
+        builder.put(node, "binds_property", item)
     axis = Axis.WEATHER if set(names) <= _WEATHER else Axis.PARTICIPANTS
-    units = [tbox().units[one] for one in names if one in tbox().units]
+    units = [tbox().units[item] for item in names if item in tbox().units]
     builder.put(node, "has_axis", _said(builder, facts, "axis", str(axis)))
     builder.put(node, "has_unit", _said(builder, facts, "unit", units[0] if units else "1"))
     _constrain(builder, node, facts, names)
@@ -161,21 +165,21 @@ def _said(
 ) -> str:
     if not facts.get(what):
         return usual
-    one = facts[what][0]
-    text = builder.text(one.value)
+    fact = facts[what][0]
+    text = builder.text(fact.value)
     if what == "axis" and text not in [axis.value for axis in Axis if axis != Axis.STATIC]:
-        raise UnsayableError(one, f"the axis '{text}' of a parameter")
+        raise UnsayableError(fact, f"the axis '{text}' of a parameter")
     return text
 
 
 def _put_range(
-    builder: StoryBuilder, node: ox.NamedNode, one: osc.ParameterDeclaration | None
+    builder: StoryBuilder, node: ox.NamedNode, declaration: osc.ParameterDeclaration | None
 ) -> None:
     """State the range that the first constraints give; what else there is the comparison finds."""
-    if one is None or len(one.constraint_groups) != 1:
+    if declaration is None or len(declaration.constraint_groups) != 1:
         return
     found: set[str] = set()
-    for limit in one.constraint_groups[0].constraints:
+    for limit in declaration.constraint_groups[0].constraints:
         name = _LIMITS.get(limit.rule)
         if name is not None and name not in found and not refers(limit):
             found.add(name)
@@ -183,7 +187,7 @@ def _put_range(
 
 
 def _check_clear(
-    one: osc.ParameterDeclaration | None,
+    declaration: osc.ParameterDeclaration | None,
     name: str,
     bound: dict[str, list[ox.NamedNode]],
     free: Iterable[tuple[ox.NamedNode, str]],
@@ -195,11 +199,12 @@ def _check_clear(
     Raises:
         UnsayableError: an individual has one of its properties from the parameter, another not.
     """
-    if len(bound) < 2 or one is None:
+    if len(bound) < 2 or declaration is None:
         return
     owned = {node for nodes in bound.values() for node in nodes}
     taken = set(free)
     if any((node, property_name) in taken for node in owned for property_name in bound):
         raise UnsayableError(
-            one, f"the parameter {name}, which gives {' and '.join(sorted(bound))} by turns,"
+            declaration,
+            f"the parameter {name}, which gives {' and '.join(sorted(bound))} by turns,",
         )

@@ -89,9 +89,9 @@ def _position(builder: StoryBuilder, name: str, position: osc.Position) -> ox.Na
     return node
 
 
-def same_place(one: osc.Position, other: osc.Position) -> bool:
+def same_place(position: osc.Position, other: osc.Position) -> bool:
     """Return whether two positions are one place, whichever way one looks there."""
-    a, b = one.position, other.position
+    a, b = position.position, other.position
     if isinstance(a, osc.LanePosition) and isinstance(b, osc.LanePosition):
         return (a.road_id, a.lane_id, a.s, a.offset) == (b.road_id, b.lane_id, b.s, b.offset)
     return a == b

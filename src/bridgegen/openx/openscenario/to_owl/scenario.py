@@ -82,14 +82,16 @@ def add_controllers(builder: StoryBuilder, network: ox.NamedNode, said: Facts) -
     signals = builder.scenario_file.road_network.traffic_signals
     done: list[str] = []
     switched: set[str] = set()
-    for one in () if signals is None else signals.controllers:
-        name = builder.text(one.name)
+    for controller in () if signals is None else signals.controllers:
+        name = builder.text(controller.name)
         with builder.attempt():
             if name in done:
-                raise UnsayableError(one, f"a second TrafficSignalController {name}")
-            lights = _add_controller(builder, network, name, one, said.get(name, {}))
+                raise UnsayableError(controller, f"a second TrafficSignalController {name}")
+            lights = _add_controller(builder, network, name, controller, said.get(name, {}))
             if switched & lights:
-                raise UnsayableError(one, f"a second TrafficSignalController of {min(lights)}")
+                raise UnsayableError(
+                    controller, f"a second TrafficSignalController of {min(lights)}"
+                )
             switched |= lights
             done.append(name)
     return done
@@ -99,7 +101,7 @@ def _add_controller(
     builder: StoryBuilder,
     network: ox.NamedNode,
     name: str,
-    one: osc.TrafficSignalController,
+    controller: osc.TrafficSignalController,
     facts: dict[str, list[osc.Property]],
 ) -> set[str]:
     node = builder.node(name, "SignalController")
@@ -107,19 +109,21 @@ def _add_controller(
     builder.put(node, "has_name", name)
     passed = facts.get("offset")
     offset = as_number(builder, passed[0].value, passed[0]) if passed else 0.0
-    if not one.phases:
-        raise UnsayableError(one, f"the TrafficSignalController {name} without a Phase")
+    if not controller.phases:
+        raise UnsayableError(controller, f"the TrafficSignalController {name} without a Phase")
     shown = [
         {builder.text(state.traffic_signal_id): state for state in phase.traffic_signal_states}
-        for phase in one.phases
+        for phase in controller.phases
     ]
     lights = set(shown[0])
     for light in sorted(lights):
         builder.put(node, "has_light", builder.light(light, shown[0][light]))
-    if passed is not None and not 0.0 <= offset < builder.now(one.phases[0].duration, one):
+    if passed is not None and not 0.0 <= offset < builder.now(
+        controller.phases[0].duration, controller
+    ):
         raise UnsayableError(passed[0], f"an offset of {offset!r} s, not within the first Phase,")
     builder.put(node, "has_offset", offset)
-    for number, (phase, states) in enumerate(zip(one.phases, shown, strict=True), start=1):
+    for number, (phase, states) in enumerate(zip(controller.phases, shown, strict=True), start=1):
         if set(states) != lights:
             raise UnsayableError(phase, "a Phase that does not state every light of its controller")
         duration = builder.now(phase.duration, phase)
@@ -182,20 +186,20 @@ def individuals_from_openscenario(
     importer = _Importer(scenario, roads, map_file, in_substance)
     individuals = importer.build()
     missing = list(importer.problems(individuals))
-    if in_substance and (lines := frozenset(one.line for one in missing if not one.is_detail)):
+    if in_substance and (lines := frozenset(item.line for item in missing if not item.is_detail)):
         again = _Importer(scenario, roads, map_file, in_substance, lines - {0})
         quoted = again.build()
         still = list(again.problems(quoted))
         if _count(still) + len(again.refused) < _count(missing) + len(importer.refused):
             importer, individuals, missing = again, quoted, still
     found = dict.fromkeys((*lost, *missing))
-    problems = sorted(found, key=lambda one: one.line)
-    details = [one for one in problems if one.is_detail and in_substance]
+    problems = sorted(found, key=lambda item: item.line)
+    details = [item for item in problems if item.is_detail and in_substance]
     sentences = [
-        f"{place}: {one.text} cannot be said in the ontology"
-        + (f" (line {one.line})" if one.line else "")
-        for one in problems
-        if one not in details
+        f"{place}: {item.text} cannot be said in the ontology"
+        + (f" (line {item.line})" if item.line else "")
+        for item in problems
+        if item not in details
     ]
     sentences += [f"{place}: {problem}" for problem in importer.refused]
     if EGO not in importer.builder.cast:
@@ -211,13 +215,13 @@ def individuals_from_openscenario(
 
 def _count(lost: list[Lost]) -> int:
     """Return how many of the things that are lost are no details."""
-    return sum(not one.is_detail for one in lost)
+    return sum(not item.is_detail for item in lost)
 
 
 def _of_details(place: str, details: list[Lost]) -> Iterator[str]:
     """Yield a sentence on details, if there are any: the first ones, and how many more."""
     if details:
-        shown = ", ".join(one.text for one in details[:_SHOWN])
+        shown = ", ".join(detail.text for detail in details[:_SHOWN])
         more = f" and {len(details) - _SHOWN} more" if len(details) > _SHOWN else ""
         yield f"{place}: details on which nothing depends that happens: {shown}{more}"
 
@@ -251,7 +255,7 @@ class _Importer:
             name=self.name or PurePath(map_file).stem,
             controllers=signals is None or not signals.controllers,
         )
-        nodes = {one: self.builder.iri(road_name(one)) for one in self.builder.legs}
+        nodes = {leg: self.builder.iri(road_name(leg)) for leg in self.builder.legs}
         self.static = tuple(with_legs(self.builder.legs, nodes, whole.quads))
         self.derived: dict[str, osc.Event] = {}
         self.stated: set[str] = set()
@@ -271,7 +275,11 @@ class _Importer:
                     action.action, osc.AssignRouteAction
                 ):
                     positions.append(action.action.route.waypoints[-1].position.position)
-        return {builder.text(one.road_id) for one in positions if isinstance(one, osc.LanePosition)}
+        return {
+            builder.text(position.road_id)
+            for position in positions
+            if isinstance(position, osc.LanePosition)
+        }
 
     def build(self) -> Individuals:
         """Return the individuals."""
@@ -338,12 +346,12 @@ class _Importer:
         builder, declared = self.builder, self.scenario.variable_declarations
         if declared is None or not builder.in_substance:
             return
-        for one in part_resolved(declared, self.scenario, "document").variables:
-            variable = builder.node(f"v_{one.name}", "Variable")
-            builder.put(variable, "has_name", one.name)
-            builder.put(variable, "has_openscenario", fragment_of(one))
+        for declaration in part_resolved(declared, self.scenario, "document").variables:
+            variable = builder.node(f"v_{declaration.name}", "Variable")
+            builder.put(variable, "has_name", declaration.name)
+            builder.put(variable, "has_openscenario", fragment_of(declaration))
             builder.put(node, "has_variable", variable)
-            builder.variables.add(one.name)
+            builder.variables.add(declaration.name)
 
     def _put_stop(self, node: ox.NamedNode) -> None:
         """State what else than the time ends the scenario; the ego's arrival follows from its way.
@@ -357,9 +365,9 @@ class _Importer:
         if not arrives and self._has_way():
             builder.put(node, "has_arrival", "goes-on")
         groups = tuple(
-            one
-            for one in stop.condition_groups
-            if _time_alone(one) is None and not (arrives and self._is_arrival(one))
+            group
+            for group in stop.condition_groups
+            if _time_alone(group) is None and not (arrives and self._is_arrival(group))
         )
         before = len(builder.problems)
         with builder.attempt():
@@ -367,18 +375,21 @@ class _Importer:
                 trigger = add_trigger(builder, "stop", (), osc.Trigger(groups))
                 builder.put(node, "has_stop", trigger)
         builder.problems[before:] = [
-            one._replace(is_detail=True) for one in builder.problems[before:]
+            problem._replace(is_detail=True) for problem in builder.problems[before:]
         ]
 
     def _is_arrival(self, group: osc.ConditionGroup) -> bool:
         """Return whether the ego's arrival ends the scenario, as that of its route does."""
-        (one, *others) = (each.condition for each in group.conditions)
+        (condition, *others) = (each.condition for each in group.conditions)
         return (
             not others
-            and isinstance(one, osc.ByEntityCondition)
-            and isinstance(one.entity_condition.condition, osc.ReachPositionCondition)
-            and one.entity_condition.condition.tolerance == ARRIVAL
-            and [self.builder.text(each.entity_ref) for each in one.triggering_entities.entity_refs]
+            and isinstance(condition, osc.ByEntityCondition)
+            and isinstance(condition.entity_condition.condition, osc.ReachPositionCondition)
+            and condition.entity_condition.condition.tolerance == ARRIVAL
+            and [
+                self.builder.text(each.entity_ref)
+                for each in condition.triggering_entities.entity_refs
+            ]
             == [EGO]
             and self._has_way()
         )
@@ -386,16 +397,16 @@ class _Importer:
     def _has_way(self) -> bool:
         """Return whether the ego has a route that is stated."""
         ego, route = self.builder.cast.get(EGO), bg("has_route")
-        return any((one.subject, one.predicate) == (ego, route) for one in self.builder.quads)
+        return any((quad.subject, quad.predicate) == (ego, route) for quad in self.builder.quads)
 
     def _elements(self, notes: Notes) -> dict[str, str]:
         """Return the things at road works, each with whose they are."""
         builder = self.builder
         return {
-            builder.text(one.value): name
+            builder.text(property_.value): name
             for name, facts in notes.of[EVENT].items()
             if any(builder.text(said.value) == "RoadWorks" for said in facts.get("class", ()))
-            for one in facts.get("element", ())
+            for property_ in facts.get("element", ())
         }
 
     def _add_entities(self, node: ox.NamedNode, elements: dict[str, str]) -> None:
@@ -405,22 +416,22 @@ class _Importer:
             name = builder.text(private.entity_ref)
             starts.setdefault(name, []).extend(private.private_actions)
         stated: list[osc.ScenarioObject] = []
-        for one in self.scenario.entities.scenario_objects:
-            name = builder.text(one.name)
+        for obj in self.scenario.entities.scenario_objects:
+            name = builder.text(obj.name)
             if name in builder.cast:
-                builder.problems.append(Lost(one.line, f"a second entity of the name {name}"))
+                builder.problems.append(Lost(obj.line, f"a second entity of the name {name}"))
                 continue
             with builder.attempt():
                 add = add_element if name in elements else add_participant
-                entity = add(builder, one, tuple(starts.get(name, ())))
+                entity = add(builder, obj, tuple(starts.get(name, ())))
                 if name not in elements:
                     builder.put(node, "has_participant", entity)
                 builder.cast[name] = entity
-                stated.append(one)
-        for one in stated:
-            name = builder.text(one.name)
+                stated.append(obj)
+        for obj in stated:
+            name = builder.text(obj.name)
             if name not in elements:
-                add_begun(builder, one, tuple(starts.get(name, ())))
+                add_begun(builder, obj, tuple(starts.get(name, ())))
 
     def _lights(self, duration: float) -> Signals:
         """Return what the controllers that are stated make of the lights."""
@@ -431,21 +442,23 @@ class _Importer:
         """State the weather at the start, and quote what else the scenario begins with."""
         builder, begun = self.builder, False
         globals_ = self.scenario.storyboard.init.actions.global_actions
-        for number, one in zip(numbered(len(globals_)), globals_, strict=True):
-            if isinstance(one.action, osc.EnvironmentAction) and not begun:
+        for number, action in zip(numbered(len(globals_)), globals_, strict=True):
+            if isinstance(action.action, osc.EnvironmentAction) and not begun:
                 begun = True
                 with builder.attempt():
-                    weather = add_weather(builder, one.action.environment)
+                    weather = add_weather(builder, action.action.environment)
                     if weather is not None:
                         builder.put(node, "has_weather", weather)
                     elif builder.in_substance:
-                        self._quote_global(node, number, one)
-            elif one.line in builder.quoted_lines:
+                        self._quote_global(node, number, action)
+            elif action.line in builder.quoted_lines:
                 with builder.attempt():
-                    self._quote_global(node, number, one)
+                    self._quote_global(node, number, action)
 
-    def _quote_global(self, node: ox.NamedNode, number: str, one: osc.GlobalAction) -> None:
-        what = quoted(self.builder, f"global_action_{number}", ACTION, one)
+    def _quote_global(
+        self, node: ox.NamedNode, number: str, global_action: osc.GlobalAction
+    ) -> None:
+        what = quoted(self.builder, f"global_action_{number}", ACTION, global_action)
         self.builder.put(node, "has_global_action", what)
 
     # -- losses ------------------------------------------------------------------------------------
@@ -454,7 +467,7 @@ class _Importer:
         """Yield lines, and their contents that the individuals lack."""
         builder = self.builder
         yield from builder.problems
-        entities = {builder.text(one.name) for one in self.scenario.entities.scenario_objects}
+        entities = {builder.text(obj.name) for obj in self.scenario.entities.scenario_objects}
         for private in self.scenario.storyboard.init.actions.privates:
             if (name := builder.text(private.entity_ref)) not in entities:
                 yield Lost(private.line, f"Private of {name}, which is no entity,")
@@ -466,7 +479,7 @@ class _Importer:
         except InputError as error:
             self.refused += error.problems
             return
-        stated = [one for one in self.happenings if one.name in self.stated]
+        stated = [happening for happening in self.happenings if happening.name in self.stated]
         yield from losses(builder, again, self.controllers, stated)
 
 
@@ -478,7 +491,11 @@ def _time_alone(group: osc.ConditionGroup) -> osc.SimulationTimeCondition | None
     if condition.condition_edge is osc.ConditionEdge.FALLING or condition.delay != 0.0:
         return None
     wrapped = condition.condition
-    one = wrapped.condition if isinstance(wrapped, osc.ByValueCondition) else None
-    if not isinstance(one, osc.SimulationTimeCondition):
+    parameter_condition = wrapped.condition if isinstance(wrapped, osc.ByValueCondition) else None
+    if not isinstance(parameter_condition, osc.SimulationTimeCondition):
         return None
-    return one if one.rule in (osc.Rule.GREATER_OR_EQUAL, osc.Rule.GREATER_THAN) else None
+    return (
+        parameter_condition
+        if parameter_condition.rule in (osc.Rule.GREATER_OR_EQUAL, osc.Rule.GREATER_THAN)
+        else None
+    )

@@ -48,7 +48,7 @@ class _Simplified:
             self.lost.append(Lost(declared.line, "VariableDeclarations", is_detail=True))
             scenario = replace(scenario, variable_declarations=None)
         elif declared is not None:
-            kept = tuple(one for one in declared.variables if one.name in self._read)
+            kept = tuple(variable for variable in declared.variables if variable.name in self._read)
             scenario = replace(scenario, variable_declarations=replace(declared, variables=kept))
         self._named = named_elements(
             storyboard, partial(parameters.text_of, parameters.values(scenario))
@@ -71,8 +71,8 @@ class _Simplified:
             for name in self._actors(group)
         )
         initial = _placed(storyboard.init.actions)
-        privates = tuple(self._begun(one) for one in initial.privates)
-        stories = [self._story(one) for one in storyboard.stories]
+        privates = tuple(self._begun(private) for private in initial.privates)
+        stories = [self._story(story) for story in storyboard.stories]
         actions = replace(storyboard.init.actions, privates=privates)
         init = replace(storyboard.init, actions=actions)
         told = replace(storyboard, init=init, stories=tuple(stories))
@@ -132,7 +132,9 @@ class _Simplified:
         groups = [
             replace(
                 group,
-                maneuvers=tuple(self._maneuver(group, one, begins) for one in group.maneuvers),
+                maneuvers=tuple(
+                    self._maneuver(group, maneuver, begins) for maneuver in group.maneuvers
+                ),
             )
             for group in act.maneuver_groups
         ]
@@ -142,7 +144,7 @@ class _Simplified:
         self, group: osc.ManeuverGroup, maneuver: osc.Maneuver, begins: osc.ConditionGroup | None
     ) -> osc.Maneuver:
         events = []
-        alike = len({_domain(one) for event in maneuver.events for one in event.actions}) == 1
+        alike = len({_domain(item) for event in maneuver.events for item in event.actions}) == 1
         for event in maneuver.events:
             actions = []
             for action in event.actions:
@@ -178,8 +180,11 @@ class _Simplified:
     def _is_unread(self, action: osc.Action) -> bool:
         """Return whether an action sets a variable that no event waits for."""
         wrapped = action.action
-        one = wrapped.action if isinstance(wrapped, osc.GlobalAction) else None
-        return isinstance(one, osc.VariableAction) and str(one.variable_ref) not in self._read
+        environment_action = wrapped.action if isinstance(wrapped, osc.GlobalAction) else None
+        return (
+            isinstance(environment_action, osc.VariableAction)
+            and str(environment_action.variable_ref) not in self._read
+        )
 
     def _trigger(self, trigger: osc.Trigger | None) -> osc.Trigger | None:
         if trigger is None:
@@ -187,7 +192,7 @@ class _Simplified:
         groups = []
         for group in trigger.condition_groups:
             alone = len(group.conditions) == 1
-            conditions = tuple(self._condition(one, alone) for one in group.conditions)
+            conditions = tuple(self._condition(condition, alone) for condition in group.conditions)
             groups.append(replace(group, conditions=conditions))
         return replace(trigger, condition_groups=tuple(groups))
 
@@ -200,13 +205,19 @@ class _Simplified:
         wrapped = condition.condition
         if not isinstance(wrapped, osc.ByValueCondition):
             return condition
-        one = wrapped.condition
-        if not isinstance(one, osc.StoryboardElementStateCondition):
+        storyboard_element_state_condition = wrapped.condition
+        if not isinstance(storyboard_element_state_condition, osc.StoryboardElementStateCondition):
             return condition
-        name, state = str(one.storyboard_element_ref), str(one.state)
-        if str(one.storyboard_element_type) == "action" and name in self._only:
+        name, state = (
+            str(storyboard_element_state_condition.storyboard_element_ref),
+            str(storyboard_element_state_condition.state),
+        )
+        if (
+            str(storyboard_element_state_condition.storyboard_element_type) == "action"
+            and name in self._only
+        ):
             name = self._only[name]
-        elif str(one.storyboard_element_type) != "event":
+        elif str(storyboard_element_state_condition.storyboard_element_type) != "event":
             return condition
         at = osc.StoryboardElementState
         known = at.COMPLETE_STATE if state in _ENDED else at.START_TRANSITION
@@ -216,7 +227,10 @@ class _Simplified:
         if edge is osc.ConditionEdge.RISING and alone:
             edge = osc.ConditionEdge.NONE
         changed = replace(
-            one, storyboard_element_ref=name, storyboard_element_type=_ONCE, state=known
+            storyboard_element_state_condition,
+            storyboard_element_ref=name,
+            storyboard_element_type=_ONCE,
+            state=known,
         )
         return replace(
             condition,
@@ -227,7 +241,7 @@ class _Simplified:
     # -- lanes -------------------------------------------------------------------------------------
 
     def _actors(self, group: osc.ManeuverGroup) -> list[str]:
-        return [self._starts.text(one.entity_ref) for one in group.actors.entity_refs]
+        return [self._starts.text(ref.entity_ref) for ref in group.actors.entity_refs]
 
     def _counted(
         self,
@@ -276,13 +290,15 @@ class _Simplified:
 def _placed(actions: osc.InitActions) -> osc.InitActions:
     """Return initial actions in which who is added is put there."""
     kept, added = [], []
-    for one in actions.global_actions:
-        action = one.action
+    for global_action in actions.global_actions:
+        action = global_action.action
         if isinstance(action, osc.EntityAction) and isinstance(action.action, osc.AddEntityAction):
-            put = osc.PrivateAction(osc.TeleportAction(action.action.position), line=one.line)
-            added.append(osc.Private(action.entity_ref, (put,), line=one.line))
+            put = osc.PrivateAction(
+                osc.TeleportAction(action.action.position), line=global_action.line
+            )
+            added.append(osc.Private(action.entity_ref, (put,), line=global_action.line))
         else:
-            kept.append(one)
+            kept.append(global_action)
     privates = tuple(map(_at_its_trajectory, actions.privates))
     return replace(actions, global_actions=tuple(kept), privates=(*added, *privates))
 
@@ -334,9 +350,9 @@ def _variables(storyboard: osc.Storyboard) -> Iterator[str]:
     for trigger in triggers:
         for group in () if trigger is None else trigger.condition_groups:
             for condition in group.conditions:
-                one = getattr(condition.condition, "condition", None)
-                if isinstance(one, osc.VariableCondition):
-                    yield str(one.variable_ref)
+                variable_condition = getattr(condition.condition, "condition", None)
+                if isinstance(variable_condition, osc.VariableCondition):
+                    yield str(variable_condition.variable_ref)
 
 
 def _inner(wrapped: object) -> object:
@@ -363,17 +379,17 @@ def _lasting(trigger: osc.Trigger | None) -> osc.ConditionGroup | None:
 
 def _lasts(condition: osc.Condition) -> bool:
     wrapped = condition.condition
-    one: object = None
+    value: object = None
     if isinstance(wrapped, osc.ByValueCondition):
-        one = wrapped.condition
+        value = wrapped.condition
     elif isinstance(wrapped, osc.ByEntityCondition):
-        one = wrapped.entity_condition.condition
+        value = wrapped.entity_condition.condition
     edges = (osc.ConditionEdge.NONE, osc.ConditionEdge.RISING)
     if condition.condition_edge not in edges or condition.delay != 0.0:
         return False
-    if isinstance(one, osc.SimulationTimeCondition):
-        return one.rule in _LEAST
-    return isinstance(one, osc.TraveledDistanceCondition)
+    if isinstance(value, osc.SimulationTimeCondition):
+        return value.rule in _LEAST
+    return isinstance(value, osc.TraveledDistanceCondition)
 
 
 def _after(event: osc.Event, begins: osc.ConditionGroup) -> osc.Event:
@@ -381,28 +397,31 @@ def _after(event: osc.Event, begins: osc.ConditionGroup) -> osc.Event:
     if all(map(_is_start, begins.conditions)) and (event.start_trigger or _at_zero(begins)):
         return event
     none = osc.ConditionEdge.NONE
-    lasting = tuple(replace(one, condition_edge=none) for one in begins.conditions)
+    lasting = tuple(replace(condition, condition_edge=none) for condition in begins.conditions)
     own = event.start_trigger
     groups = own.condition_groups if own is not None else ()
-    found = tuple(replace(one, conditions=(*one.conditions, *lasting)) for one in groups)
+    found = tuple(replace(group, conditions=(*group.conditions, *lasting)) for group in groups)
     return replace(event, start_trigger=osc.Trigger(found or (osc.ConditionGroup(lasting),)))
 
 
 def _at_zero(begins: osc.ConditionGroup) -> bool:
     """Return whether times are true at 0, and not just after it."""
     return all(
-        isinstance(one.condition, osc.ByValueCondition)
-        and isinstance(one.condition.condition, osc.SimulationTimeCondition)
-        and one.condition.condition.rule is osc.Rule.GREATER_OR_EQUAL
-        for one in begins.conditions
+        isinstance(condition.condition, osc.ByValueCondition)
+        and isinstance(condition.condition.condition, osc.SimulationTimeCondition)
+        and condition.condition.condition.rule is osc.Rule.GREATER_OR_EQUAL
+        for condition in begins.conditions
     )
 
 
 def _is_start(condition: osc.Condition) -> bool:
     """Return whether a condition is true from the start."""
     wrapped = condition.condition
-    one = wrapped.condition if isinstance(wrapped, osc.ByValueCondition) else None
-    return isinstance(one, osc.SimulationTimeCondition) and one.value == 0.0
+    parameter_condition = wrapped.condition if isinstance(wrapped, osc.ByValueCondition) else None
+    return (
+        isinstance(parameter_condition, osc.SimulationTimeCondition)
+        and parameter_condition.value == 0.0
+    )
 
 
 # --- OpenSCENARIO2OWL, before it: what a file's parameters and empty triggers decide beforehand ---
@@ -423,8 +442,8 @@ _AT_ONCE = osc.ConditionGroup(
 def without_foregone(scenario: osc.OpenScenario) -> tuple[osc.OpenScenario, list[Lost]]:
     """Return a scenario without conditions that are decided, and what it lacks then."""
     made = _Foregone(scenario)
-    stories = tuple(made.story(one) for one in scenario.storyboard.stories)
-    kept = tuple(one for one in stories if one is not None)
+    stories = tuple(made.story(story) for story in scenario.storyboard.stories)
+    kept = tuple(story for story in stories if story is not None)
     return replace(scenario, storyboard=replace(scenario.storyboard, stories=kept)), made.lost
 
 
@@ -432,16 +451,18 @@ class _Foregone:
     def __init__(self, scenario: osc.OpenScenario) -> None:
         self.lost: list[Lost] = []
         declared = scenario.parameter_declarations
-        self._declared = {one.name: one for one in declared.parameters} if declared else {}
+        self._declared = (
+            {parameter.name: parameter for parameter in declared.parameters} if declared else {}
+        )
         self._values = parameters.values(scenario)
         self._set = {
-            str(one.parameter_ref)
-            for one in walk(scenario.storyboard)
-            if isinstance(one, osc.ParameterAction)
+            str(node.parameter_ref)
+            for node in walk(scenario.storyboard)
+            if isinstance(node, osc.ParameterAction)
         }
 
     def story(self, story: osc.Story) -> osc.Story | None:
-        acts = tuple(one for act in story.acts if (one := self._act(act)) is not None)
+        acts = tuple(item for act in story.acts if (item := self._act(act)) is not None)
         return replace(story, acts=acts) if acts else None
 
     def _act(self, act: osc.Act) -> osc.Act | None:
@@ -475,14 +496,14 @@ class _Foregone:
             text = f"the {what}, which never begins: its StartTrigger is empty"
             self.lost.append(Lost(element.line, text, is_detail=True))
             return True
-        if trigger is None or any(self._may_hold(one) for one in trigger.condition_groups):
+        if trigger is None or any(self._may_hold(group) for group in trigger.condition_groups):
             return False
         text = f"the {what}, which never begins: a ParameterCondition of its trigger is false"
         self.lost.append(Lost(element.line, text, is_detail=True))
         return True
 
     def _may_hold(self, group: osc.ConditionGroup) -> bool:
-        return all(self._decided(one) is not False for one in group.conditions)
+        return all(self._decided(condition) is not False for condition in group.conditions)
 
     def _trigger(self, trigger: osc.Trigger | None) -> osc.Trigger | None:
         if trigger is None:
@@ -491,22 +512,30 @@ class _Foregone:
         for group in trigger.condition_groups:
             if not self._may_hold(group):
                 continue
-            left = tuple(one for one in group.conditions if self._decided(one) is None)
+            left = tuple(
+                condition for condition in group.conditions if self._decided(condition) is None
+            )
             groups.append(replace(group, conditions=left) if left else _AT_ONCE)
         return replace(trigger, condition_groups=tuple(groups))
 
     def _decided(self, condition: osc.Condition) -> bool | None:
         """Return whether a condition is always true, or never; None where it may change."""
         wrapped = condition.condition
-        one = wrapped.condition if isinstance(wrapped, osc.ByValueCondition) else None
-        if not isinstance(one, osc.ParameterCondition):
+        parameter_condition = (
+            wrapped.condition if isinstance(wrapped, osc.ByValueCondition) else None
+        )
+        if not isinstance(parameter_condition, osc.ParameterCondition):
             return None
-        declaration = self._declared.get(str(one.parameter_ref))
+        declaration = self._declared.get(str(parameter_condition.parameter_ref))
         unmoved = condition.condition_edge is osc.ConditionEdge.NONE and condition.delay == 0.0
         if declaration is None or not unmoved or declaration.name in self._set:
             return None
-        rule = osc.Rule(parameters.text_of(self._values, one.rule))
-        said = str(one.value).lower() if isinstance(one.value, bool) else str(one.value)
+        rule = osc.Rule(parameters.text_of(self._values, parameter_condition.rule))
+        said = (
+            str(parameter_condition.value).lower()
+            if isinstance(parameter_condition.value, bool)
+            else str(parameter_condition.value)
+        )
         limit = replace(declaration, constraint_groups=(
             osc.ValueConstraintGroup((osc.ValueConstraint(rule, said),)),
         ))  # fmt: skip

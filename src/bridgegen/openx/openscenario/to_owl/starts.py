@@ -102,7 +102,7 @@ class Starts:
         """
         road, t = self._roads.road(self.text(where.road_id)), self.number(where.t)
         line = reference_line(road, np.array([self.number(where.s)]))
-        x, y, h = (float(one[0]) for one in (line.x, line.y, line.h))
+        x, y, h = (float(array[0]) for array in (line.x, line.y, line.h))
         turned, facing = where.orientation, h
         if turned is not None and turned.h is not None:
             own = self.number(turned.h)
@@ -246,12 +246,14 @@ class Starts:
             InputError: no lane leads along the route, or it is shorter.
             ValueError: a waypoint is on no lane, or the place is that of an entity.
         """
-        points = [self._on_lane(one.position, 1) for one in where.route_ref.route.waypoints]
+        points = [
+            self._on_lane(waypoint.position, 1) for waypoint in where.route_ref.route.waypoints
+        ]
         places = []
-        for one in points:
-            if one is None or not isinstance(one.position, osc.LanePosition):
+        for point in points:
+            if point is None or not isinstance(point.position, osc.LanePosition):
                 raise ValueError("a waypoint is on no lane")
-            at = one.position
+            at = point.position
             places.append((self.text(at.road_id), int(self.text(at.lane_id)), self.number(at.s)))
         said = where.in_route_position.position
         if isinstance(said, osc.PositionOfCurrentEntity) or len(places) < 2:

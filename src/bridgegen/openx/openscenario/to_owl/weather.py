@@ -22,11 +22,11 @@ CLASSES = {part.link: part.owl_class for part in PARTS}
 
 _STATED = {
     element: [
-        one
-        for one in PARAMETERS.values()
-        if one.stands_for and PHYSICAL[one.stands_for].element == element
+        parameter
+        for parameter in PARAMETERS.values()
+        if parameter.stands_for and PHYSICAL[parameter.stands_for].element == element
     ]
-    for element in dict.fromkeys(one.element for one in PHYSICAL.values())
+    for element in dict.fromkeys(physical.element for physical in PHYSICAL.values())
     if element not in ("", "road_condition")
 }
 """Parameters that stand for attributes of an element of the standard's Weather, by element."""
@@ -57,7 +57,11 @@ def add_weather(
     own = _originals(builder, environment.road_condition)
     found: dict[str, dict[str, Any]] = {}
     for part, parameters in PARTS.items():
-        said = {one.owl_property: own[one.name] for one in parameters if one.name in own}
+        said = {
+            parameter.owl_property: own[parameter.name]
+            for parameter in parameters
+            if parameter.name in own
+        }
         if said:
             found[part.link] = said
     for link, values in _solved(builder, environment).items():
@@ -92,17 +96,22 @@ def _originals(builder: StoryBuilder, road: osc.RoadCondition | None) -> dict[st
     if road is None or road.properties is None:
         return {}
     found: dict[str, Any] = {}
-    for one in road.properties.properties:
-        name = builder.text(one.name)
+    for property_ in road.properties.properties:
+        name = builder.text(property_.name)
         if name not in PARAMETERS:
             continue
-        if isinstance(one.value, osc.ParameterRef) and one.value.name in builder.numbers:
-            found[name] = one.value
+        if (
+            isinstance(property_.value, osc.ParameterRef)
+            and property_.value.name in builder.numbers
+        ):
+            found[name] = property_.value
             continue
         try:
-            found[name] = builder.now(float(builder.text(one.value)), one)
+            found[name] = builder.now(float(builder.text(property_.value)), property_)
         except ValueError:
-            raise UnsayableError(one, f"the Property {name}, which must be a number,") from None
+            raise UnsayableError(
+                property_, f"the Property {name}, which must be a number,"
+            ) from None
     return found
 
 
@@ -122,9 +131,11 @@ def _solved(builder: StoryBuilder, environment: osc.Environment) -> dict[str, di
         if name == "precipitation":
             found |= _falling(builder, element)
         elif element is not None:
-            for one in parameters:
-                value = now(getattr(element, PHYSICAL[one.stands_for].attribute), element)
-                found.setdefault(one.part.link, {})[one.owl_property] = _inverse(one, value)
+            for parameter in parameters:
+                value = now(getattr(element, PHYSICAL[parameter.stands_for].attribute), element)
+                found.setdefault(parameter.part.link, {})[parameter.owl_property] = _inverse(
+                    parameter, value
+                )
     road = environment.road_condition
     if road is not None and (road.wetness is not None or road.friction_scale_factor != 1.0):
         state_of_road: dict[str, Any] = {"has_friction": road.friction_scale_factor}
@@ -135,18 +146,24 @@ def _solved(builder: StoryBuilder, environment: osc.Environment) -> dict[str, di
     return found
 
 
-def _falling(builder: StoryBuilder, one: osc.Precipitation | None) -> dict[str, dict[str, Any]]:
-    if one is None or (one.precipitation_intensity is None and one.intensity is None):
+def _falling(
+    builder: StoryBuilder, precipitation: osc.Precipitation | None
+) -> dict[str, dict[str, Any]]:
+    if precipitation is None or (
+        precipitation.precipitation_intensity is None and precipitation.intensity is None
+    ):
         return {}
-    kind = builder.choice(osc.PrecipitationType, one.precipitation_type)
-    if one.precipitation_intensity is None:  # 1.0's share of the most: as a percentage is to us
-        percent = min(100.0 * builder.now(one.intensity, one), _MOST)
+    kind = builder.choice(osc.PrecipitationType, precipitation.precipitation_type)
+    if (
+        precipitation.precipitation_intensity is None
+    ):  # 1.0's share of the most: as a percentage is to us
+        percent = min(100.0 * builder.now(precipitation.intensity, precipitation), _MOST)
         formula = PARAMETERS["precipitation"].law.formula
         falls = osc.Precipitation(kind, float(parse(formula).evaluate({"x": percent})))
         return _falling(builder, falls)
     if kind is osc.PrecipitationType.SNOW:
-        return {"has_snow": {"has_snowfall": one.precipitation_intensity}}
-    rate = builder.now(one.precipitation_intensity, one)
+        return {"has_snow": {"has_snowfall": precipitation.precipitation_intensity}}
+    rate = builder.now(precipitation.precipitation_intensity, precipitation)
     if kind is osc.PrecipitationType.DRY or rate <= 0.0:
         return {"has_rain": {"has_precipitation": 0.0}} if kind is not kind.DRY else {}
     return {"has_rain": {"has_precipitation": _inverse(PARAMETERS["precipitation"], rate)}}

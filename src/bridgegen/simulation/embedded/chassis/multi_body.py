@@ -207,12 +207,12 @@ def multi_body(car: MultiBody, wheelbase: float, width: float, height: float, lo
     actuators = CLASSES[CLASS]
     long, wide = wheelbase / (car.to_front + car.to_rear), width / car.width
     made = np.zeros(columns.MULTI_BODY)
-    for one in (actuators, car, car.tyre, car.camber):
-        for name in (each.name for each in fields(one)):
+    for class_ in (actuators, car, car.tyre, car.camber):
+        for name in (each.name for each in fields(class_)):
             for names in (common, columns):
                 column = getattr(names, name.upper(), None)
-                if column is not None and isinstance(getattr(one, name), float):
-                    made[column] = getattr(one, name)
+                if column is not None and isinstance(getattr(class_, name), float):
+                    made[column] = getattr(class_, name)
     made[common.TO_FRONT], made[common.TO_REAR] = long * car.to_front, long * car.to_rear
     made[common.HEIGHT] = height * car.sprung_height / car.height
     made[common.LOCK] = lock

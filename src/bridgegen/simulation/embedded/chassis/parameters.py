@@ -153,10 +153,10 @@ def chassis(found: VehicleClass, wheelbase: float, height: float, lock: float) -
     made[columns.LOCK] = lock
     at = np.linspace(0.0, 1.0, columns.SLIPS + 1)
     made[columns.SLIP :] = found.tyre.slip(1.0 - at * at)
-    for one in (found, found.tyre):
-        for name in (each.name for each in fields(one)):
+    for class_ in (found, found.tyre):
+        for name in (each.name for each in fields(class_)):
             if (column := getattr(columns, name.upper(), None)) is not None and name not in (
                 "height", "inertia",
             ):  # fmt: skip
-                made[column] = getattr(one, name)
+                made[column] = getattr(class_, name)
     return made

@@ -173,7 +173,7 @@ class Actions:
         elif isinstance(action, osc.TrailerAction):
             self._coupling(action, entity)
         elif isinstance(action, osc.VisibilityAction):
-            shown = (int(self._tables.truth(one)) for one in (action.sensors, action.traffic))
+            shown = (int(self._tables.truth(flag)) for flag in (action.sensors, action.traffic))
             slot, (sensors, traffic) = self._tables.slot(0.0), shown
             self.rows.append((entity, SHOW, 0, sensors, slot, slot, traffic))
         elif isinstance(inner, osc.LightStateAction) and (switched := self.lamps(inner)):
@@ -247,7 +247,7 @@ class Actions:
                 row = (entity, FOLLOW_LAID, 0, int(relative), start, slot, number)
                 self.rows.append(row)
                 return
-            number = sum(isinstance(one, AlongTrajectory) for one in self._paths)
+            number = sum(isinstance(lanes, AlongTrajectory) for lanes in self._paths)
             path = compile_trajectory(self._tables, action)
             self._paths.append(path)
             offset = self._tables.slot(path.start)
@@ -262,8 +262,8 @@ class Actions:
         if isinstance(action, osc.AcquirePositionAction):
             found = [self._positions.spot(action.position)]
         else:
-            found = [self._positions.spot(one.position) for one in action.route.waypoints]
-        return tuple(one for one in found if one is not None)
+            found = [self._positions.spot(waypoint.position) for waypoint in action.route.waypoints]
+        return tuple(spot for spot in found if spot is not None)
 
     def add_route(self, spots: tuple[Spot, ...]) -> int:
         """Return the number of a route, a new one if it is new."""

@@ -162,8 +162,9 @@ def compile_storyboard(
             skipped += error.problems
         while astray := strays(left):
             skipped += [
-                f"{place}, line {one.line}: {type(one).__name__} of an entity that is not there"
-                for one in astray
+                f"{place}, line {element.line}: {type(element).__name__} of an entity that is not "
+                "there"
+                for element in astray
             ]
             left = without(left, astray)
         scenario = left
@@ -191,9 +192,9 @@ class _Compiler:
 
     def without_culprits(self, scenario: osc.OpenScenario) -> osc.OpenScenario:
         """Return the scenario as it was given without what cannot be run."""
-        culprits = {id(one) for one in self.tables.culprits}
+        culprits = {id(culprit) for culprit in self.tables.culprits}
         pairs = zip(walk(scenario), walk(self.scenario), strict=True)  # one is resolved
-        return without(scenario, [one for one, other in pairs if id(other) in culprits])
+        return without(scenario, [pair for pair, other in pairs if id(other) in culprits])
 
     def has_ego(self, left: osc.OpenScenario) -> bool:
         """Return whether a scenario still has the entity that is this one's ego."""
@@ -213,8 +214,8 @@ class _Compiler:
         storyboard = self.scenario.storyboard
         found = nodes(storyboard)
         self.triggers = Triggers(self.tables, step, found, self.positions, self.global_actions)
-        objects = [one.entity_object for one in self.tables.objects]
-        bodies = np.array([measures(self.tables, one) for one in objects])
+        objects = [obj.entity_object for obj in self.tables.objects]
+        bodies = np.array([measures(self.tables, obj) for obj in objects])
         has_driver = (driver or self._declared_driver()) is not STORYBOARD
         self.controllers.has_driver, self.controllers.replaces = has_driver, driver is not None
         self.towing.compile()
@@ -240,7 +241,9 @@ class _Compiler:
         duration = self.triggers.stop_time or DEFAULT_DURATION
         rows = elements(found, self.tables, self.triggers, self.actions)
         self.actions.refuse_driven()
-        trajectories = [p for p, one in enumerate(self.paths) if isinstance(one, AlongTrajectory)]
+        trajectories = [
+            p for p, lanes in enumerate(self.paths) if isinstance(lanes, AlongTrajectory)
+        ]
         follows = [
             trajectories.index(e) if self.actions.is_timed(e) else -1 for e in range(len(objects))
         ]
@@ -265,9 +268,9 @@ class _Compiler:
             place=self.place,
             names=self.tables.names,
             bodies=bodies,
-            objects=np.array([self.tables.type_of(one) for one in objects], dtype=np.int64),
-            kinds=np.array([kind(one) for one in objects], dtype=np.int64),
-            sirens=np.array([has_siren(one) for one in objects], dtype=np.int64),
+            objects=np.array([self.tables.type_of(obj) for obj in objects], dtype=np.int64),
+            kinds=np.array([kind(obj) for obj in objects], dtype=np.int64),
+            sirens=np.array([has_siren(obj) for obj in objects], dtype=np.int64),
             parameters=self.tables.parameters,
             slots=self.tables.slots,
             init=np.array(self.start.speeds, dtype=np.int64),
@@ -334,7 +337,7 @@ class _Compiler:
             time_step=step,
             n_steps=n_steps,
             fixed=self.tables.fixed,
-            event_names=tuple(one.path[-1] for one in found if one.kind == EVENT),
+            event_names=tuple(node.path[-1] for node in found if node.kind == EVENT),
             noise_key=declared.noise_key(self.controllers, self.place),
             notes=tuple(self.tables.notes),
         )

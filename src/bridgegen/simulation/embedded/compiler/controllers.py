@@ -75,8 +75,8 @@ class Controllers:
     def of(self, entity: int) -> Iterator[osc.Controller]:
         """Yield an entity's controllers from the start on, in the order of the file."""
         owner = self._tables.objects[entity]
-        for one in owner.object_controllers:
-            yield one.controller
+        for controller in owner.object_controllers:
+            yield controller.controller
         for private in self._scenario.storyboard.init.actions.privates:
             for wrapped in private.private_actions if private.entity_ref == owner.name else ():
                 for part in parts(wrapped.action):
@@ -95,10 +95,10 @@ class Controllers:
             if isinstance(part, osc.AssignControllerAction) and _names_driver(_controller(part)):
                 self._tables.unsupported(part, "another driver than at the start")
         switched = self._switched(action, entity)
-        for which, one in switched.items():
-            if one != UNSAID:
-                self._later[which].append(one)
-        if all(one == UNSAID for one in switched.values()):
+        for which, number in switched.items():
+            if number != UNSAID:
+                self._later[which].append(number)
+        if all(number == UNSAID for number in switched.values()):
             return None
         slot = self._tables.slot(0.0)
         return entity, CONTROL, switched[LATERALLY], switched[LONGITUDINALLY], slot, slot, 0
@@ -135,10 +135,10 @@ class Controllers:
         if isinstance(part, osc.AssignControllerAction):
             return _names_driver(_controller(part))
         wanted = part.object_controller_ref or part.controller_ref
-        mine = {str(one.name) for one in self.of(0) if _names_driver(one)}
-        for one in self._tables.objects[0].object_controllers:
-            if _names_driver(one.controller) and one.name is not None:
-                mine.add(str(one.name))
+        mine = {str(controller.name) for controller in self.of(0) if _names_driver(controller)}
+        for controller in self._tables.objects[0].object_controllers:
+            if _names_driver(controller.controller) and controller.name is not None:
+                mine.add(str(controller.name))
         return wanted is None or self._tables.text(wanted) in mine
 
     def _is_of_driver(self, part: Switching, entity: int) -> bool:
@@ -146,7 +146,7 @@ class Controllers:
         if isinstance(part, osc.AssignControllerAction):
             return _names_driver(_controller(part))
         wanted = part.object_controller_ref or part.controller_ref
-        mine = {str(one.name) for one in self.of(entity) if _names_driver(one)}
+        mine = {str(controller.name) for controller in self.of(entity) if _names_driver(controller)}
         return self._tables.text(wanted) in mine if wanted is not None else bool(mine)
 
     def _stand_in(self, part: Switching, entity: int) -> None:
@@ -155,7 +155,7 @@ class Controllers:
         Refuse it where a known one would have to make way for it.
         """
         name = self._tables.names[entity]
-        if any(_names_driver(one) for one in self.of(entity)):
+        if any(_names_driver(controller) for controller in self.of(entity)):
             what = f"switching on another controller of '{name}' than its driver"
             self._tables.unsupported(part, what)
         elif name not in self._unknown:
@@ -179,12 +179,12 @@ def parts(action: Element) -> Iterator[Part]:
 
 
 def _controller(part: osc.AssignControllerAction) -> osc.Controller:
-    one = part.controller
-    return one.controller if isinstance(one, osc.ObjectController) else one
+    controller = part.controller
+    return controller.controller if isinstance(controller, osc.ObjectController) else controller
 
 
-def _names_driver(one: osc.Controller) -> bool:
-    return one.properties is not None and one.properties.get(DRIVER) is not None
+def _names_driver(controller: osc.Controller) -> bool:
+    return controller.properties is not None and controller.properties.get(DRIVER) is not None
 
 
 # --- Pedals, wheel and gear that a storyboard holds; see ``_pedal_kernels`` ---
@@ -220,8 +220,8 @@ class Pedals:
             steers: whether the entity has a driver, whose wheel may be held.
         """
         if part.throttle is not None:
-            one = part.throttle
-            yield self._row(entity, THROTTLE, one.active, one.value, one.max_rate)
+            throttle = part.throttle
+            yield self._row(entity, THROTTLE, throttle.active, throttle.value, throttle.max_rate)
         for column, brake in ((BRAKE, part.brake), (PARKING_BRAKE, part.parking_brake)):
             if brake is not None:
                 yield self._brake(entity, column, brake)
@@ -235,7 +235,7 @@ class Pedals:
         self, entity: int, column: int, active: bool | osc.ParameterRef | osc.Expr, value: Value,
         rate: Value | None, wheelbase: float = 1.0,
     ) -> Row:  # fmt: skip
-        slots = (self._tables.slot(one) for one in (value, AT_ONCE if rate is None else rate))
+        slots = (self._tables.slot(number) for number in (value, AT_ONCE if rate is None else rate))
         is_held = int(self._tables.truth(active))
         return entity, PRESS, is_held, column, *slots, self._tables.slot(wheelbase)
 

@@ -136,16 +136,16 @@ class Courses:
         mode = self._tables.choice(osc.FollowingMode, action.following_mode)
         row[codes.FOLLOWS] = int(mode is osc.FollowingMode.FOLLOW)
         row[codes.FIRST_ENTRY] = len(self.entries)
-        for one in action.entries:
-            time = -1 if one.time is None else self._tables.slot(one.time)
-            self.entries.append((self._tables.slot(one.speed), time))
+        for entry in action.entries:
+            time = -1 if entry.time is None else self._tables.slot(entry.time)
+            self.entries.append((self._tables.slot(entry.speed), time))
         row[codes.PAST_ENTRY] = len(self.entries)
         self._limit(row, action.dynamic_constraints)
         return entity, codes.SPEED_PROFILE, 0, 0, 0, 0, self._keep(row)
 
     def _distance(self, action: osc.LongitudinalDistanceAction, entity: int) -> Row:
         row = self._row(entity, action.entity_ref)
-        given = [one for one in (action.distance, action.time_gap) if one is not None]
+        given = [value for value in (action.distance, action.time_gap) if value is not None]
         if len(given) != 1:
             self._tables.unsupported(
                 action, "a LongitudinalDistanceAction without distance or timeGap, or with both,"
@@ -189,7 +189,7 @@ class Courses:
             for rate in (limits.max_acceleration_rate, limits.max_deceleration_rate):
                 if rate is not None and rate != math.inf:
                     self._tables.unsupported(limits, "a rate of a lateral acceleration")
-        row[codes.UNLIMITED] = int(all(one is None for one in bounds))
+        row[codes.UNLIMITED] = int(all(bound is None for bound in bounds))
         self._limit(row, limits)
 
     def _synchronise(self, action: osc.SynchronizeAction, entity: int) -> Row:
@@ -235,7 +235,7 @@ class Courses:
             most.max_acceleration, most.max_deceleration, most.max_speed,
             most.max_acceleration_rate, most.max_deceleration_rate,
         )  # fmt: skip
-        row[codes.MOST : codes.MOST + 5] = [self._optional(one) for one in values]
+        row[codes.MOST : codes.MOST + 5] = [self._optional(value) for value in values]
 
     def _optional(self, value: Value | None) -> int:
         return -1 if value is None else self._tables.slot(value)

@@ -269,10 +269,12 @@ class Values:
         self.slots: list[int] = []
         parameters, variables = scenario.parameter_declarations, scenario.variable_declarations
         self._declared: dict[tuple[str, str], tuple[Kind, Value]] = {}
-        for one in parameters.parameters if parameters else ():
-            kind = kind_of(one.parameter_type)
-            first: Value = osc.ParameterRef(f"${one.name}") if kind.is_number else one.value
-            self._declared["parameter", one.name] = kind, first
+        for parameter in parameters.parameters if parameters else ():
+            kind = kind_of(parameter.parameter_type)
+            first: Value = (
+                osc.ParameterRef(f"${parameter.name}") if kind.is_number else parameter.value
+            )
+            self._declared["parameter", parameter.name] = kind, first
         for other in variables.variables if variables else ():
             kind = kind_of(other.variable_type)
             self._declared["variable", other.name] = kind, other.value

@@ -56,14 +56,14 @@ class Signals:
         self._tables = tables
         self._states = dict(LIGHT_STATES)
         self._found = declared.controllers if declared else ()
-        self._names = [tables.text(one.name) for one in self._found]
+        self._names = [tables.text(controller.name) for controller in self._found]
         self.lights: list[str] = []
         self.first_states: list[int] = []
         self.controllers: list[tuple[int, ...]] = []
         self.phases: list[tuple[int, ...]] = []
         self.changes: list[tuple[int, int]] = []
-        for one in self._found:
-            self._add(one)
+        for controller in self._found:
+            self._add(controller)
 
     def light(self, name: object) -> int:
         """Return the number of a light."""
@@ -98,9 +98,9 @@ class Signals:
             self._tables.unsupported(element, f'phase="{name}" (no such phase)')
         return -1
 
-    def _add(self, one: osc.TrafficSignalController) -> None:
+    def _add(self, controller: osc.TrafficSignalController) -> None:
         first = len(self.phases)
-        for phase in one.phases:
+        for phase in controller.phases:
             if phase.traffic_signal_group_state is not None:
                 self._tables.unsupported(phase, "a TrafficSignalGroupState")
             change = len(self.changes)
@@ -110,9 +110,9 @@ class Signals:
             slot = self._tables.slot(phase.duration)
             self.phases.append((slot, change, len(self.changes)))
         reference = -1
-        if one.reference is not None:
-            reference = self.controller(one, self._tables.text(one.reference))
-        delay = self._tables.slot(0.0 if one.delay is None else one.delay)
+        if controller.reference is not None:
+            reference = self.controller(controller, self._tables.text(controller.reference))
+        delay = self._tables.slot(0.0 if controller.delay is None else controller.delay)
         self.controllers.append((first, len(self.phases), delay, reference))
 
 
@@ -179,17 +179,17 @@ class Environments:
         value: Value | None = getattr(element, column.attribute)
         return column.clear if value is None else value
 
-    def _of_property(self, one: Parameter, road: osc.RoadCondition | None) -> Value | None:
+    def _of_property(self, parameter: Parameter, road: osc.RoadCondition | None) -> Value | None:
         """Return the quantity of a parameter that our files say as a property, in percent."""
-        said = road.properties.get(one.name) if road and road.properties else None
+        said = road.properties.get(parameter.name) if road and road.properties else None
         if isinstance(said, osc.ParameterRef) and said.name in self._tables.parameters:
-            return Expr("${" + re.sub(r"\bx\b", said.text, one.law.formula) + "}")
+            return Expr("${" + re.sub(r"\bx\b", said.text, parameter.law.formula) + "}")
         if isinstance(said, str):
             try:
                 percent = min(max(float(said), 0.0), 100.0)
             except ValueError:
                 return None  # another tool's property of that name
-            return float(parse(one.law.formula).evaluate({"x": percent}))
+            return float(parse(parameter.law.formula).evaluate({"x": percent}))
         return None
 
     def _fall(self, row: list[int], falling: osc.Precipitation) -> None:

@@ -40,7 +40,7 @@ def is_laid(action: osc.FollowTrajectoryAction) -> bool:
     if isinstance(line, osc.Clothoid):
         return not is_fixed(line.position)
     if isinstance(line, osc.ClothoidSpline):
-        first, *others = (one.position_start for one in line.segments)
+        first, *others = (segment.position_start for segment in line.segments)
         return first is None or not is_fixed(first) or any(others)
     timed = any(vertex.time is not None for vertex in line.vertices)
     return any(
@@ -69,7 +69,7 @@ def gives_path(action: osc.FollowTrajectoryAction) -> bool:
     elif isinstance(line, osc.Clothoid):
         places = [line.position]
     elif isinstance(line, osc.ClothoidSpline):
-        if any(one.position_start for one in line.segments[1:]):
+        if any(segment.position_start for segment in line.segments[1:]):
             return False
         places = [line.segments[0].position_start]
     else:
@@ -110,8 +110,8 @@ class Layouts:
     @property
     def shapes(self) -> Float:
         """As ``Program.shapes`` has them."""
-        width = max((one.shape[1] for one in self._shapes), default=0)
-        padded = [np.pad(one, ((0, 0), (0, width - one.shape[1]))) for one in self._shapes]
+        width = max((shape.shape[1] for shape in self._shapes), default=0)
+        padded = [np.pad(shape, ((0, 0), (0, width - shape.shape[1]))) for shape in self._shapes]
         return np.concatenate(padded) if padded else np.empty((0, 0))
 
     def add(self, action: osc.FollowTrajectoryAction, entity: int) -> int:
@@ -135,7 +135,7 @@ class Layouts:
         line = where.trajectory_ref.trajectory.shape.shape
         lacks = ""
         if isinstance(line, osc.ClothoidSpline):
-            first, *others = (one.position_start for one in line.segments)
+            first, *others = (segment.position_start for segment in line.segments)
             lacks = " with several starts" if any(others) else "" if first else " without a start"
         if isinstance(line, osc.Nurbs) or lacks:
             what = f"a TrajectoryPosition on a {type(line).__name__}{lacks}"
@@ -203,8 +203,8 @@ class Layouts:
         place = self._positions.add_own(entity) if origin is None else self._positions.add(origin)
         anchors = [(place, UNTIMED, 1)]
         if isinstance(line, osc.ClothoidSpline):
-            others = (one.position_start for one in line.segments[1:])
-            anchors += [(self._positions.add(one), UNTIMED, 1) for one in others if one]
+            others = (segment.position_start for segment in line.segments[1:])
+            anchors += [(self._positions.add(other), UNTIMED, 1) for other in others if other]
         drawn = _Drawn(RIGID, anchors)
         length = sum(bend.length for bend in curve)
         if not 0.0 < length <= SAMPLE * (MOST_VERTICES - 1):
@@ -247,8 +247,11 @@ class Layouts:
             anchors.append((self._positions.add(point.position), time, 0))
         literal = self._tables.literal
         order = int(literal(line, "order", line.order))
-        weights = [literal(one, "weight", _or(one.weight, 1.0)) for one in points]
-        knots = [literal(one, "value", one.value) for one in line.knots]
+        weights = [
+            literal(control_point, "weight", _or(control_point.weight, 1.0))
+            for control_point in points
+        ]
+        knots = [literal(knot, "value", knot.value) for knot in line.knots]
         if problem := _knot_problem(order, len(points), knots, weights):
             self._tables.unsupported(line, f"a Nurbs {problem}")
             return _Drawn(WEIGHTED, anchors)
@@ -392,8 +395,8 @@ class Towing:
 
     def compile(self) -> None:
         """Take down who tows whom at the start."""
-        for tower, one in enumerate(self._tables.objects):
-            vehicle = one.entity_object
+        for tower, obj in enumerate(self._tables.objects):
+            vehicle = obj.entity_object
             if not isinstance(vehicle, osc.Vehicle) or vehicle.trailer is None:
                 continue
             named = vehicle.trailer.trailer
@@ -455,8 +458,8 @@ class Towing:
     def couplings(self) -> Float:
         """Return where each entity tows and is towed, ``(E, 2)`` ahead of its reference [m]."""
         found = np.full((len(self._tables.objects), 2), math.nan)
-        for e, one in enumerate(self._tables.objects):
-            vehicle = one.entity_object
+        for e, obj in enumerate(self._tables.objects):
+            vehicle = obj.entity_object
             if isinstance(vehicle, osc.Vehicle):
                 for i, part in enumerate((vehicle.trailer_hitch, vehicle.trailer_coupler)):
                     if part is not None and self._pairs:

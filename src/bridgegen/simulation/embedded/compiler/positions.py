@@ -50,7 +50,7 @@ def is_fixed(position: osc.Position) -> bool:
         numbers = (where.x, where.y)
     else:
         return False
-    return not any(isinstance(one, osc.ParameterRef | Expr) for one in numbers)
+    return not any(isinstance(number, osc.ParameterRef | Expr) for number in numbers)
 
 
 class Positions:
@@ -167,8 +167,8 @@ class Positions:
 
     def _route_spot(self, where: osc.RoutePosition) -> RouteSpot | None:
         literal = self._tables.literal
-        found = [self.spot(one.position) for one in where.route_ref.route.waypoints]
-        waypoints = tuple(one for one in found if one is not None)
+        found = [self.spot(waypoint.position) for waypoint in where.route_ref.route.waypoints]
+        waypoints = tuple(spot for spot in found if spot is not None)
         inner = where.in_route_position.position
         if isinstance(inner, osc.PositionOfCurrentEntity):
             self._tables.unsupported(inner, "FromCurrentEntity")

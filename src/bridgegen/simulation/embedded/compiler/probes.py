@@ -154,13 +154,15 @@ class Probes:
         return []
 
     def _value(
-        self, one: osc.ParameterCondition | osc.VariableCondition, what: str, name: str
+        self, condition: osc.ParameterCondition | osc.VariableCondition, what: str, name: str
     ) -> Probe:
         """Return the probe of a condition on a parameter or variable."""
-        rule, number = self._rule(one.rule), self._values.number(one, what, name)
+        rule, number = self._rule(condition.rule), self._values.number(condition, what, name)
         if not self._values.is_ordered(what, name) and rule not in EQUALITY:
-            self._tables.unsupported(one, f"rule=\"{one.rule}\" for the text of {what} '{name}'")
-        value = self._values.value(one, what, name, one.value)
+            self._tables.unsupported(
+                condition, f"rule=\"{condition.rule}\" for the text of {what} '{name}'"
+            )
+        value = self._values.value(condition, what, name, condition.value)
         return Probe(codes.VALUE, other=number, rule=rule, limit=value)
 
     def by_entity(self, condition: Element, entities: Sequence[int]) -> list[Probe]:
@@ -168,50 +170,54 @@ class Probes:
         probe = self._probe(condition)
         return [replace(probe, entity=e) for e in entities]
 
-    def _probe(self, one: Element) -> Probe:
+    def _probe(self, element: Element) -> Probe:
         """Return the probe of a condition on no entity in particular."""
-        match one:
+        match element:
             case osc.SpeedCondition() | osc.AccelerationCondition():
-                kind = codes.SPEED if isinstance(one, osc.SpeedCondition) else codes.ACCELERATING
-                direction = self._direction(one.direction)
-                return Probe(kind, rule=self._rule(one.rule), limit=one.value, measure=direction)
+                kind = (
+                    codes.SPEED if isinstance(element, osc.SpeedCondition) else codes.ACCELERATING
+                )
+                direction = self._direction(element.direction)
+                return Probe(
+                    kind, rule=self._rule(element.rule), limit=element.value, measure=direction
+                )
             case osc.RelativeSpeedCondition():
                 return Probe(
-                    codes.SPEED_DIFFERENCE, other=self._tables.entity(one.entity_ref),
-                    rule=self._rule(one.rule), limit=one.value,
-                    measure=self._direction(one.direction),
+                    codes.SPEED_DIFFERENCE, other=self._tables.entity(element.entity_ref),
+                    rule=self._rule(element.rule), limit=element.value,
+                    measure=self._direction(element.direction),
                 )  # fmt: skip
             case osc.TraveledDistanceCondition():
-                return Probe(codes.TRAVELED_DISTANCE, limit=one.value)
+                return Probe(codes.TRAVELED_DISTANCE, limit=element.value)
             case osc.StandStillCondition():
-                return Probe(codes.STAND_STILL, limit=one.duration)
+                return Probe(codes.STAND_STILL, limit=element.duration)
             case osc.EndOfRoadCondition():
-                return Probe(codes.END_OF_ROAD, limit=one.duration)
+                return Probe(codes.END_OF_ROAD, limit=element.duration)
             case osc.ReachPositionCondition():
-                where, place = self._place(one.position)
+                where, place = self._place(element.position)
                 return Probe(
-                    codes.DISTANCE, other=where, rule=codes.LESS_EQUAL, limit=one.tolerance,
+                    codes.DISTANCE, other=where, rule=codes.LESS_EQUAL, limit=element.tolerance,
                     place=place,
                 )  # fmt: skip
             case osc.OffroadCondition():
-                return Probe(codes.OFFROAD, limit=one.duration)
+                return Probe(codes.OFFROAD, limit=element.duration)
             case osc.RelativeClearanceCondition():
-                return self._clearance(one)
+                return self._clearance(element)
             case osc.CollisionCondition(target=osc.EntityRef() as target):
                 return Probe(codes.COLLISION, other=self._tables.entity(target.entity_ref))
             case osc.CollisionCondition(target=osc.ByObjectType() as target):
                 number = self._tables.type_number(target.type)
                 return Probe(codes.COLLISION_WITH_TYPE, other=number)
             case osc.AngleCondition() | osc.RelativeAngleCondition():
-                return self._angle(one)
+                return self._angle(element)
             case (
                 osc.DistanceCondition()
                 | osc.RelativeDistanceCondition()
                 | osc.TimeHeadwayCondition()
                 | osc.TimeToCollisionCondition()
             ):
-                return self._pair(one)
-        self._tables.unsupported(one, type(one).__name__)
+                return self._pair(element)
+        self._tables.unsupported(element, type(element).__name__)
         return Probe(codes.NEVER_TRUE)
 
     def _place(self, position: osc.Position) -> tuple[int, int]:
@@ -222,10 +228,10 @@ class Probes:
         self.marks.append(-1 - place)
         return codes.AT_MARK, len(self.marks) - 1
 
-    def _clearance(self, one: osc.RelativeClearanceCondition) -> Probe:
+    def _clearance(self, condition: osc.RelativeClearanceCondition) -> Probe:
         """Return the probe of a condition on the lanes around an entity."""
         first = len(self.ranges)
-        for lanes in one.relative_lane_ranges:
+        for lanes in condition.relative_lane_ranges:
             ends = ((lanes.from_, "from", -math.inf), (lanes.to, "to", math.inf))
             low, high = (
                 unsaid if end is None else self._tables.literal(lanes, name, end)
@@ -234,86 +240,93 @@ class Probes:
             if low > high:
                 self._tables.unsupported(lanes, f'from="{low:g}" to="{high:g}" (none between)')
             self.ranges.append((low, high))
-        named = [e for ref in one.entity_refs for e in self._tables.members(ref.entity_ref)]
+        named = [e for ref in condition.entity_refs for e in self._tables.members(ref.entity_ref)]
         counts = [int(not named or e in named) for e in range(len(self._tables.names))]
-        opposite = int(self._tables.truth(one.opposite_lanes))
+        opposite = int(self._tables.truth(condition.opposite_lanes))
         self.clearances.append((first, len(self.ranges), opposite, *counts))
         return Probe(
-            codes.CLEARANCE, other=len(self.clearances) - 1, limit=one.distance_forward or 0.0,
-            within=one.distance_backward or 0.0, freespace=self._tables.truth(one.free_space),
-        )  # fmt: skip
+            codes.CLEARANCE,
+            other=len(self.clearances) - 1,
+            limit=condition.distance_forward or 0.0,
+            within=condition.distance_backward or 0.0,
+            freespace=self._tables.truth(condition.free_space),
+        )
 
-    def _pair(self, one: Pair) -> Probe:
+    def _pair(self, pair: Pair) -> Probe:
         """Return the probe of a condition on a distance to an entity or a place."""
         place = 0
-        if isinstance(one, osc.DistanceCondition):
-            other, place = self._place(one.position)
-        elif isinstance(one, osc.TimeToCollisionCondition):
-            target = one.target.target
+        if isinstance(pair, osc.DistanceCondition):
+            other, place = self._place(pair.position)
+        elif isinstance(pair, osc.TimeToCollisionCondition):
+            target = pair.target.target
             if isinstance(target, osc.EntityRef):
                 other = self._tables.entity(target.entity_ref)
             else:
                 other, place = self._place(target)
         else:
-            other = self._tables.entity(one.entity_ref)
-        measure, system = self._measure(one)
-        freespace = self._tables.truth(one.freespace)
+            other = self._tables.entity(pair.entity_ref)
+        measure, system = self._measure(pair)
+        freespace = self._tables.truth(pair.freespace)
         return Probe(
-            _PAIRS[type(one)], 0, other, self._rule(one.rule), one.value, place, measure, system,
+            _PAIRS[type(pair)], 0, other, self._rule(pair.rule), pair.value, place, measure, system,
             freespace,
         )  # fmt: skip
 
-    def _measure(self, one: Pair) -> tuple[int, int]:
+    def _measure(self, pair: Pair) -> tuple[int, int]:
         """Return the kind of distance and the coordinate system; 1.0 has ``alongRoute`` instead."""
-        if not isinstance(one, osc.RelativeDistanceCondition) and one.along_route is not None:
-            along = self._tables.truth(one.along_route)
+        if not isinstance(pair, osc.RelativeDistanceCondition) and pair.along_route is not None:
+            along = self._tables.truth(pair.along_route)
             return (codes.LONGITUDINAL, codes.PATH_SYSTEM) if along else (codes.EUCLIDIAN, 0)
         measure, system = codes.EUCLIDIAN, codes.ENTITY_SYSTEM
-        if one.relative_distance_type is not None:
-            kind = self._tables.choice(osc.RelativeDistanceType, one.relative_distance_type)
+        if pair.relative_distance_type is not None:
+            kind = self._tables.choice(osc.RelativeDistanceType, pair.relative_distance_type)
             measure = _MEASURES[kind]
-        if one.coordinate_system is not None:
-            system = _SYSTEMS[self._tables.choice(osc.CoordinateSystem, one.coordinate_system)]
+        if pair.coordinate_system is not None:
+            system = _SYSTEMS[self._tables.choice(osc.CoordinateSystem, pair.coordinate_system)]
         if measure == codes.EUCLIDIAN:
             return measure, system
         if system == codes.WORLD_SYSTEM:
-            self._tables.unsupported(one, 'coordinateSystem="world" of a distance')
-        if one.routing_algorithm is not None and system == codes.PATH_SYSTEM:
-            way = self._tables.choice(osc.RoutingAlgorithm, one.routing_algorithm)
+            self._tables.unsupported(pair, 'coordinateSystem="world" of a distance')
+        if pair.routing_algorithm is not None and system == codes.PATH_SYSTEM:
+            way = self._tables.choice(osc.RoutingAlgorithm, pair.routing_algorithm)
             if way not in _ON_OWN_WAY:  # distances are measured on the entity's own way
-                self._tables.unsupported(one, f'routingAlgorithm="{way}"')
+                self._tables.unsupported(pair, f'routingAlgorithm="{way}"')
         return measure, system
 
-    def _angle(self, one: osc.AngleCondition | osc.RelativeAngleCondition) -> Probe:
+    def _angle(self, angle_condition: osc.AngleCondition | osc.RelativeAngleCondition) -> Probe:
         """Return the probe of a condition on a heading."""
-        kind = self._tables.choice(osc.AngleType, one.angle_type)
+        kind = self._tables.choice(osc.AngleType, angle_condition.angle_type)
         if kind is not osc.AngleType.HEADING:
-            self._tables.unsupported(one, f'angleType="{kind}"')
+            self._tables.unsupported(angle_condition, f'angleType="{kind}"')
         system = codes.WORLD_SYSTEM
-        if one.coordinate_system is not None:
-            chosen = self._tables.choice(osc.CoordinateSystem, one.coordinate_system)
+        if angle_condition.coordinate_system is not None:
+            chosen = self._tables.choice(osc.CoordinateSystem, angle_condition.coordinate_system)
             system = _ANGLE_SYSTEMS[chosen]
-        within = one.angle_tolerance
-        if isinstance(one, osc.AngleCondition):
-            return Probe(codes.ANGLE, limit=one.angle, system=system, within=within)
-        other = self._tables.entity(one.entity_ref)
+        within = angle_condition.angle_tolerance
+        if isinstance(angle_condition, osc.AngleCondition):
+            return Probe(codes.ANGLE, limit=angle_condition.angle, system=system, within=within)
+        other = self._tables.entity(angle_condition.entity_ref)
         return Probe(
-            codes.RELATIVE_ANGLE, other=other, limit=one.angle, system=system, within=within
+            codes.RELATIVE_ANGLE,
+            other=other,
+            limit=angle_condition.angle,
+            system=system,
+            within=within,
         )
 
-    def _element_state(self, one: osc.StoryboardElementStateCondition) -> list[Probe]:
+    def _element_state(self, condition: osc.StoryboardElementStateCondition) -> list[Probe]:
         """Return a probe for each element that bears the name, or ends in the path of names."""
-        kind = self._tables.choice(osc.StoryboardElementType, one.storyboard_element_type)
-        state = self._tables.choice(osc.StoryboardElementState, one.state)
-        path = tuple(self._tables.text(one.storyboard_element_ref).split("::"))
+        kind = self._tables.choice(osc.StoryboardElementType, condition.storyboard_element_type)
+        state = self._tables.choice(osc.StoryboardElementState, condition.state)
+        path = tuple(self._tables.text(condition.storyboard_element_ref).split("::"))
         found = [
             number
             for number, node in enumerate(self._nodes)
             if node.kind == _ELEMENTS[kind] and node.path[-len(path) :] == path
         ]
         if not found:
-            what = f'storyboardElementRef="{one.storyboard_element_ref}"'
-            self._tables.unsupported(one, f"{what} (no such {kind})")
+            what = f'storyboardElementRef="{condition.storyboard_element_ref}"'
+            self._tables.unsupported(condition, f"{what} (no such {kind})")
         return [Probe(codes.ELEMENT_STATE, number, _STATES[state]) for number in found]
 
     def _rule(self, rule: osc.Rule | osc.ParameterRef) -> int:

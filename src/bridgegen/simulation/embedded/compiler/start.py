@@ -71,9 +71,9 @@ class Start:
         actions = storyboard.init.actions
         for command in actions.user_defined_actions:
             self._tables.unsupported(command, "UserDefinedAction")
-        for one in actions.global_actions:
-            if not isinstance(one.action, osc.EntityAction):
-                self._actions.begin_with_all(one.action)
+        for global_action in actions.global_actions:
+            if not isinstance(global_action.action, osc.EntityAction):
+                self._actions.begin_with_all(global_action.action)
         init = dict.fromkeys(self._tables.names, self._tables.slot(0.0))
         starts = dict(self._added(actions.global_actions))
         routes: dict[str, Way] = {}
@@ -132,7 +132,7 @@ class Start:
         missing = [name for name in self._tables.names if name not in settled]
         if missing and not self._tables.problems:
             self._tables.culprits += [
-                one for one in self._tables.objects if str(one.name) in missing
+                obj for obj in self._tables.objects if str(obj.name) in missing
             ]
             raise InputError(
                 *(
@@ -174,8 +174,8 @@ class Start:
 
     def _added(self, elements: Iterable[Element]) -> Iterator[tuple[str, osc.Position]]:
         """Yield whom actions among some elements add, and where."""
-        for one in elements:
-            action = one.action if isinstance(one, osc.GlobalAction) else None
+        for element in elements:
+            action = element.action if isinstance(element, osc.GlobalAction) else None
             if isinstance(action, osc.EntityAction) and isinstance(
                 action.action, osc.AddEntityAction
             ):
@@ -184,10 +184,10 @@ class Start:
     def _deleted(self, actions: Iterable[osc.GlobalAction]) -> list[int]:
         """Return the entities that are deleted at the start."""
         return [
-            self._tables.entity(one.action.entity_ref)
-            for one in actions
-            if isinstance(one.action, osc.EntityAction)
-            and isinstance(one.action.action, osc.DeleteEntityAction)
+            self._tables.entity(action.action.entity_ref)
+            for action in actions
+            if isinstance(action.action, osc.EntityAction)
+            and isinstance(action.action.action, osc.DeleteEntityAction)
         ]
 
     def _nowhere(self, e: int, route: Way | None) -> Nowhere:
@@ -217,9 +217,9 @@ class Start:
         if not isinstance(point, LanePoint):
             return Nowhere()
         via = tuple(
-            LanePoint(one.road, one.lane, one.s, one.line)
-            for one in spots
-            if isinstance(one, LaneSpot) and one.s is not None
+            LanePoint(spot.road, spot.lane, spot.s, spot.line)
+            for spot in spots
+            if isinstance(spot, LaneSpot) and spot.s is not None
         )
         if len(via) < len(spots):
             self._places[e] = self._positions.add(position)

@@ -43,8 +43,10 @@ class Tables:
         self.place = place
         objects = scenario.entities.scenario_objects
         self.objects = sorted(objects, key=_rank)
-        self._selections = {str(one.name): one for one in scenario.entities.entity_selections}
-        self.names = tuple(str(one.name) for one in self.objects)
+        self._selections = {
+            str(selection.name): selection for selection in scenario.entities.entity_selections
+        }
+        self.names = tuple(str(obj.name) for obj in self.objects)
         self.parameters = numbers(scenario)
         self._declared = values(scenario)
         self.problems: list[str] = []
@@ -86,7 +88,7 @@ class Tables:
     def of_type(self, kind: osc.ObjectType | osc.ParameterRef) -> list[int]:
         """Return the numbers of the entities of a kind."""
         wanted = _OBJECTS[self.choice(osc.ObjectType, kind)]
-        return [e for e, one in enumerate(self.objects) if isinstance(one.entity_object, wanted)]
+        return [e for e, obj in enumerate(self.objects) if isinstance(obj.entity_object, wanted)]
 
     def type_number(self, kind: osc.ObjectType | osc.ParameterRef) -> int:
         """Return the number of a kind of entities."""
@@ -167,11 +169,11 @@ class Tables:
         return LanePoint(str(where.road_id), lane, where.s, where.line)
 
 
-def _rank(one: osc.ScenarioObject) -> tuple[bool, bool]:
+def _rank(scenario_object: osc.ScenarioObject) -> tuple[bool, bool]:
     """Return what the ego has least of: another name, and being a trailer."""
-    body = one.entity_object
+    body = scenario_object.entity_object
     is_trailer = isinstance(body, osc.Vehicle) and body.vehicle_category in TRAILERS
-    return str(one.name).lower() != "ego", is_trailer
+    return str(scenario_object.name).lower() != "ego", is_trailer
 
 
 def table(rows: Sequence[tuple[int, ...]], width: int) -> Int:

@@ -46,7 +46,7 @@ def compile_trajectory(tables: Tables, action: osc.FollowTrajectoryAction) -> Al
     else:
         tables.unsupported(line, type(line).__name__)
         return AlongTrajectory((), action.line)
-    points = [point for one in positions if (point := _point(tables, one)) is not None]
+    points = [point for position in positions if (point := _point(tables, position)) is not None]
     elements = line.vertices if isinstance(line, osc.Polyline) else (line,) * len(stated)
     times = () if isinstance(timing, osc.NoTime) else check_times(tables, timing, stated, elements)
     start = tables.literal(action, "initialDistanceOffset", action.initial_distance_offset or 0.0)

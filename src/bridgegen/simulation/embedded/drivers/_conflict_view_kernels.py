@@ -40,12 +40,16 @@ def see_conflicts(k, plan, roads, state, record, found):
             for i in range(found.shape[2]):
                 found[e, w, i] = math.nan
     for i in range(count):
-        one = state.passages[i]
-        q, e = one[STATION], int(one[ENTITY]) - 1
+        passage = state.passages[i]
+        q, e = passage[STATION], int(passage[ENTITY]) - 1
         row = (
-            one[ENTER] - front, one[LEAVE] - rear, one[OTHER_ENTERS] - q - one[FRONT],
-            one[OTHER_LEAVES] - q + one[REAR], one[RANK], one[HOW],
-        )  # fmt: skip
+            passage[ENTER] - front,
+            passage[LEAVE] - rear,
+            passage[OTHER_ENTERS] - q - passage[FRONT],
+            passage[OTHER_LEAVES] - q + passage[REAR],
+            passage[RANK],
+            passage[HOW],
+        )
         at = 0
         while at < found.shape[1] and found[e, at, 0] <= row[0]:
             if (

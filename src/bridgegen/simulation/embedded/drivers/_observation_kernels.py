@@ -41,10 +41,10 @@ def observe(k, plan, roads, state, record, step, route, tracks):
     stop, light = math.inf, 0
     if on == 0:  # stop lines along other paths are unknown
         front = station + plan.bodies[0, 2] + 0.5 * plan.bodies[0, 0]
-        for one in range(roads.stops.shape[0]):
-            ahead = roads.stops[one] - front
+        for number in range(roads.stops.shape[0]):
+            ahead = roads.stops[number] - front
             if 0.0 <= ahead < stop:
-                stop, light = ahead, int(state.lights[one])
+                stop, light = ahead, int(state.lights[number])
     return stop, light
 
 

@@ -40,5 +40,5 @@ def code_of(
         states: of N rows.
         records: of N rows.
     """
-    rows = (row_type(one) for one in (networks, states, records))
+    rows = (row_type(roads) for roads in (networks, states, records))
     return address_of(demands, (types.int64, row_type(plan, 0), *rows))

@@ -119,7 +119,7 @@ class Lanes:
             if not 0.0 <= spot.s <= road.length:
                 raise InputError(f"road {road.id} is {road.length:g} m long, got s={spot.s:g} m")
             return road, spot.s, 1
-        places = [self._on_lane(one) for one in spot.waypoints]
+        places = [self._on_lane(waypoint) for waypoint in spot.waypoints]
         left, s = spot.path_s, places[0].s
         for i, number in enumerate(self._way(places)):
             node, (entry, leave) = self.graph.nodes[number], self.graph.ends[number].tolist()
@@ -137,7 +137,7 @@ class Lanes:
         for lane in road.sections[index].lanes:
             inner, outer = edges[lane.id - (1 if lane.id > 0 else -1)][0], edges[lane.id][0]
             beyond = max(t - max(inner, outer), min(inner, outer) - t, 0.0)
-            best = min(best, (beyond, lane.id, t - 0.5 * (inner + outer)), key=lambda one: one[0])
+            best = min(best, (beyond, lane.id, t - 0.5 * (inner + outer)), key=lambda pair: pair[0])
         if not best[1]:
             raise InputError(f"road {road.id} has no lanes at s={s:g} m")
         return best[1], best[2]
@@ -203,15 +203,16 @@ class Lanes:
         last = graph.nodes[node]
         start = Place(last.road_id, last.lane_id, float(graph.ends[node, 0]))
         steps = change_lanes(graph.model, start, place)
-        middles = (Place(one.road_id, one.lane_id, 0.5 * (one.s + one.s_end)) for one in steps)
-        nodes = [graph.node(*one) for one in middles]
-        return [one for k, one in enumerate(nodes) if one != (nodes[k - 1] if k else node)]
+        middles = (Place(step.road_id, step.lane_id, 0.5 * (step.s + step.s_end)) for step in steps)
+        nodes = [graph.node(*middle) for middle in middles]
+        return [number for k, number in enumerate(nodes) if number != (nodes[k - 1] if k else node)]
 
     def _changes(self, way: Sequence[int]) -> bool:
         """Return whether a way leads from one lane to another beside it."""
-        nodes = [self.graph.nodes[one] for one in way]
+        nodes = [self.graph.nodes[number] for number in way]
         return any(
-            one[:2] == other[:2] and one.lane_id != other.lane_id for one, other in pairwise(nodes)
+            node[:2] == other[:2] and node.lane_id != other.lane_id
+            for node, other in pairwise(nodes)
         )
 
     def _leg(self, start: int, end: int) -> list[int] | None:
@@ -227,7 +228,9 @@ class Lanes:
     def _abreast(self, node: int) -> list[int]:
         """Return the nodes of all lanes of a node's section in its direction."""
         first, past = self.nodes[node, 1:3].tolist()
-        return [one for one in range(first, past) if self.nodes[one, 4] == self.nodes[node, 4]]
+        return [
+            number for number in range(first, past) if self.nodes[number, 4] == self.nodes[node, 4]
+        ]
 
     def plan(self, route: int, node: int) -> Path | None:
         """Return the way that begins where a node does; None: it does not come to the route.
@@ -250,13 +253,13 @@ class Lanes:
 
     def _joins(self, route: int, node: int) -> list[int] | None:
         way = self.ways[route]
-        on = [i for i, one in enumerate(way) if one == node] or [
-            i for i, one in enumerate(way) if one in self._abreast(node)
+        on = [i for i, number in enumerate(way) if number == node] or [
+            i for i, number in enumerate(way) if number in self._abreast(node)
         ]
         if on:
             return self._follow(node, way[on[0] :])
-        for i, one in enumerate(way):
-            leg = self._leg(node, one)
+        for i, number in enumerate(way):
+            leg = self._leg(node, number)
             if leg is not None:
                 return leg[:-1] + self._follow(leg[-1], way[i:])
         return None
@@ -307,13 +310,13 @@ class Lanes:
             a, b, c, d = piece.taper.t
             local = s - min(piece.s, piece.s_end)
             t = a + local * (b + local * (c + local * d))
-        drivable = [one.id for one in road.sections[node.section].lanes if one.drivable]
-        sides = [edges[0], *(edges[one] for one in drivable)]
+        drivable = [lane.id for lane in road.sections[node.section].lanes if lane.drivable]
+        sides = [edges[0], *(edges[item] for item in drivable)]
         up, down = np.max(sides, axis=0) - t, t - np.min(sides, axis=0)
         left, right = (up, down) if node.way > 0 else (down, up)
         at = piece.station + station
         number_s = np.full(len(s) - 1, float(number))
-        pairs = ((one[:-1], one[1:]) for one in (at, s, t, left, right))
+        pairs = ((array[:-1], array[1:]) for array in (at, s, t, left, right))
         (begins, ends), (enters, leaves), *others = pairs
         columns = (
             begins,

@@ -45,39 +45,39 @@ def meetings(program: Program, models: Sequence[OpenDrive], ways: Sequence[Ways]
     zones, lines = np.full((p, e, e, ZONE), np.inf), np.full((p, e, lights), np.inf)
     signs: dict[tuple[int, int], list[float]] = {}
     for number, (model, known) in enumerate(zip(models, ways, strict=True)):
-        for one in np.flatnonzero(program.others == ATTENTIVE).tolist():
-            _find_zones(zones[number, one], one, program, known)
-            route = known.routes[one]
+        for item in np.flatnonzero(program.others == ATTENTIVE).tolist():
+            _find_zones(zones[number, item], item, program, known)
+            route = known.routes[item]
             if route is None:
                 continue
             for line in reversed(stop_lines(model, route, program.lights)):
-                lines[number, one, program.lights.index(line.light)] = line.station
-            signs[number, one] = stop_signs(model, route)
+                lines[number, item, program.lights.index(line.light)] = line.station
+            signs[number, item] = stop_signs(model, route)
     halts = np.full((p, e, max(map(len, signs.values()), default=0)), np.inf)
-    for (number, one), stations in signs.items():
-        halts[number, one, : len(stations)] = stations
+    for (number, item), stations in signs.items():
+        halts[number, item, : len(stations)] = stations
     meets = np.isfinite(zones[..., 0]).any(axis=2).astype(np.int64)
     return Meetings(meets, zones, lines, halts)
 
 
-def _find_zones(zones: Float, one: int, program: Program, ways: Ways) -> None:
+def _find_zones(zones: Float, number: int, program: Program, ways: Ways) -> None:
     """Fill ``(E, ZONE)`` with where a participant's path meets the others'."""
     from bridgegen.drivers._yielding_kernels import find_zone  # numba is slow to import
 
-    own, bodies = ways.paths[one], program.bodies
+    own, bodies = ways.paths[number], program.bodies
     for other in range(len(program.names)):
         path = ways.paths[other]
-        if other == one or _follows(ways, one, other):
+        if other == number or _follows(ways, number, other):
             continue
         find_zone(
-            own.table, len(own.table), own.step, bodies[one],
+            own.table, len(own.table), own.step, bodies[number],
             path.table, len(path.table), path.step, bodies[other], zones[other],
         )  # fmt: skip
 
 
-def _follows(ways: Ways, one: int, other: int) -> bool:
+def _follows(ways: Ways, number: int, other: int) -> bool:
     """Return whether two paths begin on the same lane: then the one behind follows the other."""
-    a, b = ways.routes[one], ways.routes[other]
+    a, b = ways.routes[number], ways.routes[other]
     if a is None or b is None:
         return False
     first, second = a.steps[0], b.steps[0]

@@ -86,7 +86,7 @@ class Network:
     def __getstate__(self) -> dict[str, Any]:
         """Another process has the same ways, and plans more of them by itself."""
         with self._lock:
-            return {name: one for name, one in vars(self).items() if name != "_lock"}
+            return {name: var for name, var in vars(self).items() if name != "_lock"}
 
     def __setstate__(self, state: Mapping[str, Any]) -> None:
         vars(self).update(state, _lock=Lock())
@@ -120,7 +120,7 @@ class Network:
     def roads_ahead(self, p: int) -> tuple[str, ...]:
         """Return the ids of the roads of the ego's first path on road network p, in its order."""
         route = self._ways[p].routes[0]
-        return tuple(dict.fromkeys(one.road_id for one in route.steps)) if route else ()
+        return tuple(dict.fromkeys(step.road_id for step in route.steps)) if route else ()
 
     def in_junctions(self, p: int) -> Float:
         """Return where the ego's first path leads through junctions on road network p.
@@ -161,8 +161,8 @@ class Network:
                 )
             found.append(self._corridors[p])
         whole = np.full((len(found), max(map(len, found), default=0), CORRIDOR), np.inf)
-        for table, one in zip(whole, found, strict=True):
-            table[: len(one)] = one
+        for table, array in zip(whole, found, strict=True):
+            table[: len(array)] = array
         return whole
 
     def amend(self, name: str, first: int, part: Float) -> None:
@@ -423,7 +423,9 @@ def _stacked(tables: Sequence[np.ndarray], least: int = 0) -> np.ndarray:
     longest = max(least, *map(len, tables))
     return np.stack(
         [
-            np.concatenate([one, np.full((longest - len(one), *one.shape[1:]), -1, one.dtype)])
-            for one in tables
+            np.concatenate(
+                [table, np.full((longest - len(table), *table.shape[1:]), -1, table.dtype)]
+            )
+            for table in tables
         ]
     )

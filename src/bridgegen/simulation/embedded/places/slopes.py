@@ -52,10 +52,15 @@ def slopes(model: OpenDrive, route: Route, step: float, count: int) -> Float:
 
 def _is_sloped(road: Road) -> bool:
     """Return whether a road rises, falls or banks anywhere."""
-    rises = any(one.b or one.c or one.d for one in road.elevations)
-    return rises or any(one.a or one.b or one.c or one.d for one in road.superelevations)
+    rises = any(elevation.b or elevation.c or elevation.d for elevation in road.elevations)
+    return rises or any(
+        superelevation.a or superelevation.b or superelevation.c or superelevation.d
+        for superelevation in road.superelevations
+    )
 
 
 def _derived(records: tuple[Cubic, ...]) -> tuple[Cubic, ...]:
     """Return the cubics' derivatives."""
-    return tuple(Cubic(one.s, one.b, 2.0 * one.c, 3.0 * one.d, 0.0) for one in records)
+    return tuple(
+        Cubic(record.s, record.b, 2.0 * record.c, 3.0 * record.d, 0.0) for record in records
+    )

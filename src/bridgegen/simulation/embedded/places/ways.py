@@ -150,7 +150,7 @@ class Ways:
             known = spans[:, 4].astype(int).tolist()
             there = reached.setdefault(check.entity, list(dict.fromkeys(known)))
             targets = [
-                target for one in there if (target := _target(graph, one, check)) is not None
+                target for number in there if (target := _target(graph, number, check)) is not None
             ]
             if there and not targets:
                 which = str(check.lane)
@@ -201,7 +201,7 @@ class Ways:
             return plan_route(self._model, first, via, end)
         except InputError:
             # One changes lane after the start, and before the places that are passed.
-            points = [_place(self._program, one) for one in (start, *waypoints)]
+            points = [_place(self._program, waypoint) for waypoint in (start, *waypoints)]
             return plan_with_changes(self._model, [first, *points, end])
 
     def _onward(self, road_id: str, lane_id: int, s: float) -> Route:
