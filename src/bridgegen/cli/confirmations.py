@@ -51,7 +51,7 @@ def confirm(
 
     Are its critical scenarios critical there, too?
     """
-    from bridgegen.cli.terminal.confirmation import ConfirmationScreen, print_confirmation
+    from bridgegen.cli.terminal.confirmation import ConfirmationProgress, print_confirmation
     from bridgegen.cli.terminal.tables import print_outcomes
     from bridgegen.cli.verdict.of_confirmation import ConfirmationCriteria
     from bridgegen.jobs.search.confirm import confirm as confirm_run
@@ -59,7 +59,7 @@ def confirm(
     criteria = ConfirmationCriteria.read(fail_if or (), junit)
     choice = options.read_simulator(simulator, simulator_set, connection)
     assert choice is not None
-    with ConfirmationScreen() as screen:
+    with ConfirmationProgress() as live:
         found = confirm_run(
             run,
             choice,
@@ -67,8 +67,8 @@ def confirm(
             again=again,
             ego=ego,
             workers=workers,
-            stage=screen.stage,
-            progress=screen.progress,
+            stage=live.stage,
+            progress=live.progress,
         )
     print_confirmation(found, as_json=as_json)
     if not print_outcomes(criteria.judge(found)):

@@ -27,7 +27,7 @@ def demo(
 
     The run is a new folder, runs/demo or runs/demo-2 …; it takes about 20 seconds.
     """
-    from bridgegen.cli.terminal.search import SearchScreen, print_summary
+    from bridgegen.cli.terminal.search import SearchProgress, print_summary
     from bridgegen.jobs import search as campaign
 
     folder = next(path for path in _folders(Path("runs")) if not path.exists())
@@ -37,16 +37,16 @@ def demo(
         f"{ALGORITHM} --budget {BUDGET} --out {folder}\n",
         flush=True,
     )
-    with SearchScreen(BUDGET) as screen:
+    with SearchProgress(BUDGET) as live:
         run = campaign.run_search(
             SCENARIO,
             ego=DRIVER,
             algorithm=ALGORITHM,
             budget=BUDGET,
             out=folder,
-            callbacks=screen.callbacks,
+            callbacks=live.callbacks,
         )
-    print_summary(run, screen.seconds)
+    print_summary(run, live.seconds)
     if open_page and not webbrowser.open(run.report.resolve().as_uri()):
         print(
             f"bridgegen: no browser found: open {run.report} yourself, or see 'bridgegen view "

@@ -61,15 +61,15 @@ def fit(
     Chooses a form for each parameter, tests it, measures how they depend on each other, and
     writes an exposure, and a page that shows how well it fits.
     """
-    from bridgegen.cli.terminal.fit import FitScreen, print_fit
+    from bridgegen.cli.terminal.fit import FitProgress, print_fit
     from bridgegen.jobs.fit import write_fit
 
     notes: list[str] = []
-    with FitScreen() as screen:
+    with FitProgress() as live:
         fitted, written = write_fit(
             scenario, events, out=out, page=page, xosc=xosc, hours=hours, km=km,
             ignore=ignore or (), others=others, source=source, replicates=replicates, seed=seed,
-            progress=screen.progress, notes=notes,
+            progress=live.progress, notes=notes,
         )  # fmt: skip
     for note in notes:
         print(f"bridgegen: note: {note}", file=sys.stderr)

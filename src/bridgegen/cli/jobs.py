@@ -72,7 +72,7 @@ def command_of(job: Job) -> Any:
         as_json: common.Json = False,
         save: common.Save = None,
     ) -> None:
-        from bridgegen.cli.terminal.live import JobScreen
+        from bridgegen.cli.terminal.live import JobProgress
         from bridgegen.cli.terminal.tables import print_outcomes
 
         assert save is None  # written by the run file's reader, which knows what was given
@@ -81,9 +81,9 @@ def command_of(job: Job) -> Any:
         if simulators:
             chosen = common.read_simulator(simulator, simulator_set, connection)
             options = replace(options, simulator=chosen) if chosen else options
-        with JobScreen() as screen:
-            result = job.run(replace(options, callbacks=screen.callbacks))
-        _print(result, screen.seconds, as_json=as_json)
+        with JobProgress() as live:
+            result = job.run(replace(options, callbacks=live.callbacks))
+        _print(result, live.seconds, as_json=as_json)
         if not print_outcomes(judges.judge(result)):
             raise typer.Exit(FAILED)
 

@@ -50,9 +50,9 @@ def reproduce(
     """
     if quick and seeds is not None:
         raise InputError(f"--quick is one seed; leave out --seeds {seeds}, or --quick")
-    screen = import_module(f"{PACKAGE}.screen")
+    terminal = import_module(f"{PACKAGE}.terminal")
     chosen = {} if scenarios is None else {"scenarios": read_names(scenarios)}
-    result = screen.reproduce_and_print(
+    result = terminal.reproduce_and_print(
         seeds=1 if quick else 10 if seeds is None else seeds,
         iterations=iterations,
         **chosen,

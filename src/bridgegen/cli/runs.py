@@ -56,7 +56,7 @@ def search_all(
         keys: of a run.
         command: searches with some options.
     """
-    from bridgegen.cli.terminal.search import SearchScreen, conclusion, print_summary
+    from bridgegen.cli.terminal.search import SearchProgress, conclusion, print_summary
     from bridgegen.jobs.search import Run, resume
 
     ends: dict[str, str] = {}
@@ -71,15 +71,15 @@ def search_all(
             elif Run(out).finished and Run(out).report.is_file():
                 print(f"finished already: {out}")
             else:
-                with SearchScreen() as screen:
+                with SearchProgress() as live:
                     run = resume(
                         out,
                         ego=values.get("ego"),
                         worse_than=values.get("worse_than"),
                         algorithm=values.get("algorithm"),
-                        callbacks=screen.callbacks,
+                        callbacks=live.callbacks,
                     )
-                print_summary(run, screen.seconds)
+                print_summary(run, live.seconds)
         except Interrupted as stop:
             raise Interrupted(
                 stop.folder, stop.evaluations, stop.budget, command=f"bridgegen search {path}"
@@ -137,7 +137,7 @@ def search(
     In place of a scenario, a run file (docs/run-files.md) may give the scenario and all options;
     those of the command line override the file's.
     """
-    from bridgegen.cli.terminal.search import SearchScreen, print_summary
+    from bridgegen.cli.terminal.search import SearchProgress, print_summary
     from bridgegen.cli.verdict.of_run import PassFailCriteria
     from bridgegen.jobs import search as campaign
     from bridgegen.jobs.search.scenarios import margins_of
@@ -149,7 +149,7 @@ def search(
     )  # fmt: skip
     chosen, cheap = common.read_simulators(simulator, simulator_set, screen, screen_set, connection)
     options = replace(options, simulator=chosen or EMBEDDED, screen=cheap)
-    with SearchScreen(options.budget) as shown:
+    with SearchProgress(options.budget) as shown:
         run = campaign.run_search(
             scenario, **vars(options), out=out, workers=workers, callbacks=shown.callbacks
         )
@@ -201,12 +201,12 @@ def resume(
 
     The result is as if it had not been interrupted.
     """
-    from bridgegen.cli.terminal.search import SearchScreen, print_summary
+    from bridgegen.cli.terminal.search import SearchProgress, print_summary
     from bridgegen.cli.verdict.of_run import PassFailCriteria
     from bridgegen.jobs import search as campaign
 
     criteria = PassFailCriteria.of_run(fail_if or (), junit, folder)
-    with SearchScreen() as screen:
+    with SearchProgress() as live:
         run = campaign.resume(
             folder,
             ego=ego,
@@ -214,9 +214,9 @@ def resume(
             algorithm=algorithm,
             simulator=read_access(connection),
             workers=workers,
-            callbacks=screen.callbacks,
+            callbacks=live.callbacks,
         )
-    print_summary(run, screen.seconds, verbose=verbose)
+    print_summary(run, live.seconds, verbose=verbose)
     _end(criteria.judge(run))
 
 
@@ -274,10 +274,10 @@ def regions(
     Each is a readable rule, verified by fresh scenarios; with an exposure, with the
     share of encounters that lie in it.
     """
-    from bridgegen.cli.terminal.regions import RegionsScreen, print_regions
+    from bridgegen.cli.terminal.regions import RegionsProgress, print_regions
     from bridgegen.jobs.search.regions import regions_of
 
-    with RegionsScreen() as screen:
+    with RegionsProgress() as live:
         found = regions_of(
             run,
             ego=ego,
@@ -288,8 +288,8 @@ def regions(
             seed=seed,
             exposure=exposure,
             workers=workers,
-            stage=screen.stage,
-            progress=screen.progress,
+            stage=live.stage,
+            progress=live.progress,
         )
     print_regions(found, as_json=as_json)
 

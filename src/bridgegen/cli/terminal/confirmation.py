@@ -19,7 +19,7 @@ MOST_MARGINS = 3
 """Maximum number of columns with margins of pass criteria."""
 
 
-class ConfirmationScreen(Live):
+class ConfirmationProgress(Live):
     """The live progress of scenarios that run in another simulator."""
 
     def stage(self, stage: str) -> None:

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from bridgegen.scenario.exposure.fit import Fit
 
 
-class FitScreen(Live):
+class FitProgress(Live):
     """The bar of the parameters that are fitted."""
 
     def progress(self, done: int, total: int) -> None:

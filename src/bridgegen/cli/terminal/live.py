@@ -94,7 +94,7 @@ class Live:
         self._progress.stop()
 
 
-class JobScreen(Live):
+class JobProgress(Live):
     """A job's live progress."""
 
     @property

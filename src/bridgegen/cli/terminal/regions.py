@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from bridgegen.search.regions import Evidence
 
 
-class RegionsScreen(Live):
+class RegionsProgress(Live):
     """The live progress of simulating fresh scenarios."""
 
     def stage(self, stage: str) -> None:

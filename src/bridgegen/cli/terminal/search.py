@@ -33,7 +33,7 @@ MOST_REASONS = 5
 """Maximum number of lines with reasons of failed evaluations."""
 
 
-class SearchScreen(Live):
+class SearchProgress(Live):
     """A campaign's live progress: evaluations, critical so far, best d_min, rate.
 
     Args:

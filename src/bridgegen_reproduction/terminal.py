@@ -4,19 +4,19 @@ from typing import Any
 
 from rich.console import Console
 
-from bridgegen.cli.terminal.live import JobScreen
+from bridgegen.cli.terminal.live import JobProgress
 from bridgegen_reproduction.reproduction import Reproduction, reproduce
 
 
 def reproduce_and_print(**arguments: Any) -> Reproduction:
-    """Reproduce the evaluation with its progress on the screen, and print what was found.
+    """Reproduce the evaluation with its progress on the terminal, and print what was found.
 
     Args:
         arguments: of ``reproduce``, but for ``callbacks``.
     """
-    with JobScreen() as screen:
-        result = reproduce(**arguments, callbacks=screen.callbacks)
-    print_reproduction(result, screen.seconds)
+    with JobProgress() as live:
+        result = reproduce(**arguments, callbacks=live.callbacks)
+    print_reproduction(result, live.seconds)
     return result
 
 
