@@ -49,14 +49,21 @@ def _claims() -> tuple[Claim, ...]:
         "spread": ("spread Δ", False, 3),
     }
     said = [
-        *(("single", q, "ppo", "random") for q in (
-            "r_critic", "t_critic", "median_d_min", "median_v_d", "median_fitness")),
-        *(("single", q, "pso", "random") for q in (
-            "r_critic", "t_critic", "median_d_min", "median_v_d")),
-        ("single", "r_critic", "ppo", "pso"), ("single", "t_critic", "ppo", "pso"),
-        *(("many", q, "nsga2-dt", "random") for q in (
-            "r_critic", "t_critic", "median_d_min", "median_v_d", "hypervolume", "spread")),
-    ]  # fmt: skip
+        *(
+            ("single", q, "ppo", "random")
+            for q in ("r_critic", "t_critic", "median_d_min", "median_v_d", "median_fitness")
+        ),
+        *(
+            ("single", q, "pso", "random")
+            for q in ("r_critic", "t_critic", "median_d_min", "median_v_d")
+        ),
+        ("single", "r_critic", "ppo", "pso"),
+        ("single", "t_critic", "ppo", "pso"),
+        *(
+            ("many", q, "nsga2-dt", "random")
+            for q in ("r_critic", "t_critic", "median_d_min", "median_v_d", "hypervolume", "spread")
+        ),
+    ]
     found = []
     for group, quantity, ahead, behind in said:
         title, larger, digits = kinds[quantity]
@@ -168,17 +175,30 @@ def table_claims(verdicts: Mapping[str, Sequence[Verdict]], seeds: int) -> Table
                 f"{paper.TITLES[claim.ahead]} ahead of {paper.TITLES[claim.behind]}: {claim.title}",
                 told,
                 f"{number(verdict.ahead, claim.digits)} : {number(verdict.behind, claim.digits)}",
-                p_value(verdict.p), number(verdict.a12, 2), verdict.word,
+                p_value(verdict.p),
+                number(verdict.a12, 2),
+                verdict.word,
                 *(verdicts[name][k].word for name in others),
             )
-        )  # fmt: skip
+        )
         for name in verdicts:
             v = verdicts[name][k]
             told_of = printed if printed and name == paper.MAIN else (None, None)
             data.append(
-                (name, claim.group, claim.quantity, claim.ahead, claim.behind, *told_of,
-                 v.ahead, v.behind, v.p, v.a12, v.word)
-            )  # fmt: skip
+                (
+                    name,
+                    claim.group,
+                    claim.quantity,
+                    claim.ahead,
+                    claim.behind,
+                    *told_of,
+                    v.ahead,
+                    v.behind,
+                    v.p,
+                    v.a12,
+                    v.word,
+                )
+            )
     notes = [
         "The claims are the orders of Section V-C. Ours: medians over the seeds; p is that of the "
         f"two-sided Mann–Whitney U test, corrected by Holm’s method for the {len(CLAIMS)} claims "
@@ -194,8 +214,10 @@ def table_claims(verdicts: Mapping[str, Sequence[Verdict]], seeds: int) -> Table
         "claims",
         "What the paper claims, and what our runs say",
         ("claim", "paper", "ours, S4", "p", "A12", "S4", *(f"S{name[-1]}" for name in others)),
-        tuple(rows), tuple(notes), tuple(data),
-    )  # fmt: skip
+        tuple(rows),
+        tuple(notes),
+        tuple(data),
+    )
 
 
 def _printed(claim: Claim) -> tuple[float, float] | None:

@@ -22,9 +22,15 @@ WEIGHTS = {"d_min": 0.8297, "v_d": 0.1703}
 """Of the fitness, a1 and a2, Section V-B; d_min in m, v_d in km/h."""
 
 POINTS = {
-    ("A", "in"): "P1", ("A", "out"): "P2", ("B", "in"): "P3", ("B", "out"): "P4",
-    ("C", "in"): "P5", ("C", "out"): "P6", ("D", "in"): "P7", ("D", "out"): "P8",
-}  # fmt: skip
+    ("A", "in"): "P1",
+    ("A", "out"): "P2",
+    ("B", "in"): "P3",
+    ("B", "out"): "P4",
+    ("C", "in"): "P5",
+    ("C", "out"): "P6",
+    ("D", "in"): "P7",
+    ("D", "out"): "P8",
+}
 """Where a leg's inbound lane begins, and where its outbound lane ends."""
 
 

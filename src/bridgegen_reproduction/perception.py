@@ -62,10 +62,13 @@ def causes_of(protocol: Protocol, runs: Runs) -> tuple[Causes, ...]:
             counts = [sum(int((run.cause == c).sum()) for run in these) for c in CAUSES]
             found.append(
                 Causes(
-                    scenario, method.algorithm, sum(len(run.critical) for run in these),
-                    tuple(counts), tuple(float(run.critical.mean()) for run in these),
+                    scenario,
+                    method.algorithm,
+                    sum(len(run.critical) for run in these),
+                    tuple(counts),
+                    tuple(float(run.critical.mean()) for run in these),
                 )
-            )  # fmt: skip
+            )
     return tuple(found)
 
 
@@ -78,12 +81,15 @@ def table_causes(found: Sequence[Causes]) -> Table:
         middle = quartiles(np.array(causes.r_critic))
         rows.append(
             (
-                title, TITLES[causes.algorithm],
-                spread(middle, 3, several=len(causes.r_critic) > 1), f"{causes.critical:,}",
-                f"{causes.vanish:,}", share(causes.vanish, causes.critical),
+                title,
+                TITLES[causes.algorithm],
+                spread(middle, 3, several=len(causes.r_critic) > 1),
+                f"{causes.critical:,}",
+                f"{causes.vanish:,}",
+                share(causes.vanish, causes.critical),
                 *(f"{count:,}" for count in causes.by_cause[1:]),
             )
-        )  # fmt: skip
+        )
         data.append(
             (
                 causes.scenario,
@@ -97,8 +103,17 @@ def table_causes(found: Sequence[Causes]) -> Table:
                 *causes.by_cause,
             )
         )
-    head = ("scenario", "algorithm", "runs", "evaluations", "critical", "r_critic_q1",
-            "r_critic_median", "r_critic_q3", *names)  # fmt: skip
+    head = (
+        "scenario",
+        "algorithm",
+        "runs",
+        "evaluations",
+        "critical",
+        "r_critic_q1",
+        "r_critic_median",
+        "r_critic_q3",
+        *names,
+    )
     return Table(
         "perception",
         "With the reference driver: critical scenarios that vanish with ideal perception",
@@ -155,10 +170,14 @@ def paired_of(protocol: Protocol, runs: Runs) -> tuple[Paired, ...]:
         ideal = np.concatenate([b.critical for _, b in pairs])
         found.append(
             Paired(
-                scenario, len(real), int(real.sum()), int(ideal.sum()),
-                int((real & ~ideal).sum()), int((ideal & ~real).sum()),
+                scenario,
+                len(real),
+                int(real.sum()),
+                int(ideal.sum()),
+                int((real & ~ideal).sum()),
+                int((ideal & ~real).sum()),
             )
-        )  # fmt: skip
+        )
     return tuple(found)
 
 
@@ -181,8 +200,15 @@ def table_paired(found: Sequence[Paired]) -> Table:
     return Table(
         "perception-paired",
         "The same random scenarios, once with sensors and once with ideal perception",
-        ("scenario", "scenarios", "critical, sensors", "critical, ideal", "vanish", "appear",
-         "change"),
+        (
+            "scenario",
+            "scenarios",
+            "critical, sensors",
+            "critical, ideal",
+            "vanish",
+            "appear",
+            "change",
+        ),
         rows,
         (
             "Ideal perception takes harm away and adds some: who sees farther drives faster, and "
@@ -192,4 +218,4 @@ def table_paired(found: Sequence[Paired]) -> Table:
             ("scenario", "scenarios", "critical_sensors", "critical_ideal", "vanish", "appear"),
             *(astuple(paired) for paired in found),
         ),
-    )  # fmt: skip
+    )

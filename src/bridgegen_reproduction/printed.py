@@ -32,17 +32,26 @@ def table_2(scenarios: Sequence[str]) -> Table:
         title = f"S{name[-1]}"
         rows.append(
             (
-                title, "paper", *printed.ego, f"{printed.ego_speed:g} m/s",
-                *printed.bv, f"{printed.bv_speed:g} m/s", printed.conflict,
+                title,
+                "paper",
+                *printed.ego,
+                f"{printed.ego_speed:g} m/s",
+                *printed.bv,
+                f"{printed.bv_speed:g} m/s",
+                printed.conflict,
             )
-        )  # fmt: skip
+        )
         rows.append(
             (
-                title, "ours", *_ends(ego),
-                f"{ego_speed.default:g} m/s ({ego_speed.low:g} to {ego_speed.high:g})", *_ends(bv),
-                f"{bv_speed.default:g} m/s ({bv_speed.low:g} to {bv_speed.high:g})", ours.title,
+                title,
+                "ours",
+                *_ends(ego),
+                f"{ego_speed.default:g} m/s ({ego_speed.low:g} to {ego_speed.high:g})",
+                *_ends(bv),
+                f"{bv_speed.default:g} m/s ({bv_speed.low:g} to {bv_speed.high:g})",
+                ours.title,
             )
-        )  # fmt: skip
+        )
     return Table(
         "table-2",
         "Table II: logical scenarios",
@@ -87,10 +96,12 @@ def table_3(runs: Runs) -> Table:
         ours = weights[name]
         rows.append(
             (
-                f"{symbol}, weight of {name}", f"{paper.WEIGHTS[name]:g}",
-                "–" if ours is None else f"{ours:g}", middle + reach,
+                f"{symbol}, weight of {name}",
+                f"{paper.WEIGHTS[name]:g}",
+                "–" if ours is None else f"{ours:g}",
+                middle + reach,
             )
-        )  # fmt: skip
+        )
     return Table(
         "table-3",
         "Table III: what is critical; and the weights of the fitness",
@@ -122,14 +133,16 @@ def entropy_weights(runs: Runs) -> list[tuple[float, ...]]:
 
 def table_4(runs: Runs, protocol: Protocol) -> Table:
     """Return the hyper-parameters of the methods of one objective."""
-    return _hyperparameters("table-4", "Table IV: hyper-parameters, one objective", "single",
-                            runs, protocol)  # fmt: skip
+    return _hyperparameters(
+        "table-4", "Table IV: hyper-parameters, one objective", "single", runs, protocol
+    )
 
 
 def table_5(runs: Runs, protocol: Protocol) -> Table:
     """Return the hyper-parameters of the methods of many objectives."""
-    return _hyperparameters("table-5", "Table V: hyper-parameters, many objectives", "many",
-                            runs, protocol)  # fmt: skip
+    return _hyperparameters(
+        "table-5", "Table V: hyper-parameters, many objectives", "many", runs, protocol
+    )
 
 
 def _hyperparameters(name: str, title: str, group: str, runs: Runs, protocol: Protocol) -> Table:
@@ -142,44 +155,73 @@ def _hyperparameters(name: str, title: str, group: str, runs: Runs, protocol: Pr
             if made
             else {key: setting.default for key, setting in declared.items()}
         )
-        printed = {"population": paper.POPULATION, **paper.HYPERPARAMETERS.get(
-            method.algorithm, {})}  # fmt: skip
+        printed = {
+            "population": paper.POPULATION,
+            **paper.HYPERPARAMETERS.get(method.algorithm, {}),
+        }
         rows.append(
-            (method.title, "iterations", f"{paper.ITERATIONS}", f"{protocol.iterations}",
-             "batches of a run; the budget is this × population")
-        )  # fmt: skip
+            (
+                method.title,
+                "iterations",
+                f"{paper.ITERATIONS}",
+                f"{protocol.iterations}",
+                "batches of a run; the budget is this × population",
+            )
+        )
         for key in dict.fromkeys((*printed, *ours)):
             told = f"{printed[key]:g}" if key in printed else "–"
             rows.append((method.title, key, told, f"{ours[key]}", declared[key].text))
     return Table(
-        name, title, ("method", "setting", "paper", "ours", "what it is"), tuple(rows),
-        ("“–”: the paper does not say; ours is a default of BridgeGen’s.",), texts=5,
-    )  # fmt: skip
+        name,
+        title,
+        ("method", "setting", "paper", "ours", "what it is"),
+        tuple(rows),
+        ("“–”: the paper does not say; ours is a default of BridgeGen’s.",),
+        texts=5,
+    )
 
 
 def table_6(results: Results, protocol: Protocol) -> Table:
     """Return Table VI: the results of the main scenario."""
-    return _results(results, protocol, QUANTITIES, "table-6", "Table VI: results, S4", (
-        f"Ours: the median over {_seeds(protocol)}"
-        + (" and, in brackets, its quartiles." if protocol.seeds > 1 else ".")
-        + " The paper gives one number each.",
-        f"T_critic: evaluations until the {results.k}th critical scenario, divided by the least "
-        "median of the methods on its side of the table; the paper does not define it.",
-        "RS takes no notice of objectives, so that its runs are the same in both halves; the paper "
-        "has another sample in each.",
-        *_misprints(),
-        *_without(protocol),
-    ))  # fmt: skip
+    return _results(
+        results,
+        protocol,
+        QUANTITIES,
+        "table-6",
+        "Table VI: results, S4",
+        (
+            f"Ours: the median over {_seeds(protocol)}"
+            + (" and, in brackets, its quartiles." if protocol.seeds > 1 else ".")
+            + " The paper gives one number each.",
+            f"T_critic: evaluations until the {results.k}th critical scenario, divided by the "
+            "least "
+            "median of the methods on its side of the table; the paper does not define it.",
+            "RS takes no notice of objectives, so that its runs are the same in both halves; the "
+            "paper "
+            "has another sample in each.",
+            *_misprints(),
+            *_without(protocol),
+        ),
+    )
 
 
 def table_6_runtime(results: Results, protocol: Protocol) -> Table:
     """Return Table VI's last row, and T_critic in seconds: what is not the same the next time."""
-    return _results(results, protocol, TIMED, "table-6-runtime", "Table VI: runtime, S4", (
-        "Seconds of one run on this machine, in one thread. The paper’s seconds are CARLA’s; here "
-        "a scenario takes a fraction of a millisecond, so that it is the methods themselves that "
-        "these seconds tell apart.",
-        *_without(protocol),
-    ))  # fmt: skip
+    return _results(
+        results,
+        protocol,
+        TIMED,
+        "table-6-runtime",
+        "Table VI: runtime, S4",
+        (
+            "Seconds of one run on this machine, in one thread. The paper’s seconds are CARLA’s; "
+            "here "
+            "a scenario takes a fraction of a millisecond, so that it is the methods themselves "
+            "that "
+            "these seconds tell apart.",
+            *_without(protocol),
+        ),
+    )
 
 
 def _seeds(protocol: Protocol) -> str:
@@ -200,8 +242,10 @@ def _misprints() -> tuple[str, ...]:
 def _without(protocol: Protocol) -> tuple[str, ...]:
     if "ppo" not in protocol.missing:
         return ()
-    return ("PPO is missing: it needs the extra rl, pip install 'bridgegen[rl]'; then run the same "
-            "command again.",)  # fmt: skip
+    return (
+        "PPO is missing: it needs the extra rl, pip install 'bridgegen[rl]'; then run the same "
+        "command again.",
+    )
 
 
 def _results(
@@ -213,12 +257,17 @@ def _results(
     notes: tuple[str, ...],
 ) -> Table:
     columns = [(group, item) for group, methods in paper.GROUPS.items() for item in methods]
-    head = ["", *(part for group, column in columns for part in (
-        f"{column.title}{_MARK[group]}, ours", "paper"))]  # fmt: skip
+    head = [
+        "",
+        *(
+            part
+            for group, column in columns
+            for part in (f"{column.title}{_MARK[group]}, ours", "paper")
+        ),
+    ]
     data: list[tuple[object, ...]] = [
-        ("quantity", "unit", "objectives", "method", "paper", "runs", "never", "q1", "median",
-         "q3")
-    ]  # fmt: skip
+        ("quantity", "unit", "objectives", "method", "paper", "runs", "never", "q1", "median", "q3")
+    ]
     rows = []
     for quantity in quantities:
         cells = [f"{quantity.title}{f' [{quantity.unit}]' if quantity.unit else ''}"]
@@ -234,9 +283,19 @@ def _results(
             cells.append(spread(quartiles, quantity.digits, several=runs > 1))
             cells.append(number(printed, quantity.digits))
             data.append(
-                (quantity.name, quantity.unit, group, method.algorithm, printed, runs, never,
-                 quartiles.low, quartiles.median, quartiles.high)
-            )  # fmt: skip
+                (
+                    quantity.name,
+                    quantity.unit,
+                    group,
+                    method.algorithm,
+                    printed,
+                    runs,
+                    never,
+                    quartiles.low,
+                    quartiles.median,
+                    quartiles.high,
+                )
+            )
         rows.append(tuple(cells))
     return Table(name, title, tuple(head), tuple(rows), notes, tuple(data))
 
@@ -247,8 +306,12 @@ _MARK = {"single": "", "many": " (many)"}
 def table_6_others(found: Sequence[Results], protocol: Protocol) -> Table:
     """Return the results of the other scenarios, of which the paper prints none."""
     shown = [item for item in QUANTITIES if item.name in _OTHERS]
-    head = ("scenario", "method", "objectives",
-            *(f"{q.title}{f' [{q.unit}]' if q.unit else ''}" for q in shown))  # fmt: skip
+    head = (
+        "scenario",
+        "method",
+        "objectives",
+        *(f"{q.title}{f' [{q.unit}]' if q.unit else ''}" for q in shown),
+    )
     rows = []
     data: list[tuple[object, ...]] = [
         ("scenario", "objectives", "method", "quantity", "runs", "q1", "median", "q3")
@@ -262,13 +325,28 @@ def table_6_others(found: Sequence[Results], protocol: Protocol) -> Table:
                     quartiles = results.quartiles(group, method.algorithm, quantity.name)
                     runs = int(np.count_nonzero(~np.isnan(values)))
                     cells.append(spread(quartiles, quantity.digits, several=runs > 1))
-                    data.append((results.scenario, group, method.algorithm, quantity.name, runs,
-                                 quartiles.low, quartiles.median, quartiles.high))  # fmt: skip
+                    data.append(
+                        (
+                            results.scenario,
+                            group,
+                            method.algorithm,
+                            quantity.name,
+                            runs,
+                            quartiles.low,
+                            quartiles.median,
+                            quartiles.high,
+                        )
+                    )
                 rows.append(tuple(cells))
     return Table(
-        "table-6-others", "The same for the other scenarios, of which the paper prints no numbers",
-        head, tuple(rows), _without(protocol), tuple(data), texts=3,
-    )  # fmt: skip
+        "table-6-others",
+        "The same for the other scenarios, of which the paper prints no numbers",
+        head,
+        tuple(rows),
+        _without(protocol),
+        tuple(data),
+        texts=3,
+    )
 
 
 _OTHERS = ("r_critic", "t_critic", "median_d_min", "median_v_d")

@@ -52,9 +52,12 @@ PERCEIVING = Part(
     "with-perception", "the reference driver and its perception", "reference", causes=True
 )
 IDEAL = Part(
-    "ideal-perception", "the same random scenarios, perceived ideally", "reference",
-    ideal=("perception",), algorithms=(RS.algorithm,),
-)  # fmt: skip
+    "ideal-perception",
+    "the same random scenarios, perceived ideally",
+    "reference",
+    ideal=("perception",),
+    algorithms=(RS.algorithm,),
+)
 
 PARTS = (PRINTED, PERCEIVING, IDEAL)
 

@@ -30,9 +30,15 @@ from bridgegen_reproduction.table import to_csv, to_latex, to_markdown
 MARK, PAGE, README, TIMES_FILE = "reproduction.json", "index.html", "README.md", "times.csv"
 
 NUMBERS = (
-    "r_critic", "evaluations_to_k", "avg_d_min", "median_d_min", "avg_v_d", "median_v_d",
-    "avg_fitness", "median_fitness",
-)  # fmt: skip
+    "r_critic",
+    "evaluations_to_k",
+    "avg_d_min",
+    "median_d_min",
+    "avg_v_d",
+    "median_v_d",
+    "avg_fitness",
+    "median_fitness",
+)
 TIMES = ("seconds_to_k", "runtime")
 
 
@@ -264,16 +270,32 @@ def _cells(found: Found) -> Iterator[tuple[Part, Cell, Run]]:
 
 def _runs(found: Found, k: int) -> Iterator[Sequence[object]]:
     labels = [cause.label for cause in CAUSES]
-    yield ("part", "scenario", "algorithm", "seed", "evaluations", "critical", *NUMBERS, *labels,
-           "folder", "command")  # fmt: skip
+    yield (
+        "part",
+        "scenario",
+        "algorithm",
+        "seed",
+        "evaluations",
+        "critical",
+        *NUMBERS,
+        *labels,
+        "folder",
+        "command",
+    )
     for part, cell, run in _cells(found):
         numbers = of_run(run, k)
         yield (
-            part.name, cell.scenario, cell.algorithm, cell.seed, len(run.critical), len(run.hits),
+            part.name,
+            cell.scenario,
+            cell.algorithm,
+            cell.seed,
+            len(run.critical),
+            len(run.hits),
             *(numbers[name] for name in NUMBERS),
             *(int((run.cause == cause).sum()) if part.causes else "" for cause in CAUSES),
-            run.folder, run.command,
-        )  # fmt: skip
+            run.folder,
+            run.command,
+        )
 
 
 def _times(found: Found, k: int) -> Iterator[Sequence[object]]:

@@ -105,19 +105,27 @@ def tell(found: Found, pictures: Mapping[str, Picture]) -> Document:
             ),
             Section(
                 "Perception",
-                (Shown(table_causes(found.causes)), *drawn("causes"),
-                 Shown(table_paired(found.paired))),
+                (
+                    Shown(table_causes(found.causes)),
+                    *drawn("causes"),
+                    Shown(table_paired(found.paired)),
+                ),
             ),
             Section(
                 "The experiment",
-                (Shown(table_2(protocol.scenarios)), *drawn("collision-points"),
-                 Shown(table_3(found.runs)), Shown(table_4(found.runs, protocol)),
-                 Shown(table_5(found.runs, protocol)), *drawn("ontology")),
+                (
+                    Shown(table_2(protocol.scenarios)),
+                    *drawn("collision-points"),
+                    Shown(table_3(found.runs)),
+                    Shown(table_4(found.runs, protocol)),
+                    Shown(table_5(found.runs, protocol)),
+                    *drawn("ontology"),
+                ),
             ),
             Section("What cannot be reproduced, and why", (Points(limits(protocol)),)),
             Section("Make it again", tuple(_again(found))),
         ),
-    )  # fmt: skip
+    )
 
 
 def _facts(found: Found) -> list[str]:
@@ -289,9 +297,15 @@ def _run_table(found: Found) -> Table:
             continue
         rows.append(
             (
-                part.name, f"S{cell.scenario[-1]}", paper.TITLES[cell.algorithm], f"{cell.seed}",
-                f"{len(run.critical):,}", f"{len(run.hits):,}", run.folder, run.command,
+                part.name,
+                f"S{cell.scenario[-1]}",
+                paper.TITLES[cell.algorithm],
+                f"{cell.seed}",
+                f"{len(run.critical):,}",
+                f"{len(run.hits):,}",
+                run.folder,
+                run.command,
             )
-        )  # fmt: skip
+        )
     head = ("part", "scenario", "method", "seed", "evaluations", "critical", "folder", "command")
     return Table("runs", "Every run", head, tuple(rows))

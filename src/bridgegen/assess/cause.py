@@ -64,8 +64,12 @@ class Cause(IntEnum):
 
 
 CAUSES = (
-    Cause.PERCEPTION, Cause.VEHICLE_DYNAMICS, Cause.PLANNING, Cause.CONTROL, Cause.UNAVOIDABLE,
-)  # fmt: skip
+    Cause.PERCEPTION,
+    Cause.VEHICLE_DYNAMICS,
+    Cause.PLANNING,
+    Cause.CONTROL,
+    Cause.UNAVOIDABLE,
+)
 """Root causes in the order in which they are sought."""
 
 

@@ -354,7 +354,10 @@ else:
     bundled, bundled_row, call_at, call_kernel_at, run_kernel_at = map(
         numba.extending.intrinsic,
         (
-            _bundled, _bundled_row, _called_at, _calls_kernel(DEMAND),
+            _bundled,
+            _bundled_row,
+            _called_at,
+            _calls_kernel(DEMAND),
             _calls_kernel(numba.types.none),
         ),
-    )  # fmt: skip
+    )

@@ -18,11 +18,16 @@ WRITTEN: Mapping[str, Mapping[str, tuple[Fraction, Fraction]]] = MappingProxyTyp
         unit: {symbol: (Fraction(factor), Fraction(offset)) for symbol, factor, offset in symbols}
         for unit, symbols in {
             "m": (
-                ("m", 1, 0), ("mm", "0.001", 0), ("cm", "0.01", 0), ("km", 1000, 0),
+                ("m", 1, 0),
+                ("mm", "0.001", 0),
+                ("cm", "0.01", 0),
+                ("km", 1000, 0),
                 ("ft", 12 * _INCH, 0),
             ),
             "m/s": (
-                ("m/s", 1, 0), ("km/h", Fraction(5, 18), 0), ("mph", 63360 * _INCH / 3600, 0),
+                ("m/s", 1, 0),
+                ("km/h", Fraction(5, 18), 0),
+                ("mph", 63360 * _INCH / 3600, 0),
             ),
             "m/s²": (("m/s²", 1, 0), ("m/s^2", 1, 0), ("m/s2", 1, 0), ("g", "9.80665", 0)),
             "s": (("s", 1, 0), ("ms", "0.001", 0), ("min", 60, 0), ("h", 3600, 0)),
@@ -34,12 +39,14 @@ WRITTEN: Mapping[str, Mapping[str, tuple[Fraction, Fraction]]] = MappingProxyTyp
             "kg": (("kg", 1, 0), ("t", 1000, 0)),
             "lx": (("lx", 1, 0), ("klx", 1000, 0)),
             "°C": (
-                ("°C", 1, 0), ("K", 1, "-273.15"), ("°F", Fraction(5, 9), Fraction(-160, 9)),
+                ("°C", 1, 0),
+                ("K", 1, "-273.15"),
+                ("°F", Fraction(5, 9), Fraction(-160, 9)),
             ),
             "1/m": (("1/m", 1, 0), ("1/km", "0.001", 0)),
         }.items()
     }
-)  # fmt: skip
+)
 """Units that a number may be written in, with factor and offset, by unit of the parameter."""
 
 _SYMBOLS = sorted({symbol for symbols in WRITTEN.values() for symbol in symbols})

@@ -63,11 +63,13 @@ def without_command(
     show_version: Annotated[
         bool,
         typer.Option(
-            "--version", help="Print the version and exit.",
-            callback=_print_version, is_eager=True,
+            "--version",
+            help="Print the version and exit.",
+            callback=_print_version,
+            is_eager=True,
         ),
     ] = False,
-) -> None:  # fmt: skip
+) -> None:
     """Print the help if no command is given."""
     if context.invoked_subcommand is None:
         print(context.get_help())

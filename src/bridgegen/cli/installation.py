@@ -79,9 +79,11 @@ def _cache() -> Finding:
     folder = cache_folder()
     if not is_kept(folder):
         return Finding(
-            "compiled code", f"{folder}, for this process only",
-            "make ~/.cache writable for you alone, or set NUMBA_CACHE_DIR", is_problem=True,
-        )  # fmt: skip
+            "compiled code",
+            f"{folder}, for this process only",
+            "make ~/.cache writable for you alone, or set NUMBA_CACHE_DIR",
+            is_problem=True,
+        )
     if is_compiled():
         return Finding("compiled code", str(folder))
     return Finding(
@@ -93,9 +95,10 @@ def _esmini() -> Finding:
     path = os.environ.get(ESMINI)
     if path is None:
         return Finding(
-            "esmini", f"unknown: {ESMINI} is not set",
+            "esmini",
+            f"unknown: {ESMINI} is not set",
             "name libesminiLib.so of esmini 3 in it, or by --esmini-lib (docs/esmini.md)",
-        )  # fmt: skip
+        )
     if not Path(path).is_file():
         return Finding("esmini", f"{path}: no such file", f"correct {ESMINI}", is_problem=True)
     return Finding("esmini", path)

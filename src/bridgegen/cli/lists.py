@@ -63,11 +63,13 @@ def list_simulators(as_json: options.Json = False) -> None:
 
     rows = [
         (
-            simulator.name, simulator.description, ", ".join(simulator.access),
+            simulator.name,
+            simulator.description,
+            ", ".join(simulator.access),
             "; ".join(f"{name}: {what}" for name, what in simulator.settings.items()),
         )
         for simulator in SIMULATORS.values()
-    ]  # fmt: skip
+    ]
     print_table(("simulator", "description", "options", "settings"), rows, as_json=as_json)
 
 
@@ -80,11 +82,15 @@ def list_metrics(as_json: options.Json = False) -> None:
 
     rows = [
         (
-            m.name, m.unit, m.sense, m.description, getattr(m, "needs", None),
+            m.name,
+            m.unit,
+            m.sense,
+            m.description,
+            getattr(m, "needs", None),
             "always" if m.name in (*TABLE_I, *MEASURED) else "on request",
         )
         for m in QUANTITIES.values()
-    ]  # fmt: skip
+    ]
     head = ("metric", "unit", "more critical if", "description", "needs", "recorded")
     print_table(head, rows, as_json=as_json)
 

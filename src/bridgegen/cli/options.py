@@ -27,10 +27,12 @@ Json = Annotated[
 Verbose = Annotated[
     bool,
     typer.Option(
-        "--verbose", "-v", help="Print all figures, too, and each failure mode in full.",
+        "--verbose",
+        "-v",
+        help="Print all figures, too, and each failure mode in full.",
         rich_help_panel=OUTPUT,
     ),
-]  # fmt: skip
+]
 
 OwnEgo = Annotated[
     str | None,

@@ -144,9 +144,11 @@ def search(
 
     assert save is None  # written by the run file's reader, which knows what was given
     criteria = PassFailCriteria.read(
-        fail_if or (), junit, causes=options.causes,
+        fail_if or (),
+        junit,
+        causes=options.causes,
         criteria=margins_of(scenario, options) if fail_if else (),
-    )  # fmt: skip
+    )
     chosen, cheap = common.read_simulators(simulator, simulator_set, screen, screen_set, connection)
     options = replace(options, simulator=chosen or EMBEDDED, screen=cheap)
     with SearchProgress(options.budget) as shown:

@@ -106,5 +106,15 @@ def video(
         raise InputError(f"--size must read WIDTHxHEIGHT, e.g. 960x540, got '{size}'")
     if max(len(width), len(height)) > 6:
         raise InputError(f"--size must have at most 6 digits each, got '{size}'")
-    print(film(run, out, evaluation=evaluation, size=(int(width), int(height)), fps=fps,
-               start=start, end=end, ego=ego))  # fmt: skip
+    print(
+        film(
+            run,
+            out,
+            evaluation=evaluation,
+            size=(int(width), int(height)),
+            fps=fps,
+            start=start,
+            end=end,
+            ego=ego,
+        )
+    )

@@ -114,9 +114,7 @@ def straight_to(path, n, ds, s):
 
 
 @kernel
-def keep_to_leaders(
-    e, path, n, ds, p, s, v, right, left, present, seen, far, bodies, kinds, mind
-):  # fmt: skip
+def keep_to_leaders(e, path, n, ds, p, s, v, right, left, present, seen, far, bodies, kinds, mind):
     """Return the acceleration [m/s²] that traffic ahead on its strip requires; +inf if none does.
 
     The strip is from ``right`` to ``left`` of the path [m], widened by half of its body.
@@ -224,16 +222,24 @@ def look(
             rank = -1 if IS_PEDESTRIAN[kinds[o]] else min(max(claims[o], -1), 1)
             other_front = bodies[o, 2] + 0.5 * bodies[o, 0]
             follows, stops_at = give_way(
-                s, v, pace, front, rear, zone, station[o], seen[W, o], seen[GAIN, o], rank,
-                other_front, bodies[o, 0] - other_front,
-            )  # fmt: skip
+                s,
+                v,
+                pace,
+                front,
+                rear,
+                zone,
+                station[o],
+                seen[W, o],
+                seen[GAIN, o],
+                rank,
+                other_front,
+                bodies[o, 0] - other_front,
+            )
             if follows < CONCERNS:
                 asked = min(asked, follows)
             if v * v <= 2.0 * COMMITTED * grip * (stops_at - front - s):
                 stop = min(stop, stops_at)
-        item, light = stop_at_lights(
-            stops, lights, s, front, v, math.inf, int(mind[STOPS_FOR]) - 1
-        )  # fmt: skip
+        item, light = stop_at_lights(stops, lights, s, front, v, math.inf, int(mind[STOPS_FOR]) - 1)
         mind[STOPS_FOR] = light + 1.0
         asked = min(asked, item)
         item, mind[HALTED] = stop_at_signs(halts, s, front, v, mind[HALTED])
@@ -282,9 +288,7 @@ def is_safe(gap, closing, lasts, grip):
 
 
 @kernel
-def gap_is_free(
-    e, k, path, n, ds, s, target, lasts, grip, present, x, y, h, speed, bodies
-):  # fmt: skip
+def gap_is_free(e, k, path, n, ds, s, target, lasts, grip, present, x, y, h, speed, bodies):
     """Return whether participant e may begin to change lane at instant k.
 
     It is abreast of station ``s`` of the other lane's path and will be ``target`` [m] left of that

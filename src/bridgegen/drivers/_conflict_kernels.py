@@ -112,9 +112,7 @@ def meet(
     while t <= horizon and not met:
         ex, ey, eh = pose(path, n, ds, s + pace * t)
         c, r = math.cos(eh), math.sin(eh)
-        px, py, ph = later(
-            known, other_path, other_n, other_ds, q, left, x, y, h, w, turn, t
-        )  # fmt: skip
+        px, py, ph = later(known, other_path, other_n, other_ds, q, left, x, y, h, w, turn, t)
         dx = px + other[2] * math.cos(ph) - ex - own[2] * c
         dy = py + other[2] * math.sin(ph) - ey - own[2] * r
         apart = math.hypot(dx, dy) - reach
@@ -131,7 +129,7 @@ def meet(
         while 0.0 <= moment <= t + AFTER:
             px, py, ph = later(
                 known, other_path, other_n, other_ds, q, left, x, y, h, w, turn, moment
-            )  # fmt: skip
+            )
             cx, cy = px + other[2] * math.cos(ph), py + other[2] * math.sin(ph)
             foot, offset = project(path, n, ds, foot, cx, cy)
             i = min(int(foot / ds), n - 1)

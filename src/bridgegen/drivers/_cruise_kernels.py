@@ -22,7 +22,13 @@ def cruise(k, plan, roads, state, record):
     asked, stops_for = stop_at_lights(lines, state.lights, s, front, v, math.inf, stopping)
     state.mind[STOPS_FOR] = stops_for + 1.0
     planned = bend_speed(
-        roads.paths[p], roads.bends[p], roads.counts[p], roads.steps[p], s, v, state.command[0],
+        roads.paths[p],
+        roads.bends[p],
+        roads.counts[p],
+        roads.steps[p],
+        s,
+        v,
+        state.command[0],
         state.weather[FRICTION],
-    )  # fmt: skip
+    )
     return planned, asked

@@ -81,9 +81,15 @@ def must_brake(path, n, ds, s, v, body, shift, around, tracks, friction_limit):
                 dy = tracks[e, TRACK_Y] + tracks[e, VY] * t - py - centre * sine - aside * c
                 along = dx * c + dy * sine
                 meets = dx * dx + dy * dy < (reach + room) ** 2 and boxes_meet(
-                    dx, dy, ph, 0.5 * length + MARGIN, 0.5 * width + MARGIN,
-                    tracks[e, H], 0.5 * tracks[e, LENGTH], 0.5 * tracks[e, WIDTH],
-                )  # fmt: skip
+                    dx,
+                    dy,
+                    ph,
+                    0.5 * length + MARGIN,
+                    0.5 * width + MARGIN,
+                    tracks[e, H],
+                    0.5 * tracks[e, LENGTH],
+                    0.5 * tracks[e, WIDTH],
+                )
             if meets:
                 if along > 0.0:
                     return True

@@ -123,9 +123,14 @@ def keep_distance(around, tracks, s, front, rear, half_width, shift, v):
         if space > least and (nearing < DRIFT or space - nearing * COMING_IN > least):
             if around[e, COSINE] >= SAME_WAY:
                 allowed = let_in(
-                    tracks[e, LAMPS], beside, space, gap, v, max(around[e, ALONG], 0.0),
+                    tracks[e, LAMPS],
+                    beside,
+                    space,
+                    gap,
+                    v,
+                    max(around[e, ALONG], 0.0),
                     around[e, GAINING],
-                )  # fmt: skip
+                )
                 asked = min(asked, allowed)
             continue
         if gap < 0.0 and around[e, AT] < s + front:

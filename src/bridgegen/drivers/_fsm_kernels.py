@@ -130,9 +130,18 @@ def drive_fsm(
     for e in range(1, len(speed) if len(speed) > 2 else 1):
         if present[e] and USES_LANES[kinds[e]]:
             ahead, _, aside, _, _ = place_on_way(
-                paths[own], path_n[own], path_ds[own], station[0], reach + FARTHER, bodies[0],
-                x[e, k], y[e, k], h[e, k], speed[e, k], bodies[e],
-            )  # fmt: skip
+                paths[own],
+                path_n[own],
+                path_ds[own],
+                station[0],
+                reach + FARTHER,
+                bodies[0],
+                x[e, k],
+                y[e, k],
+                h[e, k],
+                speed[e, k],
+                bodies[e],
+            )
             if ahead >= 0.0 and aside <= WANDERING:
                 hides = min(hides, ahead)
     needed, on_way, closing = 0.0, 0.0, False
@@ -145,9 +154,18 @@ def drive_fsm(
             turn = (h[e, k] - h[e, k - 1]) / dt
         if USES_LANES[kinds[e]]:
             ahead, gap, aside, side, along = place_on_way(
-                paths[own], path_n[own], path_ds[own], station[0], reach + FARTHER, bodies[0],
-                x[e, k], y[e, k], h[e, k], w, bodies[e],
-            )  # fmt: skip
+                paths[own],
+                path_n[own],
+                path_ds[own],
+                station[0],
+                reach + FARTHER,
+                bodies[0],
+                x[e, k],
+                y[e, k],
+                h[e, k],
+                w,
+                bodies[e],
+            )
             if w >= STANDS or (ahead > hides and side <= 0.0):
                 attention[e, IN_TRAFFIC] = 1.0
             has_driven = attention[e, IN_TRAFFIC] > 0.0

@@ -124,7 +124,7 @@ def know(k, dt, present, x, y, h, v, bodies, kinds, lamps, tracks, detections):
 @kernel
 def look(
     k, dt, frame, key, present, x, y, h, bodies, kinds, lamps, weather, memory, tracks, detections
-):  # fmt: skip
+):
     """Take a sensor frame: fill its detections, and update the tracks."""
     elapsed = max(dt, FRAME)
     renew, keep = 1.0 - math.exp(-elapsed / DROPOUT_TIME), math.exp(-elapsed / ERROR_TIME)
@@ -153,11 +153,19 @@ def look(
         ux, uy = memory[e, DX] / memory[e, D], memory[e, DY] / memory[e, D]
         along, across = COLOURED * along, COLOURED * across
         tracking.see(
-            tracks, memory, e, detections[e, k, X], detections[e, k, Y], detections[e, k, HEADING],
-            detections[e, k, LENGTH], detections[e, k, WIDTH], detections[e, k, KIND],
+            tracks,
+            memory,
+            e,
+            detections[e, k, X],
+            detections[e, k, Y],
+            detections[e, k, HEADING],
+            detections[e, k, LENGTH],
+            detections[e, k, WIDTH],
+            detections[e, k, KIND],
             detections[e, k, CONFIDENCE],
-            along * ux * ux + across * uy * uy, along * uy * uy + across * ux * ux,
-        )  # fmt: skip
+            along * ux * ux + across * uy * uy,
+            along * uy * uy + across * ux * ux,
+        )
         tracks[e, tracking.LAMPS] = lamps[e]
 
 

@@ -184,8 +184,15 @@ def drive(k, plan_, roads, state, record):
         )  # fmt: skip
     if shift_of(mind) != UNSHIFTED and state.on[0] == 0:
         curvature = pursue_beside(
-            roads.paths[0], roads.counts[0], roads.steps[0], s, shift_of(mind), record.x[0, k],
-            record.y[0, k], record.h[0, k], preview(v),
-        )  # fmt: skip
+            roads.paths[0],
+            roads.counts[0],
+            roads.steps[0],
+            s,
+            shift_of(mind),
+            record.x[0, k],
+            record.y[0, k],
+            record.h[0, k],
+            preview(v),
+        )
     lags = plan_.moves_chassis == 0
     return control.actuate(mind, mind[PLANNED], curvature, plan_.dt, plan_.ideal_control, lags)

@@ -34,9 +34,15 @@ def keep_to_route(k, roads, state, record):
     """Return the curvature [1/m] that keeps the ego to its route at instant k."""
     p = state.on[0]
     return steer(
-        roads.paths[p], roads.counts[p], roads.steps[p], state.station[0], record.x[0, k],
-        record.y[0, k], record.h[0, k], record.v[0, k],
-    )  # fmt: skip
+        roads.paths[p],
+        roads.counts[p],
+        roads.steps[p],
+        state.station[0],
+        record.x[0, k],
+        record.y[0, k],
+        record.h[0, k],
+        record.v[0, k],
+    )
 
 
 @kernel

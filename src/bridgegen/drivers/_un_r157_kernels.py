@@ -96,9 +96,18 @@ def drive_un_r157(
         w = speed[e, k]
         slowing = (speed[e, k - 1] - w) / dt if k > 0 else 0.0
         ahead, gap, aside, side, along = place_on_way(
-            paths[own], path_n[own], path_ds[own], station[0], reach, bodies[0],
-            x[e, k], y[e, k], h[e, k], w, bodies[e],
-        )  # fmt: skip
+            paths[own],
+            path_n[own],
+            path_ds[own],
+            station[0],
+            reach,
+            bodies[0],
+            x[e, k],
+            y[e, k],
+            h[e, k],
+            w,
+            bodies[e],
+        )
         before, was_on_way = attention[e, ASIDE], attention[e, ON_WAY] > 0.0
         on_way = side <= 0.0
         attention[e, ASIDE], attention[e, ON_WAY] = aside, 1.0 if on_way else 0.0

@@ -43,15 +43,20 @@ def _record(*names: str) -> np.dtype[Any]:
 
 
 SCENE = _record(
-    "time_step", "n_steps", "length", "width", "centre",
-    "max_speed", "max_acceleration", "max_deceleration", "max_curvature",
-)  # fmt: skip
+    "time_step",
+    "n_steps",
+    "length",
+    "width",
+    "centre",
+    "max_speed",
+    "max_acceleration",
+    "max_deceleration",
+    "max_curvature",
+)
 """Record of what is constant in a scenario, see `bridgegen.drivers.interface.Scene`; all are
 float64."""
 
-EGO = _record(
-    "time", "x", "y", "h", "v", "a", "target_speed", "offset", "stop_distance", "light"
-)  # fmt: skip
+EGO = _record("time", "x", "y", "h", "v", "a", "target_speed", "offset", "stop_distance", "light")
 """Record of the ego's state, see `Observation`."""
 
 ROUTE = _record("x", "y", "h", "curvature")
@@ -81,11 +86,20 @@ PIECE = np.dtype(
     [
         ("points", np.float64, (PIECE_POINTS, 3)),
         ("width", np.float64, (PIECE_POINTS,)),
-        *((name, np.float64) for name in (
-            "count", "kind", "lane", "light", "marking", "speed_limit", "on_route",
-        )),
+        *(
+            (name, np.float64)
+            for name in (
+                "count",
+                "kind",
+                "lane",
+                "light",
+                "marking",
+                "speed_limit",
+                "on_route",
+            )
+        ),
     ]
-)  # fmt: skip
+)
 """A piece of the map, see `bridgegen.drivers.interface.RoadMap`; kind -1 where there is none.
 
 ``width`` is the lane's [m] at the points of a centre line, 0 of other pieces.

@@ -229,9 +229,14 @@ def get(name: str, ideal: Iterable[str] = (), time_limit: float | None = None) -
     elif not is_spec(name):
         raise UnknownNameError("ego driver", name, [*DRIVERS, *planners()])
     own = Driver(
-        name, what, stages=frozenset({"perception"}), time_limit=time_limit or TIME_LIMIT,
-        origin=Origin.OWN, spec=spec, domain=domain,
-    )  # fmt: skip
+        name,
+        what,
+        stages=frozenset({"perception"}),
+        time_limit=time_limit or TIME_LIMIT,
+        origin=Origin.OWN,
+        spec=spec,
+        domain=domain,
+    )
     return own.idealised(ideal)
 
 
@@ -284,11 +289,16 @@ def listed() -> list[tuple[str, ...]]:
     ]
     rows += [
         (
-            planner.name, planner.description, "perception", available(planner), planner.licence,
-            in_order(planner.domain), planner.source,
+            planner.name,
+            planner.description,
+            "perception",
+            available(planner),
+            planner.licence,
+            in_order(planner.domain),
+            planner.source,
         )
         for planner in planners().values()
-    ]  # fmt: skip
+    ]
     rows += [
         (name, f"Of other participants: {what}", "", "ships", *blank)
         for name, what in OTHERS.items()

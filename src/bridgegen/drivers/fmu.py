@@ -27,9 +27,20 @@ from bridgegen.base.extras import require
 from bridgegen.drivers.interface import ROUTE_POINTS, Control, Observation, Scene
 
 TRACK = (
-    "state", "x", "y", "h", "vx", "vy", "length", "width", "class", "confidence", "unseen", "age",
+    "state",
+    "x",
+    "y",
+    "h",
+    "vx",
+    "vy",
+    "length",
+    "width",
+    "class",
+    "confidence",
+    "unseen",
+    "age",
     "lamps",
-)  # fmt: skip
+)
 _PLAIN = ("x", "y", "h", "v", "a", "target_speed", "offset", "stop_distance", "light")
 _ROUTE = ("x", "y", "h", "curvature")
 _INDEXED = re.compile(r"(route|track)_(\d{1,4})_([a-z]+)")

@@ -42,9 +42,12 @@ class Grid(NamedTuple):
 def no_grid(n: int) -> Grid:
     """Return n maps without pieces."""
     return Grid(
-        np.empty((n, 0, COLUMNS)), np.empty((n, 0, 2)), np.empty((n, 0)),
-        np.empty((n, 0), dtype=np.int64), np.empty((n, 0), dtype=np.int64),
-    )  # fmt: skip
+        np.empty((n, 0, COLUMNS)),
+        np.empty((n, 0, 2)),
+        np.empty((n, 0)),
+        np.empty((n, 0), dtype=np.int64),
+        np.empty((n, 0), dtype=np.int64),
+    )
 
 
 def grid_of(maps: Sequence[RoadMap]) -> Grid:
@@ -53,10 +56,12 @@ def grid_of(maps: Sequence[RoadMap]) -> Grid:
     k = max(len(grid.pieces[0]) for grid in grids)
     c = max(grid.starts.shape[1] for grid in grids)
     found = Grid(
-        np.zeros((len(maps), k, COLUMNS)), np.full((len(maps), k, 2), np.inf),
-        np.concatenate([grid.box for grid in grids]), np.zeros((len(maps), c), dtype=np.int64),
+        np.zeros((len(maps), k, COLUMNS)),
+        np.full((len(maps), k, 2), np.inf),
+        np.concatenate([grid.box for grid in grids]),
+        np.zeros((len(maps), c), dtype=np.int64),
         np.zeros((len(maps), k), dtype=np.int64),
-    )  # fmt: skip
+    )
     found.pieces[:, :, 3 * PIECE_POINTS + PIECE_POINTS + 1] = -1.0
     for p, grid in enumerate(grids):
         for whole, part in zip(found, grid, strict=True):
@@ -71,9 +76,12 @@ def _grid(roads: RoadMap) -> Grid:
     rows["points"][:, 0] = roads.pieces
     names = ("count", "kind", "lane", "light", "marking")
     columns = (
-        roads.piece_points, roads.piece_kind, roads.piece_lane, roads.piece_light,
+        roads.piece_points,
+        roads.piece_kind,
+        roads.piece_lane,
+        roads.piece_light,
         roads.piece_marking,
-    )  # fmt: skip
+    )
     for name, column in zip(names, columns, strict=True):
         rows[name][:, 0] = column
     rows["speed_limit"] = np.inf

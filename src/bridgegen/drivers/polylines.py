@@ -102,9 +102,17 @@ def gather(scene: Scene, observation: Observation) -> Polylines:
     points = np.zeros((*at.shape, PIECE_POINTS, 4), dtype=np.float32)
     mask = np.zeros(points.shape[:3], dtype=np.bool_)
     gather_points(
-        at, tables.counts, tables.pieces, tables.directions, observation.x, observation.y,
-        np.cos(observation.h), np.sin(observation.h), points, mask,
-    )  # fmt: skip
+        at,
+        tables.counts,
+        tables.pieces,
+        tables.directions,
+        observation.x,
+        observation.y,
+        np.cos(observation.h),
+        np.sin(observation.h),
+        points,
+        mask,
+    )
     attributes = tables.attributes[at]
     light = tables.light[at]
     if view.lights.shape[1]:

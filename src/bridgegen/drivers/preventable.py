@@ -137,8 +137,12 @@ def avoids_cut_in(
 
     return _shaped(
         _avoids(v, place, ego_size[0], other_size[0], driver, cut_in=True),
-        ego_speed, other_speed, gap, lateral_speed, lateral_gap,
-    )  # fmt: skip
+        ego_speed,
+        other_speed,
+        gap,
+        lateral_speed,
+        lateral_gap,
+    )
 
 
 def avoids_cut_out(
@@ -211,8 +215,11 @@ def avoids_deceleration(
 
     return _shaped(
         _avoids(v, place, SIZE[0], SIZE[0], driver, cut_in=False),
-        ego_speed, other_speed, gap, deceleration,
-    )  # fmt: skip
+        ego_speed,
+        other_speed,
+        gap,
+        deceleration,
+    )
 
 
 def _arrays(**values: npt.ArrayLike) -> list[Float]:

@@ -103,10 +103,11 @@ def road_map(model: OpenDrive, route: Route | None, lights: Sequence[str]) -> Ro
     ]
     numbers = {stretch: number for number, stretch in enumerate(stretches)}
     onward = {
-        stretch: tuple(_id(item) for item in dict.fromkeys(next_stretches(model, stretch))
-                       if item in numbers)
+        stretch: tuple(
+            _id(item) for item in dict.fromkeys(next_stretches(model, stretch)) if item in numbers
+        )
         for stretch in stretches
-    }  # fmt: skip
+    }
     back: dict[str, list[str]] = {}
     for stretch, following in onward.items():
         for name in following:

@@ -127,9 +127,16 @@ def survey(
             steps.append(way_step)
             zone = np.empty(ZONE)
             find_zone(
-                path, len(path), step, bodies[0],
-                tables[-1], len(tables[-1]), way_step, bodies[e], zone,
-            )  # fmt: skip
+                path,
+                len(path),
+                step,
+                bodies[0],
+                tables[-1],
+                len(tables[-1]),
+                way_step,
+                bodies[e],
+                zone,
+            )
             zones.append(zone)
             rank = right_of_way(model, route, way, lights) if route is not None else NO_RULE
             lane_ranks.append(WE_WAIT if ranks[e] > 0 else rank)

@@ -38,10 +38,13 @@ class Sky:
 
     def __post_init__(self) -> None:
         limits = {
-            "visual_range": (1.0, math.inf, "m"), "rain": (0.0, math.inf, "mm/h"),
-            "snow": (0.0, math.inf, "mm/h"), "sun_altitude": (-90.0, 90.0, "deg"),
-            "off_sun": (0.0, 180.0, "deg"), "cloud": (0.0, 1.0, "1"),
-        }  # fmt: skip
+            "visual_range": (1.0, math.inf, "m"),
+            "rain": (0.0, math.inf, "mm/h"),
+            "snow": (0.0, math.inf, "mm/h"),
+            "sun_altitude": (-90.0, 90.0, "deg"),
+            "off_sun": (0.0, 180.0, "deg"),
+            "cloud": (0.0, 1.0, "1"),
+        }
         for name, (low, high, unit) in limits.items():
             value = getattr(self, name)
             if not (low <= value <= high and math.isfinite(value)):
@@ -104,9 +107,10 @@ def detection_range(sky: Sky, kind: int) -> DetectionRange:
         return float(lidar.detection(echoes))
 
     return DetectionRange(
-        _half(by_camera), _half(by_lidar),
+        _half(by_camera),
+        _half(by_lidar),
         _half(lambda d: 1.0 - (1.0 - by_camera(d)) * (1.0 - by_lidar(d))),
-    )  # fmt: skip
+    )
 
 
 def _half(probability: Callable[[float], float]) -> float:
@@ -124,9 +128,14 @@ def _half(probability: Callable[[float], float]) -> float:
 
 
 HEAD = (
-    "weather", "car, camera", "car, LiDAR", "car, either",
-    "walker, camera", "walker, LiDAR", "walker, either",
-)  # fmt: skip
+    "weather",
+    "car, camera",
+    "car, LiDAR",
+    "car, either",
+    "walker, camera",
+    "walker, LiDAR",
+    "walker, either",
+)
 """Column heads of `table`; distances in metres, a walker is a pedestrian."""
 
 

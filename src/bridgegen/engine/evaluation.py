@@ -65,8 +65,11 @@ class Evaluation:
         rows = np.concatenate([at for at, _ in parts])
         order, whole = np.argsort(rows), cls.join([part for _, part in parts])
         return cls(
-            whole.metrics[order], whole.F[order], whole.critical[order], whole.status[order],
+            whole.metrics[order],
+            whole.F[order],
+            whole.critical[order],
+            whole.status[order],
             whole.findings.take(order),
             {int(rows[row]): text for row, text in whole.messages.items()},
             None if whole.cause is None else whole.cause[order],
-        )  # fmt: skip
+        )

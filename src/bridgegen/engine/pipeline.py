@@ -107,17 +107,23 @@ class Pipeline:
         self.space = space
         self._options = options = PipelineOptions.of(options or PipelineOptions())
         self._made_with: dict[str, Any] = {
-            "scenario": scenario, "space": space, "road_map": road_map, "simulator": simulator,
-        }  # fmt: skip
+            "scenario": scenario,
+            "space": space,
+            "road_map": road_map,
+            "simulator": simulator,
+        }
         self._simulated_by = simulator
         self.cause = None if options.cause is None else Cause.named(options.cause)
         self.seeks_causes = options.causes or self.cause is not None
         self._workers = workers or Threads()
         self._is_far = simulator != EMBEDDED and not self._workers.are_here
         self.runner = Runner(
-            scenario, space, options, road_map=road_map,
+            scenario,
+            space,
+            options,
+            road_map=road_map,
             simulator=EMBEDDED if self._is_far else simulator,
-        )  # fmt: skip
+        )
         self.driver = self.runner.driver
         if self._is_far and self.runner.vehicle != KINEMATIC:
             raise InputError(
@@ -182,9 +188,11 @@ class Pipeline:
         """
         here = self._workers if self._workers.are_here else Threads()
         pipeline = Pipeline(
-            options=replace(self._options, causes=False), recorded=self.metrics, workers=here,
+            options=replace(self._options, causes=False),
+            recorded=self.metrics,
+            workers=here,
             **self._made_with | {"simulator": simulator},
-        )  # fmt: skip
+        )
         pipeline.choose_objective(self.objective)
         return pipeline
 

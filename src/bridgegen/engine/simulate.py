@@ -158,9 +158,12 @@ def simulate_file(
     changes = any(iterable is not None for iterable in (ego, ideal, vehicle, others))
     stated, unknown = stated_criteria(scenario)
     monitor = Monitor(
-        joined(stated, criteria), embedded.program.names, held, embedded.duration,
+        joined(stated, criteria),
+        embedded.program.names,
+        held,
+        embedded.duration,
         f"the driver '{embedded.driver}'",
-    )  # fmt: skip
+    )
     network = embedded.roads([roads])
     made = network if runs is embedded else runs.roads([roads])
     rollout = runs.run(made, np.zeros(1, dtype=np.int64), {})

@@ -131,9 +131,15 @@ class Trials:
     def take(self, at: Int | Bool) -> "Trials":
         """Return those of some rows."""
         return Trials(
-            self.harm[at], self.severity[at], self.ok[at], self.findings.take(at), self.place[at],
-            self.event[at], self.preventable[at], self.harmless_until[at],
-        )  # fmt: skip
+            self.harm[at],
+            self.severity[at],
+            self.ok[at],
+            self.findings.take(at),
+            self.place[at],
+            self.event[at],
+            self.preventable[at],
+            self.harmless_until[at],
+        )
 
 
 def _event(conflicts: Conflicts, other: Int, x: Float, y: Float) -> Float:

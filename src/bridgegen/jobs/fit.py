@@ -66,10 +66,17 @@ def write_fit(
     if xosc is not None and xosc.exists():
         raise StorageError(f"{xosc}: exists already, and is not overwritten")
     made = fit_exposure(
-        load(scenario), events, hours=hours, km=km, ignore=ignore,
-        others=cast(Literal["uniform", "default"] | None, others), source=source,
-        replicates=replicates, seed=seed, progress=progress,
-    )  # fmt: skip
+        load(scenario),
+        events,
+        hours=hours,
+        km=km,
+        ignore=ignore,
+        others=cast(Literal["uniform", "default"] | None, others),
+        source=source,
+        replicates=replicates,
+        seed=seed,
+        progress=progress,
+    )
     write_exposure(out, made.text)
     write_page(page, made)
     if xosc is None:

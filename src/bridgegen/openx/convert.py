@@ -155,8 +155,11 @@ def _seen_from(out: Path, file: Path) -> str:
 
 def scenario_of(individuals: Individuals) -> LogicalScenario | None:
     """Return the scenario of the catalogue or of a pack that individuals refer to; None if none."""
-    said = {name for node in individuals.of_class("Scenario")
-            for name in individuals.texts(node, "has_name")}  # fmt: skip
+    said = {
+        name
+        for node in individuals.of_class("Scenario")
+        for name in individuals.texts(node, "has_name")
+    }
     shipped = {name: name for name in scenario_names()}
     shipped |= {name.replace("/", "-"): name for name in pack_names()}
     known = said.intersection(shipped)

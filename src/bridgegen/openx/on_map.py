@@ -240,33 +240,58 @@ def _on_sites(scenario: LogicalScenario, road_map: RoadMap) -> LogicalScenario:
     }
     names = site_names(road_map)
     index = Parameter(
-        PLACE, Axis.STATIC, "1", 0.0, len(names) - 1.0, 0.0, Category(names),
-        f"The place on {found}: a road, or a junction and the road that is leg A.", source,
-    )  # fmt: skip
+        PLACE,
+        Axis.STATIC,
+        "1",
+        0.0,
+        len(names) - 1.0,
+        0.0,
+        Category(names),
+        f"The place on {found}: a road, or a junction and the road that is leg A.",
+        source,
+    )
     why = "The map has it."
     measured = [
         Derived(
-            name, Axis.STATIC, parameter.unit,
-            lookup(PLACE, [part.parameters[name].default for part in here]), why, source,
+            name,
+            Axis.STATIC,
+            parameter.unit,
+            lookup(PLACE, [part.parameters[name].default for part in here]),
+            why,
+            source,
             parameter.description,
         )
         for name, parameter in scenario.parameters.items()
         if name in static
-    ]  # fmt: skip
+    ]
     limits = [_lowest_limit(site) or _NO_LIMIT for site in road_map.sites]
     sharpest = [_sharpest(site) for site in road_map.sites]
     limit = _LIMIT if min(limits) < _NO_LIMIT else None
     if limit:
         measured.append(
-            Derived(_LIMIT, Axis.STATIC, "m/s", lookup(PLACE, limits), why, source,
-                    "The lowest speed limit there.")
-        )  # fmt: skip
+            Derived(
+                _LIMIT,
+                Axis.STATIC,
+                "m/s",
+                lookup(PLACE, limits),
+                why,
+                source,
+                "The lowest speed limit there.",
+            )
+        )
     curvature = _SHARPEST if max(sharpest) > GENTLE else None
     if curvature:
         measured.append(
-            Derived(_SHARPEST, Axis.STATIC, "1/m", lookup(PLACE, sharpest), why, source,
-                    "The greatest curvature of the road there.")
-        )  # fmt: skip
+            Derived(
+                _SHARPEST,
+                Axis.STATIC,
+                "1/m",
+                lookup(PLACE, sharpest),
+                why,
+                source,
+                "The greatest curvature of the road there.",
+            )
+        )
     slower = tuple(
         _slower(
             replace(

@@ -147,9 +147,12 @@ class _Populated:
             yield from self._of_swarm(name, action, random, kinds, actions)
 
     def _of_source(
-        self, name: str, action: osc.TrafficSourceAction, random: np.random.Generator,
+        self,
+        name: str,
+        action: osc.TrafficSourceAction,
+        random: np.random.Generator,
         kinds: "_Kinds",
-    ) -> Iterator[Made]:  # fmt: skip
+    ) -> Iterator[Made]:
         """Yield the vehicles that come at a place, one after the other."""
         rate, radius = (self._starts.number(value) for value in (action.rate, action.radius))
         said = action.speed if action.speed is not None else action.velocity
@@ -174,9 +177,13 @@ class _Populated:
             yield self._made(f"{name}_{k + 1}", kinds.draw(random), where, speed, k / rate)
 
     def _of_swarm(
-        self, name: str, action: osc.TrafficSwarmAction, random: np.random.Generator,
-        kinds: "_Kinds", actions: osc.InitActions,
-    ) -> Iterator[Made]:  # fmt: skip
+        self,
+        name: str,
+        action: osc.TrafficSwarmAction,
+        random: np.random.Generator,
+        kinds: "_Kinds",
+        actions: osc.InitActions,
+    ) -> Iterator[Made]:
         """Yield the vehicles around an entity at the start."""
         number = self._starts.number
         whom = self._starts.text(action.central_object.entity_ref)
@@ -259,9 +266,11 @@ class _Populated:
             near = osc.ReachPositionCondition(sink.radius, sink.position)
             who = osc.TriggeringEntities(osc.TriggeringEntitiesRule.ANY, (osc.EntityRef(name),))
             condition = osc.Condition(
-                f"{name}_is_there", 0.0, osc.ConditionEdge.NONE,
+                f"{name}_is_there",
+                0.0,
+                osc.ConditionEdge.NONE,
                 osc.ByEntityCondition(who, osc.EntityCondition(near)),
-            )  # fmt: skip
+            )
             leaves = osc.GlobalAction(osc.EntityAction(name, osc.DeleteEntityAction()))
             yield _event(f"{name}_leaves_{sink.line}", leaves, condition)
 
@@ -338,9 +347,12 @@ def _vehicle(category: str) -> osc.Vehicle:
 
     def axle(lock: float, x: float) -> osc.Axle:
         return osc.Axle(
-            max_steering=lock, wheel_diameter=0.65, track_width=body.width - 0.3, position_x=x,
+            max_steering=lock,
+            wheel_diameter=0.65,
+            track_width=body.width - 0.3,
+            position_x=x,
             position_z=0.325,
-        )  # fmt: skip
+        )
 
     return osc.Vehicle(
         name=category,
@@ -407,9 +419,12 @@ def _arrivals(made: Sequence[Made]) -> Iterator[osc.Event]:
 def _event(name: str, action: osc.GlobalAction, condition: osc.Condition) -> osc.Event:
     trigger = osc.Trigger((osc.ConditionGroup((condition,)),))
     return osc.Event(
-        priority=osc.Priority.PARALLEL, maximum_execution_count=1, name=name,
-        actions=(osc.Action(f"{name}_action", action),), start_trigger=trigger,
-    )  # fmt: skip
+        priority=osc.Priority.PARALLEL,
+        maximum_execution_count=1,
+        name=name,
+        actions=(osc.Action(f"{name}_action", action),),
+        start_trigger=trigger,
+    )
 
 
 def _with(
@@ -425,9 +440,11 @@ def _with(
     stories = board.stories
     if events:
         group = osc.ManeuverGroup(
-            maximum_execution_count=1, name=NAMED, actors=osc.Actors(False),
+            maximum_execution_count=1,
+            name=NAMED,
+            actors=osc.Actors(False),
             maneuvers=(osc.Maneuver(name=NAMED, events=tuple(events)),),
-        )  # fmt: skip
+        )
         stories = (*stories, osc.Story(name=NAMED, acts=(osc.Act(NAMED, (group,)),)))
     entities = scenario.entities
     objects = (*entities.scenario_objects, *(entity for entity, _, _, _ in made))

@@ -27,9 +27,13 @@ def parse_xml(source: Path | bytes, place: str | None = None) -> etree._Element:
     if len(data) > MAX_BYTES:
         raise FileFormatError(f"{place}: an XML file may have {MAX_BYTES} bytes, got {len(data)}")
     parser = etree.XMLParser(
-        resolve_entities=False, no_network=True, load_dtd=False, huge_tree=False,
-        remove_comments=True, remove_pis=True,
-    )  # fmt: skip
+        resolve_entities=False,
+        no_network=True,
+        load_dtd=False,
+        huge_tree=False,
+        remove_comments=True,
+        remove_pis=True,
+    )
     try:
         root = etree.fromstring(data, parser)
     except (etree.XMLSyntaxError, ValueError) as error:

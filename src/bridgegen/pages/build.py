@@ -162,8 +162,9 @@ def build_report(
         first = nearest[:1]
     judged = summarise_criteria(
         [item for item in pipeline.monitor if item.quantity in pipeline.metrics],
-        rows.metrics, pipeline.metrics,
-    )  # fmt: skip
+        rows.metrics,
+        pipeline.metrics,
+    )
     worst = [item.at for item in (*by_gravity(judged), *judged)]
     first += [at - 1 for at in worst if at is not None]
     return ReportData(
@@ -265,9 +266,15 @@ def _evaluations(pipeline: Pipeline, rows: Rows | Recorded) -> Evaluations:
     objectives = tuple(Column(name, "1", rows.F[:, j]) for j, name in enumerate(names))
     cause = rows.cause if rows.cause.any() else None
     return Evaluations(
-        rows.batch, parameters, metrics, objectives, rows.critical, rows.status, cause,
+        rows.batch,
+        parameters,
+        metrics,
+        objectives,
+        rows.critical,
+        rows.status,
+        cause,
         rows.findings if any(rows.findings.conflict) or any(rows.findings.implausible) else None,
-    )  # fmt: skip
+    )
 
 
 def _minimal(

@@ -28,9 +28,13 @@ def _rounded(value: object) -> object:
 def svg(width: float, height: float, label: str, parts: Iterable[Markup], kind: str = "") -> Markup:
     """Return a picture with its name for those who do not see it."""
     return element(
-        "svg", *parts, class_=kind or None, viewBox=f"0 0 {width:g} {height:.0f}", role="img",
+        "svg",
+        *parts,
+        class_=kind or None,
+        viewBox=f"0 0 {width:g} {height:.0f}",
+        role="img",
         aria_label=label,
-    )  # fmt: skip
+    )
 
 
 def points_of(pairs: Iterable[tuple[float, float]]) -> str:
@@ -51,9 +55,12 @@ class Plot:
     """
 
     def __init__(
-        self, size: tuple[float, float], x: tuple[float, float], y: tuple[float, float],
+        self,
+        size: tuple[float, float],
+        x: tuple[float, float],
+        y: tuple[float, float],
         margins: tuple[float, float, float, float],
-    ) -> None:  # fmt: skip
+    ) -> None:
         self.size, self._ranges = size, (x, y)
         left, right, top, bottom = margins
         self.left, self.right, self.top, self.base = left, size[0] - right, top, size[1] - bottom
@@ -91,8 +98,9 @@ class Plot:
         """Add a bar between each two edges, from the axis on."""
         left, tops = self._x(edges), self._y(heights)
         for a, b, y in zip(left[:-1].tolist(), left[1:].tolist(), tops.tolist(), strict=True):
-            self.add("rect", class_="bar", x=a, y=y, width=max(b - a - 1.0, 0.5),
-                     height=self.base - y)  # fmt: skip
+            self.add(
+                "rect", class_="bar", x=a, y=y, width=max(b - a - 1.0, 0.5), height=self.base - y
+            )
 
     def band(self, x: Float, low: Float, high: Float) -> None:
         """Add the area between two curves."""
@@ -110,13 +118,24 @@ class Plot:
 
     def image(self, address: str) -> None:
         """Add a picture that fills the plot."""
-        self.add("image", x=self.left, y=self.top, width=self.right - self.left,
-                 height=self.base - self.top, preserveAspectRatio="none", href=address)  # fmt: skip
+        self.add(
+            "image",
+            x=self.left,
+            y=self.top,
+            width=self.right - self.left,
+            height=self.base - self.top,
+            preserveAspectRatio="none",
+            href=address,
+        )
 
     def frame(self, x_label: str, y_label: str = "", most: int = 7) -> None:
         """Add the axes, each with ``most`` round numbers; the vertical one if it has a label."""
-        self.add("path", class_="axis", d=f"M{self.left:g} {self.base:g}H{self.right:g}"
-                 + (f"M{self.left:g} {self.top:g}V{self.base:g}" if y_label else ""))  # fmt: skip
+        self.add(
+            "path",
+            class_="axis",
+            d=f"M{self.left:g} {self.base:g}H{self.right:g}"
+            + (f"M{self.left:g} {self.top:g}V{self.base:g}" if y_label else ""),
+        )
         for tick in ticks(*self._ranges[0], most):
             self.text(self.at(tick), self.base + 18.0, f"{tick:g}")
         self.text(0.5 * (self.left + self.right), self.base + 36.0, x_label)
@@ -124,8 +143,12 @@ class Plot:
             for tick in ticks(*self._ranges[1], most):
                 self.text(self.left - 6.0, self.height(tick) + 4.0, f"{tick:g}", "end")
             middle = 0.5 * (self.top + self.base)
-            self.add("text", y_label, text_anchor="middle",
-                     transform=f"translate(14 {middle:.0f}) rotate(-90)")  # fmt: skip
+            self.add(
+                "text",
+                y_label,
+                text_anchor="middle",
+                transform=f"translate(14 {middle:.0f}) rotate(-90)",
+            )
 
     def svg(self, label: str, kind: str = "chart") -> Markup:
         """Return the picture."""
@@ -249,8 +272,14 @@ def trend(some: Sequence[Point], label: str) -> Markup:
         if start:
             plot.add("path", class_="new", d=f"M{left:.1f} {plot.top:g}V{plot.base:g}")
         short = name if len(name) <= room else f"…{name[-(room - 1) :]}"
-        plot.add("text", short, element("title", words), x=0.5 * (left + right),
-                 y=plot.base + 20.0, text_anchor="middle")  # fmt: skip
+        plot.add(
+            "text",
+            short,
+            element("title", words),
+            x=0.5 * (left + right),
+            y=plot.base + 20.0,
+            text_anchor="middle",
+        )
     plot.line(np.arange(0.5, n), np.array([point.share for point in some]))
     for i, point in enumerate(some):
         x, y = plot.at(i + 0.5), plot.height(point.share)
@@ -275,12 +304,15 @@ def strip(counts: Sequence[int]) -> Markup:
     width = 120.0 / max(len(counts), 1)
     cells = (
         element(
-            "rect", element("title", f"{count:,}"), x=i * width, width=max(width - 1.0, 1.0),
+            "rect",
+            element("title", f"{count:,}"),
+            x=i * width,
+            width=max(width - 1.0, 1.0),
             class_=None if count else "none",
             fill_opacity=f"{0.25 + 0.75 * count / most:.2f}" if count else None,
         )
         for i, count in enumerate(counts)
-    )  # fmt: skip
+    )
     bins = Markup("").join(cells)
     return element("svg", bins, class_="strip", viewBox="0 0 120 14", aria_hidden="true")
 

@@ -79,9 +79,12 @@ def _outcome(outcome: Outcome) -> dict[str, Any]:
     contact = None if outcome.contact is None else outcome.contact.time
     margins = {name: shown.value for name, shown in outcome.margins.items()}
     return {
-        "harm": outcome.harm, "d_min": outcome.d_min, "v_d": outcome.v_d, "contact": contact,
+        "harm": outcome.harm,
+        "d_min": outcome.d_min,
+        "v_d": outcome.v_d,
+        "contact": contact,
         "margins": margins,
-    }  # fmt: skip
+    }
 
 
 def _tracks(record: Record, scenario: Scenario) -> list[dict[str, Any]]:

@@ -31,14 +31,19 @@ def write_page(path: Path, fit: Fit) -> None:
     """
     refuse_other_page(path)
     templates.write_page(
-        path, "pages/web/exposure.html",
-        title=f"Exposure of {fit.exposure.scenario.name}", generator=GENERATOR,
-        facts=[*fit.facts()], remarks=fit.remarks(), samples=len(fit.replicates),
+        path,
+        "pages/web/exposure.html",
+        title=f"Exposure of {fit.exposure.scenario.name}",
+        generator=GENERATOR,
+        facts=[*fit.facts()],
+        remarks=fit.remarks(),
+        samples=len(fit.replicates),
         forms=[_form(parameter) for parameter in fit.parameters.values()],
         parameters=[_parameter(parameter, fit) for parameter in fit.parameters.values()],
-        correlated=fit.correlated, correlation=fit.correlation.tolist(),
+        correlated=fit.correlated,
+        correlation=fit.correlation.tolist(),
         band=fit.correlation_band.tolist(),
-    )  # fmt: skip
+    )
 
 
 def _form(parameter_fit: ParameterFit) -> list[str]:

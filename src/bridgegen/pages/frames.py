@@ -26,14 +26,22 @@ PLAYERS = ("#0063b0", "#f0a30a", "#00805f", "#a83f84")
 """Colours of the ego and of the others in turn, as the report's."""
 
 _AREAS = {
-    "driving": "#8d949d", "junction": "#8d949d", "shoulder": "#a9afb6", "sidewalk": "#a9afb6",
-    "median": GROUND, "stripe": MARKING,
-}  # fmt: skip
+    "driving": "#8d949d",
+    "junction": "#8d949d",
+    "shoulder": "#a9afb6",
+    "sidewalk": "#a9afb6",
+    "median": GROUND,
+    "stripe": MARKING,
+}
 _LINES = {  # colour, width [m], dash [m]
-    "edge": (MARKING, 0.14, 0.0), "solid": (MARKING, 0.14, 0.0), "broken": (MARKING, 0.14, 3.0),
-    "centre": (MARKING, 0.2, 0.0), "stop": (PAPER, 0.45, 0.0), "sign": (HIT, 0.3, 0.0),
+    "edge": (MARKING, 0.14, 0.0),
+    "solid": (MARKING, 0.14, 0.0),
+    "broken": (MARKING, 0.14, 3.0),
+    "centre": (MARKING, 0.2, 0.0),
+    "stop": (PAPER, 0.45, 0.0),
+    "sign": (HIT, 0.3, 0.0),
     "route": ("#0b5fa5", 0.12, 1.0),
-}  # fmt: skip
+}
 _LIT = {1: (2.2,), 2: (2.2, 0.0), 3: (0.0,), 4: (-2.2,)}  # places of the lit lamps by state
 _FLASHES = 1.5  # a second; UN R48: 60 to 120 a minute
 _RIM = "#10161d"  # tells a lamp from a body of its own colour
@@ -200,14 +208,17 @@ class Film:
             along = np.array([math.cos(lamp.h), math.sin(lamp.h)])
             aside = np.array([-along[1], along[0]])
             at = np.array([lamp.x, lamp.y])
-            box = [at + r * (a * along + b * aside)
-                   for a, b in ((3.6, 1.3), (-3.6, 1.3), (-3.6, -1.3), (3.6, -1.3))]  # fmt: skip
+            box = [
+                at + r * (a * along + b * aside)
+                for a, b in ((3.6, 1.3), (-3.6, 1.3), (-3.6, -1.3), (3.6, -1.3))
+            ]
             draw.polygon(camera.of(np.array(box)), fill="#10161d", outline=MARKING)
             lit = _LIT.get(int(lamp.states[k]), ())
             for place, colour in ((2.2, "#ff4d4d"), (0.0, "#ffd23f"), (-2.2, "#38d39f")):
                 ((u, v),) = camera.of((at + place * r * along)[np.newaxis])
-                draw.circle((u, v), 0.85 * r * camera.scale,
-                            fill=colour if place in lit else "#3a434e")  # fmt: skip
+                draw.circle(
+                    (u, v), 0.85 * r * camera.scale, fill=colour if place in lit else "#3a434e"
+                )
 
     def _draw_trail(self, draw: Draw, camera: _Camera, e: int, k: int) -> None:
         points = self.centres[e, : k + 1]
@@ -222,8 +233,9 @@ class Film:
         place = self._players.index(e) if e in self._players else 3
         return PLAYERS[0] if e == 0 else PLAYERS[(place - 1) % 3 + 1]
 
-    def _corners(self, e: int, k: int, ends: tuple[float, float] = (-1.0, 1.0),
-                 side: float = 1.0) -> Float:  # fmt: skip
+    def _corners(
+        self, e: int, k: int, ends: tuple[float, float] = (-1.0, 1.0), side: float = 1.0
+    ) -> Float:
         """Return the corners (4, 2) of a body, or of a stretch across it in shares of its half."""
         body, h = self.playback.entities[e], float(self.playback.h[e, k])
         along = 0.5 * body.length * np.array([math.cos(h), math.sin(h)])
@@ -270,8 +282,10 @@ class Film:
         for side in (-1.0, 1.0):
             if shows & BRAKE:
                 half = 0.6 * r / body.length
-                box = [(-0.5 + a * half, side * 0.25 + b * 0.14)
-                       for a, b in ((1, 1), (-1, 1), (-1, -1), (1, -1))]  # fmt: skip
+                box = [
+                    (-0.5 + a * half, side * 0.25 + b * 0.14)
+                    for a, b in ((1, 1), (-1, 1), (-1, -1), (1, -1))
+                ]
                 corners = np.array(box) * (body.length, body.width) @ turn + self.centres[e, k]
                 draw.polygon(camera.of(corners), fill="#ff2d2d", outline=_RIM, width=line)
             if shows & (LEFT if side > 0 else RIGHT):
@@ -297,8 +311,9 @@ class Film:
         hit = self._contact
         if hit is not None and 0 <= (k - hit[0]) * p.time_step <= _FLAG:
             words.append("collision")
-        boxes = [self._pill(draw, "   ".join(words), (10 * u, 10 * u),
-                            HIT if len(words) > 1 else INK)]  # fmt: skip
+        boxes = [
+            self._pill(draw, "   ".join(words), (10 * u, 10 * u), HIT if len(words) > 1 else INK)
+        ]
         now = [weather for weather in p.weather if weather.step <= k]
         if now:
             text = in_words(now[-1].stated)
@@ -306,8 +321,11 @@ class Film:
         metres = next((m for m in (2, 5, 10, 20) if m * self._scale >= 50 * u), 20)
         x, y = self._big[0] - 16 * u, self._big[1] - 16 * u
         long = metres * self._scale
-        draw.line([(x - long, y - 5 * u), (x - long, y), (x, y), (x, y - 5 * u)],
-                  fill=INK, width=round(2 * u))  # fmt: skip
+        draw.line(
+            [(x - long, y - 5 * u), (x - long, y), (x, y), (x, y - 5 * u)],
+            fill=INK,
+            width=round(2 * u),
+        )
         draw.text((x - long / 2, y - 4 * u), f"{metres} m", INK, self._font, anchor="mb")
         return [*boxes, (x - long, y - 20 * u, x, y)]
 
@@ -321,8 +339,7 @@ class Film:
     def _wide(self, text: str) -> float:
         return float(self._font.getlength(text)) + 12 * self._unit
 
-    def _draw_labels(self, draw: Draw, camera: _Camera, k: int,
-                     taken: list[Box]) -> None:  # fmt: skip
+    def _draw_labels(self, draw: Draw, camera: _Camera, k: int, taken: list[Box]) -> None:
         """Draw names and speeds, each where it hides least of the others and of the contact."""
         p, bodies = self.playback, {}
         for e in range(len(p.entities)):
@@ -336,9 +353,13 @@ class Film:
                 continue
             text = f"{p.entities[e].name}  {p.v[e, k]:.1f} m/s"
             w, h = self._wide(text), 22 * self._unit
-            box = min(_places(bodies[e], w, h, 6 * self._unit),
-                      key=lambda place: sum(_overlap(place, other) for other in taken)
-                      + 3.0 * (w * h - _overlap(place, frame)))  # fmt: skip
+            box = min(
+                _places(bodies[e], w, h, 6 * self._unit),
+                key=lambda place: (
+                    sum(_overlap(place, other) for other in taken)
+                    + 3.0 * (w * h - _overlap(place, frame))
+                ),
+            )
             taken.append(box)
             self._pill(draw, text, box[:2], self._colour(e))
 

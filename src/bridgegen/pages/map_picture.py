@@ -81,9 +81,7 @@ def map_picture(
         x, y = (line - low).T * scale
         return np.stack((x + _MARGIN, height - _MARGIN - y), axis=1)
 
-    body = [
-        *_areas(shapes, pixels), *_marks(model, fitting, pixels), *_lines(model, roads, pixels)
-    ]  # fmt: skip
+    body = [*_areas(shapes, pixels), *_marks(model, fitting, pixels), *_lines(model, roads, pixels)]
     if fitting is not None:
         key = f"green: the scenario fits ({len(fitting) + len(roads)})"
         body.append(element("text", key, class_="key", x=12, y=18))
@@ -128,6 +126,13 @@ def _lines(model: OpenDrive, stretches: Mapping[str, str], pixels: _Pixels) -> I
         x, y = line[len(line) // 2].tolist()
         text = ", ".join(places)
         yield element("polyline", class_="road", points=points_of(line.tolist()))
-        yield element("rect", class_="fits", x=x - 4 * len(text) - 6, y=y - 11,
-                      width=8 * len(text) + 12, height=22, rx=11)  # fmt: skip
+        yield element(
+            "rect",
+            class_="fits",
+            x=x - 4 * len(text) - 6,
+            y=y - 11,
+            width=8 * len(text) + 12,
+            height=22,
+            rx=11,
+        )
         yield element("text", text, x=x, y=y)

@@ -47,14 +47,18 @@ def to_html(ontology: TBox) -> bytes:
     counts = [f"{len(terms.of_kind(kind))} {what}" for kind, what in _COUNTED.items()]
     return templates.page(
         "pages/web/ontology.html",
-        title="The BridgeGen ontology", generator=GENERATOR,
+        title="The BridgeGen ontology",
+        generator=GENERATOR,
         facts=[f"version {ontology.version}", *counts, BG],
-        ontology=ontology, terms=terms, layers=LAYERS, vocabularies=VOCABULARIES,
+        ontology=ontology,
+        terms=terms,
+        layers=LAYERS,
+        vocabularies=VOCABULARIES,
         properties={
             kind: sorted(terms.of_kind(kind), key=_sort_key)
             for kind in ("ObjectProperty", "DatatypeProperty", "AnnotationProperty")
         },
-    )  # fmt: skip
+    )
 
 
 class Terms:

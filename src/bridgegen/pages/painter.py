@@ -28,12 +28,15 @@ class Bindings:
         self._members = members
         self.parameters = {
             node: Parameter(
-                members.name(node), self._text(node, "has_unit"), self._number(node, "has_low"),
-                self._number(node, "has_high"), self._text(node, "has_expression"),
+                members.name(node),
+                self._text(node, "has_unit"),
+                self._number(node, "has_low"),
+                self._number(node, "has_high"),
+                self._text(node, "has_expression"),
             )
             for node in members.nodes
             if members.is_a(node, "Parameter")
-        }  # fmt: skip
+        }
 
     def of(self, node: Subject, term: ox.NamedNode) -> str:
         """Return the name of the parameter that gives a property's value, or nothing."""
@@ -185,8 +188,9 @@ class _Painter:
     # -- what is in it -------------------------------------------------------------------------
 
     def _describe(self, node: Subject, sketch: _Sketch) -> None:
-        values = {term: found for term, found in self.members.values(node).items()
-                if term not in _UNSAID}  # fmt: skip
+        values = {
+            term: found for term, found in self.members.values(node).items() if term not in _UNSAID
+        }
         targets = {
             term: [node for node in found if isinstance(node, Subject)]
             for term, found in values.items()

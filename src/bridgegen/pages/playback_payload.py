@@ -19,9 +19,19 @@ from bridgegen.scenario.participants import drawing_of
 from bridgegen.scenario.weather import in_words
 
 SCALE = {
-    "x": 1000, "y": 1000, "h": 10_000, "v": 1000, "a": 100, "distance": 1000, "ttc": 100,
-    "length": 100, "width": 100, "confidence": 100, "station": 100, "shift": 100,
-}  # fmt: skip
+    "x": 1000,
+    "y": 1000,
+    "h": 10_000,
+    "v": 1000,
+    "a": 100,
+    "distance": 1000,
+    "ttc": 100,
+    "length": 100,
+    "width": 100,
+    "confidence": 100,
+    "station": 100,
+    "shift": 100,
+}
 """Units to 1 m, rad, m/s … of each quantity that the page has as whole numbers."""
 
 MILLIMETRE = 3
@@ -203,10 +213,8 @@ def _course(c: Course, n_steps: int) -> dict[str, Any]:
         "way": _changes(c.way[kept]),
         "station": packed(c.station[kept], SCALE["station"]),
         "acceleration": packed(c.acceleration[kept], SCALE["a"]),
-        "shift": [
-            [int(i), *np.round(shift[i], 2).tolist()] for i in np.flatnonzero(moved)
-        ],
-    }  # fmt: skip
+        "shift": [[int(i), *np.round(shift[i], 2).tolist()] for i in np.flatnonzero(moved)],
+    }
 
 
 def _planned(planned: Planned) -> dict[str, Any]:

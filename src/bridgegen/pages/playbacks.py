@@ -87,11 +87,16 @@ def playbacks(
     some = rows.take(np.array([evaluation for _, evaluation, _ in kept]))
     shown = [
         Shown(
-            name, evaluation, files, some.X[k], some.metrics[k], bool(some.critical[k]),
+            name,
+            evaluation,
+            files,
+            some.X[k],
+            some.metrics[k],
+            bool(some.critical[k]),
             Cause(some.cause[k]).label,
         )
         for k, (name, evaluation, files) in enumerate(kept)
-    ]  # fmt: skip
+    ]
     replays = pipeline.replays(some.X, plans=not brief) if replays is None else replays
     played = _all_played(pipeline, shown, replays, brief=brief)
     return played if brief else beside_others(played, some.X, others_of(pipeline))
@@ -270,7 +275,7 @@ def _played(
                 conflict=_conflict(conflicts, k, count),
                 shows=shows[k],
             )
-        )  # fmt: skip
+        )
     return tuple(found)
 
 

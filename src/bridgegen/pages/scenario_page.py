@@ -62,8 +62,10 @@ def _participant(participant: Participant, scenario: LogicalScenario) -> str:
         return f"{who}, starts at {speed}{extra}; {path}."
     if participant.ways:
         names = scenario.parameters[participant.place_by].kind.names
-        at = [f"from {_place(start)}{f' to {_place(end)}' if end else ''} ({name})"
-              for name, (start, end) in zip(names, participant.ways, strict=True)]  # fmt: skip
+        at = [
+            f"from {_place(start)}{f' to {_place(end)}' if end else ''} ({name})"
+            for name, (start, end) in zip(names, participant.ways, strict=True)
+        ]
         return (
             f"{who}, starts at {speed}{extra}; {participant.place_by} chooses its place: "
             f"{'; '.join(at)}."
@@ -146,18 +148,24 @@ def write_scenario_page(path: Path, scenario: LogicalScenario) -> None:
     """
     pipeline, aim = Pipeline(scenario, scenario.space()), scenario.objective
     templates.write_page(
-        path, "pages/web/scenario.html",
-        title=f"{scenario.name}: {scenario.title}", generator=GENERATOR, scenario=scenario,
+        path,
+        "pages/web/scenario.html",
+        title=f"{scenario.name}: {scenario.title}",
+        generator=GENERATOR,
+        scenario=scenario,
         facts=[
-            scenario.name, f"template {scenario.roads.template}", f"ego {pipeline.driver.name}",
-            f"{scenario.duration:g} s", f"searched: {', '.join(scenario.axes)}",
+            scenario.name,
+            f"template {scenario.roads.template}",
+            f"ego {pipeline.driver.name}",
+            f"{scenario.duration:g} s",
+            f"searched: {', '.join(scenario.axes)}",
             f"critical: {critical_in_words(aim.rule, aim.count, aim.critical, aim.criteria)}",
         ],
         picture=Markup(sketch(pipeline.runner)),
         story=[*story_lines(scenario)],
         parameters=[_parameter(parameter) for parameter in scenario.parameters.values()],
         rules=(*scenario.bounds, *scenario.derived),
-    )  # fmt: skip
+    )
 
 
 def _parameter(parameter: Parameter) -> list[object]:

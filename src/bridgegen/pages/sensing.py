@@ -39,13 +39,16 @@ def sensed(rollout: Rollout) -> list[Sensed]:
                 steps=steps,
                 seen_by=seen_by,
                 counts=counts[row][:, steps],
-                x=of(column.X), y=of(column.Y), h=of(column.HEADING),
-                length=of(column.LENGTH), width=of(column.WIDTH),
+                x=of(column.X),
+                y=of(column.Y),
+                h=of(column.HEADING),
+                length=of(column.LENGTH),
+                width=of(column.WIDTH),
                 confidence=of(column.CONFIDENCE),
                 kind=np.where(nothing, -1, frames[:, :, column.KIND]).astype(np.int64),
                 kinds=NAMES,
                 kind_of=rollout.kinds,
                 tolerance=TOLERANCE,
             )
-        )  # fmt: skip
+        )
     return found

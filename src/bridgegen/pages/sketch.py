@@ -21,14 +21,22 @@ _AFTER = 2.0  # s, length of the drawn paths beyond the closest approach
 _MOVES = 0.05  # m/s
 _GROUND, _INK, _PAPER = "#dfe5da", "#17202c", "#ffffff"
 _AREAS = {
-    "driving": "#8d949d", "junction": "#8d949d", "shoulder": "#a9afb6", "sidewalk": "#c3c8cd",
-    "median": _GROUND, "stripe": "#f6f7f9",
-}  # fmt: skip
+    "driving": "#8d949d",
+    "junction": "#8d949d",
+    "shoulder": "#a9afb6",
+    "sidewalk": "#c3c8cd",
+    "median": _GROUND,
+    "stripe": "#f6f7f9",
+}
 _LINES = {  # colour, width [m], dashes [m]
-    "edge": ("#f6f7f9", 0.15, ""), "solid": ("#f6f7f9", 0.15, ""),
-    "broken": ("#f6f7f9", 0.15, "3 3"), "centre": ("#f6f7f9", 0.2, ""),
-    "stop": ("#ffffff", 0.45, ""), "sign": ("#c00020", 0.4, ""), "route": ("#0b5fa5", 0.12, "1 1"),
-}  # fmt: skip
+    "edge": ("#f6f7f9", 0.15, ""),
+    "solid": ("#f6f7f9", 0.15, ""),
+    "broken": ("#f6f7f9", 0.15, "3 3"),
+    "centre": ("#f6f7f9", 0.2, ""),
+    "stop": ("#ffffff", 0.45, ""),
+    "sign": ("#c00020", 0.4, ""),
+    "route": ("#0b5fa5", 0.12, "1 1"),
+}
 _COLOURS = ("#0063b0", "#f0a30a", "#00805f", "#a83f84")
 _LAMPS = {1: ("#ff4d4d", 0), 2: ("#ff4d4d", 0), 3: ("#ffd23f", 1), 4: ("#38d39f", 2)}
 _ROUND = ("person", "cone")

@@ -21,26 +21,43 @@ class SvgDraw:
         self._size = size
         self._parts = [f'<rect width="{size[0]}" height="{size[1]}" fill="{ground}"/>']
 
-    def polygon(self, xy: Sequence[Point], fill: str | None = None, outline: str | None = None,
-                width: int = 1) -> None:  # fmt: skip
+    def polygon(
+        self,
+        xy: Sequence[Point],
+        fill: str | None = None,
+        outline: str | None = None,
+        width: int = 1,
+    ) -> None:
         """Draw a closed shape."""
         self._add("polygon", {"points": _points(xy)}, fill, outline, width)
 
-    def line(self, xy: Sequence[Point], fill: str | None = None, width: int = 1,
-             joint: str | None = None) -> None:  # fmt: skip
+    def line(
+        self, xy: Sequence[Point], fill: str | None = None, width: int = 1, joint: str | None = None
+    ) -> None:
         """Draw a line; a joint "curve" is round."""
         given = {"points": _points(xy)} | ({"stroke-linejoin": "round"} if joint else {})
         self._add("polyline", given, None, fill, width)
 
-    def circle(self, xy: Point, radius: float, fill: str | None = None, outline: str | None = None,
-               width: int = 1) -> None:  # fmt: skip
+    def circle(
+        self,
+        xy: Point,
+        radius: float,
+        fill: str | None = None,
+        outline: str | None = None,
+        width: int = 1,
+    ) -> None:
         """Draw a circle about a point."""
         given = {"cx": _number(xy[0]), "cy": _number(xy[1]), "r": _number(radius)}
         self._add("circle", given, fill, outline, width)
 
-    def rounded_rectangle(self, xy: tuple[float, float, float, float], radius: float = 0.0,
-                          fill: str | None = None, outline: str | None = None,
-                          width: int = 1) -> None:  # fmt: skip
+    def rounded_rectangle(
+        self,
+        xy: tuple[float, float, float, float],
+        radius: float = 0.0,
+        fill: str | None = None,
+        outline: str | None = None,
+        width: int = 1,
+    ) -> None:
         """Draw a box with round corners."""
         x0, y0, x1, y1 = xy
         given = {"x": x0, "y": y0, "width": x1 - x0, "height": y1 - y0, "rx": radius}
@@ -51,9 +68,12 @@ class SvgDraw:
         size = float(font.size)
         y = xy[1] + {"m": 0.36, "b": -0.2, "a": 0.9}[anchor[1]] * size
         given = {
-            "x": _number(xy[0]), "y": _number(y), "text-anchor": ANCHORS[anchor[0]],
-            "font-size": _number(size), "fill": fill,
-        }  # fmt: skip
+            "x": _number(xy[0]),
+            "y": _number(y),
+            "text-anchor": ANCHORS[anchor[0]],
+            "font-size": _number(size),
+            "fill": fill,
+        }
         self._parts.append(f"<text {_attributes(given)}>{html.escape(text)}</text>")
 
     def svg(self, size: tuple[int, int]) -> str:
@@ -65,8 +85,9 @@ class SvgDraw:
         )
         return "\n".join([head, *self._parts, "</svg>\n"])
 
-    def _add(self, name: str, given: dict[str, str], fill: str | None, stroke: str | None,
-             width: int) -> None:  # fmt: skip
+    def _add(
+        self, name: str, given: dict[str, str], fill: str | None, stroke: str | None, width: int
+    ) -> None:
         given = {**given, "fill": fill or "none"}
         if stroke:
             given |= {"stroke": stroke, "stroke-width": str(width)}

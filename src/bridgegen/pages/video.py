@@ -105,9 +105,13 @@ def encode(frames: Iterable[Image.Image], size: tuple[int, int], fps: int, kind:
 
 
 HEADS = {
-    ".gif": (0, b"GIF8"), ".webp": (0, b"RIFF"), ".mp4": (4, b"ftyp"),
-    ".webm": (0, b"\x1a\x45\xdf\xa3"), ".png": (0, b"\x89PNG"), ".svg": (0, b"<svg"),
-}  # fmt: skip
+    ".gif": (0, b"GIF8"),
+    ".webp": (0, b"RIFF"),
+    ".mp4": (4, b"ftyp"),
+    ".webm": (0, b"\x1a\x45\xdf\xa3"),
+    ".png": (0, b"\x89PNG"),
+    ".svg": (0, b"<svg"),
+}
 """Formats by the ending of the name, with bytes of such a file and where they are."""
 
 STILL = (".png", ".svg")
@@ -230,8 +234,16 @@ def _animated(frames: Sequence[Image.Image], fps: int, kind: str) -> bytes:
     file = io.BytesIO()
     delay = 10 * round(100 / fps)  # ms; a GIF counts hundredths of a second
     if kind == ".webp":
-        frames[0].save(file, "WEBP", save_all=True, append_images=frames[1:], duration=delay,
-                       loop=0, quality=80, method=2)  # fmt: skip
+        frames[0].save(
+            file,
+            "WEBP",
+            save_all=True,
+            append_images=frames[1:],
+            duration=delay,
+            loop=0,
+            quality=80,
+            method=2,
+        )
     else:
         width, height = frames[0].size
         both = Image.new("RGB", (width, 3 * height), HIT)  # red, too, where neither shows it
@@ -239,6 +251,13 @@ def _animated(frames: Sequence[Image.Image], fps: int, kind: str) -> bytes:
         both.paste(frames[-1], (0, height))
         palette = both.quantize(_COLOURS, dither=Image.Dither.NONE)
         few = [frame.quantize(palette=palette, dither=Image.Dither.NONE) for frame in frames]
-        few[0].save(file, "GIF", save_all=True, append_images=few[1:], duration=delay, loop=0,
-                    optimize=False)  # fmt: skip
+        few[0].save(
+            file,
+            "GIF",
+            save_all=True,
+            append_images=few[1:],
+            duration=delay,
+            loop=0,
+            optimize=False,
+        )
     return file.getvalue()

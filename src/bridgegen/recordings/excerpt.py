@@ -96,14 +96,26 @@ def excerpt(
         cosine, sine = np.cos(h), np.sin(h)
         v = traffic.vx[at] * cosine + traffic.vy[at] * sine
         states[:, 0, e] = (
-            traffic.x[at] - ahead * cosine, traffic.y[at] - ahead * sine, h,
-            np.where((v < 0.0) & (v > -REVERSES), 0.0, v), traffic.acceleration[at],
+            traffic.x[at] - ahead * cosine,
+            traffic.y[at] - ahead * sine,
+            h,
+            np.where((v < 0.0) & (v > -REVERSES), 0.0, v),
+            traffic.acceleration[at],
             np.zeros(count),
-        )  # fmt: skip
+        )
     x, y, h, v, a, offset = states
     return Rollout(
-        time_step=traffic.facts.time_step, names=tuple(traffic.names[p] for p in who), box=box,
-        x=x, y=y, h=h, v=v, a=a, offset=offset, n_steps=np.array([count]),
-        status=np.zeros(1, np.int8), kinds=traffic.kind[list(who)],
+        time_step=traffic.facts.time_step,
+        names=tuple(traffic.names[p] for p in who),
+        box=box,
+        x=x,
+        y=y,
+        h=h,
+        v=v,
+        a=a,
+        offset=offset,
+        n_steps=np.array([count]),
+        status=np.zeros(1, np.int8),
+        kinds=traffic.kind[list(who)],
         present=present if not present.all() else np.zeros((0, 0, 0), np.bool_),
-    )  # fmt: skip
+    )

@@ -103,8 +103,10 @@ class Failure(ShapedSection):
     @property
     def criteria(self) -> list[dict[str, Any]]:
         """The pass criteria that it violates, as `Criterion.to_dict` gives them."""
-        return [read_criterion(criterion.model_dump(exclude_defaults=True)).to_dict()
-                for criterion in self.violates]  # fmt: skip
+        return [
+            read_criterion(criterion.model_dump(exclude_defaults=True)).to_dict()
+            for criterion in self.violates
+        ]
 
 
 class _Failures(ShapedSection):
@@ -328,9 +330,13 @@ def _spans(
     starts = []
     for key in keys.values():
         start = key
-        while start and lines[start - 1].lstrip().startswith("#") and (
-            _indent(lines[start - 1]) <= _indent(lines[key])  # else of the entry before
-        ):  # fmt: skip
+        while (
+            start
+            and lines[start - 1].lstrip().startswith("#")
+            and (
+                _indent(lines[start - 1]) <= _indent(lines[key])  # else of the entry before
+            )
+        ):
             start -= 1
         starts.append(start)
     indents = [_indent(lines[key]) for key in keys.values()]

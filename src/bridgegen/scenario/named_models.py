@@ -41,9 +41,15 @@ def _design_vehicle(
     """Return a design vehicle by length, width and height, wheelbase and rear overhang [m]."""
     length, width, height = size
     return _model(
-        name, kind, AASHTO, length=length, width=width, height=height, wheelbase=wheelbase,
+        name,
+        kind,
+        AASHTO,
+        length=length,
+        width=width,
+        height=height,
+        wheelbase=wheelbase,
         center_ahead=round(0.5 * length - rear, 3),
-    )  # fmt: skip
+    )
 
 
 _ALL = (

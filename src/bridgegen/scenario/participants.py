@@ -207,9 +207,11 @@ _BUS = ObjectClass(
     injury="occupant",
     hides_people=True,
     carla=(
-        "vehicle.mitsubishi.fusorosa", "vehicle.volkswagen.t2", "vehicle.volkswagen.t2_2021",
+        "vehicle.mitsubishi.fusorosa",
+        "vehicle.volkswagen.t2",
+        "vehicle.volkswagen.t2_2021",
     ),
-)  # fmt: skip
+)
 _MOTORCYCLE = ObjectClass(
     name="motorcycle",
     conduct="vehicle",
@@ -274,9 +276,11 @@ _OTHER = ObjectClass(
     injury=None,
     hides_people=False,
     carla=(
-        "static.prop.streetbarrier", "static.prop.box01", "static.prop.warningconstruction",
+        "static.prop.streetbarrier",
+        "static.prop.box01",
+        "static.prop.warningconstruction",
     ),
-)  # fmt: skip
+)
 _TRAM = ObjectClass(
     name="tram",
     conduct="vehicle",
@@ -307,8 +311,17 @@ _E_SCOOTER = ObjectClass(
 )
 
 OBJECT_CLASSES = (
-    _CAR, _TRUCK, _BUS, _MOTORCYCLE, _BICYCLE, _PEDESTRIAN, _ANIMAL, _OTHER, _TRAM, _E_SCOOTER,
-)  # fmt: skip
+    _CAR,
+    _TRUCK,
+    _BUS,
+    _MOTORCYCLE,
+    _BICYCLE,
+    _PEDESTRIAN,
+    _ANIMAL,
+    _OTHER,
+    _TRAM,
+    _E_SCOOTER,
+)
 """Object classes by code, which files record and detectors answer: new ones come last.
 
 CARLA 0.9.13 lacks some models that later ones have, and none has animals, for which a child

@@ -223,16 +223,19 @@ _PARAMETERS = (
     Parameter("fog_distance", "m", _FOG, carla="fog_distance", is_required=False),
     Parameter("fog_falloff", "1", _FOG, carla="fog_falloff", is_required=False),
     Parameter(
-        "sun_altitude_angle", "deg", _SUN, "sun_elevation", ELEVATION,
-        also=(("illuminance", ILLUMINANCE),), carla="sun_altitude_angle",
+        "sun_altitude_angle",
+        "deg",
+        _SUN,
+        "sun_elevation",
+        ELEVATION,
+        also=(("illuminance", ILLUMINANCE),),
+        carla="sun_altitude_angle",
     ),
-    Parameter(
-        "sun_azimuth_angle", "deg", _SUN, "sun_azimuth", AZIMUTH, carla="sun_azimuth_angle"
-    ),
+    Parameter("sun_azimuth_angle", "deg", _SUN, "sun_azimuth", AZIMUTH, carla="sun_azimuth_angle"),
     Parameter("wetness", "%", _ROAD, carla="wetness", is_required=False),
     Parameter("friction", "1", _ROAD, "friction_scale"),
     Parameter("snowfall", "mm/h", _SNOW, "snow", is_declared=False),
-)  # fmt: skip
+)
 
 PARAMETERS: Mapping[str, Parameter] = MappingProxyType(
     {parameter.name: parameter for parameter in _PARAMETERS}
@@ -319,7 +322,9 @@ class Phrase:
 PHRASES: Mapping[str, tuple[Phrase, ...]] = MappingProxyType(
     {
         "sun_elevation": (
-            Phrase("night", below=math.radians(-6.0)), Phrase("dusk", below=0.0), Phrase("day"),
+            Phrase("night", below=math.radians(-6.0)),
+            Phrase("dusk", below=0.0),
+            Phrase("day"),
         ),
         "visual_range": (
             Phrase("fog, visibility {} m", below=1000.0),
@@ -329,7 +334,7 @@ PHRASES: Mapping[str, tuple[Phrase, ...]] = MappingProxyType(
         "snow": (Phrase("snow {} mm/h", above=0.0),),
         "friction_scale": (Phrase("friction {} % of dry", below=0.95, times=100.0),),
     }
-)  # fmt: skip
+)
 """Phrases by physical quantity, in the order of a sentence; the first of each that holds is
 used."""
 

@@ -56,9 +56,17 @@ def corners_outside(
 
 @kernel
 def gaps(
-    box_a: Float, box_b: Float, dx: Float, dy: Float,
-    cos_a: Float, sin_a: Float, cos_b: Float, sin_b: Float, n: int, out: Float,
-) -> None:  # fmt: skip
+    box_a: Float,
+    box_b: Float,
+    dx: Float,
+    dy: Float,
+    cos_a: Float,
+    sin_a: Float,
+    cos_b: Float,
+    sin_b: Float,
+    n: int,
+    out: Float,
+) -> None:
     """Write the first n distances between boxes A and B, 0 where they touch or overlap.
 
     (dx, dy) leads from A's centre to B's. Overlap is decided by the separating-axis theorem; the
@@ -88,9 +96,15 @@ def gaps(
 
 @kernel
 def box_gap(
-    box_a: Float, box_b: Float, dx: float, dy: float, cos_a: float, sin_a: float, cos_b: float,
+    box_a: Float,
+    box_b: Float,
+    dx: float,
+    dy: float,
+    cos_a: float,
+    sin_a: float,
+    cos_b: float,
     sin_b: float,
-) -> float:  # fmt: skip
+) -> float:
     """Return the distance of two boxes whose reference points are (dx, dy) apart, as ``gaps``."""
     la, wa, lb, wb = 0.5 * box_a[0], 0.5 * box_a[1], 0.5 * box_b[0], 0.5 * box_b[1]
     dx += box_b[2] * cos_b - box_a[2] * cos_a

@@ -153,8 +153,14 @@ def _csv_lines(text: str, found: Tracks) -> Iterator[tuple[int, list[str]]]:
 
 LOG_HEAD = "Index [-], TimeStamp [s], #1 Entity_Name [-]"
 LOG_FIELDS = {
-    "speed": 2, "centre": 5, "length": 8, "width": 9, "x": 11, "y": 12, "h": 24,
-}  # fmt: skip
+    "speed": 2,
+    "centre": 5,
+    "length": 8,
+    "width": 9,
+    "x": 11,
+    "y": 12,
+    "h": 24,
+}
 """Index of each quantity among the fields of one entity; esmini's reference point is
 OpenSCENARIO's."""
 LOG_WIDTH = 31
@@ -327,15 +333,19 @@ def read_recording(
             time_step=step,
             names=tuple(names),
             box=_boxes(found, names, ordered, boxes),
-            x=arrays["x"], y=arrays["y"], h=arrays["h"], v=arrays["speed"],
-            a=arrays["acceleration"], offset=arrays["offset"],
+            x=arrays["x"],
+            y=arrays["y"],
+            h=arrays["h"],
+            v=arrays["speed"],
+            a=arrays["acceleration"],
+            offset=arrays["offset"],
             n_steps=np.array([n], dtype=np.int64),
             status=np.zeros(1, dtype=np.int8),
             present=np.zeros((0, 0, 0), np.bool_) if present.all() else present,
         ),
         has_offset="offset" in ordered[0].states,
         notes=tuple(found.notes),
-    )  # fmt: skip
+    )
 
 
 def _in_time(found: Tracks, name: str) -> Track:
@@ -431,9 +441,12 @@ def _boxes(
                 )
         centred = centred and "centre" in track.states
         rows.append(
-            (track.states["length"][0], track.states["width"][0],
-             track.states.get("centre", [0.0])[0])
-        )  # fmt: skip
+            (
+                track.states["length"][0],
+                track.states["width"][0],
+                track.states.get("centre", [0.0])[0],
+            )
+        )
     if problems:
         raise FileFormatError(*problems)
     if not centred:

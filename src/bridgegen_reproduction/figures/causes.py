@@ -29,11 +29,25 @@ def causes(found: Sequence[Causes], theme: Theme) -> "Figure":
         for count, colour, hatch in zip(item.by_cause, colours, _HATCHES, strict=True):
             if count:
                 width = 100.0 * count / item.critical
-                axes.barh(place, width, left=left, height=0.74, color=colour, hatch=hatch,
-                          edgecolor=theme.muted, linewidth=0.6)  # fmt: skip
+                axes.barh(
+                    place,
+                    width,
+                    left=left,
+                    height=0.74,
+                    color=colour,
+                    hatch=hatch,
+                    edgecolor=theme.muted,
+                    linewidth=0.6,
+                )
                 left += width
-        axes.text(101.5, place, f"{item.critical:,} of {item.evaluations:,}", va="center",
-                  fontsize=SIZE - 0.5, color=theme.ink)  # fmt: skip
+        axes.text(
+            101.5,
+            place,
+            f"{item.critical:,} of {item.evaluations:,}",
+            va="center",
+            fontsize=SIZE - 0.5,
+            color=theme.ink,
+        )
         places.append(place)
         names.append(f"S{item.scenario[-1]}  {title_of(item.algorithm)}")
         place += 1.0

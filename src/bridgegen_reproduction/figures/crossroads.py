@@ -97,9 +97,14 @@ def crossing_of(folder: Path, runs: Sequence[Run]) -> Crossing:
     middle = np.concatenate(junction).mean(axis=0) if junction else ways[0].mean(axis=0)
     ends = tuple(_points(scenario, name) for name in nominal.names[:2])
     return Crossing(
-        scenario.name, road, (ways[0], ways[1]), (ends[0], ends[1]),
-        np.array(places).reshape(-1, 2), len(X), (float(middle[0]), float(middle[1])),
-    )  # fmt: skip
+        scenario.name,
+        road,
+        (ways[0], ways[1]),
+        (ends[0], ends[1]),
+        np.array(places).reshape(-1, 2),
+        len(X),
+        (float(middle[0]), float(middle[1])),
+    )
 
 
 def _points(scenario: LogicalScenario, name: str) -> tuple[str, str]:
@@ -125,15 +130,24 @@ def collision_points(crossings: Mapping[str, Crossing], theme: Theme) -> "Figure
         figure,
         [
             Line2D([], [], color=ego, linewidth=2, label="ego"),
-            Line2D([], [], color=bv, linewidth=2, linestyle=(0, (4, 1.5)),
-                   label="background vehicle"),
-            Line2D([], [], color=hit, marker="o", linestyle="none", markersize=4,
-                   label="collision"),
-            Line2D([], [], color=theme.ink, marker="X", linestyle="none", markersize=6,
-                   label="their median"),
+            Line2D(
+                [], [], color=bv, linewidth=2, linestyle=(0, (4, 1.5)), label="background vehicle"
+            ),
+            Line2D(
+                [], [], color=hit, marker="o", linestyle="none", markersize=4, label="collision"
+            ),
+            Line2D(
+                [],
+                [],
+                color=theme.ink,
+                marker="X",
+                linestyle="none",
+                markersize=6,
+                label="their median",
+            ),
         ],
         theme,
-    )  # fmt: skip
+    )
     return figure
 
 
@@ -152,24 +166,48 @@ def _panel(axes: "Axes", crossing: Crossing, theme: Theme) -> None:
         if len(inside):
             for at, label in zip((inside[0], inside[-1]), ends, strict=True):
                 axes.text(
-                    x[at], y[at], label, ha="center", va="center", fontsize=SIZE,
-                    color=theme.paper, fontweight="bold", zorder=6,
+                    x[at],
+                    y[at],
+                    label,
+                    ha="center",
+                    va="center",
+                    fontsize=SIZE,
+                    color=theme.paper,
+                    fontweight="bold",
+                    zorder=6,
                     bbox={"boxstyle": "round,pad=0.25", "facecolor": colour, "edgecolor": "none"},
-                )  # fmt: skip
+                )
     told = "no collision"
     if len(crossing.collisions):
         x, y = (crossing.collisions - crossing.middle).T
-        axes.plot(x, y, "o", color=theme.colours[1], markersize=3.4, alpha=0.5,
-                  markeredgewidth=0, zorder=4)  # fmt: skip
+        axes.plot(
+            x,
+            y,
+            "o",
+            color=theme.colours[1],
+            markersize=3.4,
+            alpha=0.5,
+            markeredgewidth=0,
+            zorder=4,
+        )
         cx, cy = np.median(x), np.median(y)
         axes.plot(cx, cy, "X", color=theme.ink, markersize=7, markeredgecolor=theme.paper, zorder=7)
         axes.annotate(
-            design.conflict, (cx, cy), (9, 9),
-            textcoords="offset points", fontsize=SIZE + 3, fontweight="bold", color=theme.ink,
+            design.conflict,
+            (cx, cy),
+            (9, 9),
+            textcoords="offset points",
+            fontsize=SIZE + 3,
+            fontweight="bold",
+            color=theme.ink,
             zorder=7,
-            bbox={"boxstyle": "round,pad=0.15", "facecolor": theme.paper, "alpha": 0.8,
-                  "edgecolor": "none"},
-        )  # fmt: skip
+            bbox={
+                "boxstyle": "round,pad=0.15",
+                "facecolor": theme.paper,
+                "alpha": 0.8,
+                "edgecolor": "none",
+            },
+        )
         told = f"{len(crossing.collisions):,} of {crossing.of:,} collisions"
     axes.set_title(f"S{crossing.scenario[-1]}: {told}", fontsize=SIZE + 1, color=theme.ink)
     axes.set_xlim(-HALF, HALF)

@@ -60,9 +60,15 @@ def iterations(
             look = styles[name]
             axis.fill_between(x, low, high, color=look.colour, alpha=0.15, linewidth=0)
             axis.plot(
-                x, median, color=look.colour, linestyle=look.line, linewidth=1.6,
-                marker=look.mark, markersize=3.2, markevery=max(1, len(x) // 6),
-            )  # fmt: skip
+                x,
+                median,
+                color=look.colour,
+                linestyle=look.line,
+                linewidth=1.6,
+                marker=look.mark,
+                markersize=3.2,
+                markevery=max(1, len(x) // 6),
+            )
             axis.set_xlim(1, max(len(spans), 2))
         axis.set_xlabel(f"iteration, {POPULATION} evaluations each")
         axis.set_ylabel(LABELS[quantity])
@@ -71,12 +77,20 @@ def iterations(
     legend(
         figure,
         [
-            Line2D([], [], color=styles[n].colour, linestyle=styles[n].line, linewidth=1.6,
-                   marker=styles[n].mark, markersize=3.2, label=title_of(n))
+            Line2D(
+                [],
+                [],
+                color=styles[n].colour,
+                linestyle=styles[n].line,
+                linewidth=1.6,
+                marker=styles[n].mark,
+                markersize=3.2,
+                label=title_of(n),
+            )
             for n in runs
         ],
         theme,
-    )  # fmt: skip
+    )
     return figure
 
 
@@ -123,7 +137,7 @@ def violins(columns: Mapping[str, Mapping[str, Violin]], theme: Theme) -> "Figur
             Line2D([], [], marker="x", label="paper: mean", markeredgewidth=1.4, **mark),
         ],
         theme,
-    )  # fmt: skip
+    )
     return figure
 
 
@@ -138,13 +152,19 @@ def _violin(axes: "Axes", place: int, violin: Violin, colour: str, theme: Theme)
     if np.ptp(values) > 1e-9:  # else nothing has a shape
         step = max(1, -(-len(values) // MOST))
         drawn: Any = axes.violinplot(
-            values[::step], [place], widths=0.72, showextrema=False, points=200,
+            values[::step],
+            [place],
+            widths=0.72,
+            showextrema=False,
+            points=200,
             bw_method=0.12,
-        )  # fmt: skip
+        )
         for body in drawn["bodies"]:
             body.set(facecolor=colour, edgecolor=colour, alpha=0.35, linewidth=0.9)
     item = quartiles(values)
-    axes.plot([place, place], [item.low, item.high], color=colour, linewidth=4,
-              solid_capstyle="butt")  # fmt: skip
-    axes.plot(place, item.median, "o", color=theme.paper, markeredgecolor=theme.ink,
-              markersize=SIZE - 2.5)  # fmt: skip
+    axes.plot(
+        [place, place], [item.low, item.high], color=colour, linewidth=4, solid_capstyle="butt"
+    )
+    axes.plot(
+        place, item.median, "o", color=theme.paper, markeredgecolor=theme.ink, markersize=SIZE - 2.5
+    )

@@ -80,10 +80,16 @@ def hypervolume_and_spread(
     legend(
         figure,
         [
-            Line2D([], [], color=styles[n].colour, linestyle=styles[n].line, linewidth=1.6,
-                   label=title_of(n))
+            Line2D(
+                [],
+                [],
+                color=styles[n].colour,
+                linestyle=styles[n].line,
+                linewidth=1.6,
+                label=title_of(n),
+            )
             for n in curves["hypervolume"]
         ],
         theme,
-    )  # fmt: skip
+    )
     return figure

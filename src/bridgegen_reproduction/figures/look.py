@@ -55,9 +55,14 @@ def panels(count: int, height: float, theme: Theme) -> "tuple[Figure, list[Axes]
 def legend(figure: "Figure", handles: list[Any], theme: Theme) -> None:
     """Put a legend below all axes."""
     drawn = figure.legend(
-        handles=handles, loc="outside lower center", ncols=6, frameon=False,
-        fontsize=SIZE, handlelength=2.8, columnspacing=1.6,
-    )  # fmt: skip
+        handles=handles,
+        loc="outside lower center",
+        ncols=6,
+        frameon=False,
+        fontsize=SIZE,
+        handlelength=2.8,
+        columnspacing=1.6,
+    )
     for text in drawn.get_texts():
         text.set_color(theme.ink)
 

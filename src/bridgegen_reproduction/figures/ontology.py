@@ -167,22 +167,39 @@ def ontology(picture: Picture, layers: Sequence[str], theme: Theme) -> "Figure":
     for number, (name, width) in enumerate(zip(layers, COLUMNS, strict=True), 1):
         parts = textwrap.wrap(f"{number} {name}", int(width / _LETTER / 1.1))[:2]
         for k, part in enumerate(parts):
-            axes.text(x, k * LINE + 0.02, part, va="top", fontsize=(POINTS + 0.6) * scale,
-                      fontweight="bold", color=theme.ink)  # fmt: skip
+            axes.text(
+                x,
+                k * LINE + 0.02,
+                part,
+                va="top",
+                fontsize=(POINTS + 0.6) * scale,
+                fontweight="bold",
+                color=theme.ink,
+            )
         if not columns[number - 1]:
-            axes.text(x, head, "none in this\nscenario", va="top", fontsize=POINTS * scale,
-                      style="italic", color=theme.muted)  # fmt: skip
+            axes.text(
+                x,
+                head,
+                "none in this\nscenario",
+                va="top",
+                fontsize=POINTS * scale,
+                style="italic",
+                color=theme.muted,
+            )
         x += width + GUTTER
     _links(axes, columns, theme, scale)
     for column in columns:
         for block in column:
             _block(axes, block, theme, scale)
     axes.text(
-        0, height - 0.6 * LINE,
+        0,
+        height - 0.6 * LINE,
         "blue and bold: the value is a parameter’s, at its default; orange arrows: links to "
         "another layer",
-        va="bottom", fontsize=POINTS * scale, color=theme.muted,
-    )  # fmt: skip
+        va="bottom",
+        fontsize=POINTS * scale,
+        color=theme.muted,
+    )
     return figure
 
 
@@ -191,21 +208,39 @@ def _block(axes: "Axes", block: Block, theme: Theme, scale: float) -> None:
 
     axes.add_patch(
         FancyBboxPatch(
-            (block.x, block.y), block.width, block.height,
-            boxstyle="round,pad=0,rounding_size=0.04", facecolor=theme.paper,
-            edgecolor=theme.muted, linewidth=0.7, zorder=3,
+            (block.x, block.y),
+            block.width,
+            block.height,
+            boxstyle="round,pad=0,rounding_size=0.04",
+            facecolor=theme.paper,
+            edgecolor=theme.muted,
+            linewidth=0.7,
+            zorder=3,
         )
-    )  # fmt: skip
+    )
     y = block.y + _PAD
-    axes.text(block.x + _PAD, y, block.cls, va="top", fontsize=POINTS * scale, style="italic",
-              color=theme.muted, zorder=4)  # fmt: skip
+    axes.text(
+        block.x + _PAD,
+        y,
+        block.cls,
+        va="top",
+        fontsize=POINTS * scale,
+        style="italic",
+        color=theme.muted,
+        zorder=4,
+    )
     for line in block.lines:
         y += LINE
         axes.text(
-            block.x + _PAD, y, line.text, va="top", fontsize=POINTS * scale, zorder=4,
+            block.x + _PAD,
+            y,
+            line.text,
+            va="top",
+            fontsize=POINTS * scale,
+            zorder=4,
             color=theme.colours[0] if line.kind == "bound" else theme.ink,
             fontweight="bold" if line.kind in ("name", "bound") else "normal",
-        )  # fmt: skip
+        )
 
 
 def _links(axes: "Axes", columns: Sequence[Sequence[Block]], theme: Theme, scale: float) -> None:
@@ -236,14 +271,24 @@ def _bus(axes: "Axes", block: Block, others: Sequence[Block], lane: int, theme: 
     start = block.y + _PAD + 0.4 * LINE + 0.03 * lane
     ends = [other.y + _PAD + 0.4 * LINE + 0.03 * lane for other in others]
     axes.plot([block.x, x, x], [start, start, ends[0]], color=theme.muted, linewidth=0.7, zorder=2)
-    axes.plot([x, x], [min(start, *ends), max(start, *ends)], color=theme.muted, linewidth=0.7,
-              zorder=2)  # fmt: skip
+    axes.plot(
+        [x, x], [min(start, *ends), max(start, *ends)], color=theme.muted, linewidth=0.7, zorder=2
+    )
     for other, end in zip(others, ends, strict=True):
         axes.annotate(
-            "", (other.x, end), (x, end), zorder=2,
-            arrowprops={"arrowstyle": "-|>", "color": theme.muted, "linewidth": 0.7,
-                        "mutation_scale": 4, "shrinkA": 0, "shrinkB": 0},
-        )  # fmt: skip
+            "",
+            (other.x, end),
+            (x, end),
+            zorder=2,
+            arrowprops={
+                "arrowstyle": "-|>",
+                "color": theme.muted,
+                "linewidth": 0.7,
+                "mutation_scale": 4,
+                "shrinkA": 0,
+                "shrinkB": 0,
+            },
+        )
 
 
 def _arrow(
@@ -254,13 +299,28 @@ def _arrow(
     start = (block.x if to_the_left else block.x + block.width, block.y + 0.5 * block.height)
     end = (there.x + there.width if to_the_left else there.x, there.y + 0.5 * there.height)
     axes.annotate(
-        "", end, start, zorder=2,
-        arrowprops={"arrowstyle": "-|>", "color": theme.colours[1], "linewidth": 0.9,
-                    "mutation_scale": 6, "shrinkA": 0, "shrinkB": 0},
-    )  # fmt: skip
+        "",
+        end,
+        start,
+        zorder=2,
+        arrowprops={
+            "arrowstyle": "-|>",
+            "color": theme.colours[1],
+            "linewidth": 0.9,
+            "mutation_scale": 6,
+            "shrinkA": 0,
+            "shrinkB": 0,
+        },
+    )
     share = 0.42
     axes.text(
-        start[0] + share * (end[0] - start[0]), start[1] + share * (end[1] - start[1]), label,
-        ha="center", va="center", fontsize=(POINTS - 0.4) * scale, color=theme.ink, zorder=5,
+        start[0] + share * (end[0] - start[0]),
+        start[1] + share * (end[1] - start[1]),
+        label,
+        ha="center",
+        va="center",
+        fontsize=(POINTS - 0.4) * scale,
+        color=theme.ink,
+        zorder=5,
         bbox={"facecolor": theme.paper, "edgecolor": "none", "pad": 0.8},
-    )  # fmt: skip
+    )

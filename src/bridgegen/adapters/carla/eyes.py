@@ -104,8 +104,15 @@ def matched(answer: Checked, truth: Truth, view: View) -> Float:
             continue
         free.remove(found)
         rows[found] = (
-            column.CAMERA, x, y, h, length, width, answer.confidence[i], answer.kinds[i],
-        )  # fmt: skip
+            column.CAMERA,
+            x,
+            y,
+            h,
+            length,
+            width,
+            answer.confidence[i],
+            answer.kinds[i],
+        )
     return rows
 
 
@@ -187,13 +194,22 @@ class Eyes:
         self._scans: queue.SimpleQueue[Any] = queue.SimpleQueue()
         self._held: dict[int, list[Any]] = {}
         stage.attach(
-            "sensor.camera.rgb", mount, image_size_x=WIDTH, image_size_y=HEIGHT,
-            fov=FIELD_OF_VIEW, sensor_tick=period,
-        ).listen(self._images.put)  # fmt: skip
+            "sensor.camera.rgb",
+            mount,
+            image_size_x=WIDTH,
+            image_size_y=HEIGHT,
+            fov=FIELD_OF_VIEW,
+            sensor_tick=period,
+        ).listen(self._images.put)
         stage.attach(
-            "sensor.lidar.ray_cast", mount, range=100, channels=32, points_per_second=500_000,
-            rotation_frequency=1.0 / period, sensor_tick=period,
-        ).listen(self._scans.put)  # fmt: skip
+            "sensor.lidar.ray_cast",
+            mount,
+            range=100,
+            channels=32,
+            points_per_second=500_000,
+            rotation_frequency=1.0 / period,
+            sensor_tick=period,
+        ).listen(self._scans.put)
         shape = (len(program.names), joint.n_steps, column.DETECTION)
         self.detections: Float = np.zeros(shape)
         self.detections[1:, :, column.SEEN_BY] = column.NO_FRAME

@@ -174,9 +174,10 @@ class Server:
         snapshot = self.world.get_snapshot()
         if snapshot.frame != frame:
             raise ServerError(
-                ERROR, f"another client ticks the server: frame {frame} was ours, and it is at "
+                ERROR,
+                f"another client ticks the server: frame {frame} was ours, and it is at "
                 f"{snapshot.frame}",
-            )  # fmt: skip
+            )
         return snapshot
 
     def load(self, world: Callable[["carla.Client"], "carla.World"], key: str) -> None:
@@ -282,9 +283,13 @@ class Server:
         self.close()
         command = self.access.command
         self._process = subprocess.Popen(
-            command, shell=True, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL,
-            stderr=subprocess.DEVNULL, start_new_session=True,
-        )  # fmt: skip
+            command,
+            shell=True,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+            start_new_session=True,
+        )
         until = time.monotonic() + START_SECONDS
         while time.monotonic() < until:
             if self._answers():
@@ -294,9 +299,10 @@ class Server:
                 raise ServerError(DIED, f"'{command}' (--carla-command) ended with status {status}")
             time.sleep(BACK_OFF[0])
         raise ServerError(
-            HUNG, f"'{command}' (--carla-command) has started no server that answers at "
+            HUNG,
+            f"'{command}' (--carla-command) has started no server that answers at "
             f"{self.access.address} within {START_SECONDS:g} s",
-        )  # fmt: skip
+        )
 
 
 def is_listening(access: Access) -> bool:

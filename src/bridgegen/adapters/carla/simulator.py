@@ -365,19 +365,27 @@ class CarlaSimulator:
             lights.begin()
             stage = stack.enter_context(
                 Stage(
-                    server, program, self._storyboard, ego_model=self._settings.ego_model,
+                    server,
+                    program,
+                    self._storyboard,
+                    ego_model=self._settings.ego_model,
                     ego_is_moved=self._moves_ego(program.driver),
                 )
-            )  # fmt: skip
+            )
             controller = self._make_controller(program.driver, stage, joint, way)
             if controller is not None:
                 stack.callback(_end, controller)
             incidents = Incidents(stage, program.names)
             eyes = self._eyes(stage, program, joint)
             CarlaRow(
-                joint, stage, Weather(self._storyboard, program, values), lights, controller,
-                [incidents] if eyes is None else [incidents, eyes], self._is_stopped.is_set,
-            ).run(server)  # fmt: skip
+                joint,
+                stage,
+                Weather(self._storyboard, program, values),
+                lights,
+                controller,
+                [incidents] if eyes is None else [incidents, eyes],
+                self._is_stopped.is_set,
+            ).run(server)
             if eyes is not None:
                 eyes.finish()
         return Found(incidents, eyes if self._detector else None, self._folder())
@@ -393,9 +401,13 @@ class CarlaSimulator:
         if folder is None and self._detector is None:
             return None
         return Eyes(
-            stage, program, joint, period=self._settings.sensor_period,
-            detector=self._detector, folder=folder,
-        )  # fmt: skip
+            stage,
+            program,
+            joint,
+            period=self._settings.sensor_period,
+            detector=self._detector,
+            folder=folder,
+        )
 
     def _moves_ego(self, driver: Driver) -> bool:
         """Return whether the ego is moved as the embedded simulator moves it."""

@@ -154,9 +154,11 @@ def check(roads: "carla.Map", way: Float, name: str) -> None:
     for x, y in way[:: max(len(way) // 20, 1)].tolist():
         spot = frame.location(x, y)
         waypoint = roads.get_waypoint(spot, True)
-        off = None if waypoint is None else math.dist(
-            frame.point(waypoint.transform.location), (x, y)
-        )  # fmt: skip
+        off = (
+            None
+            if waypoint is None
+            else math.dist(frame.point(waypoint.transform.location), (x, y))
+        )
         if off is None or off > ASTRAY:
             raise InputError(
                 f"carla: the ego's route must be on a lane of {name} (within {ASTRAY:g} m of its "

@@ -46,10 +46,17 @@ STEP = 0.05
 _LIB = "openpilot.selfdrive.controls.lib"
 _MPC = f"{_LIB}.longitudinal_mpc_lib.long_mpc"
 _NAMES_ONLY = (
-    "capnp", "cereal", "opendbc", "setproctitle", "zmq", "zstandard",
-    "openpilot.common.hardware", "openpilot.common.params", "openpilot.common.swaglog",
+    "capnp",
+    "cereal",
+    "opendbc",
+    "setproctitle",
+    "zmq",
+    "zstandard",
+    "openpilot.common.hardware",
+    "openpilot.common.params",
+    "openpilot.common.swaglog",
     f"{_LIB}.longitudinal_mpc_lib.c_generated_code",
-)  # fmt: skip
+)
 _LIMITS = {"ACCEL_MIN": -3.5, "ACCEL_MAX": 2.0}
 """Limits of the acceleration [m/s²], from opendbc's car/interfaces.py, after ISO 15622:2018."""
 
@@ -275,9 +282,15 @@ def _compile(code: Path) -> str:
     try:
         made = subprocess.run(
             ["make", "ocp_cython"],
-            cwd=code, env=os.environ | {"PATH": path}, text=True, errors="replace", check=False,
-            stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
-        )  # fmt: skip
+            cwd=code,
+            env=os.environ | {"PATH": path},
+            text=True,
+            errors="replace",
+            check=False,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+        )
     except OSError as error:
         return f"make cannot be run: {error.strerror}"
     return " / ".join(made.stdout.strip().splitlines()[-3:])[-500:]

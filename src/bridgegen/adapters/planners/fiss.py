@@ -92,9 +92,16 @@ WALKS = (kinds.PEDESTRIAN, kinds.ANIMAL)
 """Kinds that are predicted at constant velocity wherever they are."""
 
 VEHICLE = (
-    "length", "width", "wheelbase", "rear_axle_to_center", "max_speed", "max_accel", "max_decel",
-    "max_steer", "max_lat_accel",
-)  # fmt: skip
+    "length",
+    "width",
+    "wheelbase",
+    "rear_axle_to_center",
+    "max_speed",
+    "max_accel",
+    "max_decel",
+    "max_steer",
+    "max_lat_accel",
+)
 """The planner's names of the vehicle's values [SI units, radians]."""
 
 Inputs = dict[str, npt.NDArray[Any]]
@@ -170,11 +177,19 @@ def vehicle(scene: Scene, usual: Any) -> Float:
         usual: the planner's defaults of them, as attributes.
     """
     wheelbase = 2.0 * scene.centre
-    return np.array([
-        scene.length, scene.width, wheelbase, scene.centre, scene.max_speed,
-        min(usual.max_accel, scene.max_acceleration), min(usual.max_decel, scene.max_deceleration),
-        math.atan(scene.max_curvature * wheelbase), usual.max_lat_accel,
-    ])  # fmt: skip
+    return np.array(
+        [
+            scene.length,
+            scene.width,
+            wheelbase,
+            scene.centre,
+            scene.max_speed,
+            min(usual.max_accel, scene.max_acceleration),
+            min(usual.max_decel, scene.max_deceleration),
+            math.atan(scene.max_curvature * wheelbase),
+            usual.max_lat_accel,
+        ]
+    )
 
 
 def inputs(observation: Observation, scene: Scene, before: Float) -> Inputs:
@@ -196,11 +211,19 @@ def inputs(observation: Observation, scene: Scene, before: Float) -> Inputs:
     heading = np.where(
         speed > MOVING, np.arctan2(tracks[:, :, 5], tracks[:, :, 4]), tracks[:, :, 3]
     )
-    obstacles = np.stack([
-        (tracks[:, :, 0] >= SEEN) & (distance <= RANGE), ~np.isin(tracks[:, :, 8], WALKS),
-        tracks[:, :, 1], tracks[:, :, 2], heading, speed,
-        tracks[:, :, 6] + ENLARGED, tracks[:, :, 7] + ENLARGED,
-    ], axis=2)  # fmt: skip
+    obstacles = np.stack(
+        [
+            (tracks[:, :, 0] >= SEEN) & (distance <= RANGE),
+            ~np.isin(tracks[:, :, 8], WALKS),
+            tracks[:, :, 1],
+            tracks[:, :, 2],
+            heading,
+            speed,
+            tracks[:, :, 6] + ENLARGED,
+            tracks[:, :, 7] + ENLARGED,
+        ],
+        axis=2,
+    )
     ego = np.stack([x, y, o.h, o.v, o.a, curvature], axis=1)
     return {"ego": ego, "desired": o.target_speed, "obstacles": obstacles}
 

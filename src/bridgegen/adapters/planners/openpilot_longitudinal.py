@@ -288,11 +288,13 @@ class _Row:
             "liveParameters": SimpleNamespace(angleOffsetDeg=0.0),
             "radarState": SimpleNamespace(leadOne=leads[0], leadTwo=leads[1]),
             "modelV2": SimpleNamespace(
-                position=none, velocity=none, acceleration=none,
+                position=none,
+                velocity=none,
+                acceleration=none,
                 meta=SimpleNamespace(disengagePredictions=SimpleNamespace(gasPressProbs=[])),
                 action=SimpleNamespace(desiredAcceleration=0.0, shouldStop=False),
             ),
-        }  # fmt: skip
+        }
 
 
 def _camera(offset: float, point: Float | None) -> SimpleNamespace:
@@ -306,9 +308,15 @@ def _camera(offset: float, point: Float | None) -> SimpleNamespace:
         return SimpleNamespace(prob=0.0)
     _, distance, left, speed = (float(item) for item in point)
     return SimpleNamespace(
-        prob=1.0, x=[distance + offset], y=[-left], v=[speed], a=[0.0],
-        xStd=[1.0], yStd=[1.0], vStd=[1.0],
-    )  # fmt: skip
+        prob=1.0,
+        x=[distance + offset],
+        y=[-left],
+        v=[speed],
+        a=[0.0],
+        xStd=[1.0],
+        yStd=[1.0],
+        vStd=[1.0],
+    )
 
 
 # --- A failure with openpilot alone ---------------------------------------------------------------

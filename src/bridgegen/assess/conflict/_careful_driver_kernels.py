@@ -125,8 +125,14 @@ def braked_and_stood(scene, a, b, k, start, braking, stands):
     by not braking.
     """
     half, x, y, c, s, v, gone = (
-        scene.half, scene.x, scene.y, scene.c, scene.s, scene.v, scene.gone
-    )  # fmt: skip
+        scene.half,
+        scene.x,
+        scene.y,
+        scene.c,
+        scene.s,
+        scene.v,
+        scene.gone,
+    )
     dt, n, until = scene.dt, scene.n, scene.until
     la, wa, lb, wb = half[a, 0], half[a, 1], half[b, 0], half[b, 1]
     worst = CLEAR

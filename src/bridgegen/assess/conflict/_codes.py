@@ -15,8 +15,16 @@ NO_CONFLICT, COURSE, NEAR_MISS, CONTACT, VIOLATION = range(5)
 """Codes of the types of conflicts."""
 
 (
-    NO_ZONE, FRONT, FRONT_LEFT, LEFT, REAR_LEFT, REAR, REAR_RIGHT, RIGHT, FRONT_RIGHT,
-) = range(9)  # fmt: skip
+    NO_ZONE,
+    FRONT,
+    FRONT_LEFT,
+    LEFT,
+    REAR_LEFT,
+    REAR,
+    REAR_RIGHT,
+    RIGHT,
+    FRONT_RIGHT,
+) = range(9)
 """Edges and corners of a body, counter-clockwise from its front."""
 
 NEITHER, EGO, OTHER, SHARED = range(4)
@@ -35,14 +43,32 @@ NEITHER, EGO, OTHER, SHARED = range(4)
 who comes from off the road."""
 
 (
-    KIND, TYPE, RESPONSIBLE, RULE, INSTANT, DECIDED, ZONE_EGO, ZONE_OTHER, PREVENTABLE, LEADS_EGO,
-) = range(10)  # fmt: skip
+    KIND,
+    TYPE,
+    RESPONSIBLE,
+    RULE,
+    INSTANT,
+    DECIDED,
+    ZONE_EGO,
+    ZONE_OTHER,
+    PREVENTABLE,
+    LEADS_EGO,
+) = range(10)
 INTEGERS = 10
 """Number of columns of a pair's row of whole numbers, after the columns themselves."""
 
 (
-    TTC, NEEDED, ACROSS, ALONG, V_EGO, V_OTHER, STOOD_EGO, STOOD_OTHER, OVERLAP, NEARNESS,
+    TTC,
+    NEEDED,
+    ACROSS,
+    ALONG,
+    V_EGO,
+    V_OTHER,
+    STOOD_EGO,
+    STOOD_OTHER,
+    OVERLAP,
+    NEARNESS,
     LEFT_TO_ACT,
-) = range(11)  # fmt: skip
+) = range(11)
 FLOATS = 11
 """Number of columns of a pair's row of floats, after the columns themselves."""

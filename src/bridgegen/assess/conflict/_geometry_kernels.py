@@ -232,9 +232,17 @@ def apart_at(half, x, y, c, s, v, gone, e, k, n, until, i, j, t):
     i, xa, ya = pose_on(x[0], y[0], c[0], s[0], gone[0], n, i, gone[0, k] + v[0, k] * t)
     j, xb, yb = pose_on(x[e], y[e], c[e], s[e], gone[e], until, j, gone[e, k] + v[e, k] * t)
     apart = separation(
-        xb - xa, yb - ya, c[0, i], s[0, i], c[e, j], s[e, j],
-        half[0, 0], half[0, 1], half[e, 0], half[e, 1],
-    )  # fmt: skip
+        xb - xa,
+        yb - ya,
+        c[0, i],
+        s[0, i],
+        c[e, j],
+        s[e, j],
+        half[0, 0],
+        half[0, 1],
+        half[e, 0],
+        half[e, 1],
+    )
     return i, j, apart
 
 

@@ -188,9 +188,15 @@ def judge(
                     apart = math.sqrt(dx * dx + dy * dy) - reach[a] - reach[b]
                     if apart <= 0.0:
                         depth = overlap_depth(
-                            box[a], box[b], dx, dy, cosine[i, a, k], sine[i, a, k],
-                            cosine[i, b, k], sine[i, b, k],
-                        )  # fmt: skip
+                            box[a],
+                            box[b],
+                            dx,
+                            dy,
+                            cosine[i, a, k],
+                            sine[i, a, k],
+                            cosine[i, b, k],
+                            sine[i, b, k],
+                        )
                         if depth > DEPTH:
                             kind = OVERLAP_AT_START if k == at else OTHERS_COLLIDE
                             if k < best or kind < code[i]:

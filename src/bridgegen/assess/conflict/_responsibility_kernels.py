@@ -190,9 +190,19 @@ def foreseen_since(scene, e, risk, since):
     every = max(int(EVIDENT_EVERY / scene.dt + 0.5), 1)
     while since - every >= risk:
         time = time_along_paths(
-            scene.half, scene.x, scene.y, scene.c, scene.s, scene.v, scene.gone, e, since - every,
-            scene.n, scene.n, HORIZON,
-        )  # fmt: skip
+            scene.half,
+            scene.x,
+            scene.y,
+            scene.c,
+            scene.s,
+            scene.v,
+            scene.gone,
+            e,
+            since - every,
+            scene.n,
+            scene.n,
+            HORIZON,
+        )
         if time == math.inf:
             break
         since -= every
@@ -226,9 +236,19 @@ def evident_since(scene, e, k, entry, signal):
         if hidden(scene, e, i) or (signal > 0 and not shows(scene, e, i, signal)):
             break
         time = time_along_paths(
-            scene.half, scene.x, scene.y, scene.c, scene.s, scene.v, scene.gone, e, i, scene.n,
-            scene.n, HORIZON,
-        )  # fmt: skip
+            scene.half,
+            scene.x,
+            scene.y,
+            scene.c,
+            scene.s,
+            scene.v,
+            scene.gone,
+            e,
+            i,
+            scene.n,
+            scene.n,
+            HORIZON,
+        )
         if expected and time > DOUBTS and v * v <= 2.0 * COMFORT * left:
             break
         if time < math.inf:
@@ -250,7 +270,7 @@ def shows(scene, e, k, signal):
 @kernel
 def decide(
     scene, e, k, kind, own, own_part, risk, since, side, late, stands, avoidable, whole, real
-):  # fmt: skip
+):
     """Return the responsible party, and the rule.
 
     The other has been visible in the ego's way from ``risk`` on, a danger from ``since`` on, and

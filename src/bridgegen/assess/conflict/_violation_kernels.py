@@ -172,10 +172,19 @@ def find_rows(
     for i in rows:
         corridor = corridors[corridor_of[i]]
         leaving(
-            corridor, rear_x[i, 0], rear_y[i, 0], c[i, 0], s[i, 0], v[i, 0],
-            offset[i, 0], half[0, 1], begins[i],
-            until[i], leavings[i], over[i],
-        )  # fmt: skip
+            corridor,
+            rear_x[i, 0],
+            rear_y[i, 0],
+            c[i, 0],
+            s[i, 0],
+            v[i, 0],
+            offset[i, 0],
+            half[0, 1],
+            begins[i],
+            until[i],
+            leavings[i],
+            over[i],
+        )
         for e in range(1, x.shape[1]):
             if NEEDS_ROOM[kinds[e]]:
                 passing(

@@ -17,9 +17,18 @@ from bridgegen.drivers.kinds import IS_OBSTACLE
 from bridgegen.simulation.rollout import Rollout
 
 _DIRECTION = np.array(
-    [injury.SIDE, injury.FRONT, injury.FRONT, injury.SIDE, injury.REAR, injury.REAR, injury.REAR,
-     injury.SIDE, injury.FRONT]
-)  # fmt: skip
+    [
+        injury.SIDE,
+        injury.FRONT,
+        injury.FRONT,
+        injury.SIDE,
+        injury.REAR,
+        injury.REAR,
+        injury.REAR,
+        injury.SIDE,
+        injury.FRONT,
+    ]
+)
 """The direction of the force by `Zone`; a corner counts as its end."""
 
 
@@ -186,9 +195,13 @@ def _seen_from(rollout: Rollout, e: int, own: list[int]) -> Rollout:
     }
     kinds = rollout.kinds[order] if len(rollout.kinds) else rollout.kinds
     return replace(
-        rollout, **swapped, box=rollout.box[order], kinds=kinds, present=there[:, order],
+        rollout,
+        **swapped,
+        box=rollout.box[order],
+        kinds=kinds,
+        present=there[:, order],
         towed_by=np.zeros(0, np.int64),
-    )  # fmt: skip
+    )
 
 
 def _of_one_body(rollout: Rollout) -> Conflicts:
@@ -235,35 +248,58 @@ def _of_one_body(rollout: Rollout) -> Conflicts:
         tangential = real[rows, entities, codes.ALONG]
         fixed = np.array(IS_OBSTACLE)[kind_b] & _never_moves(rollout)[rows, entities]
         potential[rows, entities] = injury.severity(
-            kind_a, kind_b, normal, tangential,
+            kind_a,
+            kind_b,
+            normal,
+            tangential,
             _DIRECTION[whole[rows, entities, codes.ZONE_EGO]],
-            _DIRECTION[whole[rows, entities, codes.ZONE_OTHER]], True, ~fixed,
-        )  # fmt: skip
+            _DIRECTION[whole[rows, entities, codes.ZONE_OTHER]],
+            True,
+            ~fixed,
+        )
         dv_ego[rows, entities], dv_other[rows, entities] = injury.delta_v(
             kind_a, kind_b, normal, tangential, True, ~fixed
         )
     columns = {
-        "kind": codes.KIND, "type": codes.TYPE, "responsible": codes.RESPONSIBLE,
-        "rule": codes.RULE, "instant": codes.INSTANT, "decided": codes.DECIDED,
-        "zone_ego": codes.ZONE_EGO, "zone_other": codes.ZONE_OTHER,
-    }  # fmt: skip
+        "kind": codes.KIND,
+        "type": codes.TYPE,
+        "responsible": codes.RESPONSIBLE,
+        "rule": codes.RULE,
+        "instant": codes.INSTANT,
+        "decided": codes.DECIDED,
+        "zone_ego": codes.ZONE_EGO,
+        "zone_other": codes.ZONE_OTHER,
+    }
     numbers = {
-        "ttc": codes.TTC, "needed": codes.NEEDED, "closing_normal": codes.ACROSS,
-        "closing_tangential": codes.ALONG, "v_ego": codes.V_EGO, "v_other": codes.V_OTHER,
-        "stood_ego": codes.STOOD_EGO, "stood_other": codes.STOOD_OTHER,
-        "overlap": codes.OVERLAP, "left": codes.LEFT_TO_ACT, "nearness": codes.NEARNESS,
-    }  # fmt: skip
+        "ttc": codes.TTC,
+        "needed": codes.NEEDED,
+        "closing_normal": codes.ACROSS,
+        "closing_tangential": codes.ALONG,
+        "v_ego": codes.V_EGO,
+        "v_other": codes.V_OTHER,
+        "stood_ego": codes.STOOD_EGO,
+        "stood_other": codes.STOOD_OTHER,
+        "overlap": codes.OVERLAP,
+        "left": codes.LEFT_TO_ACT,
+        "nearness": codes.NEARNESS,
+    }
     found: dict[str, Any] = {name: whole[:, :, column] for name, column in columns.items()}
     found |= {name: real[:, :, column] for name, column in numbers.items()}
     return Conflicts(
-        names=rollout.names, time_step=rollout.time_step, **found,
+        names=rollout.names,
+        time_step=rollout.time_step,
+        **found,
         leads_ego=whole[:, :, codes.LEADS_EGO] > 0,
         preventable=whole[:, :, codes.PREVENTABLE] > 0,
-        severity=np.where(touched, potential, 0.0), potential=potential,
-        delta_v_ego=np.where(touched, dv_ego, 0.0), delta_v_other=np.where(touched, dv_other, 0.0),
+        severity=np.where(touched, potential, 0.0),
+        potential=potential,
+        delta_v_ego=np.where(touched, dv_ego, 0.0),
+        delta_v_other=np.where(touched, dv_other, 0.0),
         ok=ok,
-        body=np.zeros((n, e), np.int64), aside=np.zeros((n, e)), breach=np.zeros((n, e)),
-    )  # fmt: skip
+        body=np.zeros((n, e), np.int64),
+        aside=np.zeros((n, e)),
+        breach=np.zeros((n, e)),
+    )
 
 
 def _turn_round(whole: Int, reverses: Bool) -> None:
@@ -303,4 +339,4 @@ __all__ = [
     "Zone",
     "analyse",
     "encounters",
-]  # fmt: skip
+]

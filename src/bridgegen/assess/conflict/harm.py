@@ -57,9 +57,10 @@ def harm_of_pairs(conflicts: Conflicts, count: Count = "ego") -> Float:
     """Return the harm of each pair, ``(N, E)`` in [0, 1]; column 0: of its departures."""
     violates = conflicts.kind == analysis.VIOLATION
     share = np.select(
-        [conflicts.kind == analysis.CONTACT, violates], [1.0, VIOLATES],
+        [conflicts.kind == analysis.CONTACT, violates],
+        [1.0, VIOLATES],
         NEARLY * urgency(conflicts),
-    )  # fmt: skip
+    )
     severe = np.log1p(share * conflicts.potential / LIGHT) / np.log1p(1.0 / LIGHT)
     worth = NEAR_MISS + (1.0 - NEAR_MISS) * severe
     value = _of_kinds(conflicts, count, contact=worth, near=worth)
@@ -76,9 +77,11 @@ def closeness_of_pairs(conflicts: Conflicts, count: Count) -> Float:
     """
     least = 2.0 * NEAR_MISS
     return _of_kinds(
-        conflicts, count, contact=least + (1.0 - least) * conflicts.severity,
+        conflicts,
+        count,
+        contact=least + (1.0 - least) * conflicts.severity,
         near=NEAR_MISS + (least - NEAR_MISS) * urgency(conflicts),
-    )  # fmt: skip
+    )
 
 
 def _of_kinds(conflicts: Conflicts, count: Count, contact: Float, near: Float) -> Float:

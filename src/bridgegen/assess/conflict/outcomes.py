@@ -47,8 +47,10 @@ def with_outcomes(
     for accident in accidents(rollout, row, standing):
         node = writer.node("accident", "TrafficAccident")
         for name, number in (
-            ("has_time", accident.time), ("has_world_x", accident.x), ("has_world_y", accident.y)
-        ):  # fmt: skip
+            ("has_time", accident.time),
+            ("has_world_x", accident.x),
+            ("has_world_y", accident.y),
+        ):
             writer.put(node, name, ox.Literal(float(number)))
         for name in accident.who:
             if name in participants:

@@ -19,11 +19,18 @@ HARM, HARM_ANY = "harm", "harm_any"
 
 _MEASURED = (
     Quantity(
-        HARM, "1", "how much the scenario is a failure of the ego, 0 to 1; critical from 0.3 on",
-        "larger", 0.0,
+        HARM,
+        "1",
+        "how much the scenario is a failure of the ego, 0 to 1; critical from 0.3 on",
+        "larger",
+        0.0,
     ),
     Quantity(
-        HARM_ANY, "1", "as harm, whoever is responsible", "larger", 0.0,
+        HARM_ANY,
+        "1",
+        "as harm, whoever is responsible",
+        "larger",
+        0.0,
     ),
     Quantity(
         "severity", "1", "probability of a MAIS3+ injury in the ego's collision", "larger", 0.0
@@ -32,10 +39,8 @@ _MEASURED = (
     Quantity(
         "course_ttc", "s", "least time to collision on a collision course", "smaller", HORIZON
     ),
-    Quantity(
-        "course_braking", "m/s²", "deceleration that the ego needed then", "larger", 0.0
-    ),
-)  # fmt: skip
+    Quantity("course_braking", "m/s²", "deceleration that the ego needed then", "larger", 0.0),
+)
 
 MEASURED = tuple(quantity.name for quantity in _MEASURED)
 """The names of the conflict analysis's measures; a search records them all."""

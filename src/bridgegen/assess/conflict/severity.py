@@ -315,11 +315,17 @@ def severity(
     return np.asarray(
         np.maximum(
             *injuries(
-                kind_a, kind_b, closing_normal, closing_tangential, direction_a, direction_b,
-                movable_a, movable_b,
+                kind_a,
+                kind_b,
+                closing_normal,
+                closing_tangential,
+                direction_a,
+                direction_b,
+                movable_a,
+                movable_b,
             )
         )
-    )  # fmt: skip
+    )
 
 
 def _on_curve(kind: Int, share: Float) -> Float:

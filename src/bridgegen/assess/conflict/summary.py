@@ -149,9 +149,11 @@ def _time_left(conflicts: Conflicts, row: int, other: int) -> str:
     kind = ConflictType(int(conflicts.type[row, other]))
     rule = Rule(int(conflicts.rule[row, other]))
     by_others = (
-        ConflictType.EGO_STANDING, ConflictType.REAR_END_STRUCK, ConflictType.SIDE_SWIPE,
+        ConflictType.EGO_STANDING,
+        ConflictType.REAR_END_STRUCK,
+        ConflictType.SIDE_SWIPE,
         ConflictType.VRU_INTO_SIDE,
-    )  # fmt: skip
+    )
     left = conflicts.left[row, other]
     arose = f"the risk arose {left:.1f} s before"
     if rule == Rule.STANDING_AHEAD and left > HORIZON:
@@ -276,9 +278,18 @@ class ConflictSummary:
         """
         texts: dict[str, Any] = {}
         for name in (
-            "conflict", "sentence", "partner", "type", "type_source", "responsible", "rule",
-            "rule_says", "rule_source", "zone_ego", "zone_other",
-        ):  # fmt: skip
+            "conflict",
+            "sentence",
+            "partner",
+            "type",
+            "type_source",
+            "responsible",
+            "rule",
+            "rule_says",
+            "rule_source",
+            "zone_ego",
+            "zone_other",
+        ):
             texts[name] = getattr(self, name) or None
         texts["preventable"] = self.preventable if self.happened else None
         return texts | {
@@ -323,11 +334,21 @@ def of_pair(conflicts: Conflicts, row: int, other: int, count: Count = "ego") ->
     numbers = {
         name: number(name)
         for name in (
-            "left", "ttc", "closing_normal", "closing_tangential", "v_ego", "v_other",
-            "stood_ego", "stood_other", "overlap", "delta_v_ego", "delta_v_other", "severity",
+            "left",
+            "ttc",
+            "closing_normal",
+            "closing_tangential",
+            "v_ego",
+            "v_other",
+            "stood_ego",
+            "stood_other",
+            "overlap",
+            "delta_v_ego",
+            "delta_v_other",
+            "severity",
             "aside",
         )
-    }  # fmt: skip
+    }
     return ConflictSummary(
         conflict=KINDS[kind],
         sentence=sentence(conflicts, row, other),

@@ -29,9 +29,18 @@ from bridgegen.drivers.lane_tables import EDGES, HEADING, LANES
 from bridgegen.simulation.rollout import Rollout
 
 _CHANGED = (
-    "kind", "type", "responsible", "rule", "instant", "decided", "v_ego", "v_other",
-    "aside", "breach", "potential",
-)  # fmt: skip
+    "kind",
+    "type",
+    "responsible",
+    "rule",
+    "instant",
+    "decided",
+    "v_ego",
+    "v_other",
+    "aside",
+    "breach",
+    "potential",
+)
 
 
 def with_violations(rollout: Rollout, found: Conflicts) -> Conflicts:
@@ -91,21 +100,34 @@ def with_violations(rollout: Rollout, found: Conflicts) -> Conflicts:
     head_on = injury.severity(own, CAR, 2.0 * v, 0.0, injury.FRONT, injury.FRONT)
     share = np.minimum(over[left, 0] / rollout.box[0, 1], 1.0)
     _put(
-        arrays, (left, np.zeros_like(left)), instant=worst, decided=at, v_ego=v, breach=1.0,
+        arrays,
+        (left, np.zeros_like(left)),
+        instant=worst,
+        decided=at,
+        v_ego=v,
+        breach=1.0,
         type=np.where(off, ConflictType.ROAD_DEPARTURE, ConflictType.LANE_DEPARTURE),
         rule=np.where(off, Rule.LEFT_THE_ROAD, Rule.DID_NOT_KEEP_LANE),
-        aside=side * over[left, 0], potential=np.where(off, against, share * head_on),
-    )  # fmt: skip
+        aside=side * over[left, 0],
+        potential=np.where(off, against, share * head_on),
+    )
     i, k = np.nonzero(close)
     moment, (clearance, faster) = passings[i, k, kernels.MOMENT], beside[i, k].T
     limit, closest = limit[i, k], closest[i, k]
     front = injury.severity(kinds[0], kinds[k], faster, 0.0, injury.FRONT, injury.REAR)
     _put(
-        arrays, (i, k), instant=moment, decided=moment, v_ego=moving.v[i, 0, moment],
-        v_other=moving.v[i, k, moment], type=ConflictType.CLOSE_PASS, rule=Rule.PASSED_TOO_CLOSE,
-        aside=clearance, potential=front * np.maximum(1.0 - clearance / closest, 0.0),
+        arrays,
+        (i, k),
+        instant=moment,
+        decided=moment,
+        v_ego=moving.v[i, 0, moment],
+        v_other=moving.v[i, k, moment],
+        type=ConflictType.CLOSE_PASS,
+        rule=Rule.PASSED_TOO_CLOSE,
+        aside=clearance,
+        potential=front * np.maximum(1.0 - clearance / closest, 0.0),
         breach=np.minimum((limit - clearance) / np.maximum(limit - closest, 1e-9), 1.0),
-    )  # fmt: skip
+    )
     return replace(found, **arrays)
 
 

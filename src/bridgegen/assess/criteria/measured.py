@@ -26,9 +26,12 @@ def quantity(name: str) -> Quantity:
     if name.startswith(PREFIX):
         text = f"margin by which criterion {name.removeprefix(PREFIX)} is met; violated below 0"
         return Quantity(
-            name, "1", text, "smaller",
+            name,
+            "1",
+            text,
+            "smaller",
             LARGEST,
-        )  # fmt: skip
+        )
     if name.startswith(OF_BASELINE):
         item = quantity(name.removeprefix(OF_BASELINE))
         text = f"{item.name} with the baseline's driver"

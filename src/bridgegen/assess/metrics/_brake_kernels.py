@@ -147,9 +147,18 @@ def required(
 
 @kernel
 def largest_required(
-    half: Float, x: Float, y: Float, cosine: Float, sine: Float, v: Float, a: Float,
-    distance: Float, n_steps: Int, most: float, out: Float,
-) -> None:  # fmt: skip
+    half: Float,
+    x: Float,
+    y: Float,
+    cosine: Float,
+    sine: Float,
+    v: Float,
+    a: Float,
+    distance: Float,
+    n_steps: Int,
+    most: float,
+    out: Float,
+) -> None:
     """Write the largest deceleration that any participant requires of the ego, at most ``most``."""
     n_rows, n_entities, _ = x.shape
     low, slope = np.empty(3), np.empty(3)
@@ -165,11 +174,19 @@ def largest_required(
                 ca, sa = cosine[i, 0, k], sine[i, 0, k]
                 dx, dy = x[i, e, k] - x[i, 0, k], y[i, e, k] - y[i, 0, k]
                 needed = required(
-                    dx * ca + dy * sa, dy * ca - dx * sa,
+                    dx * ca + dy * sa,
+                    dy * ca - dx * sa,
                     ca * cosine[i, e, k] + sa * sine[i, e, k],
                     ca * sine[i, e, k] - sa * cosine[i, e, k],
-                    half[0, 0], half[0, 1], half[e, 0], half[e, 1],
-                    v[i, 0, k], v[i, e, k], a[i, e, k], low, slope,
-                )  # fmt: skip
+                    half[0, 0],
+                    half[0, 1],
+                    half[e, 0],
+                    half[e, 1],
+                    v[i, 0, k],
+                    v[i, e, k],
+                    a[i, e, k],
+                    low,
+                    slope,
+                )
                 best = max(best, needed)
         out[i] = min(best, most)

@@ -116,9 +116,15 @@ def braking_edges(a: Float, n_steps: Int, threshold: float, out: Float) -> None:
 
 @kernel
 def place(
-    box: Float, x: Float, y: Float, cosine: Float, sine: Float, n_steps: Int,
-    centre_x: Float, centre_y: Float,
-) -> None:  # fmt: skip
+    box: Float,
+    x: Float,
+    y: Float,
+    cosine: Float,
+    sine: Float,
+    n_steps: Int,
+    centre_x: Float,
+    centre_y: Float,
+) -> None:
     """Write the centre of each body's box."""
     n_rows, n_entities, _ = x.shape
     for i in range(n_rows):
@@ -137,9 +143,18 @@ RED, RED_AND_YELLOW = 1, 2  # of Rollout.lights
 
 @kernel
 def red_lights(
-    front: float, x: Float, y: Float, cosine: Float, sine: Float, lines: Float, stop_lights: Int,
-    lights: Int, n_steps: Int, aside: float, out: Float,
-) -> None:  # fmt: skip
+    front: float,
+    x: Float,
+    y: Float,
+    cosine: Float,
+    sine: Float,
+    lines: Float,
+    stop_lights: Int,
+    lights: Int,
+    n_steps: Int,
+    aside: float,
+    out: Float,
+) -> None:
     """Count the lights whose stop line the ego crosses while they are red.
 
     ``front`` [m] is how far its front bumper is ahead of its reference point.
@@ -206,9 +221,17 @@ def share_of_safe(gap: float, safe: float) -> float:
 
 @kernel
 def missing_share(
-    half: Float, x: Float, y: Float, cosine: Float, sine: Float, v: Float, distance: Float,
-    n_steps: Int, p: Float, out: Float,
-) -> None:  # fmt: skip
+    half: Float,
+    x: Float,
+    y: Float,
+    cosine: Float,
+    sine: Float,
+    v: Float,
+    distance: Float,
+    n_steps: Int,
+    p: Float,
+    out: Float,
+) -> None:
     """Write the largest share of the safe distances that is missing both along and across."""
     n_rows, n_entities, n_instants = x.shape
     la, wa = half[0, 0], half[0, 1]

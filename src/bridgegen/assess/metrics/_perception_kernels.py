@@ -36,9 +36,16 @@ def cut(points: Float, n: int, axis: int, side: float, limit: float, out: Float)
 
 @kernel
 def overlap(
-    dx: float, dy: float, turn: float, la: float, wa: float, lb: float, wb: float,
-    array: Float, other: Float,
-) -> float:  # fmt: skip
+    dx: float,
+    dy: float,
+    turn: float,
+    la: float,
+    wa: float,
+    lb: float,
+    wb: float,
+    array: Float,
+    other: Float,
+) -> float:
     """Return the area [m²] that boxes A and B share.
 
     In A's frame, B's centre is at (dx, dy) and its heading is ``turn``; la, wa, lb, wb are half
@@ -62,9 +69,18 @@ def overlap(
 
 @kernel
 def truth(
-    box: Float, x: Float, y: Float, cosine: Float, sine: Float, detections: Float, n_steps: Int,
-    reach: Float, centre_x: Float, centre_y: Float, counts: Bool,
-) -> bool:  # fmt: skip
+    box: Float,
+    x: Float,
+    y: Float,
+    cosine: Float,
+    sine: Float,
+    detections: Float,
+    n_steps: Int,
+    reach: Float,
+    centre_x: Float,
+    centre_y: Float,
+    counts: Bool,
+) -> bool:
     """Write where the boxes' centres are at the instants with a frame, and which of them count.
 
     ``reach`` ``(E,)`` [m] is how near to the ego's reference point an entity must be. Return
@@ -89,9 +105,17 @@ def truth(
 
 @kernel
 def mean_iou(
-    half: Float, h: Float, cosine: Float, sine: Float, centre_x: Float, centre_y: Float,
-    counts: Bool, detections: Float, n_steps: Int, out: Float,
-) -> None:  # fmt: skip
+    half: Float,
+    h: Float,
+    cosine: Float,
+    sine: Float,
+    centre_x: Float,
+    centre_y: Float,
+    counts: Bool,
+    detections: Float,
+    n_steps: Int,
+    out: Float,
+) -> None:
     """Write each scenario's mean intersection over union; +inf where no truth counts."""
     n_rows, n_entities, _ = h.shape
     array, other = np.empty((8, 2)), np.empty((8, 2))
@@ -110,9 +134,16 @@ def mean_iou(
                 dx, dy = seen[X] - centre_x[i, e, k], seen[Y] - centre_y[i, e, k]
                 lb, wb = 0.5 * seen[LENGTH], 0.5 * seen[WIDTH]
                 common = overlap(
-                    dx * c + dy * s, dy * c - dx * s, seen[HEADING] - h[i, e, k],
-                    la, wa, lb, wb, array, other,
-                )  # fmt: skip
+                    dx * c + dy * s,
+                    dy * c - dx * s,
+                    seen[HEADING] - h[i, e, k],
+                    la,
+                    wa,
+                    lb,
+                    wb,
+                    array,
+                    other,
+                )
                 total += common / (4.0 * (la * wa + lb * wb) - common)
         out[i] = min(total / count, 1.0) if count else np.inf  # rounding may exceed 1
 
@@ -189,9 +220,17 @@ def order_of(confidence: Float, n: int) -> Int:
 
 @kernel
 def mark_hits(
-    order: Int, entity: Int, frame: Int, centre_x: Float, centre_y: Float, detections: Float,
-    wanted: Bool, threshold: float, taken: Bool, hit: Bool,
-) -> None:  # fmt: skip
+    order: Int,
+    entity: Int,
+    frame: Int,
+    centre_x: Float,
+    centre_y: Float,
+    detections: Float,
+    wanted: Bool,
+    threshold: float,
+    taken: Bool,
+    hit: Bool,
+) -> None:
     """Write which detections, by descending confidence, match a box that is still unmatched.
 
     ``wanted`` and ``taken`` are ``(E, T)``: boxes of this class within range, and matched ones.
@@ -237,10 +276,19 @@ def average_precision(hit: Bool, n: int, n_truth: int) -> float:
 
 @kernel
 def mean_average_precision(
-    x: Float, y: Float, centre_x: Float, centre_y: Float, counts: Bool, classes: Int,
-    detections: Float, n_steps: Int, class_of_kind: Int, ranges: Float, thresholds: Float,
+    x: Float,
+    y: Float,
+    centre_x: Float,
+    centre_y: Float,
+    counts: Bool,
+    classes: Int,
+    detections: Float,
+    n_steps: Int,
+    class_of_kind: Int,
+    ranges: Float,
+    thresholds: Float,
     out: Float,
-) -> None:  # fmt: skip
+) -> None:
     """Write each scenario's mean over classes and thresholds; +inf where no truth counts."""
     n_rows, n_entities, n_instants = x.shape
     size = n_entities * n_instants
@@ -272,8 +320,16 @@ def mean_average_precision(
             for threshold in thresholds:
                 taken[:, :n] = False
                 mark_hits(
-                    order, entity, frame, centre_x[i], centre_y[i], detections[i], wanted,
-                    threshold, taken, hit,
-                )  # fmt: skip
+                    order,
+                    entity,
+                    frame,
+                    centre_x[i],
+                    centre_y[i],
+                    detections[i],
+                    wanted,
+                    threshold,
+                    taken,
+                    hit,
+                )
                 total += average_precision(hit, m, n_truth) / len(thresholds)
         out[i] = min(total / n_classes, 1.0) if n_classes else np.inf  # rounding may exceed 1

@@ -92,10 +92,8 @@ def pair(
                 continue
         best = min(
             best,
-            time_to_contact(
-                dx, dy, wx, wy, ca, sa, cb, sb, la, wa, lb, wb, STANDSTILL * speeds
-            ),
-        )  # fmt: skip
+            time_to_contact(dx, dy, wx, wy, ca, sa, cb, sb, la, wa, lb, wb, STANDSTILL * speeds),
+        )
     return best
 
 
@@ -120,9 +118,17 @@ def least_time(
 
 @kernel
 def separation(
-    dx: float, dy: float, ca: float, sa: float, cb: float, sb: float,
-    la: float, wa: float, lb: float, wb: float,
-) -> float:  # fmt: skip
+    dx: float,
+    dy: float,
+    ca: float,
+    sa: float,
+    cb: float,
+    sb: float,
+    la: float,
+    wa: float,
+    lb: float,
+    wb: float,
+) -> float:
     """Return the widest gap [m] between boxes A and B over their four axes; ≤ 0 if they touch.
 
     (dx, dy) leads from A's centre to B's. Their distance is no less.
@@ -153,9 +159,16 @@ def stride(x: Float, y: Float, c: Float, s: Float, radius: float, n: int) -> flo
 
 @kernel
 def nearest_in_time(
-    half: Float, x: Float, y: Float, c: Float, s: Float, distance: Float, e: int, n: int,
+    half: Float,
+    x: Float,
+    y: Float,
+    c: Float,
+    s: Float,
+    distance: Float,
+    e: int,
+    n: int,
     best: int,
-) -> int:  # fmt: skip
+) -> int:
     """Return the least of ``best`` and the steps between the ego and e covering one point.
 
     From each instant of the ego, e's track is searched in both directions. Where the boxes are
@@ -177,9 +190,17 @@ def nearest_in_time(
                 skip = 1
                 if distance[j] < math.inf:  # else it is absent
                     apart = separation(
-                        x[e, j] - x[0, i], y[e, j] - y[0, i],
-                        c[0, i], s[0, i], c[e, j], s[e, j], la, wa, lb, wb,
-                    )  # fmt: skip
+                        x[e, j] - x[0, i],
+                        y[e, j] - y[0, i],
+                        c[0, i],
+                        s[0, i],
+                        c[e, j],
+                        s[e, j],
+                        la,
+                        wa,
+                        lb,
+                        wb,
+                    )
                     if apart <= 0.0:
                         best = abs(j - i)
                         break
@@ -192,9 +213,16 @@ def nearest_in_time(
 
 @kernel
 def encroachment(
-    half: Float, x: Float, y: Float, cosine: Float, sine: Float, distance: Float, n_steps: Int,
-    longest: int, out: Float,
-) -> None:  # fmt: skip
+    half: Float,
+    x: Float,
+    y: Float,
+    cosine: Float,
+    sine: Float,
+    distance: Float,
+    n_steps: Int,
+    longest: int,
+    out: Float,
+) -> None:
     """Write each scenario's least number of steps between covering one point; +inf if none.
 
     More than ``longest`` steps do not count.
@@ -231,7 +259,7 @@ def contact(
         return math.inf, squared  # they pass each other, or separate
     return time_to_contact(
         dx, dy, wx, wy, ca, sa, cb, sb, la, wa, lb, wb, STANDSTILL * (va + vb)
-    ), squared  # fmt: skip
+    ), squared
 
 
 @kernel
@@ -243,9 +271,17 @@ def circles_of(la: float, wa: float, lb: float, wb: float) -> float:
 
 @kernel
 def avoidance_rate(
-    half: Float, x: Float, y: Float, cosine: Float, sine: Float, v: Float, distance: Float,
-    n_steps: Int, most: float, out: Float,
-) -> None:  # fmt: skip
+    half: Float,
+    x: Float,
+    y: Float,
+    cosine: Float,
+    sine: Float,
+    v: Float,
+    distance: Float,
+    n_steps: Int,
+    most: float,
+    out: Float,
+) -> None:
     """Write the largest relative speed over twice the time to collision, at most ``most``."""
     n_rows, n_entities, _ = x.shape
     la, wa = half[0, 0], half[0, 1]
@@ -274,9 +310,16 @@ def avoidance_rate(
 
 @kernel
 def headway(
-    half: Float, x: Float, y: Float, cosine: Float, sine: Float, v: Float, distance: Float,
-    n_steps: Int, out: Float,
-) -> None:  # fmt: skip
+    half: Float,
+    x: Float,
+    y: Float,
+    cosine: Float,
+    sine: Float,
+    v: Float,
+    distance: Float,
+    n_steps: Int,
+    out: Float,
+) -> None:
     """Write the least time in which the ego reaches the place where another is."""
     n_rows, n_entities, _ = x.shape
     la, wa = half[0, 0], half[0, 1]
@@ -302,9 +345,17 @@ def headway(
 
 @kernel
 def short_times(
-    half: Float, x: Float, y: Float, cosine: Float, sine: Float, v: Float, distance: Float,
-    n_steps: Int, target: float, out: Float,
-) -> None:  # fmt: skip
+    half: Float,
+    x: Float,
+    y: Float,
+    cosine: Float,
+    sine: Float,
+    v: Float,
+    distance: Float,
+    n_steps: Int,
+    target: float,
+    out: Float,
+) -> None:
     """Write for how many instants the least time to collision is ≤ ``target``, and their sum short.
 
     ``out`` is ``(N, 2)``.

@@ -171,9 +171,18 @@ def btn(rollout: Rollout, available: float = GRIP) -> Float:
     m = motion(rollout)
     out = np.empty(len(m.n_steps))
     _brake_kernels.largest_required(
-        m.half, m.x, m.y, m.cosine, m.sine, m.v, m.a, m.distance, m.n_steps,
-        MOST, out,
-    )  # fmt: skip
+        m.half,
+        m.x,
+        m.y,
+        m.cosine,
+        m.sine,
+        m.v,
+        m.a,
+        m.distance,
+        m.n_steps,
+        MOST,
+        out,
+    )
     return without_failed(rollout, out / available)
 
 

@@ -145,9 +145,17 @@ def rss(rollout: Rollout, parameters: Parameters | None = None) -> Float:
     m = motion(rollout)
     out = np.empty(len(m.n_steps))
     _rss_kernels.missing_share(
-        m.half, m.x, m.y, m.cosine, m.sine, m.v, m.distance, m.n_steps,
-        np.array(astuple(parameters or Parameters())), out,
-    )  # fmt: skip
+        m.half,
+        m.x,
+        m.y,
+        m.cosine,
+        m.sine,
+        m.v,
+        m.distance,
+        m.n_steps,
+        np.array(astuple(parameters or Parameters())),
+        out,
+    )
     return without_failed(rollout, out)
 
 

@@ -90,9 +90,19 @@ def _perceived(rollout: Rollout) -> Perceived:
     if rollout.present.size:
         counts &= rollout.present
     return Perceived(
-        0.5 * box[:, :2], x, y, h, cosine, sine, centre_x, centre_y, counts, classes, detections,
+        0.5 * box[:, :2],
+        x,
+        y,
+        h,
+        cosine,
+        sine,
+        centre_x,
+        centre_y,
+        counts,
+        classes,
+        detections,
         n_steps,
-    )  # fmt: skip
+    )
 
 
 # --- iou: intersection over union of the ego's detections with the truth ---
@@ -116,9 +126,17 @@ def iou(rollout: Rollout) -> Float:
     p = perceived(rollout)
     out = np.empty(len(p.n_steps))
     _detection_kernels.mean_iou(
-        p.half, p.h, p.cosine, p.sine, p.centre_x, p.centre_y, p.counts, p.detections, p.n_steps,
+        p.half,
+        p.h,
+        p.cosine,
+        p.sine,
+        p.centre_x,
+        p.centre_y,
+        p.counts,
+        p.detections,
+        p.n_steps,
         out,
-    )  # fmt: skip
+    )
     return without_failed(rollout, out)
 
 
@@ -190,9 +208,19 @@ def mean_average_precision(rollout: Rollout) -> Float:
     p = perceived(rollout)
     out = np.empty(len(p.n_steps))
     _precision_kernels.mean_average_precision(
-        p.x, p.y, p.centre_x, p.centre_y, p.counts, p.classes, p.detections, p.n_steps,
-        CLASS_OF_KIND, RANGES, THRESHOLDS, out,
-    )  # fmt: skip
+        p.x,
+        p.y,
+        p.centre_x,
+        p.centre_y,
+        p.counts,
+        p.classes,
+        p.detections,
+        p.n_steps,
+        CLASS_OF_KIND,
+        RANGES,
+        THRESHOLDS,
+        out,
+    )
     return without_failed(rollout, out)
 
 

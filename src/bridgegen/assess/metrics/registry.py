@@ -28,13 +28,31 @@ from bridgegen.drivers import DRIVERS, Driver
 from bridgegen.simulation.rollout import Rollout
 
 _TABLE_I = (
-    R_RED, N_COLLISION, TTC, D_MIN, V_D, L_OFFSET, IOU, E_POSITION, MEAN_AVERAGE_PRECISION,
-    A_CHANGE, N_BRAKE,
-)  # fmt: skip
+    R_RED,
+    N_COLLISION,
+    TTC,
+    D_MIN,
+    V_D,
+    L_OFFSET,
+    IOU,
+    E_POSITION,
+    MEAN_AVERAGE_PRECISION,
+    A_CHANGE,
+    N_BRAKE,
+)
 
 _BEYOND = (
-    PET, DRAC, BTN, THW, TET, TIT, RSS, IMPACT_SPEED, RELATIVE_IMPACT_SPEED, SPEED_REDUCTION,
-)  # fmt: skip
+    PET,
+    DRAC,
+    BTN,
+    THW,
+    TET,
+    TIT,
+    RSS,
+    IMPACT_SPEED,
+    RELATIVE_IMPACT_SPEED,
+    SPEED_REDUCTION,
+)
 
 _OURS: dict[str, Metric] = {metric.name: metric for metric in (*_TABLE_I, *_BEYOND)}
 

@@ -77,9 +77,17 @@ def r_red(rollout: Rollout) -> Float:
         raise ValueError(f"rollout.stop_lights must be in 0..{n_lights - 1}, got {stop_lights}")
     box = rollout.box[0]
     _light_kernels.red_lights(
-        float(box[2] + 0.5 * box[0]), recorded(rollout, "x"), recorded(rollout, "y"),
-        *rollout.direction, lines, stop_lights, lights, steps(rollout), ASIDE, out,
-    )  # fmt: skip
+        float(box[2] + 0.5 * box[0]),
+        recorded(rollout, "x"),
+        recorded(rollout, "y"),
+        *rollout.direction,
+        lines,
+        stop_lights,
+        lights,
+        steps(rollout),
+        ASIDE,
+        out,
+    )
     return without_failed(rollout, out)
 
 

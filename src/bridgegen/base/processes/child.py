@@ -133,9 +133,13 @@ def _start(
 ) -> subprocess.Popen[bytes]:
     """Start a program below a supervisor."""
     return subprocess.Popen(
-        [sys.executable, "-I", "-S", str(SUPERVISOR), *words], stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE, stderr=errors, env=environment, start_new_session=True,
-    )  # fmt: skip
+        [sys.executable, "-I", "-S", str(SUPERVISOR), *words],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=errors,
+        env=environment,
+        start_new_session=True,
+    )
 
 
 def _end_program(process: subprocess.Popen[bytes]) -> None:

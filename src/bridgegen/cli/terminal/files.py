@@ -84,24 +84,36 @@ def _print_conflict(conflicts: "Conflicts", assumptions: Iterable[str] = ()) -> 
             ("rule", f"{summary.rule}: {summary.rule_says} ({summary.rule_source})"),
         ]
     if violates:
-        lines += [("began", f"at {summary.decided:.2f} s, worst at {summary.time:.2f} s"),
-                  ("by", f"{abs(summary.aside):.2f} m at {summary.v_ego:.1f} m/s")]  # fmt: skip
+        lines += [
+            ("began", f"at {summary.decided:.2f} s, worst at {summary.time:.2f} s"),
+            ("by", f"{abs(summary.aside):.2f} m at {summary.v_ego:.1f} m/s"),
+        ]
     elif summary.happened:
         lines += [
             ("zones", f"ego {summary.zone_ego}, {summary.partner} {summary.zone_other}"),
             ("decided", f"at {summary.decided:.2f} s, {summary.left:.2f} s before contact"),
             ("preventable", f"{CAREFUL_DRIVER} {prevents} have avoided it"),
         ]
-    lines += [] if violates else [
-        ("closing speed", f"{summary.closing_normal:.1f} m/s across the surfaces that meet, "
-                          f"{summary.closing_tangential:.1f} m/s along them"),
-    ]  # fmt: skip
+    lines += (
+        []
+        if violates
+        else [
+            (
+                "closing speed",
+                f"{summary.closing_normal:.1f} m/s across the surfaces that meet, "
+                f"{summary.closing_tangential:.1f} m/s along them",
+            ),
+        ]
+    )
     if summary.conflict == "contact":
         lines += [
-            ("delta-v", f"ego {summary.delta_v_ego:.1f} m/s, "
-                        f"{summary.partner} {summary.delta_v_other:.1f} m/s"),
+            (
+                "delta-v",
+                f"ego {summary.delta_v_ego:.1f} m/s, "
+                f"{summary.partner} {summary.delta_v_other:.1f} m/s",
+            ),
             ("severity", f"{summary.severity:.3g} (probability of a MAIS3+ injury)"),
-        ]  # fmt: skip
+        ]
     elif not violates:
         lines += [
             ("least TTC", f"{summary.ttc:.2f} s at {summary.time:.2f} s"),
@@ -118,10 +130,15 @@ def print_measured(file: Path, measured: "Measured", *, as_json: bool) -> None:
     rollout, n = measured.rollout, measured.rollout.shape[2]
     if as_json:
         facts = {
-            "file": str(file), "ego": rollout.names[0], "entities": rollout.names, "instants": n,
-            "time_step": rollout.time_step, "metrics": _finite(measured.metrics),
-            "notes": measured.notes, **conflict_facts(measured.conflicts, measured.assumptions),
-        }  # fmt: skip
+            "file": str(file),
+            "ego": rollout.names[0],
+            "entities": rollout.names,
+            "instants": n,
+            "time_step": rollout.time_step,
+            "metrics": _finite(measured.metrics),
+            "notes": measured.notes,
+            **conflict_facts(measured.conflicts, measured.assumptions),
+        }
         print(json.dumps(facts, indent=2))
         return
     print(

@@ -35,14 +35,16 @@ def print_fit(fit: "Fit", written: "Sequence[Path]", *, as_json: bool) -> None:
         ("parameter", "unit", "form", "D", "p"),
         [
             (
-                parameter.name, parameter.unit, parameter.form,
+                parameter.name,
+                parameter.unit,
+                parameter.form,
                 None if math.isnan(parameter.distance) else float(f"{parameter.distance:.3g}"),
                 None if math.isnan(parameter.p) else float(f"{parameter.p:.3g}"),
             )
             for parameter in fit.parameters.values()
         ],
         as_json=False,
-    )  # fmt: skip
+    )
     print()
     for text in fit.facts():
         print(text)

@@ -58,9 +58,11 @@ def print_additions(made: "Sequence[Addition]", to: Path, *, as_json: bool = Fal
     written = [addition for addition in made if addition.outcome in ("added", "replaced")]
     if written:
         same = sum(addition.is_same for addition in written)
-        all_same = "with the recorded values, to the bit" if same == len(written) else (
-            f"{same} with the recorded values, to the bit"
-        )  # fmt: skip
+        all_same = (
+            "with the recorded values, to the bit"
+            if same == len(written)
+            else (f"{same} with the recorded values, to the bit")
+        )
         print(f"Run again there, each fails in its mode, {all_same}.")
 
 

@@ -60,9 +60,11 @@ def print_table(
     table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0), header_style="bold")
     for column, name in enumerate(head):
         table.add_column(
-            name, overflow="fold", no_wrap=column != widest,
+            name,
+            overflow="fold",
+            no_wrap=column != widest,
             justify="left" if column < texts else "right",
-        )  # fmt: skip
+        )
     for row in shown:
         table.add_row(*row)
     console.print(table)

@@ -193,10 +193,11 @@ def _cases(suite: SuiteRun, entry_result: EntryResult, group: str) -> list[Case]
         group, "", entry_result, odd, f"not judged: {entry_result.unjudged}", "error"
     )
     return [
-        each if each.problem or each.name == "runs"
+        each
+        if each.problem or each.name == "runs"
         else replace(why, name=each.name, message=f"not judged: {entry_result.unjudged}")
         for each in cases
-    ]  # fmt: skip
+    ]
 
 
 def case_of_rows(

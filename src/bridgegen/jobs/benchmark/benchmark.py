@@ -113,9 +113,13 @@ def searches(plan: Plan, failures: dict[Cell, str]) -> tuple[list[Task], int, in
 def task_of(plan: Plan, cell: Cell, *, deliver: bool = False) -> Task:
     """Return the task of a run."""
     return Task(
-        cell.name, plan.folder(cell), plan.scenarios[cell.scenario], plan.options_of(cell),
-        deliver=deliver, may_be_refused=True,
-    )  # fmt: skip
+        cell.name,
+        plan.folder(cell),
+        plan.scenarios[cell.scenario],
+        plan.options_of(cell),
+        deliver=deliver,
+        may_be_refused=True,
+    )
 
 
 def chosen(plan: Plan, failed: Mapping[Cell, str]) -> tuple[Cell, ...]:
@@ -220,19 +224,28 @@ class Benchmark:
         """Return what is known of each driver."""
         return [
             {
-                **vars(standing), "first": standing.first if isfinite(standing.first) else None,
+                **vars(standing),
+                "first": standing.first if isfinite(standing.first) else None,
                 "avoided": {k: v if isfinite(v) else None for k, v in standing.avoided.items()},
             }
             for standing in self.standings
-        ]  # fmt: skip
+        ]
 
     def shown(self) -> list[str | Table]:
         """Return what the terminal shows: the table of drivers, and the files."""
         head = (
-            "driver", "perception", "modes", "robust", "first", "severity",
-            *(f"{name} avoids" for name in CAREFUL), "scenarios", "n/a", "no result",
+            "driver",
+            "perception",
+            "modes",
+            "robust",
+            "first",
+            "severity",
+            *(f"{name} avoids" for name in CAREFUL),
+            "scenarios",
+            "n/a",
+            "no result",
             "failed rows",
-        )  # fmt: skip
+        )
         gaps = [f"missing: {cell.name}: {why}" for cell, why in self.gaps.items()]
         return [
             Table(head, [_row(standing) for standing in self.standings], texts=2),
@@ -323,13 +336,25 @@ def benchmark_planners(given: BenchmarkOptions) -> Benchmark:
     callbacks.compile()
     needs = {name: domain_of(name) for name in dict.fromkeys(searched)}
     plan = make_plan(
-        searched, taking_part, needs, seeds=seeds, budget=budget, algorithm=algorithm, keep=keep,
-        triage=triage, out=folder,
-    )  # fmt: skip
+        searched,
+        taking_part,
+        needs,
+        seeds=seeds,
+        budget=budget,
+        algorithm=algorithm,
+        keep=keep,
+        triage=triage,
+        out=folder,
+    )
     claim(
-        plan.out, plan.identity(), file=FILE, what="benchmark", pieces=RUNS, kept=RUN_PATTERN,
+        plan.out,
+        plan.identity(),
+        file=FILE,
+        what="benchmark",
+        pieces=RUNS,
+        kept=RUN_PATTERN,
         grows=True,
-    )  # fmt: skip
+    )
     lock = Lock(plan.out / LOCK)
     done: list[str] = []
     try:

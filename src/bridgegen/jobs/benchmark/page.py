@@ -57,9 +57,12 @@ def _measured(standing: Standing) -> list[str | int]:
         return ["–"] * (4 + len(CAREFUL))
     shares = [standing.avoided.get(name, float("nan")) for name in CAREFUL]
     return [
-        standing.modes, standing.robust, number(standing.first, 0), f"{standing.severity:.2f}",
+        standing.modes,
+        standing.robust,
+        number(standing.first, 0),
+        f"{standing.severity:.2f}",
         *("–" if share != share else f"{100 * share:.0f} %" for share in shares),
-    ]  # fmt: skip
+    ]
 
 
 def _cell(columns: Sequence[Outcome]) -> dict[str, object]:

@@ -217,8 +217,12 @@ def _ways(modes: Iterable[tuple[Cell, Run, Mode]]) -> tuple[Way, ...]:
     groups: dict[tuple[str, ...], list[tuple[Cell, Run, Mode]]] = {}
     for cell, run, mode in modes:
         key = (
-            mode.conflict, mode.conflict_type, mode.responsible, mode.partner, mode.place,
-        )  # fmt: skip
+            mode.conflict,
+            mode.conflict_type,
+            mode.responsible,
+            mode.partner,
+            mode.place,
+        )
         groups.setdefault(key, []).append((cell, run, mode))
     found = [_way(some) for some in groups.values()]
     return tuple(sorted(found, key=lambda way: (not way.robust, -way.harm, way.title)))
@@ -302,10 +306,21 @@ def read_gaps(plan: Plan, failures: Mapping[Cell, str]) -> dict[Cell, str]:
 DRIVERS_FILE, OUTCOMES_FILE, MODES_FILE = "drivers.csv", "outcomes.csv", "modes.csv"
 
 DRIVERS_HEAD = (
-    "driver", "perception", "scenarios", "not_applicable", "failed", "modes", "robust",
-    "first_failure", "severity", "failures", "evaluations", "failed_rows", "causes",
+    "driver",
+    "perception",
+    "scenarios",
+    "not_applicable",
+    "failed",
+    "modes",
+    "robust",
+    "first_failure",
+    "severity",
+    "failures",
+    "evaluations",
+    "failed_rows",
+    "causes",
     *(f"avoided_by_{name}" for name in CAREFUL),
-)  # fmt: skip
+)
 """Columns of the table of drivers. ``first_failure``: median of the runs, inf where most runs have
 none; ``avoided_by_…``: share of the failures."""
 
@@ -318,9 +333,20 @@ OUTCOMES_HEAD = (
 the driver could have prevented the conflict; they are no failures here."""
 
 MODES_HEAD = (
-    "driver", "scenario", "perception", "mode", "robust", "harm", "severity", "causes", "minimal",
-    "scenario_file", "minimal_file", "script", "playback",
-)  # fmt: skip
+    "driver",
+    "scenario",
+    "perception",
+    "mode",
+    "robust",
+    "harm",
+    "severity",
+    "causes",
+    "minimal",
+    "scenario_file",
+    "minimal_file",
+    "script",
+    "playback",
+)
 """Columns of the table of failure modes. ``robust``: empty where it was not tested."""
 
 

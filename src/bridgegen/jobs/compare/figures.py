@@ -44,16 +44,22 @@ class Theme:
 
 
 LIGHT = Theme(
-    "#ffffff", "#17202c", "#566273", "#e4e9f0",
+    "#ffffff",
+    "#17202c",
+    "#566273",
+    "#e4e9f0",
     ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9"),
-)  # fmt: skip
+)
 """Theme on white paper: Okabe and Ito's colours (2008), without black, and yellow, which is
 invisible there."""
 
 DARK = Theme(
-    "#171e27", "#e7ecf3", "#9ba8b8", "#2c3643",
+    "#171e27",
+    "#e7ecf3",
+    "#9ba8b8",
+    "#2c3643",
     ("#3d9fe0", "#ff7f3f", "#1fc796", "#e39ac6", "#f2b73a", "#a5d8f5"),
-)  # fmt: skip
+)
 """Theme on a dark page: the hues of `LIGHT`, lighter."""
 
 
@@ -135,10 +141,17 @@ def boxes(samples: Mapping[str, Float], baseline: str, label: str, theme: Theme)
             continue
         line = {"color": colour, "linewidth": 1.4}
         axes.boxplot(
-            [values], positions=[row], orientation="horizontal", widths=0.6, whis=(0, 100),
-            showcaps=False, manage_ticks=False, boxprops=line, whiskerprops=line,
+            [values],
+            positions=[row],
+            orientation="horizontal",
+            widths=0.6,
+            whis=(0, 100),
+            showcaps=False,
+            manage_ticks=False,
+            boxprops=line,
+            whiskerprops=line,
             medianprops={"color": colour, "linewidth": 3.2, "solid_capstyle": "butt"},
-        )  # fmt: skip
+        )
         # Beside one another in the order of the seeds, so that equal values do not hide each other.
         aside = np.linspace(-0.2, 0.2, len(values)) if len(values) > 1 else np.zeros(1)
         axes.plot(values, row + aside, ".", color=colour, markersize=4.5, alpha=0.65)

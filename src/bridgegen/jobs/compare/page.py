@@ -39,18 +39,22 @@ def write_page(comparison: Comparison) -> None:
         raise StorageError(f"{comparison.folder}: cannot be written: {error.strerror}") from None
     settled = [measure for measure in comparison.measures if not measure.timed]
     templates.write_page(
-        comparison.page, "jobs/compare/page.html",
+        comparison.page,
+        "jobs/compare/page.html",
         title=f"Comparison: {', '.join(plan.scenarios)}",
         facts=[*_facts(comparison)],
         scenarios=[_scenario(comparison, name, settled) for name in plan.scenarios],
         measures=settled,
         shown=[measure for measure in settled if measure.name != "t_critic"],
-        baseline=plan.baseline, sure=words.SURE, apart=100 * plan.apart,
+        baseline=plan.baseline,
+        sure=words.SURE,
+        apart=100 * plan.apart,
         tested=counted(len(plan.algorithms) - 1, "algorithm"),
-        waited=waited_for(plan.budget), tenth=ordinal(10),
+        waited=waited_for(plan.budget),
+        tenth=ordinal(10),
         boxes=_boxes(comparison),
         command=plan.command(),
-    )  # fmt: skip
+    )
 
 
 def _facts(comparison: Comparison) -> Iterator[str]:
@@ -93,15 +97,21 @@ def _scenario(
         "name": scenario,
         "sentences": [*words.sentences(comparison, scenario)],
         "figures": [*_figures(comparison, scenario)] if is_measured else [],
-        "medians": [
-            (title, some, _medians(comparison, scenario, some)) for title, some in groups
-        ] if is_measured else [],
+        "medians": [(title, some, _medians(comparison, scenario, some)) for title, some in groups]
+        if is_measured
+        else [],
         "runs": [
-            (name, [_run(comparison, cell, measures) for cell in comparison.plan.cells_in_order
-                    if (cell.scenario, cell.algorithm) == (scenario, name)])
+            (
+                name,
+                [
+                    _run(comparison, cell, measures)
+                    for cell in comparison.plan.cells_in_order
+                    if (cell.scenario, cell.algorithm) == (scenario, name)
+                ],
+            )
             for name in comparison.plan.algorithms
         ],
-    }  # fmt: skip
+    }
 
 
 def _medians(
@@ -196,9 +206,7 @@ def _run(comparison: Comparison, cell: Cell, measures: Sequence[Measure]) -> dic
         for measure in measures
         if measure.name != "t_critic"
     ]
-    return {
-        **about, "evaluations": record.evaluations, "values": values, "command": record.command
-    }  # fmt: skip
+    return {**about, "evaluations": record.evaluations, "values": values, "command": record.command}
 
 
 def _range(term: Quantity, worst: float, best: float) -> str:
@@ -210,15 +218,18 @@ def _range(term: Quantity, worst: float, best: float) -> str:
 def _boxes(comparison: Comparison) -> str:
     """Return the range of each objective over all runs, by scenario, in words."""
     return "; ".join(
-        f"{name}: " + ", ".join(
+        f"{name}: "
+        + ", ".join(
             _range(quantity(term), worst, best)
             for term, worst, best in zip(
                 next(r for c, r in comparison.records.items() if c.scenario == name).terms,
-                measured.scale.worst, measured.scale.best, strict=True,
+                measured.scale.worst,
+                measured.scale.best,
+                strict=True,
             )
         )
         for name, measured in comparison.measured.items()
-    )  # fmt: skip
+    )
 
 
 def _data(png: bytes) -> str:

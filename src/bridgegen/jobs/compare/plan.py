@@ -224,9 +224,15 @@ def begin(plan: Plan) -> None:
         StorageError: the folder holds something else, or runs with other settings.
     """
     claim(
-        plan.out, plan.identity(), file=FILE, what="comparison", pieces=RUNS, kept=RUN_PATTERN,
-        grows=True, defaults=asdict(CommonOptions()),
-    )  # fmt: skip
+        plan.out,
+        plan.identity(),
+        file=FILE,
+        what="comparison",
+        pieces=RUNS,
+        kept=RUN_PATTERN,
+        grows=True,
+        defaults=asdict(CommonOptions()),
+    )
 
 
 def _plain(value: Any) -> dict[str, Any]:

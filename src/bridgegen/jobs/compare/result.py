@@ -63,13 +63,18 @@ class Comparison:
         """Return what ``summary.csv`` says, a measure of an algorithm each."""
         return [
             {
-                "scenario": line.scenario, "algorithm": line.algorithm, "measure": line.measure,
-                "runs": line.runs, "never": line.never,
+                "scenario": line.scenario,
+                "algorithm": line.algorithm,
+                "measure": line.measure,
+                "runs": line.runs,
+                "never": line.never,
                 **{name: number(value) for name, value in vars(line.quartiles).items()},
-                "p": number(line.p), "p_holm": number(line.p_holm), "a12": number(line.a12),
+                "p": number(line.p),
+                "p_holm": number(line.p_holm),
+                "a12": number(line.a12),
             }
             for line in self.lines
-        ]  # fmt: skip
+        ]
 
     def shown(self) -> list[str | Table]:
         """Return what the terminal shows."""
@@ -83,11 +88,15 @@ class Comparison:
         name = "-".join(self.plan.scenarios)
         return (
             Judged(
-                suite=f"{name} comparison", group=f"bridgegen.{name}", test="runs have results",
-                holds=bool(self.records), details=f"{len(self.records)} of {self.work}",
-                figures=figures, facts={"command": self.plan.command(), "page": str(self.page)},
+                suite=f"{name} comparison",
+                group=f"bridgegen.{name}",
+                test="runs have results",
+                holds=bool(self.records),
+                details=f"{len(self.records)} of {self.work}",
+                figures=figures,
+                facts={"command": self.plan.command(), "page": str(self.page)},
             ),
-        )  # fmt: skip
+        )
 
     def line(self, scenario: str, algorithm: str, measure: str) -> Line:
         """Return one measure of one algorithm in one scenario.

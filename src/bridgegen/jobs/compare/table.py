@@ -88,14 +88,18 @@ def _lines(
     }
     return [
         Line(
-            scenario, name, measure.name,
+            scenario,
+            name,
+            measure.name,
             runs=int(np.count_nonzero(~np.isnan(sample))),
             never=int(np.count_nonzero(np.isinf(sample))),
             quartiles=quartiles(sample),
-            p=p.get(name, nan), p_holm=corrected.get(name, nan), a12=effects.get(name, nan),
+            p=p.get(name, nan),
+            p_holm=corrected.get(name, nan),
+            a12=effects.get(name, nan),
         )
         for name, sample in samples.items()
-    ]  # fmt: skip
+    ]
 
 
 def write_tables(
@@ -123,16 +127,35 @@ def write_tables(
 
 
 RUNS_HEAD = (
-    "scenario", "algorithm", "seed", "measure", "value", "evaluations", "critical", "failed",
-    "ended", "folder", "command",
-)  # fmt: skip
+    "scenario",
+    "algorithm",
+    "seed",
+    "measure",
+    "value",
+    "evaluations",
+    "critical",
+    "failed",
+    "ended",
+    "folder",
+    "command",
+)
 """Columns of the table of runs. ``value``: inf where the event never occurred in so many
 evaluations (censored), empty where the measure is not defined; ``ended``: budget, exhausted or
 converged, or why the run failed."""
 
 SUMMARY_HEAD = (
-    "scenario", "algorithm", "measure", "runs", "never", "q1", "median", "q3", "p", "p_holm", "a12",
-)  # fmt: skip
+    "scenario",
+    "algorithm",
+    "measure",
+    "runs",
+    "never",
+    "q1",
+    "median",
+    "q3",
+    "p",
+    "p_holm",
+    "a12",
+)
 
 
 def _runs(
@@ -172,9 +195,18 @@ def _times(
 def _line(line: Line) -> Sequence[object]:
     q = line.quartiles
     return (
-        line.scenario, line.algorithm, line.measure, line.runs, line.never,
-        q.low, q.median, q.high, line.p, line.p_holm, line.a12,
-    )  # fmt: skip
+        line.scenario,
+        line.algorithm,
+        line.measure,
+        line.runs,
+        line.never,
+        q.low,
+        q.median,
+        q.high,
+        line.p,
+        line.p_holm,
+        line.a12,
+    )
 
 
 def write_csv(path: Path, head: Sequence[str], rows: Iterable[Sequence[object]]) -> None:

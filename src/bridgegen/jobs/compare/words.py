@@ -89,8 +89,17 @@ def _findings(comparison: Comparison, scenario: str) -> Table:
     """Return the table of what was found and how soon, with the tests of ``distinct``."""
     kinds = {measure.name: measure for measure in comparison.measures}
     early = [name for name in kinds if name.endswith(("_distinct", "_modes", "to_1"))]
-    head = ("algorithm", "found in", "modes", "distinct", "quartiles", "p", "A12",
-            *(kinds[name].title for name in early), "R_critic")  # fmt: skip
+    head = (
+        "algorithm",
+        "found in",
+        "modes",
+        "distinct",
+        "quartiles",
+        "p",
+        "A12",
+        *(kinds[name].title for name in early),
+        "R_critic",
+    )
     rows = []
     for name in comparison.plan.algorithms:
         of = {kind: comparison.line(scenario, name, kind) for kind in kinds}
@@ -110,9 +119,16 @@ def _findings(comparison: Comparison, scenario: str) -> Table:
 
 
 _MORE = {
-    "t_critic", "to_10", "to_50", "critical_bins", "critical_pairs", "hypervolume", "gd",
-    "spread", "seconds",
-}  # fmt: skip
+    "t_critic",
+    "to_10",
+    "to_50",
+    "critical_bins",
+    "critical_pairs",
+    "hypervolume",
+    "gd",
+    "spread",
+    "seconds",
+}
 
 
 def _others(comparison: Comparison, scenario: str) -> Table:

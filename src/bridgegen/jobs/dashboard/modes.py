@@ -80,9 +80,13 @@ class Decisions:
         """
         key = failure.key
         in_file = ModeKey(
-            key.scenario, "", key.conflict, key.conflict_type, key.responsible,
+            key.scenario,
+            "",
+            key.conflict,
+            key.conflict_type,
+            key.responsible,
             requirement=key.requirement,
-        )  # fmt: skip
+        )
         for mode_key in (replace(key, scenario=failure.searched or key.scenario), in_file, key.id):
             if some := self.others.get(mode_key, []):
                 return min(some, key=lambda pair: STATUSES.index(pair[1].status))
@@ -125,9 +129,14 @@ def _keys(block: Block, project: Project) -> Iterator[ModeKey]:
     scenario, driver = block.scenario, driver_of(block.driver, project.folder, "").name
     if block.conflict:
         yield ModeKey(
-            scenario, driver, block.conflict, block.type, block.responsible, block.partner,
+            scenario,
+            driver,
+            block.conflict,
+            block.type,
+            block.responsible,
+            block.partner,
             block.place,
-        )  # fmt: skip
+        )
     else:
         for criterion in block.violates:
             yield ModeKey(scenario, driver, requirement=criterion.id)

@@ -109,10 +109,14 @@ def write_page(found: Dashboard) -> None:
 
 def _facts(found: Dashboard) -> Iterator[str]:
     for name, noun in (
-        ("runs", "run"), ("suites", "suite"), ("maps", "preventability map"),
-        ("comparisons", "comparison"), ("scenarios", "scenario"), ("drivers", "driver"),
+        ("runs", "run"),
+        ("suites", "suite"),
+        ("maps", "preventability map"),
+        ("comparisons", "comparison"),
+        ("scenarios", "scenario"),
+        ("drivers", "driver"),
         ("evaluations", "evaluation"),
-    ):  # fmt: skip
+    ):
         if found.figures[name]:
             yield counted(int(found.figures[name]), noun)
 
@@ -124,11 +128,21 @@ def _address(base: str, page: str) -> str:
 
 
 def _table(
-    name: str, heads: Sequence[str], rows: Sequence[Row], most: int = MOST_ROWS,
-    kind: str = "list", title: str = "",
-) -> Table:  # fmt: skip
-    return {"name": name, "title": title or name, "heads": heads, "rows": rows[:most],
-            "more": max(0, len(rows) - most), "kind": kind}  # fmt: skip
+    name: str,
+    heads: Sequence[str],
+    rows: Sequence[Row],
+    most: int = MOST_ROWS,
+    kind: str = "list",
+    title: str = "",
+) -> Table:
+    return {
+        "name": name,
+        "title": title or name,
+        "heads": heads,
+        "rows": rows[:most],
+        "more": max(0, len(rows) - most),
+        "kind": kind,
+    }
 
 
 def _span(value: float, low: float, high: float) -> str | tuple[str, str]:
@@ -235,8 +249,10 @@ def _matrix(matrix: Matrix, base: str) -> Table:
         for name in matrix.scenarios[:MOST_SCENARIOS]
     ]
     name, heads = f"Requirements of {matrix.driver} by scenario", [each.id for each in shown]
-    return {**_table(name, ("scenario", *heads), rows, kind="matrix", title=words),
-            "left": "; ".join(left)}  # fmt: skip
+    return {
+        **_table(name, ("scenario", *heads), rows, kind="matrix", title=words),
+        "left": "; ".join(left),
+    }
 
 
 def _verdict(matrix: Matrix, scenario: str, requirement: str, base: str) -> Cell:
@@ -248,10 +264,13 @@ def _verdict(matrix: Matrix, scenario: str, requirement: str, base: str) -> Cell
         words = f"{cell.violated:,} of {cell.met + cell.violated:,} violate"
     worst = "" if cell.worst is None else margin_in_words(cell.worst, cell.unit, 3)
     return Cell(
-        words, [f"{'least' if is_met else 'worst'} {worst}"],
-        kind="good" if is_met else "bad", before="✓ " if is_met else "✗ ",
-        href=_address(base, cell.page), label=f"{requirement} in {scenario}: {words}",
-    )  # fmt: skip
+        words,
+        [f"{'least' if is_met else 'worst'} {worst}"],
+        kind="good" if is_met else "bad",
+        before="✓ " if is_met else "✗ ",
+        href=_address(base, cell.page),
+        label=f"{requirement} in {scenario}: {words}",
+    )
 
 
 # --- Trends: versions, a chart for each series, and what was measured once ---
@@ -261,13 +280,18 @@ def chart(series: Series, base: str) -> str:
     """Return a series as a chart; a dot leads to its result's page."""
     points = [
         charts.Point(
-            point.share, point.low, point.high, share(point.share), bool(point.count),
+            point.share,
+            point.low,
+            point.high,
+            share(point.share),
+            bool(point.count),
             f"{point.driver}, {when(point.time)} UTC: {share(point.share)} ({point.count:,} of "
             f"{point.of:,}); {point.source}",
-            (point.version, point.driver), _address(base, point.page),
+            (point.version, point.driver),
+            _address(base, point.page),
         )
         for point in series.points
-    ]  # fmt: skip
+    ]
     latest = ", ".join(f"{point.driver} {share(point.share)}" for point in series.points[-5:])
     return charts.trend(points, f"{series.measure} of {series.driver} in {series.title}: {latest}")
 
@@ -287,21 +311,23 @@ def _versions(found: Dashboard) -> Table:
                     len({failure.key for result in of_it for failure in result.failures}),
                 ]
             )
-    heads = ("driver", "version", "first result (UTC)", "scenarios", "evaluations",
-             "failure modes")  # fmt: skip
+    heads = ("driver", "version", "first result (UTC)", "scenarios", "evaluations", "failure modes")
     return _table("Versions of drivers", heads, rows[-MOST_ROWS:])
 
 
 def _once(some: list[Series], base: str) -> Table:
     rows = [
         [
-            series.title, point.driver, series.measure, _span(point.share, point.low, point.high),
+            series.title,
+            point.driver,
+            series.measure,
+            _span(point.share, point.low, point.high),
             f"{point.count:,} of {point.of:,}",
             Cell(point.source, href=_address(base, point.page)),
         ]
         for series in some
         for point in series.points
-    ]  # fmt: skip
+    ]
     title = f"Measured once: {counted(len(some), 'scenario and driver', 'pairs')}"
     heads = ("scenario or suite", "driver", "measure", "share", "count", "result")
     return _table("Measured once", heads, rows, title=title)
@@ -492,20 +518,24 @@ def _suite(suite_line: SuiteLine, base: str) -> Row:
         joined(suite_line.egos),
         len({each.entry for each in suite_line.results}),
         len({each.entry for each in suite_line.results if each.unjudged}),
-        *(sum(getattr(each, name) for each in suite_line.results)
-          for name in ("evaluations", "failed", "lost")),
+        *(
+            sum(getattr(each, name) for each in suite_line.results)
+            for name in ("evaluations", "failed", "lost")
+        ),
         when(suite_line.time),
-    ]  # fmt: skip
+    ]
 
 
 def _difference(suite_line: SuiteLine, base: str) -> Row:
     found = suite_line.difference
     assert found is not None
     return [
-        Cell(suite_line.source, href=_address(base, suite_line.page)), found.first, found.second,
+        Cell(suite_line.source, href=_address(base, suite_line.page)),
+        found.first,
+        found.second,
         *(found.counts[name] for name in ("fixed", "broken", "both fail", "both pass")),
         f"p = {found.p_value:.2g}",
-    ]  # fmt: skip
+    ]
 
 
 def _maps(found: Dashboard, base: str) -> Iterator[Row]:
@@ -517,6 +547,9 @@ def _maps(found: Dashboard, base: str) -> Iterator[Row]:
         for each in line.drivers:
             numbers = (each.avoided, each.preventable, each.unpreventable)
             yield [
-                Cell(line.source, href=href), line.scenario, each.driver, line.cells,
+                Cell(line.source, href=href),
+                line.scenario,
+                each.driver,
+                line.cells,
                 *((n, share(n / each.judged)) if each.judged else "–" for n in numbers),
-            ]  # fmt: skip
+            ]

@@ -63,9 +63,10 @@ class Matrix:
     def violated(self, requirement: str) -> list[str]:
         """Return the scenarios in which a requirement is violated."""
         return [
-            name for name in self.scenarios
+            name
+            for name in self.scenarios
             if (cell := self.cell(name, requirement)) and cell.verdict == "violated"
-        ]  # fmt: skip
+        ]
 
     @property
     def without(self) -> list[str]:

@@ -107,9 +107,14 @@ def _failures(line: RunLine, scenario: str, driver: Driver) -> Iterator[Failure]
     held: dict[ModeKey, list[Mode]] = {}
     for mode in line.modes:
         key = ModeKey(
-            scenario, driver.name, mode.conflict, mode.conflict_type, mode.responsible,
-            mode.partner, mode.place,
-        )  # fmt: skip
+            scenario,
+            driver.name,
+            mode.conflict,
+            mode.conflict_type,
+            mode.responsible,
+            mode.partner,
+            mode.place,
+        )
         held.setdefault(key, []).append(mode)
     for key, modes in held.items():
         yield Failure(
@@ -214,9 +219,10 @@ def read_suite_line(project: Path, folder: Path, sceneries: Sceneries) -> SuiteL
     files = {
         scenario_name(result.scenario, project): path.resolve()
         for result in suite.results
-        if result.scenario.lower().endswith(".xosc") and not result.distribution
+        if result.scenario.lower().endswith(".xosc")
+        and not result.distribution
         and (path := _path(project, result.scenario)).is_file()
-    }  # fmt: skip
+    }
     return SuiteLine(
         source, page, time, egos, results, _difference(project, suite, made), lost, files
     )
@@ -233,9 +239,10 @@ def _difference(project: Path, suite: SuiteRun, made: str) -> Difference | None:
     )  # a suite that was stopped lacks some
     both = sorted(name for name in first if name in second)
     return difference(
-        [first[name] for name in both], [second[name] for name in both],
+        [first[name] for name in both],
+        [second[name] for name in both],
         (labels[0], labels[1]),
-    )  # fmt: skip
+    )
 
 
 def _result(
@@ -299,9 +306,13 @@ def _failures_of_entry(entry_result: EntryResult, scenario: str, driver: str) ->
     for row in entry_result.rows:
         if row.critical:
             key = ModeKey(
-                scenario, driver, row.conflict, row.conflict_type, row.responsible,
+                scenario,
+                driver,
+                row.conflict,
+                row.conflict_type,
+                row.responsible,
                 partner=row.partner,
-            )  # fmt: skip
+            )
             held.setdefault(key, []).append(row)
     for key, rows in held.items():
         severity = max(row.severity for row in rows)

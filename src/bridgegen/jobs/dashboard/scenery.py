@@ -180,9 +180,11 @@ def scenery_of(scenario: SearchedScenario, *, on_map: bool = False) -> Scenery:
 
 def _of_logical(scenario: LogicalScenario, on_map: bool) -> tuple[set[str], dict[str, Measure]]:
     kinds = {
-        kind for participant in scenario.participants if participant.name != "ego"
+        kind
+        for participant in scenario.participants
+        if participant.name != "ego"
         for kind in (participant.types or (participant.type,))
-    }  # fmt: skip
+    }
     facts = {f"participant:{_kind(item)}" for item in kinds}
     facts |= {"participant:emergency" for participant in scenario.participants if participant.siren}
     facts |= {"jam"} if scenario.story.jams else set()
@@ -256,10 +258,16 @@ def _radius(*curvatures: Float) -> Float:
 # ---- scenario files ----
 
 _ROAD_TYPES = {
-    "motorway": "motorway", "rural": "rural", "town": "town", "townExpressway": "town",
-    "townCollector": "town", "townArterial": "town", "townPrivate": "town", "townLocal": "town",
+    "motorway": "motorway",
+    "rural": "rural",
+    "town": "town",
+    "townExpressway": "town",
+    "townCollector": "town",
+    "townArterial": "town",
+    "townPrivate": "town",
+    "townLocal": "town",
     "lowSpeed": "town",
-}  # fmt: skip
+}
 """OpenDRIVE's types of roads, by BridgeGen's."""
 
 

@@ -109,9 +109,17 @@ def _of_run(run: Result) -> Point | None:
     if space is None or space.share is None:
         return None
     return Point(
-        run.driver.label, _version(run), run.source, run.page, run.time, space.harmful, space.rows,
-        space.share, space.low, space.high,
-    )  # fmt: skip
+        run.driver.label,
+        _version(run),
+        run.source,
+        run.page,
+        run.time,
+        space.harmful,
+        space.rows,
+        space.share,
+        space.low,
+        space.high,
+    )
 
 
 def _version(result: Result) -> str:
@@ -128,8 +136,16 @@ def _of_suite(suite: SuiteLine) -> list[tuple[str, Point]]:
         if of:
             share = count / of
             point = Point(
-                label, _version(some[0]), suite.source, suite.page, suite.time, count, of,
-                share, share, share,
-            )  # fmt: skip
+                label,
+                _version(some[0]),
+                suite.source,
+                suite.page,
+                suite.time,
+                count,
+                of,
+                share,
+                share,
+                share,
+            )
             found.append((some[0].driver.name, point))
     return found

@@ -242,10 +242,18 @@ def mine(given: MineOptions) -> Mined:
     )
     updates = write_updates(out, sought, met, update)
     mined = Mined(
-        tuple(found), tuple(skipped), tuple(others), time_step, out, warnings, replays,
-        tuple(played), met, made,
+        tuple(found),
+        tuple(skipped),
+        tuple(others),
+        time_step,
+        out,
+        warnings,
+        replays,
+        tuple(played),
+        met,
+        made,
         updates,
-    )  # fmt: skip
+    )
     write_all(mined)
     for text in warnings_of(mined):
         given.callbacks.say(f"bridgegen: {text}")
@@ -321,11 +329,19 @@ def summarise(
     points = np.concatenate([path for _, path in paths])
     lanes = account_of(located, points.min(axis=0) - MARGIN, points.max(axis=0) + MARGIN)
     return Summary(
-        facts=traffic.facts, participants=dict(kinds.most_common()), states=len(traffic.time),
-        duration=float(np.ptp(traffic.time)), hours=after.hours, kilometres=after.kilometres,
-        read_hours=traffic.hours, read_kilometres=traffic.kilometres, tracks=len(after.names),
-        findings=cleaned.quality.findings, paths=tuple(paths), lanes=lanes,
+        facts=traffic.facts,
+        participants=dict(kinds.most_common()),
+        states=len(traffic.time),
+        duration=float(np.ptp(traffic.time)),
+        hours=after.hours,
+        kilometres=after.kilometres,
+        read_hours=traffic.hours,
+        read_kilometres=traffic.kilometres,
+        tracks=len(after.names),
+        findings=cleaned.quality.findings,
+        paths=tuple(paths),
+        lanes=lanes,
         events=find_events(after, located),
         conflicts=conflicts,
         names={p: after.names[p] for conflict in conflicts for p in (conflict.ego, conflict.other)},
-    )  # fmt: skip
+    )

@@ -105,9 +105,12 @@ def conflicts_as_json(summary: Summary, time_step: float) -> list[dict[str, obje
 
 def _as_json(summary: Summary, each: RecordedConflict, time_step: float) -> dict[str, object]:
     return {
-        "ego": summary.names[each.ego], "other": summary.names[each.other],
-        "time": each.instant * time_step, "doubt": each.doubt or None, **each.found.to_dict(),
-    }  # fmt: skip
+        "ego": summary.names[each.ego],
+        "other": summary.names[each.other],
+        "time": each.instant * time_step,
+        "doubt": each.doubt or None,
+        **each.found.to_dict(),
+    }
 
 
 def recordings_in_words(mined: Mined) -> Sequence[tuple[str, str]]:

@@ -35,17 +35,27 @@ TABLE_HEAD = (
     "lights", "lanes", "vehicles_on_lanes", "km_on_lanes",
 )  # fmt: skip
 LANES_HEAD = (
-    "recording", "file", "source", "carriageway", "lanes", "width_m", "length_m", "states",
-    "rms_m", "p95_m",
-)  # fmt: skip
+    "recording",
+    "file",
+    "source",
+    "carriageway",
+    "lanes",
+    "width_m",
+    "length_m",
+    "states",
+    "rms_m",
+    "p95_m",
+)
 QUALITY_HEAD = ("recording", "file", "rule", "participants", "count", "examples")
 SPACE = 3.0
 """Margin around the paths in the picture [m]."""
 CARRIAGEWAYS_SHOWN = 12
 SOURCES = {
-    "map": "of the map", "lanelets": "of the recording's lanelets",
-    "markings": "between the recording's lane markings", "inferred": "inferred from the paths",
-}  # fmt: skip
+    "map": "of the map",
+    "lanelets": "of the recording's lanelets",
+    "markings": "between the recording's lane markings",
+    "inferred": "inferred from the paths",
+}
 TWO_WHEELED = (BICYCLE, MOTORCYCLE)
 _LINKS = ("scenario", "how well its distributions fit", "OpenSCENARIO distribution")
 
@@ -69,9 +79,12 @@ def refuse_foreign(out: Path, more: Sequence[str] = ()) -> None:
                 f"{out / folder}: exists already, is not of recordings, and is not overwritten"
             )
     for name, head in (
-        (TABLE, TABLE_HEAD), (LANES, LANES_HEAD), (QUALITY, QUALITY_HEAD),
-        (EVENTS, EVENTS_HEAD), (CONFLICTS, conflicts.HEAD),
-    ):  # fmt: skip
+        (TABLE, TABLE_HEAD),
+        (LANES, LANES_HEAD),
+        (QUALITY, QUALITY_HEAD),
+        (EVENTS, EVENTS_HEAD),
+        (CONFLICTS, conflicts.HEAD),
+    ):
         try:
             with (out / name).open("rb") as file:
                 ours = file.readline(4096).decode("utf-8", "replace").strip() == ",".join(head)
@@ -221,16 +234,21 @@ def _recordings(mined: Mined) -> dict[str, object]:
     ]
     rows = [
         [
-            recording.facts.name, recording.facts.format, f"{recording.facts.time_step:.4g} s",
-            f"{recording.duration:.4g} s", *(recording.participants.get(kind, 0) for kind in kinds),
-            f"{recording.hours:.4g}", f"{recording.kilometres:.4g}",
+            recording.facts.name,
+            recording.facts.format,
+            f"{recording.facts.time_step:.4g} s",
+            f"{recording.duration:.4g} s",
+            *(recording.participants.get(kind, 0) for kind in kinds),
+            f"{recording.hours:.4g}",
+            f"{recording.kilometres:.4g}",
         ]
         for recording in mined.recordings
-    ]  # fmt: skip
+    ]
     return {
-        "kinds": kinds, "rows": rows,
+        "kinds": kinds,
+        "rows": rows,
         "recordings": [_recording(recording, mined.time_step) for recording in mined.recordings],
-    }  # fmt: skip
+    }
 
 
 def _events(mined: Mined) -> dict[str, object]:
@@ -260,16 +278,25 @@ def _events(mined: Mined) -> dict[str, object]:
         ),
         "met": [row for count, row in met if count],
         "unmet": _grouped(
-            (f"{scenario.scenario} ({', '.join(scenario.unmapped)} not given)" if scenario.unmapped
-             else scenario.scenario, f"no {scenario.kind}")
+            (
+                f"{scenario.scenario} ({', '.join(scenario.unmapped)} not given)"
+                if scenario.unmapped
+                else scenario.scenario,
+                f"no {scenario.kind}",
+            )
             for scenario, (count, _) in zip(mined.scenarios, met, strict=True)
             if not count
         ),
-        "against": [f"{scenario.scenario}: {text}"
-                    for scenario in mined.scenarios for text in against_in_words(scenario)],
-        "driven": [sum(getattr(events, name) for events in found)
-                   for name in ("hours", "kilometres", "all_hours", "all_kilometres")],
-    }  # fmt: skip
+        "against": [
+            f"{scenario.scenario}: {text}"
+            for scenario in mined.scenarios
+            for text in against_in_words(scenario)
+        ],
+        "driven": [
+            sum(getattr(events, name) for events in found)
+            for name in ("hours", "kilometres", "all_hours", "all_kilometres")
+        ],
+    }
 
 
 def _recording(summary: Summary, time_step: float) -> dict[str, object]:

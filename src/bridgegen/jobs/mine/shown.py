@@ -41,11 +41,16 @@ def json_of(mined: Mined) -> dict[str, Any]:
     return {
         "recordings": [_facts(recording, mined.time_step) for recording in mined.recordings],
         "scenarios": [
-            {"file": str(replay.scenario), "recording": replay.event.recording,
-             "ego": replay.event.names[0], "other": replay.event.names[1],
-             "position_off": None if replay.problem else replay.off,
-             "speed_off": None if replay.problem else replay.too_fast,
-             "problem": replay.problem or None, "ontology_lacks": replay.lacks}
+            {
+                "file": str(replay.scenario),
+                "recording": replay.event.recording,
+                "ego": replay.event.names[0],
+                "other": replay.event.names[1],
+                "position_off": None if replay.problem else replay.off,
+                "speed_off": None if replay.problem else replay.too_fast,
+                "problem": replay.problem or None,
+                "ontology_lacks": replay.lacks,
+            }
             for replay in mined.replays
         ],
         "skipped": [str(path) for path, _ in mined.skipped],
@@ -53,7 +58,7 @@ def json_of(mined: Mined) -> dict[str, Any]:
         **_events(mined),
         "mined": [made_as_json(scenario, mined.out) for scenario in mined.mined],
         "updates": [{**asdict(update), "path": str(update.path)} for update in mined.updates],
-    }  # fmt: skip
+    }
 
 
 def shown_of(mined: Mined) -> Iterator[str | Table]:
@@ -89,9 +94,14 @@ def shown_of(mined: Mined) -> Iterator[str | Table]:
     if mined.replays:
         yield ""
         of_events = (
-            "scenario", "recording", "ego and other", "type", "TTC [s]", "needed [m/s²]",
+            "scenario",
+            "recording",
+            "ego and other",
+            "type",
+            "TTC [s]",
+            "needed [m/s²]",
             "responsible",
-        )  # fmt: skip
+        )
         yield Table(of_events, list(screen_rows(mined)))
     yield ""
     unmade: dict[str, list[str]] = {}
@@ -140,11 +150,16 @@ def _events_shown(mined: Mined) -> Iterator[str | Table]:
         yield Table(
             ("scenario", "event", "rows", "incomplete", "per hour (95 %)"),
             [
-                (events.scenario, events.kind, events.complete, events.incomplete,
-                 rates_in_words(events.encounters)[0])
+                (
+                    events.scenario,
+                    events.kind,
+                    events.complete,
+                    events.incomplete,
+                    rates_in_words(events.encounters)[0],
+                )
                 for events in met
             ],
-        )  # fmt: skip
+        )
     for events in met:
         for text in against_in_words(events):
             yield f"{events.scenario}: {text}"
@@ -164,8 +179,10 @@ def _events(mined: Mined) -> dict[str, object]:
         for event in events:
             refused.update(event.refused)
         kinds[kind] = {
-            "count": count, **_rates(encounters_of(count, found, kind)), "refused": dict(refused),
-        }  # fmt: skip
+            "count": count,
+            **_rates(encounters_of(count, found, kind)),
+            "refused": dict(refused),
+        }
     return {
         "hours_on_lanes": sum(found_events.hours for found_events in found),
         "km_on_lanes": sum(found_events.kilometres for found_events in found),

@@ -58,9 +58,12 @@ def require(scenario: str) -> None:
 
 def _cut_in(columns: Mapping[str, Float], driver: str) -> Bool:
     return avoids_cut_in(
-        columns["ego_speed"], columns["other_speed"], columns["gap"], columns["lateral_speed"],
+        columns["ego_speed"],
+        columns["other_speed"],
+        columns["gap"],
+        columns["lateral_speed"],
         driver=driver,
-    )  # fmt: skip
+    )
 
 
 def _cut_out(columns: Mapping[str, Float], driver: str) -> Bool:

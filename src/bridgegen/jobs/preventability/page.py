@@ -60,18 +60,20 @@ def write_page(path: Path, result: PreventabilityMap) -> None:
     shown = [combinations[i] for i in _spread(len(combinations), BLOCKS)]
     there = np.unique(np.concatenate([kind.ravel() for kind in result.classes.values()]))
     templates.write_page(
-        path, "jobs/preventability/page.html",
+        path,
+        "jobs/preventability/page.html",
         title=f"{result.scenario.name}: which collisions are preventable",
         facts=[*_facts(result)],
         lead=_lead(result),
         classes=[class_.label for class_ in CellClass],
         counts=[[name, *_counts(result, name)] for name in result.drivers],
         legend=[(COLOURS[class_], class_.label) for class_ in CellClass if class_ in there],
-        shown=len(shown), combinations=len(combinations),
+        shown=len(shown),
+        combinations=len(combinations),
         blocks=[_block(result, at) for at in shown],
         models=result.models,
         command=result.command,
-    )  # fmt: skip
+    )
 
 
 def _facts(result: PreventabilityMap) -> Iterator[str]:

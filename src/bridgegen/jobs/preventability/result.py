@@ -127,11 +127,15 @@ class PreventabilityMap:
             facts[f"axis {axis}"] = f"{v[0]:.6g} to {v[-1]:.6g} {unit}, {len(v)} values"
         counts = ((item, count) for item, count in figures.items() if not item.endswith("_share"))
         return Judged(
-            suite=f"{name} preventability", group=f"bridgegen.{name}.{driver.replace('.', '_')}",
-            test="the map has results", holds=holds,
-            details=", ".join(f"{item} {count:.0f}" for item, count in counts), figures=figures,
-            facts=facts | {"command": self.command, "page": str(self.page)}, of=driver,
-        )  # fmt: skip
+            suite=f"{name} preventability",
+            group=f"bridgegen.{name}.{driver.replace('.', '_')}",
+            test="the map has results",
+            holds=holds,
+            details=", ".join(f"{item} {count:.0f}" for item, count in counts),
+            figures=figures,
+            facts=facts | {"command": self.command, "page": str(self.page)},
+            of=driver,
+        )
 
     def write(self) -> tuple[Path, ...]:
         """Write arrays, figures, the page, and a table where the extra for Parquet is there.

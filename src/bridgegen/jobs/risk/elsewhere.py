@@ -81,11 +81,14 @@ class Elsewhere:
     def to_dict(self) -> Mapping[str, Any]:
         """Return what ``risk.json`` says of it."""
         return {
-            "simulator": self.simulator, "rows": self.rows, "failed": self.failed,
-            "confirmed": _known(self.confirmed), "new": _known(self.new),
+            "simulator": self.simulator,
+            "rows": self.rows,
+            "failed": self.failed,
+            "confirmed": _known(self.confirmed),
+            "new": _known(self.new),
             "factor": None if self.factor is None else _known(self.factor),
             "doubt": self.doubt,
-        }  # fmt: skip
+        }
 
 
 @dataclass(frozen=True)
@@ -113,9 +116,14 @@ class Group:
 
 
 def look_elsewhere(
-    here: Experiment, there: Experiment, simulator: str, known: Weighted, threshold: float,
-    rows: int, seed: int,
-) -> Elsewhere:  # fmt: skip
+    here: Experiment,
+    there: Experiment,
+    simulator: str,
+    known: Weighted,
+    threshold: float,
+    rows: int,
+    seed: int,
+) -> Elsewhere:
     """Simulate rows around those of an event in two simulators.
 
     Args:
@@ -156,9 +164,13 @@ def _closest(scores: Float, weights: Float, is_event: Bool) -> Bool:
 
 
 def _group(
-    there: Experiment, Z: Float, weights: Float, rows: int, threshold: float,
+    there: Experiment,
+    Z: Float,
+    weights: Float,
+    rows: int,
+    threshold: float,
     random: np.random.Generator,
-) -> Group:  # fmt: skip
+) -> Group:
     """Simulate some of weighted rows there, chosen in proportion to their weights."""
     if not len(Z):
         none = np.empty(0)

@@ -164,6 +164,8 @@ def estimate(name: str, problem: Problem, aim: Aim, seed: int, start: Float | No
     if name == "importance":
         return Estimated(name, "asked for", importance.estimate(problem, aim, seed, start))
     plain: Mapping[str, Callable[[Problem, Aim, int], Weighted]] = {
-        "mc": monte_carlo.estimate, "subset": subset.estimate, "stratified": stratified.estimate,
-    }  # fmt: skip
+        "mc": monte_carlo.estimate,
+        "subset": subset.estimate,
+        "stratified": stratified.estimate,
+    }
     return Estimated(name, "asked for", plain[name](problem, aim, seed))

@@ -28,8 +28,14 @@ ELSEWHERE = "elsewhere-"
 """Prefix of the folder with another simulator's results; the simulator's name follows."""
 _LONGEST_MODE = 400
 _DAMAGED = (
-    ValueError, TypeError, LookupError, EOFError, MemoryError, RuntimeError, zipfile.BadZipFile,
-)  # fmt: skip
+    ValueError,
+    TypeError,
+    LookupError,
+    EOFError,
+    MemoryError,
+    RuntimeError,
+    zipfile.BadZipFile,
+)
 """Exceptions that reading a damaged or hostile batch may raise."""
 
 

@@ -29,10 +29,13 @@ class RiskOptions(DriveOptions, SimulatingOptions):
     ego: str | None = field(
         default=None,
         metadata=option(
-            TEXT, "Driver under test.", shown="the scenario's choice", group=DRIVER,
+            TEXT,
+            "Driver under test.",
+            shown="the scenario's choice",
+            group=DRIVER,
             names="driver",
         ),
-    )  # fmt: skip
+    )
     exposure: "str | Path | Exposure | None" = field(
         default=None,
         metadata=option(
@@ -76,17 +79,19 @@ class RiskOptions(DriveOptions, SimulatingOptions):
     start: str | Path | None = field(
         default=None,
         metadata=option(
-            PATH, "Run of a search, whose harmful scenarios importance sampling may use.",
+            PATH,
+            "Run of a search, whose harmful scenarios importance sampling may use.",
             spelling="--from",
         ),
-    )  # fmt: skip
+    )
     check: int = field(
         default=0,
         metadata=option(
-            WHOLE, "Number of plain Monte Carlo simulations for a second estimate, to compare.",
+            WHOLE,
+            "Number of plain Monte Carlo simulations for a second estimate, to compare.",
             shown="none",
         ),
-    )  # fmt: skip
+    )
     events: "str | Path | Fit | None" = field(
         default=None,
         metadata=option(
@@ -114,10 +119,12 @@ class RiskOptions(DriveOptions, SimulatingOptions):
     out: Path | str | None = field(
         default=None,
         metadata=option(
-            PATH, "The risk's folder; a stopped estimate is resumed.", shown="risk/SCENARIO",
+            PATH,
+            "The risk's folder; a stopped estimate is resumed.",
+            shown="risk/SCENARIO",
             group=OUTPUT,
         ),
-    )  # fmt: skip
+    )
 
 
 _OF = {"": "probability of {} per encounter", "_upper": "it is below this, with 95 % confidence"}

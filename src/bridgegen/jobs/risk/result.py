@@ -285,14 +285,20 @@ class Risk:
         name, method = self.exposure.scenario.name, self.estimated.method
         return (
             Judged(
-                suite=f"{name} risk", group=f"bridgegen.{name}.{self.driver.replace('.', '_')}",
-                test="the interval is believed", holds=self.believed,
+                suite=f"{name} risk",
+                group=f"bridgegen.{name}.{self.driver.replace('.', '_')}",
+                test="the interval is believed",
+                holds=self.believed,
                 details=self.findings[self.event].doubt or f"method {method}",
                 figures={figure: found[figure] for figure in FIGURES},
-                facts={"scenario": name, "ego": self.driver, "method": method,
-                       "command": self.command},
+                facts={
+                    "scenario": name,
+                    "ego": self.driver,
+                    "method": method,
+                    "command": self.command,
+                },
             ),
-        )  # fmt: skip
+        )
 
     def write(self) -> tuple[Path, ...]:
         """Write the record, the page and the table of harmful rows.
@@ -361,9 +367,13 @@ def _share(name: str, unit: str, values: Float, weights: Float, road: Float) -> 
     first, second, third = np.quantile(road, ends)
     distance = 0.5 * float(np.abs(mine - usual).sum())
     return ParameterShare(
-        name, unit, distance, (float(low), float(middle), float(high)),
-        (float(first), float(second), float(third)), mine,
-    )  # fmt: skip
+        name,
+        unit,
+        distance,
+        (float(low), float(middle), float(high)),
+        (float(first), float(second), float(third)),
+        mine,
+    )
 
 
 def _finding(finding: Finding) -> Mapping[str, Any]:

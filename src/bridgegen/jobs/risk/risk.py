@@ -55,9 +55,13 @@ BEFORE, AFTER = 4.0, 2.0  # s, of the picture, around the conflict's most urgent
 
 
 def find_most_likely(
-    experiment: Experiment, exposure: Exposure, known: Weighted, threshold: float, budget: int,
+    experiment: Experiment,
+    exposure: Exposure,
+    known: Weighted,
+    threshold: float,
+    budget: int,
     seed: int,
-) -> dict[str, Float]:  # fmt: skip
+) -> dict[str, Float]:
     """Return the harmful row of each failure mode that is most likely on the road.
 
     Args:
@@ -166,11 +170,13 @@ def estimate_risk(given: RiskOptions) -> Risk:
     require_ranges(
         given,
         {
-            "simulator_rows": (1, MOST_ELSEWHERE), "precision": (0.0, MOST_PRECISION),
-            "budget": (LEAST_EVALUATIONS, MOST_EVALUATIONS), "check": (0, MOST_EVALUATIONS),
+            "simulator_rows": (1, MOST_ELSEWHERE),
+            "precision": (0.0, MOST_PRECISION),
+            "budget": (LEAST_EVALUATIONS, MOST_EVALUATIONS),
+            "check": (0, MOST_EVALUATIONS),
             "seed": (0, math.inf),
         },
-    )  # fmt: skip
+    )
     elsewhere = given.simulator
     if elsewhere is not None and elsewhere.name == EMBEDDED.name:
         raise InputError(
@@ -221,18 +227,26 @@ def estimate_risk(given: RiskOptions) -> Risk:
             there = Pipeline(driven, met.space, options, simulator=elsewhere, workers=hands)
         is_object = isinstance(given.exposure, Exposure)
         command = command_of(
-            "risk", given, folder, ego=name, vehicle=vehicle,
+            "risk",
+            given,
+            folder,
+            ego=name,
+            vehicle=vehicle,
             exposure="EXPOSURE" if is_object else given.exposure,
             simulator_rows=given.simulator_rows if elsewhere else None,
-        )  # fmt: skip
+        )
         ledger = Ledger(folder, settings)
         say.compile()
         pipeline.warm_up()
         total = budget + check + (HERE if there else 0)
         experiment = Experiment(
-            pipeline, met, hands, whose, ledger,
+            pipeline,
+            met,
+            hands,
+            whose,
+            ledger,
             lambda done: say.progress("simulations", done, total, ""),
-        )  # fmt: skip
+        )
         try:
             aim = Aim(aimed.score, LEAST, budget, given.precision)
             found = methods.estimate(given.method, experiment, aim, seed, Z)
@@ -247,9 +261,13 @@ def estimate_risk(given: RiskOptions) -> Risk:
                 rows = given.simulator_rows
                 kept = kept_elsewhere(folder, elsewhere, settings)
                 beyond = Experiment(
-                    there, met, hands, whose, kept,
+                    there,
+                    met,
+                    hands,
+                    whose,
+                    kept,
                     lambda done: say.progress("elsewhere", done, rows, ""),
-                )  # fmt: skip
+                )
                 other = look_elsewhere(
                     experiment, beyond, elsewhere.name, found.weighted, aimed.score, rows, seed
                 )

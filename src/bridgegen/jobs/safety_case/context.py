@@ -43,13 +43,16 @@ def add_context(top: Draft, facts: Facts, files: Files) -> None:
         link="scenarios.md",
     )
     top.add(
-        "Context", f"{at}.2",
+        "Context",
+        f"{at}.2",
         f"Operational design domain: {scenario.title}{_road(facts)}; {_weather(facts)}.",
-        details=[*_environment(facts)], link="scenarios.md",
-    )  # fmt: skip
+        details=[*_environment(facts)],
+        link="scenarios.md",
+    )
     driver = [f"its code: file {files.driver}"] if files.driver else []
     top.add(
-        "Context", f"{at}.3",
+        "Context",
+        f"{at}.3",
         f"System under test: {facts.ego}, simulated by {settings.simulator.name}.",
         details=[
             f"driver {settings.ego}",
@@ -61,9 +64,10 @@ def add_context(top: Draft, facts: Facts, files: Files) -> None:
             + (f", digest {settings.map_digest}" if settings.map_digest else ""),
         ],
         link="drivers.md",
-    )  # fmt: skip
+    )
     top.add(
-        "Context", f"{at}.4",
+        "Context",
+        f"{at}.4",
         f"Search: {settings.algorithm}, seed {settings.seed}, budget {settings.budget}, BridgeGen "
         f"{facts.run.version}.",
         details=[
@@ -71,7 +75,7 @@ def add_context(top: Draft, facts: Facts, files: Files) -> None:
             f"digest of all evaluations {facts.triage.results}",
         ],
         link="algorithms.md",
-    )  # fmt: skip
+    )
     top.add("Context", f"{at}.5", _failure(facts), link="failure-modes.md")
 
 
@@ -156,8 +160,9 @@ def _assumptions(runs: list[Facts]) -> Iterator[tuple[str, str]]:
     for name in sorted(simulators - {EMBEDDED.name}):
         yield f"The motion of vehicles is as {name} simulates it.", "#other-simulators"
     yield (
-        "Sensors are models of detection, without images, false positives or radar.", "#sensors",
-    )  # fmt: skip
+        "Sensors are models of detection, without images, false positives or radar.",
+        "#sensors",
+    )
     yield (
         "Other participants follow scripted paths and at most adapt speed and timing. No recorded "
         "traffic stands behind the ranges.",

@@ -230,9 +230,16 @@ def drawing(found: Layout, label: str) -> Markup:
     """
     width, height = round(found.width + 4.0), round(found.height + 4.0)
     return element(
-        "svg", *map(_edge, found.edges), *map(_element, found.boxes), class_="gsn", role="img",
-        aria_label=label, width=width, height=height, viewBox=f"-2 -2 {width} {height}",
-    )  # fmt: skip
+        "svg",
+        *map(_edge, found.edges),
+        *map(_element, found.boxes),
+        class_="gsn",
+        role="img",
+        aria_label=label,
+        width=width,
+        height=height,
+        viewBox=f"-2 -2 {width} {height}",
+    )
 
 
 def _edge(edge: Edge) -> Markup:
@@ -254,9 +261,14 @@ def _element(box: Box) -> Markup:
     counter = " counter" if item.kind.startswith("Counter") else ""
     words = f"{item.id}: {item.statement.text}" + (f" ({item.status})" if item.status else "")
     return element(
-        "a", element("title", words), *_shape(box), *_text(box), *_marks(box),
-        href=f"#{item.id}", class_=f"{kind}{counter} {_CLASS[item.status]}",
-    )  # fmt: skip
+        "a",
+        element("title", words),
+        *_shape(box),
+        *_text(box),
+        *_marks(box),
+        href=f"#{item.id}",
+        class_=f"{kind}{counter} {_CLASS[item.status]}",
+    )
 
 
 def _shape(box: Box) -> Iterator[Markup]:

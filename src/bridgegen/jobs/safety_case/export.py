@@ -100,10 +100,11 @@ def _over(runs: Sequence[Facts], numbers: dict[str, Number]) -> Draft:
         of.add("joint", max(0.0, round(1.0 - bounded * (1.0 - CONFIDENCE), 12)), "percent")
         numbers |= {number.id: number for number in of.all}
         strategy.add(
-            "Justification", "1.1",
+            "Justification",
+            "1.1",
             "The confidence of an interval is that of its run alone. All of them hold together "
             "with a confidence of at least {all.joint} (Bonferroni's inequality).",
-        )  # fmt: skip
+        )
     add_assumptions(strategy, list(runs))
     return top
 

@@ -258,8 +258,12 @@ class Files:
         except OSError as error:
             raise StorageError(f"{path}: cannot be read: {error.strerror}") from None
         evidence = Evidence(
-            id=f"E{self._number}.{len(self.all) + 1}", file=file, sha256=digest, bytes=size,
-            shows=shows, command=command,
-        )  # fmt: skip
+            id=f"E{self._number}.{len(self.all) + 1}",
+            file=file,
+            sha256=digest,
+            bytes=size,
+            shows=shows,
+            command=command,
+        )
         self.all.append(evidence)
         return evidence.id

@@ -39,30 +39,34 @@ class Failures(Part):
         if not bound.judged:
             why = "too few evaluations could be judged, or the scenario did not happen."
             self._strategy.add(
-                "Goal", at,
+                "Goal",
+                at,
                 f"No failure of {self._ego} was found in {self._n('evaluations')} evaluations. The "
                 f"run was not judged: {why}",
-                undeveloped=True, link="failure-modes.md",
-            )  # fmt: skip
+                undeveloped=True,
+                link="failure-modes.md",
+            )
             return
         besides = ""
         if self._facts.triage.fresh is not None:
             besides = f" or in {self._n('drawn')} fresh random draws besides"
         goal = self._strategy.add(
-            "Goal", at,
+            "Goal",
+            at,
             f"No failure of {self._ego} was found in {self._n('evaluations')} evaluations"
             f"{besides}.",
             holds=Condition(number=self._numbers.id("failures"), equals=0),
             link="failure-modes.md",
-        )  # fmt: skip
+        )
         self._not_counted(goal, at)
         files = [self._files.run, self._files.triage]
         if not bound.harmful and not self._facts.fresh_harmful:
             goal.add(
-                "Solution", f"{at}.1",
+                "Solution",
+                f"{at}.1",
                 f"All evaluations: {self._n('harmful')} failures.{self._margins()}",
                 evidence=files,
-            )  # fmt: skip
+            )
             return
         counter = goal.challenge(
             f"{self._n('failures')} failures of {self._ego} were found: {self._n('harmful')} of "
@@ -70,9 +74,11 @@ class Failures(Part):
             details=self._ways(),
         )
         counter.add(
-            "CounterSolution", at, "All evaluations, their failure modes, and the draws.",
+            "CounterSolution",
+            at,
+            "All evaluations, their failure modes, and the draws.",
             evidence=files,
-        )  # fmt: skip
+        )
         for mode in self._facts.triage.modes[:MOST_SHOWN]:
             self._mode(counter, mode)
 
@@ -152,11 +158,12 @@ class Failures(Part):
             )
         cause = f"; root cause: {mode.cause}" if mode.cause else ""
         draft = counter.add(
-            "CounterGoal", at,
+            "CounterGoal",
+            at,
             f"{self._ego} {self._n(f'title{k}')}: {self._n(f'count{k}')} evaluations; "
             f"{near}{cause}.",
             details=[", ".join(way_of(mode))],
-        )  # fmt: skip
+        )
         severity = ""
         if f"severity{k}" in self._numbers:
             severity = f", MAIS3+ {self._n(f'severity{k}')}"
@@ -164,7 +171,8 @@ class Failures(Part):
         if f"simplest{k}" in self._numbers:
             where = f" Simplest form: {self._n(f'simplest{k}')}."
         draft.add(
-            "CounterSolution", at,
+            "CounterSolution",
+            at,
             f"Evaluation {self._n(f'at{k}')}: harm {self._n(f'harm{k}')}{severity}.{where}",
             evidence=[self._files.run, *self._files.modes[k]],
-        )  # fmt: skip
+        )

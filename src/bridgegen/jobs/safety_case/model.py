@@ -14,9 +14,15 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 FILE = "safety-case.json"
 
 Kind = Literal[
-    "Goal", "Strategy", "Solution", "Context", "Assumption", "Justification",
-    "CounterGoal", "CounterSolution",
-]  # fmt: skip
+    "Goal",
+    "Strategy",
+    "Solution",
+    "Context",
+    "Assumption",
+    "Justification",
+    "CounterGoal",
+    "CounterSolution",
+]
 RelationKind = Literal["SupportedBy", "InContextOf", "Challenges"]
 
 Status = Literal["supported", "not supported", "incomplete", "undeveloped", ""]

@@ -74,9 +74,15 @@ class Numbers:
             again: the command that determines it anew, where no file has what it follows from.
         """
         self._held[self.id(name)] = Number(
-            id=self.id(name), value=value, unit=unit, form=form, text=written(value, form),
-            of=of, source="" if again else source, again=again,
-        )  # fmt: skip
+            id=self.id(name),
+            value=value,
+            unit=unit,
+            form=form,
+            text=written(value, form),
+            of=of,
+            source="" if again else source,
+            again=again,
+        )
 
 
 def statement(template: str, numbers: dict[str, Number]) -> Statement:

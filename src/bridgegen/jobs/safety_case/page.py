@@ -46,12 +46,18 @@ def page(case: SafetyCase, data: bytes) -> bytes:
             drawn.append((f"{run.id}: {label}", label, _drawn(case, goal, label)))
     return templates.page(
         "jobs/safety_case/page.html",
-        title=f"Safety case: {case.title}", case=case, top=top, drawn=drawn,
+        title=f"Safety case: {case.title}",
+        case=case,
+        top=top,
+        drawn=drawn,
         elements=[(element, _relations(case, element)) for element in case.elements],
         files={evidence.id: evidence for evidence in case.evidence},
-        states=_STATES, meaning=_MEANING, site=SITE, file=FILE,
+        states=_STATES,
+        meaning=_MEANING,
+        site=SITE,
+        file=FILE,
         digest=hashlib.sha256(data).hexdigest(),
-    )  # fmt: skip
+    )
 
 
 def _drawn(case: SafetyCase, goal: Element, label: str, *, deep: bool = True) -> str:
@@ -61,8 +67,14 @@ def _drawn(case: SafetyCase, goal: Element, label: str, *, deep: bool = True) ->
 def _relations(case: SafetyCase, element: Element) -> list[tuple[str, list[str]]]:
     """Return what an element is related to: how, and the ids of the others."""
     found = (
-        (words, [each.target for each in case.relations
-                 if (each.source, each.kind) == (element.id, kind)])
+        (
+            words,
+            [
+                each.target
+                for each in case.relations
+                if (each.source, each.kind) == (element.id, kind)
+            ],
+        )
         for kind, words in _RELATIONS.items()
-    )  # fmt: skip
+    )
     return [(words, names) for words, names in found if names]

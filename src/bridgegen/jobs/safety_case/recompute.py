@@ -99,10 +99,14 @@ def recompute(what: str, of: str, run: dict[str, Any], folder: Path, confidence:
     mode = modes[int(of) - 1] if of.isdecimal() and 0 < int(of) <= len(modes) else {}
     course = "" if of == "harm" else f" AND {column['harm']} >= 0.1"  # on a collision course
     place = column | {
-        "bad": bad, "margin": column.get(f"criterion:{of}"), "worth": column.get(of),
-        "near": FIT + course, "order": "ASC" if of == "course_ttc" else "DESC",
-        "of": "'" + of.replace("'", "''") + "'", "row": mode.get("worst"),
-    }  # fmt: skip
+        "bad": bad,
+        "margin": column.get(f"criterion:{of}"),
+        "worth": column.get(of),
+        "near": FIT + course,
+        "order": "ASC" if of == "course_ttc" else "DESC",
+        "of": "'" + of.replace("'", "''") + "'",
+        "row": mode.get("worst"),
+    }
 
     def ask(text: str) -> Any:
         return sql.execute("SELECT " + text.format(**place) + " LIMIT 1").fetchone()[0]

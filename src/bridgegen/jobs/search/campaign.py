@@ -204,9 +204,15 @@ def run_search(given: SearchArguments) -> Run:
         )
         searcher = searcher_of(pipeline, made_with, callbacks.warning)  # it may refuse
         with Store.create(
-            folder, made_with.to_dict(), space.names, pipeline.metrics,
-            n_var=space.n_var, n_obj=chosen.n_obj, labels=space.labels, domain=domain,
-        ) as store:  # fmt: skip
+            folder,
+            made_with.to_dict(),
+            space.names,
+            pipeline.metrics,
+            n_var=space.n_var,
+            n_obj=chosen.n_obj,
+            labels=space.labels,
+            domain=domain,
+        ) as store:
             return _go(pipeline, searcher, store, made_with, callbacks, given.deliver)
 
 
@@ -251,9 +257,15 @@ def resume(
         check_named(run.settings.algorithm, algorithm, "algorithm", run.folder, "resume")
         require_asynchronous(run.settings, toolkit.get(run.settings.algorithm))
         pipeline = pipeline_of(
-            run, "resume", ego=ego, worse_than=worse_than, compares=True, causes=True,
-            simulator=simulator, workers=pool,
-        )  # fmt: skip
+            run,
+            "resume",
+            ego=ego,
+            worse_than=worse_than,
+            compares=True,
+            causes=True,
+            simulator=simulator,
+            workers=pool,
+        )
         callbacks.stage("compile")
         pipeline.warm_up()
         settings = run.settings
@@ -286,9 +298,14 @@ def _go(
         evaluating = pipeline.stream() if settings.ahead else nullcontext(pipeline.evaluate)
         with evaluating as evaluate:
             result = run_loop(
-                algorithm, pipeline.space.decode, evaluate, store, settings.budget, on_batch,
+                algorithm,
+                pipeline.space.decode,
+                evaluate,
+                store,
+                settings.budget,
+                on_batch,
                 ahead=settings.ahead or 0,
-            )  # fmt: skip
+            )
     except WorkersError as error:
         raise _workers_lost(error, store) from error
     store.require_there()
@@ -331,10 +348,15 @@ def _finish(
         best = _critical_by_objective(rows, settings.keep)
     if records_harm:
         triaged = triage(
-            pipeline, rows, algorithm=settings.algorithm, seed=settings.seed, keep=settings.keep,
-            chosen=best.tolist() if rule == "criteria" else None, effort=effort(settings.triage),
+            pipeline,
+            rows,
+            algorithm=settings.algorithm,
+            seed=settings.seed,
+            keep=settings.keep,
+            chosen=best.tolist() if rule == "criteria" else None,
+            effort=effort(settings.triage),
             domain=store.domain,
-        )  # fmt: skip
+        )
         record = triaged.record
         if rule != "criteria":
             best = np.array(triaged.exports, dtype=np.int64)

@@ -85,15 +85,23 @@ def export_critical(
             quick, judged = Cause(rows.cause[i]), ""
             if conflict is not None and conflict.happened:
                 judged = judgement(
-                    tested.cause if tested is not None and tested.cause else quick.label, tested,
-                    preventable=conflict.preventable, responsible=conflict.responsible,
-                )  # fmt: skip
+                    tested.cause if tested is not None and tested.cause else quick.label,
+                    tested,
+                    preventable=conflict.preventable,
+                    responsible=conflict.responsible,
+                )
                 conflict = conflict.reconciled(judged)
             try:
                 files = write_scenario(
-                    pipeline, rows.X[i], fresh, name, _cause(quick, tested),
-                    rollout=rollout, row=row, conflict=conflict,
-                )  # fmt: skip
+                    pipeline,
+                    rows.X[i],
+                    fresh,
+                    name,
+                    _cause(quick, tested),
+                    rollout=rollout,
+                    row=row,
+                    conflict=conflict,
+                )
             except OntologyError as error:
                 refused.append(Refused(name, int(rows.id[i]), error.problems))
                 continue

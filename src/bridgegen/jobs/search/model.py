@@ -199,8 +199,11 @@ class Model:
         """Whether ``evaluate`` adds a column, which is no parameter."""
         findings = (item.name for item in fields(Findings))
         return name not in self.columns and name in {
-            *self._pipeline.metrics, *findings, "critical", "problem"
-        }  # fmt: skip
+            *self._pipeline.metrics,
+            *findings,
+            "critical",
+            "problem",
+        }
 
     @property
     def columns(self) -> tuple[str, ...]:

@@ -99,9 +99,14 @@ def regions_of(
     rows, settings, place = run.rows(), run.settings, run.folder
     with open_workers(workers) as pool:
         pipeline = pipeline_of(
-            run, "regions", ego=ego, worse_than=worse_than, compares=True, simulator=simulator,
+            run,
+            "regions",
+            ego=ego,
+            worse_than=worse_than,
+            compares=True,
+            simulator=simulator,
             workers=pool,
-        )  # fmt: skip
+        )
         space, ok = pipeline.space, rows.status == 0
         check(space, rows.critical[ok], samples, at_least)
         stage("compile")
@@ -109,9 +114,15 @@ def regions_of(
         stage("regions")
         seed = settings.seed if seed is None else seed
         found = find_regions(
-            space, pipeline.evaluate, rows.X[ok], rows.critical[ok],
-            samples=samples, at_least=at_least, seed=seed, progress=progress,
-        )  # fmt: skip
+            space,
+            pipeline.evaluate,
+            rows.X[ok],
+            rows.critical[ok],
+            samples=samples,
+            at_least=at_least,
+            seed=seed,
+            progress=progress,
+        )
     driver = pipeline.driver.label
     record: dict[str, Any] = {
         "run": str(place),
@@ -136,10 +147,13 @@ def regions_of(
     files = [place / JSON_FILE, *([place / OWL_FILE] if stated else [])]
     files += rewrite_report(run, pipeline, stage)
     return RunRegions(
-        place, space, found, record,
+        place,
+        space,
+        found,
+        record,
         files=tuple(files),
         unstated=tuple(region for region in found.confirmed if region not in stated),
-    )  # fmt: skip
+    )
 
 
 def _add_exposure(record: dict[str, Any], found: Found, X: Float, space: SearchSpace) -> None:

@@ -234,10 +234,13 @@ def judged(store: Store, settings: Settings) -> tuple[CriterionSummary, ...]:
 def _summary(store: Store, rows: Rows | Recorded) -> Summary:
     metric = store.metrics.index
     return summarise(
-        rows.critical, rows.status == 0,
-        rows.metrics[:, metric("d_min")], rows.metrics[:, metric("v_d")], rows.cause,
+        rows.critical,
+        rows.status == 0,
+        rows.metrics[:, metric("d_min")],
+        rows.metrics[:, metric("v_d")],
+        rows.cause,
         store.seconds,
-    )  # fmt: skip
+    )
 
 
 def _happening(store: Store, rows: Rows | Recorded) -> Happening:

@@ -156,8 +156,11 @@ def _columns(store: Store, of_run: dict[str, Any], rows: Rows, weight: Float) ->
     n, columns = len(rows), store.columns
     found: dict[str, Any] = {name: [item] * n for name, item in of_run.items()}
     found |= {"id": rows.id, "batch": rows.batch, "seconds": rows.seconds}
-    for names, values in ((columns.X, rows.X), (columns.metrics, rows.metrics),
-                          (columns.F, rows.F)):  # fmt: skip
+    for names, values in (
+        (columns.X, rows.X),
+        (columns.metrics, rows.metrics),
+        (columns.F, rows.F),
+    ):
         found |= dict(zip(names, values.T, strict=True))
     for name, label in _labels(store):
         if words := label.get("words"):
@@ -167,6 +170,8 @@ def _columns(store: Store, of_run: dict[str, Any], rows: Rows, weight: Float) ->
     found |= {"status": rows.status.astype(np.int16), "critical": rows.critical}
     labels = {int(item): Cause(item).label or None for item in np.unique(rows.cause)}
     found["cause"] = [labels[item] for item in rows.cause.tolist()]
-    found |= {name: [text or None for text in texts.tolist()]
-              for name, texts in rows.findings.columns().items()}  # fmt: skip
+    found |= {
+        name: [text or None for text in texts.tolist()]
+        for name, texts in rows.findings.columns().items()
+    }
     return found | {WEIGHT: weight}

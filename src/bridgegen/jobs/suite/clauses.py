@@ -91,11 +91,16 @@ def _result(
     letters = [letter for result, number in stated for letter in result.letters(number)]
     counts = Counter(letters)
     return ClauseResult(
-        id, text, ego, tuple(dict.fromkeys(result.entry for result, _ in stated)),
-        passed=counts[PASSED] + counts[EXCUSED], failed=counts[FAILED],
-        not_run=counts[NOT_RUN], not_applicable=counts[NOT_APPLICABLE],
+        id,
+        text,
+        ego,
+        tuple(dict.fromkeys(result.entry for result, _ in stated)),
+        passed=counts[PASSED] + counts[EXCUSED],
+        failed=counts[FAILED],
+        not_run=counts[NOT_RUN],
+        not_applicable=counts[NOT_APPLICABLE],
         unpreventable=counts[EXCUSED],
-    )  # fmt: skip
+    )
 
 
 def judged(
@@ -175,9 +180,12 @@ def _classes(
         if not open_.any():
             break
         model = Pipeline(
-            scenario, pipeline.space, PipelineOptions(ego=name, vehicle=pipeline.runner.vehicle),
-            simulator=simulator, workers=Threads(1),
-        )  # fmt: skip
+            scenario,
+            pipeline.space,
+            PipelineOptions(ego=name, vehicle=pipeline.runner.vehicle),
+            simulator=simulator,
+            workers=Threads(1),
+        )
         codes[open_] = outcomes(model, X[open_])
         open_ &= codes != Outcome.AVOIDED
     return classes(ego, theirs)

@@ -242,9 +242,16 @@ def _searched(
 ) -> WorseThan:
     """Search one scenario, resume the search, or read what it found."""
     options = SearchOptions.of(
-        job.options, ego=job.ego, worse_than=first, distribution=job.entry.distribution,
-        algorithm=ALGORITHM, budget=budget, seed=seed, simulator=job.simulator, causes=True,
-    )  # fmt: skip
+        job.options,
+        ego=job.ego,
+        worse_than=first,
+        distribution=job.entry.distribution,
+        algorithm=ALGORITHM,
+        budget=budget,
+        seed=seed,
+        simulator=job.simulator,
+        causes=True,
+    )
     how = SearchCallbacks(batch=lambda batch: progress(batch.evaluations))
     name = job.entry.name
     folder = home / _folder_name(job, replace(job, ego=first), options)

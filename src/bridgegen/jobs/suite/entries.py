@@ -114,9 +114,10 @@ def find_entries(given: Sequence[str | Path]) -> tuple[Entry, ...]:
     kept = [
         item
         for item in found.values()
-        if item.distribution or not Path(item.scenario).is_file()
+        if item.distribution
+        or not Path(item.scenario).is_file()
         or Path(item.scenario).resolve() not in varied
-    ]  # fmt: skip
+    ]
     read = dict[Path, FailureFile]()
     return _named([indexed(item, read) for item in kept])
 

@@ -209,9 +209,11 @@ def _of_run(
         raise InputError(f"{folder}: the ego of this run must be {settings.ego}, got {given}")
     ego = settings.ego if code else None
     options = CommonOptions(
-        criteria=settings.criteria, count=run.triage.count,
-        ideal=settings.ideal if ego else (), vehicle=settings.vehicle,
-    )  # fmt: skip
+        criteria=settings.criteria,
+        count=run.triage.count,
+        ideal=settings.ideal if ego else (),
+        vehicle=settings.vehicle,
+    )
     exported = {item.name: item.evaluation for item in exported_scenarios(folder)}
     moded = {name for mode in run.modes for name in mode.exports}
 
@@ -257,8 +259,13 @@ def _of_mode(
     None if only another scenario is asked for.
     """
     key = Key(
-        mode.conflict, mode.conflict_type, mode.responsible, mode.partner, mode.place, mode.cause,
-    )  # fmt: skip
+        mode.conflict,
+        mode.conflict_type,
+        mode.responsible,
+        mode.partner,
+        mode.place,
+        mode.cause,
+    )
     kept = [name for name in mode.exports if name in exported]
     minimal = mode.minimal
     if minimal is None or not (folder / FOLDER / f"{minimal.name}.xosc").is_file():

@@ -192,15 +192,26 @@ def _kept(found: Failing, way: Way, id: str, to: Path) -> tuple[Failure, str, bo
         shutil.rmtree(stage, ignore_errors=True)
     key, metrics = way.key, there.metrics
     failure = Failure(
-        title=_cut(way.title), scenario=_cut(found.scenario),
-        conflict=key.conflict, type=key.conflict_type,
-        responsible=key.responsible, rule=way.rule, partner=key.partner, place=key.place,
-        cause=key.cause, minimal=_cut(needs),
+        title=_cut(way.title),
+        scenario=_cut(found.scenario),
+        conflict=key.conflict,
+        type=key.conflict_type,
+        responsible=key.responsible,
+        rule=way.rule,
+        partner=key.partner,
+        place=key.place,
+        cause=key.cause,
+        minimal=_cut(needs),
         violates=[CriterionSection.model_validate(violated) for violated in way.violates],
-        count="any" if found.job.options.count == "any" else "ego", driver=_cut(way.driver),
-        found=found.found, seed=found.seed, version=version("bridgegen"), harm=there.harm,
-        severity=float(np.nan_to_num(metrics["severity"])), files=files,
-    )  # fmt: skip
+        count="any" if found.job.options.count == "any" else "ego",
+        driver=_cut(way.driver),
+        found=found.found,
+        seed=found.seed,
+        version=version("bridgegen"),
+        harm=there.harm,
+        severity=float(np.nan_to_num(metrics["severity"])),
+        files=files,
+    )
     return failure, "; ".join(notes), is_same
 
 

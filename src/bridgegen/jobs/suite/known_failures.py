@@ -52,8 +52,10 @@ class KnownFailures:
         failure = self._excuse(entry_result)
         way = (row.conflict, row.conflict_type, row.responsible)
         return failure is not None and way == (
-            failure.conflict, failure.type, failure.responsible,
-        )  # fmt: skip
+            failure.conflict,
+            failure.type,
+            failure.responsible,
+        )
 
     def is_criterion_excused(self, entry_result: EntryResult, criterion: int) -> bool:
         """Return whether it is known that an entry violates a criterion, by its number."""
@@ -80,8 +82,13 @@ class KnownFailures:
         """Return how an entry stands: as its worst variation does."""
         found = {self.standing(entry_result, row) for row in entry_result.rows}
         order: tuple[Standing, ...] = (
-            "regression", "new", "not run", "known", "accepted", "passed",
-        )  # fmt: skip
+            "regression",
+            "new",
+            "not run",
+            "known",
+            "accepted",
+            "passed",
+        )
         if entry_result.problem or not entry_result.rows:
             return "not run"
         if entry_result.verdict == "not judged":

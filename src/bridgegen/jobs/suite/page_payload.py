@@ -46,8 +46,11 @@ Key = tuple[str, str]
 
 _LETTER: dict[Verdict, str] = {"passed": "p", "failed": "f", "not run": "n", "not judged": "u"}
 _OUTCOME: dict[Outcome | None, str] = {
-    "avoided": "a", "mitigated": "m", "not avoided": "n", None: "-",
-}  # fmt: skip
+    "avoided": "a",
+    "mitigated": "m",
+    "not avoided": "n",
+    None: "-",
+}
 _HAPPENED = ("contact", "near miss", "violation")
 _SEVERITIES = ("critical", "major", "minor")
 

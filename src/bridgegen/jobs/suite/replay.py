@@ -117,10 +117,15 @@ def replay(
     except OSError as error:
         raise StorageError(f"{target}: cannot be written: {error.strerror}") from None
     return Replayed(
-        number, result, job, tuple(files), target, replay_command(folder, before, number - 1),
+        number,
+        result,
+        job,
+        tuple(files),
+        target,
+        replay_command(folder, before, number - 1),
         is_same=result.rows[0] == before.rows[number - 1],
         is_same_exported=_moves_alike(result.rows[0], _of_file(job, pipeline, files[-1])),
-    )  # fmt: skip
+    )
 
 
 def _of_file(job: Job, pipeline: Pipeline, file: Path) -> EntryResult:
@@ -171,19 +176,29 @@ def job_of(suite: SuiteRun, result: EntryResult, simulator: SimulatorChoice | No
             f"{simulator.name}"
         )
     options = CommonOptions(
-        criteria=settings.criteria, critical=settings.critical, objective=settings.objective,
-        count=settings.count, ideal=settings.ideal, vehicle=settings.vehicle,
-        others=settings.others, empty_trigger=settings.empty_trigger,
+        criteria=settings.criteria,
+        critical=settings.critical,
+        objective=settings.objective,
+        count=settings.count,
+        ideal=settings.ideal,
+        vehicle=settings.vehicle,
+        others=settings.others,
+        empty_trigger=settings.empty_trigger,
         time_limit=settings.time_limit,
-    )  # fmt: skip
+    )
     entry = indexed(Entry(result.entry, result.scenario, result.distribution or None))
     chosen = SimulatorChoice(
         settings.simulator, settings.simulator_settings, simulator.access if simulator else {}
     )
     return Job(
-        entry, result.ego or None, options, chosen, settings.samples, settings.seed,
+        entry,
+        result.ego or None,
+        options,
+        chosen,
+        settings.samples,
+        settings.seed,
         settings.matrix,
-    )  # fmt: skip
+    )
 
 
 def refuse_code(results: Sequence[EntryResult], named: Sequence[str], command: str) -> None:

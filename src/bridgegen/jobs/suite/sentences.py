@@ -26,8 +26,12 @@ from bridgegen.jobs.suite.suite import SuiteRun
 Colour = Literal["green", "yellow", "orange", "brown", "red"]
 
 SUB_SCORES: dict[Colour, float] = {
-    "green": 1.0, "yellow": 0.75, "orange": 0.5, "brown": 0.25, "red": 0.0,
-}  # fmt: skip
+    "green": 1.0,
+    "yellow": 0.75,
+    "orange": 0.5,
+    "brown": 0.25,
+    "red": 0.0,
+}
 """Sub-scores by colour. Source: section 5.3.1."""
 
 KMH = 3.6
@@ -133,8 +137,11 @@ MOST_DIFFERENCES = 4
 """Largest number of kinds of differences that a sentence names."""
 
 _WORD: dict[Verdict, str] = {
-    "failed": "fails", "passed": "passes", "not judged": "is not judged", "not run": "did not run",
-}  # fmt: skip
+    "failed": "fails",
+    "passed": "passes",
+    "not judged": "is not judged",
+    "not run": "did not run",
+}
 
 
 def label_of(suite: SuiteRun, ego: str) -> str:

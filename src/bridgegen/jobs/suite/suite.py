@@ -268,9 +268,13 @@ def _run(
     def ended(job: Job, result: EntryResult | None, crash: str | None) -> None:
         if result is None:
             result = EntryResult(
-                entry=job.entry.name, ego=job.ego or "", digest="", scenario=job.entry.scenario,
-                distribution=job.entry.distribution or "", problem=crash or "",
-            )  # fmt: skip
+                entry=job.entry.name,
+                ego=job.ego or "",
+                digest="",
+                scenario=job.entry.scenario,
+                distribution=job.entry.distribution or "",
+                problem=crash or "",
+            )
         done[job.entry.name, job.ego or ""] = result
         _append(path, result.model_dump_json() + "\n")
         number[result.verdict] += 1

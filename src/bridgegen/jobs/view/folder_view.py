@@ -68,19 +68,30 @@ class FolderView:
         a, b = (read_line(self.folder, self._runs[k]) for k in (first, second))
         rows = [(name, of(a), of(b)) for name, of in _FIGURES.items()]
         return templates.page(
-            "jobs/view/pair.html", title=f"{a.path} and {b.path}", runs=((first, a), (second, b)),
-            rows=rows, matched=[*_matched(a, b)],
-        )  # fmt: skip
+            "jobs/view/pair.html",
+            title=f"{a.path} and {b.path}",
+            runs=((first, a), (second, b)),
+            rows=rows,
+            matched=[*_matched(a, b)],
+        )
 
 
 def _facts(number: int, line: RunLine) -> Mapping[str, Any]:
     bound = line.triage.bound if line.triage else None
     worst = max(line.modes, key=lambda item: (not item.knife_edge, item.harm), default=None)
     return {
-        "number": number, "path": line.path, "problem": line.problem, "changed": line.changed,
-        "size": line.size, "scenario": line.scenario, "ego": line.ego,
-        "algorithm": line.algorithm, "seed": line.seed, "evaluations": line.evaluations,
-        "budget": line.budget, "finished": line.finished,
+        "number": number,
+        "path": line.path,
+        "problem": line.problem,
+        "changed": line.changed,
+        "size": line.size,
+        "scenario": line.scenario,
+        "ego": line.ego,
+        "algorithm": line.algorithm,
+        "seed": line.seed,
+        "evaluations": line.evaluations,
+        "budget": line.budget,
+        "finished": line.finished,
         "modes": len(line.modes) + (line.triage.unrecorded_modes if line.triage else 0),
         "worst": worst.title if worst else "",
         "judged": headline(line.ego, line.criteria),
@@ -90,7 +101,7 @@ def _facts(number: int, line: RunLine) -> Mapping[str, Any]:
         "share": bound.space.share if bound else None,
         "low": bound.space.low if bound else None,
         "high": bound.space.high if bound else None,
-    }  # fmt: skip
+    }
 
 
 def _failures(line: RunLine) -> str:
@@ -137,7 +148,7 @@ def _matched(a: RunLine, b: RunLine) -> Iterator[tuple[str, list[str]]]:
             f"{ours[k][0].title}: {_count(ours[k])} and {_count(theirs[k])} evaluations"
             for k in both
         ],
-    )  # fmt: skip
+    )
     for line, own, other in ((a, ours, theirs), (b, theirs, ours)):
         alone = [group for key, group in own.items() if key not in other]
         words = [f"{group[0].title}: {_count(group)} evaluations" for group in alone]

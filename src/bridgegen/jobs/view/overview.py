@@ -133,11 +133,21 @@ def read_line(
     except BridgeGenError as error:
         return RunLine(path, changed, size, problem="; ".join(error.problems))
     return RunLine(
-        path, changed, size,
-        scenario=settings.scenario, ego=settings.ego, algorithm=settings.algorithm,
-        seed=settings.seed, evaluations=n, budget=settings.budget, finished=finished,
-        triage=triage, criteria=criteria, settings=settings, version=version,
-    )  # fmt: skip
+        path,
+        changed,
+        size,
+        scenario=settings.scenario,
+        ego=settings.ego,
+        algorithm=settings.algorithm,
+        seed=settings.seed,
+        evaluations=n,
+        budget=settings.budget,
+        finished=finished,
+        triage=triage,
+        criteria=criteria,
+        settings=settings,
+        version=version,
+    )
 
 
 def _sizes(folder: Path, depth: int = 2) -> Iterator[int]:

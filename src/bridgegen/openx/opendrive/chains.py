@@ -20,8 +20,11 @@ ROAD_TYPES = ("town", "rural", "motorway")
 """Types of road that a scenario distinguishes."""
 
 _STRIPS: dict[str, LaneType] = {
-    "shoulder": "shoulder", "stop": "shoulder", "parking": "shoulder", "sidewalk": "sidewalk"
-}  # fmt: skip
+    "shoulder": "shoulder",
+    "stop": "shoulder",
+    "parking": "shoulder",
+    "sidewalk": "sidewalk",
+}
 """Types that lanes beside the driving lanes have in a scenario, by OpenDRIVE's type."""
 
 _STEP = 2.0  # m, between places at which curvatures and widths are looked at

@@ -184,10 +184,11 @@ def _change(road: Road, item: Stretch, other: Stretch, s: float, s_end: float) -
     c, d = _centre(road, at_high, high, low)
     span = high - low
     cubic = (
-        a, b,
+        a,
+        b,
         (3.0 * (c - a) / span - 2.0 * b - d) / span,
         (2.0 * (a - c) / span + b + d) / span**2,
-    )  # fmt: skip
+    )
     middle = 0.5 * (s + s_end)
     for stretch, first, last in ((item, s, middle), (other, middle, s_end)):
         across = shifted(cubic, min(first, last) - low)

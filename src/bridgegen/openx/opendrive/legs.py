@@ -21,9 +21,10 @@ def heading(road: Road, end: str) -> float:
 def junction_end(road: Road) -> str:
     """Return which ends of a road touch a junction: start, end, both or none."""
     ends = [
-        end for end in CONTACTS
+        end
+        for end in CONTACTS
         if (link := road.link(end)) is not None and link.element_type == "junction"
-    ]  # fmt: skip
+    ]
     return "both" if len(ends) == 2 else ends[0] if ends else "none"
 
 

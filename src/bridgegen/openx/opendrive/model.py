@@ -369,9 +369,13 @@ class OpenDrive:
         touching = self.roads_by_id[connection.incoming_road].ends_at(junction_id)
         links = tuple(LaneLink(link.to_lane, link.from_lane) for link in connection.lane_links)
         return Connection(
-            connection.id, connection.entered_road, None, touching[0], links,
+            connection.id,
+            connection.entered_road,
+            None,
+            touching[0],
+            links,
             connection.incoming_road,
-        )  # fmt: skip
+        )
 
     def connecting_roads(self, junction_id: str) -> Iterator[Road]:
         """Yield the roads within a junction."""

@@ -92,10 +92,11 @@ class _Links:
             return link
         other = self._model.roads_by_id[link.element_id]
         back = [
-            end for end in CONTACTS
+            end
+            for end in CONTACTS
             if (there := other.link(end)) is not None
             and there.element_id in (road.id, road.junction)
-        ]  # fmt: skip
+        ]
         if len(back) != 1:
             self._notes.add("contact", line, f"{what} needs a contactPoint: read as the road's end")
             return None
@@ -214,8 +215,9 @@ class _Links:
 def _entry(way: Road, incoming: Road) -> str:
     """Return the end of a connecting road at which it links to a road; empty if not one does."""
     ends = [
-        end for end in CONTACTS
+        end
+        for end in CONTACTS
         if (link := way.link(end)) is not None
         and (link.element_type, link.element_id) == ("road", incoming.id)
-    ]  # fmt: skip
+    ]
     return ends[0] if len(ends) == 1 else ""

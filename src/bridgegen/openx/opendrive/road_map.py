@@ -138,10 +138,12 @@ def map_of(owl: Path) -> tuple[Path, str]:
     individuals = load(owl)
     networks = individuals.of_class("RoadNetwork")
     named = [
-        (individuals.optional_text(network, "has_map_file"),
-         individuals.optional_text(network, "has_map_digest"))
+        (
+            individuals.optional_text(network, "has_map_file"),
+            individuals.optional_text(network, "has_map_digest"),
+        )
         for network in networks
-    ]  # fmt: skip
+    ]
     if len(named) != 1 or named[0][0] is None or individuals.of_class("Scenario"):
         raise FileFormatError(
             f"{owl}: it must be a map that 'bridgegen import' made individuals of, with the file "

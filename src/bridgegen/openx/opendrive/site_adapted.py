@@ -272,9 +272,7 @@ def _on_leg(model: OpenDrive, leg: Leg) -> Iterator[Facility]:
         if at is None or cls not in ("Crosswalk", "StopLine"):
             continue
         if cls == "Crosswalk" and high > low:
-            yield Facility(
-                cls, leg.name, at, width=high - low, object_id=item.id, s=item.s
-            )  # fmt: skip
+            yield Facility(cls, leg.name, at, width=high - low, object_id=item.id, s=item.s)
         elif cls == "StopLine":
             yield Facility(cls, leg.name, at, governs=("in",), object_id=item.id, s=item.s)
     for signal in road.signals:
@@ -284,9 +282,15 @@ def _on_leg(model: OpenDrive, leg: Leg) -> Iterator[Facility]:
             continue
         if _is_for(road, signal, [lane.lane_id for lane in arm.along("in")]):
             yield Facility(
-                cls, leg.name, at, None if cls == "StopLine" else signal.t, governs=("in",),
-                speed_limit=limit, object_id=signal.id, s=signal.s,
-            )  # fmt: skip
+                cls,
+                leg.name,
+                at,
+                None if cls == "StopLine" else signal.t,
+                governs=("in",),
+                speed_limit=limit,
+                object_id=signal.id,
+                s=signal.s,
+            )
 
 
 def _lights(model: OpenDrive, site: Site, leg: Leg) -> Iterator[Facility]:

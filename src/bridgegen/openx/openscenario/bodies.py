@@ -36,9 +36,12 @@ def entity_body(
 
 
 def _vehicle(
-    kind: ParticipantKind, body: Body, mass: float | None, model: str | None,
+    kind: ParticipantKind,
+    body: Body,
+    mass: float | None,
+    model: str | None,
     properties: tuple[osc.Property, ...],
-) -> osc.Vehicle:  # fmt: skip
+) -> osc.Vehicle:
     written = kind.written
     return osc.Vehicle(
         name=model or written.name or written.category,
@@ -55,9 +58,12 @@ def _vehicle(
 
 
 def _pedestrian(
-    kind: ParticipantKind, body: Body, mass: float | None, model: str | None,
+    kind: ParticipantKind,
+    body: Body,
+    mass: float | None,
+    model: str | None,
     properties: tuple[osc.Property, ...],
-) -> osc.Pedestrian:  # fmt: skip
+) -> osc.Pedestrian:
     name = kind.written.name or kind.written.category
     return osc.Pedestrian(
         name=model or name,
@@ -70,9 +76,12 @@ def _pedestrian(
 
 
 def _object(
-    kind: ParticipantKind, body: Body, mass: float | None, model: str | None,
+    kind: ParticipantKind,
+    body: Body,
+    mass: float | None,
+    model: str | None,
     properties: tuple[osc.Property, ...],
-) -> osc.MiscObject:  # fmt: skip
+) -> osc.MiscObject:
     return osc.MiscObject(
         name=model or kind.written.name or kind.written.category,
         misc_object_category=osc.MiscObjectCategory(kind.written.category),

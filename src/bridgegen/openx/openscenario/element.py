@@ -228,13 +228,16 @@ def _declare(cls: type[Element]) -> Declaration:
             limits = [mark for mark in marks if isinstance(mark, Range)]
             name = _camel_case(item.name)
             attributes[name] = Attribute(
-                field=item.name, name=name, kind=kinds[0] if kinds else Kind.STRING,
-                enum=enums[0] if enums else None, required=required,
+                field=item.name,
+                name=name,
+                kind=kinds[0] if kinds else Kind.STRING,
+                enum=enums[0] if enums else None,
+                required=required,
                 is_literal=ParameterRef not in options,
                 takes_expressions=Expr in options,
                 limits=limits[0] if limits else None,
                 means=next((mark for mark in marks if isinstance(mark, Meaning)), None),
-            )  # fmt: skip
+            )
         elif options and all(isinstance(o, type) and issubclass(o, Element) for o in options):
             children.append(_child(item.name, options, marks, many, required))
         else:

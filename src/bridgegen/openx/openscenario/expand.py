@@ -433,8 +433,11 @@ def _is_no_trailer(element: Element) -> bool:
 
 
 def _height(element: Element) -> int:
-    below = [_height(item) for child in declaration(type(element)).children
-             for item in _held(element, child)]  # fmt: skip
+    below = [
+        _height(item)
+        for child in declaration(type(element)).children
+        for item in _held(element, child)
+    ]
     return 1 + max(below, default=0)
 
 

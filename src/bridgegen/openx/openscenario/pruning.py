@@ -26,10 +26,16 @@ from bridgegen.openx.openscenario.storyboard import ManeuverGroup, OpenScenario
 
 _WHOLES = frozenset(
     {
-        "ConditionGroup", "Event", "GlobalAction", "ObjectController", "ParameterDeclaration",
-        "PrivateAction", "ScenarioObject", "TrafficSignalController",
+        "ConditionGroup",
+        "Event",
+        "GlobalAction",
+        "ObjectController",
+        "ParameterDeclaration",
+        "PrivateAction",
+        "ScenarioObject",
+        "TrafficSignalController",
     }
-)  # fmt: skip
+)
 _ENDS = frozenset({"Event", "ScenarioObject"})
 _NEVER_EMPTY = frozenset({"Act", "Maneuver", "Private", "Story"})
 _LOCAL = "ParameterDeclarations"  # of a story or a maneuver: what is below refers to them

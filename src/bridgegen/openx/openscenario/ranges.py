@@ -300,9 +300,15 @@ class _Builder:
         declared = float(self._words[name].index(str(self._declared[name].value)))
         default = declared if declared in found.values else found.values[0]
         self._categories[name] = FileParameter(
-            name, self._axis(name), self._unit(name), found.low, found.high, default,
-            Category(self._words[name]), distribution=found,
-        )  # fmt: skip
+            name,
+            self._axis(name),
+            self._unit(name),
+            found.low,
+            found.high,
+            default,
+            Category(self._words[name]),
+            distribution=found,
+        )
 
     def _codes(self, name: str, words: list[str]) -> list[float]:
         """Return the numbers of a text's values, and remember which text each stands for.
@@ -380,16 +386,26 @@ class _Builder:
                 index += "_"
             last = len(next(iter(columns.values()))) - 1
             parameters[index] = FileParameter(
-                index, Axis.PARTICIPANTS, "count", 0.0, float(last), 0.0, INTEGER,
+                index,
+                Axis.PARTICIPANTS,
+                "count",
+                0.0,
+                float(last),
+                0.0,
+                INTEGER,
                 WHICH_SET,
-            )  # fmt: skip
+            )
             joint += [
                 DerivedParameter(
-                    name, self._axis(name), self._unit(name), lookup(index, values),
-                    "The values of a set are taken together.", "ParameterValueSet",
+                    name,
+                    self._axis(name),
+                    self._unit(name),
+                    lookup(index, values),
+                    "The values of a set are taken together.",
+                    "ParameterValueSet",
                 )
                 for name, values in columns.items()
-            ]  # fmt: skip
+            ]
         derived = [*joint, *self._formulas({parameter.name for parameter in joint})]
         following = {item.name for item in derived}
         own = {name: self._parameter(name) for name in self._numbers if name not in following}
@@ -402,9 +418,14 @@ class _Builder:
         ]
         names, combinations = self._combinations()
         return Ranges(
-            made, tuple(derived), tuple(bounds), self._words, names, combinations,
+            made,
+            tuple(derived),
+            tuple(bounds),
+            self._words,
+            names,
+            combinations,
             tuple(self.notes),
-        )  # fmt: skip
+        )
 
     def _combinations(self) -> tuple[tuple[str, ...], tuple[tuple[float, ...], ...]]:
         """Return the texts on which the storyboard depends, and which values come together.
@@ -453,9 +474,13 @@ class _Builder:
             formula = parse(text, f"{PARAMETER}.{name}.expression", self._words)
             if formula.names <= self._numbers.keys() | self._words.keys():
                 yield DerivedParameter(
-                    name, self._axis(name), self._unit(name), formula,
-                    "The file's header says so.", "FileHeader",
-                )  # fmt: skip
+                    name,
+                    self._axis(name),
+                    self._unit(name),
+                    formula,
+                    "The file's header says so.",
+                    "FileHeader",
+                )
 
     def _parameter(self, name: str) -> Parameter:
         declared = self._numbers[name]
@@ -465,10 +490,15 @@ class _Builder:
         if whole:
             low, high = float(math.ceil(low)), float(math.floor(high))
         return FileParameter(
-            name, self._axis(name), self._unit(name), low, high, min(max(declared, low), high),
+            name,
+            self._axis(name),
+            self._unit(name),
+            low,
+            high,
+            min(max(declared, low), high),
             INTEGER if whole else FLOAT,
             distribution=None if isinstance(found, Uniform) else found,
-        )  # fmt: skip
+        )
 
     def _kind(self, name: str) -> Kind:
         """Return the type of a parameter that is to vary.

@@ -217,9 +217,10 @@ def _stories(board: osc.Storyboard, recording: Recording) -> Iterator[osc.Story]
                 maneuvers = []
                 for maneuver in group.maneuvers:
                     events = [
-                        item for event in maneuver.events
+                        item
+                        for event in maneuver.events
                         for item in _event(event, next(began) * recording.time_step)
-                    ]  # fmt: skip
+                    ]
                     if events:
                         maneuvers.append(replace(maneuver, events=tuple(events)))
                 if maneuvers:

@@ -59,8 +59,10 @@ def part_resolved(part: E, scenario: osc.OpenScenario, place: str) -> E:
                 if not np.isfinite(number) or not whole:
                     what = "a whole number" if attribute.kind.is_integer else "finite"
                     tag = f"{attribute.name} of {type(element).__name__}"
-                    found.append(f"{place}: {tag} must be {what}, got {value} = {number:g} "
-                                 f"(line {element.line})")  # fmt: skip
+                    found.append(
+                        f"{place}: {tag} must be {what}, got {value} = {number:g} "
+                        f"(line {element.line})"
+                    )
                     continue
                 is_text = attribute.kind is Kind.STRING  # a value of any type
                 changes[attribute.field] = (

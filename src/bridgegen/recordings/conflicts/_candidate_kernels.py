@@ -8,9 +8,19 @@ from bridgegen.base.compiled import kernel
 
 @kernel
 def mark_pairs(
-    order: Int, first: Int, participant: Int, x: Float, y: Float, vx: Float, vy: Float,
-    reach: Float, moves: Bool, horizon: float, farthest: float, keys: Int,
-) -> int:  # fmt: skip
+    order: Int,
+    first: Int,
+    participant: Int,
+    x: Float,
+    y: Float,
+    vx: Float,
+    vy: Float,
+    reach: Float,
+    moves: Bool,
+    horizon: float,
+    farthest: float,
+    keys: Int,
+) -> int:
     """Write the pairs that would come within reach of each other at constant velocity.
 
     A pair is p · P + q with p < q, P participants; it is written at each instant.

@@ -110,9 +110,18 @@ def candidates(traffic: RecordedTraffic, clock: Clock) -> dict[int, list[int]]:
     keys = np.empty(1 << 20, np.int64)
     for begin in range(0, len(first) - 1, BLOCK):
         arguments = (
-            by_instant, first[begin : begin + BLOCK + 1], participant, traffic.x, traffic.y,
-            traffic.vx, traffic.vy, reach, moves, HORIZON, FARTHEST,
-        )  # fmt: skip
+            by_instant,
+            first[begin : begin + BLOCK + 1],
+            participant,
+            traffic.x,
+            traffic.y,
+            traffic.vx,
+            traffic.vy,
+            reach,
+            moves,
+            HORIZON,
+            FARTHEST,
+        )
         count = mark_pairs(*arguments, keys)
         if count > len(keys):
             keys = np.empty(count, np.int64)
@@ -143,9 +152,10 @@ def _of_ego(
         last = min(first + span - 1, end)
         around = max(first - context, begin), min(last + context, end)
         there = [
-            other for other in others
+            other
+            for other in others
             if clock.begin[other] <= around[1] and clock.end[other] >= around[0]
-        ]  # fmt: skip
+        ]
         for conflict in _of_part(traffic, clock, ego, there, *around):
             if first <= conflict.instant <= last:
                 yield conflict
@@ -164,9 +174,12 @@ def _of_part(
         for e in np.flatnonzero(kind == worst).tolist():
             other, instant = left[e - 1], int(by_clock.instant[0, e])
             yield RecordedConflict(
-                ego, other, instant, of_pair(by_clock, 0, e, "any"),
+                ego,
+                other,
+                instant,
+                of_pair(by_clock, 0, e, "any"),
                 _doubt(traffic, clock, ego, other, instant),
-            )  # fmt: skip
+            )
         if worst == NEAR_MISS:
             return
         left = [other for e, other in enumerate(left, 1) if kind[e] != CONTACT]

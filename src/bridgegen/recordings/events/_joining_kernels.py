@@ -10,9 +10,9 @@ from bridgegen.recordings.events._crossing_kernels import passed
 
 
 @kernel
-def foot(x: Float, y: Float, first: int, last: int, at: int, px: float, py: float) -> tuple[
-    float, int
-]:  # fmt: skip
+def foot(
+    x: Float, y: Float, first: int, last: int, at: int, px: float, py: float
+) -> tuple[float, int]:
     """Return the distance of a point from a line [m], and the vertex of the line next to it.
 
     The line is followed from one of its vertices on, as long as it comes nearer.
@@ -43,9 +43,15 @@ def foot(x: Float, y: Float, first: int, last: int, at: int, px: float, py: floa
 
 @kernel
 def joined(
-    x: Float, y: Float, number: int, first: int, other: int, other_first: int, other_last: int,
+    x: Float,
+    y: Float,
+    number: int,
+    first: int,
+    other: int,
+    other_first: int,
+    other_last: int,
     near: float,
-) -> tuple[int, float, int]:  # fmt: skip
+) -> tuple[int, float, int]:
     """Return where a line comes nearer than a distance to another, and stays so up to a vertex.
 
     Args:

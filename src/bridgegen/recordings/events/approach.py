@@ -34,13 +34,18 @@ def find(scene: Scene, changes: LaneChanges) -> Events:
     begin = scene.clock.instant[first].astype(np.float64)
     end = scene.clock.instant[last].astype(np.float64)
     return events_of(
-        "approach", ego, {"lead": lead}, (scene.seconds(begin), scene.seconds(end)),
+        "approach",
+        ego,
+        {"lead": lead},
+        (scene.seconds(begin), scene.seconds(end)),
         {
-            "ego_speed": scene.speed[first], "lead_speed": scene.speed[lead_state],
+            "ego_speed": scene.speed[first],
+            "lead_speed": scene.speed[lead_state],
             "relative_speed": scene.speed[first] - scene.speed[lead_state],
-            "gap": ahead.gap[first], "lead_offset": scene.placed.offset[lead_state],
+            "gap": ahead.gap[first],
+            "lead_offset": scene.placed.offset[lead_state],
             "lane_width": scene.lane_width(ego, begin),
             "lead_time": scene.led_time(ego, lead, begin),
         },
         {OVERLAP: least_of(ahead.gap, first, last) <= 0.0},
-    )  # fmt: skip
+    )

@@ -92,9 +92,7 @@ def lane_changes(scene: Scene) -> LaneChanges:
     lateral = _of_rear_axle(scene, offset) + np.cumsum(shift)
     first, last = _pieces(scene, state, jumps)
     speed = np.abs(_mean_around(across, state, first, last, round(0.25 / scene.step)))
-    duration = np.clip(
-        0.5 * np.pi * np.abs(apart) / np.maximum(speed, 1e-3), SHORTEST, LONGEST
-    )  # fmt: skip
+    duration = np.clip(0.5 * np.pi * np.abs(apart) / np.maximum(speed, 1e-3), SHORTEST, LONGEST)
     duration /= scene.step
     fit = fit_steps(
         lateral, first, last, (state - 0.5 - 0.5 * duration, duration), scene.step, "cosine"
@@ -113,9 +111,16 @@ def lane_changes(scene: Scene) -> LaneChanges:
     cut = CUT / scene.step
     is_whole = (fit.begin >= first - cut) & (fit.begin + fit.duration <= last + cut)
     found = LaneChanges(
-        who[state], state, side, begin, end, np.abs(fit.height), is_change, is_whole,
+        who[state],
+        state,
+        side,
+        begin,
+        end,
+        np.abs(fit.height),
+        is_change,
+        is_whole,
         scene.clock.instant[state].astype(np.float64),
-    )  # fmt: skip
+    )
     return _without(found, _touches(found, BACK / scene.step))
 
 
@@ -136,10 +141,12 @@ def _sides(lanes: RecordedLanes, a: Int, b: Int) -> Int:
 def _of_rear_axle(scene: Scene, offset: Float) -> Float:
     """Return the offset of every state's rear axle [m]; off the lanes that of the state before."""
     traffic = scene.traffic
-    ahead = np.array([
-        centre_ahead(kind, length)
-        for kind, length in zip(traffic.kind.tolist(), traffic.length.tolist(), strict=True)
-    ])  # fmt: skip
+    ahead = np.array(
+        [
+            centre_ahead(kind, length)
+            for kind, length in zip(traffic.kind.tolist(), traffic.length.tolist(), strict=True)
+        ]
+    )
     heading = np.asarray(scene.placed.heading, np.float64)
     ahead_of = np.repeat(ahead, np.diff(traffic.first))
     return np.asarray(np.nan_to_num(offset - ahead_of * np.sin(heading)), np.float64)

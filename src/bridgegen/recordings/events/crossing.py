@@ -18,11 +18,12 @@ from bridgegen.recordings.events.scene import Scene
 def find(scene: Scene, changes: LaneChanges) -> Events:
     """Return the crossings of a recording; of two that go straight on, from both views."""
     met = [
-        meeting for meeting in meetings(scene, scene.is_ego, scene.is_ego)
+        meeting
+        for meeting in meetings(scene, scene.is_ego, scene.is_ego)
         if CROSSING[0] <= meeting.angle <= CROSSING[1]
         and meeting.approach_angle < OPPOSITE
         and abs(meeting.ego_turn) <= STRAIGHT
-    ]  # fmt: skip
+    ]
     paces = paces_of(scene, met)
     return events_of_meetings(
         "crossing", scene, met, lambda meeting: _more(scene, meeting) | paces[meeting]

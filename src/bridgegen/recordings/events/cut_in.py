@@ -36,13 +36,21 @@ def find(scene: Scene, changes: LaneChanges) -> Events:
     own = scene.state(ego, begin)
     course = scene.traffic.heading[own] - np.asarray(scene.placed.heading, np.float64)[own]
     return events_of(
-        "cut-in", ego, {"other": other}, (scene.seconds(begin), scene.seconds(end)),
+        "cut-in",
+        ego,
+        {"other": other},
+        (scene.seconds(begin), scene.seconds(end)),
         {
-            "ego_speed": speed, "other_speed": other_speed,
-            "relative_speed": speed - other_speed, "gap": at_begin, "crossing_gap": gap,
+            "ego_speed": speed,
+            "other_speed": other_speed,
+            "relative_speed": speed - other_speed,
+            "gap": at_begin,
+            "crossing_gap": gap,
             "lateral_distance": np.abs(dy * np.cos(course) - dx * np.sin(course)),
-            "change_time": duration, "lateral_speed": changes.move[picked] / duration,
-            "side": -changes.side[picked], "lane_width": scene.lane_width(ego, begin),
+            "change_time": duration,
+            "lateral_speed": changes.move[picked] / duration,
+            "side": -changes.side[picked],
+            "lane_width": scene.lane_width(ego, begin),
             "lead_time": scene.together(ego, other, begin),
         },
         {
@@ -51,4 +59,4 @@ def find(scene: Scene, changes: LaneChanges) -> Events:
             NOT_WHOLE: ~changes.is_whole[picked] | np.isnan(at_begin),
             EGO_CHANGES: changes.meanwhile(ego, begin, end),
         },
-    )  # fmt: skip
+    )

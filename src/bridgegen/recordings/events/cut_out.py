@@ -29,23 +29,30 @@ def find(scene: Scene, changes: LaneChanges) -> Events:
     duration = (end - begin) * scene.step
     there = revealed >= 0
     return events_of(
-        "cut-out", ego, {"lead": lead, "revealed": revealed},
+        "cut-out",
+        ego,
+        {"lead": lead, "revealed": revealed},
         (scene.seconds(begin), scene.seconds(end)),
         {
             "ego_speed": scene.at(scene.speed, ego, begin),
-            "lead_speed": scene.at(scene.speed, lead, begin), "gap": gap,
+            "lead_speed": scene.at(scene.speed, lead, begin),
+            "gap": gap,
             "revealed_speed": np.where(there, scene.at(scene.speed, revealed, begin), np.nan),
             "revealed_gap": np.where(there, revealed_gap, np.nan),
-            "change_time": duration, "lateral_speed": changes.move[picked] / duration,
-            "side": -changes.side[picked], "lane_width": scene.lane_width(ego, begin),
+            "change_time": duration,
+            "lateral_speed": changes.move[picked] / duration,
+            "side": -changes.side[picked],
+            "lane_width": scene.lane_width(ego, begin),
             "lead_time": scene.led_time(ego, lead, begin),
         },
         {
             OVERLAP: (gap <= 0.0) | (there & (revealed_gap <= 0.0)),
             NO_CHANGE: ~changes.is_change[picked],
-            NOT_WHOLE: ~changes.is_whole[picked] | (after < 0) | np.isnan(gap)
+            NOT_WHOLE: ~changes.is_whole[picked]
+            | (after < 0)
+            | np.isnan(gap)
             | (there & np.isnan(revealed_gap)),
             EGO_CHANGES: changes.meanwhile(ego, begin, end),
             "the ego has had another leader": np.isnan(scene.led_time(ego, lead, begin)),
         },
-    )  # fmt: skip
+    )

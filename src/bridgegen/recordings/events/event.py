@@ -71,8 +71,11 @@ def events_of(
     order = order[np.lexsort((begin[order], ego[order]))]
     declared = EVENT_KINDS[kind]
     return Events(
-        declared, ego[order], {role: others[role][order] for role in declared.roles},
-        begin[order], end[order],
+        declared,
+        ego[order],
+        {role: others[role][order] for role in declared.roles},
+        begin[order],
+        end[order],
         {name: np.asarray(quantities[name], np.float64)[order] for name in declared.quantities},
         {reason: count for reason, count in counts.items() if count},
-    )  # fmt: skip
+    )

@@ -90,12 +90,16 @@ def find_events(traffic: RecordedTraffic, located: Located) -> FoundEvents:
     pairs = own & scene.drives[1:] & scene.drives[:-1]
     paths = np.hypot(np.diff(traffic.x), np.diff(traffic.y))
     return FoundEvents(
-        traffic.facts.name, traffic.facts.source, traffic.names,
+        traffic.facts.name,
+        traffic.facts.source,
+        traffic.names,
         tuple(find(scene, changes) for find in DETECTORS.values()),
-        float(pairs.sum()) * scene.step / 3600.0, float(paths[pairs].sum()) / 1000.0,
-        float(own.sum()) * scene.step / 3600.0, float(paths[own].sum()) / 1000.0,
+        float(pairs.sum()) * scene.step / 3600.0,
+        float(paths[pairs].sum()) / 1000.0,
+        float(own.sum()) * scene.step / 3600.0,
+        float(paths[own].sum()) / 1000.0,
         any(len(light.path) for light in traffic.facts.lights.values()),
-    )  # fmt: skip
+    )
 
 
 def named(

@@ -31,14 +31,18 @@ def find(scene: Scene, changes: LaneChanges) -> Events:
     begin = scene.clock.instant[first].astype(np.float64)
     end = scene.clock.instant[last].astype(np.float64)
     return events_of(
-        "following", ego, {"lead": lead}, (scene.seconds(begin), scene.seconds(end)),
+        "following",
+        ego,
+        {"lead": lead},
+        (scene.seconds(begin), scene.seconds(end)),
         {
             "ego_speed": mean_of(speed, first, last),
             "lead_speed": mean_of(lead_speed, first, last),
-            "gap": mean_of(ahead.gap, first, last), "headway": mean_of(headway, first, last),
+            "gap": mean_of(ahead.gap, first, last),
+            "headway": mean_of(headway, first, last),
             "least_headway": least_of(headway, first, last),
             "following_time": (end - begin) * scene.step,
             "lane_width": scene.lane_width(ego, begin),
         },
         {OVERLAP: least_of(ahead.gap, first, last) <= 0.0},
-    )  # fmt: skip
+    )

@@ -91,19 +91,26 @@ def path_joins(scene: Scene) -> Iterator[Join]:
         main = 1 - merging
         at = (first_at, other_at)
         yield Join(
-            who[main], who[merging], at[main], at[merging], angle,
+            who[main],
+            who[merging],
+            at[main],
+            at[merging],
+            angle,
             _side(paths, who[main], lengths[main], who[merging], lengths[merging]),
             is_of_paths=True,
-        )  # fmt: skip
+        )
 
 
 def _crossing_pairs(scene: Scene) -> set[tuple[int, int]]:
     """Return the pairs whose paths cross at `CROSSES` or more."""
     paths, met, found = scene.paths, scene.crossings, set()
     for item, other, first_at, other_at in zip(
-        met.first.tolist(), met.other.tolist(), met.first_at.tolist(), met.other_at.tolist(),
+        met.first.tolist(),
+        met.other.tolist(),
+        met.first_at.tolist(),
+        met.other_at.tolist(),
         strict=True,
-    ):  # fmt: skip
+    ):
         courses = [
             paths.course(who, paths.length(who, at))
             for who, at in ((item, first_at), (other, other_at))
@@ -182,10 +189,17 @@ def _from_ending_lanes(scene: Scene, changes: LaneChanges) -> Iterator[Join]:
             main_at = _passes(scene, main, int(placed.lane[state]), placed.station[state], at)
             if np.isfinite(main_at):
                 yield Join(
-                    main, merging, main_at, at, 0.0, float(changes.side[i]), left,
-                    float(changes.begin[i]), float(changes.end[i] - changes.begin[i]) * step,
+                    main,
+                    merging,
+                    main_at,
+                    at,
+                    0.0,
+                    float(changes.side[i]),
+                    left,
+                    float(changes.begin[i]),
+                    float(changes.end[i] - changes.begin[i]) * step,
                     bool(changes.is_change[i] and changes.is_whole[i]),
-                )  # fmt: skip
+                )
 
 
 def _passes(scene: Scene, who: int, lane: int, station: float, near: float) -> float:
@@ -231,9 +245,13 @@ def _of_two_lanes(scene: Scene) -> Iterator[Join]:
         before = [float(heading[lanes.points(int(lane[steps[k]]))][0]) for k in (main, merging)]
         turned = float(np.remainder(before[1] - before[0] + np.pi, 2.0 * np.pi) - np.pi)
         yield Join(
-            int(who[steps[main]]), int(who[steps[merging]]), float(instant[main]),
-            float(instant[merging]), abs(float(np.degrees(turned))), 1.0 if turned > 0.0 else -1.0,
-        )  # fmt: skip
+            int(who[steps[main]]),
+            int(who[steps[merging]]),
+            float(instant[main]),
+            float(instant[merging]),
+            abs(float(np.degrees(turned))),
+            1.0 if turned > 0.0 else -1.0,
+        )
 
 
 def _entered(scene: Scene, steps: Int) -> Float:

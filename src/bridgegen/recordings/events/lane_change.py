@@ -29,9 +29,11 @@ def find(scene: Scene, changes: LaneChanges) -> Events:
     back_gap = np.where(behind >= 0, scene.ahead.gap[behind], np.nan)
     duration = (end - begin) * scene.step
     return events_of(
-        "lane-change", ego,
+        "lane-change",
+        ego,
         {
-            "lead": lead, "new_lead": np.where(ahead >= 0, scene.participant[ahead], ABSENT),
+            "lead": lead,
+            "new_lead": np.where(ahead >= 0, scene.participant[ahead], ABSENT),
             "follower": np.where(behind >= 0, scene.participant[behind], ABSENT),
         },
         (scene.seconds(begin), scene.seconds(end)),
@@ -43,8 +45,10 @@ def find(scene: Scene, changes: LaneChanges) -> Events:
             "new_lead_gap": new_gap,
             "follower_speed": np.where(behind >= 0, scene.speed[behind], np.nan),
             "follower_gap": back_gap,
-            "change_time": duration, "lateral_speed": changes.move[picked] / duration,
-            "side": -changes.side[picked], "lane_width": scene.lane_width(ego, begin),
+            "change_time": duration,
+            "lateral_speed": changes.move[picked] / duration,
+            "side": -changes.side[picked],
+            "lane_width": scene.lane_width(ego, begin),
             "passing_time": _passing_time(scene, ego, lead, begin, crossing),
         },
         {
@@ -52,7 +56,7 @@ def find(scene: Scene, changes: LaneChanges) -> Events:
             NO_CHANGE: ~changes.is_change[picked],
             NOT_WHOLE: ~whole,
         },
-    )  # fmt: skip
+    )
 
 
 def _passing_time(scene: Scene, ego: Int, lead: Int, begin: Float, crossing: Float) -> Float:

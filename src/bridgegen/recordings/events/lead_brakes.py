@@ -58,12 +58,15 @@ def find(scene: Scene, changes: LaneChanges) -> Events:
     cut = CUT / step
     whole = (fit.begin >= low - cut) & (fit.begin + fit.duration <= high + cut)
     return events_of(
-        "lead-brakes", ego,
+        "lead-brakes",
+        ego,
         {"lead": lead, "next": np.where(ahead >= 0, scene.participant[ahead], ABSENT)},
         (scene.seconds(begin), scene.seconds(end)),
         {
-            "ego_speed": speed, "lead_speed": fit.level[picked],
-            "relative_speed": speed - fit.level[picked], "gap": gap,
+            "ego_speed": speed,
+            "lead_speed": fit.level[picked],
+            "relative_speed": speed - fit.level[picked],
+            "gap": gap,
             "deceleration": rate[picked],
             "low_speed": np.maximum((fit.level + fit.height)[picked], 0.0),
             "next_speed": np.where(ahead >= 0, scene.speed[ahead], np.nan),
@@ -78,7 +81,7 @@ def find(scene: Scene, changes: LaneChanges) -> Events:
             "it is not the ego's leader throughout": ~stays,
             "it brakes harder than its kind can": rate[picked] > hardest[lead],
         },
-    )  # fmt: skip
+    )
 
 
 def _or_nan(gap: Float) -> Float:

@@ -86,9 +86,12 @@ def meetings(scene: Scene, egos: Bool, others: Bool) -> list[Meeting]:
     """
     met, found = scene.crossings, []
     for item, other, first_at, other_at in zip(
-        met.first.tolist(), met.other.tolist(), met.first_at.tolist(), met.other_at.tolist(),
+        met.first.tolist(),
+        met.other.tolist(),
+        met.first_at.tolist(),
+        met.other_at.tolist(),
         strict=True,
-    ):  # fmt: skip
+    ):
         if egos[item] and others[other]:
             found.append(meeting(scene, item, other, first_at, other_at))
         if egos[other] and others[item]:
@@ -107,12 +110,18 @@ def meeting(scene: Scene, ego: int, other: int, ego_at: float, other_at: float) 
     both = float(max(clock.begin[ego], clock.begin[other]))
     begin = max(min(ego_at, other_at) - AHEAD / scene.step, both)
     return Meeting(
-        ego, other, ego_at, other_at, begin,
+        ego,
+        other,
+        ego_at,
+        other_at,
+        begin,
         float(np.degrees(abs(_wrapped(its - own)))),
         float(np.degrees(abs(_wrapped(its_before - before)))),
-        float(np.degrees(turn)), float(np.degrees(its_turn)),
-        1.0 if np.sin(its - own) > 0.0 else -1.0, own,
-    )  # fmt: skip
+        float(np.degrees(turn)),
+        float(np.degrees(its_turn)),
+        1.0 if np.sin(its - own) > 0.0 else -1.0,
+        own,
+    )
 
 
 def _wrapped(angle: float) -> float:
@@ -154,30 +163,35 @@ def events_of_meetings(
         for key in ("begin", "first_at", "last_at")
     )
     return events_of(
-        kind, ego,
+        kind,
+        ego,
         {"other": other} | {name: np.array(who, np.int64) for name, who in roles.items()},
-        (scene.seconds(begin), scene.seconds(last)), table,
+        (scene.seconds(begin), scene.seconds(last)),
+        table,
         {
             NOT_WHOLE: (first - begin) * scene.step < LEAST_SEEN,
             TOUCH: table["pet"] <= 0.0,
         }
         | {reason: np.array(mask, np.bool_) for reason, mask in refused.items()},
-    )  # fmt: skip
+    )
 
 
 def paces_of(scene: Scene, met: Sequence[Meeting]) -> dict[Meeting, dict[str, float]]:
     """Return of meetings how the other changes its pace before it passes the point."""
     found = pace_changes(
         scene, [item.other for item in met], [item.other_at for item in met], LEAST_PACE
-    )  # fmt: skip
+    )
     paces = {}
     for i, item in enumerate(met):
         begin = float(found.begin[i])
         ways, distance = _ways_left(scene, item, begin)
         paces[item] = {
-            "pace_before": float(found.before[i]), "pace_after": float(found.after[i]),
-            "pace_distance": ways[0], "pace_ego_distance": ways[1], "pace_apart": distance,
-        }  # fmt: skip
+            "pace_before": float(found.before[i]),
+            "pace_after": float(found.after[i]),
+            "pace_distance": ways[0],
+            "pace_ego_distance": ways[1],
+            "pace_apart": distance,
+        }
     return paces
 
 

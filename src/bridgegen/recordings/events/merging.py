@@ -42,10 +42,12 @@ def find(scene: Scene, changes: LaneChanges) -> Events:
             of[view] = join
             met.append(view)
     return events_of_meetings(
-        "merging", scene, met,
+        "merging",
+        scene,
+        met,
         lambda item: _more(scene, item, of[item], gaps[of[item]]) | paces[of[item]],
         refused={NO_CHANGE: [not of[item].is_change for item in met]},
-    )  # fmt: skip
+    )
 
 
 def _next_ones(scene: Scene, joins: Iterable[Join]) -> Iterator[Join]:
@@ -68,8 +70,9 @@ def _next_ones(scene: Scene, joins: Iterable[Join]) -> Iterator[Join]:
             }
             if (min(join.main, join.merging), max(join.main, join.merging)) in before:
                 continue
-            if any(abs(at - other) <= most
-                   for key, at in places.items() for other in kept.get(key, [])):  # fmt: skip
+            if any(
+                abs(at - other) <= most for key, at in places.items() for other in kept.get(key, [])
+            ):
                 continue
             for key, at in places.items():
                 kept.setdefault(key, []).append(at)
@@ -93,8 +96,9 @@ def _view(scene: Scene, join: Join, ego_merges: bool) -> Meeting:
 
 def _gap(scene: Scene, join: Join) -> float:
     """Return the gap between both along their path when the merging one joins [m]."""
-    at = min(max(join.merging_at, float(scene.clock.begin[join.main])),
-             float(scene.clock.end[join.main]))  # fmt: skip
+    at = min(
+        max(join.merging_at, float(scene.clock.begin[join.main])), float(scene.clock.end[join.main])
+    )
     way = scene.paths.length(join.main, at) - scene.paths.length(join.main, join.main_at)
     length = scene.traffic.length
     return abs(way) - 0.5 * float(length[join.main] + length[join.merging])
@@ -120,7 +124,7 @@ def _paces(scene: Scene, joins: list[Join]) -> dict[Join, dict[str, float]]:
     """Return of each join how the one that merges speeds up before, and where both are then."""
     found = pace_changes(
         scene, [join.merging for join in joins], [join.merging_at for join in joins], LEAST_SPEEDING
-    )  # fmt: skip
+    )
     paces = {}
     for i, join in enumerate(joins):
         begin = float(found.begin[i]) if found.after[i] > found.before[i] else np.nan
@@ -146,7 +150,10 @@ def _more(scene: Scene, item: Meeting, join: Join, gaps: _Gaps) -> dict[str, flo
         "ego_merges": float(item.ego == join.merging),
         "ego_joining_speed": crossing_speed(scene, item.ego, item.ego_at),
         "other_joining_speed": crossing_speed(scene, item.other, item.other_at),
-        "gap": _gap(scene, join), "lead_gap": gaps.lead, "follower_gap": gaps.follower,
-        "lane_left": join.lane_left, "change_time": join.change_time,
+        "gap": _gap(scene, join),
+        "lead_gap": gaps.lead,
+        "follower_gap": gaps.follower,
+        "lane_left": join.lane_left,
+        "change_time": join.change_time,
         "change_distance": _way(scene, join.merging, join.change_begin, join.merging_at),
-    }  # fmt: skip
+    }

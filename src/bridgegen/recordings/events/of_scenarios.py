@@ -193,8 +193,9 @@ def scenario_events(
             values = spec.values(events.quantities)
             counts += int(kept.sum())
             columns.append({name: column[kept] for name, column in values.items()})
-            names += [name for name, counts_it in zip(called, kept.tolist(), strict=True)
-                      if counts_it]  # fmt: skip
+            names += [
+                name for name, counts_it in zip(called, kept.tolist(), strict=True) if counts_it
+            ]
     table = {
         name: np.concatenate([np.empty(0), *(column[name] for column in columns)])
         for name in spec.parameters
@@ -207,11 +208,17 @@ def scenario_events(
         for rule, breaks in broken_by(scenario, rows)
     )
     return ScenarioEvents(
-        scenario.name, spec.event, counts, rows, called, int(counts - whole.sum()),
-        tuple(_outside(scenario, rows)), broken,
+        scenario.name,
+        spec.event,
+        counts,
+        rows,
+        called,
+        int(counts - whole.sum()),
+        tuple(_outside(scenario, rows)),
+        broken,
         unmapped(spec, scenario.parameters),
         encounters_of(counts, found, spec.event, needs_lights=spec.needs_lights),
-    )  # fmt: skip
+    )
 
 
 def _outside(scenario: LogicalScenario, rows: dict[str, Float]) -> list[Outside]:

@@ -20,12 +20,13 @@ be cut off."""
 def find(scene: Scene, changes: LaneChanges) -> Events:
     """Return the oncoming left turns of a recording, from both views."""
     met = [
-        meeting for meeting in meetings(scene, scene.is_ego, scene.is_ego)
+        meeting
+        for meeting in meetings(scene, scene.is_ego, scene.is_ego)
         if CROSSING[0] <= meeting.angle <= CROSSING[1]
         and meeting.approach_angle >= OPPOSITE
         and max(abs(meeting.ego_turn), abs(meeting.other_turn)) > TURNS
         and min(abs(meeting.ego_turn), abs(meeting.other_turn)) <= STRAIGHT
-    ]  # fmt: skip
+    ]
     return events_of_meetings("oncoming-left-turn", scene, met, _turn)
 
 

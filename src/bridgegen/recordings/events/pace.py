@@ -70,8 +70,12 @@ def pace_changes(
     is_one &= fit.begin >= first + KNOWN / scene.step
     is_one &= fit.rms <= np.maximum(WORST_FIT * np.abs(fit.height), LEAST_RMS)
     is_one &= fit.begin <= _states(scene, who, until)[rows]
-    columns = (fit.begin + scene.clock.instant[first] - first, fit.level, fit.level + fit.height,
-               rate)  # fmt: skip
+    columns = (
+        fit.begin + scene.clock.instant[first] - first,
+        fit.level,
+        fit.level + fit.height,
+        rate,
+    )
     found[:, rows] = np.where(is_one, np.array(columns), np.nan)
     return PaceChanges(*found)
 
@@ -171,9 +175,7 @@ def apart(scene: Scene, number: int, other: int, instant: float) -> float:
     for who in (number, other):
         at = np.array([instant])
         ahead = centre_ahead(int(scene.traffic.kind[who]), float(scene.traffic.length[who]))
-        x, y, c, s = (
-            float(scene.at(values, np.array([who]), at)[0]) for values in _pose(scene)
-        )  # fmt: skip
+        x, y, c, s = (float(scene.at(values, np.array([who]), at)[0]) for values in _pose(scene))
         points.append((x - ahead * c, y - ahead * s))
     (x, y), (u, v) = points
     return float(np.hypot(u - x, v - y))

@@ -120,10 +120,19 @@ class Paths:
         order = np.lexsort((instant[b], cell))
         cells, first = np.unique(cell[order], return_index=True)
         arguments = (
-            cells, np.append(first, len(order)).astype(np.int64), row, who[order], a[order],
-            b[order], x, y, instant, _roles(traffic, self.clock),
-            WINDOW / traffic.facts.time_step, float(np.sin(LEAST_ANGLE)),
-        )  # fmt: skip
+            cells,
+            np.append(first, len(order)).astype(np.int64),
+            row,
+            who[order],
+            a[order],
+            b[order],
+            x,
+            y,
+            instant,
+            _roles(traffic, self.clock),
+            WINDOW / traffic.facts.time_step,
+            float(np.sin(LEAST_ANGLE)),
+        )
         room = 1 << 12
         while True:
             pairs, times = np.empty((room, 2), np.int64), np.empty((room, 2))

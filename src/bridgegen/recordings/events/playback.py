@@ -107,16 +107,25 @@ def _played(
     around = round(AROUND / step)
     at = round(float(events.begin[i]) / step)
     begin = max(at - around, int(clock.begin[ego]))
-    end = min(round(float(events.end[i]) / step) + around, int(clock.end[ego]),
-              begin + round(LONGEST / step))  # fmt: skip
+    end = min(
+        round(float(events.end[i]) / step) + around,
+        int(clock.end[ego]),
+        begin + round(LONGEST / step),
+    )
     first = list(dict.fromkeys(int(who[i]) for who in events.others.values() if who[i] != ABSENT))
     others = others_near(traffic, clock, ego, first, begin, end)[:MOST_OTHERS]
     if others and end > begin:
         motion = excerpt(traffic, clock, ego, others, begin, end)
         yield PlayedEvent(
-            events.kind.name, name, traffic.facts.name, traffic.names[ego], time_gap, motion,
-            (at - begin) * step, begin * step,
-        )  # fmt: skip
+            events.kind.name,
+            name,
+            traffic.facts.name,
+            traffic.names[ego],
+            time_gap,
+            motion,
+            (at - begin) * step,
+            begin * step,
+        )
 
 
 def caption(played_event: PlayedEvent) -> str:

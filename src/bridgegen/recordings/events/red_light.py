@@ -39,24 +39,35 @@ def find(scene: Scene, changes: LaneChanges) -> Events:
         np.bool_,
     )
     turn = np.array([_turn(scene, passing) for passing in ran], np.float64)
-    least = np.array([_least_speed(scene, who, a, b) for who, a, b in zip(
-        ego.tolist(), begin.tolist(), at.tolist(), strict=True)], np.float64)  # fmt: skip
+    least = np.array(
+        [
+            _least_speed(scene, who, a, b)
+            for who, a, b in zip(ego.tolist(), begin.tolist(), at.tolist(), strict=True)
+        ],
+        np.float64,
+    )
     return events_of(
-        "red-light-violation", ego, {}, (scene.seconds(begin), scene.seconds(at)),
+        "red-light-violation",
+        ego,
+        {},
+        (scene.seconds(begin), scene.seconds(at)),
         {
             "ego_speed": scene.at(scene.speed, ego, begin),
             "ego_distance": _ways(scene, ego, begin, at),
             "line_speed": scene.at(scene.speed, ego, at),
-            "least_speed": least, "red_time": red, "red_seen": seen,
+            "least_speed": least,
+            "red_time": red,
+            "red_seen": seen,
             "red_speed": np.where(seen, scene.at(scene.speed, ego, turned), np.nan),
-            "red_distance": np.where(seen, _ways(scene, ego, turned, at), np.nan), "turn": turn,
+            "red_distance": np.where(seen, _ways(scene, ego, turned, at), np.nan),
+            "turn": turn,
         },
         {
             NOT_WHOLE: ((at - begin) * scene.step < LEAST_SEEN)
             | np.array([passing.followed < LEAST_FOLLOWED for passing in ran], np.bool_),
             RIGHT_ON_RED: (turn < -TURNS) & (least < HALTS),
         },
-    )  # fmt: skip
+    )
 
 
 def red_time(scene: Scene, passing: Passing) -> float:
@@ -72,11 +83,15 @@ def ran_red(scene: Scene, who: int, at: float) -> float:
     """
     if not any(len(light.path) for light in scene.traffic.facts.lights.values()):
         return np.nan
-    return float(any(
-        passing.who == who and passing.at <= at and red_time(scene, passing) > RED_FOR
-        and scene.paths.length(who, at) - scene.paths.length(who, passing.at) <= JUNCTION
-        for passing in scene.passings
-    ))  # fmt: skip
+    return float(
+        any(
+            passing.who == who
+            and passing.at <= at
+            and red_time(scene, passing) > RED_FOR
+            and scene.paths.length(who, at) - scene.paths.length(who, passing.at) <= JUNCTION
+            for passing in scene.passings
+        )
+    )
 
 
 def _ways(scene: Scene, who: Int, begin: Float, end: Float) -> Float:

@@ -25,10 +25,13 @@ ANGLES = (15.0, 160.0)
 def find(scene: Scene, changes: LaneChanges) -> Events:
     """Return the right turns of a recording across the path of a bicycle."""
     met = [
-        meeting for meeting in meetings(scene, scene.is_ego, scene.traffic.kind == BICYCLE)
-        if meeting.ego_turn < -TURNS and abs(meeting.other_turn) <= STRAIGHT
-        and meeting.approach_angle <= SAME_WAY and ANGLES[0] <= meeting.angle <= ANGLES[1]
-    ]  # fmt: skip
+        meeting
+        for meeting in meetings(scene, scene.is_ego, scene.traffic.kind == BICYCLE)
+        if meeting.ego_turn < -TURNS
+        and abs(meeting.other_turn) <= STRAIGHT
+        and meeting.approach_angle <= SAME_WAY
+        and ANGLES[0] <= meeting.angle <= ANGLES[1]
+    ]
     paces = paces_of(scene, met)
     return events_of_meetings(
         "right-turn-with-bicycle",

@@ -81,8 +81,13 @@ def find(scene: Scene, changes: LaneChanges) -> Events:
     picked, guess = _guesses(scene, pairs, first)
     low, high = first[picked], first[picked + 1] - 1
     fit = fit_steps(offsets, low, high, guess, scene.step, "cosine")
-    return _events(scene, [pairs[i] for i in picked.tolist()], low, high, np.array(
-        [fit.begin, fit.duration, fit.level, fit.height, fit.rms]))  # fmt: skip
+    return _events(
+        scene,
+        [pairs[i] for i in picked.tolist()],
+        low,
+        high,
+        np.array([fit.begin, fit.duration, fit.level, fit.height, fit.rms]),
+    )
 
 
 def _near(scene: Scene) -> list[tuple[int, int]]:
@@ -118,9 +123,9 @@ def _together(scene: Scene, ego: int, other: int, line: Float | None) -> Iterato
         for p in (ego, other)
     )
     ahead = centre_ahead(BICYCLE, float(traffic.length[other]))
-    rear = np.column_stack([
-        traffic.x[its] - ahead * scene.cosine[its], traffic.y[its] - ahead * scene.sine[its]
-    ])  # fmt: skip
+    rear = np.column_stack(
+        [traffic.x[its] - ahead * scene.cosine[its], traffic.y[its] - ahead * scene.sine[its]]
+    )
     ego_way, ego_offset, _ = _beside(line, np.column_stack([traffic.x[own], traffic.y[own]]))
     way, offset, course = _beside(line, rear)
     turned = np.abs(wrap(traffic.heading[its] - course))
@@ -146,10 +151,13 @@ def _smooth_line(scene: Scene, ego: int) -> Float | None:
     line: Float = savgol_filter(points, 2 * half + 1, 2, axis=0)
     reach = min(round(0.5 * SMOOTHED), half)
     ahead, back = line[-1] - line[-1 - reach], line[0] - line[reach]
-    return np.concatenate([
-        [line[0] + back / np.hypot(*back) * BEYOND], line,
-        [line[-1] + ahead / np.hypot(*ahead) * BEYOND],
-    ])  # fmt: skip
+    return np.concatenate(
+        [
+            [line[0] + back / np.hypot(*back) * BEYOND],
+            line,
+            [line[-1] + ahead / np.hypot(*ahead) * BEYOND],
+        ]
+    )
 
 
 def _beside(line: Float, points: Float) -> tuple[Float, Float, Float]:
@@ -168,9 +176,9 @@ def _beside(line: Float, points: Float) -> tuple[Float, Float, Float]:
         left = steps[k, 0] * away[:, 1] - steps[k, 1] * away[:, 0]
         course = np.arctan2(steps[k, 1], steps[k, 0])
         better = apart < best[0]
-        best[:, better] = np.array(
-            [apart, way[k] + along, np.copysign(apart, left), course]
-        )[:, better]  # fmt: skip
+        best[:, better] = np.array([apart, way[k] + along, np.copysign(apart, left), course])[
+            :, better
+        ]
     return best[1], best[2], best[3]
 
 
@@ -190,8 +198,9 @@ def _guesses(scene: Scene, pairs: list[_Pair], first: Int) -> tuple[Int, tuple[F
         towards = -slope * np.sign(offset)
         at = int(enters[int(towards[enters].argmax())])
         rate = max(float(towards[at]) / (2.0 * half), 1e-3)
-        took = float(np.clip(0.5 * np.pi * 2.0 * LEAST_MOVE / rate, 2.0 * half,
-                             LONGEST / scene.step))  # fmt: skip
+        took = float(
+            np.clip(0.5 * np.pi * 2.0 * LEAST_MOVE / rate, 2.0 * half, LONGEST / scene.step)
+        )
         picked.append(i)
         begin.append(float(first[i]) + at - 0.5 * took)
         duration.append(took)
@@ -207,12 +216,14 @@ def _events(scene: Scene, pairs: list[_Pair], low: Int, high: Int, fit: Float) -
     begin, duration, level, height, rms = fit
     at = np.clip(begin, low, high)
     centres, own = (
-        np.array([
-            np.interp(place - origin, np.arange(len(pair.apart)), getattr(pair, column))
-            for place, origin, pair in zip(at.tolist(), low.tolist(), pairs, strict=True)
-        ])
+        np.array(
+            [
+                np.interp(place - origin, np.arange(len(pair.apart)), getattr(pair, column))
+                for place, origin, pair in zip(at.tolist(), low.tolist(), pairs, strict=True)
+            ]
+        )
         for column in ("apart", "own")
-    )  # fmt: skip
+    )
     before, after = level - own, level + height - own
     near = np.array([_half_widths(scene, pair) for pair in pairs])
     moves = (np.abs(before) > near) & (np.abs(after) < near) & (np.abs(height) >= LEAST_MOVE)
@@ -226,10 +237,14 @@ def _events(scene: Scene, pairs: list[_Pair], low: Int, high: Int, fit: Float) -
     speed, its = (scene.at(scene.speed, who, start) for who in (ego, other))
     soon = (gap > 0.0) & (gap <= WINDOW * np.maximum(speed, LEAST_SPEED))
     seconds = duration * scene.step
-    kept = np.array([
-        i for i in np.flatnonzero(moves & soon).tolist()
-        if _bend(scene, int(ego[i]), float(start[i]), float(centres[i])) <= STRAIGHT
-    ], np.int64)  # fmt: skip
+    kept = np.array(
+        [
+            i
+            for i in np.flatnonzero(moves & soon).tolist()
+            if _bend(scene, int(ego[i]), float(start[i]), float(centres[i])) <= STRAIGHT
+        ],
+        np.int64,
+    )
     standing = [obstacle_ahead(scene, int(other[i]), float(start[i])) for i in kept.tolist()]
     cut = SHORTEST / scene.step
     whole = (begin >= low - cut) & (begin + duration <= high + cut)

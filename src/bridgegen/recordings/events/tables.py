@@ -88,9 +88,11 @@ def kind_rows(found: Sequence[FoundEvents]) -> Iterator[tuple[str, int, str, str
         for events in same:
             refused.update(events.refused)
         yield (
-            kind, count, *rates_in_words(encounters_of(count, found, kind)),
+            kind,
+            count,
+            *rates_in_words(encounters_of(count, found, kind)),
             "; ".join(f"{number:,} {reason}" for reason, number in refused.items()),
-        )  # fmt: skip
+        )
 
 
 def rates_in_words(met: Encounters | None) -> tuple[str, str]:

@@ -75,7 +75,7 @@ def hiding(scene: Scene, meeting: Meeting) -> Hiding:
             continue
         seen = motion(
             excerpt(scene.traffic, scene.clock, meeting.ego, [meeting.other, who], begin, end)
-        )  # fmt: skip
+        )
         bodies = Bodies(
             seen.half, seen.x[0], seen.y[0], seen.cosine[0], seen.sine[0], seen.distance[0]
         )
@@ -96,8 +96,9 @@ def _beside(scene: Scene, meeting: Meeting, begin: int, end: int) -> Int:
     for values in (traffic.x, traffic.y):
         ends = [
             values[traffic.first[p] + k - clock.begin[p]]
-            for p in (meeting.ego, meeting.other) for k in (begin, end)
-        ]  # fmt: skip
+            for p in (meeting.ego, meeting.other)
+            for k in (begin, end)
+        ]
         near &= (values[at] >= min(ends) - BESIDE) & (values[at] <= max(ends) + BESIDE)
     return who[near]
 
@@ -121,9 +122,10 @@ def find(scene: Scene, changes: LaneChanges) -> Events:
     """Return who crosses an ego's path on foot or by bicycle, before the ego comes."""
     kind = scene.traffic.kind
     met = [
-        meeting for meeting in meetings(scene, scene.is_ego, np.isin(kind, (PEDESTRIAN, BICYCLE)))
+        meeting
+        for meeting in meetings(scene, scene.is_ego, np.isin(kind, (PEDESTRIAN, BICYCLE)))
         if meeting.other_at < meeting.ego_at and _crosses(meeting, int(kind[meeting.other]))
-    ]  # fmt: skip
+    ]
     hidden = {meeting: hiding(scene, meeting) for meeting in met}
     return events_of_meetings(
         "vru-crossing",
@@ -141,6 +143,8 @@ def _crosses(meeting: Meeting, kind: int) -> bool:
 
 def _more(meeting: Meeting, kind: int, hidden: Hiding) -> dict[str, float]:
     return {
-        "ego_turn": meeting.ego_turn, "is_bicycle": float(kind == BICYCLE),
-        "hidden": float(hidden.is_hidden), "occluder_gap": hidden.gap,
-    }  # fmt: skip
+        "ego_turn": meeting.ego_turn,
+        "is_bicycle": float(kind == BICYCLE),
+        "hidden": float(hidden.is_hidden),
+        "occluder_gap": hidden.gap,
+    }

@@ -68,17 +68,27 @@ def account_of(located: Located, low: Float, high: Float) -> LanesFound:
         width = np.array([lanes.width[lanes.points(lane)].mean() for lane in on.tolist()])
         station = np.concatenate([lanes.station[lanes.points(lane)] for lane in on.tolist()])
         of = lanes.carriageway == number
-        found.append(Carriageway(
-            number, int(lanes.number[of].max()), float(np.average(width, weights=states)),
-            float(np.ptp(station)), int(states.sum()),
-            float(np.sqrt(np.average(fit.rms[on] ** 2, weights=states))),
-            float(fit.p95[on].max()),
-        ))  # fmt: skip
+        found.append(
+            Carriageway(
+                number,
+                int(lanes.number[of].max()),
+                float(np.average(width, weights=states)),
+                float(np.ptp(station)),
+                int(states.sum()),
+                float(np.sqrt(np.average(fit.rms[on] ** 2, weights=states))),
+                float(fit.p95[on].max()),
+            )
+        )
     found.sort(key=lambda carriageway: (-carriageway.states, carriageway.number))
     return LanesFound(
-        lanes.source, tuple(found), fit.vehicle_share, fit.km_on, fit.km_off, lanes.notes,
+        lanes.source,
+        tuple(found),
+        fit.vehicle_share,
+        fit.km_on,
+        fit.km_off,
+        lanes.notes,
         tuple(_borders(located, low, high)),
-    )  # fmt: skip
+    )
 
 
 def _borders(located: Located, low: Float, high: Float) -> list[Float]:

@@ -72,9 +72,13 @@ def fit_of(traffic: RecordedTraffic, placed: Placed, lanes: RecordedLanes) -> Fi
     km_on = float(steps[on[1:] & on[:-1]].sum()) / 1000.0
     share = float(on[of_vehicles].mean()) if of_vehicles.any() else float("nan")
     return Fit(
-        states, rms, p95, share, km_on,
+        states,
+        rms,
+        p95,
+        share,
+        km_on,
         max(float(steps.sum()) / 1000.0 - km_on, 0.0),
-    )  # fmt: skip
+    )
 
 
 def _drive(traffic: RecordedTraffic) -> Bool:
@@ -199,9 +203,12 @@ def _projected(lanes: RecordedLanes, offset: Offset) -> RecordedLanes:
         f"by its header's offset, ({offset.x:g}, {offset.y:g}) m, {offset.hdg:g} rad"
     )
     return replace(
-        lanes, x=c * x - s * y, y=s * x + c * y, heading=wrap(lanes.heading + offset.hdg),
+        lanes,
+        x=c * x - s * y,
+        y=s * x + c * y,
+        heading=wrap(lanes.heading + offset.hdg),
         notes=(*lanes.notes, note),
-    )  # fmt: skip
+    )
 
 
 def _span(x: Float, y: Float) -> str:

@@ -125,10 +125,12 @@ def _lanes(pieces: Pieces, line: Float, s: Float, t: Float) -> _Found | str:
     for k in range(len(borders)):
         here = inside[:, k]
         for begin, end in _extents(s[here], vehicle[here], station[-1]):
-            extents.append((
-                int(np.searchsorted(station, begin, side="right")) - 1,
-                min(int(np.searchsorted(station, end)), len(line) - 1) + 1,
-            ))  # fmt: skip
+            extents.append(
+                (
+                    int(np.searchsorted(station, begin, side="right")) - 1,
+                    min(int(np.searchsorted(station, end)), len(line) - 1) + 1,
+                )
+            )
             which.append(k)
     if not extents:
         return f"no lane of {SHORTEST:g} m"
@@ -145,9 +147,10 @@ def _piles(t: Float, vehicle: Int) -> Float:
     peaks = (np.flatnonzero((inner > density[:-2]) & (inner >= density[2:])) + 1).tolist()
     centre = 0.5 * (edges[1:] + edges[:-1])
     peaks = [
-        k for k in peaks
+        k
+        for k in peaks
         if len(np.unique(vehicle[np.abs(t - centre[k]) < 0.5 * NARROWEST])) >= LEAST_IN_LANE
-    ]  # fmt: skip
+    ]
     while True:
         for a, b in itertools.pairwise(peaks):
             lower = min(density[a], density[b])
@@ -194,13 +197,18 @@ def _strips(found: _Found, group: int, first: int) -> list[Strip]:
     made = []
     for (begin, end), k in zip(found.extents, found.lane.tolist(), strict=True):
         part = slice(begin, end)
-        made.append(Strip(
-            name=f"{group + 1}.{k + 1}", kind="driving", group=group,
-            points=found.line[part] + middle[k] * sideways[part],
-            width=np.full(end - begin, width[k]), station=station[part],
-            left=_beside(found, begin, end, k, 1, first),
-            right=_beside(found, begin, end, k, -1, first),
-        ))  # fmt: skip
+        made.append(
+            Strip(
+                name=f"{group + 1}.{k + 1}",
+                kind="driving",
+                group=group,
+                points=found.line[part] + middle[k] * sideways[part],
+                width=np.full(end - begin, width[k]),
+                station=station[part],
+                left=_beside(found, begin, end, k, 1, first),
+                right=_beside(found, begin, end, k, -1, first),
+            )
+        )
     return made
 
 

@@ -45,13 +45,20 @@ def lanes_of_lanelets(lanelets: Sequence[Lanelet]) -> RecordedLanes:
     strips = []
     for index, lanelet in enumerate(used):
         share, left, right = _bounds(lanelet)
-        strips.append(Strip(
-            name=lanelet.name, kind=kinds[index], group=group[index], points=0.5 * (left + right),
-            width=np.hypot(*(left - right).T), station=share * length[group[index]],
-            left=beside(index, lanelet.left_same), right=beside(index, lanelet.right_same),
-            opposite=beside(index, lanelet.left_opposite),
-            successors=tuple(number[name] for name in lanelet.successors if name in number),
-        ))  # fmt: skip
+        strips.append(
+            Strip(
+                name=lanelet.name,
+                kind=kinds[index],
+                group=group[index],
+                points=0.5 * (left + right),
+                width=np.hypot(*(left - right).T),
+                station=share * length[group[index]],
+                left=beside(index, lanelet.left_same),
+                right=beside(index, lanelet.right_same),
+                opposite=beside(index, lanelet.left_opposite),
+                successors=tuple(number[name] for name in lanelet.successors if name in number),
+            )
+        )
     is_marked = bool(used) and all(lanelet.is_marked for lanelet in used)
     return assemble("markings" if is_marked else "lanelets", strips)
 

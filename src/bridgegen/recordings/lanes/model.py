@@ -197,7 +197,8 @@ def assemble(source: Source, strips: Sequence[Strip], notes: Sequence[str] = ())
     points = np.concatenate([np.empty((0, 2)), *(strip.points for strip in strips)])
     station = [strip.station + begin[strip.group] for strip in strips]
     return RecordedLanes(
-        source=source, names=tuple(strip.name for strip in strips),
+        source=source,
+        names=tuple(strip.name for strip in strips),
         kinds=tuple(strip.kind for strip in strips),
         carriageway=np.array([carriageway[strip.group] for strip in strips], np.int64),
         number=_numbers(strips),
@@ -206,11 +207,13 @@ def assemble(source: Source, strips: Sequence[Strip], notes: Sequence[str] = ())
         opposite=np.array([strip.opposite for strip in strips], np.int64),
         successors=tuple(strip.successors for strip in strips),
         first=np.concatenate([[0], np.cumsum(counts)]).astype(np.int64),
-        x=points[:, 0].copy(), y=points[:, 1].copy(),
+        x=points[:, 0].copy(),
+        y=points[:, 1].copy(),
         heading=np.concatenate([np.empty(0), *(headings_along(strip.points) for strip in strips)]),
         width=np.concatenate([np.empty(0), *(strip.width for strip in strips)]),
-        station=np.concatenate([np.empty(0), *station]), notes=tuple(notes),
-    )  # fmt: skip
+        station=np.concatenate([np.empty(0), *station]),
+        notes=tuple(notes),
+    )
 
 
 def headings_along(points: Float) -> Float:

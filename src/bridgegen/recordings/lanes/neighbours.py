@@ -75,9 +75,7 @@ class Neighbours:
         for lane, onward in enumerate(lanes.successors):
             for to in onward:
                 led[to].append(lane)
-        self._onward = {
-            True: flattened(lanes.successors), False: flattened(tuple(map(tuple, led)))
-        }  # fmt: skip
+        self._onward = {True: flattened(lanes.successors), False: flattened(tuple(map(tuple, led)))}
 
     def ahead(self, side: Side = "own") -> Nearest:
         """Return each state's leader in the own lane, or in that to the left or right."""

@@ -182,17 +182,21 @@ def _straightened(pieces: Pieces, line: Float) -> Float:
     cell = np.clip(np.round(middle / PIECE).astype(np.int64), 0, len(line) - 1)
     order = np.argsort(cell, kind="stable")
     bounds = np.searchsorted(cell[order], np.arange(len(line) + 1))
-    drift = np.array([
-        np.median(slope[order[a:b]]) if b - a >= 3 else np.nan
-        for a, b in itertools.pairwise(bounds.tolist())
-    ])  # fmt: skip
+    drift = np.array(
+        [
+            np.median(slope[order[a:b]]) if b - a >= 3 else np.nan
+            for a, b in itertools.pairwise(bounds.tolist())
+        ]
+    )
     known = np.flatnonzero(np.isfinite(drift))
     if len(known) < 2:
         return line
     drift = np.interp(np.arange(len(line)), known, drift[known])
-    move = gaussian_filter1d(np.concatenate([[0.0], np.cumsum(
-        0.5 * (drift[1:] + drift[:-1]) * np.diff(station)
-    )]), 1.0, mode="nearest")  # fmt: skip
+    move = gaussian_filter1d(
+        np.concatenate([[0.0], np.cumsum(0.5 * (drift[1:] + drift[:-1]) * np.diff(station))]),
+        1.0,
+        mode="nearest",
+    )
     h = headings_along(line)
     moved = line + move[:, None] * np.column_stack([-np.sin(h), np.cos(h)])
     return _respaced(moved)

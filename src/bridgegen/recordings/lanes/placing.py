@@ -66,12 +66,14 @@ def grid_of(lanes: RecordedLanes, margin: float) -> Grid:
         return Grid(segments, empty, np.zeros(1, np.int64), empty, np.array([0, 0, EDGE, 1.0]))
     reach = 0.5 * np.maximum(lanes.width[point], lanes.width[point + 1]) + margin
     low, high = (
-        np.column_stack([
-            choose(values[point], values[point + 1]) + side * reach
-            for values in (lanes.x, lanes.y)
-        ])
+        np.column_stack(
+            [
+                choose(values[point], values[point + 1]) + side * reach
+                for values in (lanes.x, lanes.y)
+            ]
+        )
         for choose, side in ((np.minimum, -1.0), (np.maximum, 1.0))
-    )  # fmt: skip
+    )
     corner = low.min(axis=0)
     begin = np.floor((low - corner) / EDGE).astype(np.int64)
     spans = np.floor((high - corner) / EDGE).astype(np.int64) - begin + 1
@@ -90,9 +92,12 @@ def grid_of(lanes: RecordedLanes, margin: float) -> Grid:
     order = np.argsort(key, kind="stable")
     keys, first = np.unique(key[order], return_index=True)
     return Grid(
-        segments, keys, np.append(first, len(key)).astype(np.int64), which[order],
+        segments,
+        keys,
+        np.append(first, len(key)).astype(np.int64),
+        which[order],
         np.array([*corner, EDGE, rows], np.float64),
-    )  # fmt: skip
+    )
 
 
 WALKS = (PEDESTRIAN, ANIMAL, OTHER)

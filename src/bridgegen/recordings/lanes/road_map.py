@@ -13,9 +13,11 @@ from bridgegen.openx.opendrive.model import DRIVABLE, Lane, OpenDrive, Road
 from bridgegen.recordings.lanes.model import NONE, STEP, Kind, RecordedLanes, Strip, along, assemble
 
 KINDS: dict[str, Kind] = {
-    **dict.fromkeys(DRIVABLE, "driving"), "biking": "bicycle", "sidewalk": "sidewalk",
+    **dict.fromkeys(DRIVABLE, "driving"),
+    "biking": "bicycle",
+    "sidewalk": "sidewalk",
     "walking": "sidewalk",
-}  # fmt: skip
+}
 """Kinds of lanes by OpenDRIVE's type; lanes of other types are left out."""
 MOST_POINTS = 5_000_000
 SHORTEST = 1e-3  # m; shorter lane sections are passed over
@@ -51,14 +53,19 @@ def lanes_of_map(model: OpenDrive, place: str) -> RecordedLanes:
                 group += bool(made)
     strips = [
         Strip(
-            name=f"{node.road_id}:{node.section}:{node.lane_id}", kind=KINDS[lane.type],
-            group=of, points=centre, width=width, station=station,
-            left=_beside(model, node, lane, known, 1), right=_beside(model, node, lane, known, -1),
+            name=f"{node.road_id}:{node.section}:{node.lane_id}",
+            kind=KINDS[lane.type],
+            group=of,
+            points=centre,
+            width=width,
+            station=station,
+            left=_beside(model, node, lane, known, 1),
+            right=_beside(model, node, lane, known, -1),
             opposite=_opposite(model, node, lane, known),
             successors=tuple(_onward(graph, node, known)),
         )
         for node, lane, of, centre, width, station in found
-    ]  # fmt: skip
+    ]
     if not any(strip.kind == "driving" for strip in strips):
         raise InputError(f"{place}: the map has no driving lane")
     return assemble("map", strips)

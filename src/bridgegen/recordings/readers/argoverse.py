@@ -29,10 +29,16 @@ from bridgegen.recordings.readers.table import (
 TIME_STEP = 0.1
 """Time step of the data set [s]."""
 KINDS = {
-    "vehicle": CAR, "bus": BUS, "motorcyclist": MOTORCYCLE, "cyclist": BICYCLE,
-    "pedestrian": PEDESTRIAN, "riderless_bicycle": OTHER, "static": OTHER, "construction": OTHER,
+    "vehicle": CAR,
+    "bus": BUS,
+    "motorcyclist": MOTORCYCLE,
+    "cyclist": BICYCLE,
+    "pedestrian": PEDESTRIAN,
+    "riderless_bicycle": OTHER,
+    "static": OTHER,
+    "construction": OTHER,
     "background": OTHER,
-}  # fmt: skip
+}
 NUMBERS = ("timestep", "position_x", "position_y", "heading", "velocity_x", "velocity_y")
 
 
@@ -71,22 +77,30 @@ def _read(path: Path) -> Iterator[RecordedTraffic]:
         _, at = np.unique(ids, return_index=True)
         beside = map_beside(path, scenario)
         facts = Facts(
-            name=scenario, format=FORMAT.name, source=str(path), time_step=TIME_STEP,
+            name=scenario,
+            format=FORMAT.name,
+            source=str(path),
+            time_step=TIME_STEP,
             frame=f"the city's ({texts['city'][rows[0]]})",
             map=beside.name if beside else "",
             lanelets=read_lanelets(beside) if beside else (),
-        )  # fmt: skip
+        )
         of = {name: column[rows] for name, column in values.items()}
         yield build(
-            facts, ids,
+            facts,
+            ids,
             {
-                "time": of["timestep"] * TIME_STEP, "x": of["position_x"], "y": of["position_y"],
-                "heading": of["heading"], "vx": of["velocity_x"], "vy": of["velocity_y"],
+                "time": of["timestep"] * TIME_STEP,
+                "x": of["position_x"],
+                "y": of["position_y"],
+                "heading": of["heading"],
+                "vx": of["velocity_x"],
+                "vy": of["velocity_y"],
             },
             _rows_of(path, rows),
             names=tracks.tolist(),
             kind=[KINDS.get(texts["object_type"][rows[i]], UNKNOWN_KIND) for i in at.tolist()],
-        )  # fmt: skip
+        )
 
 
 def _rows_of(path: Path, rows: Int) -> Where:
@@ -94,6 +108,8 @@ def _rows_of(path: Path, rows: Int) -> Where:
 
 
 FORMAT = Format(
-    name="Argoverse 2", title="Argoverse 2 motion forecasting (.parquet)",
-    recognises=_recognises, read=_read,
-)  # fmt: skip
+    name="Argoverse 2",
+    title="Argoverse 2 motion forecasting (.parquet)",
+    recognises=_recognises,
+    read=_read,
+)

@@ -62,12 +62,15 @@ def _lanelet(name: str, record: dict[str, Any], bounds: dict[str, tuple[Float, F
     other = beside["left"]
     successors = record.get("successors")
     return Lanelet(
-        name=name, left=bounds[name][0], right=bounds[name][1],
-        left_same=same.get("left", ""), right_same=same.get("right", ""),
+        name=name,
+        left=bounds[name][0],
+        right=bounds[name][1],
+        left_same=same.get("left", ""),
+        right_same=same.get("right", ""),
         left_opposite=other if other in bounds and "left" not in same else "",
         successors=tuple(map(str, successors)) if isinstance(successors, list) else (),
         kinds=KINDS.get(str(record.get("lane_type")), ()),
-    )  # fmt: skip
+    )
 
 
 def _course(bounds: tuple[Float, Float]) -> Float:

@@ -106,14 +106,18 @@ def _linked(
             if is_last
             else (names[index + 1],)
         )
-        lanelets.append(Lanelet(
-            name=names[index],
-            left=points + half[0, a : b + 1, None] * normal,
-            right=points - half[1, a : b + 1, None] * normal,
-            left_same=_name(names, left[index]), right_same=_name(names, right[index]),
-            left_opposite=_name(names, opposite[index]),
-            successors=successors, kinds=lines[k].kinds,
-        ))  # fmt: skip
+        lanelets.append(
+            Lanelet(
+                name=names[index],
+                left=points + half[0, a : b + 1, None] * normal,
+                right=points - half[1, a : b + 1, None] * normal,
+                left_same=_name(names, left[index]),
+                right_same=_name(names, right[index]),
+                left_opposite=_name(names, opposite[index]),
+                successors=successors,
+                kinds=lines[k].kinds,
+            )
+        )
     return tuple(lanelets)
 
 
@@ -164,9 +168,12 @@ def _abreast(field: LineField, a: int, b: int) -> float:
 
 
 def _keep(
-    kind: dict[tuple[str, int], tuple[float, int]], sides: tuple[str, str], i: int, j: int,
+    kind: dict[tuple[str, int], tuple[float, int]],
+    sides: tuple[str, str],
+    i: int,
+    j: int,
     near: tuple[float, float],
-) -> None:  # fmt: skip
+) -> None:
     if near[0] * near[1] <= 0.0:
         return
     side, away = sides[0] if near[0] > 0.0 else sides[1], abs(near[0] + near[1])
@@ -185,8 +192,11 @@ def _followers(field: LineField, lines: Sequence[CentreLine]) -> list[tuple[str,
             continue
         end = int(field.first[k + 1]) - 1
         at = sorted(tree.query_ball_point(field.points[end], JOINED))
-        found.append(tuple(
-            lines[j].name for j in at
-            if j != k and field.along[starts[j]] @ field.along[end] >= PARALLEL
-        ))  # fmt: skip
+        found.append(
+            tuple(
+                lines[j].name
+                for j in at
+                if j != k and field.along[starts[j]] @ field.along[end] >= PARALLEL
+            )
+        )
     return found

@@ -85,8 +85,9 @@ def clean(traffic: RecordedTraffic, time_step: float = TIME_STEP) -> Cleaned:
     owner: list[int] = []
     names: list[str] = []
     for p, states in enumerate(traffic.states()):
-        whole = _Track({key: getattr(traffic, key)[states] for key in COLUMNS},
-                       traffic.lane[states])  # fmt: skip
+        whole = _Track(
+            {key: getattr(traffic, key)[states] for key in COLUMNS}, traffic.lane[states]
+        )
         number = 0
         for piece in _pieces(traffic, p, whole, p in suspects, at_jumps, quality):
             done = _complete(traffic, p, piece, time_step, quality)
@@ -104,15 +105,19 @@ def clean(traffic: RecordedTraffic, time_step: float = TIME_STEP) -> Cleaned:
     source = traffic.facts.source
     return Cleaned(
         RecordedTraffic(
-            facts=replace(traffic.facts, time_step=time_step), names=tuple(names), kind=kind[of],
-            length=length[of], width=width[of],
+            facts=replace(traffic.facts, time_step=time_step),
+            names=tuple(names),
+            kind=kind[of],
+            length=length[of],
+            width=width[of],
             first=np.cumsum([0, *(len(piece) for piece in pieces)]),
-            lane=np.concatenate([piece.lane for piece in pieces]), where=lambda _: source,
+            lane=np.concatenate([piece.lane for piece in pieces]),
+            where=lambda _: source,
             **columns,
         ),
         quality,
         kind,
-    )  # fmt: skip
+    )
 
 
 class _Cuts:
@@ -151,9 +156,13 @@ class _Cuts:
 
 
 def _pieces(
-    traffic: RecordedTraffic, p: int, track: _Track, suspect: bool, at_jumps: _Cuts,
+    traffic: RecordedTraffic,
+    p: int,
+    track: _Track,
+    suspect: bool,
+    at_jumps: _Cuts,
     quality: Quality,
-) -> Iterator[_Track]:  # fmt: skip
+) -> Iterator[_Track]:
     """Yield the pieces of a track between cuts, without the states that are off its path."""
     name, begin = traffic.names[p], int(traffic.first[p])
     step = traffic.facts.time_step
@@ -203,8 +212,9 @@ def _complete(
     if missing.any():
         quality.note(Rule.VELOCITY, p, int(missing.sum()), name)
         of_positions = velocities(time, columns["x"], columns["y"])
-        vx, vy = (np.where(missing, new, old)
-                  for new, old in zip(of_positions, (vx, vy), strict=True))  # fmt: skip
+        vx, vy = (
+            np.where(missing, new, old) for new, old in zip(of_positions, (vx, vy), strict=True)
+        )
     heading = columns["heading"]
     missing = ~np.isfinite(heading)
     if missing.any():
@@ -220,8 +230,14 @@ def _complete(
         acceleration = np.where(missing, np.gradient(along, time), acceleration)
     at = time_step * np.arange(low, high + 1, dtype=np.float64)
     if len(at) == n and np.abs(at - time).max() <= SAME:
-        done = {"x": columns["x"], "y": columns["y"], "vx": vx, "vy": vy, "heading": heading,
-                "acceleration": acceleration}  # fmt: skip
+        done = {
+            "x": columns["x"],
+            "y": columns["y"],
+            "vx": vx,
+            "vy": vy,
+            "heading": heading,
+            "acceleration": acceleration,
+        }
         lane = track.lane
     else:
         quality.note(Rule.RESAMPLED, p, n, f"{name}, {n} states become {len(at)}")
@@ -229,12 +245,15 @@ def _complete(
         done = {
             "x": smoothing.hermite(within, time, columns["x"], vx),
             "y": smoothing.hermite(within, time, columns["y"], vy),
-            **{speed: smoothing.hermite_slopes(within, time, columns[place], slopes)
-               if track.is_spline else np.interp(within, time, slopes)
-               for place, speed, slopes in (("x", "vx", vx), ("y", "vy", vy))},
+            **{
+                speed: smoothing.hermite_slopes(within, time, columns[place], slopes)
+                if track.is_spline
+                else np.interp(within, time, slopes)
+                for place, speed, slopes in (("x", "vx", vx), ("y", "vy", vy))
+            },
             "heading": smoothing.hermite(within, time, heading, smoothing.slopes(time, heading)),
             "acceleration": np.interp(within, time, acceleration),
-        }  # fmt: skip
+        }
         lane = track.lane[np.searchsorted(time, within + SAME, side="right") - 1]
     return _Track({"time": at, **done, "heading": wrap(done["heading"])}, lane)
 
@@ -275,10 +294,18 @@ def _smoothed(traffic: RecordedTraffic, p: int, track: _Track, quality: Quality)
     speed = np.hypot(vx, vy)
     along = np.divide(ax * vx + ay * vy, speed, out=np.zeros(count), where=speed > 0.1)
     return _Track(
-        {"time": time, "x": x, "y": y, "vx": vx, "vy": vy, "heading": heading,
-         "acceleration": along},
-        track.lane[nearest], is_spline=True,
-    )  # fmt: skip
+        {
+            "time": time,
+            "x": x,
+            "y": y,
+            "vx": vx,
+            "vy": vy,
+            "heading": heading,
+            "acceleration": along,
+        },
+        track.lane[nearest],
+        is_spline=True,
+    )
 
 
 def _kinds(traffic: RecordedTraffic, quality: Quality) -> Int:

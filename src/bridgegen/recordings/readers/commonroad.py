@@ -27,11 +27,21 @@ from bridgegen.recordings.readers.table import (
 )
 
 KINDS = {
-    "car": CAR, "taxi": CAR, "parkedVehicle": CAR, "priorityVehicle": CAR, "truck": TRUCK,
-    "bus": BUS, "motorcycle": MOTORCYCLE, "bicycle": BICYCLE, "pedestrian": PEDESTRIAN,
-    "constructionZone": OTHER, "roadBoundary": OTHER, "pillar": OTHER, "building": OTHER,
+    "car": CAR,
+    "taxi": CAR,
+    "parkedVehicle": CAR,
+    "priorityVehicle": CAR,
+    "truck": TRUCK,
+    "bus": BUS,
+    "motorcycle": MOTORCYCLE,
+    "bicycle": BICYCLE,
+    "pedestrian": PEDESTRIAN,
+    "constructionZone": OTHER,
+    "roadBoundary": OTHER,
+    "pillar": OTHER,
+    "building": OTHER,
     "median_strip": OTHER,
-}  # fmt: skip
+}
 VERSIONS = ("2020a", "2018b")
 MOST_STEPS = 1_000_000
 
@@ -91,27 +101,35 @@ def _read(path: Path) -> Iterator[RecordedTraffic]:
     )
     heading, speed = table[:, 3], table[:, 4]
     yield build(
-        facts, ids,
+        facts,
+        ids,
         {
-            "time": table[:, 0] * step, "x": table[:, 1], "y": table[:, 2], "heading": heading,
-            "vx": speed * np.cos(heading), "vy": speed * np.sin(heading),
+            "time": table[:, 0] * step,
+            "x": table[:, 1],
+            "y": table[:, 2],
+            "heading": heading,
+            "vx": speed * np.cos(heading),
+            "vy": speed * np.sin(heading),
             "acceleration": table[:, 5],
         },
         lambda i: f"{path}, line {rows[i][0]}",
         names=[element.get("id") or "" for element, _ in found],
         kind=[KINDS.get(element.findtext("type") or "", UNKNOWN_KIND) for element, _ in found],
-        length=[length for length, _ in boxes], width=[width for _, width in boxes],
-    )  # fmt: skip
+        length=[length for length, _ in boxes],
+        width=[width for _, width in boxes],
+    )
 
 
 def _lanelet(path: Path, element: etree._Element) -> Lanelet:
     left, right = (
-        np.array([
-            [_number(path, point, point.findtext(axis), axis) for axis in ("x", "y")]
-            for point in element.iterfind(f"{side}/point")
-        ]).reshape(-1, 2)
+        np.array(
+            [
+                [_number(path, point, point.findtext(axis), axis) for axis in ("x", "y")]
+                for point in element.iterfind(f"{side}/point")
+            ]
+        ).reshape(-1, 2)
         for side in ("leftBound", "rightBound")
-    )  # fmt: skip
+    )
     if min(len(left), len(right)) < 2:
         raise FileFormatError(
             f"{path}, line {_line(element)}: a lanelet must have two points at least on each bound"
@@ -126,12 +144,15 @@ def _lanelet(path: Path, element: etree._Element) -> Lanelet:
         for item in element.iterfind(f"adjacent{side}")
     }
     return Lanelet(
-        name=element.get("id") or "", left=left, right=right,
-        left_same=beside.get("Leftsame", ""), right_same=beside.get("Rightsame", ""),
+        name=element.get("id") or "",
+        left=left,
+        right=right,
+        left_same=beside.get("Leftsame", ""),
+        right_same=beside.get("Rightsame", ""),
         left_opposite=beside.get("Leftopposite", ""),
         successors=tuple(item.get("ref") or "" for item in element.iterfind("successor")),
         kinds=tuple((item.text or "").strip() for item in element.iterfind("laneletType")),
-    )  # fmt: skip
+    )
 
 
 def _obstacles(root: etree._Element, role: str) -> Iterator[etree._Element]:
@@ -213,6 +234,8 @@ def _box(path: Path, element: etree._Element) -> tuple[float, float]:
 
 
 FORMAT = Format(
-    name="CommonRoad", title="CommonRoad 2020a and 2018b (.xml)",
-    recognises=_recognises, read=_read,
-)  # fmt: skip
+    name="CommonRoad",
+    title="CommonRoad 2020a and 2018b (.xml)",
+    recognises=_recognises,
+    read=_read,
+)

@@ -34,9 +34,17 @@ LONGEST_NAME = 200
 _ENTITY, _TYPE, _CATEGORY, _TIME, _NAME, _SPEED = 0, 2, 3, 5, 6, 7
 _BOX, _POSE, _DELETED, _STEP, _END = 10, 13, 19, 21, 22
 _SIZES = {
-    _ENTITY: 4, _TYPE: 4, _CATEGORY: 4, _TIME: 8, _SPEED: 8, _BOX: 48, _POSE: 48, _DELETED: 0,
-    _STEP: 8, _END: 8,
-}  # fmt: skip
+    _ENTITY: 4,
+    _TYPE: 4,
+    _CATEGORY: 4,
+    _TIME: 8,
+    _SPEED: 8,
+    _BOX: 48,
+    _POSE: 48,
+    _DELETED: 0,
+    _STEP: 8,
+    _END: 8,
+}
 _VEHICLE, _PEDESTRIAN = 1, 2
 KINDS = {
     **{(_VEHICLE, k): kind for k, kind in enumerate((
@@ -183,10 +191,18 @@ class _Log:
         for k in range(1 + unwritten):
             for entity in seen:
                 x, y, heading = entity.pose[0], entity.pose[1], entity.pose[3]
-                self.rows.append((
-                    entity.number, self.time + k * self.step if k else self.time, x, y, heading,
-                    entity.speed, entity.box[0], entity.box[1],
-                ))  # fmt: skip
+                self.rows.append(
+                    (
+                        entity.number,
+                        self.time + k * self.step if k else self.time,
+                        x,
+                        y,
+                        heading,
+                        entity.speed,
+                        entity.box[0],
+                        entity.box[1],
+                    )
+                )
                 self.places.append(self.at)
 
     def traffic(self, path: Path, road: str) -> RecordedTraffic:
@@ -240,5 +256,8 @@ def _distinct(names: list[str]) -> list[str]:
 
 
 FORMAT = Format(
-    name="esmini", title="esmini's binary log (.dat)", recognises=_recognises, read=_read,
-)  # fmt: skip
+    name="esmini",
+    title="esmini's binary log (.dat)",
+    recognises=_recognises,
+    read=_read,
+)

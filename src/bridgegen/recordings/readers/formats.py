@@ -38,9 +38,13 @@ FORMATS: tuple[Format, ...] = (
 """Formats of recordings; no file is of more than one of them."""
 
 ARCHIVES = {
-    b"PK\x03\x04": "zip", b"\x1f\x8b": "gzip", b"BZh": "bzip2", b"\xfd7zXZ\x00": "xz",
-    b"7z\xbc\xaf\x27\x1c": "7z", b"Rar!": "rar",
-}  # fmt: skip
+    b"PK\x03\x04": "zip",
+    b"\x1f\x8b": "gzip",
+    b"BZh": "bzip2",
+    b"\xfd7zXZ\x00": "xz",
+    b"7z\xbc\xaf\x27\x1c": "7z",
+    b"Rar!": "rar",
+}
 
 
 def recognise(head: Head) -> Format | None:

@@ -30,9 +30,13 @@ COLUMNS = ("timestamp_ms", "x", "y", "vx", "vy")
 MORE = ("psi_rad", "length", "width", "case_id")
 TEXTS = ("track_id", "agent_type")
 KINDS = {
-    "car": CAR, "truck": TRUCK, "bus": BUS, "motorcycle": MOTORCYCLE, "bicycle": BICYCLE,
+    "car": CAR,
+    "truck": TRUCK,
+    "bus": BUS,
+    "motorcycle": MOTORCYCLE,
+    "bicycle": BICYCLE,
     "pedestrian": PEDESTRIAN,
-}  # fmt: skip
+}
 EITHER = "pedestrian/bicycle"
 FASTEST_WALK = 2.5  # m/s
 
@@ -67,17 +71,25 @@ def _recording(path: Path, name: str, data: Columns, rows: Int) -> RecordedTraff
         columns["heading"] = values["psi_rad"]
     kinds, either = _kinds([types[of_state[rows[i]]] for i in at.tolist()], ids, values)
     facts = Facts(
-        name=name, format=FORMAT.name, source=str(path),
-        time_step=median_step(time[order], first), frame="the map's (Lanelet2, local metres)",
-        notes=(f"{either} are pedestrians or bicycles, told apart by their speed",) if either
+        name=name,
+        format=FORMAT.name,
+        source=str(path),
+        time_step=median_step(time[order], first),
+        frame="the map's (Lanelet2, local metres)",
+        notes=(f"{either} are pedestrians or bicycles, told apart by their speed",)
+        if either
         else (),
-    )  # fmt: skip
+    )
     return build(
-        facts, ids, columns, lambda i: f"{path}, line {rows[i] + 2}",
-        names=[tracks[code] for code in distinct.tolist()], kind=kinds,
+        facts,
+        ids,
+        columns,
+        lambda i: f"{path}, line {rows[i] + 2}",
+        names=[tracks[code] for code in distinct.tolist()],
+        kind=kinds,
         length=per_participant(ids, values["length"]) if "length" in values else None,
         width=per_participant(ids, values["width"]) if "width" in values else None,
-    )  # fmt: skip
+    )
 
 
 def _kinds(types: list[str], ids: Int, values: dict[str, Float]) -> tuple[list[int], int]:
@@ -93,5 +105,8 @@ def _kinds(types: list[str], ids: Int, values: dict[str, Float]) -> tuple[list[i
 
 
 FORMAT = Format(
-    name="INTERACTION", title="INTERACTION (.csv)", recognises=_recognises, read=_read,
-)  # fmt: skip
+    name="INTERACTION",
+    title="INTERACTION (.csv)",
+    recognises=_recognises,
+    read=_read,
+)

@@ -42,9 +42,16 @@ OTHERS = ("trackId", "frame", "xCenter", "yCenter", "heading", "width", "length"
 OTHERS_MORE = ("xVelocity", "yVelocity", "xAcceleration", "yAcceleration")
 
 CLASSES = {
-    "car": CAR, "van": CAR, "truck": TRUCK, "truck_bus": TRUCK, "bus": BUS, "trailer": TRUCK,
-    "motorcycle": MOTORCYCLE, "bicycle": BICYCLE, "pedestrian": PEDESTRIAN,
-}  # fmt: skip
+    "car": CAR,
+    "van": CAR,
+    "truck": TRUCK,
+    "truck_bus": TRUCK,
+    "bus": BUS,
+    "trailer": TRUCK,
+    "motorcycle": MOTORCYCLE,
+    "bicycle": BICYCLE,
+    "pedestrian": PEDESTRIAN,
+}
 """Kinds by the recordings' classes; a trailer is a track of its own."""
 
 META, RECORDING_META = "_tracksMeta.csv", "_recordingMeta.csv"
@@ -92,9 +99,14 @@ def _facts(
     place = about.get("locationId")
     where = "" if place is None or not np.isfinite(place[0]) else f", location {place[0]:g}"
     return Facts(
-        name=path.name.removesuffix("_tracks.csv"), format=FORMAT.name, source=str(path),
-        time_step=1.0 / rate, frame=frame + where, notes=notes, lanelets=lanelets,
-    )  # fmt: skip
+        name=path.name.removesuffix("_tracks.csv"),
+        format=FORMAT.name,
+        source=str(path),
+        time_step=1.0 / rate,
+        frame=frame + where,
+        notes=notes,
+        lanelets=lanelets,
+    )
 
 
 def _read_highd(path: Path, stem: str, rate: float, about: dict[str, Float]) -> RecordedTraffic:
@@ -110,10 +122,13 @@ def _read_highd(path: Path, stem: str, rate: float, about: dict[str, Float]) -> 
     kinds, time = _kinds(meta, rows), data.pop("frame") / rate
     heading = _headings(ids, time, vx, vy, along, kinds, length)
     columns: dict[str, npt.NDArray[Any]] = {
-        "time": time, "x": data.pop("x") + 0.5 * data.pop("width"),
+        "time": time,
+        "x": data.pop("x") + 0.5 * data.pop("width"),
         "y": -(data.pop("y") + 0.5 * data.pop("height")),
-        "heading": heading, "vx": vx, "vy": vy,
-    }  # fmt: skip
+        "heading": heading,
+        "vx": vx,
+        "vy": vy,
+    }
     if {"xAcceleration", "yAcceleration"} <= set(data):
         columns["acceleration"] = data["xAcceleration"] * np.cos(heading) - data[
             "yAcceleration"
@@ -124,9 +139,15 @@ def _read_highd(path: Path, stem: str, rate: float, about: dict[str, Float]) -> 
     ends = (float(columns["x"].min()), float(columns["x"].max()))
     lanelets = _lanes(path.with_name(stem + RECORDING_META), ends)
     return build(
-        _facts(path, rate, about, frame, lanelets=lanelets), ids, columns, line_of_table(str(path)),
-        names=[str(track) for track in tracks], kind=kinds, length=length, width=width,
-    )  # fmt: skip
+        _facts(path, rate, about, frame, lanelets=lanelets),
+        ids,
+        columns,
+        line_of_table(str(path)),
+        names=[str(track) for track in tracks],
+        kind=kinds,
+        length=length,
+        width=width,
+    )
 
 
 def _headings(
@@ -140,15 +161,21 @@ def _headings(
     first = np.searchsorted(ids[order], np.arange(len(kinds) + 1))
     begin = order[first[:-1]]
     moves = np.hypot(vx[begin], vy[begin]) > STANDING
-    arm = np.array([
-        centre_ahead(CAR if kind == UNKNOWN_KIND else kind, item)
-        for kind, item in zip(kinds.tolist(), length.tolist(), strict=True)
-    ])  # fmt: skip
+    arm = np.array(
+        [
+            centre_ahead(CAR if kind == UNKNOWN_KIND else kind, item)
+            for kind, item in zip(kinds.tolist(), length.tolist(), strict=True)
+        ]
+    )
     found = np.empty(len(ids))
     found[order] = headings_of_centres(
-        time[order], vx[order], vy[order], first, np.maximum(arm, SHORTEST_ARM),
+        time[order],
+        vx[order],
+        vy[order],
+        first,
+        np.maximum(arm, SHORTEST_ARM),
         np.where(moves, np.arctan2(vy[begin], vx[begin]), along[begin]),
-    )  # fmt: skip
+    )
     return found
 
 
@@ -194,9 +221,11 @@ def _read_others(path: Path, stem: str, rate: float, about: dict[str, Float]) ->
     rows = _rows(path, stem, "trackId", meta, tracks)
     heading = np.radians(data.pop("heading"))
     columns = {
-        "time": data.pop("frame") / rate, "x": data.pop("xCenter"), "y": data.pop("yCenter"),
+        "time": data.pop("frame") / rate,
+        "x": data.pop("xCenter"),
+        "y": data.pop("yCenter"),
         "heading": heading,
-    }  # fmt: skip
+    }
     if {"xVelocity", "yVelocity"} <= set(data):
         columns |= {"vx": data["xVelocity"], "vy": data["yVelocity"]}
     if {"xAcceleration", "yAcceleration"} <= set(data):
@@ -205,10 +234,15 @@ def _read_others(path: Path, stem: str, rate: float, about: dict[str, Float]) ->
         ] * np.sin(heading)
     frame = "the recording's, east and north of its UTM origin"
     return build(
-        _facts(path, rate, about, frame), ids, columns, line_of_table(str(path)),
-        names=[str(track) for track in tracks], kind=_kinds(meta, rows),
-        length=meta.numbers["length"][rows], width=meta.numbers["width"][rows],
-    )  # fmt: skip
+        _facts(path, rate, about, frame),
+        ids,
+        columns,
+        line_of_table(str(path)),
+        names=[str(track) for track in tracks],
+        kind=_kinds(meta, rows),
+        length=meta.numbers["length"][rows],
+        width=meta.numbers["width"][rows],
+    )
 
 
 def _ids(path: Path, name: str, values: Float) -> tuple[Int, Int]:
@@ -235,6 +269,9 @@ def _kinds(meta: Columns, rows: Int) -> Int:
 
 
 FORMAT = Format(
-    name="levelX", title="levelX: highD, inD, rounD, exiD, uniD (_tracks.csv)",
-    recognises=_recognises, read=_read, companion=_companion,
-)  # fmt: skip
+    name="levelX",
+    title="levelX: highD, inD, rounD, exiD, uniD (_tracks.csv)",
+    recognises=_recognises,
+    read=_read,
+    companion=_companion,
+)

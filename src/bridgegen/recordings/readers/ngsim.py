@@ -36,9 +36,18 @@ FOOT = 0.3048  # m
 CLASSES = {1: MOTORCYCLE, 2: CAR, 3: TRUCK}
 
 NUMBERS = (
-    "Vehicle_ID", "Total_Frames", "Global_Time", "Local_X", "Local_Y",
-    "v_length", "v_Width", "v_Class", "v_Vel", "v_Acc", "Lane_ID",
-)  # fmt: skip
+    "Vehicle_ID",
+    "Total_Frames",
+    "Global_Time",
+    "Local_X",
+    "Local_Y",
+    "v_length",
+    "v_Width",
+    "v_Class",
+    "v_Vel",
+    "v_Acc",
+    "Lane_ID",
+)
 TEXT_FILE = (
     "Vehicle_ID", "Frame_ID", "Total_Frames", "Global_Time", "Local_X", "Local_Y", "Global_X",
     "Global_Y", "v_length", "v_Width", "v_Class", "v_Vel", "v_Acc", "Lane_ID", "Preceding",
@@ -89,24 +98,31 @@ def _recording(path: Path, place: str, values: dict[str, Float], lines: Int) -> 
     sizes = {name: per_participant(ids, values[name]) for name in ("v_length", "v_Width")}
     classes = per_participant(ids, values["v_Class"])
     bounds = np.searchsorted(ids, np.arange(len(keys) + 1))
-    kinds = np.array([
-        UNKNOWN_KIND if np.isnan(item) else CLASSES.get(int(item), UNKNOWN_KIND) for item in classes
-    ])  # fmt: skip
+    kinds = np.array(
+        [
+            UNKNOWN_KIND if np.isnan(item) else CLASSES.get(int(item), UNKNOWN_KIND)
+            for item in classes
+        ]
+    )
     length = np.nan_to_num(sizes["v_length"]) * FOOT
-    arm = 0.5 * length + np.array([
-        centre_ahead(CAR if kind == UNKNOWN_KIND else kind, item)
-        for kind, item in zip(kinds.tolist(), length.tolist(), strict=True)
-    ])  # fmt: skip
+    arm = 0.5 * length + np.array(
+        [
+            centre_ahead(CAR if kind == UNKNOWN_KIND else kind, item)
+            for kind, item in zip(kinds.tolist(), length.tolist(), strict=True)
+        ]
+    )
     quiet = _without_noise(time, x, y, bounds)
     heading = headings_behind(*quiet, bounds, np.maximum(arm, SHORTEST_ARM))
     behind = 0.5 * length[ids]
     speed, lane = values["v_Vel"] * FOOT, values["Lane_ID"]
     facts = Facts(
-        name=place, format=FORMAT.name, source=str(path),
+        name=place,
+        format=FORMAT.name,
+        source=str(path),
         time_step=median_step(time, bounds),
         frame="the road's: x along Local_Y, y to the left",
         notes=("headings are those with which rear axles follow the fronts",),
-    )  # fmt: skip
+    )
     numbers = [key // 2**24 for key in keys.tolist()]
     used = Counter(numbers)
     names = [
@@ -114,17 +130,24 @@ def _recording(path: Path, place: str, values: dict[str, Float], lines: Int) -> 
         for number, key in zip(numbers, keys.tolist(), strict=True)
     ]
     return build(
-        facts, ids,
+        facts,
+        ids,
         {
-            "time": time, "x": x - behind * np.cos(heading), "y": y - behind * np.sin(heading),
-            "heading": heading, "vx": speed * np.cos(heading), "vy": speed * np.sin(heading),
+            "time": time,
+            "x": x - behind * np.cos(heading),
+            "y": y - behind * np.sin(heading),
+            "heading": heading,
+            "vx": speed * np.cos(heading),
+            "vy": speed * np.sin(heading),
             "acceleration": values["v_Acc"] * FOOT,
             "lane": np.where(np.abs(lane) < 1e6, lane, NO_LANE),
         },
         lambda i: f"{path}, line {lines[i]}",
-        names=names, kind=kinds,
-        length=sizes["v_length"] * FOOT, width=sizes["v_Width"] * FOOT,
-    )  # fmt: skip
+        names=names,
+        kind=kinds,
+        length=sizes["v_length"] * FOOT,
+        width=sizes["v_Width"] * FOOT,
+    )
 
 
 def _without_noise(time: Float, x: Float, y: Float, bounds: Int) -> tuple[Float, Float]:
@@ -139,5 +162,8 @@ def _without_noise(time: Float, x: Float, y: Float, bounds: Int) -> tuple[Float,
 
 
 FORMAT = Format(
-    name="NGSIM", title="NGSIM (.csv, .txt)", recognises=_recognises, read=_read,
-)  # fmt: skip
+    name="NGSIM",
+    title="NGSIM (.csv, .txt)",
+    recognises=_recognises,
+    read=_read,
+)

@@ -54,8 +54,13 @@ _BOUNDARY_POINT = Shape({1: {1: "x.", 2: "y."}})
 _IDENTIFIER = Shape({1: "id"})
 _PAIR = Shape({1: {1: "before"}, 2: {1: "after"}})
 _SUBTYPES = {
-    3: "bicycleLane", 4: "sidewalk", 5: "parking", 7: "restricted", 8: "border", 9: "shoulder",
-}  # fmt: skip
+    3: "bicycleLane",
+    4: "sidewalk",
+    5: "parking",
+    7: "restricted",
+    8: "border",
+    9: "shoulder",
+}
 
 
 def lanelets_of(truth: Message) -> tuple[tuple[Lanelet, ...], tuple[str, ...]]:
@@ -86,12 +91,15 @@ def lanelets_of(truth: Message) -> tuple[tuple[Lanelet, ...], tuple[str, ...]]:
             pairs = _PAIR.read(inner, found[_PAIRING])["after" if ascending else "before"]
             borders = np.concatenate([found[_RIGHT_BORDERS], found[_LEFT_BORDERS]])
             subtype = _SUBTYPES.get(int(about["subtype"][k]))
-            lines.append(CentreLine(
-                name=str(about["id"][k]), points=points if ascending else points[::-1],
-                borders=_texts(_IDENTIFIER.read(inner, borders)["id"].tolist()),
-                successors=_texts(pairs.tolist()) if len(pairs) else None,
-                kinds=(subtype,) if subtype else (),
-            ))  # fmt: skip
+            lines.append(
+                CentreLine(
+                    name=str(about["id"][k]),
+                    points=points if ascending else points[::-1],
+                    borders=_texts(_IDENTIFIER.read(inner, borders)["id"].tolist()),
+                    successors=_texts(pairs.tolist()) if len(pairs) else None,
+                    kinds=(subtype,) if subtype else (),
+                )
+            )
     joined = {name: np.concatenate(parts) for name, parts in road.items() if parts}
     lanelets, notes = lanelets_of_centre_lines(lines, joined, truth.place(truth.begin))
     if without:
@@ -116,14 +124,22 @@ _TIMESTAMP, _MOVING_OBJECT, _TRAFFIC_LIGHT, _GROUND_TRUTH = 2, 5, 7, 7
 _PROJECTION, _MAP = 14, 15
 
 TIMESTAMP = Shape({1: "seconds", 2: "nanos"})
-OBJECT = Shape({
-    1: {1: "id"},
-    2: {
-        1: {1: "length.", 2: "width."}, 2: {1: "x.", 2: "y."}, 3: {3: "heading."},
-        4: {1: "vx.", 2: "vy."}, 5: {1: "ax.", 2: "ay."},
-    },
-    3: "type", 4: {1: "lane"}, 6: {1: "vehicle"}, 9: {1: {1: "assigned"}},
-})  # fmt: skip
+OBJECT = Shape(
+    {
+        1: {1: "id"},
+        2: {
+            1: {1: "length.", 2: "width."},
+            2: {1: "x.", 2: "y."},
+            3: {3: "heading."},
+            4: {1: "vx.", 2: "vy."},
+            5: {1: "ax.", 2: "ay."},
+        },
+        3: "type",
+        4: {1: "lane"},
+        6: {1: "vehicle"},
+        9: {1: {1: "assigned"}},
+    }
+)
 LIGHT = Shape({1: {1: "id"}, 3: {1: "color", 3: "mode"}})
 
 TYPES = {3: PEDESTRIAN, 4: ANIMAL, 1: OTHER}
@@ -285,18 +301,27 @@ class _Trace:
         heading = columns["heading"]
         first = np.searchsorted(np.sort(ids), np.arange(len(identifiers) + 1))
         facts = Facts(
-            name=self.name[:200], format=FORMAT.name, source=str(self.path),
+            name=self.name[:200],
+            format=FORMAT.name,
+            source=str(self.path),
             time_step=median_step(time[np.argsort(ids, kind="stable")], first),
             frame=f"OSI's global frame ({self.frame})" if self.frame else "OSI's global frame",
-            map=self.map, lights=MappingProxyType(self._lights(start)), notes=tuple(notes),
+            map=self.map,
+            lights=MappingProxyType(self._lights(start)),
+            notes=tuple(notes),
             lanelets=lanelets,
-        )  # fmt: skip
+        )
         lane = np.where(columns["assigned"] >= 0, columns["assigned"], columns["lane"])
         return build(
-            facts, ids,
+            facts,
+            ids,
             {
-                "time": time, "x": columns["x"], "y": columns["y"], "heading": heading,
-                "vx": columns["vx"], "vy": columns["vy"],
+                "time": time,
+                "x": columns["x"],
+                "y": columns["y"],
+                "heading": heading,
+                "vx": columns["vx"],
+                "vy": columns["vy"],
                 "acceleration": columns["ax"] * np.cos(heading) + columns["ay"] * np.sin(heading),
                 "lane": np.where((lane >= 0) & (lane < 2**31), lane, NO_LANE),
             },
@@ -305,7 +330,7 @@ class _Trace:
             kind=_kinds(ids, columns["type"], columns["vehicle"]),
             length=per_participant(ids, columns["length"]),
             width=per_participant(ids, columns["width"]),
-        )  # fmt: skip
+        )
 
     def _lights(self, start: int) -> dict[str, RecordedLight]:
         """Return when each light changes [s], and to what; a light is one lamp."""
@@ -354,6 +379,8 @@ def _kinds(ids: Int, types: Int, vehicles: Int) -> Int:
 
 
 FORMAT = Format(
-    name="OSI", title="ASAM OSI GroundTruth or SensorView (.osi, .mcap)",
-    recognises=_recognises, read=_read,
-)  # fmt: skip
+    name="OSI",
+    title="ASAM OSI GroundTruth or SensorView (.osi, .mcap)",
+    recognises=_recognises,
+    read=_read,
+)

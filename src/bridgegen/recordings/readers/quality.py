@@ -96,9 +96,13 @@ OVER = 1.0
 LEAST_MOVING = 20  # states
 MOVING = 1.0  # m/s
 UNITS = {
-    "km/h": 3.6, "mph": 2.23694, "ft/s": 3.28084, "positions in km": 1000.0,
-    "positions in feet": 0.3048, "positions in cm": 0.01,
-}  # fmt: skip
+    "km/h": 3.6,
+    "mph": 2.23694,
+    "ft/s": 3.28084,
+    "positions in km": 1000.0,
+    "positions in feet": 0.3048,
+    "positions in cm": 0.01,
+}
 """Ratios of the given speeds to those of the positions, by the wrong unit of one of both."""
 
 

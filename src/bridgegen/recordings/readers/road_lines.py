@@ -64,9 +64,12 @@ class LineField:
     """
 
     def __init__(
-        self, lines: Sequence[CentreLine], edges: Sequence[tuple[str, Float]],
-        outlines: Sequence[tuple[str, Float]], place: str,
-    ) -> None:  # fmt: skip
+        self,
+        lines: Sequence[CentreLine],
+        edges: Sequence[tuple[str, Float]],
+        outlines: Sequence[tuple[str, Float]],
+        place: str,
+    ) -> None:
         parts = [_resampled(line.points, STEP) for line in lines]
         counts = [len(part) for part in parts]
         self.first = np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)

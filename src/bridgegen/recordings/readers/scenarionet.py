@@ -30,15 +30,24 @@ from bridgegen.recordings.readers.table import (
 )
 
 KINDS = {
-    "VEHICLE": CAR, "PEDESTRIAN": PEDESTRIAN, "CYCLIST": BICYCLE, "MOTORCYCLIST": MOTORCYCLE,
-    "TRAFFIC_CONE": OTHER, "TRAFFIC_BARRIER": OTHER, "TRAFFIC_OBJECT": OTHER,
-}  # fmt: skip
+    "VEHICLE": CAR,
+    "PEDESTRIAN": PEDESTRIAN,
+    "CYCLIST": BICYCLE,
+    "MOTORCYCLIST": MOTORCYCLE,
+    "TRAFFIC_CONE": OTHER,
+    "TRAFFIC_BARRIER": OTHER,
+    "TRAFFIC_OBJECT": OTHER,
+}
 LIGHTS = {
-    "LANE_STATE_STOP": "red", "LANE_STATE_ARROW_STOP": "red", "LANE_STATE_CAUTION": "yellow",
-    "LANE_STATE_ARROW_CAUTION": "yellow", "LANE_STATE_GO": "green",
-    "LANE_STATE_ARROW_GO": "green", "LANE_STATE_FLASHING_STOP": "flashing red",
+    "LANE_STATE_STOP": "red",
+    "LANE_STATE_ARROW_STOP": "red",
+    "LANE_STATE_CAUTION": "yellow",
+    "LANE_STATE_ARROW_CAUTION": "yellow",
+    "LANE_STATE_GO": "green",
+    "LANE_STATE_ARROW_GO": "green",
+    "LANE_STATE_FLASHING_STOP": "flashing red",
     "LANE_STATE_FLASHING_CAUTION": "flashing yellow",
-}  # fmt: skip
+}
 """States of traffic lights by ScenarioNet's; any other state is unknown."""
 BESIDE_LANE = 5.0
 """Largest distance of a stop point from its lane [m]: unknown ones are at the origin."""
@@ -80,18 +89,26 @@ def _read(path: Path) -> Iterator[RecordedTraffic]:
     lanelets, notes = lanelets_of(str(path), whole.get("map_features") or {})
     data_set = str(metadata.get("dataset", ""))[:40]
     facts = Facts(
-        name=str(whole.get("id", path.stem))[:200], format=FORMAT.name, source=str(path),
+        name=str(whole.get("id", path.stem))[:200],
+        format=FORMAT.name,
+        source=str(path),
         time_step=median_step(table[:, 0], first),
         frame=f"the scenario's ({data_set})" if data_set else "the scenario's",
         map="map features of the file" if whole.get("map_features") else "",
-        lights=MappingProxyType(_lights(path, whole, times)), notes=notes, lanelets=lanelets,
-    )  # fmt: skip
+        lights=MappingProxyType(_lights(path, whole, times)),
+        notes=notes,
+        lanelets=lanelets,
+    )
     yield build(
-        facts, numbers,
+        facts,
+        numbers,
         dict(zip(("time", "x", "y", "heading", "vx", "vy"), table.T, strict=True)),
         lambda i: f"{places[i][0]}, step {places[i][1]}",
-        names=names, kind=kinds, length=size[:, 0], width=size[:, 1],
-    )  # fmt: skip
+        names=names,
+        kind=kinds,
+        length=size[:, 0],
+        width=size[:, 1],
+    )
 
 
 def _lights(
@@ -186,5 +203,8 @@ def _column(place: str, holder: Any, name: str) -> npt.NDArray[np.float64]:
 
 
 FORMAT = Format(
-    name="ScenarioNet", title="ScenarioNet (.pkl)", recognises=_recognises, read=_read,
-)  # fmt: skip
+    name="ScenarioNet",
+    title="ScenarioNet (.pkl)",
+    recognises=_recognises,
+    read=_read,
+)

@@ -36,19 +36,25 @@ def lanelets_of(place: str, features: Any) -> tuple[tuple[Lanelet, ...], tuple[s
             road[str(name)] = _points(at, feature["polyline"])
         elif kind.startswith("LANE_") and "polyline" in feature:
             exits = feature.get("exit_lanes")
-            lines.append(CentreLine(
-                name=str(name)[:200], points=_points(at, feature["polyline"]),
-                borders=tuple(
-                    str(border.get("boundary_feature_id"))
-                    for side in ("left_boundaries", "right_boundaries")
-                    for border in _listed(feature.get(side))
-                    if isinstance(border, dict)
-                ),
-                outline=_closed(_points(at, feature["polygon"])) if "polygon" in feature else None,
-                successors=tuple(str(exit)[:200] for exit in exits)
-                if isinstance(exits, list) else None,
-                kinds=KINDS.get(kind, ()),
-            ))  # fmt: skip
+            lines.append(
+                CentreLine(
+                    name=str(name)[:200],
+                    points=_points(at, feature["polyline"]),
+                    borders=tuple(
+                        str(border.get("boundary_feature_id"))
+                        for side in ("left_boundaries", "right_boundaries")
+                        for border in _listed(feature.get(side))
+                        if isinstance(border, dict)
+                    ),
+                    outline=_closed(_points(at, feature["polygon"]))
+                    if "polygon" in feature
+                    else None,
+                    successors=tuple(str(exit)[:200] for exit in exits)
+                    if isinstance(exits, list)
+                    else None,
+                    kinds=KINDS.get(kind, ()),
+                )
+            )
     return lanelets_of_centre_lines(lines, road, place)
 
 

@@ -45,9 +45,10 @@ def _read(path: Path) -> Iterator[RecordedTraffic]:
         address = path.resolve().as_uri() + "?mode=ro&immutable=1"
         with closing(sqlite3.connect(address, uri=True)) as base:
             base.execute("PRAGMA trusted_schema=OFF")
-            tables = {name for (name,) in base.execute(
-                "SELECT name FROM sqlite_master WHERE type = 'table'"
-            )}  # fmt: skip
+            tables = {
+                name
+                for (name,) in base.execute("SELECT name FROM sqlite_master WHERE type = 'table'")
+            }
             if not tables >= TABLES:
                 raise FileFormatError(
                     f"{path}: is a database, but no traffic history of SMARTS: has no table "
@@ -74,21 +75,30 @@ def _recording(path: Path, base: sqlite3.Connection) -> RecordedTraffic:
     heading, speed, lane = states[:, 4] + math.pi / 2, states[:, 5], states[:, 6]
     first = np.searchsorted(ids, np.arange(len(distinct) + 1))
     facts = Facts(
-        name=path.stem, format=FORMAT.name, source=str(path),
-        time_step=median_step(states[:, 1], first), frame="the traffic history's",
-    )  # fmt: skip
+        name=path.stem,
+        format=FORMAT.name,
+        source=str(path),
+        time_step=median_step(states[:, 1], first),
+        frame="the traffic history's",
+    )
     return build(
-        facts, ids,
+        facts,
+        ids,
         {
-            "time": states[:, 1], "x": states[:, 2], "y": states[:, 3], "heading": heading,
-            "vx": speed * np.cos(heading), "vy": speed * np.sin(heading),
+            "time": states[:, 1],
+            "x": states[:, 2],
+            "y": states[:, 3],
+            "heading": heading,
+            "vx": speed * np.cos(heading),
+            "vy": speed * np.sin(heading),
             "lane": np.where(np.abs(lane) < 1e6, lane, NO_LANE),
         },
         lambda i: f"{path}, Trajectory of vehicle_id {states[i, 0]:g} at {states[i, 1]:g} s",
         names=[f"{item:g}" for item in distinct.tolist()],
         kind=[CLASSES.get(int(item), UNKNOWN_KIND) for item in np.nan_to_num(about[:, 1])],
-        length=about[:, 2], width=about[:, 3],
-    )  # fmt: skip
+        length=about[:, 2],
+        width=about[:, 3],
+    )
 
 
 def _rows(
@@ -123,6 +133,8 @@ def _numbers(path: Path, table: str, columns: tuple[str, ...], rows: list[Any]) 
 
 
 FORMAT = Format(
-    name="SMARTS", title="traffic histories of SMARTS (.shf)",
-    recognises=_recognises, read=_read,
-)  # fmt: skip
+    name="SMARTS",
+    title="traffic histories of SMARTS (.shf)",
+    recognises=_recognises,
+    read=_read,
+)

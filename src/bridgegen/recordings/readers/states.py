@@ -45,8 +45,12 @@ def _read(path: Path) -> Iterator[RecordedTraffic]:
         notes.append("without the column centre, positions are taken as the bodies' centres")
     yield build(
         Facts(
-            name=path.stem, format=FORMAT.name, source=str(path),
-            time_step=median_step(time, first), frame="as in the table", notes=tuple(notes),
+            name=path.stem,
+            format=FORMAT.name,
+            source=str(path),
+            time_step=median_step(time, first),
+            frame="as in the table",
+            notes=tuple(notes),
         ),
         ids,
         {
@@ -62,13 +66,15 @@ def _read(path: Path) -> Iterator[RecordedTraffic]:
         names=list(found.tracks),
         length=states["length"][first[:-1]],
         width=states["width"][first[:-1]],
-    )  # fmt: skip
+    )
 
 
 FORMAT = Format(
-    name="states", title="a table of states, or esmini's log (.csv)",
-    recognises=_recognises, read=_read,
-)  # fmt: skip
+    name="states",
+    title="a table of states, or esmini's log (.csv)",
+    recognises=_recognises,
+    read=_read,
+)
 
 
 # --- Directions, velocities and headings from positions; and the usual body of each kind ---

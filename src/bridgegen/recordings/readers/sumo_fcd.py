@@ -29,10 +29,17 @@ from bridgegen.recordings.readers.table import (
 )
 
 WORDS = {
-    "truck": TRUCK, "trailer": TRUCK, "bus": BUS, "coach": BUS, "motorcycle": MOTORCYCLE,
-    "moped": MOTORCYCLE, "bicycle": BICYCLE, "bike": BICYCLE, "pedestrian": PEDESTRIAN,
+    "truck": TRUCK,
+    "trailer": TRUCK,
+    "bus": BUS,
+    "coach": BUS,
+    "motorcycle": MOTORCYCLE,
+    "moped": MOTORCYCLE,
+    "bicycle": BICYCLE,
+    "bike": BICYCLE,
+    "pedestrian": PEDESTRIAN,
     "ped": PEDESTRIAN,
-}  # fmt: skip
+}
 """Kinds by words in names of types; a vehicle with none of them is a car."""
 MOST_BYTES = 8 * 2**30
 
@@ -74,32 +81,45 @@ def _read(path: Path) -> Iterator[RecordedTraffic]:
     order = np.argsort(ids, kind="stable")
     first = np.searchsorted(ids[order], np.arange(len(boxes) + 1))
     facts = Facts(
-        name=path.stem, format=FORMAT.name, source=str(path),
-        time_step=median_step(table[order, 0], first), frame="the network's",
+        name=path.stem,
+        format=FORMAT.name,
+        source=str(path),
+        time_step=median_step(table[order, 0], first),
+        frame="the network's",
         notes=("lengths, and by them centres, are the usual ones of each kind",),
-    )  # fmt: skip
+    )
     yield build(
-        facts, ids,
+        facts,
+        ids,
         {
             "time": table[:, 0],
             "x": table[:, 1] - behind * np.cos(heading),
             "y": table[:, 2] - behind * np.sin(heading),
             "heading": heading,
-            "vx": table[:, 4] * np.cos(heading), "vy": table[:, 4] * np.sin(heading),
-            "acceleration": table[:, 5], "lane": table[:, 6],
+            "vx": table[:, 4] * np.cos(heading),
+            "vy": table[:, 4] * np.sin(heading),
+            "acceleration": table[:, 5],
+            "lane": table[:, 6],
         },
         lambda i: f"{path}, line {found.lines[i]}",
-        names=list(found.participants), kind=found.kinds,
-    )  # fmt: skip
+        names=list(found.participants),
+        kind=found.kinds,
+    )
 
 
 def _stream(path: Path, file: BinaryIO, found: _Found) -> None:
     """Read all states; each time step's elements are freed once it is read."""
     time = math.nan
     events = etree.iterparse(
-        file, events=("start", "end"), resolve_entities=False, no_network=True, load_dtd=False,
-        huge_tree=False, remove_comments=True, remove_pis=True,
-    )  # fmt: skip
+        file,
+        events=("start", "end"),
+        resolve_entities=False,
+        no_network=True,
+        load_dtd=False,
+        huge_tree=False,
+        remove_comments=True,
+        remove_pis=True,
+    )
     for event, element in events:
         if event == "start":
             parent = element.getparent()
@@ -150,6 +170,8 @@ def _number(path: Path, element: etree._Element, name: str) -> float:
 
 
 FORMAT = Format(
-    name="SUMO FCD", title="SUMO's floating-car data (.xml)",
-    recognises=_recognises, read=_read,
-)  # fmt: skip
+    name="SUMO FCD",
+    title="SUMO's floating-car data (.xml)",
+    recognises=_recognises,
+    read=_read,
+)

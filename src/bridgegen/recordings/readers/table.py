@@ -281,12 +281,17 @@ def build(
     if "lane" in columns:
         lane = (columns["lane"] if order is None else columns["lane"][order]).astype(np.int32)
     return RecordedTraffic(
-        facts=facts, names=names,
+        facts=facts,
+        names=names,
         kind=np.full(count, UNKNOWN_KIND) if kind is None else np.array(kind, dtype=np.int64),
-        length=_sizes(length, count), width=_sizes(width, count), first=first, time=time,
+        length=_sizes(length, count),
+        width=_sizes(width, count),
+        first=first,
+        time=time,
         lane=lane,
-        where=where if order is None else lambda i: where(int(order[i])), **rest,
-    )  # fmt: skip
+        where=where if order is None else lambda i: where(int(order[i])),
+        **rest,
+    )
 
 
 def wrap(angle: Float) -> Float:

@@ -153,9 +153,14 @@ class Shape:
         numbers: Float = np.empty((len(spans), len(self.numbers)))
         whole: Int = np.empty((len(spans), len(self.whole)), dtype=np.int64)
         at, fault = read_each(
-            message.data, np.ascontiguousarray(spans), self.step, self.wires, self.own, numbers,
+            message.data,
+            np.ascontiguousarray(spans),
+            self.step,
+            self.wires,
+            self.own,
+            numbers,
             whole,
-        )  # fmt: skip
+        )
         if fault:
             raise FileFormatError(f"{message.place(at)}: {_FAULTS[fault]}")
         return {

@@ -71,20 +71,32 @@ def _read(path: Path) -> Iterator[RecordedTraffic]:
     notes += assumed
     size = np.array(boxes)
     facts = Facts(
-        name=str(whole.get("name", path.stem))[:200], format=FORMAT.name, source=str(path),
-        time_step=TIME_STEP, frame="the scenario's (Waymo), metres",
-        map="roads of the file" if whole.get("roads") else "", notes=tuple(notes),
+        name=str(whole.get("name", path.stem))[:200],
+        format=FORMAT.name,
+        source=str(path),
+        time_step=TIME_STEP,
+        frame="the scenario's (Waymo), metres",
+        map="roads of the file" if whole.get("roads") else "",
+        notes=tuple(notes),
         lanelets=lanelets,
-    )  # fmt: skip
+    )
     yield build(
-        facts, np.array(ids),
+        facts,
+        np.array(ids),
         {
-            "time": table[:, 0] * TIME_STEP, "x": table[:, 1], "y": table[:, 2],
-            "heading": table[:, 3], "vx": table[:, 4], "vy": table[:, 5],
+            "time": table[:, 0] * TIME_STEP,
+            "x": table[:, 1],
+            "y": table[:, 2],
+            "heading": table[:, 3],
+            "vx": table[:, 4],
+            "vy": table[:, 5],
         },
         lambda i: f"{path}, objects[{places[i][0]}], step {places[i][1]}",
-        names=names, kind=kinds, length=size[:, 0], width=size[:, 1],
-    )  # fmt: skip
+        names=names,
+        kind=kinds,
+        length=size[:, 0],
+        width=size[:, 1],
+    )
 
 
 def _lanelets(path: Path, roads: Any) -> tuple[tuple[Lanelet, ...], tuple[str, ...]]:
@@ -144,6 +156,8 @@ def _size(value: Any) -> float:
 
 
 FORMAT = Format(
-    name="WOMD JSON", title="Waymo motion as JSON, GPUDrive's form (.json)",
-    recognises=_recognises, read=_read,
-)  # fmt: skip
+    name="WOMD JSON",
+    title="Waymo motion as JSON, GPUDrive's form (.json)",
+    recognises=_recognises,
+    read=_read,
+)

@@ -53,14 +53,19 @@ def along(x: Float, y: Float, h: Float) -> tuple[OpenDrive, float]:
     last = knots[-1]
     pieces.append(Geometry(_end(pieces), *last, BEYOND, Line()))
     lanes = LaneSection(
-        0.0, center=(Lane(0),),
+        0.0,
+        center=(Lane(0),),
         right=(Lane(LANE, "driving", widths=(Width(0.0, WIDTH, 0.0, 0.0, 0.0),)),),
-    )  # fmt: skip
+    )
     shift = Cubic(0.0, 0.5 * WIDTH, 0.0, 0.0, 0.0)  # the lane's middle is the reference line
     road = Road(
-        ROAD, _end(pieces), name="the ego's path", plan_view=tuple(pieces),
-        lane_offsets=(shift,), sections=(lanes,),
-    )  # fmt: skip
+        ROAD,
+        _end(pieces),
+        name="the ego's path",
+        plan_view=tuple(pieces),
+        lane_offsets=(shift,),
+        sections=(lanes,),
+    )
     header = Header(1, 7, name="the ego's path", version="1.00", vendor="BridgeGen")
     return OpenDrive(header, (road,), (), ()), BEFORE
 
@@ -98,9 +103,7 @@ def _cubic(s: float, knot: Knot, two: Knot) -> Geometry:
     p = np.linspace(0.0, 1.0, _SAMPLES)
     speed = np.hypot(chord + 2.0 * c_u * p + 3.0 * d_u * p * p, 2.0 * c_v * p + 3.0 * d_v * p * p)
     length = float(np.sum(speed * _simpson(_SAMPLES)) / (_SAMPLES - 1))
-    shape = ParamPoly3(
-        0.0, chord, float(c_u), float(d_u), 0.0, 0.0, float(c_v), float(d_v)
-    )  # fmt: skip
+    shape = ParamPoly3(0.0, chord, float(c_u), float(d_u), 0.0, 0.0, float(c_v), float(d_v))
     return Geometry(s, x, y, h, length, shape)
 
 
@@ -165,18 +168,28 @@ def replay_of(
     about = f"{traffic.facts.name}: participant {traffic.names[ego]} from {seconds:.2f} s"
     empty = osc.OpenScenario(
         osc.FileHeader(
-            1, 2, DATE, about, "BridgeGen",
+            1,
+            2,
+            DATE,
+            about,
+            "BridgeGen",
             properties=osc.Properties((osc.Property("time_step", repr(motion.time_step)),)),
         ),
         osc.RoadNetwork(),
         osc.Entities(tuple(entities)),
         osc.Storyboard(osc.Init(osc.InitActions()), (), osc.Trigger()),
-    )  # fmt: skip
+    )
     there = motion.present[0] if motion.present.size else None
     recording = Recording(
-        names, motion.time_step, motion.x[0], motion.y[0], motion.h[0],
-        path_speeds(traffic, clock, (ego, *others), begin, end), (), there,
-    )  # fmt: skip
+        names,
+        motion.time_step,
+        motion.x[0],
+        motion.y[0],
+        motion.h[0],
+        path_speeds(traffic, clock, (ego, *others), begin, end),
+        (),
+        there,
+    )
     return recorded(empty, recording), motion, recording
 
 
@@ -208,9 +221,10 @@ def driven(
     )
     bodies = tuple(
         replace(obj, object_controllers=(osc.ObjectController(controller),))
-        if obj.name == EGO else obj
+        if obj.name == EGO
+        else obj
         for obj in scenario.entities.scenario_objects
-    )  # fmt: skip
+    )
     place, goal = (
         osc.Position(osc.LanePosition(ROAD, str(LANE), s)) for s in (start, length - 1.0)
     )
@@ -250,13 +264,18 @@ def _at_speed(speed: float, seconds: float) -> osc.PrivateAction:
 
 def _story(action: osc.PrivateAction) -> osc.Story:
     event = osc.Event(
-        "target_speed", osc.Priority.PARALLEL, (osc.Action("target_speed", action),),
-        at(0.0, "target_speed_at"), 1,
-    )  # fmt: skip
+        "target_speed",
+        osc.Priority.PARALLEL,
+        (osc.Action("target_speed", action),),
+        at(0.0, "target_speed_at"),
+        1,
+    )
     group = osc.ManeuverGroup(
-        "target_speed", 1, osc.Actors(False, (osc.EntityRef(EGO),)),
+        "target_speed",
+        1,
+        osc.Actors(False, (osc.EntityRef(EGO),)),
         (osc.Maneuver("target_speed", (event,)),),
-    )  # fmt: skip
+    )
     return osc.Story("target_speed", (osc.Act("target_speed", (group,), at_once()),))
 
 
@@ -265,9 +284,12 @@ def _body(traffic: RecordedTraffic, p: int) -> EntityBody:
     length, width = float(traffic.length[p]), float(traffic.width[p])
     scale = length / kind.body.length
     body = replace(
-        kind.body, length=length, width=width, center_ahead=kind.body.center_ahead * scale,
+        kind.body,
+        length=length,
+        width=width,
+        center_ahead=kind.body.center_ahead * scale,
         wheelbase=kind.body.wheelbase * scale,
-    )  # fmt: skip
+    )
     return entity_body(kind, body, mass=kind.body.mass or None)
 
 

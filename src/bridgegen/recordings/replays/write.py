@@ -87,9 +87,16 @@ def prepare(traffic: RecordedTraffic, clock: Clock, event: RecordedConflict) -> 
     roads, start = along(motion.x[0, 0], motion.y[0, 0], motion.h[0, 0])
     names = traffic.names[event.ego], traffic.names[event.other]
     return Prepared(
-        traffic.facts.name, event, names, (event.instant - begin) * step, scenario, roads, start,
-        motion, states,
-    )  # fmt: skip
+        traffic.facts.name,
+        event,
+        names,
+        (event.instant - begin) * step,
+        scenario,
+        roads,
+        start,
+        motion,
+        states,
+    )
 
 
 def write(prepared: Prepared, stem: Path, ego: str | None = None) -> Replay:
@@ -234,9 +241,13 @@ def _box(box: Float) -> str:
 
 
 def _moving(
-    looks: str, outline: str, name: str, places: tuple[Float, Float, Float], there: Bool,
+    looks: str,
+    outline: str,
+    name: str,
+    places: tuple[Float, Float, Float],
+    there: Bool,
     seconds: float,
-) -> Iterator[str]:  # fmt: skip
+) -> Iterator[str]:
     timing = f'dur="{max(seconds, EVERY):.2f}s" repeatCount="indefinite"'
     x, y, h = places
     moves = ";".join(f"{a:.2f} {b:.2f}" for a, b in zip(x, y, strict=True))

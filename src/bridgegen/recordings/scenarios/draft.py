@@ -113,9 +113,12 @@ def _is_wider(scenario: LogicalScenario, name: str, end: str, rows: Mapping[str,
 
 
 def _attempt(
-    sought: Sought, rows: Mapping[str, Float], names: Sequence[str], about: str,
+    sought: Sought,
+    rows: Mapping[str, Float],
+    names: Sequence[str],
+    about: str,
     cut: Sequence[tuple[str, str]],
-) -> Draft:  # fmt: skip
+) -> Draft:
     scenario, own = sought.scenario, _own_parameters(sought)
     wanted: dict[str, Range] = {}
     for name in names:
@@ -136,20 +139,26 @@ def _attempt(
         axis=0,
     )
     if inside.sum() < LEAST_ROWS:
-        raise InputError(f"{inside.sum()} events are in ranges that it can hold; "
-                         f"{LEAST_ROWS} are needed")  # fmt: skip
-    usual = {name: float(f"{values[typical(rows, names, inside)]:.{_DIGITS}g}")
-             for name, values in rows.items()}  # fmt: skip
+        raise InputError(
+            f"{inside.sum()} events are in ranges that it can hold; {LEAST_ROWS} are needed"
+        )
+    usual = {
+        name: float(f"{values[typical(rows, names, inside)]:.{_DIGITS}g}")
+        for name, values in rows.items()
+    }
     kept = {name: values[inside] for name, values in rows.items()}
     tightened = bounds_of_speeds(scenario, kept, names, EVENTS_SOURCE)
     parameters = {
         name: replace(
-            item, low=wanted[name].low, high=wanted[name].high,
+            item,
+            low=wanted[name].low,
+            high=wanted[name].high,
             default=float(np.clip(usual[name], wanted[name].low, wanted[name].high)),
         )
-        if name in wanted else item
+        if name in wanted
+        else item
         for name, item in scenario.parameters.items()
-    }  # fmt: skip
+    }
     parameters = with_room(
         parameters, [*scenario.bounds, *tightened], scenario.derived, scenario.space().variables
     )
@@ -169,22 +178,31 @@ def _ranged(
     parameter, seen = scenario.parameters[name], seen_range(rows[name])
     remarks = []
     if mined.low < seen.low or mined.high > seen.high:
-        remarks.append("extended, because a constraint asks for it where other parameters are at "
-                       "the ends of their ranges")  # fmt: skip
+        remarks.append(
+            "extended, because a constraint asks for it where other parameters are at "
+            "the ends of their ranges"
+        )
     if mined.low > seen.low or mined.high < seen.high:
-        remarks.append("cut to the source's, because the scenario cannot hold more" if is_own else
-                       "cut to that of the fragment that declares it")  # fmt: skip
+        remarks.append(
+            "cut to the source's, because the scenario cannot hold more"
+            if is_own
+            else "cut to that of the fragment that declares it"
+        )
     if mined.low < parameter.low or mined.high > parameter.high:
         remarks.append(f"beyond the source's {parameter.low:g} to {parameter.high:g}")
     return MinedRange(
         name, parameter.unit, Range(parameter.low, parameter.high), seen, mined, "; ".join(remarks)
-    )  # fmt: skip
+    )
 
 
 def _data(
-    sought: Sought, parameters: Mapping[str, Any], ranges: Sequence[MinedRange],
-    usual: Mapping[str, float], tightened: Sequence[Bound], about: str,
-) -> dict[str, Any]:  # fmt: skip
+    sought: Sought,
+    parameters: Mapping[str, Any],
+    ranges: Sequence[MinedRange],
+    usual: Mapping[str, float],
+    tightened: Sequence[Bound],
+    about: str,
+) -> dict[str, Any]:
     """Return the file's data, without the exposure."""
     data = _stripped(sought.document.data)
     assert isinstance(data, dict)
@@ -206,12 +224,17 @@ def _data(
             seen = changed[name]
             remark = f" ({seen.remark})" if seen.remark else ""
             data["parameters"][name] |= {
-                "low": parameter.low, "high": parameter.high, "default": parameter.default,
+                "low": parameter.low,
+                "high": parameter.high,
+                "default": parameter.default,
                 "source": f"Seen: {seen.seen.low:g} to {seen.seen.high:g}{remark}.",
-            }  # fmt: skip
+            }
         elif parameter.kind.name == FLOAT.name and parameter.low <= value <= parameter.high:
-            (data["parameters"][name].__setitem__("default", value) if name in own
-             else defaults.__setitem__(name, value))  # fmt: skip
+            (
+                data["parameters"][name].__setitem__("default", value)
+                if name in own
+                else defaults.__setitem__(name, value)
+            )
     if defaults:
         data["defaults"] = defaults
     if tightened:
@@ -249,9 +272,11 @@ def _built(data: Mapping[str, Any], source: LogicalScenario) -> LogicalScenario:
 
 def dumped(data: Mapping[str, Any]) -> str:
     """Return data as YAML."""
-    return str(yaml.safe_dump(
-        dict(data), sort_keys=False, allow_unicode=True, width=100, default_flow_style=None
-    ))  # fmt: skip
+    return str(
+        yaml.safe_dump(
+            dict(data), sort_keys=False, allow_unicode=True, width=100, default_flow_style=None
+        )
+    )
 
 
 def _own_parameters(sought: Sought) -> frozenset[str]:

@@ -48,8 +48,9 @@ def _statistics(scenario: MinedScenario) -> Iterator[tuple[str, str, float]]:
     if met is not None:
         yield "encounters", "count", float(met.count)
         for name, unit, amount, rate in (
-            ("hours", "h", met.hours, met.per_hour), ("kilometres", "km", met.km, met.per_km),
-        ):  # fmt: skip
+            ("hours", "h", met.hours, met.per_hour),
+            ("kilometres", "km", met.km, met.per_km),
+        ):
             if amount is not None and rate is not None:
                 yield name, unit, amount
                 yield f"encounters per {unit}", f"1/{unit}", rate.estimate

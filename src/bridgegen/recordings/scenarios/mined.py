@@ -97,18 +97,27 @@ def mined_scenario(
         made = draft(sought, rows, names, about)
         met = events.encounters
         fitted = fit_exposure(
-            made.scenario, table, hours=met.hours if met else None, km=met.km if met else None,
+            made.scenario,
+            table,
+            hours=met.hours if met else None,
+            km=met.km if met else None,
             ignore=[name for name in events.rows if name not in names],
             others="default" if _rest(made.scenario, names) else None,
-            source=about, replicates=REPLICATES, progress=progress,
-        )  # fmt: skip
+            source=about,
+            replicates=REPLICATES,
+            progress=progress,
+        )
     except InputError as error:
         return Unmade(scenario.name, "; ".join(error.problems))
     block = fitted.text[fitted.text.index("\nexposure:") + 1 :]
     return MinedScenario(
-        made.scenario.name, scenario.name, f"{HEAD}\n{dumped(made.data)}{block}", made.ranges,
-        tuple(str(bound) for bound in made.tightened), fitted,
-    )  # fmt: skip
+        made.scenario.name,
+        scenario.name,
+        f"{HEAD}\n{dumped(made.data)}{block}",
+        made.ranges,
+        tuple(str(bound) for bound in made.tightened),
+        fitted,
+    )
 
 
 def _rest(scenario: LogicalScenario, names: Sequence[str]) -> list[str]:

@@ -100,10 +100,17 @@ def bounds_of_speeds(
         names: the parameters whose ranges are what was seen.
         source: of the bounds, for the file.
     """
-    speeds = {value for participant in scenario.participants if not participant.exceeds_limit
-              for value in speeds_of(participant, scenario.story)}  # fmt: skip
-    factors = [derived.name.removesuffix(_FACTOR) for derived in scenario.derived
-               if derived.name.endswith(_FACTOR)]  # fmt: skip
+    speeds = {
+        value
+        for participant in scenario.participants
+        if not participant.exceeds_limit
+        for value in speeds_of(participant, scenario.story)
+    }
+    factors = [
+        derived.name.removesuffix(_FACTOR)
+        for derived in scenario.derived
+        if derived.name.endswith(_FACTOR)
+    ]
     limit = cap(scenario.roads.knobs["speed_limit"], sorted(factors))
     made: list[Bound] = []
     for derived in scenario.derived:
@@ -172,9 +179,11 @@ def _end(rest: str, k: float, value: str) -> str:
 
 
 def with_room(
-    parameters: Mapping[str, Parameter], bounds: Sequence[Bound], derived: Sequence[Derived],
+    parameters: Mapping[str, Parameter],
+    bounds: Sequence[Bound],
+    derived: Sequence[Derived],
     variables: Sequence[str],
-) -> dict[str, Parameter]:  # fmt: skip
+) -> dict[str, Parameter]:
     """Return parameters whose ranges leave a value wherever others are in theirs.
 
     Where a constraint asks for more than the range has, or for less, the range is extended to it.
@@ -233,6 +242,7 @@ def _extended(parameter: Parameter, lo: Float, hi: Float) -> Parameter:
         return parameter
     wide = around(low, high)
     return replace(
-        parameter, low=parameter.low if low == parameter.low else wide.low,
+        parameter,
+        low=parameter.low if low == parameter.low else wide.low,
         high=parameter.high if high == parameter.high else wide.high,
-    )  # fmt: skip
+    )

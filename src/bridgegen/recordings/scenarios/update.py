@@ -128,8 +128,11 @@ def _ends(
     while (problem := _problem(sought, text, texts)) is not None:
         paths = list(texts)
         named = [path for path in paths if str(path[1]) in problem] or paths
-        helps = [path for path in named
-                 if _problem(sought, text, {**texts, path: found[path].text}) is None]  # fmt: skip
+        helps = [
+            path
+            for path in named
+            if _problem(sought, text, {**texts, path: found[path].text}) is None
+        ]
         path = (helps or named)[0]
         name, end = str(path[1]), str(path[2])
         del texts[path], wanted[name, end]

@@ -151,9 +151,10 @@ class Course(_Model):
     def of(cls, track: Track) -> "Course":
         """Return a track, rounded."""
         return cls(
-            entity=track.entity, first=track.first,
+            entity=track.entity,
+            first=track.first,
             **{name: _units(getattr(track, name) * scale) for name, scale in SCALE.items()},
-        )  # fmt: skip
+        )
 
 
 class Differences(_Model):

@@ -484,8 +484,11 @@ class Store:
             labels["cause"] = [Cause(item).label or None for item in rows.cause.tolist()]
             for name in texts:
                 data[name][at] = labels[name]
-            for part, values in ((columns.X, rows.X), (columns.metrics, rows.metrics),
-                                 (columns.F, rows.F)):  # fmt: skip
+            for part, values in (
+                (columns.X, rows.X),
+                (columns.metrics, rows.metrics),
+                (columns.F, rows.F),
+            ):
                 for name, column in zip(part, values.T, strict=True):
                     data[name][at] = column
         return pd.DataFrame(data, index=pd.RangeIndex(n, name="id"), columns=names)

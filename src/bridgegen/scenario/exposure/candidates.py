@@ -238,9 +238,11 @@ def fit(
         share = len(excess) / len(values)
         shares.append(share)
         section[key] = {
-            "threshold": threshold, "share": _rounded(share), "scale": _rounded(scale),
+            "threshold": threshold,
+            "share": _rounded(share),
+            "scale": _rounded(scale),
             "shape": _rounded(shape),
-        }  # fmt: skip
+        }
         criterion += 2.0 * 3 - 2.0 * log_likelihood  # scale, shape and share
     counts = np.array(shares) * len(values)
     criterion -= 2.0 * float((counts * np.log(shares)).sum())
@@ -279,8 +281,10 @@ def _fit_body(
         corners = zip(density.at, density.heights, strict=True)
         rounded = {_rounded(x, 9): _rounded(height) for x, height in corners}
         polygon: Section = {
-            "distribution": "polygon", "at": list(rounded), "density": list(rounded.values()),
-        }  # fmt: skip
+            "distribution": "polygon",
+            "at": list(rounded),
+            "density": list(rounded.values()),
+        }
         return polygon, -2.0 * float(left_out.sum())
     family = FAMILIES[recipe.body]
     found = _fit_family(values, family, low, high, near)
@@ -333,10 +337,17 @@ def _fit_family(
             [first, first + np.diag(np.where(first + step <= highest, step, -step))]
         )
         found = scipy.optimize.minimize(
-            loss, first, method="Nelder-Mead",
-            options={"xatol": precise, "fatol": precise, "maxiter": 600, "maxfev": 900,
-                     "initial_simplex": corners},
-        )  # fmt: skip
+            loss,
+            first,
+            method="Nelder-Mead",
+            options={
+                "xatol": precise,
+                "fatol": precise,
+                "maxiter": 600,
+                "maxfev": 900,
+                "initial_simplex": corners,
+            },
+        )
     return numbers_at(found.x), -float(found.fun)
 
 
@@ -391,9 +402,14 @@ def _pareto(values: Float, low: float, high: float) -> Limits:
 
 
 _LIMITS: dict[str, Callable[[Float, float, float], Limits]] = {
-    "normal": _normal, "lognormal": _lognormal, "exponential": _exponential, "gamma": _gamma,
-    "weibull": _weibull, "beta": _beta, "pareto": _pareto,
-}  # fmt: skip
+    "normal": _normal,
+    "lognormal": _lognormal,
+    "exponential": _exponential,
+    "gamma": _gamma,
+    "weibull": _weibull,
+    "beta": _beta,
+    "pareto": _pareto,
+}
 _KEYS = {name: FAMILIES[name].keys for name in _LIMITS} | {"pareto": ("shape", "scale")}
 """Names of the fitted numbers by family."""
 

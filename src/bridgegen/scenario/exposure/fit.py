@@ -201,10 +201,12 @@ def fit_exposure(
     correlated = tuple(name for name in columns if not scenario.parameters[name].kind.apart)
     scores = np.array([_normal_scores(columns[name]) for name in correlated])
     correlation = _correlation(scores)
-    resampled = np.array([
-        _correlation(np.array([_normal_scores(columns[name][rows]) for name in correlated]))
-        for rows in draws
-    ])  # fmt: skip
+    resampled = np.array(
+        [
+            _correlation(np.array([_normal_scores(columns[name][rows]) for name in correlated]))
+            for rows in draws
+        ]
+    )
     data: dict[str, Any] = {
         "exposure_of": scenario.name,
         "exposure": {
@@ -243,9 +245,10 @@ def fit_exposure(
 
 
 def _columns(
-    scenario: LogicalScenario, events: str | Path | Mapping[str, npt.ArrayLike],
+    scenario: LogicalScenario,
+    events: str | Path | Mapping[str, npt.ArrayLike],
     ignore: Sequence[str],
-) -> tuple[dict[str, Float], str]:  # fmt: skip
+) -> tuple[dict[str, Float], str]:
     """Return the columns of the scenario's parameters, in its order, and where they come from."""
     path = None if isinstance(events, Mapping) else Path(events)
     header = tuple(events) if isinstance(events, Mapping) else read_header(Path(events))
@@ -319,9 +322,12 @@ def _refuse_constant(scenario: LogicalScenario, columns: Mapping[str, Float]) ->
 
 
 def _fit_parameter(
-    parameter: Parameter, values: Float, draws: Sequence[npt.NDArray[np.int64]], seed: int,
+    parameter: Parameter,
+    values: Float,
+    draws: Sequence[npt.NDArray[np.int64]],
+    seed: int,
     number: int,
-) -> tuple[ParameterFit, list[Form]]:  # fmt: skip
+) -> tuple[ParameterFit, list[Form]]:
     """Return the best form of a parameter's values, and the same form fitted to resampled ones."""
     if parameter.kind.apart:
         return _fit_single(parameter, values, draws)
@@ -391,12 +397,21 @@ def _fit_single(
         densities = [np.exp(refit.log_density(at)) for refit in refits]
     nothing = np.empty(0)
     return ParameterFit(
-        name=parameter.name, unit=parameter.unit, values=np.sort(values), section=best,
-        marginal=marginal, form="shares", ranking=(), distance=math.nan, p=math.nan, at=at,
+        name=parameter.name,
+        unit=parameter.unit,
+        values=np.sort(values),
+        section=best,
+        marginal=marginal,
+        form="shares",
+        ranking=(),
+        distance=math.nan,
+        p=math.nan,
+        at=at,
         density=np.exp(marginal.log_density(at)),
-        band=np.quantile(densities, [0.025, 0.975], axis=0), quantiles=nothing,
+        band=np.quantile(densities, [0.025, 0.975], axis=0),
+        quantiles=nothing,
         envelope=np.empty((2, 0)),
-    ), refits  # fmt: skip
+    ), refits
 
 
 def _form(section: dict[str, Any], parameter: Parameter) -> Form:
@@ -467,9 +482,11 @@ def _built(
 
 
 def _replicated(
-    exposure: Exposure, refits: Mapping[str, Sequence[Form]], correlated: tuple[str, ...],
+    exposure: Exposure,
+    refits: Mapping[str, Sequence[Form]],
+    correlated: tuple[str, ...],
     matrices: Float,
-) -> tuple[Exposure, ...]:  # fmt: skip
+) -> tuple[Exposure, ...]:
     names = exposure.names
     places = [names.index(name) for name in correlated]
     made = []

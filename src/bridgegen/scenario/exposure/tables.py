@@ -86,11 +86,18 @@ def read_table(path: Path, readers: Mapping[str, Callable[[str], float]]) -> Tab
                         f"({path}, line {reader.line_num})"
                     )
                 else:
-                    rows.append([
-                        _number(cells[place], name, read, f"{path}, line {reader.line_num}",
-                                problems)
-                        for place, (name, read) in zip(places, readers.items(), strict=True)
-                    ])  # fmt: skip
+                    rows.append(
+                        [
+                            _number(
+                                cells[place],
+                                name,
+                                read,
+                                f"{path}, line {reader.line_num}",
+                                problems,
+                            )
+                            for place, (name, read) in zip(places, readers.items(), strict=True)
+                        ]
+                    )
                     lines.append(reader.line_num)
                 if len(problems) >= _MOST_PROBLEMS:
                     break

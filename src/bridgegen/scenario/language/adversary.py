@@ -153,15 +153,25 @@ def _controls(adversary: Adversary) -> Iterable[Parameter]:
     for k, (pace, offset) in enumerate(zip(adversary.paces, adversary.offsets, strict=True)):
         when = f"from {k * PERIOD:g} s to {(k + 1) * PERIOD:g} s"
         yield Parameter(
-            pace, Axis.EXTENSION, "1", 0.0, 1.0, 1.0,
+            pace,
+            Axis.EXTENSION,
+            "1",
+            0.0,
+            1.0,
+            1.0,
             description=f"Speed that the adversary has {name} make for {when}; 1: its highest.",
             source="The speeds that the scenario gives it.",
-        )  # fmt: skip
+        )
         yield Parameter(
-            offset, Axis.EXTENSION, "1", -1.0, 1.0, 0.0,
+            offset,
+            Axis.EXTENSION,
+            "1",
+            -1.0,
+            1.0,
+            0.0,
             description=f"Where in its lane the adversary steers {name} {when}; 1: leftmost.",
             source="The lane's width, less its body's.",
-        )  # fmt: skip
+        )
 
 
 def _refuse_awaited(

@@ -59,6 +59,4 @@ def event_kind(
 ) -> EventKind:
     """Return a kind of the rows of its quantities: name, unit, description."""
     quantities = {row[0]: EventQuantity(*row) for row in rows}
-    return EventKind(
-        name, roles, rule, source, quantities, needs_lanes, needs_lights, of_lights
-    )  # fmt: skip
+    return EventKind(name, roles, rule, source, quantities, needs_lanes, needs_lights, of_lights)

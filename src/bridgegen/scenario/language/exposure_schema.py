@@ -11,9 +11,20 @@ from pydantic import Field
 from bridgegen.scenario.language.shape import Formula, Number, NumberOrName, ShapedSection, Text
 
 FormName = Literal[
-    "uniform", "normal", "lognormal", "exponential", "gamma", "weibull", "beta", "pareto",
-    "histogram", "discrete", "polygon", "kde", "mixture",
-]  # fmt: skip
+    "uniform",
+    "normal",
+    "lognormal",
+    "exponential",
+    "gamma",
+    "weibull",
+    "beta",
+    "pareto",
+    "histogram",
+    "discrete",
+    "polygon",
+    "kde",
+    "mixture",
+]
 
 ScenarioName = Annotated[
     str, Field(strict=True, pattern=r"^([A-Za-z0-9_-]{1,64}/)?[A-Za-z0-9][A-Za-z0-9_-]{0,63}$")

@@ -3,8 +3,10 @@
 from bridgegen.scenario.language.event_kind import EGO_SPEED, event_kind
 
 _LEAD_TIME = (
-    "lead_time", "s", "how long the ego has had this leader before, at most 30 s",
-)  # fmt: skip
+    "lead_time",
+    "s",
+    "how long the ego has had this leader before, at most 30 s",
+)
 _WIDTH = ("lane_width", "m", "width of the ego's lane at the beginning")
 _CHANGE = (
     ("change_time", "s", "duration of the sinusoidal lane change that fits best"),
@@ -88,8 +90,11 @@ LANE_KINDS = (
             ("lead_speed", "m/s", "speed of the leader at the beginning"),
             ("relative_speed", "m/s", "ego_speed less lead_speed"),
             ("gap", "m", "at the beginning"),
-            ("lead_offset", "m", "of the leader's centre from the middle of the lane, left "
-             "positive"),
+            (
+                "lead_offset",
+                "m",
+                "of the leader's centre from the middle of the lane, left positive",
+            ),
             _WIDTH,
             _LEAD_TIME,
         ),
@@ -128,8 +133,11 @@ LANE_KINDS = (
             ("follower_gap", "m", "from the follower to the ego at the crossing"),
             *_CHANGE,
             _WIDTH,
-            ("passing_time", "s", "from the beginning until the ego is level with the leader "
-             "of the old lane"),
+            (
+                "passing_time",
+                "s",
+                "from the beginning until the ego is level with the leader of the old lane",
+            ),
         ),
     ),
-)  # fmt: skip
+)

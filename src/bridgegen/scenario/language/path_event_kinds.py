@@ -88,7 +88,8 @@ PATH_KINDS = (
         f"from opposite directions. {_MEETING_RULE}",
         _MEETING_SOURCE.format("straight crossing paths, left turn across path from a side"),
         (
-            *_MEETING, _EGO_FIRST,
+            *_MEETING,
+            _EGO_FIRST,
             ("other_turn", "deg", "by how much the other turns, to the left positive"),
             ("ego_ran_red", "1", "1 if the ego ran a red light before, else 0"),
             ("other_ran_red", "1", "1 if the other ran one, else 0"),
@@ -106,7 +107,8 @@ PATH_KINDS = (
         f"turn. {_MEETING_RULE}",
         _MEETING_SOURCE.format("left turn across path from opposite directions"),
         (
-            *_MEETING, _EGO_FIRST,
+            *_MEETING,
+            _EGO_FIRST,
             ("ego_turns", "1", "1 if the ego turns, 0 if the other does"),
             ("turn", "deg", "by how much the one turns that does"),
         ),
@@ -124,8 +126,12 @@ PATH_KINDS = (
             ("ego_turn", "deg", "by how much the ego turns, to the left positive"),
             ("is_bicycle", "1", "1 for a bicycle, 0 for a pedestrian"),
             ("hidden", "1", "1 if it is hidden, else 0"),
-            ("occluder_gap", "m", "along the ego's course, from the crossing point to the "
-             "nearest end of what hides it"),
+            (
+                "occluder_gap",
+                "m",
+                "along the ego's course, from the crossing point to the "
+                "nearest end of what hides it",
+            ),
         ),
         needs_lanes=False,
     ),
@@ -178,10 +184,15 @@ PATH_KINDS = (
         f"{_MEETING_RULE}",
         "Euro NCAP, AEB/LSS VRU, CBTA; UN Regulation No. 151; the thresholds are ours",
         (
-            *_MEETING, _EGO_FIRST,
+            *_MEETING,
+            _EGO_FIRST,
             ("ego_turn", "deg", "by how much the ego turns, to the left positive"),
-            ("ahead", "m", "from the ego's centre to that of the bicycle along the ego's course "
-             "at the beginning, negative behind it"),
+            (
+                "ahead",
+                "m",
+                "from the ego's centre to that of the bicycle along the ego's course "
+                "at the beginning, negative behind it",
+            ),
             ("aside", "m", "likewise across it, to the right positive"),
             *_PACE,
         ),
@@ -212,4 +223,4 @@ PATH_KINDS = (
         ),
         needs_lanes=False,
     ),
-)  # fmt: skip
+)

@@ -165,8 +165,9 @@ class Places:
         reach = 0.5 * (half if isinstance(half, float) else 0.0)
         for waypoint, other in pairwise(points):
             if waypoint.lane == other.lane == "sidewalk" and (waypoint.leg, waypoint.way) == (
-                other.leg, other.way
-            ):  # fmt: skip
+                other.leg,
+                other.way,
+            ):
                 continue
             at = roads.crosswalk(waypoint.leg)
             rule = "pedestrians cross on crosswalks only"
@@ -257,10 +258,15 @@ class TemporaryChanges:
                 continue
             count = int(given.length / given.spacing) + 1
             cones = tuple(
-                self._moved(f"{name}_cone_{k + 1}_at", start, k * given.spacing,
-                            self._offset(given, start, k * given.spacing), path)
+                self._moved(
+                    f"{name}_cone_{k + 1}_at",
+                    start,
+                    k * given.spacing,
+                    self._offset(given, start, k * given.spacing),
+                    path,
+                )
                 for k in range(count)
-            )  # fmt: skip
+            )
             sign = self._moved(
                 f"{name}_sign_at", start, -given.sign_before, self._beside(start), path
             )
@@ -330,11 +336,16 @@ class TemporaryChanges:
                 return start
             self.derived.append(
                 Derived(
-                    name, Axis.TEMPORARY, "m", parse(text),
-                    "It stands in a row with the first.", "BridgeGen", f"Where {name[:-3]} stands.",
+                    name,
+                    Axis.TEMPORARY,
+                    "m",
+                    parse(text),
+                    "It stands in a row with the first.",
+                    "BridgeGen",
+                    f"Where {name[:-3]} stands.",
                     self._quantities.document.at(path),
                 )
-            )  # fmt: skip
+            )
             distance = name
         else:
             between_them = gaps * float(gap) if gaps else 0.0

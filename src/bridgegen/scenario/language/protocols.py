@@ -153,9 +153,15 @@ def _read_grid(
     if (given.score is None) != (given.points is None):
         report("a grid that is rated must have both score and points", path)
     return Grid(
-        given.edition, given.name, given.source, tuple(values), tuple(sets),
-        given.score or "", given.points or 0.0, given.graded,
-    )  # fmt: skip
+        given.edition,
+        given.name,
+        given.source,
+        tuple(values),
+        tuple(sets),
+        given.score or "",
+        given.points or 0.0,
+        given.graded,
+    )
 
 
 def _numbers(

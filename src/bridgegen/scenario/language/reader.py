@@ -293,10 +293,18 @@ class _Declarations:
             )
         self.parameters.append(
             Parameter(
-                self._prefix + name, Axis(given.axis), given.unit or "1", low, high, default,
-                kind, given.description, given.source, place,
+                self._prefix + name,
+                Axis(given.axis),
+                given.unit or "1",
+                low,
+                high,
+                default,
+                kind,
+                given.description,
+                given.source,
+                place,
             )
-        )  # fmt: skip
+        )
 
     def _bound(self, _: str, given: BoundSection, place: str) -> None:
         lo, hi = (
@@ -310,10 +318,16 @@ class _Declarations:
         value = parse(self._formula(given.value), place)
         self.derived.append(
             Derived(
-                self._prefix + name, Axis(given.axis), given.unit, value,
-                given.why, given.source, given.description, place,
+                self._prefix + name,
+                Axis(given.axis),
+                given.unit,
+                value,
+                given.why,
+                given.source,
+                given.description,
+                place,
             )
-        )  # fmt: skip
+        )
 
 
 Side = TypeVar("Side", Expression, Expression | None)
@@ -477,6 +491,10 @@ def _roads(document: Document, quantities: Quantities) -> RoadsSpec | None:
     if kind is None or given is None:
         return None
     return read_roads(
-        kind, given, quantities.parameters, quantities.derived, quantities.declared,
+        kind,
+        given,
+        quantities.parameters,
+        quantities.derived,
+        quantities.declared,
         quantities.report,
-    )  # fmt: skip
+    )

@@ -179,14 +179,19 @@ class SearchedScenario:
         """Return every parameter and derived quantity with its range and rules, for people."""
         lines = [
             ParameterLine(
-                p.name, p.axis, p.unit, p.low, p.high, p.default,
+                p.name,
+                p.axis,
+                p.unit,
+                p.low,
+                p.high,
+                p.default,
                 "; ".join(str(bound) for bound in self.bounds if bound.target == p.name),
                 p.description,
                 p.kind.span_text(p.low, p.high, "{:g}".format, f" {p.unit}"),
                 p.kind.text(p.default, "{:g}".format),
             )
             for p in self.parameters.values()
-        ]  # fmt: skip
+        ]
         lines += [
             ParameterLine(d.name, d.axis, d.unit, None, None, None, str(d), d.description)
             for d in self.derived
@@ -272,9 +277,18 @@ class LogicalScenario(SearchedScenario):
             if participant.model
         }
         parts = (
-            drivers, headings, lifted, sirens, bodies, types, models, ways, self.criteria,
-            self.clauses, self.matrix,
-        )  # fmt: skip
+            drivers,
+            headings,
+            lifted,
+            sirens,
+            bodies,
+            types,
+            models,
+            ways,
+            self.criteria,
+            self.clauses,
+            self.matrix,
+        )
         more = "".join(repr(part) for part in parts if part)
         return sha256((content + more).encode()).hexdigest()
 

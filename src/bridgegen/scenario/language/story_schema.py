@@ -204,8 +204,14 @@ class ArrivalSection(ShapedSection):
 
 
 ACTIONS = (
-    "speed", "lane_change", "lane_offset", "keep_distance", "arrive", "indicate", "weather",
-)  # fmt: skip
+    "speed",
+    "lane_change",
+    "lane_offset",
+    "keep_distance",
+    "arrive",
+    "indicate",
+    "weather",
+)
 """Keys of an event that are actions; it has one of them at least."""
 
 

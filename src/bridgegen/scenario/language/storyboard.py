@@ -169,10 +169,20 @@ class Storyboard:
             self._places.check_crossing(name, points, path)
         driver = given.driver or ""
         return Participant(
-            name, given.type, points[0], None, given.speed, points, driver=driver,
-            exceeds_limit=given.exceeds_limit or "", siren=given.siren, own_body=_body(given),
-            type_by=given.type_by or "", types=self._choices.types(given), model=given.model or "",
-        )  # fmt: skip
+            name,
+            given.type,
+            points[0],
+            None,
+            given.speed,
+            points,
+            driver=driver,
+            exceeds_limit=given.exceeds_limit or "",
+            siren=given.siren,
+            own_body=_body(given),
+            type_by=given.type_by or "",
+            types=self._choices.types(given),
+            model=given.model or "",
+        )
 
     def _driver(
         self, name: str, given: ParticipantSection, place: WaypointSection, path: Path
@@ -208,11 +218,20 @@ class Storyboard:
         if conduct == "vehicle" and start.lane == "sidewalk":
             self._report(f"{name} must stand on a lane: vehicles are on roads only", path)
         return Participant(
-            name, given.type, start, end, given.speed, driver=given.driver or "",
-            heading=given.heading, exceeds_limit=given.exceeds_limit or "", siren=given.siren,
-            own_body=_body(given), type_by=given.type_by or "", types=self._choices.types(given),
+            name,
+            given.type,
+            start,
+            end,
+            given.speed,
+            driver=given.driver or "",
+            heading=given.heading,
+            exceeds_limit=given.exceeds_limit or "",
+            siren=given.siren,
+            own_body=_body(given),
+            type_by=given.type_by or "",
+            types=self._choices.types(given),
             model=given.model or "",
-        )  # fmt: skip
+        )
 
     def _check_body(self, name: str, given: ParticipantSection, path: Path) -> None:
         """Check model and own body, if there are: what the type's has none of, it has not."""
@@ -456,9 +475,13 @@ class Storyboard:
                 if value is not None:
                     self._check(value, unit, (*place, part), above=True)
             yield KeepDistance(
-                keeps.to, keeps.distance, keeps.time, keeps.acceleration, keeps.braking,
+                keeps.to,
+                keeps.distance,
+                keeps.time,
+                keeps.acceleration,
+                keeps.braking,
                 keeps.max_speed,
-            )  # fmt: skip
+            )
         if arrives is not None:
             places = [
                 self._places.waypoint(waypoint_section, (*path, "arrive", key))

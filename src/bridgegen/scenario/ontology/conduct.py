@@ -43,8 +43,12 @@ def conduct_rules() -> Iterator[Rule]:
 
 def _places() -> Iterator[Rule]:
     yield Rule(
-        "on-its-road", "", "Scenario",
-        "must lie on the road of its lane ({?lane}), got {?got}", None, "",
+        "on-its-road",
+        "",
+        "Scenario",
+        "must lie on the road of its lane ({?lane}), got {?got}",
+        None,
+        "",
         f"SELECT $this ?value ({called('?on')} AS ?lane) ({shown('?at')} AS ?got) WHERE {{ "
         f"$this a bg:Scenario . ?on {_ROAD} ?road ; ^bg:on_lane ?value . "
         "?value bg:has_distance ?at . ?road bg:has_length ?length . "
@@ -52,8 +56,10 @@ def _places() -> Iterator[Rule]:
         "GROUP BY $this ?value ?on ?at ?length HAVING("
         f"xsd:double(?at) < SUM(COALESCE(?before, 0.0e0)) - {_SLACK} || "
         f"xsd:double(?at) > SUM(COALESCE(?before, 0.0e0)) + xsd:double(?length) + {_SLACK})",
-        "has_distance", True, ("LanePosition",),
-    )  # fmt: skip
+        "has_distance",
+        True,
+        ("LanePosition",),
+    )
 
 
 def _pedestrians() -> Iterator[Rule]:
@@ -65,8 +71,12 @@ def _pedestrians() -> Iterator[Rule]:
         f"{is_a('?crosswalk', 'Crosswalk')} BIND(0.5e0 * ?wide + {_SLACK} AS ?reach)"
     )
     yield about(
-        "walks-on-sidewalk", "Scenario", "on_lane",
-        "must be a sidewalk, or a lane where a crosswalk is, got {?got} at {?where} m", why, source,
+        "walks-on-sidewalk",
+        "Scenario",
+        "on_lane",
+        "must be a sidewalk, or a lane where a crosswalk is, got {?got} at {?where} m",
+        why,
+        source,
         f"SELECT DISTINCT $this ?value ({called('?lane')} AS ?got) ({shown('?at')} AS ?where) "
         f"WHERE {{ {walker} ?value {_PLACES} ?place . "
         "?place bg:on_lane ?lane ; bg:has_distance ?at . "
@@ -77,11 +87,14 @@ def _pedestrians() -> Iterator[Rule]:
         f"OPTIONAL {{ ?lane {_ROAD} ?road . {crosswalk} "
         "FILTER(ABS(?at - ?middle) <= ?reach) } FILTER(!BOUND(?crosswalk)) }",
         ("Pedestrian",),
-    )  # fmt: skip
+    )
     yield about(
-        "crosses-on-crosswalk", "Scenario", "has_trajectory",
+        "crosses-on-crosswalk",
+        "Scenario",
+        "has_trajectory",
         "must cross within a crosswalk, got {?got} at {?where} m to {?other} at {?there} m",
-        why, source,
+        why,
+        source,
         f"SELECT DISTINCT $this ?value ({called('?lane')} AS ?got) ({shown('?at')} AS ?where) "
         f"({called('?lane_2')} AS ?other) ({shown('?at_2')} AS ?there) WHERE {{ "
         f"{walker} ?value {_DOES}/bg:has_trajectory ?way . ?way bg:has_vertex ?one, ?two . "
@@ -93,7 +106,7 @@ def _pedestrians() -> Iterator[Rule]:
         "FILTER(ABS(?at - ?middle) <= ?reach && ABS(?at_2 - ?middle) <= ?reach) } "
         "FILTER(!BOUND(?crosswalk)) }",
         ("Pedestrian", "has_trajectory"),
-    )  # fmt: skip
+    )
 
 
 def _vehicles() -> Iterator[Rule]:
@@ -111,9 +124,12 @@ def _vehicles() -> Iterator[Rule]:
         "?own bg:has_spline_order ?order ; bg:has_vertex/bg:has_position ?place }"
     )
     yield about(
-        "on-drivable-lane", "Scenario", "on_lane",
+        "on-drivable-lane",
+        "Scenario",
+        "on_lane",
         "must be a lane to drive on (or a shoulder to stand on, or to pull out from), got {?got}",
-        "Vehicles keep to the lanes that are made for them; a shoulder is for stopping.", source,
+        "Vehicles keep to the lanes that are made for them; a shoulder is for stopping.",
+        source,
         f"SELECT DISTINCT $this ?value ({called('?lane')} AS ?got) WHERE {{ {vehicle} "
         f"?value {_PLACES} ?place . ?place bg:on_lane ?lane . "
         f"FILTER NOT EXISTS {{ {is_a('?lane', 'Lane')} }} {own_way} "
@@ -121,27 +137,33 @@ def _vehicles() -> Iterator[Rule]:
         "FILTER((BOUND(?speed) && !BOUND(?change)) || "
         f"NOT EXISTS {{ {is_a('?lane', 'Shoulder')} }}) }}",
         ("Vehicle",),
-    )  # fmt: skip
+    )
     yield about(
-        "within-lane", "Scenario", "has_lateral_offset",
+        "within-lane",
+        "Scenario",
+        "has_lateral_offset",
         "must keep it on its lane ({?lane}), ±{?half}, got {?got}",
-        "Vehicles keep to the lanes that are made for them.", source,
+        "Vehicles keep to the lanes that are made for them.",
+        source,
         f"SELECT DISTINCT $this ?value ({called('?on')} AS ?lane) ({shown('?aside')} AS ?got) "
         f"({shown('0.5e0 * ?width')} AS ?half) WHERE {{ {vehicle} ?value {_PLACES} ?place . "
         "?place bg:has_lateral_offset ?aside ; bg:on_lane ?on . ?on bg:has_width ?width . "
         f"FILTER(ABS(?aside) > 0.5e0 * ?width + {_SLACK}) {own_way} }}",
         ("Vehicle", "has_lateral_offset"),
-    )  # fmt: skip
+    )
     yield about(
-        "faces-its-way", "Scenario", "has_relative_heading",
+        "faces-its-way",
+        "Scenario",
+        "has_relative_heading",
         "must be 0 or 180 deg while it moves, and -180 to 180 deg otherwise, got {?got}",
-        "A vehicle that moves goes where it looks: along its lane, or against its traffic.", "ours",
+        "A vehicle that moves goes where it looks: along its lane, or against its traffic.",
+        "ours",
         f"SELECT DISTINCT $this ?value ({shown('?turned')} AS ?got) WHERE {{ {vehicle} "
         f"?value {_PLACES}/bg:has_relative_heading ?turned . OPTIONAL {{ {moves} }} "
         "FILTER(ABS(?turned) > 180 || "
         f"(BOUND(?speed) && ?turned != 0 && ABS(ABS(?turned) - 180) > {_SLACK})) }}",
         ("Vehicle", "has_relative_heading"),
-    )  # fmt: skip
+    )
 
 
 # -- how fast --------------------------------------------------------------------------------------
@@ -149,7 +171,9 @@ def _vehicles() -> Iterator[Rule]:
 
 def _speeds() -> Iterator[Rule]:
     yield about(
-        "speed-limit", "Scenario", "has_target_speed",
+        "speed-limit",
+        "Scenario",
+        "has_target_speed",
         "must be {?limit} at most, as road and weather allow, got {?got}",
         "Nobody drives faster than the road allows, less in rain, in fog and by night.",
         f"{_PAPER} (road and weather constrain participants); has_speed_limit of the road, "
@@ -166,16 +190,19 @@ def _speeds() -> Iterator[Rule]:
         f"?value {_DOES}/bg:has_target_speed ?speed . FILTER(?speed > {slack('?most', 1)}) "
         "FILTER NOT EXISTS { ?value bg:has_reason_to_exceed ?reason } }",
         ("Vehicle", "has_speed_limit"),
-    )  # fmt: skip
+    )
     yield about(
-        "body-speed", "Scenario", "has_target_speed",
+        "body-speed",
+        "Scenario",
+        "has_target_speed",
         "must be {?limit} at most, the most that it can do, got {?got}",
-        "Nobody is faster than they can.", "has_max_speed of the participant",
+        "Nobody is faster than they can.",
+        "has_max_speed of the participant",
         f"SELECT DISTINCT $this ?value ({shown('?speed')} AS ?got) ({shown('?most')} AS ?limit) "
         f"WHERE {{ {_PARTICIPANT} ?value bg:has_max_speed ?most ; "
         f"{_DOES}/bg:has_target_speed ?speed . FILTER(?speed > {slack('?most', 1)}) }}",
         ("has_max_speed",),
-    )  # fmt: skip
+    )
 
 
 def _bends() -> Iterator[Rule]:
@@ -220,7 +247,9 @@ def _bend(key: str, curvature: str, needs: tuple[str, ...]) -> Rule:
     least = f"IF({grip} < {_MOST} || COUNT(?reason) > 0, {grip}, {_MOST})"
     slower = "(?speed - (1.0e0 + ?speed) * " + _SLACK + ")"
     return about(
-        key, "Scenario", "has_target_speed",
+        key,
+        "Scenario",
+        "has_target_speed",
         f"must keep v² <= {DRY_FRICTION}·{GRAVITY}·friction·R in a bend of R = {{?radius}} m with "
         f"friction = {{?mu}}, and v² <= {MOST_LATERAL}·R unless it has a reason to exceed, got "
         "{?got}",
@@ -238,13 +267,15 @@ def _bend(key: str, curvature: str, needs: tuple[str, ...]) -> Rule:
         "OPTIONAL { ?value bg:has_reason_to_exceed ?reason } } "
         f"GROUP BY $this ?value HAVING(MAX({slower} * {slower}) * MAX(?sharp) > {least})",
         needs,
-    )  # fmt: skip
+    )
 
 
 def _closed_roads() -> Iterator[Rule]:
     for name, path in (("fog_density", "bg:has_fog"), ("precipitation", "bg:has_rain")):
         yield about(
-            f"closed-by-{name}", "Scenario", "",
+            f"closed-by-{name}",
+            "Scenario",
+            "",
             f"must not be on {{?road}}, closed above {with_unit(f'has_{name}')} {{?limit}}, "
             "got {?got}",
             "The road is closed in such weather.",
@@ -255,7 +286,7 @@ def _closed_roads() -> Iterator[Rule]:
             f"FILTER(?much > {slack('?most', 1)}) {_PARTICIPANT} "
             f"?value {_PLACES}/bg:on_lane/{_ROAD} ?place }}",
             (f"closes_above_{name}",),
-        )  # fmt: skip
+        )
 
 
 # -- temporary changes -----------------------------------------------------------------------------
@@ -263,7 +294,9 @@ def _closed_roads() -> Iterator[Rule]:
 
 def _temporary_changes() -> Iterator[Rule]:
     yield about(
-        "works-element", "Scenario", "has_position",
+        "works-element",
+        "Scenario",
+        "has_position",
         "must be on the lane that is closed ({?lane}) or beside the lanes, got {?got} with "
         "has_lateral_offset {?off} m",
         "What secures road works stands on the closed lane or beside the road, not in the traffic.",
@@ -284,28 +317,40 @@ def _temporary_changes() -> Iterator[Rule]:
         "COALESCE(SUM(?inner) - 0.5e0 * ?width - ?aside >= SUM(?driven) && SUM(?wide) > 0.0e0, "
         "false)))",
         ("RoadWorks",),
-    )  # fmt: skip
+    )
     jam = f"$this bg:has_event ?jam . {is_a('?jam', 'TrafficJam')} ?jam bg:has_who ?value ."
     place = "?value bg:has_init_action/bg:has_position ?place . ?place bg:on_lane"
     why, source = "A jam is a row of vehicles that stand on one lane.", "ours"
     yield about(
-        "jam-on-its-lane", "Scenario", "on_lane",
-        "must be that of its jam, {?lane}, got {?got}", why, source,
+        "jam-on-its-lane",
+        "Scenario",
+        "on_lane",
+        "must be that of its jam, {?lane}, got {?got}",
+        why,
+        source,
         f"SELECT DISTINCT $this ?value ({called('?at')} AS ?lane) ({called('?on')} AS ?got) "
         f"WHERE {{ {jam} ?jam bg:on_lane ?at . {place} ?on . FILTER(?on != ?at) }}",
         ("TrafficJam",),
-    )  # fmt: skip
+    )
     yield about(
-        "jam-stands", "Scenario", "has_target_speed",
-        "must be 0 at the start, in a jam, got {?got}", why, source,
+        "jam-stands",
+        "Scenario",
+        "has_target_speed",
+        "must be 0 at the start, in a jam, got {?got}",
+        why,
+        source,
         f"SELECT DISTINCT $this ?value ({shown('?speed')} AS ?got) WHERE {{ {jam} "
         "?value bg:has_init_action/bg:has_target_speed ?speed . FILTER(?speed > 0) }",
         ("TrafficJam",),
-    )  # fmt: skip
+    )
     body = "bg:has_center_ahead ?ahead{0} ; bg:has_box_length ?length{0}"
     yield about(
-        "jam-in-a-row", "Scenario", "has_distance",
-        "must leave room between the vehicles of a jam, got {?got} m to {?other}", why, source,
+        "jam-in-a-row",
+        "Scenario",
+        "has_distance",
+        "must leave room between the vehicles of a jam, got {?got} m to {?other}",
+        why,
+        source,
         f"SELECT DISTINCT $this ?value ({shown('?gap')} AS ?got) ({called('?who')} AS ?other) "
         f"WHERE {{ {jam} ?jam bg:has_who ?who . FILTER(STR(?value) < STR(?who)) "
         f"{place} ?on ; bg:has_distance ?at . ?who bg:has_init_action/bg:has_position ?place_2 . "
@@ -316,7 +361,7 @@ def _temporary_changes() -> Iterator[Rule]:
         "- 0.5e0 * (?length + ?length_2) AS ?gap) "
         f"FILTER(?gap < -{_SLACK}) }}",
         ("TrafficJam",),
-    )  # fmt: skip
+    )
 
 
 # -- accidents and near misses ---------------------------------------------------------------------
@@ -325,22 +370,28 @@ def _temporary_changes() -> Iterator[Rule]:
 def _conflicts() -> Iterator[Rule]:
     outcome = "$this bg:has_outcome ?value ."
     yield about(
-        "severity-is-a-probability", "Scenario", "has_severity",
+        "severity-is-a-probability",
+        "Scenario",
+        "has_severity",
         "must be a probability, 0 to 1, got {?got}",
-        "Severity is the probability of a MAIS3+ injury.", "ours",
+        "Severity is the probability of a MAIS3+ injury.",
+        "ours",
         f"SELECT DISTINCT $this ?value ({shown('?severity')} AS ?got) WHERE {{ "
         "$this a bg:Scenario . { BIND($this AS ?value) } UNION { $this bg:has_outcome ?value } "
         "?value bg:has_severity ?severity . FILTER(?severity < 0 || ?severity > 1) }",
         ("has_severity",),
-    )  # fmt: skip
+    )
     yield about(
-        "responsible-takes-part", "Scenario", "has_responsible",
+        "responsible-takes-part",
+        "Scenario",
+        "has_responsible",
         "must be one of its participants, got {?got}",
-        "Only a participant of an accident or a near miss can be responsible for it.", "ours",
+        "Only a participant of an accident or a near miss can be responsible for it.",
+        "ours",
         f"SELECT DISTINCT $this ?value ({called('?who')} AS ?got) WHERE {{ {outcome} "
         "?value bg:has_responsible ?who . FILTER NOT EXISTS { ?value bg:has_who ?who } }",
         ("has_responsible",),
-    )  # fmt: skip
+    )
 
 
 # --- Rules of layers 1 and 2 in every scenario: where lights, signs and markings may be ---
@@ -368,15 +419,21 @@ def _lights() -> Iterator[Rule]:
     why = "Traffic lights give and take the right of way, so they are at intersections only."
     source = f"{_PAPER} (layer 1 constrains layer 2)"
     yield about(
-        "light-at-intersection", "RoadNetwork", "on_road",
-        "must be a road that meets an intersection, got {?got}", why, source,
-        f"SELECT $this ?value (COALESCE({called('?road')}, \"none\") AS ?got) WHERE {{ {light} "
+        "light-at-intersection",
+        "RoadNetwork",
+        "on_road",
+        "must be a road that meets an intersection, got {?got}",
+        why,
+        source,
+        f'SELECT $this ?value (COALESCE({called("?road")}, "none") AS ?got) WHERE {{ {light} '
         "OPTIONAL { ?value bg:on_road ?road } FILTER(NOT EXISTS { ?value bg:has_s ?s } && "
         "(!BOUND(?road) || NOT EXISTS { ?crossing bg:has_leg ?road })) }",
         ("TrafficLight",),
-    )  # fmt: skip
+    )
     yield about(
-        "light-at-stop-line", "RoadNetwork", "has_distance",
+        "light-at-stop-line",
+        "RoadNetwork",
+        "has_distance",
         "must be that of the stop line of its lanes, got {?got}",
         "Who waits at a light waits at its stop line.",
         f"{source}; Vienna Convention on Road Signs and Signals (1968), Article 23",
@@ -385,14 +442,16 @@ def _lights() -> Iterator[Rule]:
         "FILTER NOT EXISTS { ?line bg:marks_lane ?lane ; bg:has_distance ?there . "
         f"FILTER(ABS(?there - ?at) <= {_SLACK}) }} }}",
         ("TrafficLight",),
-    )  # fmt: skip
+    )
 
 
 def _beside_and_on_roads() -> Iterator[Rule]:
     source = f"{_PAPER} (signs and street lights beside the road)"
     farthest = literal(FARTHEST_BESIDE)
     yield about(
-        "beside-road", "RoadNetwork", "has_t",
+        "beside-road",
+        "RoadNetwork",
+        "has_t",
         "must be beyond the road's edge, {?edge} m from its reference line, by "
         f"{FARTHEST_BESIDE:g} m at most, got {{?got}}",
         "What stands on the road is in the way, and what stands far from it is not seen as its.",
@@ -405,11 +464,14 @@ def _beside_and_on_roads() -> Iterator[Rule]:
         "BIND(COALESCE(?width, 0.0e0) AS ?wide) } GROUP BY $this ?value ?t "
         f"HAVING(ABS(?t) <= SUM(?wide) || ABS(?t) > SUM(?wide) + {farthest})",
         ("has_t",),
-    )  # fmt: skip
+    )
     yield about(
-        "along-road", "RoadNetwork", "has_distance",
+        "along-road",
+        "RoadNetwork",
+        "has_distance",
         "must keep it on its road, {?low} to {?high}, got {?got}",
-        "Crosswalks and stop lines lie on a road, signs and lights stand beside one.", source,
+        "Crosswalks and stop lines lie on a road, signs and lights stand beside one.",
+        source,
         f"SELECT DISTINCT $this ?value ({shown('?at')} AS ?got) ({shown('?half')} AS ?low) "
         f"({shown('?length - ?half')} AS ?high) WHERE {{ "
         "$this bg:has_facility|bg:has_area ?value . "
@@ -418,23 +480,28 @@ def _beside_and_on_roads() -> Iterator[Rule]:
         "BIND(0.5e0 * COALESCE(?width, 0.0e0) AS ?half) "
         f"FILTER(?at < ?half - {_SLACK} || ?at > ?length - ?half + {_SLACK}) }}",
         ("on_road",),
-    )  # fmt: skip
+    )
     yield about(
-        "own-lanes", "RoadNetwork", "",
+        "own-lanes",
+        "RoadNetwork",
+        "",
         "must be for lanes of its own road, got {?got}",
-        "A light, a sign or a line is for those who drive past it.", source,
+        "A light, a sign or a line is for those who drive past it.",
+        source,
         f"SELECT DISTINCT $this ?value ({called('?lane')} AS ?got) WHERE {{ "
         f"$this bg:has_facility ?value . ?value bg:on_road ?road ; bg:has_distance ?at ; "
         f"bg:marks_lane|bg:governs_lane ?lane . {_OURS} "
         "FILTER NOT EXISTS { ?road bg:has_lane ?lane } }",
         ("has_facility", "on_road"),
-    )  # fmt: skip
+    )
 
 
 def _phases() -> Iterator[Rule]:
     phase = "$this bg:has_signal_controller ?controller . ?controller bg:has_phase ?value ."
     yield about(
-        "no-conflicting-green", "RoadNetwork", "gives_green_to",
+        "no-conflicting-green",
+        "RoadNetwork",
+        "gives_green_to",
         "must not let conflicting legs go at once, got {?got} and {?other}",
         "Legs that are not opposite have ways that cross.",
         "RiLSA 2015, conflicting streams never have green together; which are, ours",
@@ -447,13 +514,16 @@ def _phases() -> Iterator[Rule]:
         f"{literal(OPPOSITE)}) "
         "FILTER(STR(?one) < STR(?two) || NOT EXISTS { ?value bg:gives_green_to ?two }) }",
         ("SignalController",),
-    )  # fmt: skip
+    )
     yield about(
-        "own-lights", "RoadNetwork", "",
+        "own-lights",
+        "RoadNetwork",
+        "",
         "must switch lights of its controller only (has_light), got {?got}",
-        "A controller switches the lights that it has.", "ASAM OpenDRIVE 1.7, controllers",
+        "A controller switches the lights that it has.",
+        "ASAM OpenDRIVE 1.7, controllers",
         f"SELECT DISTINCT $this ?value ({called('?light')} AS ?got) WHERE {{ {phase} "
         "?value bg:gives_green_to|bg:gives_yellow_to|bg:gives_red_yellow_to ?light . "
         "FILTER NOT EXISTS { ?controller bg:has_light ?light } }",
         ("SignalController",),
-    )  # fmt: skip
+    )

@@ -28,11 +28,21 @@ Value = ox.NamedNode | ox.BlankNode | ox.Literal | ox.Triple
 _INTEGERS = frozenset(
     ox.NamedNode(XSD + name)
     for name in (
-        "integer", "int", "long", "short", "byte", "nonNegativeInteger", "positiveInteger",
-        "nonPositiveInteger", "negativeInteger", "unsignedInt", "unsignedLong", "unsignedShort",
+        "integer",
+        "int",
+        "long",
+        "short",
+        "byte",
+        "nonNegativeInteger",
+        "positiveInteger",
+        "nonPositiveInteger",
+        "negativeInteger",
+        "unsignedInt",
+        "unsignedLong",
+        "unsignedShort",
         "unsignedByte",
     )
-)  # fmt: skip
+)
 _NUMBERS = _INTEGERS | {ox.NamedNode(XSD + name) for name in ("double", "decimal", "float")}
 
 

@@ -17,9 +17,13 @@ from bridgegen.scenario.ontology.vocabulary import TYPE, Subject, bg, local_name
 NARROW = "\N{NARROW NO-BREAK SPACE}"
 _UNITS = {"deg": "°", "1": "", "count": "", "m/s^2": "m/s²"}
 _RULES = {
-    "lessThan": "<", "lessOrEqual": "≤", "equalTo": "=", "greaterOrEqual": "≥",
-    "greaterThan": ">", "notEqualTo": "≠",
-}  # fmt: skip
+    "lessThan": "<",
+    "lessOrEqual": "≤",
+    "equalTo": "=",
+    "greaterOrEqual": "≥",
+    "greaterThan": ">",
+    "notEqualTo": "≠",
+}
 _UNSAID = frozenset({TYPE, bg("has_name"), bg("has_parameter"), bg("binds_property")})
 _DEEP = 8
 """Largest depth of individuals within individuals; a circle in an edited file ends there."""
@@ -138,11 +142,13 @@ def _change(speaker: _Speaker, node: Subject) -> str:
     text = "".join(
         f" {word} {speaker.value(node, name)}"
         for name, word in (
-            ("has_rate", "at"), ("has_transition_time", "within"),
-            ("has_transition_distance", "over"), ("has_max_jerk", "with"),
+            ("has_rate", "at"),
+            ("has_transition_time", "within"),
+            ("has_transition_distance", "over"),
+            ("has_max_jerk", "with"),
         )
         if speaker.has(node, name)
-    )  # fmt: skip
+    )
     shape = "has_dynamics_shape"
     return f"{text} ({speaker.value(node, shape)})" if speaker.has(node, shape) else text
 
@@ -162,8 +168,11 @@ def _lane_change(speaker: _Speaker, node: Subject) -> str:
 
 
 def _trajectory(speaker: _Speaker, node: Subject) -> str:
-    vertices = [v for link in speaker.links(node, "has_trajectory")
-                for v in speaker.links(link, "has_vertex")]  # fmt: skip
+    vertices = [
+        v
+        for link in speaker.links(node, "has_trajectory")
+        for v in speaker.links(link, "has_vertex")
+    ]
     speaker.phrase.nodes += speaker.links(node, "has_trajectory") + vertices
 
     def index(vertex: Subject) -> float:

@@ -103,9 +103,13 @@ def ask_sparql(individuals: Individuals, query: str) -> Answer:
     data = ox.serialize(_quads(individuals), format=ox.RdfFormat.N_QUADS)
     assert data is not None
     task = {
-        "data": data.decode(), "query": query, "prefixes": {**PREFIXES, "rdf": RDF},
-        "rows": MAX_ROWS + 1, "seconds": MAX_SECONDS, "bytes": MAX_MEMORY,
-    }  # fmt: skip
+        "data": data.decode(),
+        "query": query,
+        "prefixes": {**PREFIXES, "rdf": RDF},
+        "rows": MAX_ROWS + 1,
+        "seconds": MAX_SECONDS,
+        "bytes": MAX_MEMORY,
+    }
     # -P: the folder of the file must not hide the standard library's modules
     command = [sys.executable, "-P", str(Path(__file__).with_name("_query_process.py"))]
     try:

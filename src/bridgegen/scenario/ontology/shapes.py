@@ -87,12 +87,17 @@ def _required_weather(scenario: "LogicalScenario | None") -> tuple[tuple[str, st
 def _general_rules() -> Iterator[Rule]:
     """Yield rules of every scenario that need a query."""
     yield Rule(
-        "one-value", "", "Scenario", "a parameter has one value, wherever it is bound", None, "",
+        "one-value",
+        "",
+        "Scenario",
+        "a parameter has one value, wherever it is bound",
+        None,
+        "",
         "SELECT $this (MIN(?raw) AS ?value) WHERE { $this a bg:Scenario . "
         "?node bg:has_parameter ?parameter ; ?property ?raw . "
         f"{_bound_by('?parameter')} }} "
         "GROUP BY $this ?parameter HAVING(COUNT(DISTINCT ?raw) > 1)",
-    )  # fmt: skip
+    )
     yield from placement_rules()
     yield from conduct_rules()
 
@@ -100,22 +105,32 @@ def _general_rules() -> Iterator[Rule]:
 def _declared_ranges() -> Rule:
     low, high = slack("xsd:double(?low)", -1), slack("xsd:double(?high)", 1)
     return Rule(
-        "declared-range", "", "Parameter", "has_low <= value <= has_high", None, "",
+        "declared-range",
+        "",
+        "Parameter",
+        "has_low <= value <= has_high",
+        None,
+        "",
         "SELECT DISTINCT $this ?value WHERE { $this bg:has_low ?low ; bg:has_high ?high . "
         f"?node bg:has_parameter $this ; ?property ?value . {_bound_by('$this')} "
         "BIND(xsd:double(?value) AS ?x) "
         f"FILTER(!COALESCE(?x >= {low} && ?x <= {high}, false)) }}",
-    )  # fmt: skip
+    )
 
 
 def _declared_words() -> Rule:
     return Rule(
-        "declared-words", "", "Parameter", "has a word that is allowed", None,
+        "declared-words",
+        "",
+        "Parameter",
+        "has a word that is allowed",
+        None,
         "a category has one of its names",
         "SELECT DISTINCT $this (?word AS ?value) WHERE { $this bg:has_allowed_word ?any ; "
         "bg:has_word ?word . FILTER NOT EXISTS { $this bg:has_allowed_word ?word } }",
-        "has_word", True,
-    )  # fmt: skip
+        "has_word",
+        True,
+    )
 
 
 # -- constraints, from the declarations in odd -----------------------------------------------------
@@ -131,8 +146,10 @@ def rules(scenario: "LogicalScenario | None") -> tuple[Rule, ...]:
         return (*found, _declared_ranges(), _declared_words())
     rule = partial(_rule, scenario.parameters)
     for name, parameter in scenario.parameters.items():
-        low, high = (slack(literal(value), side) for value, side in
-                     ((parameter.low, -1), (parameter.high, 1)))  # fmt: skip
+        low, high = (
+            slack(literal(value), side)
+            for value, side in ((parameter.low, -1), (parameter.high, 1))
+        )
         x = variable(name)
         kind = parameter.kind
         inside = kind.sparql_inside(_raw(name)) or f"{x} >= {low} && {x} <= {high}"

@@ -135,10 +135,16 @@ class _Compiler:
         if name == "sign":
             return f"IF({x} > 0.0e0, 1.0e0, IF({x} < 0.0e0, -1.0e0, 0.0e0))"
         function = {
-            "sqrt": self.sqrt, "exp": self.exp, "log": self.log,
-            "sin": self.sin, "cos": self.cos, "tan": self.tan,
-            "asin": self.asin, "acos": self.acos, "atan": self.atan,
-        }[name]  # fmt: skip
+            "sqrt": self.sqrt,
+            "exp": self.exp,
+            "log": self.log,
+            "sin": self.sin,
+            "cos": self.cos,
+            "tan": self.tan,
+            "asin": self.asin,
+            "acos": self.acos,
+            "atan": self.atan,
+        }[name]
         return function(x)
 
     def taken(self, index: str, values: list[str]) -> str:

@@ -118,9 +118,11 @@ def add_participant(
 
 def _add_body(builder: Builder, node: ox.NamedNode, body: Body) -> None:
     values = {
-        "has_box_length": body.length, "has_box_width": body.width, "has_box_height": body.height,
+        "has_box_length": body.length,
+        "has_box_width": body.width,
+        "has_box_height": body.height,
         "has_center_ahead": body.center_ahead,
-    }  # fmt: skip
+    }
     if body.wheelbase:
         values |= {
             "has_wheelbase": body.wheelbase,
@@ -230,14 +232,23 @@ class _Switch(NamedTuple):
 
 
 _SWITCHES = {
-    "left": (_Switch("warningLights", "off"), _Switch("indicatorRight", "off"),
-             _Switch("indicatorLeft", "flashing")),
-    "right": (_Switch("warningLights", "off"), _Switch("indicatorLeft", "off"),
-              _Switch("indicatorRight", "flashing")),
+    "left": (
+        _Switch("warningLights", "off"),
+        _Switch("indicatorRight", "off"),
+        _Switch("indicatorLeft", "flashing"),
+    ),
+    "right": (
+        _Switch("warningLights", "off"),
+        _Switch("indicatorLeft", "off"),
+        _Switch("indicatorRight", "flashing"),
+    ),
     "hazard": (_Switch("warningLights", "flashing"),),
-    "off": (_Switch("warningLights", "off"), _Switch("indicatorLeft", "off"),
-            _Switch("indicatorRight", "off")),
-}  # fmt: skip
+    "off": (
+        _Switch("warningLights", "off"),
+        _Switch("indicatorLeft", "off"),
+        _Switch("indicatorRight", "off"),
+    ),
+}
 
 
 def _add_action(

@@ -81,8 +81,9 @@ class _Template:
         legs = tuple(self.arm(number, name) for number, name in enumerate(roads.legs, start=1))
         if roads.template == "roundabout":
             measures = {
-                "has_radius": knobs["radius"], "has_ring_lane_width": knobs["ring_lane_width"]
-            }  # fmt: skip
+                "has_radius": knobs["radius"],
+                "has_ring_lane_width": knobs["ring_lane_width"],
+            }
             return self.assemble(legs, "Roundabout", None, measures)
         kind = _BY_LEGS.get(len(legs), "Intersection")
         return self.assemble(legs, kind, knobs["intersection_size"], {})

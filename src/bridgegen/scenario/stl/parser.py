@@ -33,8 +33,17 @@ _TEMPORAL = ("always", "eventually", "historically", "once")
 _BINARY = ("until", "since")
 _FUNCTIONS = ("abs", "min", "max", "first", "last")
 _WORDS = {
-    *_TEMPORAL, *_BINARY, *_FUNCTIONS, "and", "or", "not", "implies", "while", "to", "any",
-}  # fmt: skip
+    *_TEMPORAL,
+    *_BINARY,
+    *_FUNCTIONS,
+    "and",
+    "or",
+    "not",
+    "implies",
+    "while",
+    "to",
+    "any",
+}
 
 _UNIT = "|".join(re.escape(symbol) for symbol in sorted(SYMBOLS, key=len, reverse=True))
 _TOKEN = re.compile(

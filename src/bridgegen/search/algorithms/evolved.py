@@ -40,9 +40,13 @@ class Evolved(ABC):
         self._values = resolve(type(self), problem, seed, settings)
         within = self._values["restart_within"]
         self._search = Generations(
-            self._build, problem, seed, within, scaled=self.scaled,
+            self._build,
+            problem,
+            seed,
+            within,
+            scaled=self.scaled,
             asynchronous=asynchronous(type(self)),
-        )  # fmt: skip
+        )
 
     @abstractmethod
     def _build(self) -> Any:

@@ -69,14 +69,18 @@ class Surrogate(Saved):
         ),
         "explore": Setting(0.2, "share of a batch that is drawn at random", 0.0, 1.0),
         "critical": Setting(
-            0.7, "share of the others that are likely critical, once a critical row is known",
-            0.0, 1.0,
+            0.7,
+            "share of the others that are likely critical, once a critical row is known",
+            0.0,
+            1.0,
         ),
         "apart": Setting(
-            0.1, "distance kept from critical rows, as a share of the ranges, in root mean square",
-            0.0, 1.0,
+            0.1,
+            "distance kept from critical rows, as a share of the ranges, in root mean square",
+            0.0,
+            1.0,
         ),
-    }  # fmt: skip
+    }
     objectives: ClassVar[Arity] = "one"
     asynchronous: ClassVar[bool] = True
 

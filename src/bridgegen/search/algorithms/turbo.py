@@ -86,14 +86,19 @@ class TuRBO(Saved):
         "shortest": Setting(2.0**-7, "length below which a region restarts elsewhere", 1e-6, 0.5),
         "successes": Setting(3, "improving batches in a row after which a region doubles", 1, 1000),
         "failures": Setting(
-            0, "rows without improvement after which it halves; 0: the parameters, 5 at least",
-            0, 100_000,
+            0,
+            "rows without improvement after which it halves; 0: the parameters, 5 at least",
+            0,
+            100_000,
         ),
         "avoid": Setting(
-            0.15, "distance that a region keeps from critical rows found before it began, as a "
-            "share of the ranges, in root mean square", 0.0, 1.0,
+            0.15,
+            "distance that a region keeps from critical rows found before it began, as a "
+            "share of the ranges, in root mean square",
+            0.0,
+            1.0,
         ),
-    }  # fmt: skip
+    }
     objectives: ClassVar[Arity] = "one"
     asynchronous: ClassVar[bool] = True
 

@@ -154,9 +154,12 @@ def conditions(box: Box, space: SearchSpace) -> list[str]:
         low, high = float(box.low[k]), float(box.high[k])
         name = space.variables[k]
         text = space.parameters[name].kind.range_text(
-            low, high, number,
-            low_counts=low > float(outer.low[k]), high_counts=high < float(outer.high[k]),
-        )  # fmt: skip
+            low,
+            high,
+            number,
+            low_counts=low > float(outer.low[k]),
+            high_counts=high < float(outer.high[k]),
+        )
         found.append(f"{name} {text}{_unit(space, name)}")
     return found
 

@@ -149,9 +149,13 @@ class _Search:
     def run(self) -> Found:
         """Verify the boxes of the run's tree, then boxes inside those that are not confirmed."""
         leaves = fit_leaves(
-            self._X, self._critical, low=self._outer.low, high=self._outer.high,
-            min_rows=MIN_ROWS, max_depth=MOST_CONDITIONS,
-        )  # fmt: skip
+            self._X,
+            self._critical,
+            low=self._outer.low,
+            high=self._outer.high,
+            min_rows=MIN_ROWS,
+            max_depth=MOST_CONDITIONS,
+        )
         inner: list[Box] = []
         for box in (boxes := self._readable(leaves, self._outer)):
             region, fresh, fresh_critical = self._verify(box, len(boxes))
@@ -225,10 +229,13 @@ class _Search:
         free = MOST_CONDITIONS - int(named.sum())
         columns = np.arange(len(named)) if free > 0 else np.flatnonzero(named)
         leaves = fit_leaves(
-            X[:, columns], critical, low=box.low[columns], high=box.high[columns],
+            X[:, columns],
+            critical,
+            low=box.low[columns],
+            high=box.high[columns],
             min_rows=max(MIN_ROWS, len(fresh) // 12),
             max_depth=min(2, free) if free > 0 else 2,
-        )  # fmt: skip
+        )
         inner = []
         for leaf in leaves:
             low, high = box.low.copy(), box.high.copy()

@@ -24,9 +24,12 @@ class Duel:
         self._n_decisions, n_actions = arena.decisions.shape
         made = values["population"] * self._n_decisions
         self._model = model_of(
-            values, arena.n_observed, n_actions,
-            n_steps=self._n_decisions, minibatch=_even(made, values["minibatch"]),
-        )  # fmt: skip
+            values,
+            arena.n_observed,
+            n_actions,
+            n_steps=self._n_decisions,
+            minibatch=_even(made, values["minibatch"]),
+        )
         self._steps: list[tuple[Any, ...]] = []
         self.arrays: Arrays = arrays_of(self._model.policy, [self._model.policy.optimizer])
 
@@ -58,9 +61,13 @@ class Duel:
             last = alive[k] & ~after[k]
             began = ~alive[k] | (k == 0)
             buffer.add(
-                kept, action, np.where(last, reward, 0.0).astype(np.float32),
-                began.astype(np.float32), value, log_probability,
-            )  # fmt: skip
+                kept,
+                action,
+                np.where(last, reward, 0.0).astype(np.float32),
+                began.astype(np.float32),
+                value,
+                log_probability,
+            )
         buffer.compute_returns_and_advantage(last_values=torch.zeros(n), dones=np.ones(n))
         # Steps after a scenario's end hold no decisions: they are not trained on.
         buffer.advantages[~alive] = 0.0

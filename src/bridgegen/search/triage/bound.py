@@ -88,9 +88,11 @@ def _least(name: str, column: Float, counts: Bool, ids: Int) -> Least:
     k = int(np.lexsort((ids, -worth))[0]) if len(worth) else 0  # the earliest of equal ones
     known = len(worth) > 0 and bool(np.isfinite(worth[k]))
     return Least(
-        quantity=name, unit=quantity.unit, value=float(column[k]) if known else None,
+        quantity=name,
+        unit=quantity.unit,
+        value=float(column[k]) if known else None,
         evaluation=int(ids[k]) if known else None,
-    )  # fmt: skip
+    )
 
 
 @dataclass(frozen=True)
@@ -129,9 +131,13 @@ class NotCounted:
         pairs = zip(findings.conflict[excused], findings.rule[excused], strict=True)
         again = avoids(np.flatnonzero(excused & contact)) if avoids else np.zeros(0, np.bool_)
         return cls(
-            Counter(pairs), Counter(findings.implausible[odd].tolist()),
-            int((odd & contact).sum()), int((~ok).sum()), int(again.sum()), len(again),
-        )  # fmt: skip
+            Counter(pairs),
+            Counter(findings.implausible[odd].tolist()),
+            int((odd & contact).sum()),
+            int((~ok).sum()),
+            int(again.sum()),
+            len(again),
+        )
 
     @property
     def unsafe(self) -> int:
@@ -244,9 +250,16 @@ def bound(
             f"{_of_the_space(space, such)}."
         )
     return Bound(
-        evaluations=evaluations, failed=failed, implausible=implausible, harmful=harmful,
-        space=space, least=least, verdict=verdict, not_counted=besides.sentence, sentence=text,
-    )  # fmt: skip
+        evaluations=evaluations,
+        failed=failed,
+        implausible=implausible,
+        harmful=harmful,
+        space=space,
+        least=least,
+        verdict=verdict,
+        not_counted=besides.sentence,
+        sentence=text,
+    )
 
 
 def _of_the_space(space: Estimate, such: str) -> str:

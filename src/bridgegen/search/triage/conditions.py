@@ -349,11 +349,17 @@ class Conditions:
             (span.low, span.high, span.above) if sign == ">=" else (span.high, span.low, span.below)
         )
         return Condition(
-            name=name, unit=self._space.parameters[name].unit, sign=sign, limit=near,
+            name=name,
+            unit=self._space.parameters[name].unit,
+            sign=sign,
+            limit=near,
             until=far if (ends or span.closed) and confirmed else None,
-            step=float(self._steps[i]), value=v, nominal=nominal,
-            needs=_words(self._space, name, span), outside=outside,
-        )  # fmt: skip
+            step=float(self._steps[i]),
+            value=v,
+            nominal=nominal,
+            needs=_words(self._space, name, span),
+            outside=outside,
+        )
 
 
 def _words(space: SearchSpace, name: str, span: _Span) -> str:

@@ -41,13 +41,27 @@ class Effort:
 
 
 FULL = Effort(
-    per_mode=3, spare=2, placed=4096, tested=20, minimal=10, probes=500, descends_robustly=True,
-    sampled=8, fresh=256,
-)  # fmt: skip
+    per_mode=3,
+    spare=2,
+    placed=4096,
+    tested=20,
+    minimal=10,
+    probes=500,
+    descends_robustly=True,
+    sampled=8,
+    fresh=256,
+)
 SHORT = Effort(
-    per_mode=1, spare=0, placed=64, tested=0, minimal=3, probes=250, descends_robustly=False,
-    sampled=0, fresh=0,
-)  # fmt: skip
+    per_mode=1,
+    spare=0,
+    placed=64,
+    tested=0,
+    minimal=3,
+    probes=250,
+    descends_robustly=False,
+    sampled=0,
+    fresh=0,
+)
 NONE = Effort(
     per_mode=0,
     spare=0,

@@ -229,9 +229,14 @@ class Minimiser:
             if not tried.harmful[k]:
                 continue
             conditions, inside, rest = Conditions(
-                self._pipeline, X[k], self._bases[m], ladders[m].step, int(noise[k]), self._seed,
+                self._pipeline,
+                X[k],
+                self._bases[m],
+                ladders[m].step,
+                int(noise[k]),
+                self._seed,
                 self._effort.probes,
-            ).find(_needed(ladders[m], here[m]))  # fmt: skip
+            ).find(_needed(ladders[m], here[m]))
             width = dict(zip(space.variables, ranges(space).tolist(), strict=True))
             conditions.sort(
                 key=lambda condition: (
@@ -241,13 +246,19 @@ class Minimiser:
             )
             share, hits, rows = shares[k]
             found[m] = Minimal(
-                name=names[m], x=tuple(X[k].tolist()), noise_key=str(noise[k]),
+                name=names[m],
+                x=tuple(X[k].tolist()),
+                noise_key=str(noise[k]),
                 values=self._pipeline.runner.facts(X[k]),
                 conditions=tuple(conditions),
                 sentence=sentence(conditions, rest, draws=self._pipeline.draws),
-                rows=rows, harmful=hits, robustness=share if rows else None,
-                harm=float(tried.harm[k]), severity=float(tried.severity[k]), inside=inside,
-            )  # fmt: skip
+                rows=rows,
+                harmful=hits,
+                robustness=share if rows else None,
+                harm=float(tried.harm[k]),
+                severity=float(tried.severity[k]),
+                inside=inside,
+            )
         return found
 
     def _rows(self, ladder: Ladder, at: Int) -> Float:

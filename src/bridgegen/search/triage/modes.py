@@ -186,7 +186,7 @@ _TITLES: Mapping[ConflictType, tuple[str, str]] = {
     ConflictType.LANE_DEPARTURE: ("", "leaves its lane"),
     ConflictType.ROAD_DEPARTURE: ("", "leaves the road"),
     ConflictType.CLOSE_PASS: ("", "passes {} too closely"),
-}  # fmt: skip
+}
 _ARTICLES = {"": "another participant", "other": "an object", "animal": "an animal"}
 _RESPONSIBLE = {
     "ego": "ego responsible",
@@ -247,5 +247,15 @@ def where(U: Float, others: Float, names: Sequence[str]) -> tuple[int, float, fl
     return k, float(U[:, k].min()), float(U[:, k].max())
 
 
-__all__ = ["Group", "Key", "by_frequency", "by_harm", "clusters", "group", "keys_of", "rekeyed",
-           "title", "where"]  # fmt: skip
+__all__ = [
+    "Group",
+    "Key",
+    "by_frequency",
+    "by_harm",
+    "clusters",
+    "group",
+    "keys_of",
+    "rekeyed",
+    "title",
+    "where",
+]

@@ -80,9 +80,10 @@ def neighbourhoods(
                 item,
                 np.concatenate([before[:, np.newaxis], harmful[k]], axis=1),
                 np.concatenate([has[:, np.newaxis], ok[k]], axis=1),
-                tried, sampled,
+                tried,
+                sampled,
             )
-        )  # fmt: skip
+        )
     return made
 
 
@@ -130,11 +131,17 @@ def _neighbourhood(
                 treatment(fix_name(fix), fix.cause.label, harmful[:, pair], ok[:, pair])
             )
     return Neighbourhood(
-        evaluation=evaluation, rows=rows, harmful=hits,
-        robustness=hits / rows if rows else None, low=low, high=high,
-        cause=cause_of(hits, rows, treatments, placebo), fixes=tuple(treatments), placebo=placebo,
+        evaluation=evaluation,
+        rows=rows,
+        harmful=hits,
+        robustness=hits / rows if rows else None,
+        low=low,
+        high=high,
+        cause=cause_of(hits, rows, treatments, placebo),
+        fixes=tuple(treatments),
+        placebo=placebo,
         sampled=sampled,
-    )  # fmt: skip
+    )
 
 
 def treatment(name: str, cause: str, harmful: Bool, ok: Bool) -> Treatment:
@@ -152,9 +159,16 @@ def treatment(name: str, cause: str, harmful: Bool, ok: Bool) -> Treatment:
     both, n = int((before & after).sum()), int(known.sum())
     drop, low, high = paired_drop(both, gone, new, n - both - gone - new)
     return Treatment(
-        name=name, cause=cause, rows=n, gone=gone, new=new, drop=drop, low=low, high=high,
+        name=name,
+        cause=cause,
+        rows=n,
+        gone=gone,
+        new=new,
+        drop=drop,
+        low=low,
+        high=high,
         before=both + gone,
-    )  # fmt: skip
+    )
 
 
 def cause_of(harmful: int, rows: int, fixes: Sequence[Treatment], placebo: Treatment | None) -> str:

@@ -38,9 +38,15 @@ Verdict = Literal["fails", "no failure found", "not judged"]
 NOT_JUDGED: Verdict = "not judged"
 
 CauseLabel = Literal[
-    "perception", "planning", "vehicle dynamics", "control", "unavoidable", "sensitive",
-    "not known", "",
-]  # fmt: skip
+    "perception",
+    "planning",
+    "vehicle dynamics",
+    "control",
+    "unavoidable",
+    "sensitive",
+    "not known",
+    "",
+]
 """Labels of `bridgegen.assess.cause.Cause`; "sensitive": a small change of the parameters alone
 makes most of the harm vanish, so that no fix can be credited; "not known": too few neighbours have
 a result with some fix; "" where none was tried."""

@@ -265,9 +265,14 @@ class _Triage:
     def _simulate(self, at: Any, *, fixes: bool, sampled: bool = False) -> None:
         rows = self._at[np.array(list(at), dtype=np.int64)]
         results = neighbourhoods(
-            self._pipeline, self._rows.X[rows], self._rows.id[rows], self._seed,
-            fixes=fixes, sampled=sampled, as_is=self._as_is,
-        )  # fmt: skip
+            self._pipeline,
+            self._rows.X[rows],
+            self._rows.id[rows],
+            self._seed,
+            fixes=fixes,
+            sampled=sampled,
+            as_is=self._as_is,
+        )
         self._found |= dict(zip(at, results, strict=True))
 
     def _is_knife_edge(self, i: int) -> bool:
@@ -364,19 +369,25 @@ class _Triage:
             rules = by_frequency(rows.findings.rule[self._at[item.rows]].tolist())
             modes.append(
                 Mode(
-                    number=k, title=self._title(item, groups, [rule for rule, _ in rules]),
-                    **item.key._asdict(), rule=rules[0][0], rules=rules,
+                    number=k,
+                    title=self._title(item, groups, [rule for rule, _ in rules]),
+                    **item.key._asdict(),
+                    rule=rules[0][0],
+                    rules=rules,
                     judgement=self._judgement(i, item.key.cause),
                     tested=near is not None and near.cause != "",
-                    count=len(item.rows), space=shares[k - 1],
+                    count=len(item.rows),
+                    space=shares[k - 1],
                     harm=float(self._harm[self._at[item.rows]].max()),
-                    severity=self._severity(item), worst=int(ids[item.rows[0]]), shown=int(ids[i]),
+                    severity=self._severity(item),
+                    worst=int(ids[item.rows[0]]),
+                    shown=int(ids[i]),
                     robustness=None if near is None else near.robustness,
                     examples=tuple(ids[item.rows[:MOST_EXAMPLES]].tolist()),
                     exports=(*([names[i]] if i in names else []), *kept),
                     minimal=minimal[k - 1],
                 )
-            )  # fmt: skip
+            )
         ok = rows.status == 0
         implausible = _implausible(rows)
         known = [self._found[i] for i in dict.fromkeys([*tested, *sample]) if i in self._found]
@@ -435,9 +446,11 @@ class _Triage:
 
     def _judgement(self, i: int, cause: str) -> str:
         return judgement(
-            cause, self._found.get(i), preventable=self._preventable.get(i),
+            cause,
+            self._found.get(i),
+            preventable=self._preventable.get(i),
             responsible=str(self._rows.findings.responsible[self._at[i]]),
-        )  # fmt: skip
+        )
 
     def _severity(self, item: Group) -> float:
         names = self._pipeline.metrics

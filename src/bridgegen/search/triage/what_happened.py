@@ -14,9 +14,15 @@ from bridgegen.base.arrays import Float, Int
 from bridgegen.engine.trials import CODES, EVENT, MEASURES
 
 LEAST = {
-    "time": 1.0, "x": 5.0, "y": 5.0, "v_ego": 2.0, "v_other": 2.0, "closing_normal": 2.0,
-    "closing_tangential": 2.0, "ttc": 0.5,
-}  # fmt: skip
+    "time": 1.0,
+    "x": 5.0,
+    "y": 5.0,
+    "v_ego": 2.0,
+    "v_other": 2.0,
+    "closing_normal": 2.0,
+    "closing_tangential": 2.0,
+    "ttc": 0.5,
+}
 """The least range of a quantity, in its unit: rows that differ by less are not spread further."""
 
 

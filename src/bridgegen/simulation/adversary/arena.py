@@ -17,11 +17,22 @@ if TYPE_CHECKING:
     from bridgegen.simulation.embedded.batch import Batch
 
 OBSERVED = (
-    "time", "speed", "place in the lane", "top speed",
-    "ego ahead", "ego to the left", "ego's heading, cosine", "ego's heading, sine",
-    "ego's speed", "ego's acceleration", "distance from the ego",
-    "way to the conflict", "ego's way to it", "time to the conflict", "ego's time to it",
-)  # fmt: skip
+    "time",
+    "speed",
+    "place in the lane",
+    "top speed",
+    "ego ahead",
+    "ego to the left",
+    "ego's heading, cosine",
+    "ego's heading, sine",
+    "ego's speed",
+    "ego's acceleration",
+    "distance from the ego",
+    "way to the conflict",
+    "ego's way to it",
+    "time to the conflict",
+    "ego's time to it",
+)
 """Observations of an adversary at each decision, each scaled to about -1 .. 1 and cut at -3 and 3.
 
 Ways lead to where its route and the ego's meet, times are at present speeds; 3 where they never
@@ -142,12 +153,20 @@ class Arena:
         with np.errstate(invalid="ignore", divide="ignore"):
             seen = [
                 np.full(len(x), k / self._simulator.program.n_steps),
-                v / FAST, aside / np.maximum(room, 1e-9), top / FAST,
-                (dx * np.cos(h) + dy * np.sin(h)) / FAR, (dy * np.cos(h) - dx * np.sin(h)) / FAR,
-                np.cos(turned), np.sin(turned),
-                ego_v / FAST, ego_a / HARD, np.hypot(dx, dy) / FAR,
-                way / FAR, ego_way / FAR,
-                way / np.maximum(v, 0.1) / LONG, ego_way / np.maximum(ego_v, 0.1) / LONG,
-            ]  # fmt: skip
+                v / FAST,
+                aside / np.maximum(room, 1e-9),
+                top / FAST,
+                (dx * np.cos(h) + dy * np.sin(h)) / FAR,
+                (dy * np.cos(h) - dx * np.sin(h)) / FAR,
+                np.cos(turned),
+                np.sin(turned),
+                ego_v / FAST,
+                ego_a / HARD,
+                np.hypot(dx, dy) / FAR,
+                way / FAR,
+                ego_way / FAR,
+                way / np.maximum(v, 0.1) / LONG,
+                ego_way / np.maximum(ego_v, 0.1) / LONG,
+            ]
         found: Float = np.clip(np.nan_to_num(np.column_stack(seen), nan=3.0), -3.0, 3.0)
         return found

@@ -59,9 +59,16 @@ class Course:
     """
 
     def __init__(
-        self, lane: Lane, station: float, speed: float, top: float, limits: tuple[float, float],
-        room: float, time_step: float, n_steps: int,
-    ) -> None:  # fmt: skip
+        self,
+        lane: Lane,
+        station: float,
+        speed: float,
+        top: float,
+        limits: tuple[float, float],
+        room: float,
+        time_step: float,
+        n_steps: int,
+    ) -> None:
         from bridgegen.simulation.embedded.motion import (
             note,  # numba is slow to import
         )
@@ -89,9 +96,18 @@ class Course:
         )
 
         steer(
-            self._lane.path, len(self._lane.path), self._lane.step, self.state, pace * self.top,
-            place * self.room, *self._limits, self._dt, k * self.steps, self.steps, self.points,
-        )  # fmt: skip
+            self._lane.path,
+            len(self._lane.path),
+            self._lane.step,
+            self.state,
+            pace * self.top,
+            place * self.room,
+            *self._limits,
+            self._dt,
+            k * self.steps,
+            self.steps,
+            self.points,
+        )
 
     @property
     def travelled(self) -> float:
@@ -175,9 +191,15 @@ class AdversarySource:
         a, b = lane.station
         station = a + b * float(program.fill(known, 1)[0, slot]) if slot >= 0 else a
         return Course(
-            lane, station, first_speed(who, values), top_speed(who, values), limits(who, values),
-            room(who, values), program.time_step, program.n_steps,
-        )  # fmt: skip
+            lane,
+            station,
+            first_speed(who, values),
+            top_speed(who, values),
+            limits(who, values),
+            room(who, values),
+            program.time_step,
+            program.n_steps,
+        )
 
     def courses(self, values: Mapping[str, float]) -> Mapping[str, Float]:
         """See `Source`: where the decisions lead the participant."""

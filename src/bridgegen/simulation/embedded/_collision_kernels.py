@@ -31,8 +31,14 @@ def collides(k, plan, record):
         dx += other[2] * math.cos(turned)
         dy += other[2] * math.sin(turned)
         if boxes_meet(
-            dx, dy, h, 0.5 * own[0] - SHRUNK, 0.5 * own[1] - SHRUNK,
-            turned, 0.5 * other[0] - SHRUNK, 0.5 * other[1] - SHRUNK,
-        ):  # fmt: skip
+            dx,
+            dy,
+            h,
+            0.5 * own[0] - SHRUNK,
+            0.5 * own[1] - SHRUNK,
+            turned,
+            0.5 * other[0] - SHRUNK,
+            0.5 * other[1] - SHRUNK,
+        ):
             return True
     return False

@@ -45,9 +45,15 @@ from bridgegen.simulation.embedded.world import run_controllers
 def before_driver(k, plan, roads, state, record):
     """Execute the storyboard at instant k, up to its commands for the ego."""
     run_controllers(
-        k * plan.dt, plan.controllers, plan.phases, plan.changes, state.slots, state.phase_now,
-        state.phase_until, state.lights,
-    )  # fmt: skip
+        k * plan.dt,
+        plan.controllers,
+        plan.phases,
+        plan.changes,
+        state.slots,
+        state.phase_now,
+        state.phase_until,
+        state.lights,
+    )
     arrive(k, plan, state, record)
     finish(k, plan, state)
     observe(k, plan, roads, state, record)

@@ -406,8 +406,11 @@ def _declared() -> tuple[tuple[str, Any, tuple[Any, ...]], ...]:
 
 
 NUMBERS: dict[Any, Any] = {
-    Float: np.float64, Int: np.int64, Bool: np.bool_, npt.NDArray[np.int8]: np.int8,
+    Float: np.float64,
+    Int: np.int64,
+    Bool: np.bool_,
+    npt.NDArray[np.int8]: np.int8,
     npt.NDArray[np.uint64]: np.uint64,
-}  # fmt: skip
+}
 """The type of number of each type of array. Looked up, since the alias `NDArray` is made otherwise
 in each version of NumPy."""

@@ -218,9 +218,14 @@ class Batch:
             _put_back(self.record, record, again)
 
     def observe(
-        self, k: int, step: float, route: Float, tracks: Float, stop: Float,
+        self,
+        k: int,
+        step: float,
+        route: Float,
+        tracks: Float,
+        stop: Float,
         light: npt.NDArray[np.int8],
-    ) -> None:  # fmt: skip
+    ) -> None:
         """Fill the observations of a driver in Python for the running rows; see `Observation`.
 
         Args:
@@ -232,9 +237,18 @@ class Batch:
             light: ``(N,)`` int8, the state of its light.
         """
         observe_rows(
-            k, self._plan, self._roads.tables, self._rows, self.state, self.record,
-            step, route, tracks, stop, light,
-        )  # fmt: skip
+            k,
+            self._plan,
+            self._roads.tables,
+            self._rows,
+            self.state,
+            self.record,
+            step,
+            route,
+            tracks,
+            stop,
+            light,
+        )
 
     def see_lanes(self, views: Float) -> None:
         """Fill what running rows see of the lanes, ``(N, LANES)``; see ``_lane_view_kernels``."""
@@ -293,7 +307,12 @@ class Batch:
             names=program.names,
             box=program.box,
             kinds=program.kinds,
-            x=record.x, y=record.y, h=record.h, v=record.v, a=record.a, offset=record.offset,
+            x=record.x,
+            y=record.y,
+            h=record.h,
+            v=record.v,
+            a=record.a,
+            offset=record.offset,
             light_names=program.lights,
             lights=record.lights,
             event_names=program.event_names,
@@ -315,7 +334,7 @@ class Batch:
             n_steps=self.state.ending[:, memory.N_STEPS].copy(),
             status=self.state.ending[:, memory.STATUS].astype(np.int8),
             messages=self._messages,
-        )  # fmt: skip
+        )
 
     def _corridors(self) -> tuple[Float, Int]:
         """Return `Rollout.corridors` and `Rollout.corridor_of`."""
@@ -526,10 +545,15 @@ def _record(program: Program, n: int) -> memory.Record:
     seen = (*shape, DETECTION) if perceives else (n, 0, 0, DETECTION)
     there = shape if program.comes_and_goes else (n, 0, 0)
     return memory.Record(
-        x=x, y=y, h=h, v=v, a=a, offset=offset,
+        x=x,
+        y=y,
+        h=h,
+        v=v,
+        a=a,
+        offset=offset,
         detections=np.zeros(seen),
         lights=np.empty((n, len(program.lights), program.n_steps), dtype=np.int8),
         present=np.zeros(there, dtype=np.bool_),
         lamps=np.zeros(shape if program.switches_lamps else (n, 0, 0), dtype=np.int8),
         began=np.full((n, len(program.event_names)), -1, dtype=np.int64),
-    )  # fmt: skip
+    )

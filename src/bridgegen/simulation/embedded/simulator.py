@@ -232,13 +232,25 @@ class EmbeddedSimulator:
             )
         if not chosen.driver.is_own:
             return self.batch(
-                roads, rows, values, driver=driver, dry=dry, kinematic=kinematic, noise=noise,
+                roads,
+                rows,
+                values,
+                driver=driver,
+                dry=dry,
+                kinematic=kinematic,
+                noise=noise,
                 until_collision=until_collision,
-            ).run()  # fmt: skip
+            ).run()
         some = self._some(
-            roads, rows, values, driver=driver, dry=dry, kinematic=kinematic, noise=noise,
+            roads,
+            rows,
+            values,
+            driver=driver,
+            dry=dry,
+            kinematic=kinematic,
+            noise=noise,
             until_collision=until_collision,
-        )  # fmt: skip
+        )
         return self._own.drive(chosen.changed(dry=dry, kinematic=kinematic), some, len(rows))
 
     def _some(

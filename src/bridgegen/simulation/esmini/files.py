@@ -219,9 +219,11 @@ def _drive_from_outside(root: Node, name: str) -> None:
 def _assigned() -> Node:
     private = etree.Element("PrivateAction")
     assign = etree.SubElement(
-        etree.SubElement(private, "ControllerAction"), "AssignControllerAction",
-        activateLateral="true", activateLongitudinal="true",
-    )  # fmt: skip
+        etree.SubElement(private, "ControllerAction"),
+        "AssignControllerAction",
+        activateLateral="true",
+        activateLongitudinal="true",
+    )
     controller = etree.SubElement(assign, "Controller", name="driver")
     properties = etree.SubElement(controller, "Properties")
     etree.SubElement(properties, "Property", name="esminiController", value=_EXTERNAL)

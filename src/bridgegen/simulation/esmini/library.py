@@ -35,7 +35,7 @@ class _State(ctypes.Structure):
         *((name, ctypes.c_double) for name in ("center_x", "center_y", "center_z")),
         *((name, ctypes.c_double) for name in ("width", "length", "height")),
         ("room", ctypes.c_ubyte * 512),
-    ]  # fmt: skip
+    ]
 
 
 _TEXT, _INT, _DOUBLE = ctypes.c_char_p, ctypes.c_int, ctypes.c_double
@@ -56,7 +56,7 @@ _FUNCTIONS = {
     "SE_SetLogFilePath": (None, _TEXT),
     "SE_SetOptionValuePersistent": (_INT, _TEXT, _TEXT),
     "SE_RegisterStoryBoardElementStateChangeCallback": (None, _Changed),
-}  # fmt: skip
+}
 
 
 class Library:

@@ -260,10 +260,16 @@ class Answers:
             )
             if joint.runs:
                 run_together(
-                    self._library, scenario, log, joint,
-                    driven=job.driven, boxes=program.box, events=self._events,
-                    steps=job.steps, alive=self._alive,
-                )  # fmt: skip
+                    self._library,
+                    scenario,
+                    log,
+                    joint,
+                    driven=job.driven,
+                    boxes=program.box,
+                    events=self._events,
+                    steps=job.steps,
+                    alive=self._alive,
+                )
         except EsminiError as error:
             problem = str(error)
         except DriverError as error:

@@ -295,6 +295,13 @@ def _result(
     low, share, high = problem.share
     factor = 1.0 / (drawn * share)
     return Weighted(
-        Z, found, weight * factor, drawn, np.empty(0, np.int64), 0, factor / DEFENSIVE,
-        (1.0 / high, 1.0 / share, 1.0 / low), spent,
-    )  # fmt: skip
+        Z,
+        found,
+        weight * factor,
+        drawn,
+        np.empty(0, np.int64),
+        0,
+        factor / DEFENSIVE,
+        (1.0 / high, 1.0 / share, 1.0 / low),
+        spent,
+    )

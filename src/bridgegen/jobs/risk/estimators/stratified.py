@@ -51,10 +51,17 @@ def estimate(problem: Problem, aim: Aim, seed: int) -> Weighted:
     low, middle, high = share
     largest = float(np.max(masses / counts)) / middle
     result = Weighted(
-        Z, found, weights, int(counts.sum()), np.empty(0, np.int64), 0, largest,
-        (1.0 / high, 1.0 / middle, 1.0 / low), spent,
+        Z,
+        found,
+        weights,
+        int(counts.sum()),
+        np.empty(0, np.int64),
+        0,
+        largest,
+        (1.0 / high, 1.0 / middle, 1.0 / low),
+        spent,
         facts={"shells": float(SHELLS)},
-    )  # fmt: skip
+    )
     result.facts["effective_hits"] = result.hits(result.there(aim.threshold))
     return result
 

@@ -317,9 +317,11 @@ def _result(
     problem: Problem, parts: list[tuple[Float, Float, Float, Int]], count: int, spent: int
 ) -> Weighted:
     none = (
-        np.empty((0, problem.dimensions)), np.empty((0, problem.columns)), np.empty(0),
+        np.empty((0, problem.dimensions)),
+        np.empty((0, problem.columns)),
+        np.empty(0),
         np.empty(0, np.int64),
-    )  # fmt: skip
+    )
     Z, found, weights, owner = (
         np.concatenate(pair) for pair in zip(*(parts or [none]), strict=True)
     )

@@ -185,9 +185,11 @@ def of_repetitions(sums: Float) -> Probability:
     more = np.append(sums, sums.max())
     tail = 0.5 * (1.0 - LEVEL)
     return Probability(
-        mean, _quantile(sums, tail), min(_quantile(more, 1.0 - tail), 1.0),
+        mean,
+        _quantile(sums, tail),
+        min(_quantile(more, 1.0 - tail), 1.0),
         min(_quantile(more, LEVEL), 1.0),
-    )  # fmt: skip
+    )
 
 
 def _quantile(sums: Float, confidence: float) -> float:

@@ -32,8 +32,10 @@ STOP_LINE = "stopLine"
 """The subtype of a stop line, an object of type roadMark."""
 
 STATES = {
-    "gives_green_to": "green", "gives_yellow_to": "yellow", "gives_red_yellow_to": "red_yellow"
-}  # fmt: skip
+    "gives_green_to": "green",
+    "gives_yellow_to": "yellow",
+    "gives_red_yellow_to": "red_yellow",
+}
 """States that a phase shows to a light that it names, by property; to other lights it shows red."""
 
 STOP_LINE_WIDTH = 0.5
@@ -86,9 +88,16 @@ def objects_on(
             )
             continue
         yield Object(
-            id=_id(individuals, node), s=s, t=t, type=LAMP, orientation="none", hdg=0.0,
-            name=individuals.optional_text(node, "has_name"), height=_HEIGHT["lamp"], radius=0.1,
-        )  # fmt: skip
+            id=_id(individuals, node),
+            s=s,
+            t=t,
+            type=LAMP,
+            orientation="none",
+            hdg=0.0,
+            name=individuals.optional_text(node, "has_name"),
+            height=_HEIGHT["lamp"],
+            radius=0.1,
+        )
 
 
 def signals_on(
@@ -216,9 +225,15 @@ def _id(individuals: Individuals, node: Subject) -> str:
 
 
 def _area(
-    object_id: str, name: str | None, kind: str, at: float, width: float, low: float, high: float,
+    object_id: str,
+    name: str | None,
+    kind: str,
+    at: float,
+    width: float,
+    low: float,
+    high: float,
     subtype: str | None = None,
-) -> Object:  # fmt: skip
+) -> Object:
     """Return a rectangle across a road: ``at`` along it, from t = ``low`` to ``high`` [m].
 
     Its corners are in its own coordinates: CARLA and CommonRoad's converter read no others.

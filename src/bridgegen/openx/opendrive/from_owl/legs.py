@@ -108,16 +108,22 @@ class _Lanes:
     """
 
     def __init__(
-        self, individuals: Individuals, leg: Subject, junction_end: str, problems: list[str],
+        self,
+        individuals: Individuals,
+        leg: Subject,
+        junction_end: str,
+        problems: list[str],
         widens: bool,
-    ) -> None:  # fmt: skip
+    ) -> None:
         self._individuals, self._what = individuals, individuals.describe(leg)
         self._end, self._problems = junction_end, problems
         self._lanes: dict[str, dict[int, tuple[str, float, frozenset[str]]]] = {"in": {}, "out": {}}
         usual = individuals.optional_number(leg, "has_lane_width")
         lanes, strips = individuals.links(leg, "has_lane"), individuals.links(leg, "has_strip")
-        starts = {node: individuals.optional_number(node, "has_section_start") or 0.0
-                  for node in (*lanes, *strips)}  # fmt: skip
+        starts = {
+            node: individuals.optional_number(node, "has_section_start") or 0.0
+            for node in (*lanes, *strips)
+        }
         if len(set(starts.values())) > 1 and not widens:
             problems.append(
                 f"{self._what}: a generated road must have one lane section, got "

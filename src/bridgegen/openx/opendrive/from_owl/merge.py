@@ -41,9 +41,15 @@ NOSE = 60.0
 
 
 def build(
-    name: str, junction_id: str, main: Arm, ramp: Arm, after: Arm, merge: float, taper: float,
+    name: str,
+    junction_id: str,
+    main: Arm,
+    ramp: Arm,
+    after: Arm,
+    merge: float,
+    taper: float,
     user_data: tuple[UserData, ...] = (),
-) -> OpenDrive:  # fmt: skip
+) -> OpenDrive:
     """Return the road network of a merge; the junction ends at the origin's right, at x = NOSE.
 
     Args:
@@ -119,9 +125,16 @@ def build(
 
 
 def _connecting(
-    arm: Arm, lane: int, after: Arm, to_lane: int, to_width: float, start: Ray, end: Ray,
-    road_id: str, junction_id: str,
-) -> Road:  # fmt: skip
+    arm: Arm,
+    lane: int,
+    after: Arm,
+    to_lane: int,
+    to_width: float,
+    start: Ray,
+    end: Ray,
+    road_id: str,
+    junction_id: str,
+) -> Road:
     geometries = joining(start, end, f"the way from leg {arm.name} to leg {after.name}")
     length = geometries[-1].s + geometries[-1].length
     width = arm.inbound[lane]

@@ -130,9 +130,15 @@ def _merge(
         )
     refuse(problems)
     return merge.build(
-        name, junction_id, by_name["main"], by_name["ramp"], by_name["after"], length, taper,
+        name,
+        junction_id,
+        by_name["main"],
+        by_name["ramp"],
+        by_name["after"],
+        length,
+        taper,
         _about(individuals, node),
-    )  # fmt: skip
+    )
 
 
 def _roundabout(

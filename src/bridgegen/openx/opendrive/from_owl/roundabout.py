@@ -44,9 +44,13 @@ _SHARE = 0.36
 
 
 def build(
-    name: str, junction_id: str, radius: float, ring_width: float, arms: tuple[Arm, ...],
+    name: str,
+    junction_id: str,
+    radius: float,
+    ring_width: float,
+    arms: tuple[Arm, ...],
     user_data: tuple[UserData, ...] = (),
-) -> OpenDrive:  # fmt: skip
+) -> OpenDrive:
     """Return the road network of a roundabout around the origin.
 
     The junctions get the ids from ``junction_id`` on, which no arm may have.
@@ -109,19 +113,23 @@ def build(
         ways = (
             (
                 (_arc(radius, first, last),),
-                (before, "end", *ring_lane), (beyond, "start", *ring_lane), "ring",
+                (before, "end", *ring_lane),
+                (beyond, "start", *ring_lane),
+                "ring",
             ),
             (
                 joining(way_out, leg_out, f"the way out to leg {arm.name}"),
                 (before, "end", *ring_lane),
-                (arm.road_id, arm.junction_end, arm.outbound[0], lane_out), "out",
+                (arm.road_id, arm.junction_end, arm.outbound[0], lane_out),
+                "out",
             ),
             (
                 joining(leg_in, way_in, f"the way in from leg {arm.name}"),
                 (arm.road_id, arm.junction_end, arm.inbound[0], lane_in),
-                (beyond, "start", *ring_lane), "in",
+                (beyond, "start", *ring_lane),
+                "in",
             ),
-        )  # fmt: skip
+        )
         connections: list[Connection] = []
         for geometries, left, entered, what in ways:
             road_id = str(free)

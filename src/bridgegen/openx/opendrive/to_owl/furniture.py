@@ -224,27 +224,30 @@ def sign_of(signal: Signal) -> tuple[str, float | None]:
 def _valid(road: Road, s: float, validity: Sequence[Validity]) -> list[int]:
     """Return the ids of the driving lanes at ``s`` that an element is valid for."""
     return [
-        lane.id for lane in road.sections[section_index(road, s)].lanes
+        lane.id
+        for lane in road.sections[section_index(road, s)].lanes
         if lane.drivable and any(item.from_lane <= lane.id <= item.to_lane for item in validity)
-    ]  # fmt: skip
+    ]
 
 
 def _along(road: Road, s: float, orientation: str) -> list[int]:
     """Return the ids of the driving lanes at ``s`` that lead in a direction ("none": both)."""
     way = {"+": 1, "-": -1}.get(orientation)
     return [
-        lane.id for lane in road.sections[section_index(road, s)].lanes
+        lane.id
+        for lane in road.sections[section_index(road, s)].lanes
         if lane.drivable and way in (None, road.direction(lane.id))
-    ]  # fmt: skip
+    ]
 
 
 def _between(road: Road, s: float, right: float, left: float) -> list[int]:
     """Return the ids of the driving lanes at ``s`` whose centres lie between two t [m]."""
     section = road.sections[section_index(road, s)]
     return [
-        lane.id for lane in section.lanes
+        lane.id
+        for lane in section.lanes
         if lane.drivable and right <= centre_of(road, section, lane, s, s)[0] <= left
-    ]  # fmt: skip
+    ]
 
 
 def box_of(item: Object) -> Box:

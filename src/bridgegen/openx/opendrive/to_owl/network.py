@@ -68,9 +68,10 @@ class Junctions:
             raise UnsupportedError(f"{what} cannot be said in the ontology")
         put = self._builder.put
         parts = [
-            item for item in self._model.junctions
+            item
+            for item in self._model.junctions
             if self._whole.get(item.id, item.id) == junction.id
-        ]  # fmt: skip
+        ]
         ids = [item.id for item in parts]
         inner, legs = [], []
         for road in self._model.roads:
@@ -273,9 +274,7 @@ class _Map(Builder):
         link = road.link(end) if end in ("start", "end") else None
         if link is not None and self.junctions.kinds.get(link.element_id) == "Merge":
             sections = sections[-1:] if end == "start" else sections[:1]
-        lanes = [
-            [lane for lane in road.sections[k].lanes if lane.drivable] for k in sections
-        ]  # fmt: skip
+        lanes = [[lane for lane in road.sections[k].lanes if lane.drivable] for k in sections]
         widths = {
             _middle_width(road, k, lane)
             for k, some in zip(sections, lanes, strict=True)

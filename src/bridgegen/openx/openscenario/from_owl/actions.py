@@ -193,10 +193,13 @@ class Actions:
         distance, time, faster, slower, fastest = (
             None if ind.optional_number(node, name) is None else self._quantities.get(node, name)
             for name in (
-                "has_kept_distance", "has_kept_time", "has_max_acceleration",
-                "has_max_deceleration", "has_max_speed",
+                "has_kept_distance",
+                "has_kept_time",
+                "has_max_acceleration",
+                "has_max_deceleration",
+                "has_max_speed",
             )
-        )  # fmt: skip
+        )
         limits = None
         if any(value is not None for value in (faster, slower, fastest)):
             limits = osc.DynamicConstraints(faster, slower, fastest)

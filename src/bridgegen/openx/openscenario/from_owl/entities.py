@@ -85,17 +85,21 @@ def _body(individuals: Individuals, node: Subject) -> EntityBody:
 def _body_of_kind(individuals: Individuals, node: Subject, kind: ParticipantKind) -> EntityBody:
     number = partial(individuals.number, node)
     body = Body(
-        number("has_box_length"), number("has_box_width"), number("has_box_height"),
+        number("has_box_length"),
+        number("has_box_width"),
+        number("has_box_height"),
         number("has_center_ahead"),
-    )  # fmt: skip
+    )
     mass = individuals.optional_number(node, "has_mass")
     model = individuals.optional_text(node, "has_model")
     if kind.written.element == "Vehicle":
         body = replace(
-            body, wheelbase=number("has_wheelbase"), max_speed=number("has_max_speed"),
+            body,
+            wheelbase=number("has_wheelbase"),
+            max_speed=number("has_max_speed"),
             max_acceleration=number("has_max_acceleration"),
             max_deceleration=number("has_max_deceleration"),
-        )  # fmt: skip
+        )
         lifted = tuple(_lifted(individuals, node))
         return entity_body(kind, body, mass=mass, model=model, properties=lifted)
     mass = number("has_mass")

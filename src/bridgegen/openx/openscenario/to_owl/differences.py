@@ -95,9 +95,18 @@ def _holds_pedals(element: object) -> bool:
     if not isinstance(element, osc.ControllerAction):
         return False
     part = element.override_controller_value_action
-    pedals = () if part is None else (
-        part.throttle, part.brake, part.clutch, part.parking_brake, part.steering_wheel, part.gear
-    )  # fmt: skip
+    pedals = (
+        ()
+        if part is None
+        else (
+            part.throttle,
+            part.brake,
+            part.clutch,
+            part.parking_brake,
+            part.steering_wheel,
+            part.gear,
+        )
+    )
     return any(pedal is not None and pedal.active is not False for pedal in pedals)
 
 

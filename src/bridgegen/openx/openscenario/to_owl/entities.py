@@ -106,10 +106,13 @@ def add_begun(
         with builder.attempt():
             done = f"{name}_init_{number}"
             link, found = said_or_quoted(
-                builder, done, ACTION, wrapped,
+                builder,
+                done,
+                ACTION,
+                wrapped,
                 partial(_init, builder, name, done, wrapped, begun, start),
                 lambda what: ("has_init_action", what),
-            )  # fmt: skip
+            )
             builder.put(node, link, found)
 
 

@@ -122,8 +122,9 @@ def _together(
     names = builder.element_names
     if not (ends or is_named) or not builder.in_substance:
         return None
-    wanted = next(n for k in count(1) if ("maneuver", n := f"{name}_{k}" if k > 1 else name)
-                  not in names)  # fmt: skip
+    wanted = next(
+        n for k in count(1) if ("maneuver", n := f"{name}_{k}" if k > 1 else name) not in names
+    )
     if wanted != name and is_named:
         return None  # two of one name, and one of them is meant
     names["maneuver", wanted] = wanted

@@ -432,11 +432,13 @@ def _is_start(condition: osc.Condition) -> bool:
 _AT_ONCE = osc.ConditionGroup(
     (
         osc.Condition(
-            "at_once", 0.0, osc.ConditionEdge.NONE,
+            "at_once",
+            0.0,
+            osc.ConditionEdge.NONE,
             osc.ByValueCondition(osc.SimulationTimeCondition(0.0, osc.Rule.GREATER_OR_EQUAL)),
         ),
     )
-)  # fmt: skip
+)
 
 
 def without_foregone(scenario: osc.OpenScenario) -> tuple[osc.OpenScenario, list[Lost]]:
@@ -536,7 +538,8 @@ class _Foregone:
             if isinstance(parameter_condition.value, bool)
             else str(parameter_condition.value)
         )
-        limit = replace(declaration, constraint_groups=(
-            osc.ValueConstraintGroup((osc.ValueConstraint(rule, said),)),
-        ))  # fmt: skip
+        limit = replace(
+            declaration,
+            constraint_groups=(osc.ValueConstraintGroup((osc.ValueConstraint(rule, said),)),),
+        )
         return not parameters.broken(limit, self._values[declaration.name], self._values)

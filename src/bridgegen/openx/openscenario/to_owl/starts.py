@@ -236,8 +236,10 @@ class Starts:
         turned = at.orientation
         own = 0.0 if turned is None or turned.h is None else self.number(turned.h)
         return (
-            pose.x - aside * math.sin(pose.h), pose.y + aside * math.cos(pose.h), pose.h + own,
-        )  # fmt: skip
+            pose.x - aside * math.sin(pose.h),
+            pose.y + aside * math.cos(pose.h),
+            pose.h + own,
+        )
 
     def _on_route(self, where: osc.RoutePosition) -> osc.LanePosition:
         """Return the place so far along a route, on a lane that leads along it.

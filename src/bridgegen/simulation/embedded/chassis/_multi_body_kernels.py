@@ -176,9 +176,11 @@ def _changes(motion, at, weight, cosine, sine, force, acts, mu, press, uphill, a
         drifts = vy + ahead * turn - goes
         sheared = -below * sr - off * cr - radius * math.sin(twist)
         shears = (
-            (off * sr - below * cr) * rolls - (deepens - sinks) * sr - drifts * cr
+            (off * sr - below * cr) * rolls
+            - (deepens - sinks) * sr
+            - drifts * cr
             - radius * math.cos(twist) * twists
-        )  # fmt: skip
+        )
         joint = chassis[K_JOINT] * sheared + chassis[D_JOINT] * shears
         # Springs, dampers and the anti-roll bar.
         travel, tilt = below / cr - above + ahead * pitch, half * twist
@@ -341,9 +343,7 @@ def advance_bodies(motion, steer, force, mu, press, uphill, aside, dt, chassis):
             cosine, sine = math.cos(steer[2]), math.sin(steer[2])
         else:
             cosine, sine = middle
-        _changes(
-            motion, at, weight, cosine, sine, force, acts, mu, press, uphill, aside, chassis
-        )  # fmt: skip
+        _changes(motion, at, weight, cosine, sine, force, acts, mu, press, uphill, aside, chassis)
         ahead, counts = dt if stage == 2 else 0.5 * dt, 1.0 if stage % 3 == 0 else 2.0
         for i in range(STATES):
             change = motion[SLOPE + i]

@@ -171,17 +171,47 @@ def advance(
     half = 0.5 * dt
     a1, b1, r1 = _changes(vx, vy, turn, c0, s0, given, most, b, weight, uphill, aside, chassis)
     a2, b2, r2 = _changes(
-        vx + half * a1, vy + half * b1, turn + half * r1, c1, s1,
-        given, most, b, weight, uphill, aside, chassis,
-    )  # fmt: skip
+        vx + half * a1,
+        vy + half * b1,
+        turn + half * r1,
+        c1,
+        s1,
+        given,
+        most,
+        b,
+        weight,
+        uphill,
+        aside,
+        chassis,
+    )
     a3, b3, r3 = _changes(
-        vx + half * a2, vy + half * b2, turn + half * r2, c1, s1,
-        given, most, b, weight, uphill, aside, chassis,
-    )  # fmt: skip
+        vx + half * a2,
+        vy + half * b2,
+        turn + half * r2,
+        c1,
+        s1,
+        given,
+        most,
+        b,
+        weight,
+        uphill,
+        aside,
+        chassis,
+    )
     a4, b4, r4 = _changes(
-        vx + dt * a3, vy + dt * b3, turn + dt * r3, c2, s2,
-        given, most, b, weight, uphill, aside, chassis,
-    )  # fmt: skip
+        vx + dt * a3,
+        vy + dt * b3,
+        turn + dt * r3,
+        c2,
+        s2,
+        given,
+        most,
+        b,
+        weight,
+        uphill,
+        aside,
+        chassis,
+    )
     sixth = dt / 6.0
     ends = vx + sixth * (a1 + 2.0 * (a2 + a3) + a4)
     x, y, h = place

@@ -162,8 +162,10 @@ CARS = {
 """Parameters of the cars by name."""
 
 MOTIONS = {
-    KINEMATIC: 0, SINGLE_TRACK: common.MOTION, MULTI_BODY: columns.MOTION_OF_BODIES,
-}  # fmt: skip
+    KINEMATIC: 0,
+    SINGLE_TRACK: common.MOTION,
+    MULTI_BODY: columns.MOTION_OF_BODIES,
+}
 """The length of ``State.chassis``, by vehicle."""
 
 VAN = 1.8  # m, from which height on a body is taken to be a van's

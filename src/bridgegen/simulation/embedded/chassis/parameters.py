@@ -156,7 +156,8 @@ def chassis(found: VehicleClass, wheelbase: float, height: float, lock: float) -
     for class_ in (found, found.tyre):
         for name in (each.name for each in fields(class_)):
             if (column := getattr(columns, name.upper(), None)) is not None and name not in (
-                "height", "inertia",
-            ):  # fmt: skip
+                "height",
+                "inertia",
+            ):
                 made[column] = getattr(class_, name)
     return made

@@ -75,9 +75,14 @@ class Actions:
     """
 
     def __init__(
-        self, tables: Tables, paths: list[PathSpec], positions: Positions,
-        global_actions: GlobalActions, controllers: Controllers, towing: Towing,
-    ) -> None:  # fmt: skip
+        self,
+        tables: Tables,
+        paths: list[PathSpec],
+        positions: Positions,
+        global_actions: GlobalActions,
+        controllers: Controllers,
+        towing: Towing,
+    ) -> None:
         self._tables, self._paths, self._global_actions = tables, paths, global_actions
         self._positions, self._controllers, self._towing = positions, controllers, towing
         self._driven: list[Element] = []

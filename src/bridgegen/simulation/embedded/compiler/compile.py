@@ -52,9 +52,11 @@ from bridgegen.simulation.vehicles import KINEMATIC, MULTI_BODY
 
 
 _PRIORITIES = {
-    osc.Priority.OVERWRITE: codes.OVERRIDE, osc.Priority.OVERRIDE: codes.OVERRIDE,
-    osc.Priority.SKIP: codes.SKIP, osc.Priority.PARALLEL: codes.PARALLEL,
-}  # fmt: skip
+    osc.Priority.OVERWRITE: codes.OVERRIDE,
+    osc.Priority.OVERRIDE: codes.OVERRIDE,
+    osc.Priority.SKIP: codes.SKIP,
+    osc.Priority.PARALLEL: codes.PARALLEL,
+}
 
 
 def elements(
@@ -183,9 +185,13 @@ class _Compiler:
         self.controllers = Controllers(self.tables, scenario)
         self.towing = Towing(self.tables)
         self.actions = Actions(
-            self.tables, self.paths, self.positions, self.global_actions, self.controllers,
+            self.tables,
+            self.paths,
+            self.positions,
+            self.global_actions,
+            self.controllers,
             self.towing,
-        )  # fmt: skip
+        )
         self.start = Start(
             self.tables, self.paths, self.positions, self.actions, self.controllers, self.towing
         )

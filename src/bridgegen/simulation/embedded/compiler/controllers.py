@@ -232,9 +232,14 @@ class Pedals:
             yield self._row(entity, IDLE, idle, 1.0, None)
 
     def _row(
-        self, entity: int, column: int, active: bool | osc.ParameterRef | osc.Expr, value: Value,
-        rate: Value | None, wheelbase: float = 1.0,
-    ) -> Row:  # fmt: skip
+        self,
+        entity: int,
+        column: int,
+        active: bool | osc.ParameterRef | osc.Expr,
+        value: Value,
+        rate: Value | None,
+        wheelbase: float = 1.0,
+    ) -> Row:
         slots = (self._tables.slot(number) for number in (value, AT_ONCE if rate is None else rate))
         is_held = int(self._tables.truth(active))
         return entity, PRESS, is_held, column, *slots, self._tables.slot(wheelbase)

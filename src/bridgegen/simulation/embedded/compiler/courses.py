@@ -10,30 +10,38 @@ from bridgegen.simulation.embedded.compiler.positions import Positions
 from bridgegen.simulation.embedded.compiler.tables import Tables
 
 SHAPES = {
-    osc.DynamicsShape.STEP: 0, osc.DynamicsShape.LINEAR: 1,
-    osc.DynamicsShape.CUBIC: 2, osc.DynamicsShape.SINUSOIDAL: 3,
-}  # fmt: skip
+    osc.DynamicsShape.STEP: 0,
+    osc.DynamicsShape.LINEAR: 1,
+    osc.DynamicsShape.CUBIC: 2,
+    osc.DynamicsShape.SINUSOIDAL: 3,
+}
 _DIMENSIONS = {
-    osc.DynamicsDimension.RATE: 0, osc.DynamicsDimension.TIME: 1,
+    osc.DynamicsDimension.RATE: 0,
+    osc.DynamicsDimension.TIME: 1,
     osc.DynamicsDimension.DISTANCE: 2,
-}  # fmt: skip
+}
 _SIDES = {
     osc.LongitudinalDisplacement.ANY: codes.EITHER_SIDE,
     osc.LongitudinalDisplacement.TRAILING_REFERENCED_ENTITY: codes.BEHIND,
     osc.LongitudinalDisplacement.LEADING_REFERENCED_ENTITY: codes.AHEAD,
-}  # fmt: skip
+}
 _LATERAL_SIDES = {
     osc.LateralDisplacement.ANY: codes.EITHER_SIDE,
     osc.LateralDisplacement.LEFT_TO_REFERENCED_ENTITY: codes.LEFT_SIDE,
     osc.LateralDisplacement.RIGHT_TO_REFERENCED_ENTITY: codes.RIGHT_SIDE,
-}  # fmt: skip
+}
 _ALONG = (
-    osc.CoordinateSystem.LANE, osc.CoordinateSystem.ROAD, osc.CoordinateSystem.TRAJECTORY,
-)  # fmt: skip
+    osc.CoordinateSystem.LANE,
+    osc.CoordinateSystem.ROAD,
+    osc.CoordinateSystem.TRAJECTORY,
+)
 
 LONGITUDINAL = (
-    osc.SpeedAction, osc.SpeedProfileAction, osc.LongitudinalDistanceAction, osc.SynchronizeAction,
-)  # fmt: skip
+    osc.SpeedAction,
+    osc.SpeedProfileAction,
+    osc.LongitudinalDistanceAction,
+    osc.SynchronizeAction,
+)
 """Actions that move an entity along its path."""
 
 Row = tuple[int, ...]
@@ -232,9 +240,12 @@ class Courses:
     def _limit(self, row: list[int], limits: osc.DynamicConstraints | None) -> None:
         most = limits or osc.DynamicConstraints()
         values = (
-            most.max_acceleration, most.max_deceleration, most.max_speed,
-            most.max_acceleration_rate, most.max_deceleration_rate,
-        )  # fmt: skip
+            most.max_acceleration,
+            most.max_deceleration,
+            most.max_speed,
+            most.max_acceleration_rate,
+            most.max_deceleration_rate,
+        )
         row[codes.MOST : codes.MOST + 5] = [self._optional(value) for value in values]
 
     def _optional(self, value: Value | None) -> int:

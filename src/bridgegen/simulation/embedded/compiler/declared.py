@@ -191,9 +191,13 @@ def noise_key(controllers: Controllers, place: str) -> int | None:
 Part = osc.Story | osc.Act | osc.ManeuverGroup | osc.Maneuver | osc.Event | osc.Action
 
 _KINDS = {
-    osc.Story: codes.STORY, osc.Act: codes.ACT, osc.ManeuverGroup: codes.GROUP,
-    osc.Maneuver: codes.MANEUVER, osc.Event: codes.EVENT, osc.Action: codes.ACTION,
-}  # fmt: skip
+    osc.Story: codes.STORY,
+    osc.Act: codes.ACT,
+    osc.ManeuverGroup: codes.GROUP,
+    osc.Maneuver: codes.MANEUVER,
+    osc.Event: codes.EVENT,
+    osc.Action: codes.ACTION,
+}
 
 
 @dataclass(frozen=True)

@@ -29,8 +29,12 @@ from bridgegen.simulation.embedded.program import UNSAID
 
 
 LIGHT_STATES = {
-    "off;off;off": 0, "on;off;off": 1, "on;on;off": 2, "off;on;off": 3, "off;off;on": 4,
-}  # fmt: skip
+    "off;off;off": 0,
+    "on;off;off": 1,
+    "on;on;off": 2,
+    "off;on;off": 3,
+    "off;off;on": 4,
+}
 """The states of a traffic light's three lamps as `Rollout.lights` has them."""
 
 _MOST_STATES = 127  # they are kept as int8

@@ -104,9 +104,14 @@ class Positions:
             by_lane = where.ds_lane is not None
             metres = where.ds_lane if where.ds_lane is not None else where.ds
             return self._append(
-                where, BY_LANES, metres or 0.0, where.offset or 0.0, whose=where.entity_ref,
-                count=int(self._tables.literal(where, "dLane", where.d_lane)), by_lane=by_lane,
-            )  # fmt: skip
+                where,
+                BY_LANES,
+                metres or 0.0,
+                where.offset or 0.0,
+                whose=where.entity_ref,
+                count=int(self._tables.literal(where, "dLane", where.d_lane)),
+                by_lane=by_lane,
+            )
         if isinstance(where, osc.RelativeRoadPosition):
             return self._append(where, BY_ROAD, where.ds, where.dt, whose=where.entity_ref)
         if isinstance(where, osc.RelativeObjectPosition):
@@ -187,10 +192,18 @@ class Positions:
         )
 
     def _append(
-        self, where: Element, kind: int, u: Value, w: Value, *, whose: object = None,
-        count: int = 0, by_lane: bool = False, heading: Value | None = None,
+        self,
+        where: Element,
+        kind: int,
+        u: Value,
+        w: Value,
+        *,
+        whose: object = None,
+        count: int = 0,
+        by_lane: bool = False,
+        heading: Value | None = None,
         spot: Spot | None = None,
-    ) -> int:  # fmt: skip
+    ) -> int:
         turned = getattr(where, "orientation", None)
         absolute = kind == IN_WORLD
         if turned is not None:

@@ -14,16 +14,21 @@ from bridgegen.simulation.embedded.compiler.positions import Positions
 from bridgegen.simulation.embedded.compiler.tables import Tables
 
 _RULES = {
-    osc.Rule.GREATER_THAN: codes.GREATER, osc.Rule.LESS_THAN: codes.LESS,
-    osc.Rule.EQUAL_TO: codes.EQUAL, osc.Rule.GREATER_OR_EQUAL: codes.GREATER_EQUAL,
-    osc.Rule.LESS_OR_EQUAL: codes.LESS_EQUAL, osc.Rule.NOT_EQUAL_TO: codes.NOT_EQUAL,
-}  # fmt: skip
+    osc.Rule.GREATER_THAN: codes.GREATER,
+    osc.Rule.LESS_THAN: codes.LESS,
+    osc.Rule.EQUAL_TO: codes.EQUAL,
+    osc.Rule.GREATER_OR_EQUAL: codes.GREATER_EQUAL,
+    osc.Rule.LESS_OR_EQUAL: codes.LESS_EQUAL,
+    osc.Rule.NOT_EQUAL_TO: codes.NOT_EQUAL,
+}
 _ELEMENTS = {
-    osc.StoryboardElementType.STORY: codes.STORY, osc.StoryboardElementType.ACT: codes.ACT,
+    osc.StoryboardElementType.STORY: codes.STORY,
+    osc.StoryboardElementType.ACT: codes.ACT,
     osc.StoryboardElementType.MANEUVER_GROUP: codes.GROUP,
     osc.StoryboardElementType.MANEUVER: codes.MANEUVER,
-    osc.StoryboardElementType.EVENT: codes.EVENT, osc.StoryboardElementType.ACTION: codes.ACTION,
-}  # fmt: skip
+    osc.StoryboardElementType.EVENT: codes.EVENT,
+    osc.StoryboardElementType.ACTION: codes.ACTION,
+}
 _TRANSITION = codes.COMPLETE + 1  # transitions are numbered after the phases
 _STATES = {
     osc.StoryboardElementState.STANDBY_STATE: codes.STANDBY,
@@ -33,7 +38,7 @@ _STATES = {
     osc.StoryboardElementState.END_TRANSITION: _TRANSITION + codes.ENDED,
     osc.StoryboardElementState.STOP_TRANSITION: _TRANSITION + codes.STOPPED,
     osc.StoryboardElementState.SKIP_TRANSITION: _TRANSITION + codes.SKIPPED,
-}  # fmt: skip
+}
 
 
 Pair = (
@@ -45,33 +50,39 @@ Pair = (
 """The conditions on a distance, or on a time in which one is covered."""
 
 _PAIRS = {
-    osc.DistanceCondition: codes.DISTANCE, osc.RelativeDistanceCondition: codes.DISTANCE,
+    osc.DistanceCondition: codes.DISTANCE,
+    osc.RelativeDistanceCondition: codes.DISTANCE,
     osc.TimeHeadwayCondition: codes.TIME_HEADWAY,
     osc.TimeToCollisionCondition: codes.TIME_TO_COLLISION,
-}  # fmt: skip
+}
 _MEASURES = {
     osc.RelativeDistanceType.EUCLIDIAN_DISTANCE: codes.EUCLIDIAN,
     osc.RelativeDistanceType.CARTESIAN_DISTANCE: codes.EUCLIDIAN,
     osc.RelativeDistanceType.LONGITUDINAL: codes.LONGITUDINAL,
     osc.RelativeDistanceType.LATERAL: codes.LATERAL,
-}  # fmt: skip
+}
 _SYSTEMS = {
-    osc.CoordinateSystem.ENTITY: codes.ENTITY_SYSTEM, osc.CoordinateSystem.LANE: codes.PATH_SYSTEM,
+    osc.CoordinateSystem.ENTITY: codes.ENTITY_SYSTEM,
+    osc.CoordinateSystem.LANE: codes.PATH_SYSTEM,
     osc.CoordinateSystem.ROAD: codes.PATH_SYSTEM,
     osc.CoordinateSystem.TRAJECTORY: codes.PATH_SYSTEM,
     osc.CoordinateSystem.WORLD: codes.WORLD_SYSTEM,
-}  # fmt: skip
+}
 _ANGLE_SYSTEMS = _SYSTEMS | {osc.CoordinateSystem.ROAD: codes.ROAD_SYSTEM}
 _DIRECTIONS = {
     osc.DirectionalDimension.LONGITUDINAL: codes.LONGITUDINAL,
     osc.DirectionalDimension.LATERAL: codes.LATERAL,
     osc.DirectionalDimension.VERTICAL: codes.VERTICAL,
-}  # fmt: skip
+}
 _DISTANCES = (codes.DISTANCE, codes.TIME_TO_COLLISION, codes.TIME_HEADWAY)
 _OFTEN = (
-    codes.NEVER_TRUE, codes.SIMULATION_TIME, codes.ELEMENT_STATE, codes.SPEED,
-    codes.TRAVELED_DISTANCE, codes.STAND_STILL,
-)  # fmt: skip
+    codes.NEVER_TRUE,
+    codes.SIMULATION_TIME,
+    codes.ELEMENT_STATE,
+    codes.SPEED,
+    codes.TRAVELED_DISTANCE,
+    codes.STAND_STILL,
+)
 _ON_OWN_WAY = (osc.RoutingAlgorithm.UNDEFINED, osc.RoutingAlgorithm.ASSIGNED_ROUTE)
 
 
@@ -112,9 +123,12 @@ class Probes:
     """
 
     def __init__(
-        self, tables: Tables, nodes: "Sequence[Node]", positions: Positions,
+        self,
+        tables: Tables,
+        nodes: "Sequence[Node]",
+        positions: Positions,
         global_actions: GlobalActions,
-    ) -> None:  # fmt: skip
+    ) -> None:
         self._tables, self._nodes, self._positions = tables, nodes, positions
         self.marks: list[int] = []
         self.clearances: list[tuple[int, ...]] = []
@@ -183,10 +197,12 @@ class Probes:
                 )
             case osc.RelativeSpeedCondition():
                 return Probe(
-                    codes.SPEED_DIFFERENCE, other=self._tables.entity(element.entity_ref),
-                    rule=self._rule(element.rule), limit=element.value,
+                    codes.SPEED_DIFFERENCE,
+                    other=self._tables.entity(element.entity_ref),
+                    rule=self._rule(element.rule),
+                    limit=element.value,
                     measure=self._direction(element.direction),
-                )  # fmt: skip
+                )
             case osc.TraveledDistanceCondition():
                 return Probe(codes.TRAVELED_DISTANCE, limit=element.value)
             case osc.StandStillCondition():
@@ -196,9 +212,12 @@ class Probes:
             case osc.ReachPositionCondition():
                 where, place = self._place(element.position)
                 return Probe(
-                    codes.DISTANCE, other=where, rule=codes.LESS_EQUAL, limit=element.tolerance,
+                    codes.DISTANCE,
+                    other=where,
+                    rule=codes.LESS_EQUAL,
+                    limit=element.tolerance,
                     place=place,
-                )  # fmt: skip
+                )
             case osc.OffroadCondition():
                 return Probe(codes.OFFROAD, limit=element.duration)
             case osc.RelativeClearanceCondition():
@@ -268,9 +287,16 @@ class Probes:
         measure, system = self._measure(pair)
         freespace = self._tables.truth(pair.freespace)
         return Probe(
-            _PAIRS[type(pair)], 0, other, self._rule(pair.rule), pair.value, place, measure, system,
+            _PAIRS[type(pair)],
+            0,
+            other,
+            self._rule(pair.rule),
+            pair.value,
+            place,
+            measure,
+            system,
             freespace,
-        )  # fmt: skip
+        )
 
     def _measure(self, pair: Pair) -> tuple[int, int]:
         """Return the kind of distance and the coordinate system; 1.0 has ``alongRoute`` instead."""
@@ -342,9 +368,11 @@ class Probes:
 
 
 _EDGES = {
-    osc.ConditionEdge.NONE: codes.NO_EDGE, osc.ConditionEdge.RISING: codes.RISING,
-    osc.ConditionEdge.FALLING: codes.FALLING, osc.ConditionEdge.RISING_OR_FALLING: codes.EITHER,
-}  # fmt: skip
+    osc.ConditionEdge.NONE: codes.NO_EDGE,
+    osc.ConditionEdge.RISING: codes.RISING,
+    osc.ConditionEdge.FALLING: codes.FALLING,
+    osc.ConditionEdge.RISING_OR_FALLING: codes.EITHER,
+}
 SAME_STEP = 1e-6
 """Tolerance of a delay for rounding [steps]."""
 
@@ -352,8 +380,9 @@ MAX_STEPS = 100_000
 """Largest number of instants of a run."""
 
 _QUANTITIES = {
-    osc.TriggeringEntitiesRule.ANY: codes.ANY, osc.TriggeringEntitiesRule.ALL: codes.ALL,
-}  # fmt: skip
+    osc.TriggeringEntitiesRule.ANY: codes.ANY,
+    osc.TriggeringEntitiesRule.ALL: codes.ALL,
+}
 
 
 class Triggers:
@@ -439,11 +468,19 @@ class Triggers:
             limit, within = self._tables.slot(probe.limit), self._tables.slot(probe.within)
             self.probes.append(
                 (
-                    probe.kind, probe.entity, probe.other, probe.rule, limit, probe.place,
-                    probe.measure, probe.system, int(probe.freespace), within,
+                    probe.kind,
+                    probe.entity,
+                    probe.other,
+                    probe.rule,
+                    limit,
+                    probe.place,
+                    probe.measure,
+                    probe.system,
+                    int(probe.freespace),
+                    within,
                     int(probe.looks_closely),
                 )
-            )  # fmt: skip
+            )
         self.conditions.append((first, len(self.probes), quantity, edge, delay))
 
     def _note_end(self, clock: osc.SimulationTimeCondition, delay: int) -> None:

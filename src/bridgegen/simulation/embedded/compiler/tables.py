@@ -14,10 +14,11 @@ from bridgegen.openx.openscenario.values import Expr, Value
 from bridgegen.simulation.embedded.program import LanePoint, Point, WorldPoint
 
 _OBJECTS = {
-    osc.ObjectType.VEHICLE: osc.Vehicle, osc.ObjectType.PEDESTRIAN: osc.Pedestrian,
+    osc.ObjectType.VEHICLE: osc.Vehicle,
+    osc.ObjectType.PEDESTRIAN: osc.Pedestrian,
     osc.ObjectType.MISCELLANEOUS: osc.MiscObject,
     osc.ObjectType.EXTERNAL: osc.ExternalObjectReference,
-}  # fmt: skip
+}
 
 TRAILERS = (osc.VehicleCategory.TRAILER, osc.VehicleCategory.SEMITRAILER)
 """The vehicles that are towed."""

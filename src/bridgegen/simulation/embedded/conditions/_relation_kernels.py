@@ -114,9 +114,17 @@ def look_ahead(p, k, plan, roads, state, record):
         path = state.on[e]
         if plan.probes[p, SYSTEM] != ENTITY_SYSTEM and path >= 0:
             along, aside, turn, other_turn = along_path(
-                roads.paths[path], roads.counts[path], roads.steps[path], state.station[e],
-                x, y, h, ox, oy, oh,
-            )  # fmt: skip
+                roads.paths[path],
+                roads.counts[path],
+                roads.steps[path],
+                state.station[e],
+                x,
+                y,
+                h,
+                ox,
+                oy,
+                oh,
+            )
         gap = aside if measure == LATERAL else along
         closing = v * math.cos(turn) - w * math.cos(other_turn)
         if measure == LATERAL:
@@ -308,9 +316,17 @@ def is_near(p, k, other, station, plan, roads, state, record):
     """Return whether a body, or its reference point, is as near along the way as probe p asks."""
     e, path = plan.probes[p, WHO], state.along[p]
     along, _, _, turn = along_path(
-        roads.paths[path], roads.counts[path], roads.steps[path], station, record.x[e, k],
-        record.y[e, k], record.h[e, k], record.x[other, k], record.y[other, k], record.h[other, k],
-    )  # fmt: skip
+        roads.paths[path],
+        roads.counts[path],
+        roads.steps[path],
+        station,
+        record.x[e, k],
+        record.y[e, k],
+        record.h[e, k],
+        record.x[other, k],
+        record.y[other, k],
+        record.h[other, k],
+    )
     reach = 0.0
     if plan.probes[p, BOXES] == 1:
         c, sine, body = math.cos(turn), math.sin(turn), plan.bodies[other]
@@ -481,12 +497,17 @@ def touch(e, other, k, plan, roads, state, record):
     """Return whether the boxes of two entities touch."""
     return (
         apart(
-            plan.bodies[e], plan.bodies[other, 0], plan.bodies[other, 1], plan.bodies[other, 2],
-            record.x[other, k] - record.x[e, k], record.y[other, k] - record.y[e, k],
-            record.h[e, k], record.h[other, k],
+            plan.bodies[e],
+            plan.bodies[other, 0],
+            plan.bodies[other, 1],
+            plan.bodies[other, 2],
+            record.x[other, k] - record.x[e, k],
+            record.y[other, k] - record.y[e, k],
+            record.h[e, k],
+            record.h[other, k],
         )
         == 0.0
-    )  # fmt: skip
+    )
 
 
 @kernel

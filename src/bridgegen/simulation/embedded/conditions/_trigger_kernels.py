@@ -63,10 +63,16 @@ def look(p, k, plan, state, record):
         return False
     if kind >= DISTANCE:
         return look_at_pair(
-            kind, rule, limit, record.x[other, k] - record.x[e, k],
-            record.y[other, k] - record.y[e, k], record.v[e, k], record.h[e, k],
-            record.v[other, k], record.h[other, k],
-        )  # fmt: skip
+            kind,
+            rule,
+            limit,
+            record.x[other, k] - record.x[e, k],
+            record.y[other, k] - record.y[e, k],
+            record.v[e, k],
+            record.h[e, k],
+            record.v[other, k],
+            record.h[other, k],
+        )
     if kind == SPEED:
         return compare(record.v[e, k], rule, limit)
     if kind == TRAVELED_DISTANCE:

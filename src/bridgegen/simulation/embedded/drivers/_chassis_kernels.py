@@ -157,9 +157,16 @@ def move_multi_body(k, demanded, curvature, plan, roads, state, record):
         acts = wanted - force_left * (wanted - force)
         force = wanted - force_left * (wanted - acts)
         advance_bodies(
-            motion, (angle, middle, last), acts, (friction, friction), press, uphill, aside, part,
+            motion,
+            (angle, middle, last),
+            acts,
+            (friction, friction),
+            press,
+            uphill,
+            aside,
+            part,
             chassis,
-        )  # fmt: skip
+        )
         angle = last
     motion[STEER], motion[FORCE] = angle, force
     past = motion[VY] - chassis[TO_REAR] * motion[YAW_RATE]

@@ -67,9 +67,13 @@ def see_conflicts(k, plan, roads, state, record, found):
                 for j in range(found.shape[2]):
                     found[e, w, j] = found[e, w - 1, j]
             (
-                found[e, at, 0], found[e, at, 1], found[e, at, 2], found[e, at, 3],
-                found[e, at, 4], found[e, at, 5],
-            ) = row  # fmt: skip
+                found[e, at, 0],
+                found[e, at, 1],
+                found[e, at, 2],
+                found[e, at, 3],
+                found[e, at, 4],
+                found[e, at, 5],
+            ) = row
 
 
 @kernel

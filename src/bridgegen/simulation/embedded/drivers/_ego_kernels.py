@@ -82,9 +82,18 @@ def move_ego(k, demanded, curvature, plan, roads, state, record):
     else:
         uphill, aside, press = slope(0, roads, state)
         x, y, h, after, given = bicycle(
-            record.x[0, k], record.y[0, k], record.h[0, k], v, demanded, curvature,
-            plan.bodies[0, 3:7], press * state.weather[FRICTION], uphill, aside, dt,
-        )  # fmt: skip
+            record.x[0, k],
+            record.y[0, k],
+            record.h[0, k],
+            v,
+            demanded,
+            curvature,
+            plan.bodies[0, 3:7],
+            press * state.weather[FRICTION],
+            uphill,
+            aside,
+            dt,
+        )
     step = 0.5 * (v + after) * dt
     record.a[0, k] = given
     state.travelled[0] += step
@@ -131,9 +140,13 @@ def begin_control(j, k, plan, roads, state, record):
         state.aside[0] = state.turn[0] = 0.0
         if lateral == 0 and p >= 0:
             state.station[0], state.aside[0] = project(
-                roads.paths[p], roads.counts[p], roads.steps[p], state.station[0],
-                record.x[0, k], record.y[0, k],
-            )  # fmt: skip
+                roads.paths[p],
+                roads.counts[p],
+                roads.steps[p],
+                state.station[0],
+                record.x[0, k],
+                record.y[0, k],
+            )
     if longitudinal >= 0 and longitudinal != state.drives[LONGITUDINALLY]:
         state.drives[LONGITUDINALLY] = longitudinal
         running = state.speed_action[0]

@@ -63,10 +63,20 @@ def ask(k, plan, roads, state, record):
     call_at(
         plan.own_code,
         (
-            inputs[EGO:], inputs[:EGO], state.ahead, state.others, state.mind, answer, state.lanes,
-            roads.pieces, state.place, state.signals, state.conflicts, state.tracked,
+            inputs[EGO:],
+            inputs[:EGO],
+            state.ahead,
+            state.others,
+            state.mind,
+            answer,
+            state.lanes,
+            roads.pieces,
+            state.place,
+            state.signals,
+            state.conflicts,
+            state.tracked,
         ),
-    )  # fmt: skip
+    )
     if answer[RETURNED] == 0.0:
         state.ending[STATUS], state.ending[STOPS] = RAISED, 1
         return 0.0, 0.0

@@ -108,9 +108,15 @@ def begin_course(j, k, plan, roads, state, record):
         before = record.v[e, k]
         acceleration = (before - record.v[e, k - 1]) / plan.dt if k > 0 else 0.0
         state.profile_rows[e] = lay_out(
-            before, acceleration, speeds, times, n, row[FOLLOWS], _limits(row, e, plan, state),
+            before,
+            acceleration,
+            speeds,
+            times,
+            n,
+            row[FOLLOWS],
+            _limits(row, e, plan, state),
             state.profile[e],
-        )  # fmt: skip
+        )
     elif kind == KEEP_DISTANCE:
         if not row[BY_BODY] and state.on[e] < 0:  # it is carried along the other's lane
             x, y, h = record.x[e, k], record.y[e, k], record.h[e, k]

@@ -46,10 +46,16 @@ def move_along_path(e, k, plan, roads, state, record):
         ahead, tilt, reached = keep_aside(j, k, step, plan, roads, state, record)
     elif j >= 0:
         state.aside[e], ahead, state.lateral_passed[e], tilt = glide(
-            plan.actions[j, SHAPE], plan.actions[j, DIMENSION], state.lateral_lasts[e],
-            state.lateral_passed[e], state.lateral_origin[e], state.lateral_target[e], abs(step),
-            dt, plan.bodies[e, 6],
-        )  # fmt: skip
+            plan.actions[j, SHAPE],
+            plan.actions[j, DIMENSION],
+            state.lateral_lasts[e],
+            state.lateral_passed[e],
+            state.lateral_origin[e],
+            state.lateral_target[e],
+            abs(step),
+            dt,
+            plan.bodies[e, 6],
+        )
         if step < 0.0:
             ahead, tilt = -ahead, -tilt
         state.foot[e] += ahead

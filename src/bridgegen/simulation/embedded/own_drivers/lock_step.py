@@ -182,12 +182,18 @@ class Wheel:
         observation = Observation(
             time=k * self._time_step,
             running=batch.running,
-            x=x, y=y, h=h, v=v,
+            x=x,
+            y=y,
+            h=h,
+            v=v,
             a=record.a[:, 0, k - 1] if k else np.zeros(len(x)),
             target_speed=state.command[:, 0],
             offset=record.offset[:, 0, k],
-            route=self._route, tracks=self._tracks, stop_distance=self._stop, light=self._light,
-        )  # fmt: skip
+            route=self._route,
+            tracks=self._tracks,
+            stop_distance=self._stop,
+            light=self._light,
+        )
         takes_two = self._driver.traits.max_rows != 1
         if len(x) == 1 and takes_two and not self._driver.answers_each_row:
             self._try_two(observation)

@@ -259,10 +259,18 @@ def _ask(process: DriverProcess, batch: Batch, k: int) -> tuple[Float, Float]:
     batch.fill_inputs(k)
     state = batch.state
     answer, memory, raised = process.call(
-        _answer, state.inputs[0], state.ahead[0], state.others[0], state.mind[0],
-        state.lanes[0], batch.pieces, state.place[0], state.signals[0], state.conflicts[0],
+        _answer,
+        state.inputs[0],
+        state.ahead[0],
+        state.others[0],
+        state.mind[0],
+        state.lanes[0],
+        batch.pieces,
+        state.place[0],
+        state.signals[0],
+        state.conflicts[0],
         state.tracked[0],
-    )  # fmt: skip
+    )
     if answer[RETURNED] == 0.0:
         raise DriverError("raised", raised)
     if problem := _not_finite(answer):

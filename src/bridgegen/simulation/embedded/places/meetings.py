@@ -70,9 +70,16 @@ def _find_zones(zones: Float, number: int, program: Program, ways: Ways) -> None
         if other == number or _follows(ways, number, other):
             continue
         find_zone(
-            own.table, len(own.table), own.step, bodies[number],
-            path.table, len(path.table), path.step, bodies[other], zones[other],
-        )  # fmt: skip
+            own.table,
+            len(own.table),
+            own.step,
+            bodies[number],
+            path.table,
+            len(path.table),
+            path.step,
+            bodies[other],
+            zones[other],
+        )
 
 
 def _follows(ways: Ways, number: int, other: int) -> bool:

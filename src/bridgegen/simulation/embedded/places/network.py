@@ -292,10 +292,16 @@ class Network:
                 zone = np.full(ZONE, np.inf)
                 if k > 0:
                     find_zone(
-                        paths[p, 0], counts[p, 0], steps[p, 0], bodies[0],
-                        paths[p, k], counts[p, k], steps[p, k],
-                        bodies[k] if k < len(bodies) else widest, zone,
-                    )  # fmt: skip
+                        paths[p, 0],
+                        counts[p, 0],
+                        steps[p, 0],
+                        bodies[0],
+                        paths[p, k],
+                        counts[p, k],
+                        steps[p, k],
+                        bodies[k] if k < len(bodies) else widest,
+                        zone,
+                    )
                 found.append(zone)
         whole = np.full((*counts.shape, ZONE), np.inf)
         for p, found in enumerate(self._zones):
@@ -379,8 +385,12 @@ def _crosswalks(scene: Scene, each: Sequence[Ways]) -> Float:
                 aside = 0.5 * (left + right)
                 half = 0.5 * (leaves - enters + path.step)
                 found[p, j] = (
-                    x - aside * s, y + aside * c, np.arctan2(s, c), half, 0.5 * (left - right)
-                )  # fmt: skip
+                    x - aside * s,
+                    y + aside * c,
+                    np.arctan2(s, c),
+                    half,
+                    0.5 * (left - right),
+                )
     return found
 
 

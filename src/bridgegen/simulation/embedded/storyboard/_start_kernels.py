@@ -149,17 +149,28 @@ def start_globals(plan, state):
     if plan.first_time >= 0:
         set_clock(state.slots[plan.first_time], plan.time_passes, 0.0, state.clock)
     start_controllers(
-        plan.controllers, plan.phases, plan.changes, state.slots, state.phase_now,
-        state.phase_until, state.lights,
-    )  # fmt: skip
+        plan.controllers,
+        plan.phases,
+        plan.changes,
+        state.slots,
+        state.phase_now,
+        state.phase_until,
+        state.lights,
+    )
     for c in range(plan.first_phases.shape[0]):
         i = plan.first_phases[c]
         if i >= 0:
             until = max(state.slots[plan.phases[i, DURATION]], 0.0)
             enter_phase(
-                c, i, until, plan.phases, plan.changes, state.phase_now, state.phase_until,
+                c,
+                i,
+                until,
+                plan.phases,
+                plan.changes,
+                state.phase_now,
+                state.phase_until,
                 state.lights,
-            )  # fmt: skip
+            )
     for i in range(state.lights.shape[0]):
         if plan.first_states[i] >= 0:
             state.lights[i] = plan.first_states[i]

@@ -105,9 +105,15 @@ def begin_global(j, k, plan, state):
         phase = plan.actions[j, ROW]
         until = k * plan.dt + max(state.slots[plan.phases[phase, DURATION]], 0.0)
         enter_phase(
-            which, phase, until, plan.phases, plan.changes, state.phase_now, state.phase_until,
+            which,
+            phase,
+            until,
+            plan.phases,
+            plan.changes,
+            state.phase_now,
+            state.phase_until,
             state.lights,
-        )  # fmt: skip
+        )
     elif kind == VALUE_SET:
         state.values[which] = value
     elif kind == VALUE_ADD:
