@@ -66,7 +66,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 def explore(items: list[pytest.Item], factor: float) -> None:
     """Let tests that state how many examples they draw, the slow ones, draw ``factor`` as many."""
     drawn = "_hypothesis_internal_use_settings"
-    for test in {getattr(item, "obj", None) for item in items}:
+    for test in {getattr(item, "function", None) for item in items}:
         own = getattr(test, drawn, None)
         if own is not None and own.max_examples != int(os.environ["BRIDGEGEN_EXPLORE"]):
             setattr(test, drawn, settings(own, max_examples=int(factor * own.max_examples) or 1))

@@ -185,7 +185,7 @@ def test_the_architecture_page_has_the_rooms_as_their_docstrings_are():
     assert made.page(text) == text
     rooms = {one.name for one in made.SOURCES.iterdir() if (one / "__init__.py").exists()}
     assert rooms == set(re.findall(r"^\| \*\*`(\w+)/`", text, re.M))
-    assert len(rooms) <= 14
+    assert len(rooms) <= 15
 
 
 def test_the_main_job_goes_through_the_files_of_the_architecture_page_in_that_order(
@@ -241,6 +241,21 @@ def test_every_function_of_a_formula_is_named():
     text = (DOCS / "extend.md").read_text("utf-8")
     (named,) = re.findall(r"^`([a-z ]+)`, with angles in radians", text, re.MULTILINE)
     assert sorted(named.split()) == sorted(FUNCTIONS)
+
+
+def test_groups_of_entry_points_are_called_as_in_the_code():
+    """Under another name a plug-in is never found, and no error says so."""
+    groups = {
+        group
+        for path in SOURCES.rglob("*.py")
+        for group in re.findall(r'PlugIns\("\w+", "([\w.]+)"\)', path.read_text("utf-8"))
+    }
+    told = {
+        group
+        for page in PAGES
+        for group in re.findall(r'entry-points\."([\w.]+)"', page.read_text("utf-8"))
+    }
+    assert told == groups
 
 
 def test_pages_that_are_made_of_the_code_can_be_made(tmp_path):

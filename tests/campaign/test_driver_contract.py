@@ -8,9 +8,9 @@ from typer.testing import CliRunner
 from bridgegen.cli import app
 from bridgegen.jobs.search import driver_contract
 from bridgegen.jobs.search.driver_contract import check_driver
+from bridgegen.testing import DriverContract
 
 DRIVERS = Path(__file__).parents[1] / "ego" / "drivers.py"
-NETWORKS = DRIVERS.with_name("network_drivers.py")
 EXAMPLES = Path(__file__).parents[2] / "docs" / "examples"
 
 
@@ -123,16 +123,23 @@ def test_a_driver_that_rounds_by_the_batch_is_told_what_to_do():
     assert "FixedBatch" not in broken("Mixes")["a row alone moves as it does among others"]
 
 
-@pytest.mark.parametrize(
-    ("file", "name"),
-    [
-        (EXAMPLES / "my_network.py", "MyNetwork"),
-        (EXAMPLES / "my_torch_network.py", "MyTorchNetwork"),
-        (NETWORKS, "Policy"),
-    ],
-)
-def test_a_network_in_a_fixed_batch_keeps_everything(file, name):
-    assert broken(name, file) == {}
+class TestGood(DriverContract):
+    time_limit = 0.5
+
+    @pytest.fixture(
+        autouse=True,
+        params=[
+            (EXAMPLES / "my_network.py:MyNetwork", CROSSROADS),
+            (EXAMPLES / "my_torch_network.py:MyTorchNetwork", CROSSROADS),
+            (DRIVERS.with_name("network_drivers.py:Policy"), CROSSROADS),
+            (EXAMPLES / "my_planner.py:MyPlanner", CUT_IN),
+            (EXAMPLES / "my_driver.py:MyDriver", CUT_IN),
+        ],
+        ids=lambda given: given[0].name.partition(":")[2],
+    )
+    def each(self, request, short_scenarios):
+        driver, scenario = request.param
+        self.driver, self.scenarios = str(driver), [str(short_scenarios / scenario)]
 
 
 def test_a_driver_that_fails_is_found_out_and_when():
@@ -155,13 +162,6 @@ def test_a_driver_that_drives_nothing_is_not_tried_further():
     assert "a trajectory must not begin in the past, got a first time of -2 s" in checks[1].problem
     assert in_short(checks)["deterministic"] == "not known"
     assert len(checks) == 5
-
-
-@pytest.mark.parametrize("name", ["my_planner.py:MyPlanner", "my_driver.py:MyDriver"])
-def test_the_examples_keep_everything(name):
-    file, _, driver = name.partition(":")
-    checks = checked(driver, EXAMPLES / file, CUT_IN)
-    assert not any(check.problem for check in checks)
 
 
 def test_the_command_says_it_and_ends_with_a_status():

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from bridgegen.search.algorithms import Problem, Results, get
+from bridgegen.testing.algorithms import Late
 
 
 def best_of(search, budget: int = 2000) -> float:
@@ -21,19 +22,19 @@ def best_of(search, budget: int = 2000) -> float:
 
 @pytest.mark.parametrize("ahead", [0, 16, 90])
 @pytest.mark.parametrize("name", ["ga", "es"])
-def test_it_goes_downhill(name: str, ahead: int, late):
+def test_it_goes_downhill(name: str, ahead: int):
     problem = Problem.unnamed(8)
-    found = [best_of(late(get(name)(problem, seed), ahead)) for seed in range(5)]
+    found = [best_of(Late(get(name)(problem, seed), ahead)) for seed in range(5)]
     by_chance = [best_of(get("random")(problem, seed)) for seed in range(5)]
     assert max(found) < (0.05 if ahead < 40 else 0.5) * min(by_chance)
 
 
 @pytest.mark.parametrize("ahead", [0, 16, 90])
 @pytest.mark.parametrize("name", ["ga", "es"])
-def test_it_begins_afresh_when_it_has_converged(name: str, ahead: int, late):
+def test_it_begins_afresh_when_it_has_converged(name: str, ahead: int):
     """Rows of the old start that are told after it are no parents of the new one."""
     search, generations, starts = get(name)(Problem.unnamed(2), 0), 0, set()
-    driven = late(search, ahead)
+    driven = Late(search, ahead)
     while generations < 400:
         U = driven.ask()
         F = ((U - 0.4) ** 2).sum(axis=1, keepdims=True)
