@@ -9,7 +9,7 @@ from bridgegen.base.errors import InputError, ScenarioError, StorageError
 from bridgegen.jobs.search.coverage import coverage_of
 from bridgegen.jobs.search.regions import regions_of
 from bridgegen.results.store import Store
-from bridgegen.scenario.language.within import in_box
+from bridgegen.scenario.language.box_sampling import in_box
 from bridgegen.scenario.ontology.files import load
 from bridgegen.scenario.ontology.vocabulary import LABEL
 

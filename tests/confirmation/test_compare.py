@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from bridgegen.results.confirmation.compare import compare, tracks
 from bridgegen.results.confirmation.differences import (
-    PARTED,
+    DIVERGED,
     TRACE,
     Approach,
     Contact,
@@ -196,9 +196,9 @@ def test_who_is_missing_before_the_closest_approach_has_diverged():
 
 
 def test_the_limit_itself_is_not_parted():
-    exact = compare(moving(steady()), moving(steady(ahead=PARTED)))
+    exact = compare(moving(steady()), moving(steady(ahead=DIVERGED)))
     assert exact.partings == ()
-    assert len(compare(moving(steady()), moving(steady(ahead=PARTED + 1e-9))).partings) == 1
+    assert len(compare(moving(steady()), moving(steady(ahead=DIVERGED + 1e-9))).partings) == 1
 
 
 def test_the_first_who_parts_comes_first():
@@ -355,7 +355,7 @@ def test_who_parts_from_whom_does_not_matter(walk, other):
     ]
     assert [p.speed for p in there.partings] == [-p.speed for p in back.partings]
     gap = np.hypot(b.x - a.x, b.y - a.y)[0, 0]
-    assert bool(there.partings) == bool((gap > PARTED).any())
+    assert bool(there.partings) == bool((gap > DIVERGED).any())
     for one in there.partings:
         assert np.hypot(one.along, one.across) == pytest.approx(one.gap)
         assert one.since <= one.time

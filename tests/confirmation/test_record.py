@@ -14,9 +14,9 @@ from bridgegen.base.errors import FileFormatError, StorageError
 from bridgegen.results.confirmation.differences import (
     BoxSizes,
     Contact,
+    EntityDivergence,
     EventTimes,
     LightTimes,
-    Parting,
 )
 from bridgegen.results.confirmation.record import (
     Change,
@@ -47,8 +47,8 @@ WHOLE = Scenario(
     change=Change.between(HERE, THERE),
     differences=Differences(
         partings=(
-            Parting("bv", 1.5, 0.6, 0.5, -0.3, 0.1, None, 1.0),
-            Parting("van", 2.0, None, None, None, None, None, 2.0, "here"),
+            EntityDivergence("bv", 1.5, 0.6, 0.5, -0.3, 0.1, None, 1.0),
+            EntityDivergence("van", 2.0, None, None, None, None, None, 2.0, "here"),
         ),
         events=(EventTimes("go", 1.0, None),),
         lights=(LightTimes("s", 1.0, 1, 4),),

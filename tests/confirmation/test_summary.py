@@ -3,7 +3,7 @@
 import pytest
 
 from bridgegen.base.statistics import wilson
-from bridgegen.results.confirmation.differences import Contact, Parting
+from bridgegen.results.confirmation.differences import Contact, EntityDivergence
 from bridgegen.results.confirmation.record import Change, Differences, Outcome, Scenario
 from bridgegen.results.confirmation.summary import summarise, to_json
 from bridgegen.results.confirmation.words import sentences
@@ -19,7 +19,11 @@ def scenario(k, here=None, there=None, parted=None, failure=""):
     here = here or outcome()
     if there is None:
         return Scenario(evaluation=k, name=f"{k:04d}", row="", here=here, failure=failure)
-    partings = () if parted is None else (Parting("bv", parted, 0.6, 0.6, 0.0, 0.0, None, parted),)
+    partings = (
+        ()
+        if parted is None
+        else (EntityDivergence("bv", parted, 0.6, 0.6, 0.0, 0.0, None, parted),)
+    )
     return Scenario(
         evaluation=k, name=f"{k:04d}", row="", here=here, there=there,
         change=Change.between(here, there), differences=Differences(partings=partings),

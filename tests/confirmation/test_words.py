@@ -8,10 +8,10 @@ from bridgegen.results.confirmation.differences import (
     BoxSizes,
     Contact,
     Divergence,
+    EntityDivergence,
     EventTimes,
     LightTimes,
     Offset,
-    Parting,
 )
 from bridgegen.results.confirmation.record import Differences, Margin, Outcome
 from bridgegen.results.confirmation.words import explanation
@@ -89,8 +89,8 @@ def test_by_harm_a_miss_says_what_conflict_there_is(there, text):
 
 
 def test_the_first_who_parts_is_told_with_what_came_before():
-    parts = Parting("bv", 3.2, 0.52, -0.51, 0.1, -0.4, None, 2.6)
-    ego = Parting("ego", 4.1, 0.6, 0.0, 0.6, 0.0, None, 4.0)
+    parts = EntityDivergence("bv", 3.2, 0.52, -0.51, 0.1, -0.4, None, 2.6)
+    ego = EntityDivergence("ego", 4.1, 0.6, 0.0, 0.6, 0.0, None, 4.0)
     text = said(
         came_to(False, 3.0, 5.0),
         partings=(parts, ego),
@@ -117,7 +117,7 @@ def test_the_first_who_parts_is_told_with_what_came_before():
     ],
 )
 def test_events_are_told(event, words):
-    parts = Parting("bv", 3.2, 0.6, 0.0, -0.6, 0.0, None, 3.0)
+    parts = EntityDivergence("bv", 3.2, 0.6, 0.0, -0.6, 0.0, None, 3.0)
     text = said(came_to(True, 1.0, 5.0), partings=(parts,), events=(event,))
     assert words in text
     assert "to the right, and as fast" in text
@@ -133,12 +133,12 @@ def test_events_are_told(event, words):
     ],
 )
 def test_another_way_is_told(turn, words):
-    parts = Parting("walker", 3.2, 0.6, 0.0, -0.6, -0.1, turn, 3.0)
+    parts = EntityDivergence("walker", 3.2, 0.6, 0.0, -0.6, -0.1, turn, 3.0)
     assert words in said(came_to(True, 1.0, 5.0), partings=(parts,))
 
 
 def test_who_was_off_before_is_told():
-    parts = Parting("ego", 6.1, 0.52, -0.52, 0.0, -0.5, None, 5.15)
+    parts = EntityDivergence("ego", 6.1, 0.52, -0.52, 0.0, -0.5, None, 5.15)
     text = said(came_to(False, 3.0, 0.0), partings=(parts,), offsets=(Offset("bv", 0.091),))
     assert text.endswith("deviating since 5.15 s. By then bv deviated by 0.09 m.")
 
@@ -147,7 +147,7 @@ def test_what_else_differs_is_told():
     text = said(
         came_to(True, 1.0, 5.0, Contact(3.0, "van")),
         here=came_to(True, 0.0, 5.0, Contact(2.0, "bv")),
-        partings=(Parting("bv", 1.0, None, None, None, None, None, 0.9, "there"),),
+        partings=(EntityDivergence("bv", 1.0, None, None, None, None, None, 0.9, "there"),),
         boxes=(BoxSizes("bv", (4.0, 2.0, 1.0), (4.5, 1.8, 1.2)),),
         only_here=("cone",),
         only_there=("walker",),
@@ -175,7 +175,7 @@ def test_where_nobody_parts_that_is_said():
 
 
 CLOSEST = Approach(4.0, "bv", 1.0)
-LATER = Parting("bv", 5.2, 0.52, -0.51, 0.1, -0.4, None, 4.6)
+LATER = EntityDivergence("bv", 5.2, 0.52, -0.51, 0.1, -0.4, None, 4.6)
 
 
 def test_a_miss_is_explained_by_what_differs_before_the_closest_approach():

@@ -12,7 +12,7 @@ from bridgegen.drivers.views import MapSender, Viewer
 from bridgegen.engine.options import PipelineOptions
 from bridgegen.engine.pipeline import Pipeline
 from bridgegen.scenario.language.reader import load
-from bridgegen.simulation.embedded.own_drivers.lock_step import drive_in_lock_step
+from bridgegen.simulation.embedded.user_drivers.lock_step import drive_in_lock_step
 
 DRIVERS = Path(__file__).with_name("drivers.py")
 

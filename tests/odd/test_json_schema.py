@@ -15,7 +15,7 @@ from bridgegen.scenario.language.json_schema import schema, schema_text, write_s
 from bridgegen.scenario.language.plain_yaml import Document, read_plain_yaml
 from bridgegen.scenario.language.reader import _Declarations, build, names
 from bridgegen.scenario.language.schema import FragmentFile, ScenarioFile
-from bridgegen.scenario.language.shape import shape_problems
+from bridgegen.scenario.language.schema_types import shape_problems
 
 ROOT = Path(__file__).parents[2]
 OTHERS = [

@@ -4,10 +4,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
 
+from bridgegen.scenario.language.box_sampling import _narrowed, draw_within, in_box
 from bridgegen.scenario.language.kinds import FLOAT, INTEGER
 from bridgegen.scenario.language.parameters import Axis, Parameter
 from bridgegen.scenario.language.reader import load
-from bridgegen.scenario.language.within import _narrowed, draw_within, in_box
 
 SPACE = load("crossroads-s4").space(["weather"])
 # Rain lifts the clouds, wind thins the fog, and both lower the sun: each range limits another.
@@ -92,7 +92,7 @@ def test_rows_kept_by_too_small_a_largest_chance_are_tried_again(monkeypatch):
         proposed.append(space.decode(U))
         return U, 1.0, np.full(len(U), 1.0 if len(proposed) == 4 else 0.01)
 
-    monkeypatch.setattr("bridgegen.scenario.language.within._narrowed", narrowed)
+    monkeypatch.setattr("bridgegen.scenario.language.box_sampling._narrowed", narrowed)
     low, high = box(SPACE, {})
     drawn = draw_within(SPACE, low, high, 1000, np.random.default_rng(0))
     assert len(drawn.X) == 1000

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from bridgegen.base.errors import InputError
-from bridgegen.scenario.language.within import in_box
+from bridgegen.scenario.language.box_sampling import in_box
 from bridgegen.search.regions.box import ANYWHERE, rule, whole
 from bridgegen.search.regions.find import MOST_CONDITIONS, find_regions
 

@@ -11,7 +11,7 @@ from bridgegen.pages.confirmation_payload import confirmations_payload
 from bridgegen.pages.page import write_report
 from bridgegen.pages.payload import news, payload
 from bridgegen.pages.series import unpacked
-from bridgegen.results.confirmation.differences import Contact, Parting, Track
+from bridgegen.results.confirmation.differences import Contact, EntityDivergence, Track
 from bridgegen.results.confirmation.record import (
     Change,
     Course,
@@ -53,7 +53,7 @@ def record(report):
     a, b, c, _ = report.kept
     rest = {p.evaluation for p in report.kept}
     other = next(i for i in np.flatnonzero(report.evaluations.critical) if i not in rest)
-    parts = Parting("bv", 2.5, 0.6, 0.6, 0.0, 0.1, None, 2.0)
+    parts = EntityDivergence("bv", 2.5, 0.6, 0.6, 0.0, 0.1, None, 2.0)
     return Record(
         simulator="esmini",
         label="esmini 3.6",

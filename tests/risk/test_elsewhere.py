@@ -13,8 +13,8 @@ from tests.campaign.biased import biased_kind, not_finite
 from bridgegen.base.errors import InputError, Interrupted
 from bridgegen.base.statistics import clopper_pearson
 from bridgegen.jobs.frame import JobCallbacks
-from bridgegen.jobs.risk import elsewhere
-from bridgegen.jobs.risk.elsewhere import Group, compare, look_elsewhere, share_of
+from bridgegen.jobs.risk import cross_simulator as elsewhere
+from bridgegen.jobs.risk.cross_simulator import Group, compare, look_elsewhere, share_of
 from bridgegen.jobs.risk.estimators import subset
 from bridgegen.jobs.risk.estimators.problem import Aim
 from bridgegen.jobs.risk.outcomes import Column

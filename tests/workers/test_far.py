@@ -7,7 +7,7 @@ import pytest
 
 from bridgegen.adapters.carla.settings import Access
 from bridgegen.base.errors import InputError
-from bridgegen.engine.pipeline import FAR_ROWS, Pipeline
+from bridgegen.engine.pipeline import REMOTE_CHUNK_ROWS, Pipeline
 from bridgegen.engine.workers import Lost, Part
 from bridgegen.engine.workers.workers import cut
 from bridgegen.scenario.language.reader import load
@@ -61,7 +61,7 @@ def test_only_workers_have_it(there):
         Pipeline(scenario, space, simulator=there)
     pool = Elsewhere()
     pipeline = Pipeline(scenario, space, simulator=there, workers=pool)
-    assert (pipeline.device, pipeline.rows_at_once) == ("GPU", FAR_ROWS)
+    assert (pipeline.device, pipeline.rows_at_once) == ("GPU", REMOTE_CHUNK_ROWS)
     pipeline.warm_up()
     pipeline.choose_objective()
     plain = Pipeline(scenario, space)

@@ -44,7 +44,7 @@ from bridgegen.simulation.choice import EMBEDDED, SimulatorChoice
 from bridgegen.simulation.rollout import WORKER_ENDED, Rollout, joined
 from bridgegen.simulation.vehicles import KINEMATIC
 
-FAR_ROWS = 8
+REMOTE_CHUNK_ROWS = 8
 """Number of rows per chunk if only the workers' machines have the simulator."""
 
 SAMPLE = 400
@@ -116,16 +116,16 @@ class Pipeline:
         self.cause = None if options.cause is None else Cause.named(options.cause)
         self.seeks_causes = options.causes or self.cause is not None
         self._workers = workers or Threads()
-        self._is_far = simulator != EMBEDDED and not self._workers.are_here
+        self._runs_remotely_only = simulator != EMBEDDED and not self._workers.are_here
         self.runner = Runner(
             scenario,
             space,
             options,
             road_map=road_map,
-            simulator=EMBEDDED if self._is_far else simulator,
+            simulator=EMBEDDED if self._runs_remotely_only else simulator,
         )
         self.driver = self.runner.driver
-        if self._is_far and self.runner.vehicle != KINEMATIC:
+        if self._runs_remotely_only and self.runner.vehicle != KINEMATIC:
             raise InputError(
                 f"{scenario.place}: the vehicle '{self.runner.vehicle}' is of the embedded "
                 f"simulator (--vehicle {KINEMATIC})"
@@ -216,8 +216,8 @@ class Pipeline:
     @property
     def rows_at_once(self) -> int:
         """The number of rows of a chunk that is fastest; see `Simulator`."""
-        if self._is_far:
-            return FAR_ROWS
+        if self._runs_remotely_only:
+            return REMOTE_CHUNK_ROWS
         own = self.runner.simulator.rows_at_once
         return own if self.baseline is None else max(own, self.baseline.rows_at_once)
 
@@ -242,7 +242,7 @@ class Pipeline:
         source, embedded = self.runner.source, self.runner.embedded
         if not isinstance(source, AdversarySource):
             raise InputError(f"{self.scenario.place}: no participant is driven by an adversary")
-        if self._is_far or self.runner.simulator is not embedded:
+        if self._runs_remotely_only or self.runner.simulator is not embedded:
             raise InputError(
                 f"{self.scenario.place}: an agent drives in closed loop in the embedded simulator "
                 "only; search there, and confirm its results in another simulator"
@@ -468,7 +468,7 @@ class Pipeline:
         Args:
             X: ``(N, len(space.names))`` float64.
         """
-        if not self._is_far:
+        if not self._runs_remotely_only:
             return self.runner.run(X)
         parts, start = [], 0
         for part in self._map(type(self).rollout, X):
@@ -499,10 +499,15 @@ class Pipeline:
         parts = []
         for at, runner in self.runner.by_variant(X):
             if noise is None:
-                rollout = self.rollout(X[at]) if self._is_far else runner.run(X[at])
+                rollout = self.rollout(X[at]) if self._runs_remotely_only else runner.run(X[at])
             else:
                 rollout = runner.run(X[at], noise=noise[at])
-            parts.append((at, replay_of(runner, X[at], rollout, plans=plans and not self._is_far)))
+            parts.append(
+                (
+                    at,
+                    replay_of(runner, X[at], rollout, plans=plans and not self._runs_remotely_only),
+                )
+            )
         return Replays(tuple(parts))
 
     def _measure_rows(self, X: Float) -> Float:

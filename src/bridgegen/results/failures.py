@@ -19,7 +19,7 @@ from bridgegen.base.disk import write_whole
 from bridgegen.base.errors import FileFormatError, InputError, StorageError
 from bridgegen.scenario.language.criteria import CriterionSection, read_criterion
 from bridgegen.scenario.language.plain_yaml import MAX_BYTES, Document, read_plain_yaml
-from bridgegen.scenario.language.shape import ShapedSection, shape_problems
+from bridgegen.scenario.language.schema_types import ShapedSection, shape_problems
 
 FILE = "failures.yaml"
 """File of known failures in the folder of a suite or a project."""

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bridgegen.adapters.carla.eyes import Truth, matched
+from bridgegen.adapters.carla.sensors import Truth, matched
 from bridgegen.adapters.carla.view import View, overlap
 from bridgegen.assess import metrics
 from bridgegen.base.errors import InputError

@@ -7,7 +7,7 @@ import carla
 import numpy as np
 import pytest
 
-from bridgegen.adapters.carla import guests
+from bridgegen.adapters.carla import carla_drivers as guests
 from bridgegen.base.errors import InputError, UnknownNameError
 from bridgegen.drivers import DRIVERS, GUESTS, get
 from bridgegen.engine.options import PipelineOptions

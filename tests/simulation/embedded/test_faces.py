@@ -13,7 +13,7 @@ from bridgegen.simulation.embedded.drivers import DEMANDS
 
 NAME = "bridgegen.simulation.embedded"
 FOLDER = Path(simulation.__file__).parent / "embedded"
-WITH_A_FACE = ("conditions", "drivers", "motion", "own_drivers", "storyboard", "world")
+WITH_A_FACE = ("conditions", "drivers", "motion", "user_drivers", "storyboard", "world")
 """Folders whose ``__init__`` names all that others may call."""
 
 

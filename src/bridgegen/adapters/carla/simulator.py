@@ -12,11 +12,11 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 import numpy.typing as npt
 
-from bridgegen.adapters.carla.eyes import Eyes
-from bridgegen.adapters.carla.guests import CONTROLLERS
+from bridgegen.adapters.carla.carla_drivers import CONTROLLERS
 from bridgegen.adapters.carla.lights import Lights
 from bridgegen.adapters.carla.pedals import Car
 from bridgegen.adapters.carla.row import BridgeGenDriver, CarlaRow, EgoController, Stopped
+from bridgegen.adapters.carla.sensors import Eyes
 from bridgegen.adapters.carla.server import ERROR, Server, ServerError
 from bridgegen.adapters.carla.settings import TIME_STEP, Access, CarlaSettings
 from bridgegen.adapters.carla.stage import Stage

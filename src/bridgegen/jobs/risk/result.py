@@ -15,7 +15,7 @@ import numpy as np
 from bridgegen.base.arrays import Float
 from bridgegen.base.disk import write_whole
 from bridgegen.jobs.frame import Judged, Table
-from bridgegen.jobs.risk.elsewhere import Elsewhere
+from bridgegen.jobs.risk.cross_simulator import Elsewhere
 from bridgegen.jobs.risk.estimators.weighted import FEWEST_HITS, Probability, Weighted
 from bridgegen.jobs.risk.experiment import Estimated
 from bridgegen.jobs.risk.options import FIGURES, WORDS

@@ -22,7 +22,7 @@ from bridgegen.engine.pipeline import Pipeline
 from bridgegen.engine.workers import CarriedDriver, open_workers
 from bridgegen.jobs.frame import command_of, require_ranges
 from bridgegen.jobs.risk import experiment as methods
-from bridgegen.jobs.risk.elsewhere import HERE, kept_elsewhere, look_elsewhere
+from bridgegen.jobs.risk.cross_simulator import HERE, kept_elsewhere, look_elsewhere
 from bridgegen.jobs.risk.estimators import exploration as design_point
 from bridgegen.jobs.risk.estimators import monte_carlo
 from bridgegen.jobs.risk.estimators.problem import Aim, block_of

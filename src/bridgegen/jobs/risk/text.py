@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 
 from bridgegen.jobs.frame import Table
-from bridgegen.jobs.risk.elsewhere import Elsewhere, Ratio
+from bridgegen.jobs.risk.cross_simulator import Elsewhere, Ratio
 from bridgegen.jobs.risk.estimators.weighted import Probability
 from bridgegen.jobs.risk.options import WORDS
 from bridgegen.jobs.risk.outcomes import EVENTS, DataBand

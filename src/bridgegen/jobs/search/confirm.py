@@ -12,7 +12,7 @@ from bridgegen.base.errors import InputError, Interrupted
 from bridgegen.engine.options import checked
 from bridgegen.engine.pipeline import Pipeline
 from bridgegen.engine.workers import Choice, open_workers
-from bridgegen.jobs.search.elsewhere import run_elsewhere
+from bridgegen.jobs.search.cross_simulator import run_elsewhere
 from bridgegen.jobs.search.report import rewrite_report
 from bridgegen.jobs.search.restored import pipeline_of
 from bridgegen.jobs.search.run import Run

@@ -16,7 +16,7 @@ from bridgegen.drivers import is_remote
 from bridgegen.engine.options import PipelineOptions
 from bridgegen.engine.pipeline import Pipeline
 from bridgegen.scenario.language.reader import load
-from bridgegen.simulation.embedded.own_drivers import OwnDriver
+from bridgegen.simulation.embedded.user_drivers import OwnDriver
 from bridgegen.simulation.rollout import FAILURES, STATUS_MESSAGES, Rollout
 
 SCENARIOS = ("crossroads-s1", "cut-in", "red-light-runner", "pedestrian-behind-parked")

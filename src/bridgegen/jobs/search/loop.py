@@ -184,7 +184,7 @@ def run_loop(
 
 
 @dataclass(frozen=True)
-class _Untold:
+class _Pending:
     """Rows that an algorithm has asked for and has no results of, in its order.
 
     Attributes:
@@ -208,18 +208,18 @@ class _Untold:
         nothing = np.empty(0, np.int64)
         return cls(np.empty((0, n_var)), np.empty((0, n_parameters)), nothing, nothing > 0)
 
-    def followed_by(self, U: Float, X: Float, ids: Int, fresh: Sequence[int]) -> "_Untold":
+    def followed_by(self, U: Float, X: Float, ids: Int, fresh: Sequence[int]) -> "_Pending":
         """Return these rows and more; ``fresh`` are the positions of new ones among these."""
-        return _Untold(
+        return _Pending(
             np.concatenate([self.U, U]),
             np.concatenate([self.X, X]),
             np.concatenate([self.ids, ids]),
             np.concatenate([self.fresh, np.isin(np.arange(len(ids)), fresh)]),
         )
 
-    def take(self, rows: slice) -> "_Untold":
+    def take(self, rows: slice) -> "_Pending":
         """Return some of the rows."""
-        return _Untold(self.U[rows], self.X[rows], self.ids[rows], self.fresh[rows])
+        return _Pending(self.U[rows], self.X[rows], self.ids[rows], self.fresh[rows])
 
 
 class _Session:
@@ -243,7 +243,7 @@ class _Session:
         self._known = KnownRows()
         self._log = ResultLog(store.n_obj, len(store.metrics))
         self._ahead, self._idle = ahead, 0
-        self._untold = _Untold.none(store.columns.n_var, len(store.parameters))
+        self._untold = _Pending.none(store.columns.n_var, len(store.parameters))
 
     @property
     def seconds(self) -> float:

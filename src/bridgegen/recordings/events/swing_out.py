@@ -30,15 +30,15 @@ SHORTEST_PATH = 20.0
 """Least length of an ego's path [m]."""
 STRAIGHT = 30.0
 """Largest bend of the ego's path until it has passed the bicycle [deg]."""
-BEYOND_IT = 10.0
+PASSING_DISTANCE = 10.0
 """Distance beyond the bicycle at which passing ends [m]."""
 BEYOND = 60.0
 """Length by which an ego's path is continued straight on at both ends [m]."""
-BEFORE = 1.0
+LOOKBACK = 1.0
 """Time before an instant until which the ego's lateral position is the reference [s]: no evasion
 yet."""
 SPAN = 4.0
-"""Time until `BEFORE` over which the ego's lateral position is averaged [s]."""
+"""Time until `LOOKBACK` over which the ego's lateral position is averaged [s]."""
 LEAST_MOVE = 0.5
 """Least lateral movement of the bicycle [m]."""
 SHORTEST = 0.5
@@ -59,7 +59,7 @@ class _Pair:
         begin: first instant.
         apart: ``(n,)`` of the bicycle's centre from the ego's along its path [m], by instant.
         offset: ``(n,)`` of its reference point from the smoothed path [m], left positive.
-        own: ``(n,)`` of the ego from it, averaged over `SPAN` until `BEFORE` [m].
+        own: ``(n,)`` of the ego from it, averaged over `SPAN` until `LOOKBACK` [m].
     """
 
     ego: int
@@ -134,7 +134,7 @@ def _together(scene: Scene, ego: int, other: int, line: Float | None) -> Iterato
     edges = np.flatnonzero(np.diff(np.concatenate([[0], holds.astype(np.int8), [0]])))
     for a, b in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
         if (b - a) * scene.step >= 2.0 * SHORTEST:
-            last = np.maximum(np.arange(a, b) - round(BEFORE / scene.step), 0)
+            last = np.maximum(np.arange(a, b) - round(LOOKBACK / scene.step), 0)
             since = np.maximum(last - round(SPAN / scene.step), 0)
             own = (sums[last + 1] - sums[since]) / (last + 1 - since)
             yield _Pair(ego, other, begin + a, apart[a:b], offset[a:b], own)
@@ -277,5 +277,5 @@ def _events(scene: Scene, pairs: list[_Pair], low: Int, high: Int, fit: Float) -
 def _bend(scene: Scene, ego: int, instant: float, ahead: float) -> float:
     """Return how far an ego's path bends until it is beyond something ahead of it [deg]."""
     length = scene.paths.length(ego, instant)
-    a, b = (scene.paths.course(ego, length + way) for way in (0.0, ahead + BEYOND_IT))
+    a, b = (scene.paths.course(ego, length + way) for way in (0.0, ahead + PASSING_DISTANCE))
     return abs(float(np.degrees(wrap(np.array([b - a]))[0])))

@@ -14,7 +14,7 @@ import numpy.typing as npt
 from bridgegen.assess.metrics.distances import first_closest
 from bridgegen.base.arrays import Bool, Float
 from bridgegen.results.confirmation.differences import (
-    PARTED,
+    DIVERGED,
     SLIGHT,
     TRACE,
     Approach,
@@ -22,10 +22,10 @@ from bridgegen.results.confirmation.differences import (
     Comparison,
     Contact,
     Divergence,
+    EntityDivergence,
     EventTimes,
     LightTimes,
     Offset,
-    Parting,
     Track,
 )
 from bridgegen.simulation.rollout import Rollout
@@ -52,7 +52,7 @@ class _States:
 
 @dataclass(frozen=True)
 class _OffBy:
-    """How an entity differs at an instant; see `Parting`."""
+    """How an entity differs at an instant; see `EntityDivergence`."""
 
     gap: float | None = None
     along: float | None = None
@@ -187,16 +187,16 @@ def _lasting(differs: Bool) -> Bool:
     return lasting
 
 
-def _parting(entity: str, a: _States, b: _States, times: Float) -> Parting | None:
+def _parting(entity: str, a: _States, b: _States, times: Float) -> EntityDivergence | None:
     gap, alone = _gap(a, b), a.present != b.present
-    off = np.flatnonzero((gap > PARTED) | _lasting(alone))
+    off = np.flatnonzero((gap > DIVERGED) | _lasting(alone))
     if not off.size:
         return None
     k = int(off[0])
     trace = np.flatnonzero(~((gap > TRACE) | alone)[: k + 1])  # where it did not deviate yet
     since = float(times[trace[-1] + 1 if trace.size else 0])
     off_by = _off_by(a, b, k)
-    return Parting(
+    return EntityDivergence(
         entity,
         float(times[k]),
         gap=off_by.gap,
@@ -254,7 +254,7 @@ def _off_by(a: _States, b: _States, k: int) -> _OffBy:
 
 
 def _offsets(
-    pairs: Sequence[tuple[str, _States, _States]], times: Float, first: Parting
+    pairs: Sequence[tuple[str, _States, _States]], times: Float, first: EntityDivergence
 ) -> tuple[Offset, ...]:
     """Return the deviations of other entities when the first one diverged, largest first."""
     k = int(np.searchsorted(times, first.time - _EPSILON))

@@ -6,7 +6,7 @@ from pydantic import ConfigDict
 
 from bridgegen.base.arrays import Float
 
-PARTED = 0.5
+DIVERGED = 0.5
 """Distance between an entity's reference points beyond which it diverges [m]."""
 
 TRACE = 0.05
@@ -36,8 +36,8 @@ class Contact(_Checked):
 
 
 @dataclass(frozen=True)
-class Parting(_Checked):
-    """The divergence of an entity: its positions differ by more than PARTED.
+class EntityDivergence(_Checked):
+    """The divergence of an entity: its positions differ by more than DIVERGED.
 
     Attributes:
         entity: its name.
@@ -87,7 +87,7 @@ class Divergence(_Checked):
         entity: its name.
         since: the first instant at which it deviates by more than TRACE [s].
         time: the instant of the largest deviation up to the closest approach [s].
-        gap: see `Parting`, as for the following.
+        gap: see `EntityDivergence`, as for the following.
         along: [m].
         across: [m].
         speed: [m/s].
@@ -193,7 +193,7 @@ class Comparison:
     step: float
     ends: tuple[float, float]
     contacts: tuple[Contact | None, Contact | None]
-    partings: tuple[Parting, ...] = ()
+    partings: tuple[EntityDivergence, ...] = ()
     offsets: tuple[Offset, ...] = ()
     events: tuple[EventTimes, ...] = ()
     lights: tuple[LightTimes, ...] = ()

@@ -16,17 +16,17 @@ from bridgegen.base.disk import write_whole
 from bridgegen.base.errors import FileFormatError
 from bridgegen.base.records import read_model
 from bridgegen.results.confirmation.differences import (
-    PARTED,
+    DIVERGED,
     TRACE,
     Approach,
     BoxSizes,
     Comparison,
     Contact,
     Divergence,
+    EntityDivergence,
     EventTimes,
     LightTimes,
     Offset,
-    Parting,
     Track,
 )
 from bridgegen.scenario.language.thresholds import Thresholds
@@ -160,7 +160,7 @@ class Course(_Model):
 class Differences(_Model):
     """How the two rollouts differ, see `differences`."""
 
-    partings: tuple[Parting, ...] = ()
+    partings: tuple[EntityDivergence, ...] = ()
     offsets: tuple[Offset, ...] = ()
     events: tuple[EventTimes, ...] = ()
     lights: tuple[LightTimes, ...] = ()
@@ -238,7 +238,7 @@ class Record(_Model):
         rule: what makes a scenario critical, "harm", "thresholds" or "criteria".
         count: whose conflicts are harm, "ego" or "any".
         objectives: the names of F's columns.
-        parted_at: see `differences.PARTED`.
+        parted_at: see `differences.DIVERGED`.
         trace: see `differences.TRACE`.
         scale: see SCALE.
         scenarios: most critical first.
@@ -255,7 +255,7 @@ class Record(_Model):
     rule: Rule = "thresholds"
     count: Count = "ego"
     objectives: tuple[str, ...]
-    parted_at: Number = PARTED
+    parted_at: Number = DIVERGED
     trace: Number = TRACE
     scale: dict[str, int] = SCALE
     scenarios: tuple[Scenario, ...] = ()

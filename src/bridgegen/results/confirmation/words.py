@@ -8,14 +8,14 @@ from bridgegen.assess.conflict.harm import NEAR_MISS
 from bridgegen.assess.criteria import margin_in_words
 from bridgegen.assess.objective import Rule
 from bridgegen.results.confirmation.differences import (
-    PARTED,
+    DIVERGED,
     TRACE,
     Approach,
     BoxSizes,
     Divergence,
+    EntityDivergence,
     EventTimes,
     LightTimes,
-    Parting,
 )
 from bridgegen.results.confirmation.record import Differences, Margin, Outcome, Scenario
 from bridgegen.results.confirmation.summary import ConfirmationSummary, Spread, summarise
@@ -207,7 +207,7 @@ def _story(found: Differences) -> list[str]:
     """Return the differences up to the first divergence, in order of time."""
     sentences = _always(found)
     if not found.partings:
-        return [*sentences, f"No entity deviates by more than {PARTED:g} m."]
+        return [*sentences, f"No entity deviates by more than {DIVERGED:g} m."]
     first = found.partings[0]
     before: list[tuple[float, str]] = []
     before += [(event.first, _event(event)) for event in found.events if event.first <= first.time]
@@ -257,7 +257,7 @@ def _light(light_times: LightTimes) -> str:
     )
 
 
-def _parting(parting: Parting) -> str:
+def _parting(parting: EntityDivergence) -> str:
     if parting.only is not None:
         return (
             f"{parting.entity} diverges first: at {parting.time:.2f} s it is present only "
@@ -357,10 +357,10 @@ def _differences(s: ConfirmationSummary) -> list[str]:
     )
     lines = [f"Differences, median (largest): {', '.join(parts)}."]
     if s.parted.median is None:
-        lines.append(f"No entity deviates by more than {PARTED:g} m.")
+        lines.append(f"No entity deviates by more than {DIVERGED:g} m.")
     else:
         lines.append(
-            f"In {s.parted.n} of {s.ran} an entity deviates by more than {PARTED:g} m, first at "
+            f"In {s.parted.n} of {s.ran} an entity deviates by more than {DIVERGED:g} m, first at "
             f"{s.parted.median:.2f} s (median)."
         )
     both, here, there = s.contacts

@@ -22,7 +22,7 @@ from bridgegen.scenario.language.parameters import nearest
 from bridgegen.scenario.language.plain_yaml import Document, read_plain_yaml
 from bridgegen.scenario.language.reader import load, names, pack_names, read_document
 from bridgegen.scenario.language.scenario import LogicalScenario, SearchedScenario
-from bridgegen.scenario.language.shape import section, shape_problems
+from bridgegen.scenario.language.schema_types import section, shape_problems
 from bridgegen.scenario.language.space import SearchSpace
 
 _EXAMPLES = "bridgegen.scenario.exposure.examples"

@@ -12,7 +12,13 @@ from bridgegen.base.errors import FileFormatError, InputError
 from bridgegen.base.plugins import PlugIns
 from bridgegen.scenario.language.parameters import at, nearest
 from bridgegen.scenario.language.plain_yaml import MAX_BYTES, Document, entries, read_plain_yaml
-from bridgegen.scenario.language.shape import ID, ShapedSection, Text, section, shape_problems
+from bridgegen.scenario.language.schema_types import (
+    ID,
+    ShapedSection,
+    Text,
+    section,
+    shape_problems,
+)
 from bridgegen.scenario.stl import Formula, parse, readings
 
 Severity = Literal["minor", "major", "critical"]

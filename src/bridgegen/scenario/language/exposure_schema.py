@@ -8,7 +8,13 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from bridgegen.scenario.language.shape import Formula, Number, NumberOrName, ShapedSection, Text
+from bridgegen.scenario.language.schema_types import (
+    Formula,
+    Number,
+    NumberOrName,
+    ShapedSection,
+    Text,
+)
 
 FormName = Literal[
     "uniform",

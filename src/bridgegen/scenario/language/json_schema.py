@@ -19,7 +19,7 @@ from bridgegen.scenario.language.parameters import UNITS
 from bridgegen.scenario.language.reader import names
 from bridgegen.scenario.language.roads import KNOBS, Template
 from bridgegen.scenario.language.schema import FragmentFile, ScenarioFile
-from bridgegen.scenario.language.shape import ShapedSection
+from bridgegen.scenario.language.schema_types import ShapedSection
 from bridgegen.scenario.language.story import CONDITIONS
 from bridgegen.scenario.language.story_schema import ACTIONS
 

@@ -8,7 +8,7 @@ from bridgegen.scenario.language.expression import parse
 from bridgegen.scenario.language.parameters import Axis, Derived, Parameter, nearest
 from bridgegen.scenario.language.plain_yaml import Document, Path, entries
 from bridgegen.scenario.language.roads import LETTERS, Quantity, RoadsSpec
-from bridgegen.scenario.language.shape import section
+from bridgegen.scenario.language.schema_types import section
 from bridgegen.scenario.language.story import Jam, Participant, RoadWorks, Waypoint
 from bridgegen.scenario.language.story_schema import JamSection, WaypointSection, WorksSection
 from bridgegen.scenario.participants import PARTICIPANTS

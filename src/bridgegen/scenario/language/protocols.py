@@ -14,7 +14,14 @@ from bridgegen.base.errors import InputError
 from bridgegen.scenario.language.criteria import Criterion, Tag
 from bridgegen.scenario.language.parameters import Derived, Parameter, at, nearest
 from bridgegen.scenario.language.plain_yaml import Document, Path, entries
-from bridgegen.scenario.language.shape import ID, Number, NumberOrName, ShapedSection, Text, section
+from bridgegen.scenario.language.schema_types import (
+    ID,
+    Number,
+    NumberOrName,
+    ShapedSection,
+    Text,
+    section,
+)
 
 # --- Test matrices: values of parameters, of which all combinations are tested ---
 # A protocol tests certain speeds and overlaps, a search what lies between them too. So a matrix is

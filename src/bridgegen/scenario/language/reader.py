@@ -41,7 +41,7 @@ from bridgegen.scenario.language.schema import (
     RoadsSection,
     ScenarioFile,
 )
-from bridgegen.scenario.language.shape import Section, section, shape_problems
+from bridgegen.scenario.language.schema_types import Section, section, shape_problems
 from bridgegen.scenario.language.story import Story
 from bridgegen.scenario.language.storyboard import Storyboard, read_recorded
 

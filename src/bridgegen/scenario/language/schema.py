@@ -12,7 +12,7 @@ from pydantic import Field, ValidationInfo, field_validator
 from bridgegen.scenario.language.criteria import CriterionSection
 from bridgegen.scenario.language.exposure_schema import ExposureSection
 from bridgegen.scenario.language.protocols import ClauseSection, GridSection
-from bridgegen.scenario.language.shape import (
+from bridgegen.scenario.language.schema_types import (
     AxisName,
     Curvature,
     Degrees,

@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING, Annotated, Literal, TypeAlias
 
 from pydantic import AfterValidator, Field, ValidationInfo, field_validator
 
-from bridgegen.scenario.language.shape import (
+from bridgegen.scenario.language.schema_types import (
     Acceleration,
     Angle,
     Duration,

@@ -15,7 +15,7 @@ from bridgegen.scenario.language.parameters import Axis, Derived, Parameter, at,
 from bridgegen.scenario.language.places import Places, Quantities
 from bridgegen.scenario.language.plain_yaml import Document, Path, entries
 from bridgegen.scenario.language.roads import LETTERS, Quantity, RoadsSpec
-from bridgegen.scenario.language.shape import Formula, ShapedSection, Text, section
+from bridgegen.scenario.language.schema_types import Formula, ShapedSection, Text, section
 from bridgegen.scenario.language.story import (
     CONDITIONS,
     Action,

@@ -15,8 +15,8 @@ import numpy.typing as npt
 
 from bridgegen.base.arrays import Bool, Float
 from bridgegen.base.errors import InputError
+from bridgegen.scenario.language.box_sampling import draw_within
 from bridgegen.scenario.language.space import SearchSpace
-from bridgegen.scenario.language.within import draw_within
 from bridgegen.search.algorithms.tree import Leaf, fit_leaves
 from bridgegen.search.regions.box import Box, Evidence, joined, readable, whole
 

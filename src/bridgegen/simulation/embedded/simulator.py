@@ -35,7 +35,7 @@ from bridgegen.simulation.rollout import Rollout
 if TYPE_CHECKING:
     from bridgegen.simulation.embedded.batch import Batch
     from bridgegen.simulation.embedded.co_simulation import CoSimulation
-    from bridgegen.simulation.embedded.own_drivers import OwnDriver
+    from bridgegen.simulation.embedded.user_drivers import OwnDriver
 
 # --- The weather of rows as a rollout went through it, from what the storyboard states and did ---
 
@@ -339,7 +339,7 @@ class EmbeddedSimulator:
 
     @cached_property
     def _own(self) -> "OwnDriver":
-        from bridgegen.simulation.embedded.own_drivers import (
+        from bridgegen.simulation.embedded.user_drivers import (
             OwnDriver,  # numba is slow to import
         )
 

@@ -16,9 +16,9 @@ from bridgegen.simulation.esmini.library import Library
 
 if TYPE_CHECKING:
     from bridgegen.drivers import Driver
-    from bridgegen.simulation.embedded.own_drivers import Layout
     from bridgegen.simulation.embedded.places.network import Network
     from bridgegen.simulation.embedded.simulator import EmbeddedSimulator
+    from bridgegen.simulation.embedded.user_drivers import Layout
     from bridgegen.simulation.esmini.files import RoadFiles, ScenarioFile
     from bridgegen.simulation.rollout import Rollout
 
@@ -105,7 +105,7 @@ class EsminiProcess:
     """
 
     def __init__(self, library: Path, job: Job, seconds: float) -> None:
-        from bridgegen.simulation.embedded.own_drivers import SharedArrays
+        from bridgegen.simulation.embedded.user_drivers import SharedArrays
         from bridgegen.simulation.esmini.files import Folder
 
         self._job, self._seconds = job, seconds
@@ -215,7 +215,7 @@ class Answers:
             raise CallError(kind, str(error)) from None
 
     def _take(self, job: Job, layout: "Layout") -> None:
-        from bridgegen.simulation.embedded.own_drivers import seen
+        from bridgegen.simulation.embedded.user_drivers import seen
 
         self._job, (self._beats,) = job, seen(layout)
         LEFT.add(Path(layout.path))

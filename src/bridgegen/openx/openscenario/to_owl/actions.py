@@ -10,8 +10,8 @@ from bridgegen.openx.openscenario.from_owl.signals import LAMPS
 from bridgegen.openx.openscenario.movement import is_uniform
 from bridgegen.openx.openscenario.to_owl.build import (
     ACTION,
+    NotExpressibleError,
     StoryBuilder,
-    UnsayableError,
     node_of,
     numbered,
     plain_name,
@@ -47,7 +47,7 @@ def add_action(
         wrapped: the action.
 
     Raises:
-        UnsayableError: an action that the ontology has no class for, or no property, and that
+        NotExpressibleError: an action that the ontology has no class for, or no property, and that
             cannot be quoted.
     """
     return node_of(
@@ -65,11 +65,11 @@ def _action(
     if isinstance(wrapped, osc.GlobalAction):
         return _global(builder, event, name, wrapped)
     if isinstance(wrapped, osc.UserDefinedAction):
-        raise UnsayableError(wrapped, "UserDefinedAction")
+        raise NotExpressibleError(wrapped, "UserDefinedAction")
     action = wrapped.action
     inner = getattr(action, "action", action)
     if not actors:
-        raise UnsayableError(wrapped, "a PrivateAction without an actor")
+        raise NotExpressibleError(wrapped, "a PrivateAction without an actor")
     if isinstance(action, osc.TeleportAction):
         node = builder.node(name, "TeleportAction")
         put_place(builder, node, "has_position", f"{name}_place", action.position)
@@ -101,7 +101,7 @@ def _action(
         node = builder.node(name, "AssignRouteAction")
         builder.put(node, "has_route", add_route(builder, name, inner.route, None))
     else:
-        raise UnsayableError(inner, type(inner).__name__)
+        raise NotExpressibleError(inner, type(inner).__name__)
     return node
 
 
@@ -116,11 +116,11 @@ def put_speed(builder: StoryBuilder, node: ox.NamedNode, action: osc.SpeedAction
     """State the speed that an action leads to, and how fast.
 
     Raises:
-        UnsayableError: the speed is relative to another's, or an expression.
+        NotExpressibleError: the speed is relative to another's, or an expression.
     """
     target = action.speed_action_target.target
     if not isinstance(target, osc.AbsoluteTargetSpeed):
-        raise UnsayableError(target, "RelativeTargetSpeed")
+        raise NotExpressibleError(target, "RelativeTargetSpeed")
     builder.number(node, "has_target_speed", target.value, target)
     _put_change(builder, node, action.dynamics)
 
@@ -131,7 +131,7 @@ def _change_with_jerk(
     """Add a change to one speed within limits of acceleration and jerk, the same both ways.
 
     Raises:
-        UnsayableError: another speed profile.
+        NotExpressibleError: another speed profile.
     """
     limits = action.dynamic_constraints or osc.DynamicConstraints()
     rate, jerk = limits.max_acceleration, limits.max_acceleration_rate
@@ -146,7 +146,7 @@ def _change_with_jerk(
         or (rate, jerk) != (limits.max_deceleration, limits.max_deceleration_rate)
         or builder.choice(osc.FollowingMode, action.following_mode) is not osc.FollowingMode.FOLLOW
     ):
-        raise UnsayableError(action, "SpeedProfileAction")
+        raise NotExpressibleError(action, "SpeedProfileAction")
     node = builder.node(name, "SpeedAction")
     builder.number(node, "has_target_speed", entry.speed, entry)
     builder.number(node, "has_rate", rate, limits)
@@ -176,21 +176,21 @@ def _keep_distance(
     """Add the following of another entity, in the one way that the ontology defines.
 
     Raises:
-        UnsayableError: not from now on, not between the bodies, within limits, or not behind.
+        NotExpressibleError: not from now on, not between the bodies, within limits, or not behind.
     """
     what = "LongitudinalDistanceAction"
     if action.continuous is not True or action.freespace is not True:
-        raise UnsayableError(action, f"{what} that is not continuous and between the bodies")
+        raise NotExpressibleError(action, f"{what} that is not continuous and between the bodies")
     limits = action.dynamic_constraints or osc.DynamicConstraints()
     unsaid = (limits.max_acceleration_rate, limits.max_deceleration_rate)
     if any(value is not None for value in unsaid):
-        raise UnsayableError(limits, f"DynamicConstraints of {what} besides accelerations")
+        raise NotExpressibleError(limits, f"DynamicConstraints of {what} besides accelerations")
     side, axes = action.displacement, action.coordinate_system
     behind = osc.LongitudinalDisplacement.TRAILING_REFERENCED_ENTITY
     if side is not None and builder.text(side) != behind:
-        raise UnsayableError(action, f'displacement="{side}" of {what}')
+        raise NotExpressibleError(action, f'displacement="{side}" of {what}')
     if axes is None or builder.text(axes) != osc.CoordinateSystem.LANE:
-        raise UnsayableError(action, f'coordinateSystem="{axes}" of {what}')
+        raise NotExpressibleError(action, f'coordinateSystem="{axes}" of {what}')
     node = builder.node(name, what)
     builder.put(node, "has_entity_ref", builder.entity(action.entity_ref, action))
     if action.distance is not None:
@@ -215,7 +215,7 @@ def _lateral(
     if isinstance(action, osc.LaneOffsetAction):
         aside = action.lane_offset_target.target
         if not isinstance(aside, osc.AbsoluteTargetLaneOffset):
-            raise UnsayableError(aside, "RelativeTargetLaneOffset")
+            raise NotExpressibleError(aside, "RelativeTargetLaneOffset")
         node = builder.node(name, "LaneOffsetAction")
         builder.number(node, "has_target_offset", aside.value, aside)
         how = action.dynamics
@@ -227,9 +227,11 @@ def _lateral(
         return node
     target = action.lane_change_target.target
     if not isinstance(target, osc.RelativeTargetLane):
-        raise UnsayableError(target, "AbsoluteTargetLane")
+        raise NotExpressibleError(target, "AbsoluteTargetLane")
     if builder.text(target.entity_ref) != actors[0]:
-        raise UnsayableError(target, f"a RelativeTargetLane of {target.entity_ref}, not the actor,")
+        raise NotExpressibleError(
+            target, f"a RelativeTargetLane of {target.entity_ref}, not the actor,"
+        )
     node = builder.node(name, "LaneChangeAction")
     builder.put(node, "has_lane_count", round(builder.now(target.value, target)))
     if action.target_lane_offset is not None:
@@ -258,7 +260,7 @@ def add_trajectory(
         start: of the participant, which the first vertex may be.
 
     Raises:
-        UnsayableError: times that count are missing, or a vertex has no place.
+        NotExpressibleError: times that count are missing, or a vertex has no place.
     """
     item = action.trajectory_ref.trajectory
     trajectory = builder.node(f"{name}_path", "Trajectory")
@@ -273,7 +275,7 @@ def add_trajectory(
         builder.put(point, "has_index", k + 1)
         if timed:
             if vertex.time is None:
-                raise UnsayableError(vertex, "a Vertex without a time among Timing's")
+                raise NotExpressibleError(vertex, "a Vertex without a time among Timing's")
             builder.put(point, "has_time", builder.now(vertex.time, vertex))
         if k == 0 and start is not None and same_place(vertex.position, start[1]):
             builder.put(point, "has_position", start[0])
@@ -291,14 +293,14 @@ def _vertices(
     if isinstance(line, osc.Polyline):
         return line.vertices
     if not isinstance(line, osc.Nurbs):
-        raise UnsayableError(line, type(line).__name__)
+        raise NotExpressibleError(line, type(line).__name__)
     points, order = line.control_points, round(builder.now(line.order, line))
     weights = [builder.now(point.weight, point) for point in points if point.weight is not None]
     knots = [builder.now(knot.value, knot) for knot in line.knots]
     if any(weight != weights[0] for weight in weights) or 0 < len(weights) < len(points):
-        raise UnsayableError(line, "a Nurbs whose weights differ")
+        raise NotExpressibleError(line, "a Nurbs whose weights differ")
     if len(knots) != len(points) + order or order > len(points) or not is_uniform(knots, order):
-        raise UnsayableError(line, "a Nurbs whose knots are not uniform between its ends")
+        raise NotExpressibleError(line, "a Nurbs whose knots are not uniform between its ends")
     builder.put(trajectory, "has_spline_order", order)
     return points
 
@@ -315,10 +317,10 @@ def add_route(
         start: of the participant, which the first waypoint may be.
 
     Raises:
-        UnsayableError: it has more waypoints, or one of them no place.
+        NotExpressibleError: it has more waypoints, or one of them no place.
     """
     if len(route.waypoints) != 2:
-        raise UnsayableError(route, f"a Route of {len(route.waypoints)} waypoints")
+        raise NotExpressibleError(route, f"a Route of {len(route.waypoints)} waypoints")
     first, last = (waypoint.position for waypoint in route.waypoints)
     node = builder.node(f"{name}_route", "Route")
     if start is not None and same_place(first, start[1]):
@@ -340,7 +342,7 @@ def _global(
         node = builder.node(name, "EnvironmentAction")
         weather = add_weather(builder, action.environment, event)
         if weather is None:
-            raise UnsayableError(action, "an EnvironmentAction that sets no weather")
+            raise NotExpressibleError(action, "an EnvironmentAction that sets no weather")
         builder.put(node, "has_weather", weather)
         return node
     if isinstance(action, osc.EntityAction):
@@ -354,10 +356,10 @@ def _global(
         builder.put(node, "has_entity_ref", entity)
         return node
     if not isinstance(action, osc.InfrastructureAction):
-        raise UnsayableError(action, type(action).__name__)
+        raise NotExpressibleError(action, type(action).__name__)
     set_ = action.traffic_signal_action.action
     if not isinstance(set_, osc.TrafficSignalStateAction):
-        raise UnsayableError(set_, type(set_).__name__)
+        raise NotExpressibleError(set_, type(set_).__name__)
     node = builder.node(name, "TrafficSignalStateAction")
     builder.put(node, "has_signal", builder.light(set_.name, set_))
     builder.put(node, "has_signal_state", signal_state(builder, set_.state, set_))
@@ -368,11 +370,11 @@ def signal_state(builder: StoryBuilder, state: str | osc.ParameterRef, element: 
     """Return the state that a light's lamps show.
 
     Raises:
-        UnsayableError: none that the ontology knows.
+        NotExpressibleError: none that the ontology knows.
     """
     found = _STATES.get(builder.text(state))
     if found is None:
         known = ", ".join(_STATES)
         what = type(element).__name__
-        raise UnsayableError(element, f'state="{state}" of {what} (other than {known})')
+        raise NotExpressibleError(element, f'state="{state}" of {what} (other than {known})')
     return found

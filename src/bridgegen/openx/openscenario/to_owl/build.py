@@ -44,7 +44,7 @@ class Lost(NamedTuple):
     is_detail: bool = False
 
 
-class UnsayableError(Exception):
+class NotExpressibleError(Exception):
     """Something for which the ontology has no words.
 
     Args:
@@ -155,7 +155,7 @@ class StoryBuilder(Builder):
         mark = self.mark()
         try:
             yield
-        except UnsayableError as error:
+        except NotExpressibleError as error:
             self.problems.append(error.lost)
             self.take_back(mark)
 
@@ -183,25 +183,27 @@ class StoryBuilder(Builder):
         """Return a number, at the parameters' values.
 
         Raises:
-            UnsayableError: it is not finite.
+            NotExpressibleError: it is not finite.
         """
         if isinstance(value, osc.ParameterRef | osc.Expr):
             value = value.resolve(self.numbers)
         number = float(value)
         if not math.isfinite(number):
-            raise UnsayableError(element, f"the number {number} in {type(element).__name__}")
+            raise NotExpressibleError(element, f"the number {number} in {type(element).__name__}")
         return number
 
     def number(self, node: ox.NamedNode, name: str, value: Any, element: Element) -> None:
         """State a number; one that a parameter gives is bound to it.
 
         Raises:
-            UnsayableError: not finite, or out of the property's range; an expression of parameters,
+            NotExpressibleError: not finite, out of the property's range; or an expression,
                 unless its value will do.
         """
         value = simplest(value)
         if isinstance(value, osc.Expr) and value.names and not self.in_substance:
-            raise UnsayableError(element, f"the expression {value} in {type(element).__name__}")
+            raise NotExpressibleError(
+                element, f"the expression {value} in {type(element).__name__}"
+            )
         number = self.now(value, element)
         self.check(name, number, element)
         if isinstance(value, osc.ParameterRef):
@@ -215,12 +217,12 @@ class StoryBuilder(Builder):
         """Make sure that a property may have a value.
 
         Raises:
-            UnsayableError: it must be above some number, and is not.
+            NotExpressibleError: it must be above some number, and is not.
         """
         least = tbox().above.get(name)
         if least is not None and not number > least:
             what, unit = name.removeprefix("has_"), tbox().units.get(name, "1")
-            raise UnsayableError(
+            raise NotExpressibleError(
                 element, f"a {what} [{unit}] of {number!r} in {type(element).__name__}"
             )
 
@@ -235,24 +237,26 @@ class StoryBuilder(Builder):
         """Return the individual of an entity.
 
         Raises:
-            UnsayableError: there is none.
+            NotExpressibleError: there is none.
         """
         found = self.cast.get(self.text(name))
         if found is None:
             what = type(element).__name__
-            raise UnsayableError(element, f"{what} of {name}, an entity that is not stated")
+            raise NotExpressibleError(element, f"{what} of {name}, an entity that is not stated")
         return found
 
     def light(self, name: osc.ParameterRef | str, element: Element) -> ox.NamedNode:
         """Return the individual of a traffic light.
 
         Raises:
-            UnsayableError: the map has none of that id.
+            NotExpressibleError: the map has none of that id.
         """
         found = self._lights.get(self.text(name))
         if found is None:
             what = type(element).__name__
-            raise UnsayableError(element, f"{what} of {name}, a traffic light that the map lacks")
+            raise NotExpressibleError(
+                element, f"{what} of {name}, a traffic light that the map lacks"
+            )
         return found
 
 
@@ -312,7 +316,7 @@ _REFERRING = (
 T = TypeVar("T")
 
 
-def said_or_quoted(
+def state_or_quote(
     builder: StoryBuilder,
     name: str,
     cls: str,
@@ -331,7 +335,7 @@ def said_or_quoted(
         quote: makes the same of the individual if it is quoted.
 
     Raises:
-        UnsayableError: it can be neither said nor quoted, or is to be said in words only.
+        NotExpressibleError: it can be neither said nor quoted, or is to be said in words only.
     """
     if not builder.in_substance:
         return say()
@@ -340,13 +344,13 @@ def said_or_quoted(
     kept = builder.mark()
     try:
         return say()
-    except UnsayableError as error:
+    except NotExpressibleError as error:
         if error.lost.is_detail:
             raise
         builder.take_back(kept)
         try:
             return quote(quoted(builder, name, cls, element))
-        except UnsayableError:
+        except NotExpressibleError:
             raise error from None
 
 
@@ -357,33 +361,33 @@ def node_of(
     element: Element,
     say: Callable[[], ox.NamedNode],
 ) -> ox.NamedNode:
-    """Return the individual of an element; see `said_or_quoted`."""
-    return said_or_quoted(builder, name, cls, element, say, lambda node: node)
+    """Return the individual of an element; see `state_or_quote`."""
+    return state_or_quote(builder, name, cls, element, say, lambda node: node)
 
 
 def quoted(builder: StoryBuilder, name: str, cls: str, element: Element) -> ox.NamedNode:
     """Return the individual of an element in OpenSCENARIO's words.
 
     Raises:
-        UnsayableError: it names parts of the file that are not kept, or has no finite value.
+        NotExpressibleError: it names parts of the file that are not kept, or has no finite value.
     """
     try:
         plain = part_resolved(element, builder.scenario_file, "document")
         plain = rewritten(plain, partial(_renamed, builder))
     except InputError:
-        raise UnsayableError(element, f"a value of {type(element).__name__}") from None
+        raise NotExpressibleError(element, f"a value of {type(element).__name__}") from None
     for item in walk(plain):
         variable = getattr(item, "variable_ref", None)
         if isinstance(item, _REFERRING) or (variable and variable not in builder.variables):
-            raise UnsayableError(element, type(item).__name__)
+            raise NotExpressibleError(element, type(item).__name__)
         for attribute, value in values_of(item):
             if attribute.is_entity and str(value) not in builder.entities:
                 what = type(item).__name__
-                raise UnsayableError(item, f"{what} of {value}, an entity that is not stated")
+                raise NotExpressibleError(item, f"{what} of {value}, an entity that is not stated")
     try:
         text = fragment_of(plain)
     except (TypeError, ValueError):
-        raise UnsayableError(element, type(element).__name__) from None
+        raise NotExpressibleError(element, type(element).__name__) from None
     node = builder.node(name, cls)
     builder.put(node, "has_openscenario", text)
     return node
@@ -393,7 +397,7 @@ def _renamed(builder: StoryBuilder, element: Element) -> Element:
     """Return an element that calls a part of the storyboard as it will be called.
 
     Raises:
-        UnsayableError: the part will not be there, or several have its name.
+        NotExpressibleError: the part will not be there, or several have its name.
     """
     if not isinstance(element, osc.StoryboardElementStateCondition):
         return element
@@ -401,7 +405,7 @@ def _renamed(builder: StoryBuilder, element: Element) -> Element:
     found = builder.element_names.get((kind, name))
     if not found:
         what = f"StoryboardElementStateCondition on {element.state} of the {kind} {name}"
-        raise UnsayableError(element, what)
+        raise NotExpressibleError(element, what)
     if kind == "event":
         builder.referred.add(found)
     return replace(element, storyboard_element_ref=found)

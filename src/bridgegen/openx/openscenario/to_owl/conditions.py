@@ -8,10 +8,10 @@ from bridgegen.openx.openscenario.from_owl.events import USUAL_RULES
 from bridgegen.openx.openscenario.to_owl.actions import put_place, signal_state
 from bridgegen.openx.openscenario.to_owl.build import (
     CONDITION,
+    NotExpressibleError,
     StoryBuilder,
-    UnsayableError,
     numbered,
-    said_or_quoted,
+    state_or_quote,
 )
 
 Relative = osc.RelativeDistanceCondition | osc.TimeHeadwayCondition | osc.TimeToCollisionCondition
@@ -33,7 +33,7 @@ def add_trigger(
     """Add the trigger of an event; without one it happens at the start.
 
     Raises:
-        UnsayableError: a condition that the ontology has no words for, or no condition at all.
+        NotExpressibleError: a condition that the ontology has no words for, or no condition at all.
     """
     node = builder.node(f"{event}_trigger", "Trigger")
     if trigger is None:
@@ -43,7 +43,7 @@ def add_trigger(
         return node
     groups = trigger.condition_groups
     if not groups:
-        raise UnsayableError(trigger, f"the event {event}, which never happens,")
+        raise NotExpressibleError(trigger, f"the event {event}, which never happens,")
     for number, group in zip(numbered(len(groups)), groups, strict=True):
         name = f"{event}_condition_{number}"
         builder.put(node, "has_condition", _add_group(builder, name, actors, group))
@@ -66,7 +66,7 @@ def _add_group(
 def _add_condition(
     builder: StoryBuilder, name: str, actors: tuple[str, ...], wrapped: osc.Condition
 ) -> ox.NamedNode:
-    node, is_quoted = said_or_quoted(
+    node, is_quoted = state_or_quote(
         builder,
         name,
         CONDITION,
@@ -100,7 +100,7 @@ def _stated(
         builder.put(node, "has_signal", builder.light(condition.name, condition))
         builder.put(node, "has_signal_state", signal_state(builder, condition.state, condition))
     elif not isinstance(condition, osc.StoryboardElementStateCondition):
-        raise UnsayableError(condition, type(condition).__name__)
+        raise NotExpressibleError(condition, type(condition).__name__)
     else:
         kind = builder.text(condition.storyboard_element_type)
         event = builder.text(condition.storyboard_element_ref)
@@ -108,7 +108,7 @@ def _stated(
         state = builder.text(condition.state)
         known = ("completeState", "startTransition")
         if kind != "event" or state not in known or event not in builder.events:
-            raise UnsayableError(
+            raise NotExpressibleError(
                 condition, f"StoryboardElementStateCondition on {state} of the {kind} {event}"
             )
         builder.referred.add(event)
@@ -124,19 +124,19 @@ def _by_entity(
 ) -> ox.NamedNode:
     refs = wrapped.triggering_entities.entity_refs
     if len(refs) != 1:
-        raise UnsayableError(
+        raise NotExpressibleError(
             wrapped.triggering_entities, f"a condition on {len(refs)} TriggeringEntities"
         )
     condition = wrapped.entity_condition.condition
     if not isinstance(condition, _SAYABLE):
-        raise UnsayableError(condition, type(condition).__name__)
+        raise NotExpressibleError(condition, type(condition).__name__)
     node = builder.node(name, type(condition).__name__)
     subject = builder.entity(refs[0].entity_ref, refs[0])
     if actors != (builder.text(refs[0].entity_ref),):
         builder.put(node, "has_subject", subject)
     if isinstance(condition, osc.CollisionCondition):
         if not isinstance(condition.target, osc.EntityRef):
-            raise UnsayableError(condition.target, "ByType")
+            raise NotExpressibleError(condition.target, "ByType")
         builder.put(
             node, "has_entity_ref", builder.entity(condition.target.entity_ref, condition.target)
         )
@@ -162,7 +162,7 @@ def _other(builder: StoryBuilder, relative: Relative) -> str | osc.ParameterRef:
     """Return the entity that a condition measures to, in the one way that the ontology defines.
 
     Raises:
-        UnsayableError: another distance, other axes, between boxes, or to a position.
+        NotExpressibleError: another distance, other axes, between boxes, or to a position.
     """
     if _is_gap(builder, relative):
         assert isinstance(relative, osc.RelativeDistanceCondition)
@@ -173,16 +173,18 @@ def _other(builder: StoryBuilder, relative: Relative) -> str | osc.ParameterRef:
         osc.RelativeDistanceType.EUCLIDIAN_DISTANCE,
         osc.RelativeDistanceType.CARTESIAN_DISTANCE,
     ):
-        raise UnsayableError(relative, f'relativeDistanceType="{distance}" of {what}')
+        raise NotExpressibleError(relative, f'relativeDistanceType="{distance}" of {what}')
     if axes is not None and builder.text(axes) != osc.CoordinateSystem.ENTITY:
-        raise UnsayableError(relative, f'coordinateSystem="{axes}" of {what}')
+        raise NotExpressibleError(relative, f'coordinateSystem="{axes}" of {what}')
     if relative.freespace is not False:
-        raise UnsayableError(relative, f'freespace="{str(relative.freespace).lower()}" of {what}')
+        raise NotExpressibleError(
+            relative, f'freespace="{str(relative.freespace).lower()}" of {what}'
+        )
     if not isinstance(relative, osc.TimeToCollisionCondition):
         return relative.entity_ref
     target = relative.target.target
     if not isinstance(target, osc.EntityRef):
-        raise UnsayableError(target, "TimeToCollisionCondition with a Position")
+        raise NotExpressibleError(target, "TimeToCollisionCondition with a Position")
     return target.entity_ref
 
 

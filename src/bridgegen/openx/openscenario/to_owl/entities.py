@@ -17,10 +17,10 @@ from bridgegen.openx.openscenario.to_owl.actions import (
 from bridgegen.openx.openscenario.to_owl.build import (
     ACTION,
     Lost,
+    NotExpressibleError,
     StoryBuilder,
-    UnsayableError,
     numbered,
-    said_or_quoted,
+    state_or_quote,
 )
 from bridgegen.openx.openscenario.to_owl.differences import is_detail
 from bridgegen.openx.openscenario.to_owl.lights import known_light
@@ -55,7 +55,7 @@ def add_participant(
         actions: its own of the storyboard's Init.
 
     Raises:
-        UnsayableError: it is of a kind without a class, or starts nowhere.
+        NotExpressibleError: it is of a kind without a class, or starts nowhere.
     """
     name = builder.text(scenario_object.name)
     node = _add_body(
@@ -105,7 +105,7 @@ def add_begun(
     for number, wrapped in zip(numbered(len(left)), left, strict=True):
         with builder.attempt():
             done = f"{name}_init_{number}"
-            link, found = said_or_quoted(
+            link, found = state_or_quote(
                 builder,
                 done,
                 ACTION,
@@ -124,11 +124,11 @@ def add_element(
     """Add a cone or a sign of road works, at its place.
 
     Raises:
-        UnsayableError: it is none, or stands nowhere.
+        NotExpressibleError: it is none, or stands nowhere.
     """
     name, body = builder.text(scenario_object.name), scenario_object.entity_object
     if not isinstance(body, osc.MiscObject):
-        raise UnsayableError(body, f"{type(body).__name__} {name} at road works")
+        raise NotExpressibleError(body, f"{type(body).__name__} {name} at road works")
     category = builder.choice(osc.MiscObjectCategory, body.misc_object_category)
     named = _ROAD_WORKS.get(builder.text(body.name))
     kind = named or _FURNITURE.get(category, PARTICIPANTS["cone"])
@@ -147,14 +147,14 @@ Body = osc.Vehicle | osc.Pedestrian | osc.MiscObject | osc.ExternalObjectReferen
 
 def _class_of(builder: StoryBuilder, body: Body) -> str:
     if isinstance(body, osc.ExternalObjectReference):
-        raise UnsayableError(body, f"the ExternalObjectReference {body.name}")
+        raise NotExpressibleError(body, f"the ExternalObjectReference {body.name}")
     if isinstance(body, osc.MiscObject):
         return PARTICIPANTS["obstacle"].owl_class
     kind = kind_of(body, builder.text)
     if kind is None:
         assert isinstance(body, osc.Vehicle)  # every Pedestrian has one
         category = builder.choice(osc.VehicleCategory, body.vehicle_category)
-        raise UnsayableError(body, f"a Vehicle of the category {category}")
+        raise NotExpressibleError(body, f"a Vehicle of the category {category}")
     return kind.owl_class
 
 
@@ -163,7 +163,7 @@ def _add_body(
 ) -> ox.NamedNode:
     body, now = scenario_object.entity_object, builder.now
     if isinstance(body, osc.ExternalObjectReference):
-        raise UnsayableError(body, f"the ExternalObjectReference {body.name}")
+        raise NotExpressibleError(body, f"the ExternalObjectReference {body.name}")
     box = body.bounding_box
     values = {
         "has_box_length": now(box.dimensions.length, box.dimensions),
@@ -176,7 +176,7 @@ def _add_body(
     if isinstance(body, osc.Vehicle):
         limits, axles = body.performance, body.axles
         if axles.front is None:
-            raise UnsayableError(axles, f"the Vehicle {name} without a FrontAxle")
+            raise NotExpressibleError(axles, f"the Vehicle {name} without a FrontAxle")
         values |= {
             "has_wheelbase": now(axles.front.position_x, axles.front)
             - now(axles.rear.position_x, axles.rear),
@@ -209,13 +209,15 @@ def as_number(
     """Return the finite number of a property.
 
     Raises:
-        UnsayableError: it has none.
+        NotExpressibleError: it has none.
     """
     said = builder.text(text)
     try:
         return builder.now(float(said), element)
     except ValueError:
-        raise UnsayableError(element, f"a Property that must be a number, '{said[:40]}',") from None
+        raise NotExpressibleError(
+            element, f"a Property that must be a number, '{said[:40]}',"
+        ) from None
 
 
 def _add_controller(
@@ -240,7 +242,7 @@ def _teleport(
     for wrapped in actions:
         if isinstance(wrapped.action, osc.TeleportAction):
             return wrapped.action
-    raise UnsayableError(
+    raise NotExpressibleError(
         scenario_object, f"the entity {scenario_object.name} without an initial TeleportAction"
     )
 
@@ -261,7 +263,7 @@ def _init(
     if isinstance(action, _AS_IN_EVENTS) or known_light(action, builder.text):
         return "has_init_action", add_action(builder, name, done, (name,), wrapped)
     if kind in begun:
-        raise UnsayableError(wrapped, f"a second initial {kind.__name__} of {name}")
+        raise NotExpressibleError(wrapped, f"a second initial {kind.__name__} of {name}")
     begun.add(kind)
     if isinstance(action, osc.SpeedAction):
         speed = builder.node(f"{name}_init_speed", "SpeedAction")
@@ -273,4 +275,4 @@ def _init(
         return "has_init_action", follow
     if isinstance(action, osc.AssignRouteAction):
         return "has_route", add_route(builder, name, action.route, start)
-    raise UnsayableError(wrapped, f"an initial {kind.__name__}", is_detail=is_detail(action))
+    raise NotExpressibleError(wrapped, f"an initial {kind.__name__}", is_detail=is_detail(action))

@@ -21,8 +21,8 @@ from bridgegen.openx.openscenario.from_owl.notes import CHANGES
 from bridgegen.openx.openscenario.to_owl.actions import add_action
 from bridgegen.openx.openscenario.to_owl.build import (
     Lost,
+    NotExpressibleError,
     StoryBuilder,
-    UnsayableError,
     numbered,
     plain_name,
 )
@@ -234,7 +234,7 @@ def _attempt(
 def _add_event(builder: StoryBuilder, happening: Happening) -> None:
     actors = happening.group.actors
     if actors.select_triggering_entities is not False:
-        raise UnsayableError(actors, "Actors by selectTriggeringEntities")
+        raise NotExpressibleError(actors, "Actors by selectTriggeringEntities")
     nodes = {
         builder.text(ref.entity_ref): builder.entity(ref.entity_ref, ref)
         for ref in actors.entity_refs
@@ -259,7 +259,7 @@ def _add_event(builder: StoryBuilder, happening: Happening) -> None:
     builder.put(node, "has_name", happening.name)
     if happening.act is not None:
         if (act := builder.acts.get(builder.text(happening.act.name))) is None:
-            raise UnsayableError(
+            raise NotExpressibleError(
                 happening.act, f"the Act {happening.act.name}, which starts later,"
             )
         builder.put(node, "in_act", act)
@@ -311,16 +311,16 @@ def _add_change(
     first = next(iter(facts.values()))[0]
     cls = builder.text(facts["class"][0].value) if facts.get("class") else ""
     if cls not in CHANGES:
-        raise UnsayableError(first, f"the temporary change {name} of the class '{cls}'")
+        raise NotExpressibleError(first, f"the temporary change {name} of the class '{cls}'")
     if name in builder.events:
-        raise UnsayableError(first, f"a second event of the name {name}")
+        raise NotExpressibleError(first, f"a second event of the name {name}")
     node = builder.node(name, cls)
     builder.put(node, "has_name", name)
     for link in ("who", "element"):
         for property_ in facts.get(link, ()):
             target = builder.text(property_.value)
             if (link == "element") != (elements.get(target) == name):
-                raise UnsayableError(property_, f"{target} as {link} of {name}")
+                raise NotExpressibleError(property_, f"{target} as {link} of {name}")
             builder.put(node, f"has_{link}", builder.entity(property_.value, property_))
     for link in ("on_lane", "closes_lane"):
         for property_ in facts.get(link, ()):
@@ -328,7 +328,7 @@ def _add_change(
     for property_ in facts.get("on_road", ()):
         road_id = builder.text(property_.value)
         if road_id not in builder.roads.roads_by_id:
-            raise UnsayableError(property_, f"the road {road_id}, which the map lacks,")
+            raise NotExpressibleError(property_, f"the road {road_id}, which the map lacks,")
         builder.put(node, "on_road", builder.iri(road_name(road_id)))
     for property_ in facts.get("time", ())[:1]:
         builder.put(node, "has_time", as_number(builder, property_.value, property_))
@@ -344,4 +344,6 @@ def _lane(builder: StoryBuilder, property_: osc.Property) -> ox.NamedNode:
         lane_at(road, int(lane_id), s)
         return builder.iri(lane_name(road.id, section_index(road, s), int(lane_id)))
     except (ValueError, InputError):
-        raise UnsayableError(property_, f"the lane '{text[:40]}', which the map lacks,") from None
+        raise NotExpressibleError(
+            property_, f"the lane '{text[:40]}', which the map lacks,"
+        ) from None

@@ -14,7 +14,7 @@ from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.declarations import ROAD_END, SEVERITY, TIME_STEP
 from bridgegen.openx.openscenario.from_owl.notes import EVENT, FINDINGS, PARAMETER, SIGNALS
 from bridgegen.openx.openscenario.parameters import refers
-from bridgegen.openx.openscenario.to_owl.build import StoryBuilder, UnsayableError
+from bridgegen.openx.openscenario.to_owl.build import NotExpressibleError, StoryBuilder
 from bridgegen.openx.openscenario.to_owl.entities import as_number
 from bridgegen.scenario.language.parameters import Axis
 from bridgegen.scenario.ontology.vocabulary import bg, tbox
@@ -168,7 +168,7 @@ def _said(
     fact = facts[what][0]
     text = builder.text(fact.value)
     if what == "axis" and text not in [axis.value for axis in Axis if axis != Axis.STATIC]:
-        raise UnsayableError(fact, f"the axis '{text}' of a parameter")
+        raise NotExpressibleError(fact, f"the axis '{text}' of a parameter")
     return text
 
 
@@ -197,14 +197,14 @@ def _check_clear(
     The ontology binds an individual to a parameter and the parameter to properties.
 
     Raises:
-        UnsayableError: an individual has one of its properties from the parameter, another not.
+        NotExpressibleError: an individual has one property from the parameter, another not.
     """
     if len(bound) < 2 or declaration is None:
         return
     owned = {node for nodes in bound.values() for node in nodes}
     taken = set(free)
     if any((node, property_name) in taken for node in owned for property_name in bound):
-        raise UnsayableError(
+        raise NotExpressibleError(
             declaration,
             f"the parameter {name}, which gives {' and '.join(sorted(bound))} by turns,",
         )

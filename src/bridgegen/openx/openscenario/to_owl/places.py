@@ -20,8 +20,8 @@ from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.from_owl.entities import RADIANS
 from bridgegen.openx.openscenario.to_owl.build import (
     POSITION,
+    NotExpressibleError,
     StoryBuilder,
-    UnsayableError,
     node_of,
     shortest,
     simplest,
@@ -45,7 +45,7 @@ def add_position(builder: StoryBuilder, name: str, position: osc.Position) -> ox
         position: on a lane of the map, or a point of the world.
 
     Raises:
-        UnsayableError: it is off the map, or given by an expression that is no distance.
+        NotExpressibleError: it is off the map, or given by an expression that is no distance.
     """
     where = position.position
     if isinstance(where, osc.LanePosition) and _is_off(builder, where):
@@ -58,7 +58,7 @@ def _is_off(builder: StoryBuilder, where: osc.LanePosition) -> bool:
     try:
         road, lane_id = _lane_of(builder, where)
         lane_at(road, lane_id, builder.now(where.s, where))
-    except (InputError, UnsayableError):
+    except (InputError, NotExpressibleError):
         return True
     return False
 
@@ -68,13 +68,13 @@ def _position(builder: StoryBuilder, name: str, position: osc.Position) -> ox.Na
     if isinstance(where, osc.WorldPosition):
         return _world_position(builder, name, where)
     if not isinstance(where, osc.LanePosition):
-        raise UnsayableError(where, type(where).__name__)
+        raise NotExpressibleError(where, type(where).__name__)
     road, lane_id = _lane_of(builder, where)
     now = builder.now(where.s, where)
     try:
         lane_at(road, lane_id, now)
     except InputError as error:
-        raise UnsayableError(where, f"a LanePosition off the map: {error}") from None
+        raise NotExpressibleError(where, f"a LanePosition off the map: {error}") from None
     _check_orientation(where)
     node = builder.node(name, "LanePosition")
     lane = lane_name(road.id, section_index(road, now), lane_id)
@@ -102,9 +102,9 @@ def _lane_of(builder: StoryBuilder, where: osc.LanePosition) -> tuple[Road, int]
         road = builder.roads.road(builder.text(where.road_id))
         return road, int(builder.text(where.lane_id))
     except InputError as error:
-        raise UnsayableError(where, f"a LanePosition off the map: {error}") from None
+        raise NotExpressibleError(where, f"a LanePosition off the map: {error}") from None
     except ValueError:
-        raise UnsayableError(where, f'laneId="{where.lane_id}" of LanePosition') from None
+        raise NotExpressibleError(where, f'laneId="{where.lane_id}" of LanePosition') from None
 
 
 def _check_orientation(where: osc.LanePosition) -> None:
@@ -112,7 +112,7 @@ def _check_orientation(where: osc.LanePosition) -> None:
     if turned is None or turned.type is osc.ReferenceContext.RELATIVE:
         return
     if any(value is not None for value in (turned.h, turned.p, turned.r)):
-        raise UnsayableError(turned, "an Orientation that is not relative to its lane")
+        raise NotExpressibleError(turned, "an Orientation that is not relative to its lane")
 
 
 def _in_degrees(builder: StoryBuilder, turned: osc.Orientation) -> Any:
@@ -120,7 +120,7 @@ def _in_degrees(builder: StoryBuilder, turned: osc.Orientation) -> Any:
     if isinstance(turned.h, osc.Expr) and (found := _TURNED.fullmatch(turned.h.text)):
         return osc.ParameterRef(f"${found['name']}")
     if isinstance(turned.h, osc.ParameterRef | osc.Expr) and not builder.in_substance:
-        raise UnsayableError(
+        raise NotExpressibleError(
             turned, f'h="{turned.h}" of Orientation, which must read ${{($name)*{RADIANS}}}'
         )
     now = builder.now(turned.h, turned)
@@ -144,7 +144,7 @@ def _distance(builder: StoryBuilder, road: Road, where: osc.LanePosition, now: f
             return osc.ParameterRef(f"${found['name']}")
     if isinstance(s, osc.ParameterRef | osc.Expr) and not builder.in_substance:
         wanted = f"${{{known!r}-($name)}}" if against else f"${{($name)-{known!r}}}"
-        raise UnsayableError(where, f's="{s}" of LanePosition, which must read {wanted} there')
+        raise NotExpressibleError(where, f's="{s}" of LanePosition, which must read {wanted} there')
 
     def station(distance: float) -> float:
         if not before <= distance <= total:
@@ -160,7 +160,7 @@ def _mirrored(builder: StoryBuilder, where: osc.LanePosition) -> Any:
     if isinstance(offset, osc.Expr) and (found := _MIRRORED.fullmatch(offset.text)):
         return osc.ParameterRef(f"${found['name']}")
     if isinstance(offset, osc.ParameterRef | osc.Expr) and not builder.in_substance:
-        raise UnsayableError(
+        raise NotExpressibleError(
             where, f'offset="{offset}" of LanePosition, which must read ${{-($name)}} on this lane'
         )
     return -builder.now(offset, where)

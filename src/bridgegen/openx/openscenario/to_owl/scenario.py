@@ -39,8 +39,8 @@ from bridgegen.openx.openscenario.to_owl.actions import signal_state
 from bridgegen.openx.openscenario.to_owl.build import (
     ACTION,
     Lost,
+    NotExpressibleError,
     StoryBuilder,
-    UnsayableError,
     numbered,
     quoted,
 )
@@ -86,10 +86,10 @@ def add_controllers(builder: StoryBuilder, network: ox.NamedNode, said: Facts) -
         name = builder.text(controller.name)
         with builder.attempt():
             if name in done:
-                raise UnsayableError(controller, f"a second TrafficSignalController {name}")
+                raise NotExpressibleError(controller, f"a second TrafficSignalController {name}")
             lights = _add_controller(builder, network, name, controller, said.get(name, {}))
             if switched & lights:
-                raise UnsayableError(
+                raise NotExpressibleError(
                     controller, f"a second TrafficSignalController of {min(lights)}"
                 )
             switched |= lights
@@ -110,7 +110,7 @@ def _add_controller(
     passed = facts.get("offset")
     offset = as_number(builder, passed[0].value, passed[0]) if passed else 0.0
     if not controller.phases:
-        raise UnsayableError(controller, f"the TrafficSignalController {name} without a Phase")
+        raise NotExpressibleError(controller, f"the TrafficSignalController {name} without a Phase")
     shown = [
         {builder.text(state.traffic_signal_id): state for state in phase.traffic_signal_states}
         for phase in controller.phases
@@ -121,14 +121,18 @@ def _add_controller(
     if passed is not None and not 0.0 <= offset < builder.now(
         controller.phases[0].duration, controller
     ):
-        raise UnsayableError(passed[0], f"an offset of {offset!r} s, not within the first Phase,")
+        raise NotExpressibleError(
+            passed[0], f"an offset of {offset!r} s, not within the first Phase,"
+        )
     builder.put(node, "has_offset", offset)
     for number, (phase, states) in enumerate(zip(controller.phases, shown, strict=True), start=1):
         if set(states) != lights:
-            raise UnsayableError(phase, "a Phase that does not state every light of its controller")
+            raise NotExpressibleError(
+                phase, "a Phase that does not state every light of its controller"
+            )
         duration = builder.now(phase.duration, phase)
         if duration <= 0.0:
-            raise UnsayableError(phase, f"a Phase of {duration!r} s")
+            raise NotExpressibleError(phase, f"a Phase of {duration!r} s")
         part = builder.node(f"{name}_phase_{number}", "SignalPhase")
         builder.put(node, "has_phase", part)
         builder.put(part, "has_index", number)
@@ -137,7 +141,7 @@ def _add_controller(
         for light, state in states.items():
             said = signal_state(builder, state.state, state)
             if said not in _LINK_OF:
-                raise UnsayableError(state, f"a Phase in which a light is {said}")
+                raise NotExpressibleError(state, f"a Phase in which a light is {said}")
             link = _LINK_OF[said]
             if link is not None:
                 builder.put(part, link, builder.light(light, state))

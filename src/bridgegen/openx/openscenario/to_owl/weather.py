@@ -13,7 +13,7 @@ import pyoxigraph as ox
 
 from bridgegen.openx.openscenario import cloudiness
 from bridgegen.openx.openscenario import model as osc
-from bridgegen.openx.openscenario.to_owl.build import StoryBuilder, UnsayableError, shortest
+from bridgegen.openx.openscenario.to_owl.build import NotExpressibleError, StoryBuilder, shortest
 from bridgegen.scenario.language.expression import parse
 from bridgegen.scenario.weather import PARAMETERS, PARTS, PHYSICAL, Parameter
 
@@ -52,7 +52,7 @@ def add_weather(
         event: that brings it; empty for the scenario's own.
 
     Raises:
-        UnsayableError: an original that is no number.
+        NotExpressibleError: an original that is no number.
     """
     own = _originals(builder, environment.road_condition)
     found: dict[str, dict[str, Any]] = {}
@@ -109,7 +109,7 @@ def _originals(builder: StoryBuilder, road: osc.RoadCondition | None) -> dict[st
         try:
             found[name] = builder.now(float(builder.text(property_.value)), property_)
         except ValueError:
-            raise UnsayableError(
+            raise NotExpressibleError(
                 property_, f"the Property {name}, which must be a number,"
             ) from None
     return found

@@ -42,9 +42,9 @@ from bridgegen.simulation.embedded.drivers import (
     ask,
     code_of,
 )
-from bridgegen.simulation.embedded.own_drivers.lock_step import Note, Wheel, drive_in_lock_step
-from bridgegen.simulation.embedded.own_drivers.shared_arrays import Layout, SharedArrays, seen
 from bridgegen.simulation.embedded.program import Program
+from bridgegen.simulation.embedded.user_drivers.lock_step import Note, Wheel, drive_in_lock_step
+from bridgegen.simulation.embedded.user_drivers.shared_arrays import Layout, SharedArrays, seen
 from bridgegen.simulation.rollout import FAILURES, Rollout, joined
 
 
