@@ -100,8 +100,8 @@ def test_the_file_of_a_table_holds_texts(run, tmp_path):
 
 def test_the_scenario_s_page_names_values_and_angles(tmp_path):
     page = show_scenario(str(EXAMPLE), tmp_path / "page.html").read_text("utf-8")
-    assert '<td class="number">gentle, firm, emergency</td><td class="number">firm</td>' in page
-    assert '<td class="number">300 to 60 deg</td><td class="number">360 deg</td>' in page
+    assert '>gentle, firm, emergency</td><td data-title="default">firm</td>' in page
+    assert '>300 to 60 deg</td><td data-title="default">360 deg</td>' in page
 
 
 def test_a_file_whose_text_varies_is_searched(run, tmp_path):

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from tests.metrics.conftest import drive_around, make_rollout, take_rows
+from tests.metrics.conftest import drive_around, make_rollout
 
 from bridgegen.assess.criteria import Monitor, evaluate, quantity
 from bridgegen.assess.criteria.monitor import LARGEST
@@ -81,7 +81,7 @@ def test_a_row_s_margins_do_not_depend_on_other_rows():
     )  # fmt: skip
     whole = found.margins(rollout)
     for i in range(rollout.shape[0]):
-        assert found.margins(take_rows(rollout, [i])).tobytes() == whole[i : i + 1].tobytes()
+        assert found.margins(rollout.take(np.array([i]))).tobytes() == whole[i : i + 1].tobytes()
 
 
 def test_a_failed_scenario_has_no_margin():

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from tests.metrics.conftest import drive_around, make_rollout, take_rows
+from tests.metrics.conftest import drive_around, make_rollout
 
 from bridgegen.assess.criteria.signals import SIGNALS, read
 
@@ -49,7 +49,7 @@ def test_a_row_s_signals_do_not_depend_on_other_rows():
         whole = read(rollout, name, of)
         for i in range(rollout.shape[0]):
             n = int(rollout.n_steps[i])
-            alone = read(take_rows(rollout, [i]), name, of)
+            alone = read(rollout.take(np.array([i])), name, of)
             assert alone[0, :n].tobytes() == whole[i, :n].tobytes(), name
 
 

@@ -1,7 +1,9 @@
 // The decisive conflict of each row, and the failure mode that it belongs to.
 
 import { data, rows } from "./data.js";
-import { drawn } from "./playbacks.js";
+
+// Fresh random draws that fail, where no evaluation does: no rows of the run, and the first of the kept.
+export const drawn = (data.kept ?? []).filter(({ evaluation }) => evaluation < 0);
 
 // The evaluation that came nearest to harm where no failure is played and the page holds its motion; else null.
 export function nearestToHarm() {

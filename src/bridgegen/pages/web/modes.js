@@ -4,10 +4,10 @@ import { $, NARROW, element } from "./common.js";
 import { anyViolated } from "./criteria_rows.js";
 import { data } from "./data.js";
 import { filters } from "./filters.js";
-import { nearestToHarm } from "./findings.js";
+import { drawn, nearestToHarm } from "./findings.js";
 import { hook } from "./hook.js";
 import { number, shareText } from "./numbers.js";
-import { drawn, minimals } from "./playbacks.js";
+import { minimals } from "./playbacks.js";
 import { addSection } from "./sections.js";
 
 const CAUSES_SAID = {

@@ -35,6 +35,5 @@ class Playbacks {
   }
 }
 
-export const drawn = data.kept.filter(({ evaluation }) => evaluation < 0); // fresh random draws that fail: no rows, and the first of the kept
 export const playbacks = new Playbacks();
 export const minimals = new Packed(data.minimal); // simplest forms of failure modes, by the evaluation that stands for the mode
