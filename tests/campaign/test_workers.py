@@ -47,8 +47,9 @@ def test_processes_find_what_threads_find_whoever_is_killed(
 
     def kill(progress) -> None:
         if progress.evaluations in (40, 120):
-            os.kill(pool.pids[-1], signal.SIGKILL)
-            killed.append(pool.pids[-1])
+            victim = next(pid for pid in reversed(pool.pids) if pid not in killed)
+            os.kill(victim, signal.SIGKILL)
+            killed.append(victim)
 
     run = bg.run_search(
         **SEARCH,
