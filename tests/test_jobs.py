@@ -15,6 +15,7 @@ from bridgegen.base.errors import StorageError
 from bridgegen.cli import jobs as cli_jobs
 from bridgegen.cli import main
 from bridgegen.cli.jobs import JOBS, schema_of
+from bridgegen.cli.terminal.live import JobProgress
 from bridgegen.engine.options import CommonOptions, options_of
 from bridgegen.jobs.frame import Job, Judged, Table, command_of
 from bridgegen.simulation.choice import SimulatorChoice
@@ -229,3 +230,9 @@ def test_what_is_not_known_is_not_judged(job, asked, monkeypatch, tmp_path, caps
     assert 'errors="2"' in junit.read_text()
     assert call(monkeypatch, *words, "--fail-if", "harmm > 3") == 2
     assert "unknown figure of --fail-if 'harmm'" in capsys.readouterr().err
+
+
+def test_what_a_job_says_stays_on_one_line_in_a_file(capsys):
+    text = f"bridgegen: warning: skipped: {'a long name ' * 20}.csv, line 2"
+    JobProgress().callbacks.say(text)
+    assert capsys.readouterr().err == f"{text}\n"

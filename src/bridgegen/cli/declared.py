@@ -1,7 +1,7 @@
 """Options of the command line from the declarations in `bridgegen.engine.options`."""
 
 import inspect
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import wraps
 from inspect import signature
@@ -54,26 +54,8 @@ def with_declared_options(command: Callable[..., None]) -> Callable[..., None]:
 
     Those that are named by their place are its arguments.
     """
-    return with_options(*_names(command))(command)
-
-
-def with_options(*names: str) -> Callable[[Callable[..., None]], Callable[..., None]]:
-    """Give a command some of these options; its parameter ``options`` has the others' defaults."""
-
-    def decorate(command: Callable[..., None]) -> Callable[..., None]:
-        return _with(command, names)
-
-    return decorate
-
-
-def _names(command: Callable[..., None]) -> list[str]:
     kind: type[PipelineOptions] = signature(command).parameters["options"].annotation
-    return [option.name for option in options_of(kind) if option.form.kind is not None]
-
-
-def _with(command: Callable[..., None], names: Collection[str]) -> Callable[..., None]:
-    kind: type[PipelineOptions] = signature(command).parameters["options"].annotation
-    declared = {option.name: option for option in options_of(kind) if option.name in names}
+    declared = {option.name: option for option in options_of(kind) if option.form.kind is not None}
 
     def fold(values: dict[str, Any]) -> PipelineOptions:
         given = {name: value for name, value in values.items() if value is not None}
@@ -84,7 +66,7 @@ def _with(command: Callable[..., None], names: Collection[str]) -> Callable[...,
 
     # Python wants parameters without a default first, and arguments are the only ones.
     places = sorted(declared.items(), key=lambda of: not of[1].is_argument)
-    made = {name: (_annotation(place), _default(place)) for name, place in places}
+    made = {name: (_annotation(option), _default(option)) for name, option in places}
     return expand(command, "options", made, fold)
 
 

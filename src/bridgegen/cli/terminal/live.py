@@ -108,5 +108,7 @@ class JobProgress(Live):
             progress=lambda what, done, total, facts: self.show(
                 what=what, done=done, total=total, facts=facts
             ),
-            say=lambda text: self.console.print(text, markup=False, highlight=False),
+            say=lambda text: self.console.print(
+                text, markup=False, highlight=False, soft_wrap=True
+            ),
         )
