@@ -142,6 +142,14 @@ def test_the_command_judges_and_keeps_statuses(cli, copy):
     assert "fixed, but fails again" in (copy / "dashboard.html").read_text("utf-8")
 
 
+def test_a_run_file_of_several_writes_each_page_in_its_folder(cli, copy, tmp_path):
+    other = shutil.copytree(copy, tmp_path / "other")
+    file = tmp_path / "all.yaml"
+    file.write_text(json.dumps({"runs": {"a": {"folder": str(copy)}, "b": {"folder": "other"}}}))
+    assert cli("dashboard", file)[0] == 0
+    assert all((folder / "dashboard.html").is_file() for folder in (copy, other))
+
+
 def test_without_update_the_file_is_not_touched(cli, copy):
     assert cli("dashboard", copy)[0] == 0
     assert not (copy / FILE).exists()

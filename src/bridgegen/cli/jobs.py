@@ -131,9 +131,9 @@ def _print(result: JobResult, seconds: float, *, as_json: bool) -> None:
 
 
 def run_all(
-    path: Path, runs: list[FiledRun], keys: Mapping[str, Key], command: Any, job: str
+    path: Path, runs: list[FiledRun], keys: Mapping[str, Key], command: Any, job: Job
 ) -> None:
-    """Do the jobs of a run file one after the other, each in a folder of its own.
+    """Do the jobs of a run file one after the other, each in a folder of its own if it has one.
 
     One that fails does not keep the others from running; the exit status is then 2.
     """
@@ -141,7 +141,8 @@ def run_all(
     for run in runs:
         print(f"\n{run.name}", flush=True)
         try:
-            command({"out": Path(job) / path.stem / run.name, **run.values})
+            folder = Path(job.name) / path.stem / run.name
+            command({**({"out": folder} if job.has_folder else {}), **run.values})
         except typer.Exit as ended:
             status = max(status, ended.exit_code)
         except Interrupted:
@@ -162,7 +163,7 @@ def argument_of(job: Job) -> str:
 def _add(job: Job) -> None:
     command = command_of(job)
     if argument := argument_of(job):
-        several = partial(run_all, job=job.name)
+        several = partial(run_all, job=job)
         command = with_run_files(several, job.options, argument)(command)
     command = with_map_folder(WHAT)(command)
     if job is SUITE:

@@ -287,6 +287,7 @@ class Job:
         example: of a fail condition.
         fails: what fails it without conditions, in words; "" for nothing.
         panel: of ``bridgegen --help`` that lists it.
+        has_folder: whether ``--out`` names a folder, of which each run of a run file gets its own.
     """
 
     name: str
@@ -297,6 +298,7 @@ class Job:
     example: str
     fails: str = ""
     panel: str = "Search"
+    has_folder: bool = True
 
     def run(self, options: JobOptions) -> JobResult:
         """Do it."""

@@ -81,4 +81,5 @@ JOB = Job(
     },
     example="new > 0",
     panel="Look at results",
+    has_folder=False,
 )
