@@ -16,6 +16,7 @@ import numpy.typing as npt
 from bridgegen.assess.conflict.harm import NEAR_MISS, Count
 from bridgegen.assess.conflict.quantities import HARM, HARM_ANY
 from bridgegen.assess.criteria import quantity
+from bridgegen.base import elementary
 from bridgegen.base.arrays import Bool, Float, as_float
 from bridgegen.base.errors import InputError, UnknownNameError
 from bridgegen.scenario.language.thresholds import Thresholds
@@ -337,7 +338,7 @@ def entropy_weights(R: npt.ArrayLike) -> Float:
         return np.full(n, 1.0 / n)
     total = np.where(varies, r.sum(axis=0), 1.0)
     p = r / total
-    E = -(p * np.log(np.where(p > 0.0, p, 1.0))).sum(axis=0) / np.log(m)
+    E = -(p * elementary.log(np.where(p > 0.0, p, 1.0))).sum(axis=0) / elementary.log(m)
     information = np.where(varies, np.maximum(1.0 - E, 0.0), 0.0)
     if not information.any():  # all vary by less than rounding can tell
         information = varies.astype(np.float64)

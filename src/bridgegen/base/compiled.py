@@ -3,6 +3,7 @@
 import ctypes
 import gc
 import hashlib
+import struct
 from collections.abc import Callable, Sequence
 from typing import Any, cast
 
@@ -220,6 +221,18 @@ def _called_at(_: Any, address: Any, arrays: Any) -> Any:
     return numba.types.void(address, arrays), generate
 
 
+def _cast(to: Any) -> Callable[..., Any]:
+    """Return an intrinsic that reads the bits of a number as those of one of another type."""
+
+    def cast(_: Any, number: Any) -> Any:
+        def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+            return builder.bitcast(arguments[0], context.get_value_type(to))
+
+        return to(numba.types.float64 if to == numba.types.int64 else numba.types.int64), generate
+
+    return cast
+
+
 DEMAND = numba.types.UniTuple(numba.types.float64, 2)
 """Return type of a kernel that is called by its address: two numbers."""
 
@@ -247,6 +260,50 @@ def _calls_kernel(returns: Any) -> Callable[..., Any]:
         return returns(address, arguments), generate
 
     return call
+
+
+def merged(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Return what calls a kernel of one float64 that returns two; of equal calls, LLVM keeps one.
+
+    A kernel writes its result to memory, so that LLVM cannot tell that a second call is in vain.
+    """
+    if numba.config.DISABLE_JIT:
+        return function
+    number = numba.types.float64
+
+    def call(_: Any, x: Any) -> Any:
+        def generate(context: Any, builder: Any, signature: Any, given: Any) -> Any:
+            found = compile_for_kernels(function, (number,))
+            context.active_code_library.add_linking_library(found.library)
+            kind = context.get_value_type(DEMAND)
+            wrapper = cgutils.get_or_insert_function(
+                builder.module,
+                ir.FunctionType(kind, [given[0].type]),
+                f"merged.{found.fndesc.llvm_func_name}",
+            )
+            if wrapper.is_declaration:
+                wrapper.linkage = "linkonce_odr"
+                for attribute in ("noinline", "nounwind", "readnone"):
+                    wrapper.attributes.add(attribute)
+                inside = ir.IRBuilder(wrapper.append_basic_block())
+                _, answer = context.call_conv.call_function(
+                    inside,
+                    cgutils.get_or_insert_function(
+                        builder.module,
+                        context.call_conv.get_function_type(DEMAND, (number,)),
+                        found.fndesc.llvm_func_name,
+                    ),
+                    DEMAND,
+                    (number,),
+                    wrapper.args,
+                )
+                inside.ret(answer)
+            return builder.call(wrapper, given)
+
+        return DEMAND(number), generate
+
+    intrinsic: Callable[..., Any] = numba.extending.intrinsic(call)
+    return intrinsic
 
 
 def compile_for_kernels(function: Callable[..., Any], kinds: tuple[Any, ...]) -> Any:
@@ -340,6 +397,15 @@ def _row(rows: Any, i: int) -> Any:
     return type(rows)(*(row[i] if isinstance(row, np.ndarray) else row for row in rows))
 
 
+def _bits_of(number: float) -> int:
+    return int.from_bytes(struct.pack(">d", number), signed=True)
+
+
+def _float_of(bits: int) -> float:
+    (number,) = struct.unpack(">d", bits.to_bytes(8, signed=True))
+    return float(number)
+
+
 def call_from_python(address: int, arrays: tuple[np.ndarray, ...]) -> None:
     """Do in Python what ``call_at`` does in a kernel."""
     kinds = [ctypes.c_void_p, ctypes.c_ssize_t] * len(arrays)
@@ -350,8 +416,9 @@ def call_from_python(address: int, arrays: tuple[np.ndarray, ...]) -> None:
 if numba.config.DISABLE_JIT:
     bundled, bundled_row = _itself, _row
     call_at, call_kernel_at, run_kernel_at = call_from_python, _interpreted_at, _interpreted_at
+    bits_of, float_of = _bits_of, _float_of
 else:
-    bundled, bundled_row, call_at, call_kernel_at, run_kernel_at = map(
+    bundled, bundled_row, call_at, call_kernel_at, run_kernel_at, bits_of, float_of = map(
         numba.extending.intrinsic,
         (
             _bundled,
@@ -359,5 +426,7 @@ else:
             _called_at,
             _calls_kernel(DEMAND),
             _calls_kernel(numba.types.none),
+            _cast(numba.types.int64),
+            _cast(numba.types.float64),
         ),
     )

@@ -9,6 +9,7 @@ in the disturbances of UN Regulation 157.
 
 import math
 
+from bridgegen.base import _elementary_kernels as elementary
 from bridgegen.base.compiled import kernel
 from bridgegen.drivers._conflict_kernels import SAME_WAY, STANDS, foot_on_way
 from bridgegen.drivers._path_kernels import COS, SIN
@@ -26,12 +27,12 @@ def place_on_way(path, n, ds, s, reach, own, x, y, h, w, other):
     ``along`` is the other's speed on the way [m/s]. A body that neither goes the ego's way nor
     stands along it has no place, and none is farther than ``reach`` [m].
     """
-    cx, cy = x + other[2] * math.cos(h), y + other[2] * math.sin(h)
+    cx, cy = x + other[2] * elementary.cos(h), y + other[2] * elementary.sin(h)
     station, offset = foot_on_way(path, n, ds, s, reach, cx, cy)
     if offset == math.inf:
         return math.inf, math.inf, math.inf, math.inf, 0.0
     i = min(int(station / ds), n - 1)
-    cosine = math.cos(h) * path[i, COS] + math.sin(h) * path[i, SIN]
+    cosine = elementary.cos(h) * path[i, COS] + elementary.sin(h) * path[i, SIN]
     stands = w < STANDS
     if (abs(cosine) if stands else cosine) <= SAME_WAY:
         return math.inf, math.inf, math.inf, math.inf, 0.0

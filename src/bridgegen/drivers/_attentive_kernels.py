@@ -29,6 +29,7 @@ Sources: UN Regulation 157, 01 series of amendments, annex 3 (reaction, braking,
 
 import math
 
+from bridgegen.base import _elementary_kernels as elementary
 from bridgegen.base.compiled import kernel
 from bridgegen.base.physics import CAREFUL_BRAKING, CAREFUL_JERK, CAREFUL_REACTION
 from bridgegen.drivers._careful_kernels import EASY_TO_STOP
@@ -92,7 +93,7 @@ LEAST_LANE_GAP = STANDSTILL_GAP  # m, to those ahead and behind on the other lan
 def see(k, dt, x, y, h, speed, bodies, lamps, seen):
     """Fill ``seen`` ``(SEEN, E)`` with all bodies at instant k."""
     for o in range(len(speed)):
-        cosine, sine = math.cos(h[o, k]), math.sin(h[o, k])
+        cosine, sine = elementary.cos(h[o, k]), elementary.sin(h[o, k])
         seen[CX, o], seen[CY, o] = x[o, k] + bodies[o, 2] * cosine, y[o, k] + bodies[o, 2] * sine
         seen[C, o], seen[S, o], seen[W, o] = cosine, sine, speed[o, k]
         seen[GAIN, o] = (speed[o, k] - speed[o, k - 1]) / dt if k > 0 else 0.0
@@ -304,7 +305,7 @@ def gap_is_free(e, k, path, n, ds, s, target, lasts, grip, present, x, y, h, spe
     for o in range(len(speed)):
         if o == e or not present[o]:
             continue
-        cosine, sine = math.cos(h[o, k]), math.sin(h[o, k])
+        cosine, sine = elementary.cos(h[o, k]), elementary.sin(h[o, k])
         cx, cy = x[o, k] + bodies[o, 2] * cosine, y[o, k] + bodies[o, 2] * sine
         i, _ = locate(n, ds, s)
         guess = s + (cx - path[i, X]) * path[i, COS] + (cy - path[i, Y]) * path[i, SIN]

@@ -10,6 +10,7 @@ impossible: if they step out late, it is past; if early, it stands.
 
 import math
 
+from bridgegen.base import _elementary_kernels as elementary
 from bridgegen.base.compiled import kernel
 from bridgegen.drivers._following_kernels import COMFORT_DECELERATION
 from bridgegen.drivers._path_kernels import aside_at
@@ -65,7 +66,7 @@ def careful_speed(around, tracks, crosswalks, s, front, half_width, shift, in_to
         distance = around[e, AT] - around[e, HALF_LENGTH] - s - front
         aside = aside_at(shift, s + max(distance, 0.0))
         room = abs(around[e, ASIDE] - aside) - around[e, HALF_WIDTH] - half_width
-        if room < 0.0 or math.hypot(around[e, ALONG], around[e, ACROSS]) > STANDS:
+        if room < 0.0 or elementary.hypot(around[e, ALONG], around[e, ACROSS]) > STANDS:
             continue
         if IS_ON_FOOT[kind]:
             if room < AT_SIDE or at_crosswalk(crosswalks, around[e, AT]):

@@ -19,6 +19,7 @@ that it has been [m]; zeros before the first instant.
 
 import math
 
+from bridgegen.base import _elementary_kernels as elementary
 from bridgegen.base.compiled import kernel
 from bridgegen.drivers._path_kernels import COS, SIN, X, Y, pose, project
 
@@ -64,7 +65,7 @@ def boxes_meet(x, y, turned, length, width, other_length, other_width):
     (x, y) is the second one's centre in the frame of the first, ``turned`` its heading there
     [rad]; lengths and widths are halves.
     """
-    c, s = math.cos(turned), math.sin(turned)
+    c, s = elementary.cos(turned), elementary.sin(turned)
     along, across = abs(c), abs(s)
     return (
         abs(x) <= length + other_length * along + other_width * across
@@ -83,9 +84,9 @@ def later(known, path, n, ds, q, left, x, y, h, w, turn, t):
     """
     if known:
         px, py, ph = pose(path, n, ds, q + w * t)
-        return px - left * math.sin(ph), py + left * math.cos(ph), ph
+        return px - left * elementary.sin(ph), py + left * elementary.cos(ph), ph
     chord = h + 0.5 * turn * t  # of the arc, and of its length but for 2 % at 40°
-    return x + w * t * math.cos(chord), y + w * t * math.sin(chord), h + turn * t
+    return x + w * t * elementary.cos(chord), y + w * t * elementary.sin(chord), h + turn * t
 
 
 @kernel
@@ -102,20 +103,20 @@ def meet(
     """
     length, width = 0.5 * own[0] + END_MARGIN, 0.5 * own[1] + SIDE_MARGIN
     other_length, other_width = 0.5 * other[0], 0.5 * other[1]
-    reach = math.hypot(length, width) + math.hypot(other_length, other_width)
+    reach = elementary.hypot(length, width) + elementary.hypot(other_length, other_width)
     closing = pace + w
     left = 0.0
     if known:
         px, py, ph = pose(other_path, other_n, other_ds, q)
-        left = (y - py) * math.cos(ph) - (x - px) * math.sin(ph)
+        left = (y - py) * elementary.cos(ph) - (x - px) * elementary.sin(ph)
     t, met, ahead = 0.0, False, 0.0
     while t <= horizon and not met:
         ex, ey, eh = pose(path, n, ds, s + pace * t)
-        c, r = math.cos(eh), math.sin(eh)
+        c, r = elementary.cos(eh), elementary.sin(eh)
         px, py, ph = later(known, other_path, other_n, other_ds, q, left, x, y, h, w, turn, t)
-        dx = px + other[2] * math.cos(ph) - ex - own[2] * c
-        dy = py + other[2] * math.sin(ph) - ey - own[2] * r
-        apart = math.hypot(dx, dy) - reach
+        dx = px + other[2] * elementary.cos(ph) - ex - own[2] * c
+        dy = py + other[2] * elementary.sin(ph) - ey - own[2] * r
+        apart = elementary.hypot(dx, dy) - reach
         if apart <= 0.0:
             ahead, aside = dx * c + dy * r, dy * c - dx * r
             met = boxes_meet(ahead, aside, ph - eh, length, width, other_length, other_width)
@@ -130,10 +131,10 @@ def meet(
             px, py, ph = later(
                 known, other_path, other_n, other_ds, q, left, x, y, h, w, turn, moment
             )
-            cx, cy = px + other[2] * math.cos(ph), py + other[2] * math.sin(ph)
+            cx, cy = px + other[2] * elementary.cos(ph), py + other[2] * elementary.sin(ph)
             foot, offset = project(path, n, ds, foot, cx, cy)
             i = min(int(foot / ds), n - 1)
-            along = abs(math.cos(ph) * path[i, COS] + math.sin(ph) * path[i, SIN])
+            along = abs(elementary.cos(ph) * path[i, COS] + elementary.sin(ph) * path[i, SIN])
             across = math.sqrt(max(1.0 - along * along, 0.0))
             if abs(offset) > width + other_length * across + other_width * along:
                 break
@@ -161,7 +162,7 @@ def foresee(
     leader's speed along the ego's way, 0 of a crossing body [m/s]; when a leader will be on the way
     [s], 0 if it is.
     """
-    cx, cy = x + other[2] * math.cos(h), y + other[2] * math.sin(h)
+    cx, cy = x + other[2] * elementary.cos(h), y + other[2] * elementary.sin(h)
     station, offset = foot_on_way(path, n, ds, s, reach, cx, cy)
     before, aside = beside[ASIDE], abs(offset)
     beside[ASIDE] = aside
@@ -169,7 +170,7 @@ def foresee(
     stands = w < STANDS
     if aside < math.inf:
         i = min(int(station / ds), n - 1)
-        along = math.cos(h) * path[i, COS] + math.sin(h) * path[i, SIN]
+        along = elementary.cos(h) * path[i, COS] + elementary.sin(h) * path[i, SIN]
         across = math.sqrt(max(1.0 - along * along, 0.0))
         length = other[0] * abs(along) + other[1] * across  # as the way sees it
         width = other[0] * across + other[1] * abs(along)

@@ -9,8 +9,7 @@ together; the steering has one. Ideal control has neither. Tyres and full lock a
 # mypy: allow-untyped-defs
 # Numba infers what kernels take; their wrappers are typed.
 
-import math
-
+from bridgegen.base import _elementary_kernels as elementary
 from bridgegen.base.compiled import kernel
 
 COMMAND, BUILD_UP, APPLIED, BEND = 0, 1, 2, 3
@@ -38,8 +37,8 @@ def actuate(state, demanded, bend, dt, ideal, lags):
     state[COMMAND] += min(max(demanded - state[COMMAND], -jerk * dt), jerk * dt)
     if not lags:
         return state[COMMAND], bend
-    share = 1.0 - math.exp(-dt / LAG)
+    share = 1.0 - elementary.exp(-dt / LAG)
     state[BUILD_UP] += share * (state[COMMAND] - state[BUILD_UP])
     state[APPLIED] += share * (state[BUILD_UP] - state[APPLIED])
-    state[BEND] += (1.0 - math.exp(-dt / STEERING_LAG)) * (bend - state[BEND])
+    state[BEND] += (1.0 - elementary.exp(-dt / STEERING_LAG)) * (bend - state[BEND])
     return state[APPLIED], state[BEND]

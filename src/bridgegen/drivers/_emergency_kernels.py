@@ -3,8 +3,7 @@
 # mypy: allow-untyped-defs
 # Numba infers what kernels take; their wrappers are typed.
 
-import math
-
+from bridgegen.base import _elementary_kernels as elementary
 from bridgegen.base.compiled import kernel
 from bridgegen.drivers._path_kernels import aside_at, pose
 from bridgegen.drivers._surroundings_kernels import (
@@ -34,8 +33,8 @@ def boxes_meet(dx, dy, h, half_length, half_width, other_h, other_length, other_
 
     Separating axes: both boxes' own directions.
     """
-    c, t = math.cos(h), math.sin(h)
-    oc, ot = math.cos(other_h), math.sin(other_h)
+    c, t = elementary.cos(h), elementary.sin(h)
+    oc, ot = elementary.cos(other_h), elementary.sin(other_h)
     cosine, sine = abs(c * oc + t * ot), abs(c * ot - t * oc)
     if abs(dx * c + dy * t) > half_length + other_length * cosine + other_width * sine:
         return False
@@ -76,7 +75,7 @@ def must_brake(path, n, ds, s, v, body, shift, around, tracks, friction_limit):
                 meets = abs(along) < reach and abs(beside + around[e, ACROSS] * t) < room
             else:
                 px, py, ph = pose(path, n, ds, s + v * t)
-                c, sine = math.cos(ph), math.sin(ph)
+                c, sine = elementary.cos(ph), elementary.sin(ph)
                 dx = tracks[e, TRACK_X] + tracks[e, VX] * t - px - centre * c + aside * sine
                 dy = tracks[e, TRACK_Y] + tracks[e, VY] * t - py - centre * sine - aside * c
                 along = dx * c + dy * sine

@@ -10,6 +10,7 @@ heuristic: a short gap to a leader that is not slower needs no hard braking).
 
 import math
 
+from bridgegen.base import _elementary_kernels as elementary
 from bridgegen.base.compiled import kernel
 from bridgegen.drivers._path_kernels import aside_at
 from bridgegen.drivers._surroundings_kernels import (
@@ -72,7 +73,9 @@ def follow(gap, v, leader_speed, leader_acceleration):
     model = idm(gap, v, leader_speed)
     if model >= needed:
         return model
-    calmed = needed + COMFORT_DECELERATION * math.tanh((model - needed) / COMFORT_DECELERATION)
+    calmed = needed + COMFORT_DECELERATION * elementary.tanh(
+        (model - needed) / COMFORT_DECELERATION
+    )
     return (1.0 - COOLNESS) * model + COOLNESS * calmed
 
 
@@ -116,7 +119,7 @@ def keep_distance(around, tracks, s, front, rear, half_width, shift, v):
         space = abs(beside) - around[e, HALF_WIDTH] - half_width
         least = SIDE_GAP_ON_FOOT if NEEDS_ROOM[int(tracks[e, KIND])] else SIDE_GAP
         nearing = -around[e, ACROSS] if beside > 0.0 else around[e, ACROSS]
-        moves = math.hypot(around[e, ALONG], around[e, ACROSS]) > STANDS
+        moves = elementary.hypot(around[e, ALONG], around[e, ACROSS]) > STANDS
         if moves and HEAD_ON < around[e, COSINE] < SAME_WAY:
             continue  # it crosses: a matter of giving way, not of following
         gap = rear_end - s - front

@@ -13,6 +13,7 @@ Its state is the shift (``_shift_kernels``), and for how long it has been held u
 
 import math
 
+from bridgegen.base import _elementary_kernels as elementary
 from bridgegen.base.compiled import kernel
 from bridgegen.drivers import _control_kernels as control
 from bridgegen.drivers._caution_kernels import ENTER, PARKED_SPEED
@@ -87,7 +88,7 @@ def look_back(mind, near):
 @kernel
 def pace_of(around, e):
     """Return an actor's speed along the route [m/s], ≥ 0; 0 if it stands."""
-    moves = math.hypot(around[e, ALONG], around[e, ACROSS]) > STANDS
+    moves = elementary.hypot(around[e, ALONG], around[e, ACROSS]) > STANDS
     return max(around[e, ALONG], 0.0) if moves else 0.0
 
 
@@ -104,7 +105,7 @@ def slow_ahead(around, tracks, s, front, half_width, aside, pace):
             continue
         if abs(around[e, ASIDE] - aside) - around[e, HALF_WIDTH] - half_width > SIDE_GAP:
             continue
-        speed = math.hypot(around[e, ALONG], around[e, ACROSS])
+        speed = elementary.hypot(around[e, ALONG], around[e, ACROSS])
         along = pace_of(around, e)
         if along > SLOW * pace or along > pace - SLOWER:
             continue

@@ -14,6 +14,7 @@ body [m], and the share of the body's height that is hidden there.
 
 import math
 
+from bridgegen.base import _elementary_kernels as elementary
 from bridgegen.base.compiled import kernel
 from bridgegen.drivers import _tracking_kernels as tracking
 
@@ -39,7 +40,7 @@ def span(memory, e, length, width):
             return -math.pi, math.pi
         across = (b * forward - a * left) / along
         low, high = min(low, across), max(high, across)
-    return math.atan(low), math.atan(high)
+    return elementary.atan(low), elementary.atan(high)
 
 
 @kernel
@@ -71,7 +72,7 @@ def cast(e, memory, bodies):
     low, high = memory[e, LOW], memory[e, HIGH]
     for ray in range(RAYS):
         angle = memory[e, BEARING] + low + (high - low) * (ray + 0.5) / RAYS
-        ux, uy = math.cos(angle), math.sin(angle)
+        ux, uy = elementary.cos(angle), elementary.sin(angle)
         memory[e, RAY_X + ray], memory[e, RAY_Y + ray] = ux, uy
         own = entry(memory, e, bodies[e, 0], bodies[e, 1], ux, uy)
         memory[e, REACH + ray] = min(own, memory[e, D])

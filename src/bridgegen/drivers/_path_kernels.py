@@ -6,6 +6,7 @@ its L rows the first n are real, and row i is at station i · ds.
 
 import math
 
+from bridgegen.base import _elementary_kernels as elementary
 from bridgegen.base.compiled import kernel
 
 # mypy: allow-untyped-defs
@@ -79,7 +80,7 @@ def pursue(path, n, ds, s, x, y, h, distance):
     """
     gx, gy, _ = pose(path, n, ds, s + distance)
     dx, dy = gx - x, gy - y
-    left = -math.sin(h) * dx + math.cos(h) * dy
+    left = -elementary.sin(h) * dx + elementary.cos(h) * dy
     return 2.0 * left / max(dx * dx + dy * dy, 1e-6)
 
 
@@ -166,6 +167,6 @@ def pursue_beside(path, n, ds, s, shift, x, y, h, distance):
     """
     gx, gy, gh = pose(path, n, ds, s + distance)
     aside = aside_at(shift, s + distance)
-    dx, dy = gx - aside * math.sin(gh) - x, gy + aside * math.cos(gh) - y
-    left = -math.sin(h) * dx + math.cos(h) * dy
+    dx, dy = gx - aside * elementary.sin(gh) - x, gy + aside * elementary.cos(gh) - y
+    left = -elementary.sin(h) * dx + elementary.cos(h) * dy
     return 2.0 * left / max(dx * dx + dy * dy, 1e-6)

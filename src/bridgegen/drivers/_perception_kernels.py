@@ -9,6 +9,7 @@ the geometry of the bodies (`place`), their occlusion, detections, and updates t
 
 import math
 
+from bridgegen.base import _elementary_kernels as elementary
 from bridgegen.base.compiled import kernel
 from bridgegen.drivers import _tracking_kernels as tracking
 from bridgegen.drivers._occlusion_kernels import (
@@ -72,11 +73,11 @@ def frame_at(k, dt):
 @kernel
 def place(k, present, x, y, h, bodies, memory):
     """Fill the geometry of all bodies from the ego's box centre; return how many are in range."""
-    cosine, sine = math.cos(h[0, k]), math.sin(h[0, k])
+    cosine, sine = elementary.cos(h[0, k]), elementary.sin(h[0, k])
     sx, sy = x[0, k] + bodies[0, 2] * cosine, y[0, k] + bodies[0, 2] * sine
     near = 0
     for e in range(1, x.shape[0]):
-        c, s = math.cos(h[e, k]), math.sin(h[e, k])
+        c, s = elementary.cos(h[e, k]), elementary.sin(h[e, k])
         dx, dy = x[e, k] + bodies[e, 2] * c - sx, y[e, k] + bodies[e, 2] * s - sy
         d = math.sqrt(dx * dx + dy * dy)
         memory[e, DX], memory[e, DY], memory[e, COS], memory[e, SIN] = dx, dy, c, s
@@ -88,7 +89,7 @@ def place(k, present, x, y, h, bodies, memory):
     if near > 1:
         for e in range(1, x.shape[0]):
             if memory[e, D] < math.inf:
-                memory[e, BEARING] = math.atan2(memory[e, DY], memory[e, DX])
+                memory[e, BEARING] = elementary.atan2(memory[e, DY], memory[e, DX])
                 memory[e, LOW], memory[e, HIGH] = span(memory, e, bodies[e, 0], bodies[e, 1])
     return near
 
@@ -101,7 +102,7 @@ def know(k, dt, present, x, y, h, v, bodies, kinds, lamps, tracks, detections):
         if not present[e]:
             blank(detections, e, k, MISSED if frame else NO_FRAME)
             continue
-        cosine, sine = math.cos(h[e, k]), math.sin(h[e, k])
+        cosine, sine = elementary.cos(h[e, k]), elementary.sin(h[e, k])
         tracks[e, tracking.STATE] = tracking.CONFIRMED
         tracks[e, tracking.X] = x[e, k] + bodies[e, 2] * cosine
         tracks[e, tracking.Y] = y[e, k] + bodies[e, 2] * sine
@@ -127,9 +128,12 @@ def look(
 ):
     """Take a sensor frame: fill its detections, and update the tracks."""
     elapsed = max(dt, FRAME)
-    renew, keep = 1.0 - math.exp(-elapsed / DROPOUT_TIME), math.exp(-elapsed / ERROR_TIME)
+    renew, keep = (
+        1.0 - elementary.exp(-elapsed / DROPOUT_TIME),
+        elementary.exp(-elapsed / ERROR_TIME),
+    )
     near = place(k, present, x, y, h, bodies, memory)
-    heading = math.cos(h[0, k]), math.sin(h[0, k])
+    heading = elementary.cos(h[0, k]), elementary.sin(h[0, k])
     height = max(MOUNT * bodies[0, 7], LEAST_HEIGHT)
     sx = x[0, k] + bodies[0, 2] * heading[0]
     sy = y[0, k] + bodies[0, 2] * heading[1]

@@ -9,6 +9,7 @@ Lengths in metres, angles in radians, extinctions in 1/m, luminances in cd/m², 
 
 import math
 
+from bridgegen.base import _elementary_kernels as elementary
 from bridgegen.base.compiled import kernel
 
 # The air.
@@ -73,13 +74,13 @@ SURE_PIXELS = 25.6  # pixels that give half of a camera's: twice what detection 
 @kernel
 def transmission(extinction, d):
     """Return the share of contrast that is left over a distance: Koschmieder's e^(−βd)."""
-    return math.exp(-extinction * d)
+    return elementary.exp(-extinction * d)
 
 
 @kernel
 def snr(reflectance, attenuation, d):
     """Return a LiDAR's signal-to-noise ratio: 1 where ρ·e^(−2αd)/d² = 0.9/r_max²."""
-    signal = reflectance * math.exp(-2.0 * attenuation * d) / (d * d)
+    signal = reflectance * elementary.exp(-2.0 * attenuation * d) / (d * d)
     return signal * RATED_RANGE * RATED_RANGE / RATED_REFLECTANCE
 
 
@@ -93,7 +94,7 @@ def veil(illuminance, cosine):
     """
     if cosine <= 0.0:
         return 0.0
-    angle = max(math.degrees(math.acos(min(cosine, 1.0))), GLARE_FROM)
+    angle = max(math.degrees(elementary.acos(min(cosine, 1.0))), GLARE_FROM)
     return GLARE * illuminance * cosine / (angle * angle)
 
 
@@ -108,5 +109,5 @@ def recognised(ratio):
         return 0.0
     if ratio > 8.0:
         return 1.0
-    odds = math.exp((2.7 + 0.7 * ratio) * math.log(ratio))
+    odds = elementary.exp((2.7 + 0.7 * ratio) * elementary.log(ratio))
     return odds / (1.0 + odds)

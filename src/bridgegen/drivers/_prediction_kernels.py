@@ -16,6 +16,7 @@ gives way (``right_of_way``). The planner reads the passages of either predictio
 
 import math
 
+from bridgegen.base import _elementary_kernels as elementary
 from bridgegen.base.compiled import kernel
 from bridgegen.drivers._path_kernels import COS, SIN, X, Y, project
 from bridgegen.drivers._surroundings_kernels import BEHIND, QUICKENING
@@ -66,7 +67,7 @@ def locate_on_way(way, n, ds, guess, x, y, h):
     if abs(d) > OFF_WAY or q >= (n - 1) * ds:
         return LOST
     i = int(q / ds)
-    if math.cos(h) * way[i, COS] + math.sin(h) * way[i, SIN] < math.cos(TURNED):
+    if elementary.cos(h) * way[i, COS] + elementary.sin(h) * way[i, SIN] < elementary.cos(TURNED):
         return LOST
     return q
 
@@ -88,7 +89,7 @@ def add_passage(passages, count, zone, q, w, half, e, gain, rank):
 @kernel
 def add_straight(path, n, ds, s, ahead, own_width, track, e, gain, passages, count):
     """Append the passage of a track straight ahead, if that crosses the ego's route."""
-    w = math.hypot(track[VX], track[VY])
+    w = elementary.hypot(track[VX], track[VY])
     if w < 3.0 * STANDING or count == passages.shape[0]:
         return count
     ux, uy = track[VX] / w, track[VY] / w
@@ -178,7 +179,7 @@ def predict_truly(path, n, ds, s, ahead, own_width, tracks, around, paths, count
             q, _ = project(
                 paths[j], counts[j], steps[j], near, tracks[e, TRACK_X], tracks[e, TRACK_Y]
             )
-            w = math.hypot(tracks[e, VX], tracks[e, VY])
+            w = elementary.hypot(tracks[e, VX], tracks[e, VY])
             half, rank = 0.5 * tracks[e, LENGTH], ranks[j] if j < len(ranks) else 0
             count = add_passage(passages, count, zones[j], q, w, half, e, gain, rank)
         if IS_VULNERABLE[int(tracks[e, KIND])]:

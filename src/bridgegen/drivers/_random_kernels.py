@@ -15,6 +15,7 @@ import math
 
 import numpy as np
 
+from bridgegen.base import _elementary_kernels as elementary
 from bridgegen.base.compiled import kernel
 
 # Unsigned throughout: numba makes a float of what mixes signed with unsigned.
@@ -52,9 +53,9 @@ def unit(word):
 @kernel
 def normal_pair(word, other):
     """Return two independent standard normal numbers of two words."""
-    radius = math.sqrt(-2.0 * math.log(unit(word)))
+    radius = math.sqrt(-2.0 * elementary.log(unit(word)))
     angle = 2.0 * math.pi * unit(other)
-    return radius * math.cos(angle), radius * math.sin(angle)
+    return radius * elementary.cos(angle), radius * elementary.sin(angle)
 
 
 @kernel

@@ -10,6 +10,7 @@ ten times a second; control acts at every instant. The driver's state between tw
 
 import math
 
+from bridgegen.base import _elementary_kernels as elementary
 from bridgegen.base.compiled import kernel
 from bridgegen.drivers import _control_kernels as control
 from bridgegen.drivers._caution_kernels import careful_speed
@@ -172,7 +173,7 @@ def drive(k, plan_, roads, state, record):
         in_town = road_n > 0 and roads.road[min(int(s / ds), n - 1), LIMIT] <= FAST_ROAD
         seen = light_seen = math.inf
         if not plan_.ideal_perception:
-            cosine, sine = math.cos(record.h[0, k]), math.sin(record.h[0, k])
+            cosine, sine = elementary.cos(record.h[0, k]), elementary.sin(record.h[0, k])
             column, share = column_of(state.weather, cosine, sine)
             seen = seen_in(state.weather, WALKER if in_town else REAR, column, share)
             light_seen = seen_in(state.weather, LIGHT, column, share)

@@ -9,6 +9,7 @@ in each weather.
 
 import math
 
+from bridgegen.base import _elementary_kernels as elementary
 from bridgegen.base.compiled import kernel
 from bridgegen.drivers import _camera_kernels as camera
 from bridgegen.drivers import _lidar_kernels as lidar
@@ -36,36 +37,38 @@ _HALVINGS = 24  # of the logarithm of the distance: to 1e-6 of itself
 @kernel
 def camera_sight(weather, size, lamp, need, dazzle):
     """Return where a target of a size [m] straight ahead has ``need`` pixels, up to `CULL`."""
-    low, high = math.log(NEAREST), math.log(CULL)
+    low, high = elementary.log(NEAREST), elementary.log(CULL)
     for _ in range(_HALVINGS):
         middle = 0.5 * (low + high)
-        d = math.exp(middle)
+        d = elementary.exp(middle)
         clear = camera.clarity(weather, d, dazzle, lamp, 1.0)
         if camera.pixels(size, d, clear) >= need:
             low = middle
         else:
             high = middle
-    return math.exp(low)
+    return elementary.exp(low)
 
 
 @kernel
 def lidar_sight(weather, area, reflectance):
     """Return where a target of an area [m²] sends back half of enough returns, up to `CULL`."""
-    low, high = math.log(NEAREST), math.log(CULL)
+    low, high = elementary.log(NEAREST), elementary.log(CULL)
     for _ in range(_HALVINGS):
         middle = 0.5 * (low + high)
-        found, _ = lidar.returns(area, reflectance, weather[ATTENUATION], math.exp(middle))
+        found, _ = lidar.returns(area, reflectance, weather[ATTENUATION], elementary.exp(middle))
         if found >= ENOUGH_RETURNS:
             low = middle
         else:
             high = middle
-    return math.exp(low)
+    return elementary.exp(low)
 
 
 @kernel
 def glare_of(weather, i):
     """Return the veiling luminance of column i: 64°, 32° … 1° off the sun."""
-    return veil(weather[GLARE], math.cos(math.radians(2.0 ** (N_GLARES - 1 - i))))
+    return veil(
+        weather[GLARE], elementary.cos(math.radians(elementary.power(2.0, N_GLARES - 1.0 - i)))
+    )
 
 
 @kernel
@@ -113,8 +116,8 @@ def column_of(weather, cosine, sine):
     """Return the column of the table by the angle to the sun of a heading, and the share beyond."""
     if weather[GLARE] <= 0.0:
         return 0, 0.0
-    angle = math.acos(min(max(weather[SUN_X] * cosine + weather[SUN_Y] * sine, -1.0), 1.0))
-    halvings = N_GLARES - 1 - math.log2(min(max(math.degrees(angle), 1.0), 64.0))
+    angle = elementary.acos(min(max(weather[SUN_X] * cosine + weather[SUN_Y] * sine, -1.0), 1.0))
+    halvings = N_GLARES - 1 - elementary.log2(min(max(math.degrees(angle), 1.0), 64.0))
     i = min(int(halvings), N_GLARES - 2)
     return i, halvings - i
 

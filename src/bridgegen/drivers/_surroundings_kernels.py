@@ -8,6 +8,7 @@
 
 import math
 
+from bridgegen.base import _elementary_kernels as elementary
 from bridgegen.base.compiled import kernel
 from bridgegen.drivers._path_kernels import COS, SIN, X, Y, project
 from bridgegen.drivers._tracking_kernels import AGE, CONFIRMED, LENGTH, STATE, VX, VY, WIDTH, H
@@ -39,7 +40,7 @@ def surround(path, n, ds, s, behind, ahead, elapsed, tracks, around):
     ``behind`` and ``ahead`` [m] are how far along its route from s the ego looks; ``elapsed``
     [s] is the time since the last call.
     """
-    share = 1.0 - math.exp(-elapsed / MEMORY_OF_GAIN)
+    share = 1.0 - elementary.exp(-elapsed / MEMORY_OF_GAIN)
     stride = max(int(COARSE / ds), 1)
     first = max(int((s - behind) / ds), 0)
     last = min(int((s + ahead) / ds) + stride, n - 1)
@@ -52,7 +53,7 @@ def surround(path, n, ds, s, behind, ahead, elapsed, tracks, around):
         if tracks[e, STATE] < CONFIRMED:
             around[e, PACE] = around[e, QUICKENING] = 0.0
             continue
-        pace = 1.0 + math.hypot(tracks[e, VX], tracks[e, VY])
+        pace = 1.0 + elementary.hypot(tracks[e, VX], tracks[e, VY])
         if around[e, PACE] > 0.0 and tracks[e, AGE] > SETTLED:
             gain = (pace - around[e, PACE]) / elapsed
             around[e, QUICKENING] += share * (gain - around[e, QUICKENING])
@@ -70,7 +71,7 @@ def surround(path, n, ds, s, behind, ahead, elapsed, tracks, around):
         foot, d = project(path, n, ds, at * ds, x, y)
         i = min(int(foot / ds), n - 1)
         c, t = path[i, COS], path[i, SIN]
-        cosine = math.cos(tracks[e, H]) * c + math.sin(tracks[e, H]) * t
+        cosine = elementary.cos(tracks[e, H]) * c + elementary.sin(tracks[e, H]) * t
         sine = math.sqrt(max(1.0 - cosine * cosine, 0.0))
         length, width = tracks[e, LENGTH], tracks[e, WIDTH]
         around[e, NEAR] = 1.0

@@ -20,6 +20,7 @@ autonomous mobile robot, IEEE ICRA 1990, equation 8 and proposition 3.
 
 import math
 
+from bridgegen.base import _elementary_kernels as elementary
 from bridgegen.base.compiled import kernel
 
 TIME, X, Y, H, V, STATION = 0, 1, 2, 3, 4, 5
@@ -42,9 +43,9 @@ def lay(plan):
         turn = plan[i, H] - plan[i - 1, H]
         turn -= 2.0 * math.pi * math.floor(turn / (2.0 * math.pi) + 0.5)
         plan[i, H] = plan[i - 1, H] + turn
-        chord = math.hypot(plan[i, X] - plan[i - 1, X], plan[i, Y] - plan[i - 1, Y])
+        chord = elementary.hypot(plan[i, X] - plan[i - 1, X], plan[i, Y] - plan[i - 1, Y])
         half = min(0.5 * abs(turn), 0.5 * math.pi)
-        arc = chord * half / math.sin(half) if half > 1e-6 else chord
+        arc = chord * half / elementary.sin(half) if half > 1e-6 else chord
         plan[i, STATION] = plan[i - 1, STATION] + arc
 
 
@@ -58,7 +59,7 @@ def pose(plan, s):
     if s <= 0.0 or s >= plan[last, STATION]:
         i = 0 if s <= 0.0 else last
         h, beyond = plan[i, H], s - plan[i, STATION]
-        return plan[i, X] + beyond * math.cos(h), plan[i, Y] + beyond * math.sin(h), h
+        return plan[i, X] + beyond * elementary.cos(h), plan[i, Y] + beyond * elementary.sin(h), h
     i = 0
     while plan[i + 1, STATION] <= s:
         i += 1
@@ -70,8 +71,8 @@ def pose(plan, s):
     x = plan[i, X] + at * (plan[i + 1, X] - plan[i, X])
     y = plan[i, Y] + at * (plan[i + 1, Y] - plan[i, Y])
     return (
-        x + leaves * math.cos(before) + arrives * math.cos(after),
-        y + leaves * math.sin(before) + arrives * math.sin(after),
+        x + leaves * elementary.cos(before) + arrives * elementary.cos(after),
+        y + leaves * elementary.sin(before) + arrives * elementary.sin(after),
         before + u * (after - before),
     )
 
@@ -103,7 +104,7 @@ def follow(plan, since, dt, x, y, h, v):
     s = planned
     px, py, ph = pose(plan, s)
     for _ in range(FEET):
-        s += math.cos(ph) * (x - px) + math.sin(ph) * (y - py)
+        s += elementary.cos(ph) * (x - px) + elementary.sin(ph) * (y - py)
         px, py, ph = pose(plan, s)
     ahead = min(max(s - planned, -MOST), MOST)
     a = (later - pace) / dt - 2.0 * RATE * (v - pace) - RATE * RATE * ahead
@@ -111,11 +112,11 @@ def follow(plan, since, dt, x, y, h, v):
         a = -v / dt
     travels = max(v * dt + 0.5 * a * dt * dt, SHORT)
     _, _, bent = pose(plan, s + travels)
-    aside = math.cos(ph) * (y - py) - math.sin(ph) * (x - px)
+    aside = elementary.cos(ph) * (y - py) - elementary.sin(ph) * (x - px)
     aside = min(max(aside, -MOST), MOST)
     length = max(SECONDS * v, LEAST_LENGTH)
     curvature = (bent - ph) / travels - aside / (length * length)
-    return a, curvature - 2.0 / length * math.sin(h - ph)
+    return a, curvature - 2.0 / length * elementary.sin(h - ph)
 
 
 @kernel

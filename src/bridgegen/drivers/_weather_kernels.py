@@ -8,6 +8,7 @@
 
 import math
 
+from bridgegen.base import _elementary_kernels as elementary
 from bridgegen.base.compiled import kernel
 from bridgegen.base.physics import GRIP
 from bridgegen.drivers._physics_kernels import (
@@ -77,22 +78,22 @@ def change(weather, environments, row, slots):
 def derive(weather):
     """Set the numbers from ``EXTINCTION`` to ``SUN_Y`` by what is stated; forget ``SIGHT``."""
     weather[SIGHT:] = 0.0
-    rain = RAIN_EXTINCTION * max(weather[RAIN], 0.0) ** RAIN_POWER
-    snow = SNOW_EXTINCTION * max(weather[SNOW], 0.0) ** SNOW_POWER
+    rain = RAIN_EXTINCTION * elementary.power(max(weather[RAIN], 0.0), RAIN_POWER)
+    snow = SNOW_EXTINCTION * elementary.power(max(weather[SNOW], 0.0), SNOW_POWER)
     # The drops of fog, too, are larger than either wavelength: Kim, McArthur, Korevaar, SPIE 4214
     # (2001), find no difference below 500 m of visibility.
     weather[EXTINCTION] = KOSCHMIEDER / max(weather[VISUAL_RANGE], 1.0) + rain + snow
     weather[ATTENUATION] = weather[EXTINCTION]
     weather[GLASS] = 1.0 / (1.0 + RAIN_ON_GLASS * max(weather[RAIN], 0.0))
     weather[FRICTION] = GRIP * weather[FRICTION_SCALE]
-    cosine, sine = math.cos(weather[SUN_ELEVATION]), math.sin(weather[SUN_ELEVATION])
-    weather[SUN_X] = cosine * math.sin(weather[SUN_AZIMUTH])
-    weather[SUN_Y] = cosine * math.cos(weather[SUN_AZIMUTH])
-    altitude = math.degrees(math.asin(min(max(sine, -1.0), 1.0)))
+    cosine, sine = elementary.cos(weather[SUN_ELEVATION]), elementary.sin(weather[SUN_ELEVATION])
+    weather[SUN_X] = cosine * elementary.sin(weather[SUN_AZIMUTH])
+    weather[SUN_Y] = cosine * elementary.cos(weather[SUN_AZIMUTH])
+    altitude = math.degrees(elementary.asin(min(max(sine, -1.0), 1.0)))
     cloud = min(max(weather[CLOUD], 0.0), 1.0)
     stated = weather[ILLUMINANCE]
     ground = stated if stated >= 0.0 else 100_000.0 * max(sine, 0.0)
-    lit = ground * (1.0 - CLOUD_SHADE * cloud**CLOUD_POWER) + skylight(altitude)
+    lit = ground * (1.0 - CLOUD_SHADE * elementary.power(cloud, CLOUD_POWER)) + skylight(altitude)
     weather[BACKGROUND] = GROUND_ALBEDO * lit / math.pi
     weather[GLARE] = 0.0
     if altitude > 0.0:
@@ -107,8 +108,11 @@ def sunbeam(altitude):
     Source: IES RP-21-84, Calculation of Daylight Availability, clear sky; air mass by Kasten and
     Young, Applied Optics 28 (1989) 4735.
     """
-    mass = 1.0 / (math.sin(math.radians(altitude)) + 0.50572 * (altitude + 6.07995) ** -1.6364)
-    return CLEAR_NORMAL * math.exp(-CLEAR_DEPTH * mass)
+    mass = 1.0 / (
+        elementary.sin(math.radians(altitude))
+        + 0.50572 * elementary.power(altitude + 6.07995, -1.6364)
+    )
+    return CLEAR_NORMAL * elementary.exp(-CLEAR_DEPTH * mass)
 
 
 @kernel
@@ -117,9 +121,9 @@ def skylight(altitude):
     if altitude >= 0.0:
         return AT_HORIZON
     if altitude >= -6.0:
-        return AT_HORIZON * (AT_CIVIL / AT_HORIZON) ** (-altitude / 6.0)
+        return AT_HORIZON * elementary.power(AT_CIVIL / AT_HORIZON, -altitude / 6.0)
     if altitude >= -12.0:
-        return AT_CIVIL * (AT_NAUTICAL / AT_CIVIL) ** ((-altitude - 6.0) / 6.0)
+        return AT_CIVIL * elementary.power(AT_NAUTICAL / AT_CIVIL, (-altitude - 6.0) / 6.0)
     if altitude >= -18.0:
-        return AT_NAUTICAL * (AT_NIGHT / AT_NAUTICAL) ** ((-altitude - 12.0) / 6.0)
+        return AT_NAUTICAL * elementary.power(AT_NIGHT / AT_NAUTICAL, (-altitude - 12.0) / 6.0)
     return AT_NIGHT

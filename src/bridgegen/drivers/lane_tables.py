@@ -4,6 +4,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from bridgegen.base import elementary
 from bridgegen.base.arrays import Float, Int
 from bridgegen.drivers.right_of_way import inner
 from bridgegen.drivers.scene import NARROW, lane_of, speed_limits
@@ -128,7 +129,9 @@ def _border(t: dict[int, Float], lane_id: int, towards: int) -> Float:
 def _across(road: Road, s: Float, points: Float) -> Float:
     """Return the t [m] of points at places s of a road."""
     line = reference_line(road, s)
-    return (points[:, 1] - line.y) * np.cos(line.h) - (points[:, 0] - line.x) * np.sin(line.h)
+    return (points[:, 1] - line.y) * elementary.cos(line.h) - (
+        points[:, 0] - line.x
+    ) * elementary.sin(line.h)
 
 
 def _along(road: Road, number: int, lane_id: int, s: Float, points: Float) -> Float:

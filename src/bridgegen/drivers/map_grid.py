@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from bridgegen.base import elementary
 from bridgegen.base.arrays import Float, Int
 from bridgegen.drivers.compiled import PIECE
 from bridgegen.drivers.interface import CENTRE, PIECE_POINTS, RoadMap
@@ -88,7 +89,8 @@ def _grid(roads: RoadMap) -> Grid:
     _add_lanes(roads, rows)
     points = roads.pieces[:, :, :2]
     middles = 0.5 * (points.min(axis=1) + points.max(axis=1)) if n else np.zeros((0, 2))
-    away = np.hypot(*np.moveaxis(points - middles[:, None], -1, 0))
+    offset = points - middles[:, None]
+    away = elementary.hypot(offset[..., 0], offset[..., 1])
     reach = float((away + rows["width"][:, 0]).max(initial=0.0))
     low = middles.min(axis=0, initial=0.0) if n == 0 else middles.min(axis=0)
     span = middles.max(axis=0) - low if n else np.zeros(2)
@@ -115,7 +117,8 @@ def _add_lanes(roads: RoadMap, rows: np.ndarray) -> None:
     for number, lane in enumerate(roads.lanes):
         mine = owned[order[begins[number] : begins[number + 1]]]
         rows["speed_limit"][mine, 0] = lane.speed_limit[0]
-        width = np.hypot(*(lane.left - lane.right).T)
+        across = lane.left - lane.right
+        width = elementary.hypot(across[:, 0], across[:, 1])
         at = 0
         for piece in mine:
             count = int(roads.piece_points[piece])

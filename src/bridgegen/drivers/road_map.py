@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from bridgegen.base import elementary
 from bridgegen.base.arrays import Float
 from bridgegen.drivers.interface import (
     BORDER,
@@ -82,7 +83,11 @@ class _Section(NamedTuple):
 
     def points(self, t: Float) -> Float:
         return np.stack(
-            (self.line.x - t * np.sin(self.line.h), self.line.y + t * np.cos(self.line.h)), axis=1
+            (
+                self.line.x - t * elementary.sin(self.line.h),
+                self.line.y + t * elementary.cos(self.line.h),
+            ),
+            axis=1,
         )
 
 
@@ -150,7 +155,7 @@ def _cut(road: Road, number: int) -> _Section:
         s = np.linspace(low, high, n + 1)
         found = _Section(road, number, s, reference_line(road, s), borders(road, number, s))
         edges = (np.diff(found.points(found.t[item]), axis=0) for item in found.t)
-        longest = max(float(np.hypot(*edge.T).max()) for edge in edges)
+        longest = max(float(elementary.hypot(edge[:, 0], edge[:, 1]).max()) for edge in edges)
         if longest <= SPACING * (1.0 + ROUNDING) or n >= MOST_CUTS * (high - low):
             return found
         n = math.ceil(n * 1.1 * longest / SPACING)
@@ -167,7 +172,7 @@ def _lane(
     way = road.direction(lane_id)
     edges = (t[lane_id], t[inner(lane_id)])
     centre = 0.5 * (edges[0] + edges[1])
-    tilt = np.arctan2(np.gradient(centre, s), 1.0 - line.curvature * centre)
+    tilt = elementary.atan2(np.gradient(centre, s), 1.0 - line.curvature * centre)
     h = line.h + tilt + (0.0 if way > 0 else math.pi)
     # In its direction of travel the outer border is to the right of right-hand traffic.
     left, right = edges[::-1] if (lane_id < 0) == (way > 0) else edges
@@ -213,7 +218,7 @@ def _mark(section: _Section, border: int) -> RoadMark | None:
 def _headings(points: Float) -> Float:
     """Return the headings of a polyline at its points [rad], continuous."""
     dx, dy = np.diff(points, axis=0).T
-    h = np.unwrap(np.arctan2(dy, dx))
+    h = np.unwrap(elementary.atan2(dy, dx))
     return np.concatenate((h[:1], 0.5 * (h[1:] + h[:-1]), h[-1:]))
 
 
@@ -285,7 +290,9 @@ def _across(road: Road, number: int, lanes: Sequence[int], s: float) -> Float:
     edges = [float(t[item][0]) for lane in lanes if lane in t for item in (lane, inner(lane))]
     line = reference_line(road, np.array([at, at]))
     ends = np.array([min(edges, default=0.0), max(edges, default=0.0)])
-    return np.stack((line.x - ends * np.sin(line.h), line.y + ends * np.cos(line.h)), axis=1)
+    return np.stack(
+        (line.x - ends * elementary.sin(line.h), line.y + ends * elementary.cos(line.h)), axis=1
+    )
 
 
 def _stop_lines(model: OpenDrive, lights: Sequence[Light]) -> Iterator[Line]:
@@ -341,6 +348,6 @@ def _refined(points: Float) -> Float:
     """Return a polyline with points `SPACING` apart at most."""
     found = [points[:1]]
     for a, b in pairwise(points):
-        n = max(1, math.ceil(math.dist(a, b) / SPACING - ROUNDING))
+        n = max(1, math.ceil(elementary.hypot(b[0] - a[0], b[1] - a[1]) / SPACING - ROUNDING))
         found.append(a + (b - a) * (np.arange(1, n + 1) / n)[:, None])
     return np.concatenate(found)

@@ -12,6 +12,7 @@ from typing import NamedTuple, TypeVar
 import numpy as np
 import numpy.typing as npt
 
+from bridgegen.base import elementary
 from bridgegen.base.arrays import Bool, Float, Int
 from bridgegen.drivers.right_of_way import (
     NO_RULE,
@@ -122,7 +123,14 @@ def survey(
         for way in [way for stretch, s in lanes for way in ways_from(model, stretch, s)]:
             way_step = way.length / math.ceil(way.length / SAMPLE)
             line_ = way.sample(way_step)
-            columns = (line_.x, line_.y, line_.h, np.cos(line_.h), np.sin(line_.h), line_.curvature)
+            columns = (
+                line_.x,
+                line_.y,
+                line_.h,
+                elementary.cos(line_.h),
+                elementary.sin(line_.h),
+                line_.curvature,
+            )
             tables.append(np.stack(columns, axis=1))
             steps.append(way_step)
             zone = np.empty(ZONE)

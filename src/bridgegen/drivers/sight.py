@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from bridgegen.base import elementary
 from bridgegen.base.arrays import Float
 from bridgegen.base.errors import InputError
 from bridgegen.drivers import _weather_columns as column
@@ -95,7 +96,7 @@ def detection_range(sky: Sky, kind: int) -> DetectionRange:
     weather = sky.numbers()
     width, height = _SIZES[kind]
     area = width * height
-    toward = weather[column.SUN_Y] * math.cos(math.radians(sky.off_sun))
+    toward = weather[column.SUN_Y] * elementary.cos(math.radians(sky.off_sun))
     dazzle = veil(weather[column.GLARE], toward)
 
     def by_camera(d: float) -> float:

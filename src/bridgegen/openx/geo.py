@@ -4,6 +4,7 @@ import math
 from collections.abc import Callable
 from dataclasses import replace
 
+from bridgegen.base import elementary
 from bridgegen.base.errors import FileFormatError
 from bridgegen.base.extras import require
 from bridgegen.openx.opendrive.model import Header, OpenDrive
@@ -78,7 +79,7 @@ def projection(header: Header, place: str) -> Project:
         ) from None
     offset = header.offset
     dx, dy, turn = (offset.x, offset.y, offset.hdg) if offset else (0.0, 0.0, 0.0)
-    c, s = math.cos(turn), math.sin(turn)
+    c, s = elementary.cos(turn), elementary.sin(turn)
 
     def project(longitude: float, latitude: float) -> tuple[float, float]:
         east, north = to_map.transform(longitude, latitude)

@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from bridgegen.base import elementary
 from bridgegen.base.arrays import Float
 from bridgegen.base.errors import FileFormatError, InputError
 from bridgegen.openx.opendrive.geometry import reference_line
@@ -163,7 +164,7 @@ class _Populated:
             raise InputError("a TrafficSourceAction needs a position on the map")
         if rate <= 0.0:
             raise InputError(f"rate [1/s] of a source must be greater than 0, got {rate:g}")
-        away = np.hypot(self._places.x - at[0], self._places.y - at[1])
+        away = elementary.hypot(self._places.x - at[0], self._places.y - at[1])
         near = np.flatnonzero(away <= max(radius, STEP))
         if not near.size:
             raise InputError(f"no lane is within {radius:g} m of the source")
@@ -191,18 +192,18 @@ class _Populated:
         if centre is None:
             raise InputError(f"a TrafficSwarmAction needs a start on the map of '{whom}'")
         x, y, h = centre
-        c, s = math.cos(h), math.sin(h)
+        c, s = elementary.cos(h), elementary.sin(h)
         dx, dy = self._places.x - x, self._places.y - y
         along, aside = dx * c + dy * s - number(action.offset), dy * c - dx * s
         major, minor = number(action.semi_major_axis), number(action.semi_minor_axis)
         with np.errstate(over="ignore"):
-            inside = np.hypot(along / max(major, 1e-9), aside / max(minor, 1e-9)) <= 1.0
-        inside &= np.hypot(along, aside) >= number(action.inner_radius)
+            inside = elementary.hypot(along / max(major, 1e-9), aside / max(minor, 1e-9)) <= 1.0
+        inside &= elementary.hypot(along, aside) >= number(action.inner_radius)
         ways = [1.0, 1.0]
         if action.direction_of_travel_distribution is not None:
             said = action.direction_of_travel_distribution
             ways = _shares([number(said.same), number(said.opposite)])
-        weight = np.where(np.cos(self._places.h - h) >= 0.0, *ways) * inside
+        weight = np.where(elementary.cos(self._places.h - h) >= 0.0, *ways) * inside
         if not weight.any():
             raise InputError(f"no lane is where the swarm around '{whom}' is")
         low = high = 0.0 if action.velocity is None else number(action.velocity)
@@ -387,7 +388,7 @@ def _places(roads: OpenDrive) -> _Places:
                 inner = edges[lane.id - int(math.copysign(1, lane.id))]
                 t = 0.5 * (inner + edges[lane.id])
                 back = 0.0 if road.direction(lane.id) > 0 else math.pi
-                x, y = line.x - t * np.sin(line.h), line.y + t * np.cos(line.h)
+                x, y = line.x - t * elementary.sin(line.h), line.y + t * elementary.cos(line.h)
                 found.append(np.stack((x, y, line.h + back)))
                 on += [osc.LanePosition(road.id, str(lane.id), float(item)) for item in s]
     x, y, h = np.concatenate(found, axis=1) if found else np.empty((3, 0))

@@ -19,6 +19,8 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Literal
 
+from bridgegen.base import elementary
+
 # -- laws ------------------------------------------------------------------------------------------
 
 DRIZZLE, CLOUDBURST = 0.1, 500.0
@@ -56,11 +58,11 @@ def rain_formula(share: str) -> str:
 
 def rain_share(rate: float) -> float:
     """Return the share, 0 to 1 and beyond, of an intensity [mm/h] of rain."""
-    return math.log(rate / DRIZZLE, CLOUDBURST) if rate > 0.0 else 0.0
+    return elementary.log(rate / DRIZZLE) / elementary.log(CLOUDBURST) if rate > 0.0 else 0.0
 
 
 def _fog_density(visual_range: float) -> float:
-    return 100.0 * math.log(CLEAR_AIR / max(visual_range, 1.0), THICK_FOG)
+    return 100.0 * elementary.log(CLEAR_AIR / max(visual_range, 1.0)) / elementary.log(THICK_FOG)
 
 
 RAIN = Law(rain_formula("x/100"), lambda rate: 100.0 * rain_share(rate))

@@ -8,6 +8,7 @@ import math
 
 import numpy as np
 
+from bridgegen.base import _elementary_kernels as elementary
 from bridgegen.base.arrays import Float, Int
 from bridgegen.base.compiled import kernel
 
@@ -15,15 +16,15 @@ from bridgegen.base.compiled import kernel
 @kernel
 def directions(heading: Float, n: int, cosine: Float, sine: Float) -> None:
     """Write the cosine and sine of the first n headings; one that stays the same is reused."""
-    cosine[0] = math.cos(heading[0])
-    sine[0] = math.sin(heading[0])
+    cosine[0] = elementary.cos(heading[0])
+    sine[0] = elementary.sin(heading[0])
     for k in range(1, n):
         if heading[k] == heading[k - 1]:
             cosine[k] = cosine[k - 1]
             sine[k] = sine[k - 1]
         else:
-            cosine[k] = math.cos(heading[k])
-            sine[k] = math.sin(heading[k])
+            cosine[k] = elementary.cos(heading[k])
+            sine[k] = elementary.sin(heading[k])
 
 
 @kernel

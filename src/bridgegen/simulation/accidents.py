@@ -3,12 +3,12 @@
 Paper, Section III-B: layer 4 brings about layer 3; for queues see `bridgegen.simulation.queues`.
 """
 
-import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from bridgegen.base import elementary
 from bridgegen.base.arrays import Bool, Float
 from bridgegen.simulation.boxes import box_distance
 from bridgegen.simulation.rollout import Rollout
@@ -89,8 +89,8 @@ def _corners(rollout: Rollout, row: int, entity: int, step: int) -> Float:
     h = float(rollout.h[row, entity, step])
     along, across = np.array([1, -1, -1, 1]), np.array([1, 1, -1, -1])
     u, v = ahead + 0.5 * length * along, 0.5 * width * across
-    x = rollout.x[row, entity, step] + u * math.cos(h) - v * math.sin(h)
-    y = rollout.y[row, entity, step] + u * math.sin(h) + v * math.cos(h)
+    x = rollout.x[row, entity, step] + u * elementary.cos(h) - v * elementary.sin(h)
+    y = rollout.y[row, entity, step] + u * elementary.sin(h) + v * elementary.cos(h)
     return np.column_stack([x, y])
 
 

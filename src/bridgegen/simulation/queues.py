@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from bridgegen.base import elementary
 from bridgegen.base.arrays import Bool, Float, Int
 from bridgegen.openx.opendrive.lanes import borders, section_end
 from bridgegen.openx.opendrive.lanes import points as road_points
@@ -78,8 +79,8 @@ def queues(
         return ()
     length, ahead = rollout.box[who, 0], rollout.box[who, 2, np.newaxis]
     h = rollout.h[row, who, :steps]
-    x = rollout.x[row, who, :steps] + ahead * np.cos(h)
-    y = rollout.y[row, who, :steps] + ahead * np.sin(h)
+    x = rollout.x[row, who, :steps] + ahead * elementary.cos(h)
+    y = rollout.y[row, who, :steps] + ahead * elementary.sin(h)
     known = sorted(lanes)
     lane, station = _on_lanes(
         x, y, slow, [_line(model.road(road), number) for road, number in known]
@@ -182,8 +183,8 @@ def _line(road: Road, lane_id: int) -> _Line:
         middle, width = 0.5 * (inner + edges[lane_id]), np.abs(edges[lane_id] - inner)
         parts.append(np.column_stack([road_points(road, s, middle), width]))
     x, y, width = np.concatenate(parts)[:: road.direction(lane_id)].T
-    station = np.concatenate([[0.0], np.cumsum(np.hypot(np.diff(x), np.diff(y)))])
-    h = np.arctan2(np.gradient(y), np.gradient(x))
+    station = np.concatenate([[0.0], np.cumsum(elementary.hypot(np.diff(x), np.diff(y)))])
+    h = elementary.atan2(np.gradient(y), np.gradient(x))
     return _Line(x, y, h, station, width)
 
 
@@ -205,7 +206,7 @@ def _on_lanes(x: Float, y: Float, asked: Bool, lines: Sequence[_Line]) -> tuple[
             away = (px[:, np.newaxis] - line.x) ** 2 + (py[:, np.newaxis] - line.y) ** 2
             at = away.argmin(axis=1)
             dx, dy = px - line.x[at], py - line.y[at]
-            cosine, sine = np.cos(line.h[at]), np.sin(line.h[at])
+            cosine, sine = elementary.cos(line.h[at]), elementary.sin(line.h[at])
             along, aside = cosine * dx + sine * dy, cosine * dy - sine * dx
             here = (np.abs(along) <= _STEP) & (np.abs(aside) <= 0.5 * line.width[at])
             lane.flat[some[here]] = number

@@ -25,6 +25,7 @@ from bridgegen.assess.conflict._limits import (
     STANDS,
     TURN_TIME,
 )
+from bridgegen.base import _elementary_kernels as elementary
 from bridgegen.base.compiled import kernel
 
 RED, RED_AND_YELLOW = 1, 2
@@ -38,7 +39,7 @@ def passes_line(scene, e, j, since, last):
     ``since`` and ``last`` limit the instants.
     """
     lines, x, y, c, s = scene.stop_lines, scene.x, scene.y, scene.c, scene.s
-    lc, ls = math.cos(lines[j, 2]), math.sin(lines[j, 2])
+    lc, ls = elementary.cos(lines[j, 2]), elementary.sin(lines[j, 2])
     reach, before, at_red, at_all = scene.half[e, 0], math.inf, -1, -1
     for i in range(since, last + 1):
         px = x[e, i] + reach * c[e, i] - lines[j, 0]
@@ -80,7 +81,7 @@ def stops_at_red(scene, e, k, time):
         if scene.stop_entities[j] != e or not math.isfinite(scene.stop_lines[j, 0]):
             continue
         line = scene.stop_lines[j]
-        lc, ls = math.cos(line[2]), math.sin(line[2])
+        lc, ls = elementary.cos(line[2]), elementary.sin(line[2])
         px = scene.x[e, k] + scene.half[e, 0] * scene.c[e, k] - line[0]
         py = scene.y[e, k] + scene.half[e, 0] * scene.s[e, k] - line[1]
         state = scene.lights[scene.stop_lights[j], k]
@@ -99,7 +100,7 @@ def on_crosswalk(scene, e, k):
     for j in range(len(walks)):
         if not math.isfinite(walks[j, 0]):
             continue
-        c, s = math.cos(walks[j, 2]), math.sin(walks[j, 2])
+        c, s = elementary.cos(walks[j, 2]), elementary.sin(walks[j, 2])
         dx, dy = scene.x[e, k] - walks[j, 0], scene.y[e, k] - walks[j, 1]
         along, across = abs(dx * c + dy * s), abs(dy * c - dx * s)
         if along <= walks[j, 3] + CROSSWALK_MARGIN and across <= walks[j, 4] + KERB:

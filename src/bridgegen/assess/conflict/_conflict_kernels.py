@@ -69,6 +69,7 @@ from bridgegen.assess.conflict._limits import (
 from bridgegen.assess.conflict._responsibility_kernels import judge
 from bridgegen.assess.conflict._type_kernels import type_of
 from bridgegen.assess.metrics._time_kernels import STANDSTILL, time_to_contact
+from bridgegen.base import _elementary_kernels as elementary
 from bridgegen.base.compiled import kernel
 
 
@@ -111,15 +112,15 @@ def nearness(half, x, y, c, s, v, distance, e, n):
         square, t = wx * wx + wy * wy, 0.0
         if square > 0.0:
             t = min(max(-(dx * wx + dy * wy) / square, 0.0), GUIDANCE)
-        gap = max(math.hypot(dx + t * wx, dy + t * wy) - radii, 0.0)
+        gap = max(elementary.hypot(dx + t * wx, dy + t * wy) - radii, 0.0)
         best = min(best, gap / NEAR + t / SOON)
-    return math.exp(-best)
+    return elementary.exp(-best)
 
 
 @kernel
 def urgency(time, needed):
     """Return how urgent a collision course is, 0 to 1; ``harm`` has the same formula."""
-    return (1.0 - time / HORIZON) * (1.0 - math.exp(-needed / SERIOUS_DECELERATION))
+    return (1.0 - time / HORIZON) * (1.0 - elementary.exp(-needed / SERIOUS_DECELERATION))
 
 
 @kernel

@@ -18,6 +18,7 @@ from bridgegen.assess.conflict._codes import (
 )
 from bridgegen.assess.conflict._limits import FINEST, FLUSH, HALVINGS, JUMPS
 from bridgegen.assess.metrics._time_kernels import separation, sweep
+from bridgegen.base import _elementary_kernels as elementary
 from bridgegen.base.arrays import Float, Int
 from bridgegen.base.compiled import kernel
 
@@ -206,7 +207,7 @@ def lengths(x, y, n, out):
     """Write the length of a track up to each instant [m]."""
     out[0] = 0.0
     for k in range(1, n):
-        out[k] = out[k - 1] + math.hypot(x[k] - x[k - 1], y[k] - y[k - 1])
+        out[k] = out[k - 1] + elementary.hypot(x[k] - x[k - 1], y[k] - y[k - 1])
 
 
 @kernel
@@ -288,7 +289,7 @@ def presence(distance, k, n):
 @kernel
 def displaced(x, y, v, e, k, dt):
     """Return whether body e is teleported from instant k to the next, not driven."""
-    moved = math.hypot(x[e, k + 1] - x[e, k], y[e, k + 1] - y[e, k])
+    moved = elementary.hypot(x[e, k + 1] - x[e, k], y[e, k + 1] - y[e, k])
     return moved > (max(abs(v[e, k]), abs(v[e, k + 1])) + JUMPS) * dt
 
 
@@ -374,4 +375,4 @@ def visible_from(scene, e, since, k):
 def turned(c, s, first, k, steps):
     """Return the change of a heading within some steps up to instant k [rad]."""
     j = max(k - steps, first)
-    return math.atan2(s[k] * c[j] - c[k] * s[j], c[k] * c[j] + s[k] * s[j])
+    return elementary.atan2(s[k] * c[j] - c[k] * s[j], c[k] * c[j] + s[k] * s[j])

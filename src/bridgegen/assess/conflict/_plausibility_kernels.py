@@ -10,6 +10,7 @@ import math
 
 import numpy as np
 
+from bridgegen.base import _elementary_kernels as elementary
 from bridgegen.base.compiled import kernel
 
 OTHERS_COLLIDE, OVERLAP_AT_START, SIDEWAYS, ACCELERATION, DECELERATION = 1, 2, 3, 4, 5
@@ -148,7 +149,7 @@ def judge(
     moves, first = np.zeros(n_entities, np.bool_), np.zeros(n_entities, np.int64)
     comes = present.shape[0] > 0
     for e in range(n_entities):
-        reach[e] = math.hypot(abs(box[e, 2]) + 0.5 * box[e, 0], 0.5 * box[e, 1])
+        reach[e] = elementary.hypot(abs(box[e, 2]) + 0.5 * box[e, 0], 0.5 * box[e, 1])
     for i in range(n_rows):
         code[i], instant[i], entity[i], other[i] = 0, -1, -1, -1
         value[i] = limit[i] = math.nan

@@ -15,6 +15,7 @@ from bridgegen.assess.conflict._limits import (
     SAME_WAY,
     WALKING_PACE,
 )
+from bridgegen.base import _elementary_kernels as elementary
 from bridgegen.base.compiled import kernel
 from bridgegen.drivers.kinds import IS_PEDESTRIAN, NEEDS_ROOM
 from bridgegen.drivers.lane_tables import EDGES, HEADING, LANES, STRAYS, TOWN
@@ -73,7 +74,7 @@ def nearest(corridor, n, x, y, i):
 def beside(corridor, i, x, y):
     """Return how far left of the route a point is at a sample [m]."""
     h = corridor[i, HEADING]
-    return (y - corridor[i, 1]) * math.cos(h) - (x - corridor[i, 0]) * math.sin(h)
+    return (y - corridor[i, 1]) * elementary.cos(h) - (x - corridor[i, 0]) * elementary.sin(h)
 
 
 @kernel
@@ -95,7 +96,7 @@ def leaving(corridor, x, y, c, s, v, offset, half_width, begin, until, whole, re
         if i == 0 or i == n - 1:  # before or behind the route
             continue
         h = corridor[i, HEADING]
-        half = half_width * abs(c[k] * math.cos(h) + s[k] * math.sin(h))
+        half = half_width * abs(c[k] * elementary.cos(h) + s[k] * elementary.sin(h))
         aside = beside(corridor, i, x[k], y[k])
         side = 1 if aside > 0.0 else -1
         at = 0 if side > 0 else 1

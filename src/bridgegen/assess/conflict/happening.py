@@ -16,6 +16,7 @@ import numpy as np
 import numpy.typing as npt
 from pydantic import BaseModel
 
+from bridgegen.base import elementary
 from bridgegen.base.arrays import Bool, Float, Int
 from bridgegen.drivers.kinds import IS_OBSTACLE, IS_ON_FOOT
 from bridgegen.simulation.rollout import Rollout
@@ -215,7 +216,7 @@ def _sampled(rollout: Rollout, rows: Int, every: int) -> Rollout:
 
 def _from_ego(rollout: Rollout, x: Float, y: Float) -> tuple[Float, Float]:
     """Return points ``(K, ·, T)`` as the ego sees them: how far ahead and to the left [m]."""
-    cosine, sine = np.cos(rollout.h[:, :1]), np.sin(rollout.h[:, :1])
+    cosine, sine = elementary.cos(rollout.h[:, :1]), elementary.sin(rollout.h[:, :1])
     dx, dy = x - rollout.x[:, :1], y - rollout.y[:, :1]
     return dx * cosine + dy * sine, dy * cosine - dx * sine
 
@@ -225,7 +226,7 @@ def _in_jam(rollout: Rollout, never: Bool, last: Int) -> Bool:
     rows = np.arange(len(last))
     x, y, h = (values[rows, :, last] for values in (rollout.x, rollout.y, rollout.h))
     dx, dy = x[:, np.newaxis] - x[:, :, np.newaxis], y[:, np.newaxis] - y[:, :, np.newaxis]
-    cosine, sine = np.cos(h)[:, :, np.newaxis], np.sin(h)[:, :, np.newaxis]
+    cosine, sine = elementary.cos(h)[:, :, np.newaxis], elementary.sin(h)[:, :, np.newaxis]
     ahead, aside = dx * cosine + dy * sine, np.abs(dy * cosine - dx * sine)
     follows = (ahead > 0.0) & (ahead <= OF_A_JAM) & (aside <= 0.5 * rollout.box[:, 1, np.newaxis])
     found: Bool = np.any(follows & never[:, np.newaxis], axis=2)
@@ -253,8 +254,8 @@ def _crossed(rollout: Rollout, distance: Float) -> Bool:
         for c in range(rollout.crosswalks.shape[1]):
             x, y, h, along, across = rollout.crosswalks[:, c].T[:, :, np.newaxis]
             dx, dy = rollout.x[:, e] - x, rollout.y[:, e] - y
-            on = np.abs(dx * np.cos(h) + dy * np.sin(h)) <= along
-            on &= np.abs(dy * np.cos(h) - dx * np.sin(h)) <= across
+            on = np.abs(dx * elementary.cos(h) + dy * elementary.sin(h)) <= along
+            on &= np.abs(dy * elementary.cos(h) - dx * elementary.sin(h)) <= across
             found |= on & (distance[:, e] <= LIGHT_AHEAD)
     return found
 

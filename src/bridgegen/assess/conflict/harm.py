@@ -23,6 +23,7 @@ import numpy as np
 from bridgegen.assess.conflict import analysis
 from bridgegen.assess.conflict._limits import HORIZON, SERIOUS_DECELERATION
 from bridgegen.assess.conflict.analysis import Conflicts
+from bridgegen.base import elementary
 from bridgegen.base.arrays import Float, Int
 
 Count = Literal["ego", "any"]
@@ -49,7 +50,7 @@ speed, below the collision. Ours."""
 def urgency(conflicts: Conflicts) -> Float:
     """Return how urgent each collision course is, ``(N, E)`` in [0, 1]; 0 without one."""
     ttc = np.minimum(conflicts.ttc, HORIZON)
-    needed = 1.0 - np.exp(-conflicts.needed / SERIOUS_DECELERATION)
+    needed = 1.0 - elementary.exp(-conflicts.needed / SERIOUS_DECELERATION)
     return (1.0 - ttc / HORIZON) * needed
 
 

@@ -9,13 +9,14 @@ import numpy.typing as npt
 
 from bridgegen.assess.conflict.analysis import COURSE, NEAR_MISS, encounters
 from bridgegen.assess.metrics.metric import distance, recorded, steps
+from bridgegen.base import elementary
 from bridgegen.base.arrays import Float, Int
 from bridgegen.base.physics import GRAVITY
 from bridgegen.drivers.kinds import OTHER
 from bridgegen.scenario.participants import OBJECT_CLASSES
 from bridgegen.simulation.rollout import Rollout
 
-SLIP = float(np.tan(np.radians(10.0)))
+SLIP = float(elementary.tan(np.radians(10.0)))
 """Largest motion across a wheeled body, as a share of its speed: tyres slide beyond 10° of slip.
 Source: lateral force of tyres peaks at slip angles of 4° to 10°: Wong, Theory of Ground Vehicles
 (4th edition, 2008), 1.4."""

@@ -16,12 +16,12 @@ those of car occupants are used. ``docs/severity.md`` has the table of constants
 curve, and the limits.
 """
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
+from bridgegen.base import elementary
 from bridgegen.base.arrays import Bool, Float, Int
 from bridgegen.drivers.kinds import CAR, IS_OBSTACLE, NAMES
 from bridgegen.scenario.participants import OBJECT_CLASSES
@@ -111,7 +111,7 @@ CURVES = {
     "front": _FRONT,
     "rear": _wang("A-9, rear-end", -8.0329, 0.1793),
     "side": Curve(
-        math.log(0.1 / 0.9) - _FRONT.slope * _SIDE_TEN_PERCENT,
+        elementary.log(0.1 / 0.9) - _FRONT.slope * _SIDE_TEN_PERCENT,
         _FRONT.slope,
         "delta-v",
         "TARGET setting for high severity collisions: tolerance-based assessment of risk for "
@@ -164,7 +164,7 @@ def effective_speed(closing_normal: npt.ArrayLike, closing_tangential: npt.Array
     """
     normal = np.maximum(np.asarray(closing_normal, dtype=np.float64), 0.0)
     tangential = np.abs(np.asarray(closing_tangential, dtype=np.float64))
-    return np.asarray(np.hypot(normal, np.minimum(FRICTION * normal, tangential)))
+    return np.asarray(elementary.hypot(normal, np.minimum(FRICTION * normal, tangential)))
 
 
 def delta_v(
@@ -232,8 +232,10 @@ def p_mais3(kind: npt.ArrayLike, speed: npt.ArrayLike, direction: npt.ArrayLike)
     v = np.asarray(speed, dtype=np.float64)
     if (v < 0.0).any():
         raise ValueError(f"speed [m/s] must be >= 0, got {v[v < 0.0][0]}")
-    logistic = 1.0 / (1.0 + np.exp(-(_INTERCEPT[kind, direction] + _SLOPE[kind, direction] * v)))
-    return np.asarray(-np.expm1(-np.square(v / FADE)) * logistic)
+    logistic = 1.0 / (
+        1.0 + elementary.exp(-(_INTERCEPT[kind, direction] + _SLOPE[kind, direction] * v))
+    )
+    return np.asarray(-elementary.expm1(-np.square(v / FADE)) * logistic)
 
 
 def injuries(

@@ -23,6 +23,7 @@ from bridgegen.assess.conflict._limits import (
 from bridgegen.assess.conflict.analysis import CONTACT, COURSE, NEAR_MISS, VIOLATION, Conflicts
 from bridgegen.assess.conflict.types import ConflictType, Responsible, Rule
 from bridgegen.assess.metrics.metric import Motion, motion, recorded
+from bridgegen.base import elementary
 from bridgegen.base.arrays import Bool, Int
 from bridgegen.drivers.kinds import CAR, OTHER
 from bridgegen.drivers.lane_tables import EDGES, HEADING, LANES
@@ -156,9 +157,9 @@ def _is_excused(rollout: Rollout, found: Conflicts, moving: Motion, row: int, le
     there = (moving.distance[row, :, at] < PASSED_AHEAD) & slower
     for e in np.flatnonzero(there).tolist():
         x, y = moving.x[row, e, at], moving.y[row, e, at]
-        i = int(np.argmin(np.hypot(table[:, 0] - x, table[:, 1] - y)))
+        i = int(np.argmin(elementary.hypot(table[:, 0] - x, table[:, 1] - y)))
         h = table[i, HEADING]
-        its = (y - table[i, 1]) * np.cos(h) - (x - table[i, 0]) * np.sin(h)
+        its = (y - table[i, 1]) * elementary.cos(h) - (x - table[i, 0]) * elementary.sin(h)
         reach = moving.half[e, 1]
         right, left_border = -table[i, LANES][1], table[i, LANES][0]
         if i >= sample and its + reach > right and its - reach < left_border:

@@ -7,6 +7,7 @@ import math
 
 import numpy as np
 
+from bridgegen.base import _elementary_kernels as elementary
 from bridgegen.base.arrays import Float, Int
 from bridgegen.base.compiled import kernel
 
@@ -164,7 +165,7 @@ def red_lights(
     for i in range(n_rows):
         ran[:] = False
         for j in range(lines.shape[1]):
-            c, s = math.cos(lines[i, j, 2]), math.sin(lines[i, j, 2])
+            c, s = elementary.cos(lines[i, j, 2]), elementary.sin(lines[i, j, 2])
             light = stop_lights[j]
             before = math.inf
             for k in range(n_steps[i]):

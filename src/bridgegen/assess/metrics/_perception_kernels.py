@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 
+from bridgegen.base import _elementary_kernels as elementary
 from bridgegen.base.arrays import Bool, Float, Int
 from bridgegen.base.compiled import kernel
 from bridgegen.drivers.kinds import CONFIDENCE, HEADING, KIND, LENGTH, MISSED, SEEN_BY, WIDTH, X, Y
@@ -51,7 +52,7 @@ def overlap(
     In A's frame, B's centre is at (dx, dy) and its heading is ``turn``; la, wa, lb, wb are half
     lengths and widths. ``array`` and ``other`` are ``(8, 2)`` scratch.
     """
-    c, s = math.cos(turn), math.sin(turn)
+    c, s = elementary.cos(turn), elementary.sin(turn)
     array[0, 0], array[0, 1] = dx + (lb * c - wb * s), dy + (lb * s + wb * c)
     array[1, 0], array[1, 1] = dx - (lb * c + wb * s), dy - (lb * s - wb * c)
     array[2, 0], array[2, 1] = dx - (lb * c - wb * s), dy - (lb * s + wb * c)

@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 
+from bridgegen.base import _elementary_kernels as elementary
 from bridgegen.base.arrays import Float, Int
 from bridgegen.base.compiled import kernel
 
@@ -68,7 +69,7 @@ def pair(
             nearest = k
     if gap[nearest] == 0.0:
         return 0.0
-    ca, sa, cb, sb = math.cos(ha[nearest]), math.sin(ha[nearest]), 0.0, 0.0
+    ca, sa, cb, sb = elementary.cos(ha[nearest]), elementary.sin(ha[nearest]), 0.0, 0.0
     known_a, known_b = ha[nearest], np.nan
     for j in range(n):
         k = nearest - j if j <= nearest else j
@@ -77,10 +78,10 @@ def pair(
             continue
         if ha[k] != known_a:
             known_a = ha[k]
-            ca, sa = math.cos(known_a), math.sin(known_a)
+            ca, sa = elementary.cos(known_a), elementary.sin(known_a)
         if hb[k] != known_b:
             known_b = hb[k]
-            cb, sb = math.cos(known_b), math.sin(known_b)
+            cb, sb = elementary.cos(known_b), elementary.sin(known_b)
         dx = (xb[k] - xa[k]) + (box_b[2] * cb - box_a[2] * ca)
         dy = (yb[k] - ya[k]) + (box_b[2] * sb - box_a[2] * sa)
         wx = vb[k] * cb - va[k] * ca

@@ -11,6 +11,7 @@ from bridgegen.assess.metrics.metric import (
     steps,
     without_failed,
 )
+from bridgegen.base import elementary
 from bridgegen.base.arrays import Bool, Float, Int
 from bridgegen.simulation.rollout import Rollout
 
@@ -131,7 +132,7 @@ def relative_impact_speed(rollout: Rollout) -> Float:
     """
     touching, _ = first_contact(rollout)
     v, h = (at_contact(rollout, field) for field in ("v", "h"))
-    relative = v[:, :1] - v * np.cos(h - h[:, :1])
+    relative = v[:, :1] - v * elementary.cos(h - h[:, :1])
     largest = np.where(touching, relative, 0.0).max(axis=1)
     return without_failed(rollout, np.maximum(largest, 0.0))
 

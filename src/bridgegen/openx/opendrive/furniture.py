@@ -2,10 +2,10 @@
 
 # ruff: noqa: RUF009  (fields are declared through functions that call dataclasses.field)
 
-import math
 from dataclasses import dataclass
 from typing import ClassVar
 
+from bridgegen.base import elementary
 from bridgegen.openx.opendrive.declaration import attribute, child, children
 from bridgegen.openx.opendrive.user_data import UserData
 
@@ -87,7 +87,7 @@ class Object:
         outline = self.outline or next(iter(self.outlines), None)
         if outline is None:
             return []
-        cos, sin = math.cos(self.hdg or 0.0), math.sin(self.hdg or 0.0)
+        cos, sin = elementary.cos(self.hdg or 0.0), elementary.sin(self.hdg or 0.0)
         return [(road.s, road.t) for road in outline.corners_road] + [
             (self.s + local.u * cos - local.v * sin, self.t + local.u * sin + local.v * cos)
             for local in outline.corners_local

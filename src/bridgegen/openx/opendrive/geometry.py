@@ -14,6 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from bridgegen.base import elementary
 from bridgegen.base.arrays import Float
 from bridgegen.openx.opendrive.model import Road
 from bridgegen.openx.opendrive.plan_view import Arc, Geometry, Line, ParamPoly3, Poly3, Spiral
@@ -79,8 +80,12 @@ def along_arc(
 ) -> tuple[float, float, float]:
     """Return x, y, h after ``u`` [m] along an arc from a pose; a line if ``curvature`` is 0."""
     half = 0.5 * curvature * u
-    chord = u * math.sin(half) / half if half != 0.0 else u
-    return x + chord * math.cos(h + half), y + chord * math.sin(h + half), h + 2.0 * half
+    chord = u * elementary.sin(half) / half if half != 0.0 else u
+    return (
+        x + chord * elementary.cos(h + half),
+        y + chord * elementary.sin(h + half),
+        h + 2.0 * half,
+    )
 
 
 def evaluate(geometry: Geometry, u: Float) -> Curve:
@@ -92,7 +97,7 @@ def evaluate(geometry: Geometry, u: Float) -> Curve:
     if isinstance(shape, Spiral):
         rate = (shape.curv_end - shape.curv_start) / geometry.length
         dx, dy = _spiral(shape.curv_start, rate, u)
-        cos, sin = math.cos(geometry.hdg), math.sin(geometry.hdg)
+        cos, sin = elementary.cos(geometry.hdg), elementary.sin(geometry.hdg)
         return Curve(
             geometry.x + cos * dx - sin * dy,
             geometry.y + sin * dx + cos * dy,
@@ -105,8 +110,8 @@ def evaluate(geometry: Geometry, u: Float) -> Curve:
     chord = u * np.sinc(half / math.pi)
     middle = geometry.hdg + half
     return Curve(
-        geometry.x + chord * np.cos(middle),
-        geometry.y + chord * np.sin(middle),
+        geometry.x + chord * elementary.cos(middle),
+        geometry.y + chord * elementary.sin(middle),
         middle + half,
         zero + curvature,
         zero,
@@ -193,8 +198,8 @@ def _spiral(curvature: float, rate: float, u: Float) -> tuple[Float, Float]:
         part = u[first : first + block]
         v = part[:, None] * nodes
         heading = v * (curvature + 0.5 * rate * v)
-        dx[first : first + block] = part * (np.cos(heading) @ weights)
-        dy[first : first + block] = part * (np.sin(heading) @ weights)
+        dx[first : first + block] = part * (elementary.cos(heading) * weights).sum(axis=1)
+        dy[first : first + block] = part * (elementary.sin(heading) * weights).sum(axis=1)
     return dx, dy
 
 
@@ -241,8 +246,8 @@ def _cubic(geometry: Geometry, distance: Float) -> Curve:
     turn = dx * ddy - dy * ddx
     curvature = turn / (square * speed)
     rate = (dx * dddy - dy * dddx) / square**2 - 3.0 * turn * (dx * ddx + dy * ddy) / square**3
-    cos, sin = math.cos(geometry.hdg), math.sin(geometry.hdg)
-    h = geometry.hdg + np.arctan2(dy, dx)
+    cos, sin = elementary.cos(geometry.hdg), elementary.sin(geometry.hdg)
+    h = geometry.hdg + elementary.atan2(dy, dx)
     return Curve(
         geometry.x + cos * x - sin * y,
         geometry.y + sin * x + cos * y,
@@ -255,7 +260,7 @@ def _cubic(geometry: Geometry, distance: Float) -> Curve:
 def _speed(u: tuple[float, ...], v: tuple[float, ...], p: Float) -> Float:
     dx = u[1] + p * (2 * u[2] + p * 3 * u[3])
     dy = v[1] + p * (2 * v[2] + p * 3 * v[3])
-    return np.hypot(dx, dy)
+    return elementary.hypot(dx, dy)
 
 
 def _derivatives(c: tuple[float, ...], p: Float) -> tuple[Float, Float, Float, Float]:
@@ -271,7 +276,7 @@ def integrate(rate: Callable[[Float], Float], low: Float, high: Float) -> Float:
     """Return the integrals of ``rate`` from each ``low`` to each ``high``; ``(P,)`` float64."""
     width = high - low
     points = low[:, None] + width[:, None] * _NODES
-    return np.asarray(width * (rate(points) @ _WEIGHTS))
+    return np.asarray(width * (rate(points) * _WEIGHTS).sum(axis=1))
 
 
 def invert(rate: Callable[[Float], Float], p: Float, total: Float, wanted: Float) -> Float:

@@ -12,6 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from bridgegen.base import elementary
 from bridgegen.base.arrays import Float, Int
 from bridgegen.openx.opendrive.geometry import reference_line, reference_pose
 from bridgegen.openx.opendrive.lanes import borders, lane_at, section_end, section_index
@@ -210,12 +211,12 @@ class LaneGraph:
                 for lane_id in drivable:
                     inner, outer = edges[lane_id - int(math.copysign(1, lane_id))], edges[lane_id]
                     t, way = 0.5 * (inner + outer), road.direction(lane_id)
-                    tilt = np.arctan2(np.gradient(t, s), 1.0 - line.curvature * t)
+                    tilt = elementary.atan2(np.gradient(t, s), 1.0 - line.curvature * t)
                     points.append(
                         np.stack(
                             (
-                                line.x - t * np.sin(line.h),
-                                line.y + t * np.cos(line.h),
+                                line.x - t * elementary.sin(line.h),
+                                line.y + t * elementary.cos(line.h),
                                 line.h + tilt + (0.0 if way > 0 else math.pi),
                                 0.5 * np.abs(outer - inner),
                             ),
@@ -240,7 +241,7 @@ class LaneGraph:
                     0.0, length, max(2, math.ceil(length / GROUND_STEP) + 1)
                 )
                 line, edges = reference_line(road, s), borders(road, index, s)
-                sine, cosine = np.sin(line.h), np.cos(line.h)
+                sine, cosine = elementary.sin(line.h), elementary.cos(line.h)
                 for lane_id in lanes:
                     sides = (edges[lane_id - int(math.copysign(1, lane_id))], edges[lane_id])
                     (ax, ay), (bx, by) = ((line.x - t * sine, line.y + t * cosine) for t in sides)

@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from bridgegen.base import elementary
 from bridgegen.base.arrays import Float
 from bridgegen.base.errors import InputError
 from bridgegen.openx.opendrive.geometry import geometry_index, pose, reference_line
@@ -166,11 +167,11 @@ def lane_pose(road: Road, lane_id: int, s: float) -> LanePose:
         width = width_of(section, lane, s, s)[0]
     geometry = road.plan_view[geometry_index(road, s)]
     x, y, h, curvature = pose(geometry, s - geometry.s)
-    tilt = math.atan2(slope, 1.0 - curvature * t)
+    tilt = elementary.atan2(slope, 1.0 - curvature * t)
     turned = 0.0 if lane_id == 0 or road.direction(lane_id) > 0 else math.pi
     return LanePose(
-        x - t * math.sin(h),
-        y + t * math.cos(h),
+        x - t * elementary.sin(h),
+        y + t * elementary.cos(h),
         h + tilt + turned,
         width,
     )
@@ -212,4 +213,6 @@ def borders(road: Road, index: int, s: Float) -> dict[int, Float]:
 def points(road: Road, s: Float, t: Float) -> Float:
     """Return road coordinates as points in the plane; ``(P, 2)`` float64 [m]."""
     line = reference_line(road, s)
-    return np.stack((line.x - t * np.sin(line.h), line.y + t * np.cos(line.h)), axis=1)
+    return np.stack(
+        (line.x - t * elementary.sin(line.h), line.y + t * elementary.cos(line.h)), axis=1
+    )

@@ -7,6 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from bridgegen.base import elementary
 from bridgegen.base.arrays import Float
 from bridgegen.openx.opendrive.furniture import Object, Signal
 from bridgegen.openx.opendrive.geometry import reference_pose
@@ -105,7 +106,11 @@ def outline_of(road: Road, obj: Object) -> Float | None:
         h = reference_pose(road, min(obj.s, road.length)).h + (obj.hdg or 0.0)
         u, v = (np.array([getattr(each, name) for each in outline.corners_local]) for name in "uv")
         found = np.stack(
-            [x + u * math.cos(h) - v * math.sin(h), y + u * math.sin(h) + v * math.cos(h)], axis=1
+            [
+                x + u * elementary.cos(h) - v * elementary.sin(h),
+                y + u * elementary.sin(h) + v * elementary.cos(h),
+            ],
+            axis=1,
         )
     else:
         return None

@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from bridgegen.base import elementary
 from bridgegen.base.arrays import Float
 from bridgegen.base.errors import InputError
 from bridgegen.openx.opendrive.geometry import (
@@ -150,7 +151,7 @@ class Taper:
     def speed(self, distance: Float) -> Float:
         """Return the metres of centre line per metre of road."""
         forward, sideways, _, _ = self._frame(distance)
-        return np.hypot(forward, sideways)
+        return elementary.hypot(forward, sideways)
 
     def least_stretch(self) -> float:
         """Return the least that the centre advances per metre of road; it must stay positive."""
@@ -173,15 +174,15 @@ class Taper:
         square = forward * forward + sideways * sideways
         scale = stretch(self.geometry)
         slowing = -scale * (scale * line.curvature_rate * t + line.curvature * dt)
-        tilt = np.arctan2(sideways, forward)
+        tilt = elementary.atan2(sideways, forward)
         tilting = (ddt * forward - dt * slowing) / square
         curvature = (scale * line.curvature + tilting) / np.sqrt(square)
         h = line.h + tilt
         if self.direction < 0:
             h, curvature = h + math.pi, -curvature
         return (
-            line.x - t * np.sin(line.h),
-            line.y + t * np.cos(line.h),
+            line.x - t * elementary.sin(line.h),
+            line.y + t * elementary.cos(line.h),
             np.unwrap(h),
             curvature,
             self.entry + self.direction * distance,
@@ -258,7 +259,7 @@ def _piece(
         x, y, h, curvature = pose(geometry, s - geometry.s)
         stretch = 1.0 - curvature * t[0]
         _check_fold(stretch, road, lane, inside)
-        x, y = x - t[0] * math.sin(h), y + t[0] * math.cos(h)
+        x, y = x - t[0] * elementary.sin(h), y + t[0] * elementary.cos(h)
         if direction < 0:
             h += math.pi
         bend = direction * curvature / stretch
@@ -319,8 +320,8 @@ def sample(pieces: Sequence[Piece], length: float, ds: float) -> LanePath:
     half *= local
     chord = local * np.sinc(half / math.pi)
     h += half
-    x += chord * np.cos(h)
-    y += chord * np.sin(h)
+    x += chord * elementary.cos(h)
+    y += chord * elementary.sin(h)
     h += half
     along = rate * local
     for index, piece in enumerate(pieces):

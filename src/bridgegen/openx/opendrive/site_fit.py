@@ -3,6 +3,7 @@
 import math
 from collections.abc import Iterator
 
+from bridgegen.base import elementary
 from bridgegen.base.errors import InputError, UnsupportedError
 from bridgegen.openx.opendrive.merges import merges
 from bridgegen.openx.opendrive.model import OpenDrive
@@ -429,7 +430,7 @@ def _unlikeness(scenario: LogicalScenario, site: Site) -> float:
     farthest = max((value(place.distance, values) for place in all_places(scenario)), default=0.0)
     short = max(0.0, 1.0 - site.legs[0].length / max(farthest, 1.0))
     wanted = value(scenario.roads.knobs["speed_limit"], values)
-    limit = math.log2(max(road.speed_limit or wanted, 1.0) / wanted)
+    limit = elementary.log2(max(road.speed_limit or wanted, 1.0) / wanted)
     within = reach(scenario)
     turned = abs(site.legs[0].turning(*within) - turning(scenario, *within))
     return lanes + short + abs(limit) + turned

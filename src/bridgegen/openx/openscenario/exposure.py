@@ -4,10 +4,9 @@ The standard has normal, log-normal, uniform and Poisson distributions, histogra
 values, each of one parameter: other forms become histograms, and dependence is left out.
 """
 
-import math
-
 import numpy as np
 
+from bridgegen.base import elementary
 from bridgegen.base.arrays import Float
 from bridgegen.base.errors import UnsupportedError
 from bridgegen.openx.openscenario import distributions as dst
@@ -96,8 +95,8 @@ def _element(marginal: Marginal | Conditional, parameter: Parameter) -> _Element
         return dst.NormalDistribution(mean, deviation**2, within)
     if isinstance(marginal, Truncated) and marginal.family is LogNormal and marginal.low > 0.0:
         median, deviation = (float(number) for number in marginal.numbers)
-        mean = median * math.exp(0.5 * deviation**2)
-        return dst.LogNormalDistribution(mean, mean**2 * math.expm1(deviation**2), within)
+        mean = median * elementary.exp(0.5 * deviation**2)
+        return dst.LogNormalDistribution(mean, mean**2 * elementary.expm1(deviation**2), within)
     return _histogram(marginal)
 
 

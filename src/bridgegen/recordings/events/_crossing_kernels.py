@@ -1,9 +1,8 @@
 """Compiled search for places where recorded paths cross; wrapper: ``paths.Paths.crossings``."""
 
-import math
-
 import numpy as np
 
+from bridgegen.base import _elementary_kernels as elementary
 from bridgegen.base.arrays import Bool, Float, Int
 from bridgegen.base.compiled import kernel
 
@@ -22,7 +21,7 @@ def mark_vertices(first: Int, x: Float, y: Float, apart: float, out: Bool) -> No
     for p in range(len(first) - 1):
         last = first[p]
         for k in range(first[p], first[p + 1]):
-            out[k] = k == last or math.hypot(x[k] - x[last], y[k] - y[last]) >= apart
+            out[k] = k == last or elementary.hypot(x[k] - x[last], y[k] - y[last]) >= apart
             if out[k]:
                 last = k
 
@@ -98,7 +97,9 @@ def mark_crossings(
                         continue
                     vx, vy = x[b[j]] - x[a[j]], y[b[j]] - y[a[j]]
                     cross = ux * vy - uy * vx
-                    if abs(cross) < least_sine * math.hypot(ux, uy) * math.hypot(vx, vy):
+                    if abs(cross) < least_sine * elementary.hypot(ux, uy) * elementary.hypot(
+                        vx, vy
+                    ):
                         continue
                     dx, dy = x[a[j]] - x[a[k]], y[a[j]] - y[a[k]]
                     item, other = (dx * vy - dy * vx) / cross, (dx * uy - dy * ux) / cross

@@ -1,9 +1,8 @@
 """Compiled search for places where recorded paths join; wrapper: ``paths.Paths.joins``."""
 
-import math
-
 import numpy as np
 
+from bridgegen.base import _elementary_kernels as elementary
 from bridgegen.base.arrays import Float, Int
 from bridgegen.base.compiled import kernel
 from bridgegen.recordings.events._crossing_kernels import passed
@@ -26,10 +25,10 @@ def foot(
         px: of the point [m].
         py: likewise.
     """
-    here = math.hypot(x[at] - px, y[at] - py)
+    here = elementary.hypot(x[at] - px, y[at] - py)
     for way in (-1, 1):
         while first <= at + way <= last:
-            onward = math.hypot(x[at + way] - px, y[at + way] - py)
+            onward = elementary.hypot(x[at + way] - px, y[at + way] - py)
             if onward > here:
                 break
             here, at = onward, at + way
@@ -37,7 +36,7 @@ def foot(
         ux, uy = x[k + 1] - x[k], y[k + 1] - y[k]
         share = ((px - x[k]) * ux + (py - y[k]) * uy) / max(ux * ux + uy * uy, 1e-12)
         share = min(max(share, 0.0), 1.0)
-        here = min(here, math.hypot(x[k] + share * ux - px, y[k] + share * uy - py))
+        here = min(here, elementary.hypot(x[k] + share * ux - px, y[k] + share * uy - py))
     return here, at
 
 
@@ -141,12 +140,14 @@ def mark_joins(
                 q = who[j]
                 if q <= p or role[q] != 1 or k <= until[q]:
                     continue
-                if math.hypot(x[j] - x[k], y[j] - y[k]) > near:
+                if elementary.hypot(x[j] - x[k], y[j] - y[k]) > near:
                     continue
                 q_first, q_last = lines[q], lines[q + 1] - 1
                 a, b = max(j - 2, q_first), min(j + 2, q_last)
                 vx, vy = x[b] - x[a], y[b] - y[a]
-                if ux * vx + uy * vy < least_cosine * math.hypot(ux, uy) * math.hypot(vx, vy):
+                if ux * vx + uy * vy < least_cosine * elementary.hypot(ux, uy) * elementary.hypot(
+                    vx, vy
+                ):
                     continue
                 end, at = k, j
                 while end < p_last:

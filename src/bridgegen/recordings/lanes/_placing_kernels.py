@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 
+from bridgegen.base import _elementary_kernels as elementary
 from bridgegen.base.arrays import Bool, Float, Int
 from bridgegen.base.compiled import inlined_kernel, kernel
 
@@ -109,8 +110,8 @@ def place_track(
             h0 = points[v, 2]
             turn = _wrapped(points[v + 1, 2] - h0)
             # u with (p - c(u)) at a right angle to the direction at u; c, direction linear in u
-            tx, ty = math.cos(h0), math.sin(h0)
-            bx, by = math.cos(h0 + turn) - tx, math.sin(h0 + turn) - ty
+            tx, ty = elementary.cos(h0), elementary.sin(h0)
+            bx, by = elementary.cos(h0 + turn) - tx, elementary.sin(h0 + turn) - ty
             u = (wx * ex + wy * ey) / (length * length)
             for _ in range(4):
                 rx, ry = wx - u * ex, wy - u * ey
@@ -125,7 +126,7 @@ def place_track(
                 continue
             inside = min(max(u, 0.0), 1.0)
             h = h0 + turn * inside
-            d = (wy - u * ey) * math.cos(h) - (wx - u * ex) * math.sin(h)
+            d = (wy - u * ey) * elementary.cos(h) - (wx - u * ex) * elementary.sin(h)
             half = 0.5 * (points[v, 3] + inside * (points[v + 1, 3] - points[v, 3]))
             if abs(d) > half or half <= 0.0:
                 continue
@@ -179,8 +180,8 @@ def place_track(
         out_station[s] = found[i, chosen, 0]
         out[0, s] = found[i, chosen, 1]
         out[1, s] = _wrapped(heading[s] - h)
-        out[2, s] = speed_x[s] * math.cos(h) + speed_y[s] * math.sin(h)
-        out[3, s] = speed_y[s] * math.cos(h) - speed_x[s] * math.sin(h)
+        out[2, s] = speed_x[s] * elementary.cos(h) + speed_y[s] * elementary.sin(h)
+        out[3, s] = speed_y[s] * elementary.cos(h) - speed_x[s] * elementary.sin(h)
         chosen = back[i, chosen]
 
 

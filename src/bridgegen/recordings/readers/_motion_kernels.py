@@ -1,9 +1,8 @@
 """Headings of bodies on wheels, of whose motion one point is known; compiled, raises nothing."""
 
-import math
-
 import numpy as np
 
+from bridgegen.base import _elementary_kernels as elementary
 from bridgegen.base.arrays import Float, Int
 from bridgegen.base.compiled import kernel
 
@@ -28,7 +27,9 @@ def following_headings(course: Float, way: Float, first: Int, arm: Float, begin:
         heading = begin[p]
         for k in range(first[p], first[p + 1]):
             if k > first[p] and way[k] > 0.0:
-                half = math.tan(0.5 * (heading - course[k])) * math.exp(-way[k] / arm[p])
-                heading = course[k] + 2.0 * math.atan(half)
+                half = elementary.tan(0.5 * (heading - course[k])) * elementary.exp(
+                    -way[k] / arm[p]
+                )
+                heading = course[k] + 2.0 * elementary.atan(half)
             found[k] = heading
     return found

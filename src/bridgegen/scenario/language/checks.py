@@ -8,6 +8,7 @@ from itertools import combinations
 
 import numpy as np
 
+from bridgegen.base import elementary
 from bridgegen.base.arrays import Float
 from bridgegen.base.errors import ScenarioError
 from bridgegen.base.units import has_unit, in_unit
@@ -249,7 +250,7 @@ def _room(participant: Participant, columns: Mapping[str, Float]) -> Body:
         return body
     if (np.abs(heading) == 180.0).all():
         return replace(body, center_ahead=-body.center_ahead)
-    far = math.hypot(max(body.front, body.rear), 0.5 * body.width)
+    far = elementary.hypot(max(body.front, body.rear), 0.5 * body.width)
     return replace(body, length=2.0 * far, width=2.0 * far, center_ahead=0.0)
 
 

@@ -15,6 +15,7 @@ from typing import Protocol
 import numpy as np
 import scipy  # its parts are imported as they are used: they take a tenth of a second
 
+from bridgegen.base import elementary
 from bridgegen.base.arrays import Float
 from bridgegen.base.errors import InputError
 from bridgegen.scenario.language.expression import FUNCTIONS
@@ -230,18 +231,18 @@ class LogNormal:
         if limits and not limits[0] > 0.0:
             raise InputError(f"a log-normal distribution is above 0, got the limit {limits[0]:g}")
         square = math.log1p(variance / mean**2)
-        logs = (math.log(limits[0]), math.log(limits[1])) if limits else None
-        return cls(Normal(math.log(mean) - 0.5 * square, math.sqrt(square), logs))
+        logs = (elementary.log(limits[0]), elementary.log(limits[1])) if limits else None
+        return cls(Normal(elementary.log(mean) - 0.5 * square, math.sqrt(square), logs))
 
     @property
     def low(self) -> float:
         """Smallest value."""
-        return math.exp(self.logarithm.low)
+        return elementary.exp(self.logarithm.low)
 
     @property
     def high(self) -> float:
         """Largest value."""
-        return math.exp(self.logarithm.high)
+        return elementary.exp(self.logarithm.high)
 
     def value(self, share: Float) -> Float:
         """See `Distribution`."""
@@ -313,7 +314,9 @@ class Discrete:
                 f"a Poisson distribution (expected value {mean:g}) has a probability below "
                 f"{TAIL:g} from {low:g} to {high:g}"
             )
-        weights = np.exp(counts * math.log(mean) - mean - scipy.special.gammaln(counts + 1.0))
+        weights = elementary.exp(
+            counts * elementary.log(mean) - mean - scipy.special.gammaln(counts + 1.0)
+        )
         return cls.of(counts.tolist(), weights.tolist())
 
     @property

@@ -34,6 +34,7 @@ from typing import Any
 
 import numpy as np
 
+from bridgegen.base import elementary
 from bridgegen.base.arrays import Float
 from bridgegen.base.errors import InputError
 
@@ -42,25 +43,6 @@ MAX_DEPTH = 32
 
 Categories = Mapping[str, Sequence[str]]
 _Program = Callable[[Mapping[str, Any]], Any]
-
-# NumPy may take different code for whole SIMD registers and for the rest, for strided arrays, and
-# for arrays of length 1 (where pow(x, 2) becomes x·x), and the last bit of exp, log, pow and the
-# angles' functions may differ between them. Always giving these whole registers of contiguous
-# memory makes a row's result independent of the batch around it. All other operations are exact by
-# IEEE 754.
-_LANES = 16
-
-
-def _steady(function: Callable[..., Any]) -> Callable[..., Any]:
-    def apply(*arguments: Any) -> Any:
-        arrays = np.broadcast_arrays(*arguments)
-        size = arrays[0].size
-        lanes = np.ones((len(arrays), -(-size // _LANES) * _LANES))
-        for lane, array in zip(lanes, arrays, strict=True):
-            lane[:size] = array.ravel()
-        return function(*lanes)[:size].reshape(arrays[0].shape)
-
-    return apply
 
 
 def _round_half_up(value: Any) -> Any:
@@ -79,21 +61,21 @@ def _greatest(*values: Any) -> Any:
 # name: (fewest arguments, most arguments, function)
 FUNCTIONS: dict[str, tuple[int, int, Callable[..., Any]]] = {
     "abs": (1, 1, np.abs),
-    "acos": (1, 1, _steady(np.arccos)),
-    "asin": (1, 1, _steady(np.arcsin)),
-    "atan": (1, 1, _steady(np.arctan)),
+    "acos": (1, 1, elementary.acos),
+    "asin": (1, 1, elementary.asin),
+    "atan": (1, 1, elementary.atan),
     "ceil": (1, 1, np.ceil),
-    "cos": (1, 1, _steady(np.cos)),
-    "exp": (1, 1, _steady(np.exp)),
+    "cos": (1, 1, elementary.cos),
+    "exp": (1, 1, elementary.exp),
     "floor": (1, 1, np.floor),
-    "log": (1, 1, _steady(np.log)),
+    "log": (1, 1, elementary.log),
     "max": (2, 16, _greatest),
     "min": (2, 16, _least),
     "round": (1, 1, _round_half_up),
     "sign": (1, 1, np.sign),
-    "sin": (1, 1, _steady(np.sin)),
+    "sin": (1, 1, elementary.sin),
     "sqrt": (1, 1, np.sqrt),
-    "tan": (1, 1, _steady(np.tan)),
+    "tan": (1, 1, elementary.tan),
 }
 RESERVED = frozenset(FUNCTIONS) | {"pi", "pow"}
 
@@ -103,7 +85,7 @@ _BINARY: dict[type[ast.operator], Callable[..., Any]] = {
     ast.Mult: np.multiply,
     ast.Div: np.divide,
     ast.Mod: np.mod,
-    ast.Pow: _steady(np.power),
+    ast.Pow: elementary.power,
 }
 _COMPARE: dict[type[ast.cmpop], Callable[..., Any]] = {
     ast.Lt: np.less,

@@ -26,6 +26,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from bridgegen.base import elementary
 from bridgegen.base.arrays import Bool, Float
 from bridgegen.base.units import PATTERN
 from bridgegen.scenario.language.expression import RESERVED
@@ -524,7 +525,7 @@ class Angle(Kind):
         if high - low < TURN:
             return super().coordinates(value, low, high)
         around = 2.0 * math.pi / TURN * value
-        return np.stack([np.cos(around), np.sin(around)], axis=1) / (2.0 * math.pi)
+        return np.stack([elementary.cos(around), elementary.sin(around)], axis=1) / (2.0 * math.pi)
 
     def shown(self, value: float) -> float:
         """See `Kind`."""

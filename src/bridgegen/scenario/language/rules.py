@@ -6,6 +6,7 @@ Each becomes a bound like one from a file, so the decoder keeps it and SHACL che
 import math
 from collections.abc import Iterable, Iterator, Mapping
 
+from bridgegen.base import elementary
 from bridgegen.base.physics import DRY_FRICTION, GRAVITY, MOST_LATERAL
 from bridgegen.scenario.language.expression import parse
 from bridgegen.scenario.language.parameters import Bound, Parameter
@@ -125,7 +126,7 @@ def bend(roads: RoadsSpec, participant: Participant) -> str | None:
         return None
     # Lane centres lie half a width beside the leg's axis: outside in a left turn, inside in a
     # right one. Legs at the angle φ have their tangent points half the junction from its centre.
-    half = 0.5 / math.tan(math.radians(abs(turn)) / 2.0)
+    half = 0.5 / elementary.tan(math.radians(abs(turn)) / 2.0)
     size, width = _text(roads.knobs["intersection_size"]), _text(roads.knobs["lane_width"])
     lane = participant.start.lane if isinstance(participant.start.lane, int) else 1
     sign = "+" if turn > 0.0 else "-"

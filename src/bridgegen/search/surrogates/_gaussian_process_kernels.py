@@ -4,12 +4,15 @@ NumPy's and SciPy's products and factorisations differ in their last bits with t
 threads; these do not.
 """
 
+import math
+
 import numpy as np
 
+from bridgegen.base import _elementary_kernels as elementary
 from bridgegen.base.arrays import Float
 from bridgegen.base.compiled import kernel
 
-ROOT5 = 5.0**0.5
+ROOT5 = math.sqrt(5.0)
 
 
 @kernel
@@ -37,7 +40,7 @@ def covariance(A: Float, B: Float, variance: float) -> Float:
                 step = A[i, c] - B[j, c]
                 square += step * step
             r = ROOT5 * np.sqrt(square)
-            K[i, j] = variance * (1.0 + r + r * r / 3.0) * np.exp(-r)
+            K[i, j] = variance * (1.0 + r + r * r / 3.0) * elementary.exp(-r)
     return K
 
 
@@ -145,7 +148,7 @@ def likelihood_gradient(X: Float, K: Float, G: Float, alpha: Float, variance: fl
                 step = X[i, c] - X[j, c]
                 square += step * step
             r = ROOT5 * np.sqrt(square)
-            slope = weight * variance * (5.0 / 3.0) * (1.0 + r) * np.exp(-r)
+            slope = weight * variance * (5.0 / 3.0) * (1.0 + r) * elementary.exp(-r)
             for c in range(d):
                 step = X[i, c] - X[j, c]
                 gradient[c] += slope * step * step

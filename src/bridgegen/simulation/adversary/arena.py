@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from bridgegen.base import elementary
 from bridgegen.base.arrays import Bool, Float, Int
 from bridgegen.base.errors import InputError
 from bridgegen.scenario.language.space import SearchSpace
@@ -156,13 +157,13 @@ class Arena:
                 v / FAST,
                 aside / np.maximum(room, 1e-9),
                 top / FAST,
-                (dx * np.cos(h) + dy * np.sin(h)) / FAR,
-                (dy * np.cos(h) - dx * np.sin(h)) / FAR,
-                np.cos(turned),
-                np.sin(turned),
+                (dx * elementary.cos(h) + dy * elementary.sin(h)) / FAR,
+                (dy * elementary.cos(h) - dx * elementary.sin(h)) / FAR,
+                elementary.cos(turned),
+                elementary.sin(turned),
                 ego_v / FAST,
                 ego_a / HARD,
-                np.hypot(dx, dy) / FAR,
+                elementary.hypot(dx, dy) / FAR,
                 way / FAR,
                 ego_way / FAR,
                 way / np.maximum(v, 0.1) / LONG,

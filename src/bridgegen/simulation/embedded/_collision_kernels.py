@@ -3,8 +3,7 @@
 # mypy: allow-untyped-defs
 # Numba infers what kernels take; their wrappers are typed.
 
-import math
-
+from bridgegen.base import _elementary_kernels as elementary
 from bridgegen.base.compiled import kernel
 from bridgegen.drivers._emergency_kernels import boxes_meet
 
@@ -20,16 +19,16 @@ def collides(k, plan, record):
     if not (always or record.present[0, k]):
         return False
     own, h = plan.bodies[0], record.h[0, k]
-    x = record.x[0, k] + own[2] * math.cos(h)
-    y = record.y[0, k] + own[2] * math.sin(h)
+    x = record.x[0, k] + own[2] * elementary.cos(h)
+    y = record.y[0, k] + own[2] * elementary.sin(h)
     for e in range(1, record.x.shape[0]):
         other, turned = plan.bodies[e], record.h[e, k]
         reach = 0.5 * (own[0] + own[1] + other[0] + other[1]) + abs(other[2])
         dx, dy = record.x[e, k] - x, record.y[e, k] - y
         if abs(dx) > reach or abs(dy) > reach or not (always or record.present[e, k]):
             continue
-        dx += other[2] * math.cos(turned)
-        dy += other[2] * math.sin(turned)
+        dx += other[2] * elementary.cos(turned)
+        dy += other[2] * elementary.sin(turned)
         if boxes_meet(
             dx,
             dy,

@@ -5,6 +5,7 @@
 
 import math
 
+from bridgegen.base import _elementary_kernels as elementary
 from bridgegen.base.compiled import kernel
 from bridgegen.drivers._path_kernels import X, Y, project
 
@@ -27,7 +28,7 @@ def bicycle(x, y, h, v, demanded, curvature, limits, friction_limit, uphill, asi
     """
     a = min(max(demanded, -limits[2] - uphill), limits[1] - uphill)
     bend = min(max(curvature, -limits[3]), limits[3])
-    total = math.hypot(a + uphill, v * v * bend + aside)
+    total = elementary.hypot(a + uphill, v * v * bend + aside)
     if total > friction_limit:
         share = friction_limit / total
         a = share * (a + uphill) - uphill
@@ -38,8 +39,8 @@ def bicycle(x, y, h, v, demanded, curvature, limits, friction_limit, uphill, asi
     travelled = 0.5 * (v + end) * dt
     middle = h + 0.5 * travelled * bend
     return (
-        x + travelled * math.cos(middle),
-        y + travelled * math.sin(middle),
+        x + travelled * elementary.cos(middle),
+        y + travelled * elementary.sin(middle),
         h + travelled * bend,
         end,
         a,
@@ -76,7 +77,7 @@ def progress(shape, u):
     if u >= 1.0:
         return 1.0, 0.0
     if shape == SINUSOIDAL:
-        return 0.5 - 0.5 * math.cos(math.pi * u), 0.5 * math.pi * math.sin(math.pi * u)
+        return 0.5 - 0.5 * elementary.cos(math.pi * u), 0.5 * math.pi * elementary.sin(math.pi * u)
     if shape == CUBIC:
         return u * u * (3.0 - 2.0 * u), 6.0 * u * (1.0 - u)
     return u, 1.0
@@ -85,7 +86,7 @@ def progress(shape, u):
 @kernel
 def shifted(x, y, h, aside):
     """Return the point so far to the left of another one [m]."""
-    return x - aside * math.sin(h), y + aside * math.cos(h)
+    return x - aside * elementary.sin(h), y + aside * elementary.cos(h)
 
 
 @kernel

@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
+from bridgegen.base import elementary
 from bridgegen.base.arrays import Float, Int
 from bridgegen.drivers.drivers import REFERENCE, STORYBOARD
 from bridgegen.simulation.embedded.places.network import Network
@@ -114,7 +115,9 @@ def _follow(roads: Network, rows: Int, rollout: Rollout, out: Intentions) -> Non
         for i, k in enumerate(out.steps.tolist()):
             reach = int((EVERY * rollout.v[row, 0, max(0, k - 1)] + NEAR) / step) + 2
             part = way[at : at + reach] if i else way
-            gap = np.hypot(part[:, 0] - rollout.x[row, 0, k], part[:, 1] - rollout.y[row, 0, k])
+            gap = elementary.hypot(
+                part[:, 0] - rollout.x[row, 0, k], part[:, 1] - rollout.y[row, 0, k]
+            )
             nearest = int(gap.argmin())
             if gap[nearest] < NEAR:
                 at += nearest

@@ -7,11 +7,11 @@ Source: esminiLib.hpp of esmini 3.6, https://github.com/esmini/esmini (MPL-2.0).
 """
 
 import ctypes
-import math
 import re
 from collections.abc import Callable
 from pathlib import Path
 
+from bridgegen.base import elementary
 from bridgegen.base.errors import InputError
 
 OLDEST = 3
@@ -177,7 +177,7 @@ class Library:
             a: acceleration along its heading [m/s²].
             turn: rate of its heading [rad/s].
         """
-        call, cos, sin = self._functions, math.cos(h), math.sin(h)
+        call, cos, sin = self._functions, elementary.cos(h), elementary.sin(h)
         call.SE_ReportObjectPosXYH(number, x, y, h)
         call.SE_ReportObjectSpeed(number, v)
         call.SE_ReportObjectVel(number, v * cos, v * sin, 0.0)

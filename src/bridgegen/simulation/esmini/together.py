@@ -14,6 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
+from bridgegen.base import elementary
 from bridgegen.base.arrays import Float
 from bridgegen.simulation.embedded.co_simulation import CoSimulation
 from bridgegen.simulation.esmini.library import Library
@@ -148,7 +149,9 @@ class _Row:
                 x, y, h, v = state
                 way = v * late  # it stopped between two instants: they go on as they were going
                 bodies.append(e)
-                states.append((x + way * math.cos(h), y + way * math.sin(h), h, max(v, 0.0)))
+                states.append(
+                    (x + way * elementary.cos(h), y + way * elementary.sin(h), h, max(v, 0.0))
+                )
         self._joint.impose_presence(k, present)
         self._joint.impose(k, bodies, states)
 

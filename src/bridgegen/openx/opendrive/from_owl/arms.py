@@ -6,6 +6,7 @@ from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from typing import Literal, NamedTuple
 
+from bridgegen.base import elementary
 from bridgegen.base.errors import OntologyError
 from bridgegen.openx.opendrive.furniture import Object, Signal
 from bridgegen.openx.opendrive.geometry import along_arc
@@ -60,7 +61,7 @@ def joining(start: Ray, end: Ray, what: str) -> tuple[Geometry, ...]:
         OntologyError: no such curve is wide enough for a car.
     """
     dx, dy = end.x - start.x, end.y - start.y
-    cos, sin = math.cos(start.h), math.sin(start.h)
+    cos, sin = elementary.cos(start.h), elementary.sin(start.h)
     ahead, aside = dx * cos + dy * sin, dy * cos - dx * sin
     turn = math.remainder(end.h - start.h, math.tau)
     bends = _bends(ahead, aside, turn)
@@ -91,11 +92,11 @@ def _bends(ahead: float, aside: float, turn: float) -> list[tuple[float, float]]
         return [(0.0, ahead)]
     if abs(turn) > _ALMOST_PARALLEL:
         # Both rays run through one corner, `before` ahead of the start, `after` behind the end.
-        after = aside / math.sin(turn)
-        before = ahead - after * math.cos(turn)
+        after = aside / elementary.sin(turn)
+        before = ahead - after * elementary.cos(turn)
         tangent = min(before, after)
         if tangent > 0.0:
-            radius = tangent / math.tan(0.5 * abs(turn))
+            radius = tangent / elementary.tan(0.5 * abs(turn))
             arc = (math.copysign(1.0 / radius, turn), radius * abs(turn))
             parts = [(0.0, before - tangent), arc, (0.0, after - tangent)]
             if radius >= LEAST_RADIUS:  # else the corner is next to one end of a slight bend
@@ -104,7 +105,7 @@ def _bends(ahead: float, aside: float, turn: float) -> list[tuple[float, float]]
 
 
 def _two_arcs(ahead: float, aside: float, turn: float) -> list[tuple[float, float]]:
-    cos, sin = math.cos(turn), math.sin(turn)
+    cos, sin = elementary.cos(turn), elementary.sin(turn)
     square = ahead * ahead + aside * aside
     along_both = ahead * (1.0 + cos) + aside * sin
     bend = 2.0 * (1.0 - cos)
@@ -114,17 +115,17 @@ def _two_arcs(ahead: float, aside: float, turn: float) -> list[tuple[float, floa
     first = _arc_to(*joint)
     x, y = ahead - joint[0], aside - joint[1]
     heading = first[0] * first[1]
-    cos, sin = math.cos(heading), math.sin(heading)
+    cos, sin = elementary.cos(heading), elementary.sin(heading)
     return [first, _arc_to(x * cos + y * sin, y * cos - x * sin)]
 
 
 def _arc_to(ahead: float, aside: float) -> tuple[float, float]:
     """Return the curvature and length of the arc that starts straight ahead and ends there."""
-    chord = math.hypot(ahead, aside)
-    half = math.atan2(aside, ahead)
+    chord = elementary.hypot(ahead, aside)
+    half = elementary.atan2(aside, ahead)
     if abs(half) < _STRAIGHT:
         return 0.0, chord
-    return 2.0 * math.sin(half) / chord, chord * half / math.sin(half)
+    return 2.0 * elementary.sin(half) / chord, chord * half / elementary.sin(half)
 
 
 _QUARTERS = {0: (1.0, 0.0), 90: (0.0, 1.0), 180: (-1.0, 0.0), 270: (0.0, -1.0)}
@@ -209,7 +210,7 @@ class Arm:
 def outward(degrees: float) -> tuple[float, float]:
     """Return the unit vector of a heading, exact for right angles."""
     exact = _QUARTERS.get(int(degrees) % 360) if degrees == int(degrees) else None
-    return exact or (math.cos(math.radians(degrees)), math.sin(math.radians(degrees)))
+    return exact or (elementary.cos(math.radians(degrees)), elementary.sin(math.radians(degrees)))
 
 
 def wrapped(degrees: float) -> float:

@@ -4,6 +4,7 @@ import math
 from collections.abc import Iterator
 from typing import Literal
 
+from bridgegen.base import elementary
 from bridgegen.base.errors import OntologyError
 from bridgegen.openx.opendrive.from_owl.arms import Arm, Strips
 from bridgegen.openx.opendrive.from_owl.furniture import objects_on, signals_on
@@ -227,7 +228,7 @@ def corner(arm: Arm, following: Arm) -> float:
         return math.inf
     if angle > math.pi - _LEAST_ANGLE:
         return 0.0
-    cos, sin = math.cos(angle), math.sin(angle)
+    cos, sin = elementary.cos(angle), elementary.sin(angle)
     return min((right + left * cos) / sin, (left + right * cos) / sin)
 
 

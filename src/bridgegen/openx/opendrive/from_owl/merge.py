@@ -7,6 +7,7 @@ at a shallow angle and becomes the acceleration lane in one bend.
 import math
 from dataclasses import replace
 
+from bridgegen.base import elementary
 from bridgegen.base.errors import OntologyError
 from bridgegen.openx.opendrive.from_owl.arms import (
     EDGE,
@@ -92,13 +93,16 @@ def build(
     edge = sum(after.outbound)
     end = Ray(NOSE, -edge - 0.5 * width, 0.0)
     turn = math.radians(angle)
-    radius = NOSE / math.sin(turn)
-    start = Ray(0.0, end.y - radius * (1.0 - math.cos(turn)), turn)
+    radius = NOSE / elementary.sin(turn)
+    start = Ray(0.0, end.y - radius * (1.0 - elementary.cos(turn)), turn)
     line = (along(0.0, -main.length, 0.0, 0.0, main.length, 0.0),)
     roads = [road_of(main, line, junction_id)]
     # The ramp's reference line is its left edge.
-    x, y = start.x - 0.5 * width * math.sin(turn), start.y + 0.5 * width * math.cos(turn)
-    x, y = x - ramp.length * math.cos(turn), y - ramp.length * math.sin(turn)
+    x, y = (
+        start.x - 0.5 * width * elementary.sin(turn),
+        start.y + 0.5 * width * elementary.cos(turn),
+    )
+    x, y = x - ramp.length * elementary.cos(turn), y - ramp.length * elementary.sin(turn)
     ramp_line = (along(0.0, x, y, turn, ramp.length, 0.0),)
     roads.append(road_of(ramp, ramp_line, junction_id))
     beyond = (along(0.0, NOSE, 0.0, 0.0, after.length, 0.0),)

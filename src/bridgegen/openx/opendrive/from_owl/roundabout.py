@@ -7,6 +7,7 @@ lead on: out to the leg, on around the ring, and from the leg into the ring.
 import math
 from itertools import pairwise
 
+from bridgegen.base import elementary
 from bridgegen.base.errors import OntologyError
 from bridgegen.openx.opendrive.from_owl.arms import (
     EDGE,
@@ -164,7 +165,7 @@ def build(
 def _ray(radius: float, angle: float) -> Ray:
     """Return a place of the ring and its direction of travel."""
     heading = math.remainder(angle + 0.5 * math.pi, math.tau)
-    return Ray(radius * math.cos(angle), radius * math.sin(angle), heading)
+    return Ray(radius * elementary.cos(angle), radius * elementary.sin(angle), heading)
 
 
 def _arc(radius: float, start: float, end: float) -> Geometry:

@@ -5,6 +5,7 @@ from collections.abc import Iterable, Iterator, Sequence
 
 import pyoxigraph as ox
 
+from bridgegen.base import elementary
 from bridgegen.openx.opendrive.from_owl.furniture import LAMP, SIGNS, STATES, STOP_LINE
 from bridgegen.openx.opendrive.furniture import (
     Controller,
@@ -120,8 +121,8 @@ class Furniture:
             if limit is not None:
                 put(node, "has_speed_limit", exact(signal.user_data, "has_speed_limit", limit))
             pose = reference_pose(road, min(signal.s, road.length))
-            put(node, "has_world_x", float(pose.x - signal.t * math.sin(pose.h)))
-            put(node, "has_world_y", float(pose.y + signal.t * math.cos(pose.h)))
+            put(node, "has_world_x", float(pose.x - signal.t * elementary.sin(pose.h)))
+            put(node, "has_world_y", float(pose.y + signal.t * elementary.cos(pose.h)))
             self._governs(cls, node, road, signal)
 
     def add_references(self, road: Road) -> None:
@@ -258,7 +259,7 @@ def box_of(item: Object) -> Box:
     if length is not None and width is not None and (not corners or hdg == 0.0):
         along, across = length, width
         if hdg != 0.0:
-            cos, sin = abs(math.cos(hdg)), abs(math.sin(hdg))
+            cos, sin = abs(elementary.cos(hdg)), abs(elementary.sin(hdg))
             along, across = length * cos + width * sin, length * sin + width * cos
         low = item.s - 0.5 * along
         middle = 0.5 * sum(_extent(t for _, t in corners)) if corners else item.t

@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterator, Mapping
 from functools import partial
 from typing import Any
 
+from bridgegen.base import elementary
 from bridgegen.base.errors import OntologyError
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.from_owl.quantities import Quantities, Quantity
@@ -295,7 +296,7 @@ def time_of_day(altitude_deg: float) -> str:
     The day is the one behind the paper's azimuth formula (CARLA's ``dynamic_weather.py``):
     altitude = −20 + 70·sin(t), from −90° at midnight to 50° at noon. Its date means nothing.
     """
-    phase = math.asin(min(max((altitude_deg + 20.0) / 70.0, -1.0), 1.0))
+    phase = elementary.asin(min(max((altitude_deg + 20.0) / 70.0, -1.0), 1.0))
     seconds = round((phase / math.pi + 0.5) * 12 * 3600)
     return f"2025-03-20T{seconds // 3600:02}:{seconds // 60 % 60:02}:{seconds % 60:02}"
 

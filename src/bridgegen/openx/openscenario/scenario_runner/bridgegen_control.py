@@ -18,13 +18,14 @@ BridgeGen puts this file beside the scenarios that it exports; they name it as t
 from __future__ import annotations
 
 import bisect
-import math
 from typing import Any
 
 import carla
 from srunner.scenariomanager.actorcontrols.basic_control import BasicControl
 from srunner.scenariomanager.carla_data_provider import CarlaDataProvider
 from srunner.scenariomanager.timer import GameTime
+
+from bridgegen.base import elementary
 
 LET_GO = 2.0
 """Deviation beyond which a participant has been pushed, and is steered no more [m]."""
@@ -119,7 +120,7 @@ class BridgegenControl(BasicControl):  # type: ignore[misc]  # not typed
         x, y, yaw = self._pose(time)
         next_x, next_y, next_yaw = self._pose(time + step)
         off_x, off_y = x - here.location.x, y - here.location.y
-        if math.hypot(off_x, off_y) > LET_GO:
+        if elementary.hypot(off_x, off_y) > LET_GO:
             self._is_let_go = True
             return
         vx = (next_x - x + PULL * off_x) / step
@@ -130,7 +131,7 @@ class BridgegenControl(BasicControl):  # type: ignore[misc]  # not typed
             self._actor.set_target_velocity(carla.Vector3D(vx, vy, falling))
             self._actor.set_target_angular_velocity(carla.Vector3D(0.0, 0.0, turn / step))
         elif isinstance(self._actor, carla.Walker):
-            control, speed = self._actor.get_control(), math.hypot(vx, vy)
+            control, speed = self._actor.get_control(), elementary.hypot(vx, vy)
             control.speed = speed
             if speed > _STANDING:
                 control.direction = carla.Vector3D(vx / speed, vy / speed, 0.0)

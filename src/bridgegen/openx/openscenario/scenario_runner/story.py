@@ -7,13 +7,13 @@ Source: ScenarioRunner 0.9.16, srunner/scenarios/open_scenario.py and
 srunner/tools/openscenario_parser.py; atomic_criteria.py for what the criteria take.
 """
 
-import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
+from bridgegen.base import elementary
 from bridgegen.base.arrays import Float
 from bridgegen.base.errors import UnsupportedError
 from bridgegen.openx.opendrive.model import OpenDrive
@@ -94,7 +94,7 @@ def course(recording: Recording, e: int, body: Body, ground: float = 0.0) -> Cou
     """
     centre: Any = body.bounding_box.center
     x, y, h = recording.x[e], recording.y[e], recording.h[e]
-    cos, sin = np.cos(h), np.sin(h)
+    cos, sin = elementary.cos(h), elementary.sin(h)
     return Course(
         x + centre.x * cos - centre.y * sin,
         y + centre.x * sin + centre.y * cos,
@@ -303,7 +303,8 @@ def _misplaced(recording: Recording, known: Mapping[str, Light]) -> Iterator[str
         near = [
             other.id
             for other in known.values()
-            if other.id != name and math.hypot(other.x - value.x, other.y - value.y) < LIGHT_REACH
+            if other.id != name
+            and elementary.hypot(other.x - value.x, other.y - value.y) < LIGHT_REACH
         ]
         if near:
             yield (

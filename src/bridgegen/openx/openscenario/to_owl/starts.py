@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from bridgegen.base import elementary
 from bridgegen.base.errors import InputError
 from bridgegen.openx.opendrive.geometry import reference_line
 from bridgegen.openx.opendrive.lanes import borders, lane_along, lane_at, lane_pose, section_index
@@ -108,7 +109,7 @@ class Starts:
             own = self.number(turned.h)
             facing = own if self._is_absolute(turned) else h + own
         facing = math.remainder(facing, math.tau)
-        at = x - t * math.sin(h), y + t * math.cos(h)
+        at = x - t * elementary.sin(h), y + t * elementary.cos(h)
         return osc.WorldPosition(*at, None, facing, None, None, line=where.line)
 
     def lane(self, entity: str) -> tuple[str, int] | None:
@@ -214,7 +215,10 @@ class Starts:
             return None
         dx, dy = self.number(where.dx), self.number(where.dy)
         if isinstance(where, osc.RelativeObjectPosition):
-            dx, dy = dx * math.cos(h) - dy * math.sin(h), dx * math.sin(h) + dy * math.cos(h)
+            dx, dy = (
+                dx * elementary.cos(h) - dy * elementary.sin(h),
+                dx * elementary.sin(h) + dy * elementary.cos(h),
+            )
         turned = where.orientation
         if turned is not None and turned.h is not None:
             own = self.number(turned.h)
@@ -236,8 +240,8 @@ class Starts:
         turned = at.orientation
         own = 0.0 if turned is None or turned.h is None else self.number(turned.h)
         return (
-            pose.x - aside * math.sin(pose.h),
-            pose.y + aside * math.cos(pose.h),
+            pose.x - aside * elementary.sin(pose.h),
+            pose.y + aside * elementary.cos(pose.h),
             pose.h + own,
         )
 

@@ -12,6 +12,7 @@ on forces that make it so, and in between both count by a smooth weight.
 
 import math
 
+from bridgegen.base import _elementary_kernels as elementary
 from bridgegen.base.compiled import kernel
 from bridgegen.base.physics import GRAVITY
 from bridgegen.simulation.embedded.chassis._chassis_columns import (
@@ -152,7 +153,7 @@ def _changes(motion, at, weight, cosine, sine, force, acts, mu, press, uphill, a
     vx, vy, turn = motion[at + VX], motion[at + VY], motion[at + YAW_RATE]
     roll, rolls, pitch = motion[at + ROLL], motion[at + ROLL_RATE], motion[at + PITCH]
     pitches, sunk, sinks = motion[at + PITCH_RATE], motion[at + SUNK], motion[at + SINKS]
-    cr, sr = math.cos(roll), math.sin(roll)
+    cr, sr = elementary.cos(roll), elementary.sin(roll)
     above = chassis[HEIGHT] - radius
     presses = max(motion[at + AXLE_AT + PRESSED], 0.0)
     both = presses + max(motion[at + AXLE_AT + AXLE_STATES + PRESSED], 0.0)
@@ -170,16 +171,16 @@ def _changes(motion, at, weight, cosine, sine, force, acts, mu, press, uphill, a
         half, unsprung = 0.5 * chassis[c + TRACK], chassis[c + UNSPRUNG]
         lean, leans, goes = motion[a + LEAN], motion[a + LEAN_RATE], motion[a + ASIDE]
         pressed, deepens, off = motion[a + PRESSED], motion[a + PRESSES], motion[a + OFF]
-        cl, sl = math.cos(lean), math.sin(lean)
+        cl, sl = elementary.cos(lean), elementary.sin(lean)
         # The joint that holds the axle below the body, sideways.
         below, twist, twists = above + pressed - sunk, roll - lean, rolls - leans
         drifts = vy + ahead * turn - goes
-        sheared = -below * sr - off * cr - radius * math.sin(twist)
+        sheared = -below * sr - off * cr - radius * elementary.sin(twist)
         shears = (
             (off * sr - below * cr) * rolls
             - (deepens - sinks) * sr
             - drifts * cr
-            - radius * math.cos(twist) * twists
+            - radius * elementary.cos(twist) * twists
         )
         joint = chassis[K_JOINT] * sheared + chassis[D_JOINT] * shears
         # Springs, dampers and the anti-roll bar.
@@ -250,7 +251,7 @@ def _changes(motion, at, weight, cosine, sine, force, acts, mu, press, uphill, a
     motion[SLOPE + ROLL], motion[SLOPE + ROLL_RATE] = rolls, overturns / chassis[I_ROLL]
     motion[SLOPE + PITCH], motion[SLOPE + PITCH_RATE] = pitches, raises / chassis[I_PITCH]
     motion[SLOPE + SUNK], motion[SLOPE + SINKS] = sinks, gravity - lifts / sprung
-    ch, sh, past = math.cos(motion[at + H]), math.sin(motion[at + H]), vy - rear * turn
+    ch, sh, past = elementary.cos(motion[at + H]), elementary.sin(motion[at + H]), vy - rear * turn
     motion[SLOPE + X], motion[SLOPE + Y] = vx * ch - past * sh, vx * sh + past * ch
     motion[SLOPE + H] = turn
 
@@ -295,8 +296,8 @@ def _slide_on(motion, mu, press, dt, chassis):
     slows = min(min(0.5 * (mu[0] + mu[1]), SCRAPES) * press * GRAVITY * dt / max(speed, 1e-9), 1.0)
     mean, left, h = 1.0 - 0.5 * slows, 1.0 - slows, motion[H]
     turned = mean * turn * dt
-    ch, sh = math.cos(h), math.sin(h)
-    cn, sn = math.cos(h + turned), math.sin(h + turned)
+    ch, sh = elementary.cos(h), elementary.sin(h)
+    cn, sn = elementary.cos(h + turned), elementary.sin(h + turned)
     east, north = vx * ch - vy * sh, vx * sh + vy * ch
     motion[X] += mean * east * dt + rear * (ch - cn)
     motion[Y] += mean * north * dt + rear * (sh - sn)
@@ -333,14 +334,14 @@ def advance_bodies(motion, steer, force, mu, press, uphill, aside, dt, chassis):
     acts = min(max(-force if force < 0.0 and vx < 0.0 else force, -most), most)
     if stands:
         acts = uphill
-    middle = math.cos(steer[1]), math.sin(steer[1])
-    ch, sh, h = math.cos(motion[H]), math.sin(motion[H]), motion[H]
+    middle = elementary.cos(steer[1]), elementary.sin(steer[1])
+    ch, sh, h = elementary.cos(motion[H]), elementary.sin(motion[H]), motion[H]
     for stage in range(4):
         at = 0 if stage == 0 else STAGE
         if stage == 0:
-            cosine, sine = math.cos(steer[0]), math.sin(steer[0])
+            cosine, sine = elementary.cos(steer[0]), elementary.sin(steer[0])
         elif stage == 3:
-            cosine, sine = math.cos(steer[2]), math.sin(steer[2])
+            cosine, sine = elementary.cos(steer[2]), elementary.sin(steer[2])
         else:
             cosine, sine = middle
         _changes(motion, at, weight, cosine, sine, force, acts, mu, press, uphill, aside, chassis)

@@ -10,6 +10,7 @@ to the kinematic bicycle, and in between both count by a smooth weight.
 
 import math
 
+from bridgegen.base import _elementary_kernels as elementary
 from bridgegen.base.compiled import inlined_kernel, kernel
 from bridgegen.base.physics import GRAVITY
 from bridgegen.simulation.embedded.chassis._chassis_columns import (
@@ -73,7 +74,7 @@ def _share(force, load, weight, chassis):
 def turned(cosine, sine, angle):
     """Return cosine and sine of an angle that is larger by so much, by series where it is small."""
     if abs(angle) > SMALL_ANGLE:
-        c, s = math.cos(angle), math.sin(angle)
+        c, s = elementary.cos(angle), elementary.sin(angle)
     else:
         q = angle * angle
         c = 1.0 - q * (0.5 - q * (1.0 / 24.0 - q * (1.0 / 720.0)))

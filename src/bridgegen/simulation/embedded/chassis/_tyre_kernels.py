@@ -9,6 +9,7 @@ and with camber where said. Friction scales the peak, and not the stiffness.
 
 import math
 
+from bridgegen.base import _elementary_kernels as elementary
 from bridgegen.base.compiled import inlined_kernel, kernel
 from bridgegen.simulation.embedded.chassis._chassis_columns import (
     B_XA,
@@ -45,7 +46,7 @@ def slip_angle(across, along):
     """Return atan2(across, |along|), by its series where it is small."""
     along = max(abs(along), 1e-6)
     if abs(across) > SMALL_ANGLE * along:
-        return math.atan2(across, along)
+        return elementary.atan2(across, along)
     x = across / along
     q = x * x
     return x * (1.0 - q * (1.0 / 3.0 - q * (0.2 - q * (1.0 / 7.0 - q * (1.0 / 9.0)))))
@@ -57,7 +58,7 @@ SMALL_ANGLE = 0.05  # the fifth term is below 1e-14 of the sum
 @inlined_kernel
 def _bent(z, e):
     """Return the argument of the magic formula's arc tangent."""
-    return z if e == 0.0 else z - e * (z - math.atan(z))
+    return z if e == 0.0 else z - e * (z - elementary.atan(z))
 
 
 @inlined_kernel
@@ -73,7 +74,7 @@ def lateral(alpha, most, b, chassis):
     shape, z = chassis[C_Y], _bent(b * alpha, chassis[E_Y])
     if abs(z) < SMALL:  # the series, to a millionth
         return -most * shape * z * (1.0 - z * z * (2.0 + shape * shape) * (1.0 / 6.0))
-    return -most * math.sin(shape * math.atan(z))
+    return -most * elementary.sin(shape * elementary.atan(z))
 
 
 @inlined_kernel
@@ -92,7 +93,7 @@ def lateral_left(alpha, kappa, chassis):
         return 1.0
     along = chassis[B_YK2] * alpha
     z = chassis[B_YK] / math.sqrt(1.0 + along * along) * kappa
-    return math.cos(chassis[C_YK] * math.atan(_bent(z, chassis[E_YK])))
+    return elementary.cos(chassis[C_YK] * elementary.atan(_bent(z, chassis[E_YK])))
 
 
 @kernel
@@ -100,7 +101,7 @@ def longitudinal_left(alpha, kappa, chassis):
     """Return the share of the longitudinal force that is left at a slip angle."""
     along = chassis[B_XA2] * kappa
     z = chassis[B_XA] / math.sqrt(1.0 + along * along) * alpha
-    return max(math.cos(chassis[C_XA] * math.atan(_bent(z, chassis[E_XA]))), LEAST)
+    return max(elementary.cos(chassis[C_XA] * elementary.atan(_bent(z, chassis[E_XA]))), LEAST)
 
 
 LEAST = 0.01  # of the longitudinal force, however far a tyre slides sideways
@@ -167,7 +168,7 @@ def rolling_tyre(kappa, alpha, camber, load, mu, stiffness, chassis):
     """
     peak = mu * chassis[MU_X]
     z = _bent(chassis[K_X] / (chassis[C_X] * peak) * kappa, chassis[E_X])
-    ahead = peak * load * math.sin(chassis[C_X] * math.atan(z))
+    ahead = peak * load * elementary.sin(chassis[C_X] * elementary.atan(z))
     grip = mu * (1.0 - chassis[D_Y3] * camber * camber)
     most = grip * chassis[MU_Y] * load
     b = stiffness_factor(stiffness, grip, chassis)
@@ -175,5 +176,5 @@ def rolling_tyre(kappa, alpha, camber, load, mu, stiffness, chassis):
     left = (left + mu * load * chassis[V_Y3] * camber) * lateral_left(alpha, kappa, chassis)
     far = chassis[V_YK4] * alpha
     turned = chassis[V_YK3] * camber / math.sqrt(1.0 + far * far)
-    left += most * turned * math.sin(chassis[V_YK5] * math.atan(chassis[V_YK6] * kappa))
+    left += most * turned * elementary.sin(chassis[V_YK5] * elementary.atan(chassis[V_YK6] * kappa))
     return ahead * longitudinal_left(alpha, kappa, chassis), left

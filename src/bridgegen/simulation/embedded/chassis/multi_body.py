@@ -1,10 +1,10 @@
 """The parameters of multi-body vehicles: measured cars, fitted to the body of the scenario."""
 
-import math
 from dataclasses import dataclass, field, fields
 
 import numpy as np
 
+from bridgegen.base import elementary
 from bridgegen.base.arrays import Float
 from bridgegen.simulation.embedded.chassis import _chassis_columns as common
 from bridgegen.simulation.embedded.chassis import _multi_body_columns as columns
@@ -190,7 +190,7 @@ def multi_body_of(wheelbase: float, body: Float) -> Float:
         wheelbase,
         float(body[1]),
         CLASSES[CLASS].height * float(body[7]),
-        math.atan(wheelbase * float(body[6])),
+        elementary.atan(wheelbase * float(body[6])),
     )
 
 

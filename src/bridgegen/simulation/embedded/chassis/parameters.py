@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, fields
 
 import numpy as np
 
+from bridgegen.base import elementary
 from bridgegen.base.arrays import Float
 from bridgegen.simulation.embedded.chassis import _chassis_columns as columns
 
@@ -55,10 +56,10 @@ class Tyre:
 
     def slip(self, share: Float) -> Float:
         """Return B·κ of shares of the largest longitudinal force: the magic formula's inverse."""
-        bent = np.tan(np.arcsin(share) / self.c_x)
+        bent = elementary.tan(elementary.asin(share) / self.c_x)
         z, e = bent.copy(), self.e_x
         for _ in range(50):
-            z -= (z - e * (z - np.arctan(z)) - bent) / (1.0 - e + e / (1.0 + z * z))
+            z -= (z - e * (z - elementary.atan(z)) - bent) / (1.0 - e + e / (1.0 + z * z))
         return z
 
 
@@ -132,7 +133,9 @@ def chassis_of(name: str, wheelbase: float, body: Float) -> Float:
         wheelbase: [m], > 0.
         body: the row of ``Program.bodies``.
     """
-    return chassis(CLASSES[name], wheelbase, float(body[7]), math.atan(wheelbase * float(body[6])))
+    return chassis(
+        CLASSES[name], wheelbase, float(body[7]), elementary.atan(wheelbase * float(body[6]))
+    )
 
 
 def chassis(found: VehicleClass, wheelbase: float, height: float, lock: float) -> Float:

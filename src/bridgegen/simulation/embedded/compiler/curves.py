@@ -5,6 +5,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from bridgegen.base import elementary
 from bridgegen.base.arrays import Float
 from bridgegen.base.errors import InputError
 from bridgegen.openx.opendrive.geometry import TURN_LIMIT, evaluate
@@ -93,7 +94,7 @@ def sampled(
         table[here, 5] = curve.curvature[:-1]
         x, y, h = float(curve.x[-1]), float(curve.y[-1]), float(curve.h[-1])
         station += bend.length
-    table[:, 3], table[:, 4] = np.cos(table[:, 2]), np.sin(table[:, 2])
+    table[:, 3], table[:, 4] = elementary.cos(table[:, 2]), elementary.sin(table[:, 2])
     return table, step
 
 

@@ -4,6 +4,7 @@ import math
 import re
 from typing import Any
 
+from bridgegen.base import elementary
 from bridgegen.base.arrays import Int
 from bridgegen.drivers._weather_columns import (
     CLOUD,
@@ -241,7 +242,7 @@ def sun_at(hours: float) -> tuple[float, float]:
     midnight, 50° at noon. The sun goes round evenly, and stands in the south at noon.
     """
     phase = (hours / 12.0 - 0.5) * math.pi
-    return math.radians(-20.0 + 70.0 * math.sin(phase)), hours / 24.0 * 2.0 * math.pi
+    return math.radians(-20.0 + 70.0 * elementary.sin(phase)), hours / 24.0 * 2.0 * math.pi
 
 
 def _bare(value: Value) -> str:

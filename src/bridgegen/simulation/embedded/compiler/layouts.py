@@ -10,6 +10,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from bridgegen.base import elementary
 from bridgegen.base.arrays import Float, Int
 from bridgegen.base.errors import InputError
 from bridgegen.drivers.kinds import NAMES
@@ -356,7 +357,7 @@ def measures(tables: Tables, body: Body) -> tuple[float, ...]:
     limits, axles = body.performance, body.axles
     front, distance = axles.front or axles.rear, wheelbase(tables, body)
     lock = tables.literal(front, "maxSteering", front.max_steering)
-    bend = math.tan(min(lock, _STEEPEST)) / max(distance, 0.1)
+    bend = elementary.tan(min(lock, _STEEPEST)) / max(distance, 0.1)
     if distance <= 0.0 and body.vehicle_category in TRAILERS:
         bend = math.inf  # it has nothing to steer with, and goes where it is led
     elif distance <= 0.0:

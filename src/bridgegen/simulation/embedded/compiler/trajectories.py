@@ -9,6 +9,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from bridgegen.base import elementary
 from bridgegen.base.arrays import Float
 from bridgegen.base.errors import InputError
 from bridgegen.openx.openscenario import model as osc
@@ -101,7 +102,7 @@ def polyline(corners: Sequence[Corner], *, may_stand: bool = False) -> tuple[Flo
     """
     if not all(math.isfinite(value) for corner in corners for value in corner if value is not None):
         raise InputError("the vertices of a trajectory must be finite")
-    lengths = [math.dist(a[:2], b[:2]) for a, b in pairwise(corners)]
+    lengths = [elementary.hypot(b[0] - a[0], b[1] - a[1]) for a, b in pairwise(corners)]
     total = sum(lengths)
     if total > LONGEST:
         raise InputError(f"a trajectory must be at most {LONGEST:g} m long, got {total:g} m")
@@ -110,7 +111,7 @@ def polyline(corners: Sequence[Corner], *, may_stand: bool = False) -> tuple[Flo
             raise InputError("a trajectory must have a length, got one point")
         x, y, h = corners[0]
         h = h or 0.0
-        end = (x + 1e-3 * math.cos(h), y + 1e-3 * math.sin(h), h)
+        end = (x + 1e-3 * elementary.cos(h), y + 1e-3 * elementary.sin(h), h)
         return polyline((corners[0], end))
     count = math.ceil(total / STEP)
     step = total / count
@@ -118,10 +119,12 @@ def polyline(corners: Sequence[Corner], *, may_stand: bool = False) -> tuple[Flo
     s = np.arange(count + 1) * step
     x_s = np.interp(s, knots, [corner[0] for corner in corners])
     y_s = np.interp(s, knots, [corner[1] for corner in corners])
-    headings = np.unwrap([math.atan2(b[1] - a[1], b[0] - a[0]) for a, b in pairwise(corners)])
+    headings = np.unwrap([elementary.atan2(b[1] - a[1], b[0] - a[0]) for a, b in pairwise(corners)])
     at = np.clip(np.searchsorted(knots, s, side="right") - 1, 0, len(headings) - 1)
     h_s = headings[at]
-    return np.stack([x_s, y_s, h_s, np.cos(h_s), np.sin(h_s), np.zeros_like(s)], axis=1), step
+    return np.stack(
+        [x_s, y_s, h_s, elementary.cos(h_s), elementary.sin(h_s), np.zeros_like(s)], axis=1
+    ), step
 
 
 def timetable(corners: Sequence[Corner], times: Sequence[float]) -> Float:
@@ -139,7 +142,8 @@ def timetable(corners: Sequence[Corner], times: Sequence[float]) -> Float:
     """
     clock = np.asarray(times, dtype=np.float64)
     place = np.array([corner[:2] for corner in corners], dtype=np.float64)
-    knots = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(place, axis=0).T))])
+    steps = np.diff(place, axis=0)
+    knots = np.cumsum([0.0, *elementary.hypot(steps[:, 0], steps[:, 1])])
     begins, ends = _headings(corners, place)
     columns = (clock[:-1], clock[1:], *place[:-1].T, *place[1:].T, begins, ends)
     return np.stack((*columns, knots[:-1], knots[1:]), axis=1)
@@ -153,7 +157,7 @@ def _headings(corners: Sequence[Corner], place: Float) -> tuple[Float, Float]:
         corners[:-1], corners[1:], np.diff(place, axis=0).tolist(), strict=True
     ):
         if dx or dy:
-            direction = math.atan2(dy, dx)
+            direction = elementary.atan2(dy, dx)
         if h is None or following is None:
             h = following = direction
         begins.append(h)

@@ -2,6 +2,7 @@
 
 import math
 
+from bridgegen.base import _elementary_kernels as elementary
 from bridgegen.base.compiled import kernel
 from bridgegen.drivers._path_kernels import COS, SIN, X, Y, pose, project
 from bridgegen.simulation._box_kernels import box_gap
@@ -126,9 +127,9 @@ def look_ahead(p, k, plan, roads, state, record):
                 oh,
             )
         gap = aside if measure == LATERAL else along
-        closing = v * math.cos(turn) - w * math.cos(other_turn)
+        closing = v * elementary.cos(turn) - w * elementary.cos(other_turn)
         if measure == LATERAL:
-            closing = v * math.sin(turn) - w * math.sin(other_turn)
+            closing = v * elementary.sin(turn) - w * elementary.sin(other_turn)
         if free:
             gap = between_boxes(gap, own, length, width, ahead, turn, other_turn, measure)
     if kind == DISTANCE:
@@ -145,9 +146,9 @@ def look_ahead(p, k, plan, roads, state, record):
 @kernel
 def as_the_crow_flies(dx, dy, v, h, w, other_h):
     """Return (distance [m], how fast it shrinks [m/s]) of a body from another at (dx, dy)."""
-    gap = math.hypot(dx, dy)
-    closing = dx * (v * math.cos(h) - w * math.cos(other_h)) + dy * (
-        v * math.sin(h) - w * math.sin(other_h)
+    gap = elementary.hypot(dx, dy)
+    closing = dx * (v * elementary.cos(h) - w * elementary.cos(other_h)) + dy * (
+        v * elementary.sin(h) - w * elementary.sin(other_h)
     )
     return gap, closing / max(gap, 1e-9)
 
@@ -155,7 +156,7 @@ def as_the_crow_flies(dx, dy, v, h, w, other_h):
 @kernel
 def in_frame(dx, dy, h):
     """Return a vector's parts along a heading and to its left."""
-    c, s = math.cos(h), math.sin(h)
+    c, s = elementary.cos(h), elementary.sin(h)
     return c * dx + s * dy, c * dy - s * dx
 
 
@@ -181,7 +182,12 @@ def along_path(path, n, ds, station, x, y, h, ox, oy, oh):
 @kernel
 def apart(own, length, width, ahead, dx, dy, h, other_h):
     """Return the distance of two boxes [m], 0 where they touch."""
-    c, s, oc, os = math.cos(h), math.sin(h), math.cos(other_h), math.sin(other_h)
+    c, s, oc, os = (
+        elementary.cos(h),
+        elementary.sin(h),
+        elementary.cos(other_h),
+        elementary.sin(other_h),
+    )
     return box_gap(own, (length, width, ahead), dx, dy, c, s, oc, os)
 
 
@@ -192,7 +198,12 @@ def between_boxes(gap, own, length, width, ahead, turn, other_turn, measure):
     ``gap`` is that of their reference points along the axis; turns are from the axis that is
     longitudinal.
     """
-    c, s, oc, os = math.cos(turn), math.sin(turn), math.cos(other_turn), math.sin(other_turn)
+    c, s, oc, os = (
+        elementary.cos(turn),
+        elementary.sin(turn),
+        elementary.cos(other_turn),
+        elementary.sin(other_turn),
+    )
     if measure == LATERAL:
         c, s, oc, os = s, c, os, oc
     middle = gap + ahead * oc - own[2] * c
@@ -329,7 +340,7 @@ def is_near(p, k, other, station, plan, roads, state, record):
     )
     reach = 0.0
     if plan.probes[p, BOXES] == 1:
-        c, sine, body = math.cos(turn), math.sin(turn), plan.bodies[other]
+        c, sine, body = elementary.cos(turn), elementary.sin(turn), plan.bodies[other]
         along += body[2] * c
         reach = 0.5 * (abs(c) * body[0] + abs(sine) * body[1])
     forward = state.slots[plan.probes[p, LIMIT]]
@@ -343,7 +354,7 @@ def is_on_lanes(p, k, other, path, shift, with_traffic, plan, roads, state, reco
     x, y, h, body = record.x[other, k], record.y[other, k], record.h[other, k], plan.bodies[other]
     if plan.probes[p, BOXES] == 0:
         return is_on_lane(p, x, y, path, shift, with_traffic, plan, roads, state, record)
-    c, s = math.cos(h), math.sin(h)
+    c, s = elementary.cos(h), elementary.sin(h)
     n, m = max(math.ceil(body[0] / SAMPLE), 1), max(math.ceil(body[1] / SAMPLE), 1)
     for i in range(n + 1):
         u = body[2] + body[0] * (i / n - 0.5)
@@ -476,7 +487,10 @@ def look_one(p, k, plan, roads, state, record):
         return is_clear(p, k, plan, roads, state, record)
     if kind == SPEED_DIFFERENCE:
         turn = record.h[other, k] - record.h[e, k]
-        along, aside = record.v[other, k] * math.cos(turn), record.v[other, k] * math.sin(turn)
+        along, aside = (
+            record.v[other, k] * elementary.cos(turn),
+            record.v[other, k] * elementary.sin(turn),
+        )
         if measure == TOTAL:
             return compare(record.v[e, k] - record.v[other, k], rule, limit)
         if measure == LONGITUDINAL:
@@ -485,7 +499,7 @@ def look_one(p, k, plan, roads, state, record):
     if kind == ACCELERATING:
         along, aside = accelerations(e, k, plan, roads, state, record)
         if measure == TOTAL:
-            return compare(math.hypot(along, aside), rule, limit)
+            return compare(elementary.hypot(along, aside), rule, limit)
         if measure == LONGITUDINAL:
             return compare(along, rule, limit)
         return compare(aside if measure == LATERAL else 0.0, rule, limit)
@@ -558,7 +572,7 @@ def axis_of(e, k, system, plan, roads, state, record):
     way = roads.nodes[int(spans[i, NODE]), WAY]
     length = spans[i, LEAVE] - spans[i, STATION]
     slope = way * (spans[i, T_LEAVE] - spans[i, T]) / length if length > 0.0 else 0.0
-    return h - math.asin(min(max(slope, -1.0), 1.0)) - (0.0 if way > 0 else math.pi)
+    return h - elementary.asin(min(max(slope, -1.0), 1.0)) - (0.0 if way > 0 else math.pi)
 
 
 @kernel

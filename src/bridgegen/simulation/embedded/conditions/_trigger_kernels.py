@@ -1,7 +1,6 @@
 """Triggers: which conditions hold at an instant, with their edges and delays, and what fires."""
 
-import math
-
+from bridgegen.base import _elementary_kernels as elementary
 from bridgegen.base.compiled import inlined_kernel, kernel, run_kernel_at
 from bridgegen.simulation.embedded._codes import (
     ALL,
@@ -83,14 +82,14 @@ def look(p, k, plan, state, record):
 @kernel
 def look_at_pair(kind, rule, limit, dx, dy, v, h, other_v, other_h):
     """Return whether a condition on two entities holds; the other one is at (dx, dy) from it."""
-    gap = math.hypot(dx, dy)
+    gap = elementary.hypot(dx, dy)
     if kind == DISTANCE:
         return compare(gap, rule, limit)
     if kind == TIME_HEADWAY:
-        is_ahead = dx * math.cos(h) + dy * math.sin(h) >= 0.0
+        is_ahead = dx * elementary.cos(h) + dy * elementary.sin(h) >= 0.0
         return v > 0.0 and is_ahead and compare(gap / v, rule, limit)
-    closing = dx * (v * math.cos(h) - other_v * math.cos(other_h)) + dy * (
-        v * math.sin(h) - other_v * math.sin(other_h)
+    closing = dx * (v * elementary.cos(h) - other_v * elementary.cos(other_h)) + dy * (
+        v * elementary.sin(h) - other_v * elementary.sin(other_h)
     )  # times the gap
     return closing > 0.0 and compare(gap * gap / closing, rule, limit)
 

@@ -5,6 +5,7 @@
 
 import math
 
+from bridgegen.base import _elementary_kernels as elementary
 from bridgegen.base.compiled import kernel
 from bridgegen.base.physics import GRAVITY
 from bridgegen.drivers._weather_columns import FRICTION
@@ -55,10 +56,10 @@ def lagged(value, target, left, lag, rate):
         return target - left * error
     near = math.copysign(most, error)
     whole = (error - near) / math.copysign(rate, error)  # s, at that rate until it is near
-    lasts = -lag * math.log(left)
+    lasts = -lag * elementary.log(left)
     if lasts <= whole:
         return value + math.copysign(rate * lasts, error)
-    return target - near * math.exp((whole - lasts) / lag)
+    return target - near * elementary.exp((whole - lasts) / lag)
 
 
 @kernel
@@ -78,13 +79,13 @@ def _asked_of(k, demanded, curvature, plan, roads, state, record):
     friction = state.weather[FRICTION]
     front, rear = chassis[TO_FRONT], chassis[TO_REAR]
     wheelbase = front + rear
-    asked = min(max(math.atan(wheelbase * curvature), -chassis[LOCK]), chassis[LOCK])
+    asked = min(max(elementary.atan(wheelbase * curvature), -chassis[LOCK]), chassis[LOCK])
     came = motion[X] == x and motion[Y] == y and motion[H] == h and motion[SPEED] == v
     if not came:
         most = TRIMMED * press * friction / max(v * v, 1e-6)
-        bend = min(max(math.tan(asked) / wheelbase, -most), most)
+        bend = min(max(elementary.tan(asked) / wheelbase, -most), most)
         motion[VX], motion[YAW_RATE] = v, v * bend
-        motion[VY], motion[STEER] = rear * motion[YAW_RATE], math.atan(wheelbase * bend)
+        motion[VY], motion[STEER] = rear * motion[YAW_RATE], elementary.atan(wheelbase * bend)
         motion[FORCE] = uphill
     wanted = min(max(demanded + uphill, -limits[5]), limits[4])
     wanted = min(wanted, (limits[3] - v) / dt + uphill)
@@ -108,10 +109,10 @@ def move_chassis(k, demanded, curvature, plan, roads, state, record):
     steering, rate = chassis[STEERING_LAG], chassis[STEERING_RATE]
     parts = sub_steps(math.sqrt(vx * vx + vy * vy), dt, chassis)
     part = dt / parts
-    angle_left = math.exp(-0.5 * part / steering)
-    force_left = math.exp(-0.5 * part / chassis[BRAKE_LAG if wanted < force else DRIVE_LAG])
-    heads = math.cos(h), math.sin(h)
-    wheels = math.cos(angle), math.sin(angle)
+    angle_left = elementary.exp(-0.5 * part / steering)
+    force_left = elementary.exp(-0.5 * part / chassis[BRAKE_LAG if wanted < force else DRIVE_LAG])
+    heads = elementary.cos(h), elementary.sin(h)
+    wheels = elementary.cos(angle), elementary.sin(angle)
     place = x + rear * heads[0], y + rear * heads[1], h
     for _ in range(parts):
         middle = lagged(angle, asked, angle_left, steering, rate)
@@ -149,8 +150,8 @@ def move_multi_body(k, demanded, curvature, plan, roads, state, record):
     vx, vy = motion[VX], motion[VY]
     parts = sub_steps_of_bodies(math.sqrt(vx * vx + vy * vy), dt, chassis)
     part = dt / parts
-    angle_left = math.exp(-0.5 * part / steering)
-    force_left = math.exp(-0.5 * part / chassis[BRAKE_LAG if wanted < force else DRIVE_LAG])
+    angle_left = elementary.exp(-0.5 * part / steering)
+    force_left = elementary.exp(-0.5 * part / chassis[BRAKE_LAG if wanted < force else DRIVE_LAG])
     for _ in range(parts):
         middle = lagged(angle, asked, angle_left, steering, rate)
         last = lagged(middle, asked, angle_left, steering, rate)

@@ -2,6 +2,7 @@
 
 import math
 
+from bridgegen.base import _elementary_kernels as elementary
 from bridgegen.base.compiled import (
     bundled,
     bundled_row,
@@ -207,8 +208,8 @@ def impose(e, k, x, y, h, v, plan, roads, state, record):
     moved_x, moved_y = x - record.x[e, k], y - record.y[e, k]
     if k > 0:
         last_x, last_y = record.x[e, k - 1], record.y[e, k - 1]
-        here = math.hypot(record.x[e, k] - last_x, record.y[e, k] - last_y)
-        state.travelled[e] += math.hypot(x - last_x, y - last_y) - here
+        here = elementary.hypot(record.x[e, k] - last_x, record.y[e, k] - last_y)
+        state.travelled[e] += elementary.hypot(x - last_x, y - last_y) - here
         record.a[e, k - 1] = (v - record.v[e, k - 1]) / plan.dt
         stands = k
         if v <= STANDS:

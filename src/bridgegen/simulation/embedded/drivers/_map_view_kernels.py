@@ -10,6 +10,7 @@ they are searched in the cells of a grid, see `bridgegen.drivers.map_grid`.
 
 import math
 
+from bridgegen.base import _elementary_kernels as elementary
 from bridgegen.base.compiled import bundled_row, kernel
 from bridgegen.drivers.interface import CENTRE, NEAR_PIECES, PIECE_POINTS
 from bridgegen.drivers.map_grid import ACROSS, BOTTOM, LEFT, REACH, UP, WIDTH
@@ -69,7 +70,7 @@ def search(roads, x, y, memory):
         ring += 1
     low, high = least, ring * box[WIDTH]
     if ring >= all_:
-        high = math.hypot(
+        high = elementary.hypot(
             max(abs(x - box[LEFT]), abs(x - box[LEFT] - across * box[WIDTH])),
             max(abs(y - box[BOTTOM]), abs(y - box[BOTTOM] - up * box[WIDTH])),
         )
@@ -146,7 +147,7 @@ def lane_of(roads, x, y, h, memory):
             half = 0.5 * (row[WIDTHS + i] + share * (row[WIDTHS + i + 1] - row[WIDTHS + i]))
             if aside > half:
                 continue
-            fits = 4.0 * row[ON_ROUTE] + math.cos(h - math.atan2(by, bx)) - 1e-3 * aside
+            fits = 4.0 * row[ON_ROUTE] + elementary.cos(h - elementary.atan2(by, bx)) - 1e-3 * aside
             if fits > best:
                 found, best = int(row[OF_LANE]), fits
     return found
@@ -156,7 +157,7 @@ def lane_of(roads, x, y, h, memory):
 def see_map(k, roads, record, memory, place):
     """Fill ``place`` ``(1 + Q,)``: the ego's lane, and the nearest pieces."""
     x, y, h = record.x[0, k], record.y[0, k], record.h[0, k]
-    moved = math.hypot(x - memory[AT_X], y - memory[AT_Y])
+    moved = elementary.hypot(x - memory[AT_X], y - memory[AT_Y])
     if memory[COUNT] == 0.0 or not moved <= memory[STAYS]:
         search(roads, x, y, memory)
     sort(roads, x, y, memory)

@@ -9,6 +9,7 @@ fast it moves to its left [m/s].
 
 import math
 
+from bridgegen.base import _elementary_kernels as elementary
 from bridgegen.base.compiled import kernel
 from bridgegen.drivers._path_kernels import pose, project
 from bridgegen.simulation.embedded._codes import (
@@ -97,7 +98,7 @@ def keep_aside(j, k, step, plan, roads, state, record):
     slow = abs(speed) <= deceleration * plan.dt
     over = slow and abs(left - across) < REACHED and not row[CONTINUOUS]
     ahead = math.sqrt(step * step - across * across)
-    return math.copysign(ahead, step), math.asin(across / step), over
+    return math.copysign(ahead, step), elementary.asin(across / step), over
 
 
 @kernel
@@ -118,9 +119,9 @@ def _beside(e, row, station, seen, roads, state, record):
     x, y, h = record.x[ref, seen], record.y[ref, seen], record.h[ref, seen]
     if row[BY_BODY]:
         px, py, ph = pose(path, n, ds, station)
-        along = math.cos(ph - h)
+        along = elementary.cos(ph - h)
         if abs(along) < CROSSING:
             return state.aside[e] - state.lateral_target[e], 1.0
-        return ((x - px) * -math.sin(h) + (y - py) * math.cos(h)) / along, 1.0 / along
+        return ((x - px) * -elementary.sin(h) + (y - py) * elementary.cos(h)) / along, 1.0 / along
     foot, t = project(path, n, ds, nearest(path, n, ds, x, y), x, y)
-    return t, 1.0 if math.cos(h - pose(path, n, ds, foot)[2]) >= 0.0 else -1.0
+    return t, 1.0 if elementary.cos(h - pose(path, n, ds, foot)[2]) >= 0.0 else -1.0

@@ -6,8 +6,7 @@ A trajectory's timetable is ``(V, 10)`` float64, a row per segment with the colu
 # mypy: allow-untyped-defs
 # Numba infers what kernels take; their wrappers are typed.
 
-import math
-
+from bridgegen.base import _elementary_kernels as elementary
 from bridgegen.base.compiled import inlined_kernel, kernel
 from bridgegen.simulation.embedded._codes import ACQUIRE, DETAIL, DOES, ROW, TARGET, WHOM
 from bridgegen.simulation.embedded._memory_kernels import NO_WAY, STOPS
@@ -107,7 +106,7 @@ def arrive(k, plan, state, record):
     for e in range(record.x.shape[0]):
         if state.goal_action[e] < 0:
             continue
-        c, s = math.cos(record.h[e, k]), math.sin(record.h[e, k])
+        c, s = elementary.cos(record.h[e, k]), elementary.sin(record.h[e, k])
         dx, dy = state.goal[e, 0] - record.x[e, k], state.goal[e, 1] - record.y[e, k]
         ahead, aside = c * dx + s * dy, c * dy - s * dx
         if abs(aside) <= ABREAST and -record.v[e, k] * plan.dt - NEAR <= ahead <= NEAR:

@@ -10,6 +10,7 @@ however long the change may take: it moves across no faster than its steering al
 
 import math
 
+from bridgegen.base import _elementary_kernels as elementary
 from bridgegen.base.compiled import kernel
 from bridgegen.simulation.embedded._motion_kernels import (
     CUBIC,
@@ -104,7 +105,12 @@ def glide(shape, dimension, lasts, passed, origin, target, step, dt, curvature):
         if length == 0.0 or passed <= 0.0:
             return before, 0.0, passed, 0.0
         length = max(length, lasts) if dimension == DISTANCE else length
-        return before, 0.0, passed, math.atan(span * progress(shape, passed / lasts)[1] / length)
+        return (
+            before,
+            0.0,
+            passed,
+            elementary.atan(span * progress(shape, passed / lasts)[1] / length),
+        )
     share, slope = progress(shape, (passed + dt) / lasts)
     across = origin + span * share - before
     if length > 0.0:
@@ -128,7 +134,7 @@ def glide(shape, dimension, lasts, passed, origin, target, step, dt, curvature):
     passed = min(passed + dt, lasts)
     sideways = span * slope / lasts * dt
     ahead = math.sqrt(step * step - across * across)
-    tilt = math.asin(min(max(sideways / step, -1.0), 1.0))
+    tilt = elementary.asin(min(max(sideways / step, -1.0), 1.0))
     return origin + span * share, ahead, passed, tilt
 
 
@@ -142,7 +148,7 @@ def _by_distance(shape, lasts, passed, origin, span, before, step):
         ahead = step / math.sqrt(1.0 + (across / ahead) ** 2)
         share, slope = progress(shape, (passed + ahead) / lasts)
     passed = min(passed + ahead, lasts)
-    return origin + span * share, ahead, passed, math.atan(span * slope / lasts)
+    return origin + span * share, ahead, passed, elementary.atan(span * slope / lasts)
 
 
 @kernel

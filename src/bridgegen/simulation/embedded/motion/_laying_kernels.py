@@ -9,6 +9,7 @@ of a timetable (``_follow_kernels``), for those without times, too.
 
 import math
 
+from bridgegen.base import _elementary_kernels as elementary
 from bridgegen.base.compiled import kernel
 from bridgegen.simulation.embedded._codes import (
     ALONG,
@@ -118,7 +119,7 @@ def lay(q, e, k, plan, roads, state, record):
             if row[IS_TIMED]:
                 table[i - first, ENDS_AT] = scale * state.slots[plan.anchors[i, TIME]] + offset
         elif row[LAYOUT_SHAPE] == RIGID:
-            c, s = math.cos(h), math.sin(h)
+            c, s = elementary.cos(h), elementary.sin(h)
             for m in range(n):
                 if plan.shapes[samples + m, ANCHOR] != i - first:
                     continue
@@ -137,7 +138,7 @@ def lay(q, e, k, plan, roads, state, record):
     for m in range(n if row[LAYOUT_SHAPE] == WEIGHTED else 0):  # of a curve, its tangent
         i, following = max(m - 1, 0), min(m + 1, n - 1)
         dx = table[following, X_END] - table[i, X_END]
-        table[m, H_END] = math.atan2(table[following, Y_END] - table[i, Y_END], dx)
+        table[m, H_END] = elementary.atan2(table[following, Y_END] - table[i, Y_END], dx)
     _join(e, n, row[IS_TIMED], state)
 
 
@@ -149,9 +150,9 @@ def _join(e, n, is_timed, state):
     for i in range(n - 1):
         x, y, h = table[i, X_END], table[i, Y_END], table[i, H_END]
         x_end, y_end, h_end = table[i + 1, X_END], table[i + 1, Y_END], table[i + 1, H_END]
-        length = math.hypot(x_end - x, y_end - y)
+        length = elementary.hypot(x_end - x, y_end - y)
         if length > SHORTEST:
-            direction = math.atan2(y_end - y, x_end - x)
+            direction = elementary.atan2(y_end - y, x_end - x)
         if math.isnan(h) or math.isnan(h_end):
             h = h_end = direction
         if is_timed and not table[i + 1, ENDS_AT] > table[i, ENDS_AT]:
@@ -264,16 +265,16 @@ def pose_along(c, k, plan, roads, state, record):
     rigid = row[LAYOUT_SHAPE] == RIGID
     count = row[PAST_SAMPLE] - row[FIRST_SAMPLE] if rigid else past - first
     passed, at_x, at_y, turn = 0.0, x, y, h
-    sine, cosine = math.sin(h), math.cos(h)
+    sine, cosine = elementary.sin(h), elementary.cos(h)
     for i in range(1, count):
         if rigid:
             u, w = plan.shapes[row[FIRST_SAMPLE] + i, 0], plan.shapes[row[FIRST_SAMPLE] + i, 1]
             x_end, y_end = x + cosine * u - sine * w, y + sine * u + cosine * w
         else:
             x_end, y_end, _ = pose_of(plan.anchors[first + i, PLACE], k, plan, roads, state, record)
-        length = math.hypot(x_end - at_x, y_end - at_y)
+        length = elementary.hypot(x_end - at_x, y_end - at_y)
         if length > SHORTEST:
-            turn = math.atan2(y_end - at_y, x_end - at_x)
+            turn = elementary.atan2(y_end - at_y, x_end - at_x)
         if passed + length >= s and length > SHORTEST:
             share = max(s - passed, 0.0) / length
             at_x, at_y = at_x + share * (x_end - at_x), at_y + share * (y_end - at_y)
@@ -293,12 +294,12 @@ def left_on_laid(e, k, x, y, state, record):
             continue
         c, s = (table[i, X_END] - table[i, X]) / length, (table[i, Y_END] - table[i, Y]) / length
         along = min(max((x - table[i, X]) * c + (y - table[i, Y]) * s, 0.0), length)
-        gap = math.hypot(x - table[i, X] - along * c, y - table[i, Y] - along * s)
+        gap = elementary.hypot(x - table[i, X] - along * c, y - table[i, Y] - along * s)
         if gap < best:
             best, foot = gap, table[i, PASSED] + along
         px, py = record.x[e, k] - table[i, X], record.y[e, k] - table[i, Y]
         along = min(max(px * c + py * s, 0.0), length)
-        gap = math.hypot(px - along * c, py - along * s)
+        gap = elementary.hypot(px - along * c, py - along * s)
         if gap < nearest:
             nearest, own = gap, table[i, PASSED] + along
     return foot - own

@@ -11,6 +11,7 @@ engine or brakes make of it. The wheel turns the front wheels by its angle over 
 
 import math
 
+from bridgegen.base import _elementary_kernels as elementary
 from bridgegen.base.compiled import kernel
 from bridgegen.drivers._weather_columns import FRICTION
 from bridgegen.simulation.embedded._codes import (
@@ -88,7 +89,7 @@ def steered(curvature, state):
     if state.holds[0] >> STEERING & 1 == 0:
         return curvature
     wheel = state.pedals[0, STEERING]
-    return math.tan(wheel[NOW] / RATIO) / wheel[BASE]
+    return elementary.tan(wheel[NOW] / RATIO) / wheel[BASE]
 
 
 @kernel

@@ -11,6 +11,7 @@ import math
 
 import numpy as np
 
+from bridgegen.base import _elementary_kernels as elementary
 from bridgegen.base.compiled import kernel
 from bridgegen.drivers._path_kernels import pose, project
 from bridgegen.simulation.embedded._codes import (
@@ -250,7 +251,7 @@ def _ahead(e, row, k, seen, plan, roads, state, record):
     x, y = record.x[ref, seen], record.y[ref, seen]
     if row[BY_BODY] or p < 0:
         h = record.h[e, k]
-        return (x - record.x[e, k]) * math.cos(h) + (y - record.y[e, k]) * math.sin(h)
+        return (x - record.x[e, k]) * elementary.cos(h) + (y - record.y[e, k]) * elementary.sin(h)
     path, n, ds = roads.paths[p], roads.counts[p], roads.steps[p]
     if state.course[e, FOOT_PATH] != p:
         state.course[e, FOOT_PATH] = p
@@ -258,7 +259,9 @@ def _ahead(e, row, k, seen, plan, roads, state, record):
     foot, _ = project(path, n, ds, state.course[e, FOOT], x, y)
     state.course[e, FOOT] = foot
     px, py, ph = pose(path, n, ds, foot)
-    beyond = (x - px) * math.cos(ph) + (y - py) * math.sin(ph)  # the path's end, if it is there
+    beyond = (x - px) * elementary.cos(ph) + (y - py) * elementary.sin(
+        ph
+    )  # the path's end, if it is there
     return foot + beyond - state.station[e]
 
 
@@ -310,7 +313,7 @@ def _way_left(e, k, x, y, plan, roads, state, record):
         path, n, ds = roads.paths[p], roads.counts[p], roads.steps[p]
         foot = nearest(path, n, ds, x, y)
         px, py, _ = pose(path, n, ds, foot)
-        if math.hypot(px - x, py - y) < ASIDE:
+        if elementary.hypot(px - x, py - y) < ASIDE:
             # Its station may be the next instant's already.
             own, _ = project(path, n, ds, state.station[e], record.x[e, k], record.y[e, k])
             return foot - own
@@ -318,7 +321,7 @@ def _way_left(e, k, x, y, plan, roads, state, record):
         left = left_on_laid(e, k, x, y, state, record)
         if not math.isnan(left):
             return left
-    return math.hypot(x - record.x[e, k], y - record.y[e, k])
+    return elementary.hypot(x - record.x[e, k], y - record.y[e, k])
 
 
 @kernel

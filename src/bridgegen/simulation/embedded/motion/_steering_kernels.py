@@ -9,6 +9,7 @@ Its state is ``(5,)`` float64, the columns below; its course ``(·, 4)``: time [
 
 import math
 
+from bridgegen.base import _elementary_kernels as elementary
 from bridgegen.base.compiled import kernel
 from bridgegen.drivers._path_kernels import locate, pose
 from bridgegen.simulation.embedded._motion_kernels import shifted
@@ -48,10 +49,10 @@ def steer(path, n, ds, state, speed, place, rate, braking, dt, first, steps, cou
         wanted = (place - state[ASIDE]) / REACH
         slide = w + min(max(wanted - w, -SLIDE_RATE * dt), SLIDE_RATE * dt)
         if faster > 1e-9:
-            turn = math.asin(min(max(slide / faster, -SLOPE), SLOPE))
+            turn = elementary.asin(min(max(slide / faster, -SLOPE), SLOPE))
             most = BEND * 0.5 * (v + faster) * dt
             state[TURN] += min(max(turn - state[TURN], -most), most)
-        slide = faster * math.sin(state[TURN])
+        slide = faster * elementary.sin(state[TURN])
         along = 0.5 * (math.sqrt(v * v - w * w) + math.sqrt(faster * faster - slide * slide)) * dt
         i, f = locate(n, ds, state[STATION])
         f = min(max(f, 0.0), 1.0)

@@ -13,6 +13,7 @@ Source: Lockwood, A Book of Curves (Cambridge 1961), chapter 13.
 
 import math
 
+from bridgegen.base import _elementary_kernels as elementary
 from bridgegen.base.compiled import kernel
 from bridgegen.simulation.embedded._codes import TOWED, WHOM
 from bridgegen.simulation.embedded.motion._follow_kernels import end_quest
@@ -38,12 +39,12 @@ def drawn(h, dx, dy, length):
         dy: of its coupler [m].
         length: from its coupler to its axle [m].
     """
-    way = math.hypot(dx, dy)
+    way = elementary.hypot(dx, dy)
     if way == 0.0:
         return h
-    along = math.atan2(dy, dx)
+    along = elementary.atan2(dy, dx)
     phi = turned(h, along)
-    return along + 2.0 * math.atan(math.tan(0.5 * phi) * math.exp(-way / length))
+    return along + 2.0 * elementary.atan(elementary.tan(0.5 * phi) * elementary.exp(-way / length))
 
 
 @kernel
@@ -60,16 +61,19 @@ def start_towed(plan, roads, state, record):
         if not state.present[t]:
             state.present[e] = record.present[e, 0] = False
         h, length = record.h[t, 0], plan.couplings[e, COUPLER]
-        x = record.x[t, 0] + plan.couplings[t, HITCH] * math.cos(h)
-        y = record.y[t, 0] + plan.couplings[t, HITCH] * math.sin(h)
+        x = record.x[t, 0] + plan.couplings[t, HITCH] * elementary.cos(h)
+        y = record.y[t, 0] + plan.couplings[t, HITCH] * elementary.sin(h)
         if plan.stands_apart[e]:
-            apart = math.atan2(y - record.y[e, 0], x - record.x[e, 0])
+            apart = elementary.atan2(y - record.y[e, 0], x - record.x[e, 0])
             if abs(turned(apart, h)) <= 0.5 * math.pi:
                 h = apart
         record.h[e, 0] = h
-        record.x[e, 0], record.y[e, 0] = x - length * math.cos(h), y - length * math.sin(h)
+        record.x[e, 0], record.y[e, 0] = (
+            x - length * elementary.cos(h),
+            y - length * elementary.sin(h),
+        )
         turn = h - record.h[t, 0]
-        record.v[e, 0] = state.command[e] = state.target[e] = record.v[t, 0] * math.cos(turn)
+        record.v[e, 0] = state.command[e] = state.target[e] = record.v[t, 0] * elementary.cos(turn)
         record.offset[e, 0] = 0.0
     look_round(state)
 
@@ -94,21 +98,24 @@ def tow(k, plan, roads, state, record):
         state.present[e] = record.present[e, k + 1] = True
         before, length = record.h[e, k], plan.couplings[e, COUPLER]
         h, hitch = record.h[t, k + 1], plan.couplings[t, HITCH]
-        x, y = record.x[t, k + 1] + hitch * math.cos(h), record.y[t, k + 1] + hitch * math.sin(h)
+        x, y = (
+            record.x[t, k + 1] + hitch * elementary.cos(h),
+            record.y[t, k + 1] + hitch * elementary.sin(h),
+        )
         if comes or state.straight[e]:
             mine = h
         else:
-            dx = x - record.x[e, k] - length * math.cos(before)
-            dy = y - record.y[e, k] - length * math.sin(before)
+            dx = x - record.x[e, k] - length * elementary.cos(before)
+            dy = y - record.y[e, k] - length * elementary.sin(before)
             mine = drawn(before, dx, dy, length)
         state.straight[e] = False
         record.h[e, k + 1] = continued(mine, before)
         record.x[e, k + 1], record.y[e, k + 1] = (
-            x - length * math.cos(mine),
-            y - length * math.sin(mine),
+            x - length * elementary.cos(mine),
+            y - length * elementary.sin(mine),
         )
         yaw = turned(h, record.h[t, k]) / plan.dt
-        v = record.v[t, k + 1] * math.cos(h - mine) + yaw * hitch * math.sin(mine - h)
+        v = record.v[t, k + 1] * elementary.cos(h - mine) + yaw * hitch * elementary.sin(mine - h)
         was = record.v[e, k]
         record.v[e, k + 1] = state.command[e] = state.target[e] = v
         record.a[e, k], record.offset[e, k + 1] = (v - was) / plan.dt, 0.0

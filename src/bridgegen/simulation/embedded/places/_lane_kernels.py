@@ -11,6 +11,7 @@ its road].
 
 import math
 
+from bridgegen.base import _elementary_kernels as elementary
 from bridgegen.base.compiled import kernel
 
 ROAD, FIRST, PAST, LANE, WAY, STRAIGHT, TRAFFIC = 0, 1, 2, 3, 4, 5, 6
@@ -169,7 +170,7 @@ def nearest_lane(points, point_nodes, x, y, h):
         reach = points[i, 3] + MARGIN
         if dx * dx + dy * dy > 1.000001 * (1.0 + reach * reach):  # it is beyond one of them
             continue
-        c, s = math.cos(points[i, 2]), math.sin(points[i, 2])
+        c, s = elementary.cos(points[i, 2]), elementary.sin(points[i, 2])
         along = dx * c + dy * s
         if abs(along) > 1.0:
             continue

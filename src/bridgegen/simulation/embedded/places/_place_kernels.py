@@ -9,6 +9,7 @@ begins, the row ends, and is run again from its start when it is there.
 
 import math
 
+from bridgegen.base import _elementary_kernels as elementary
 from bridgegen.base.compiled import kernel, run_kernel_at
 from bridgegen.drivers._path_kernels import pose, project
 from bridgegen.simulation.embedded._codes import (
@@ -266,7 +267,7 @@ def world_place(c, k, plan, roads, state, record):
         h += own
     if row[PLACE_KIND] == BY_WORLD:
         return x + u, y + w, h
-    ahead, aside = math.cos(own), math.sin(own)
+    ahead, aside = elementary.cos(own), elementary.sin(own)
     return x + u * ahead - w * aside, y + u * aside + w * ahead, h
 
 
@@ -358,8 +359,8 @@ def body_pose(e, roads, state):
     p = state.on[e]
     if p < 0:
         h = state.line[e, 2]
-        x = state.line[e, 0] + state.station[e] * math.cos(h)
-        y = state.line[e, 1] + state.station[e] * math.sin(h)
+        x = state.line[e, 0] + state.station[e] * elementary.cos(h)
+        y = state.line[e, 1] + state.station[e] * elementary.sin(h)
     else:
         x, y, h = pose(roads.paths[p], roads.counts[p], roads.steps[p], state.station[e])
     x, y = shifted(x, y, h, state.aside[e])

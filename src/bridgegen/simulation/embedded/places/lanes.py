@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from bridgegen.base import elementary
 from bridgegen.base.arrays import Float, Int
 from bridgegen.base.errors import InputError
 from bridgegen.openx.opendrive.lane_changes import change_lanes
@@ -57,7 +58,14 @@ def sampled(route: Route) -> tuple[Float, float]:
     """Return a route's samples, ``(L, 6)`` as `Path` has them, and their distance [m]."""
     step = route.length / math.ceil(route.length / STEP)
     path = route.sample(step)
-    columns = (path.x, path.y, path.h, np.cos(path.h), np.sin(path.h), path.curvature)
+    columns = (
+        path.x,
+        path.y,
+        path.h,
+        elementary.cos(path.h),
+        elementary.sin(path.h),
+        path.curvature,
+    )
     return np.stack(columns, axis=1), step
 
 
@@ -151,7 +159,7 @@ class Lanes:
         if number < 0:
             raise InputError(f"no lane leads past x={spot.x:g} m, y={spot.y:g} m")
         at = np.flatnonzero((nodes == number) | (nodes == number ^ 1))
-        away = np.hypot(points[at, 0] - spot.x, points[at, 1] - spot.y)
+        away = elementary.hypot(points[at, 0] - spot.x, points[at, 1] - spot.y)
         low, high = sorted(self.graph.ends[number].tolist())
         node = self.graph.nodes[number]
         s = low + (high - low) * int(np.argmin(away)) / (len(at) - 1)

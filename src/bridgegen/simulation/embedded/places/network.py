@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from bridgegen.base import elementary
 from bridgegen.base.arrays import Float, Int
 from bridgegen.drivers.interface import RoadMap
 from bridgegen.drivers.lane_tables import CORRIDOR, LANE, corridor_along, lanes_along
@@ -387,7 +388,7 @@ def _crosswalks(scene: Scene, each: Sequence[Ways]) -> Float:
                 found[p, j] = (
                     x - aside * s,
                     y + aside * c,
-                    np.arctan2(s, c),
+                    elementary.atan2(s, c),
                     half,
                     0.5 * (left - right),
                 )

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from bridgegen.base import elementary
 from bridgegen.base.arrays import Float
 from bridgegen.base.physics import GRAVITY
 from bridgegen.openx.opendrive.lanes import values
@@ -44,9 +45,9 @@ def slopes(model: OpenDrive, route: Route, step: float, count: int) -> Float:
         s = np.clip(s, min(piece.s, piece.s_end), max(piece.s, piece.s_end))
         rise[on] = values(_derived(road.elevations), s) * piece.rate
         bank[on] = values(road.superelevations, s) * np.sign(piece.rate)
-    grade = np.arctan(rise)
-    press = np.cos(grade) * np.cos(bank)
-    gravity = (np.sin(grade), np.sin(bank) * np.cos(grade))
+    grade = elementary.atan(rise)
+    press = elementary.cos(grade) * elementary.cos(bank)
+    gravity = (elementary.sin(grade), elementary.sin(bank) * elementary.cos(grade))
     return np.stack((GRAVITY * gravity[0], GRAVITY * gravity[1], 1.0 - press), axis=1)
 
 

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from bridgegen.base import elementary
 from bridgegen.base.arrays import Float, Int
 from bridgegen.base.errors import InputError
 from bridgegen.drivers.kinds import IS_CYCLE, IS_VEHICLE
@@ -288,7 +289,7 @@ def _corner(program: Program, model: OpenDrive, point: Point) -> Corner:
     pose = lane_pose(road, point.lane, s)
     side = road.direction(point.lane) if point.lane else 1
     aside = point.aside * side  # its sign is the road's, the pose the lane's
-    return pose.x - aside * math.sin(pose.h), pose.y + aside * math.cos(pose.h), None
+    return pose.x - aside * elementary.sin(pose.h), pose.y + aside * elementary.cos(pose.h), None
 
 
 def _stretch(model: OpenDrive, step: Step) -> Stretch:
