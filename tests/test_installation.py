@@ -16,6 +16,7 @@ from bridgegen.base.errors import InputError
 from bridgegen.base.extras import EXTRAS, Extra, is_installed, require
 from bridgegen.cli import installation
 from bridgegen.cli.installation import Finding, examine
+from bridgegen.engine import conformance
 
 PROJECT = Path(__file__).parents[1] / "pyproject.toml"
 
@@ -131,3 +132,18 @@ def test_a_wheel_carries_every_file_of_the_package():
         if path.is_file() and path.suffix not in (".py", ".pyc", ".nbi", ".nbc")
     }
     assert found - carried == development
+
+
+def test_this_machine_gives_the_published_bits():
+    assert conformance.differences() == []
+
+
+def test_other_bits_are_named(monkeypatch):
+    published = conformance.published()
+    published["functions"]["sin"] = published["rows"]["crossroads-s4 route-follower"] = "0"
+    monkeypatch.setattr(conformance, "published", lambda: published)
+    (found,) = (item for item in examine() if item.subject == "bits")
+    assert found.value == (
+        "not the published ones: sin, motion or metrics of crossroads-s4 with route-follower"
+    )
+    assert found.advice and not found.is_problem

@@ -225,6 +225,8 @@ def atan(x):
     """Return the arctangent [rad], within 1 ulp."""
     size = abs(x)
     if size < 0.4375:
+        if size < 2.0**-27:
+            return x
         z = x * x
         return x - x * (z * _arctangent(z))
     if size < 0.6875:

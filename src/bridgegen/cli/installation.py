@@ -1,6 +1,6 @@
 """This installation of BridgeGen: versions, machine, cache, extras, other simulators.
 
-Reading it compiles nothing, starts nothing and connects to nothing.
+Reading it starts nothing, connects to nothing, and compiles the elementary functions at most.
 """
 
 import os
@@ -45,6 +45,7 @@ def examine() -> Iterator[Finding]:
     yield from _libraries()
     yield Finding("cores", str(cores()))
     yield _cache()
+    yield _bits()
     for extra, (_, use) in EXTRAS.items():
         if is_installed(extra):
             yield Finding(f"extra {extra}", f"installed ({use})")
@@ -89,6 +90,20 @@ def _cache() -> Finding:
     return Finding(
         "compiled code", f"{folder}, empty", "the first search compiles, which takes minutes"
     )
+
+
+def _bits() -> Finding:
+    from bridgegen.base.compilation.cache import is_compiled
+    from bridgegen.engine.conformance import differences
+
+    rows = is_compiled()  # else they take minutes
+    if different := differences(rows=rows):
+        return Finding(
+            "bits",
+            f"not the published ones: {', '.join(different)}",
+            "results differ from other machines' in their last digits; report it, with this list",
+        )
+    return Finding("bits", "the published ones" if rows else "the published ones, of functions")
 
 
 def _esmini() -> Finding:

@@ -1,0 +1,39 @@
+"""Digests of 10,000 rows of each scenario and driver: the published ones, or another machine's.
+
+python -m benchmarks.bits            # compare with those published; 10 to 15 minutes
+python -m benchmarks.bits --write    # after a change of results that CHANGELOG names
+"""
+
+import argparse
+import json
+from pathlib import Path
+
+from bridgegen.base.errors import InputError
+from bridgegen.engine import conformance
+from bridgegen.scenario.language.reader import names
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--write", action="store_true", help="publish this machine's digests")
+    write = parser.parse_args().write
+    known = {} if write else conformance.published()["rows"]
+    found = {}
+    for scenario in names():
+        for driver in conformance.DRIVERS:
+            key = f"{scenario} {driver}"
+            try:
+                found[key] = conformance.rows_digest(scenario, driver)
+            except InputError as error:
+                print(f"{key}: {error}", flush=True)
+                continue
+            same = "" if write else "same" if found[key] == known.get(key) else "DIFFERS"
+            print(f"{key}: {found[key]} {same}", flush=True)
+    if write:
+        text = json.dumps({"functions": conformance.function_digests(), "rows": found}, indent=1)
+        path = Path(conformance.__file__).with_name("conformance.json")
+        path.write_text(text + "\n", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
