@@ -146,4 +146,5 @@ def test_other_bits_are_named(monkeypatch):
     assert found.value == (
         "not the published ones: sin, motion or metrics of crossroads-s4 with route-follower"
     )
-    assert found.advice and not found.is_problem
+    assert found.advice
+    assert not found.is_problem

@@ -8,7 +8,7 @@ Both ways run the same functions on the same arrays, so they give the same bits.
 
 from numba import float64, int64
 
-from bridgegen.base.compiled import bundled, bundled_row, kernel
+from bridgegen.base.compiled import bundled, bundled_row, inlined_kernel, kernel
 from bridgegen.simulation.embedded._instant_kernels import after_driver, before_driver
 from bridgegen.simulation.embedded._memory_kernels import (
     N_STEPS,
@@ -23,14 +23,19 @@ def simulate_rows(plan, networks, rows, states, records):
     plan = bundled(plan)
     for i in range(len(rows)):
         roads = bundled_row(networks, rows[i])
-        state, record = bundled_row(states, i), bundled_row(records, i)
-        start(plan, roads, state, record)
-        for k in range(record.x.shape[1]):
-            if state.ending[N_STEPS] > 0:
-                break
-            before_driver(k, plan, roads, state, record)
-            demanded, curvature = demand(k, plan, roads, state, record)
-            after_driver(k, demanded, curvature, plan, roads, state, record)
+        simulate_row(plan, roads, bundled_row(states, i), bundled_row(records, i))
+
+
+@inlined_kernel
+def simulate_row(plan, roads, state, record):
+    """Roll out one row from its first instant to its last; all four are bundles."""
+    start(plan, roads, state, record)
+    for k in range(record.x.shape[1]):
+        if state.ending[N_STEPS] > 0:
+            break
+        before_driver(k, plan, roads, state, record)
+        demanded, curvature = demand(k, plan, roads, state, record)
+        after_driver(k, demanded, curvature, plan, roads, state, record)
 
 
 PARTS = ((after_driver, (int64, float64, float64)), (before_driver, (int64,)))

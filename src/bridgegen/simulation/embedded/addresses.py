@@ -18,6 +18,8 @@ from bridgegen.simulation.embedded._memory_kernels import Plan, Record, Roads, S
 from bridgegen.simulation.embedded.chassis._multi_body_columns import MULTI_BODY
 from bridgegen.simulation.embedded.conditions import look_closely
 from bridgegen.simulation.embedded.drivers import (
+    DEMANDS,
+    ask,
     begin_waiting,
     heed,
     move_chassis,
@@ -32,43 +34,65 @@ from bridgegen.simulation.embedded.motion import (
     tow,
 )
 
+_BY_FIELD = {
+    "follows_courses": follow_course,
+    "poses_along": pose_along,
+    "moves_laid": move_laid,
+    "tows_trailers": tow,
+    "starts_towed": start_towed,
+    "looks_closely": look_closely,
+    "heeds": heed,
+    "begins_waiting": begin_waiting,
+}
 
-def addressed(plan: Plan, networks: Roads, states: State, records: Record) -> Plan:
-    """Return a plan with the addresses of the kernels that it needs, compiled if need be.
+_NUMBER, _TWO = (types.int64,), (types.int64, types.int64)
+_MOTION = (types.int64, types.float64, types.float64)
 
-    The addresses are this process's.
+CALLED: dict[Callable[..., Any], tuple[Any, ...]] = {
+    **dict.fromkeys((*DEMANDS.values(), ask), _NUMBER),
+    **dict.fromkeys(_BY_FIELD.values(), _NUMBER),
+    **dict.fromkeys((follow_course, pose_along, move_laid, *BEGINS.values()), _TWO),
+    **dict.fromkeys((move_chassis, move_multi_body), _MOTION),
+    start_towed: (),
+}
+"""All kernels that are called by their address, with the types of what they take before bundles."""
+
+Places = Callable[[Callable[..., Any]], int]
+"""Returns the address of a kernel of ``CALLED``."""
+
+
+def here(plan: Plan, networks: Roads, states: State, records: Record) -> Places:
+    """Return the addresses of kernels in this process, for such arrays; compile if need be."""
+    rows = (row_type(plan, 0), *map(row_type, (networks, states, records)))
+    return lambda kernel: address_of(kernel, (*CALLED[kernel], *rows))
+
+
+def addressed(plan: Plan, drives: Callable[..., Any] | None, at: Places) -> Plan:
+    """Return a plan with the addresses of the kernels that it needs.
 
     Args:
         plan: the compiled storyboard.
-        networks: the road networks.
-        states: of N rows.
-        records: of N rows.
+        drives: the kernel of the ego's driver, if it has one.
+        at: where kernels are; see `here`.
     """
-    rows = (row_type(plan, 0), *map(row_type, (networks, states, records)))
-
-    def at(kernel: Callable[..., Any], *first: Any) -> int:
-        return address_of(kernel, (*first, *rows))
-
     kinds = plan.actions[:, DOES]
-    begins = {
-        kind: at(BEGINS[kind], types.int64, types.int64)
-        for kind in np.unique(kinds).tolist()
-        if kind in BEGINS
+    begins = {kind: at(BEGINS[kind]) for kind in np.unique(kinds).tolist() if kind in BEGINS}
+    tows, attends = len(plan.tows) > 0, plan.attends > 0
+    needed = {
+        "follows_courses": ((kinds >= RELATIVE_SPEED) & (kinds < FIRST_ACROSS)).any(),
+        "poses_along": (plan.places[:, PLACE_KIND] == BY_TRAJECTORY).any(),
+        "moves_laid": len(plan.layouts) > 0,
+        "tows_trailers": tows,
+        "starts_towed": tows,
+        "looks_closely": plan.looks_closely,
+        "heeds": attends,
+        "begins_waiting": attends,
     }
-    along = (plan.places[:, PLACE_KIND] == BY_TRAJECTORY).any()
     moves = move_multi_body if plan.chassis.size == MULTI_BODY else move_chassis
-    chases = ((kinds >= RELATIVE_SPEED) & (kinds < FIRST_ACROSS)).any()
+    called: Any = {name: at(_BY_FIELD[name]) if needed[name] else 0 for name in needed}
     return plan._replace(
         begins=np.array([begins.get(kind, 0) for kind in kinds.tolist()], dtype=np.int64),
-        follows_courses=at(follow_course, types.int64, types.int64) if chases else 0,
-        poses_along=at(pose_along, types.int64, types.int64) if along else 0,
-        moves_laid=at(move_laid, types.int64, types.int64) if len(plan.layouts) else 0,
-        tows_trailers=at(tow, types.int64) if len(plan.tows) else 0,
-        starts_towed=at(start_towed) if len(plan.tows) else 0,
-        looks_closely=at(look_closely, types.int64) if plan.looks_closely else 0,
-        heeds=at(heed, types.int64) if plan.attends else 0,
-        moves_chassis=(
-            at(moves, types.int64, types.float64, types.float64) if plan.chassis.size else 0
-        ),
-        begins_waiting=at(begin_waiting, types.int64) if plan.attends else 0,
+        moves_chassis=at(moves) if plan.chassis.size else 0,
+        driver_code=at(drives) if drives else 0,
+        **called,
     )

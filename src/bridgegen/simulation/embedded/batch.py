@@ -35,14 +35,13 @@ from bridgegen.simulation.embedded._codes import (
     DOES,
     PRESS,
 )
-from bridgegen.simulation.embedded.addresses import addressed
+from bridgegen.simulation.embedded.addresses import addressed, here
 from bridgegen.simulation.embedded.chassis.multi_body import MOTIONS
 from bridgegen.simulation.embedded.drivers import (
     ANSWER,
     DEMANDS,
     LANES,
     N_INPUTS,
-    code_of,
     fill_input_rows,
     observe_rows,
     see_conflicts_of_rows,
@@ -120,11 +119,9 @@ class Batch:
         if self._has_addresses:
             return
         self._has_addresses = True
-        rows = (self._roads.tables, self.state, self.record)
-        self._plan = addressed(self._plan, *rows)
-        if demands := DEMANDS.get(self._program.driver.name):
-            code = code_of(demands, self._plan, *rows)
-            self._plan = self._plan._replace(driver_code=code)
+        drives = DEMANDS.get(self._program.driver.name)
+        at = here(self._plan, self._roads.tables, self.state, self.record)
+        self._plan = addressed(self._plan, drives, at)
 
     def run(self, simulate_rows: Callable[..., Any] = kernels.simulate_rows) -> Rollout:
         """Roll all rows out with the compiled driver; runs without the GIL.
@@ -169,12 +166,12 @@ class Batch:
 
     def compile_start(self) -> None:
         """Compile the parts of ``run`` that its first instant and this plan alone need."""
-        compile_for_kernels(start, self._kinds())
+        compile_for_kernels(start, self.kinds())
         self.take_addresses()
 
     def compile_instants(self) -> None:
         """Compile the parts of ``run`` that each instant needs, the last first."""
-        kinds = self._kinds()
+        kinds = self.kinds()
         for function, first in kernels.PARTS:
             compile_for_kernels(function, (*first, *kinds))
 
@@ -186,7 +183,7 @@ class Batch:
         self.state.ending[:, memory.N_STEPS] = self.record.x.shape[2]
         return self.rollout()
 
-    def _kinds(self) -> tuple[Any, ...]:
+    def kinds(self) -> tuple[Any, ...]:
         rows = (self._roads.tables, self.state, self.record)
         return (row_type(self._plan, 0), *map(row_type, rows))
 

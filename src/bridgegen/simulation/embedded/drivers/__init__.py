@@ -28,7 +28,7 @@ from bridgegen.simulation.embedded.drivers._own_driver_kernels import (
     ask,
     fill_input_rows,
 )
-from bridgegen.simulation.embedded.drivers.demands import DEMANDS, code_of
+from bridgegen.simulation.embedded.drivers.demands import DEMANDS
 
 __all__ = [
     "ACCELERATION",
@@ -43,7 +43,6 @@ __all__ = [
     "ask",
     "begin_control",
     "begin_waiting",
-    "code_of",
     "demand",
     "ego_is_through",
     "egos_are_through",

@@ -31,7 +31,7 @@ from bridgegen.simulation.embedded._memory_kernels import (
     State,
 )
 from bridgegen.simulation.embedded._rollout_kernels import simulate_rows
-from bridgegen.simulation.embedded.addresses import addressed
+from bridgegen.simulation.embedded.addresses import addressed, here
 from bridgegen.simulation.embedded.batch import Batch
 from bridgegen.simulation.embedded.drivers import (
     ACCELERATION,
@@ -40,7 +40,6 @@ from bridgegen.simulation.embedded.drivers import (
     EGO,
     RETURNED,
     ask,
-    code_of,
 )
 from bridgegen.simulation.embedded.program import Program
 from bridgegen.simulation.embedded.user_drivers.lock_step import Note, Wheel, drive_in_lock_step
@@ -216,7 +215,7 @@ class Seat:
         states: Any = [array[:0] for array in state]
         records: Any = [array[:0] for array in record]
         simulate_rows(plan, roads, rows, State(*states), Record(*records))
-        code_of(ask, plan, roads, State(*states), Record(*records))
+        here(plan, roads, State(*states), Record(*records))(ask)
         layout, _ = self._arrays.put((*states, *records))
         self.process.start()
         self.process.call(_simulate, layout, plan, roads, rows, seconds=START_SECONDS)
@@ -304,9 +303,8 @@ def _simulate(
     raised: list[str] = []
     sys.unraisablehook = lambda error: raised.append(_described(error))
     try:
-        plan = addressed(plan, _roads[0], state, record)
-        code = code_of(ask, plan, _roads[0], state, record)
-        plan = plan._replace(driver_code=code, own_code=address)
+        plan = addressed(plan, ask, here(plan, _roads[0], state, record))
+        plan = plan._replace(own_code=address)
         simulate_rows(plan, _roads[0], rows, state, record)
     finally:
         sys.unraisablehook = sys.__unraisablehook__
