@@ -147,7 +147,7 @@ def test_what_a_town_s_search_exports_keeps_its_constraints(
 ) -> None:
     run = bg.run_search(
         "crossroads-s4", budget=300, algorithm="random", road_map=crossroads, junction="all",
-        triage="none", out=tmp_path / "run",
+        triage="short", out=tmp_path / "run",
     )  # fmt: skip
     assert run.settings.junction == "all"
     words = {
