@@ -179,7 +179,7 @@ def test_whole_numbers_stay_whole(tmp_path):
 
 def test_a_file_of_ours_keeps_its_units_its_formulas_and_its_ontology(tmp_path):
     first = bg.run_search(
-        "crossroads-s4", budget=60, keep=1, triage="none", out=tmp_path / "first", seed=1
+        "crossroads-s4", budget=60, keep=1, triage="short", out=tmp_path / "first", seed=1
     )
     scenario = first.scenarios[0]
     ranges = tmp_path / "ranges.xosc"
@@ -189,7 +189,7 @@ def test_a_file_of_ours_keeps_its_units_its_formulas_and_its_ontology(tmp_path):
     )
     ranges.write_text(distribution_text(body, "first/critical/0001.xosc"), "utf-8")
     run = bg.run_search(
-        scenario, distribution=ranges, budget=80, keep=2, triage="none", out=tmp_path / "run",
+        scenario, distribution=ranges, budget=80, keep=2, triage="short", out=tmp_path / "run",
     )  # fmt: skip
     drawn = columns(run.folder)
     assert np.ptp(drawn["fog_density"]) > 5.0
@@ -321,7 +321,7 @@ def test_a_distribution_of_another_scenario_is_refused(tmp_path):
     scenario, ranges = write_pair(tmp_path)
     ranges.write_text(distribution_text(uniform("Gap"), "../other.xosc"), "utf-8")
     with pytest.raises(InputError, match=r"must name the scenario .*, got ../other.xosc"):
-        bg.run_search(scenario, distribution=ranges, triage="none", out=tmp_path / "run")
+        bg.run_search(scenario, distribution=ranges, triage="short", out=tmp_path / "run")
 
 
 def test_a_map_of_the_search_is_refused(tmp_path):
@@ -332,7 +332,7 @@ def test_a_map_of_the_search_is_refused(tmp_path):
 def test_a_distribution_is_for_a_scenario_file(tmp_path):
     _, ranges = write_pair(tmp_path)
     with pytest.raises(InputError, match="a distribution is for the parameters of an OpenSCENARIO"):
-        bg.run_search("crossroads-s4", distribution=ranges, triage="none", out=tmp_path / "run")
+        bg.run_search("crossroads-s4", distribution=ranges, triage="short", out=tmp_path / "run")
 
 
 def command(monkeypatch, capsys, *words) -> str:
@@ -361,7 +361,7 @@ def test_a_distribution_alone_is_refused_with_what_to_do(tmp_path, monkeypatch, 
 def test_a_scenario_is_no_distribution(tmp_path):
     scenario, _ = write_pair(tmp_path)
     with pytest.raises(InputError, match="must hold a ParameterValueDistribution"):
-        bg.run_search(scenario, distribution=scenario, triage="none", out=tmp_path / "run")
+        bg.run_search(scenario, distribution=scenario, triage="short", out=tmp_path / "run")
 
 
 def test_a_distribution_is_validated_with_its_scenario(tmp_path):

@@ -24,7 +24,7 @@ NAMES = ("gentle", "firm", "emergency")
 def searched(tmp_path_factory):
     out = tmp_path_factory.mktemp("runs") / "run"
     return bg.run_search(
-        EXAMPLE, algorithm="random", budget=40, keep=4, ego="route-follower", triage="none",
+        EXAMPLE, algorithm="random", budget=40, keep=4, ego="route-follower", triage="short",
         out=out,
     )  # fmt: skip
 
@@ -125,7 +125,7 @@ def test_a_file_whose_text_varies_is_searched(run, tmp_path):
     out = tmp_path / "run"
     bg.run_search(
         source, distribution=tmp_path / "ranges.xosc", algorithm="random", budget=12, keep=3,
-        ego="route-follower", triage="none", out=out,
+        ego="route-follower", triage="short", out=out,
     )  # fmt: skip
     store, found = rows(out)
     x = dict(zip(store.parameters, found.X.T, strict=True))

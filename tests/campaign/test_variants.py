@@ -128,7 +128,7 @@ def test_a_longer_lead_is_hit_earlier(both):
 def test_a_search_plays_and_exports_each_with_its_own_body(tmp_path):
     scenario, ranges = write(tmp_path, deterministic(models("small", "long"), GAPS))
     run = bg.run_search(
-        scenario, distribution=ranges, algorithm="random", budget=60, keep=8, triage="none",
+        scenario, distribution=ranges, algorithm="random", budget=60, keep=8, triage="short",
         out=tmp_path / "run",
         ego="route-follower",
     )  # fmt: skip
@@ -213,7 +213,7 @@ def test_an_end_that_the_constraint_excludes_is_left_out_with_a_note(tmp_path):
     scenario, ranges = write_pair(tmp_path, deterministic(GAPS), text=whole)
     bg.run_search(
         scenario, distribution=ranges, algorithm="random", budget=12, keep=0,
-        triage="none", out=tmp_path / "run", callbacks=SearchCallbacks(warning=said.append),
+        triage="short", out=tmp_path / "run", callbacks=SearchCallbacks(warning=said.append),
     )  # fmt: skip
     assert any("without that end" in one for one in said)
 

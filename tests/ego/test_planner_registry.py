@@ -119,7 +119,7 @@ def test_a_run_keeps_the_name_and_resumes_by_it(package, tmp_path):
     """Another process drives by the same planner; its files name it, too."""
     run = run_search(
         "lead-brakes", algorithm="random", budget=6, ego="house:cruises", keep=1, seed=1,
-        causes=False, triage="none", out=tmp_path / "run",
+        causes=False, triage="short", out=tmp_path / "run",
     )  # fmt: skip
     assert run.settings.ego == "house:cruises"
     assert "--ego house:cruises" in run.settings.command(tmp_path)
@@ -137,7 +137,7 @@ def test_a_run_keeps_the_name_and_resumes_by_it(package, tmp_path):
 def test_a_file_that_names_one_which_is_not_installed_is_refused(package, tmp_path):
     run = run_search(
         "lead-brakes", algorithm="random", budget=6, ego="house:cruises", keep=1, seed=1,
-        causes=False, triage="none", out=tmp_path / "run",
+        causes=False, triage="short", out=tmp_path / "run",
     )  # fmt: skip
     file = run.scenarios[0]
     file.write_text(file.read_text().replace("house:cruises", "absent"))

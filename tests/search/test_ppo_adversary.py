@@ -71,7 +71,7 @@ def test_a_search_hands_over_what_it_drove(tmp_path):
         settings={"population": 8, "epochs": 2},
         budget=30,
         keep=1,
-        triage="none",
+        triage="short",
         out=tmp_path / "run",
     )
     assert run.settings.adversary == "bv"

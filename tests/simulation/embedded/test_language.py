@@ -384,7 +384,7 @@ def test_types_vary(made, tmp_path, monkeypatch):
 
     run = bg.run_search(
         tmp_path / "types.yaml", algorithm="random", budget=40, keep=6, ego="route-follower",
-        count="any", triage="none", out=tmp_path / "run",
+        count="any", triage="short", out=tmp_path / "run",
     )  # fmt: skip
     assert run.scenarios
     kinds = {re.search(r'name="lead">\s*<Vehicle[^>]*vehicleCategory="(\w+)"', one.read_text())[1]

@@ -134,13 +134,13 @@ def test_a_run_records_it_and_resumes_with_it(tmp_path):
     run = bg.run_search(
         "stopped-after-curve",
         vehicle="single-track",
-        triage="none",
+        triage="short",
         out=tmp_path / "whole",
         **given,
     )
     assert run.settings.vehicle == "single-track"
     assert bg.resume(tmp_path / "whole").settings.vehicle == "single-track"
-    other = bg.run_search("stopped-after-curve", triage="none", out=tmp_path / "other", **given)
+    other = bg.run_search("stopped-after-curve", triage="short", out=tmp_path / "other", **given)
     assert other.settings.vehicle == "kinematic"
     assert other.summary.v_d_median != run.summary.v_d_median
 
