@@ -42,9 +42,9 @@ def test_a_search_remembers_the_reading(pair, tmp_path):
         "distribution": ranges, "algorithm": "random", "budget": 24, "keep": 2,
         "callbacks": SearchCallbacks(warning=said.append),
     }  # fmt: skip
-    never = bg.run_search(path, triage="none", out=tmp_path / "never", **given)
+    never = bg.run_search(path, triage="short", out=tmp_path / "never", **given)
     assert any("never starts" in one for one in said)
-    now = bg.run_search(path, triage="none", out=tmp_path / "now", empty_trigger="now", **given)
+    now = bg.run_search(path, triage="short", out=tmp_path / "now", empty_trigger="now", **given)
     assert now.report.exists()
     assert (now.settings.empty_trigger, never.settings.empty_trigger) == ("now", None)
     assert "--empty-trigger now" in now.settings.command(tmp_path / "again")
@@ -55,4 +55,4 @@ def test_a_search_remembers_the_reading(pair, tmp_path):
 
 def test_it_is_for_scenario_files(tmp_path):
     with pytest.raises(InputError, match="empty triggers are those of an OpenSCENARIO file"):
-        bg.run_search("cut-in", empty_trigger="now", triage="none", out=tmp_path / "run")
+        bg.run_search("cut-in", empty_trigger="now", triage="short", out=tmp_path / "run")

@@ -26,7 +26,7 @@ def run(tmp_path_factory):
         others="attentive",
         budget=200,
         keep=3,
-        triage="none",
+        triage="short",
         out=folder,
         causes=False,
     )
@@ -84,7 +84,7 @@ def test_what_drives_is_overridden_for_a_file(run, cli):
 
 def test_an_unknown_driver_of_the_others_is_one_clear_error(run, tmp_path):
     with pytest.raises(UnknownNameError, match="driver of other participants 'attentif'"):
-        bg.run_search("crossroads-s4", others="attentif", triage="none", out=tmp_path / "run")
+        bg.run_search("crossroads-s4", others="attentif", triage="short", out=tmp_path / "run")
     source = min((run.folder / "critical").glob("*.xosc"))
     with pytest.raises(UnknownNameError, match="driver of other participants 'attentif'"):
         bg.simulate_file(source, others="attentif")
