@@ -22,7 +22,7 @@ def test_tab_completes_all_names_before_first_use():
 @pytest.fixture(scope="module")
 def run(tmp_path_factory):
     folder = tmp_path_factory.mktemp("runs") / "s4"
-    return bg.run_search("crossroads-s4", budget=120, keep=1, triage="short", out=str(folder))
+    return bg.run_search("crossroads-s4", budget=120, keep=1, triage="none", out=str(folder))
 
 
 def test_paths_may_be_texts(run):

@@ -11,7 +11,8 @@ a block says what else is to be known:
 ``<!-- not run: WHY -->`` and ``<!-- tested by: FILE -->`` (what takes too long here; the commands
 of both must still parse), ``<!-- file: NAME -->`` (what the reader saves as that file),
 ``<!-- exit: 3 -->``, ``<!-- ci -->`` (the YAML of another program), ``<!-- excerpt -->`` (no
-output, but a part of a file).
+output, but a part of a file), ``<!-- shortened -->`` (of a page ``AS_PRINTED``: nothing that it
+prints depends on these commands).
 """
 
 import json
@@ -51,12 +52,18 @@ DOCS = ROOT / "docs"
 PAGES = sorted(path.stem for path in DOCS.glob("*.md"))
 BUDGET = "120"  # a failure of crossroads-s4 by pso needs 92
 SHORT = {
-    "search": {"--budget": BUDGET, "--keep": "1", "--triage": "short"},
+    "search": {"--budget": BUDGET, "--keep": "1", "--triage": "none"},
     "compare": {"--seeds": "2", "--budget": "20", "--workers": "1"},
     "regions": {"--samples": "20"},
     "check-driver": {"--scenario": "cut-in"},
 }
-"""What commands are run with instead of what the page says."""
+"""What commands are run with instead of what the page says.
+
+Pages ``AS_PRINTED`` and ``TRIAGED`` triage; each other search would take twice as long with it.
+"""
+
+TRIAGED = ("dashboard", "read-a-report", "suites")
+"""Pages whose later commands need the failure modes of a search."""
 
 FEW = {
     "suite": {"--samples": "6"},
@@ -106,9 +113,11 @@ def words_of(line: str) -> list[str]:
     return shlex.split(line, comments=True)
 
 
-def shortened(words: list[str]) -> list[str]:
+def shortened(words: list[str], is_triaged: bool = False) -> list[str]:
     """Return a bridgegen command that takes less time."""
     short = dict(SHORT.get(words[1], {}))
+    if words[1] == "search" and is_triaged:
+        short["--triage"] = "short"
     if words[1] == "search" and any(".py:" in word or word == "--adversary" for word in words):
         # A driver in Python, or a course for each row, takes its time.
         short |= {"--budget": "40", "--triage": "none"}
@@ -144,6 +153,7 @@ class Page:
     def __init__(self, monkeypatch, capsys) -> None:
         self.patch, self.names = monkeypatch, {"__name__": "a_page"}
         self.as_printed, self.capsys, self.ran = False, capsys, False
+        self.is_triaged = False
         self.output: list[str] = []
 
     def run(self, block: Block) -> None:
@@ -166,11 +176,13 @@ class Page:
                 must_parse(words[1:])
             if block.mark in ELSEWHERE:
                 continue
-            assert self.command(words) == int(block.value if block.mark == "exit" else 0), line
+            as_printed = self.as_printed and block.mark != "shortened"
+            status = self.command(words, as_printed)
+            assert status == int(block.value if block.mark == "exit" else 0), line
 
-    def command(self, words: list[str]) -> int:
+    def command(self, words: list[str], as_printed: bool) -> int:
         if words[0] == "bridgegen":
-            words = words if self.as_printed else shortened(words)
+            words = words if as_printed else shortened(words, self.is_triaged)
             if is_known(words):
                 return 0
             self.patch.setattr(sys, "argv", words)
@@ -278,7 +290,7 @@ AFTERWARDS = {"search-a-file": check_exports_of_a_searched_file}
 
 @pytest.mark.parametrize("name", [name for name in PAGES if blocks(name)])
 def test_every_snippet_runs(name, page):
-    page.as_printed = name in AS_PRINTED
+    page.as_printed, page.is_triaged = name in AS_PRINTED, name in TRIAGED
     for block in blocks(name):
         page.run(block)
     if name in AFTERWARDS:
@@ -294,5 +306,7 @@ def test_few_snippets_cannot_be_run():
 
 def test_marks_are_those_that_are_known():
     for block in (block for name in PAGES for block in blocks(name)):
-        assert block.mark in ("", *ELSEWHERE, "file", "exit", "ci", "excerpt"), block.mark
+        assert block.mark in (
+            "", *ELSEWHERE, "file", "exit", "ci", "excerpt", "shortened"
+        ), block.mark  # fmt: skip
         assert block.mark != "tested by" or (ROOT / block.value).is_file(), block.value

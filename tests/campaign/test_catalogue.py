@@ -41,7 +41,7 @@ def test_neither_driver_is_never_or_always_at_risk(name):
         space = scenario.space()
         pipeline = Pipeline(scenario, space, PipelineOptions(ego=ego))
         pipeline.choose_objective()
-        X = space.decode(np.random.default_rng(1).random((600, space.n_var)))
+        X = space.decode(np.random.default_rng(1).random((300, space.n_var)))
         shares.append(float(pipeline.evaluate(X).critical.mean()))
     careless, careful = shares
     assert careless > 0.0

@@ -8,7 +8,7 @@ GIVEN = {"algorithm": "random", "budget": 60, "seed": 0, "keep": 2}
 def test_by_harm_nobody_stops_dead_where_the_road_ends(tmp_path):
     """The paper's S3 has `road_end: stand`, which the paper's evaluation needs."""
     harm, paper, thresholds = (
-        bg.run_search("paper/crossroads-s3", **GIVEN, **how, triage="short", out=tmp_path / name)
+        bg.run_search("paper/crossroads-s3", **GIVEN, **how, triage="none", out=tmp_path / name)
         for name, how in (
             ("a", {"objective": "harm"}),
             ("b", {}),

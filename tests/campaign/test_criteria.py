@@ -24,7 +24,7 @@ def rows(run):
 def test_a_search_falsifies_a_criterion(tmp_path):
     aimed = run_search(
         "cut-in", criteria=[GAP, BRAKE], objective={"criterion:R-12": None}, budget=240, keep=2,
-        triage="short", out=tmp_path / "aimed", **GIVEN,
+        triage="none", out=tmp_path / "aimed", **GIVEN,
     )  # fmt: skip
     chance = run_search(
         "cut-in", criteria=[GAP, BRAKE], algorithm="random", budget=240, deliver=False,
@@ -82,7 +82,7 @@ def test_what_makes_a_scenario_critical_is_chosen(tmp_path):
 
 def test_junit_has_a_test_for_each_and_fails_with_the_exit_status(tmp_path):
     run = run_search(
-        "cut-in", criteria=[GAP, BRAKE], budget=80, triage="short", out=tmp_path / "a", **GIVEN
+        "cut-in", criteria=[GAP, BRAKE], budget=80, triage="none", out=tmp_path / "a", **GIVEN
     )
     judges = PassFailCriteria.of_run((), tmp_path / "j.xml", run.folder)
     verdicts = {one.test.partition(":")[0]: one.verdict for one in judges.judge(run)}
@@ -113,4 +113,4 @@ def test_a_scenario_file_states_criteria(tmp_path):
     assert np.array_equal(F, rows(run).metrics[:, run.metrics.index("criterion:R-12")])
     path.write_text(text.replace("gap to bv", "gap to bw"), "utf-8")
     with pytest.raises(InputError, match=r"criterion R-12: unknown participant 'bw'.*line \d+"):
-        run_search(path, triage="short", out=tmp_path / "b")
+        run_search(path, triage="none", out=tmp_path / "b")

@@ -64,7 +64,7 @@ def run(tmp_path_factory) -> bg.Run:
         "crossroads-s3",
         budget=100,
         keep=3,
-        triage="short",
+        triage="none",
         out=tmp_path_factory.mktemp("runs") / "s3",
     )
 
@@ -310,7 +310,7 @@ def test_refusals(run, catalogue, tmp_path):
 
 
 def test_a_run_that_kept_nothing(tmp_path):
-    run = bg.run_search("crossroads-s4", budget=5, keep=0, triage="short", out=tmp_path / "run")
+    run = bg.run_search("crossroads-s4", budget=5, keep=0, triage="none", out=tmp_path / "run")
     with pytest.raises(InputError, match="no scenario was exported"):
         export(run.folder, "recorded")
 

@@ -255,7 +255,7 @@ def test_a_run_on_a_town_names_the_town(catalogue, tmp_path):
         budget=400,
         keep=1,
         road_map=town,
-        triage="short",
+        triage="none",
         out=tmp_path / "run",
     )
     paths = export(run.folder, "carla")

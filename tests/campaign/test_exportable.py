@@ -79,7 +79,7 @@ def test_an_adversary_s_scenario_is_tried_too(tmp_path):
         algorithm="random",
         budget=4,
         keep=0,
-        triage="short",
+        triage="none",
         out=tmp_path / "run",
     )
     assert run.summary.evaluations == 4
@@ -94,7 +94,7 @@ def test_what_cannot_be_exported_is_left_out_and_named(tmp_path, monkeypatch, ca
         return write(pipeline, x, folder, name, *cause, **given)
 
     monkeypatch.setattr(critical, "write_scenario", refuse)
-    run = bg.run_search("crossroads-s3", budget=60, keep=3, triage="short", out=tmp_path / "run")
+    run = bg.run_search("crossroads-s3", budget=60, keep=3, triage="none", out=tmp_path / "run")
     assert [path.stem for path in run.scenarios] == ["0001", "0003"]
     (left,) = run.not_exported
     assert left.name == "0002"

@@ -44,7 +44,7 @@ def records(individuals):
 
 
 def test_a_search_hands_over_its_accidents(tmp_path):
-    run = bg.run_search("crossroads-s4", budget=200, keep=3, triage="short", out=tmp_path / "run")
+    run = bg.run_search("crossroads-s4", budget=200, keep=3, triage="none", out=tmp_path / "run")
     crashes = 0
     for path in run.scenarios:
         individuals = load_owl(path.with_suffix(".owl"))
@@ -180,14 +180,14 @@ def test_the_speed_limit_of_a_map_bounds_speeds(tmp_path):
     assert (speeds <= 8.0 * X[:, space.index("speed_factor")] + 1e-9).all()
     assert speeds.max() > 7.0
     run = bg.run_search(
-        "crossroads-s4", road_map=path, budget=150, keep=2, triage="short", out=tmp_path / "run"
+        "crossroads-s4", road_map=path, budget=150, keep=2, triage="none", out=tmp_path / "run"
     )
     assert run.scenarios
 
 
 def test_the_cause_is_in_every_file_and_comes_back(tmp_path):
     run = bg.run_search(
-        "crossroads-s3", budget=60, keep=2, algorithm="random", triage="short", out=tmp_path / "run"
+        "crossroads-s3", budget=60, keep=2, algorithm="random", triage="none", out=tmp_path / "run"
     )
     frame = run.frame()
     assert len(run.scenarios) == 2
@@ -224,7 +224,7 @@ def test_a_cause_that_is_none_breaks_a_rule():
 def found(tmp_path_factory):
     """Scenarios in which a pedestrian steps out, and what the analysis says of each."""
     folder = tmp_path_factory.mktemp("harm") / "run"
-    run = bg.run_search("pedestrian-behind-parked", budget=60, keep=4, triage="short", out=folder,
+    run = bg.run_search("pedestrian-behind-parked", budget=60, keep=4, triage="none", out=folder,
                         algorithm="random", ego="route-follower")  # fmt: skip
     assert run.scenarios
     return run.scenarios

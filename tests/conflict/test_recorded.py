@@ -96,7 +96,7 @@ def xosc(tmp_path_factory):
     import bridgegen as bg
 
     folder = tmp_path_factory.mktemp("run")
-    run = bg.run_search("pedestrian-behind-parked", budget=30, keep=1, triage="short",
+    run = bg.run_search("pedestrian-behind-parked", budget=30, keep=1, triage="none",
                         out=folder / "run",
                         algorithm="random", ego="route-follower")  # fmt: skip
     return run.scenarios[0]

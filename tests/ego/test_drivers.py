@@ -39,7 +39,7 @@ def test_a_driver_without_stages_refuses_them() -> None:
 def test_a_run_keeps_them(tmp_path: Path) -> None:
     run = run_search(
         "pedestrian-behind-parked", algorithm="random", budget=4, ego="reference",
-        ideal=["prediction", "perception"], keep=0, triage="short", out=tmp_path / "run",
+        ideal=["prediction", "perception"], keep=0, triage="none", out=tmp_path / "run",
     )  # fmt: skip
     assert set(run.settings.ideal) == {"perception", "prediction"}
     assert "--ideal perception,prediction" in run.settings.command(tmp_path)

@@ -279,7 +279,7 @@ def test_few_data_leave_more_open_than_many(tmp_path):
         )
         scenario = bg.load(SCENARIO)
         fit = bg.fit_exposure(
-            scenario, table, ignore=["id"], others="uniform", replicates=40, hours=100.0
+            scenario, table, ignore=["id"], others="uniform", replicates=20, hours=100.0
         )
         found = estimate_risk(
             SCENARIO, ego=DRIVER, exposure=fit.exposure, events=fit, method="mc", precision=0.0,
@@ -288,7 +288,7 @@ def test_few_data_leave_more_open_than_many(tmp_path):
         p = found.probability("collision")
         assert found.data.low < p.estimate < found.data.high
         widths.append((found.data.high - found.data.low) / p.estimate)
-        assert said(found.folder)["data"]["exposures"] == 40
+        assert said(found.folder)["data"]["exposures"] == 20
         assert "with exposures of resampled events" in (found.folder / "risk.html").read_text()
     assert widths[1] < 0.6 * widths[0]
 

@@ -1,4 +1,5 @@
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -30,6 +31,7 @@ class Chase:
         return np.abs(U[:, 1:13:2] - U[:, :1]).mean(axis=1)
 
 
+@cache
 def driven(n_batches, cause=Cause.PLANNING, **settings):
     """Return how far from the target the agent was, batch by batch."""
     problem = replace(Problem.unnamed(13), arena=Chase())

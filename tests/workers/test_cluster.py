@@ -292,7 +292,8 @@ def test_a_cluster_that_is_lost_is_told_and_the_run_can_be_gone_on_with(
 def test_no_cluster_there(doubles, monkeypatch):
     for name, value in LOCAL.items():
         monkeypatch.setenv(name, value)
-    monkeypatch.setenv("RAY_gcs_rpc_server_reconnect_timeout_s", "2")
+    for wait in ("connect", "reconnect"):  # 5 s and 60 s by default
+        monkeypatch.setenv(f"RAY_gcs_rpc_server_{wait}_timeout_s", "1")
     monkeypatch.setenv("RAY_ADDRESS", f"127.0.0.1:{free_port()}")
     with (
         open_workers("ray") as workers,
