@@ -16,6 +16,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.approval import refuses
 
 import bridgegen as bg
 from bridgegen.base.errors import UnknownNameError, WorkersError
@@ -195,7 +196,7 @@ def test_a_killed_worker_costs_nothing_and_rows_that_kill_are_lost_alone(
 
 
 def test_what_is_raised_arrives_as_it_was(cluster, doubles):
-    with pytest.raises(UnknownNameError, match="unknown number 'seven'; known: one, two"):
+    with refuses(UnknownNameError, "seven"):
         cluster.map(doubles.Doubler(), doubles.Doubler.refuse, X)
     with pytest.raises(ZeroDivisionError, match="by design"):
         cluster.map(doubles.Doubler(), doubles.Doubler.fail, X)
@@ -278,9 +279,7 @@ def test_a_cluster_that_is_lost_is_told_and_the_run_can_be_gone_on_with(
             nodes.obey("kill head")
 
     place = tmp_path / "run"
-    with pytest.raises(
-        WorkersError, match=f"is lost: .*GCS.*; [48]0 .* 'bridgegen resume {place}'"
-    ):
+    with refuses(WorkersError, place):
         bg.run_search(
             **SEARCH, triage="short", out=place, workers="ray",
             callbacks=SearchCallbacks(batch=lambda progress: (lose(progress), time.sleep(4.0))),
@@ -296,6 +295,6 @@ def test_no_cluster_there(doubles, monkeypatch):
     monkeypatch.setenv("RAY_ADDRESS", f"127.0.0.1:{free_port()}")
     with (
         open_workers("ray") as workers,
-        pytest.raises(WorkersError, match=r"cannot be reached|is lost"),
+        refuses(WorkersError),
     ):
         workers.map(doubles.Doubler(), doubles.Doubler.double, X)
