@@ -71,13 +71,13 @@ def _command(item: Any) -> str:
 
 
 def _same_everywhere(text: str, config: Any) -> str:
-    """Replace what differs by machine and run: folders, lines of code, all that ships."""
+    """Replace what differs by machine and run: folders, lines of code, all that ships; and layout."""
     text = re.sub(r"\x1b\[[0-9;?]*[A-Za-z]", "", text).replace(sys.executable, "<python>")
     base = re.escape(str(config._tmp_path_factory.getbasetemp()))
     text = re.sub(base + r"(/[\w.-]+)?", "<tmp>", text).replace(str(ROOT), "<repository>")
     text = re.sub(r"(\.py(?::|, line |\", line ))\d+", r"\1<line>", text)
     text = re.sub(r"(; known: (?:[^,\n]+, ){3})(?:[^,\n]+, ){5}[^\n]*", r"\1…", text)
-    return "\n".join(line.rstrip() for line in text.splitlines() if line.strip())
+    return "\n".join(" ".join(line.split()) for line in text.splitlines() if line.strip())
 
 
 def _without_foreign_words(error: BaseException) -> str:

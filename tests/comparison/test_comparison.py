@@ -252,7 +252,8 @@ def test_a_run_that_fails_is_a_gap_and_is_tried_again(tmp_path, monkeypatch):
     frame = found.frame()
     assert frame[frame["seed"] == 1]["ended"].str.contains("no more luck").sum() == 1
     text = found.page.read_text("utf-8")
-    approve(text, "ZeroDivisionError", "failing")
+    assert "failed: ZeroDivisionError: no more luck" in text
+    assert "failing with seed 1" in text
 
     # pairwise ends before its budget, and says so.
     rows = rows_of(found.plan.folder(Cell("crossroads-s4", "pairwise", 0)))
@@ -261,7 +262,7 @@ def test_a_run_that_fails_is_a_gap_and_is_tried_again(tmp_path, monkeypatch):
     assert row.loc["r_critic"]["value"] == rows.critical.sum() / len(rows)
     assert row.loc["to_50"]["value"] == math.inf
     assert set(row["ended"]) == {"exhausted"}
-    approve(text, "pairwise")
+    assert "pairwise had no more rows to propose after" in text
 
     monkeypatch.setattr(Failing, "broken", False)
     whole = bg.compare("crossroads-s4", **{**grid, "algorithms": ["failing"]}, workers=1)

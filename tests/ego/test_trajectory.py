@@ -80,7 +80,7 @@ def test_what_is_planned_for_an_ended_scenario_is_not_looked_at():
         (straight(np.linspace(0.0, 1.0, 1001)), "1..1000", "(1001,)"),
         (straight(TIME[:0]), "1..1000", "(0,)"),
         (replace(straight(), y=np.zeros(N)), "y", "(3,)"),
-        (replace(straight(), v="fast"), "v", "numbers"),
+        (replace(straight(), v="fast"), "a trajectory", "numbers"),
         (replace(straight(), h=None), "h", "()"),
         (replace(straight(), time=0.5), "time", "()"),
         (changed("h", 2, 10, np.inf), "h [rad]", "inf in state 10"),

@@ -259,7 +259,8 @@ def test_the_page_lists_pass_criteria_whatever_their_texts_are(tmp_path):
             f'    text: "{hostile}"\n    severity: critical\n    tags: [gap]\n'
         )
     text = show_scenario(str(path)).read_text("utf-8")
-    approve(text, "12", "2 m", "critical")
+    assert "<dt>R-12: always(gap to bv &gt; 2 m)</dt>" in text
+    assert "critical, gap" in text
     assert hostile not in text
     assert "Pass criteria" not in show_scenario("cut-in", tmp_path / "plain.html").read_text(
         "utf-8"

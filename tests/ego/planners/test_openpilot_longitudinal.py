@@ -200,7 +200,7 @@ def braking_lead(time):
 @needs_planner
 @pytest.mark.planners
 def test_another_time_step_is_refused():
-    with refuses(InputError, "0.05", "0.1"):
+    with pytest.raises(InputError, match=r"must be 0\.05 for openpilot, .* got 0\.1"):
         openpilot.OpenpilotLongitudinal().reset(1, replace(scene(), time_step=0.1))
 
 

@@ -326,7 +326,7 @@ def test_a_row_does_not_depend_on_its_batch():
 @pytest.mark.planners
 @needs_planner
 def test_a_time_step_that_sumo_has_not_is_refused():
-    with refuses(InputError, "0.0333"):
+    with pytest.raises(InputError, match=r"whole number of milliseconds, got 0\.0333"):
         sumo.ACCDriver().reset(1, replace(scene(road_map((1,))), time_step=1 / 30))
 
 

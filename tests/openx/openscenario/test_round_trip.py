@@ -235,7 +235,7 @@ def test_a_class_that_declares_nonsense_is_a_programming_error():
         (osc.Route("r", False, ()), "Waypoint"),
         (osc.Property("a", "\0"), "Property"),
         (osc.Property("a", "$a"), "reference"),
-        (osc.TransitionDynamics("sideways", "time", 0.0), "sideways"),
+        (osc.TransitionDynamics("sideways", "time", 0.0), "TransitionDynamics"),
     ],
 )
 def test_what_no_file_can_hold_is_not_written(bad, text):

@@ -4,7 +4,6 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
-from tests.approval import approve
 
 from bridgegen.engine.options import PipelineOptions
 from bridgegen.engine.pipeline import Pipeline
@@ -79,7 +78,8 @@ def test_what_it_does_not_take_is_told_in_its_words(esmini):
     roads.files.paths[0].write_text("<OpenDRIVE><road")
     out = there.runner.simulator.run(roads, rows, columns)
     assert out.status.tolist() == [40, 40]
-    approve(out.messages[0], "scenario", "OpenDRIVE")
+    assert "esmini did not take the scenario" in out.messages[0]
+    assert "OpenDRIVE" in out.messages[0]
     assert np.isfinite(out.x).all()
     roads.files.paths[0].write_bytes(whole)
     assert there.runner.simulator.run(roads, rows, columns).status.tolist() == [0, 0]
