@@ -71,11 +71,13 @@ def _command(item: Any) -> str:
 
 
 def _same_everywhere(text: str, config: Any) -> str:
-    """Replace what differs by machine and run: folders, lines of code, all that ships; and layout."""
+    """Replace what differs by machine, run and version, and layout."""
     text = re.sub(r"\x1b\[[0-9;?]*[A-Za-z]", "", text).replace(sys.executable, "<python>")
     base = re.escape(str(config._tmp_path_factory.getbasetemp()))
     text = re.sub(base + r"(/[\w.-]+)?", "<tmp>", text).replace(str(ROOT), "<repository>")
     text = re.sub(r"(\.py(?::|, line |\", line ))\d+", r"\1<line>", text)
+    text = re.sub(r"\b(?:Input|String|List) should [\w ]+(?:, unable [\w ]+)?", "<pydantic>", text)
+    text = re.sub(r"<frozen [\w.]+>:\d+", "<frozen>", text)
     text = re.sub(r"(; known: (?:[^,\n]+, ){3})(?:[^,\n]+, ){5}[^\n]*", r"\1…", text)
     return "\n".join(" ".join(line.split()) for line in text.splitlines() if line.strip())
 
