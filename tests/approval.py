@@ -78,7 +78,7 @@ def _same_everywhere(text: str, config: Any) -> str:
     text = re.sub(r"(\.py(?::|, line |\", line ))\d+", r"\1<line>", text)
     text = re.sub(r"\b(?:Input|String|List) should [\w ]+(?:, unable [\w ]+)?", "<pydantic>", text)
     text = re.sub(r"(127\.0\.0\.1:|\bport )\d{4,5}\b", r"\1<port>", text)
-    text = re.sub(r"\bBridgeGen \d+\.\d+\.\d+", "BridgeGen <version>", text)
+    text = re.sub(r"\b(BridgeGen \(?)\d+\.\d+\.\d+", r"\1<version>", text)
     text = re.sub(r"<frozen [\w.]+>:\d+", "<frozen>", text)
     text = re.sub(r"(; known: (?:[^,\n]+, ){3})(?:[^,\n]+, ){5}[^\n]*", r"\1…", text)
     return "\n".join(" ".join(line.split()) for line in text.splitlines() if line.strip())
