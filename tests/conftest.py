@@ -14,6 +14,7 @@ from typing import Any
 
 import pytest
 from hypothesis import settings
+from tests.approval import Approval
 
 from bridgegen.base.processes.child import ONE_THREAD, collect_rarely
 
@@ -50,6 +51,18 @@ collect_rarely()
 # A shell's background job ignores Ctrl-C, and what it starts inherits that: some tests send it.
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption(
+        "--approve-messages",
+        action="store_true",
+        help="write the messages of the tests that pass into tests/messages.txt",
+    )
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    config.pluginmanager.register(Approval())
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

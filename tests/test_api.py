@@ -5,6 +5,7 @@ import subprocess
 import sys
 
 import pytest
+from tests.approval import refuses
 
 import bridgegen as bg
 from bridgegen.base.errors import StorageError
@@ -50,7 +51,7 @@ def test_an_exported_scenario_of_an_earlier_version_counts_from_0(run):
         assert (read_facts(path).row, read_facts(path).evaluation) == (row, row + 1)
         assert exported_scenarios(run.folder)[0].evaluation == row
         path.write_text(json.dumps(facts | {"row": row, "evaluation": row}), "utf-8")
-        with pytest.raises(StorageError, match="evaluation must be row \\+ 1"):
+        with refuses(StorageError, "evaluation"):
             read_facts(path)
     finally:
         path.write_text(text, "utf-8")

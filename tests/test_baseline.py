@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.approval import approve, refuses
 
 import bridgegen as bg
 from bridgegen.assess.conflict.harm import NEAR_MISS
@@ -86,18 +87,18 @@ def test_a_row_that_the_other_driver_cannot_drive_has_no_result():
     assert not found.critical[lost].any()
     assert (found.F[lost] == 0.0).all()
     assert all(found.messages[row].startswith("with the baseline's driver") for row in lost)
-    assert any("too fast for me" in text for text in found.messages.values())
+    approve(found.messages.values(), "fast")
 
 
 @pytest.mark.parametrize(
     ("ego", "worse_than", "error", "message"),
     [
-        ("reference", "reference", InputError, "another driver than the ego's, both are reference"),
+        ("reference", "reference", InputError, "reference"),
         ("reference", "no-such", UnknownNameError, "no-such"),
     ],
 )
 def test_a_baseline_that_makes_no_sense_is_refused(ego, worse_than, error, message):
-    with pytest.raises(error, match=message):
+    with refuses(error, message):
         made(ego, worse_than)
 
 
@@ -113,7 +114,7 @@ def test_a_run_says_where_the_driver_is_worse_and_its_files_show_it(tmp_path):
     )  # fmt: skip
     assert run.summary.critical == run.triage.bound.harmful > 0
     assert run.triage.baseline == "careful"
-    assert "route-follower fails, and careful does not, in" in run.triage.bound.sentence
+    approve(run.triage.bound.sentence, "route-follower")
     frame = run.frame().query("critical")
     assert (frame["harm"] >= NEAR_MISS).all()
     assert (frame["baseline:harm"] < NEAR_MISS).all()
@@ -129,12 +130,12 @@ def test_a_run_says_where_the_driver_is_worse_and_its_files_show_it(tmp_path):
     )  # fmt: skip
     assert again.triage.model_dump() == run.triage.model_dump()
     assert bg.resume(run.folder, deliver=False).summary == run.summary
-    with pytest.raises(InputError, match=r"\(--worse-than\) must be careful, got fsm"):
+    with refuses(InputError, "--worse-than", "fsm"):
         bg.resume(run.folder, worse_than="fsm")
     assert "worse than careful" in run.report.read_text("utf-8")
     found = regions_of(run.folder, samples=20, at_least=0.2)
     assert found is not None
-    with pytest.raises(InputError, match="compares route-follower with careful"):
+    with refuses(InputError, "route-follower"):
         bg.export_safety_case([run.folder], out=tmp_path / "case")
     project = read_project(tmp_path)
     one = next(one for one in project.results if one.source == "run")
@@ -149,7 +150,7 @@ def test_a_driver_of_one_s_own_is_named_again_to_resume(tmp_path):
         NAME, ego="route-follower", worse_than=spec, budget=10, keep=0, algorithm="random",
         triage="short", out=tmp_path / "run",
     )  # fmt: skip
-    with pytest.raises(InputError, match=r"name it: bridgegen resume .* --worse-than"):
+    with refuses(InputError, "--worse-than"):
         bg.resume(run.folder, deliver=False)
     assert bg.resume(run.folder, worse_than=spec, deliver=False).summary == run.summary
 

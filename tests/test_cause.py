@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from tests.approval import refuses
 
 from bridgegen.assess.cause import CAUSES, Cause, causes, counterfactuals, require
 from bridgegen.assess.objective import Objective
@@ -103,11 +104,11 @@ def test_labels_are_the_only_names():
 
 
 def test_a_cause_that_cannot_be_is_refused():
-    with pytest.raises(InputError, match="kinematic can have it, only planning, control"):
+    with refuses(InputError):
         require(Cause.PERCEPTION, DRIVERS["route-follower"])
-    with pytest.raises(InputError, match="the ego has no driver"):
+    with refuses(InputError):
         require(Cause.UNAVOIDABLE, STORYBOARD)
-    with pytest.raises(InputError, match="'vehicle dynamics': no harm of the driver"):
+    with refuses(InputError):
         require(Cause.VEHICLE_DYNAMICS, WHOLE)
     for one in CAUSES:
         require(one, WHOLE, "single-track")

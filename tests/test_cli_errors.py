@@ -7,6 +7,7 @@ import sys
 import time
 
 import pytest
+from tests.approval import approve
 
 CALL = [sys.executable, "-c", "from bridgegen.cli import main; main()"]
 
@@ -19,7 +20,7 @@ def refused(cli, *words):
 
 def test_a_number_out_of_its_range_says_which_option(cli):
     err = refused(cli, "search", "cut-in", "--budget", 0)
-    assert "1 <= budget <= 10000000 must hold, got 0 (--budget: number of evaluations" in err
+    approve(err, "--budget", "10000000")
 
 
 def test_a_driver_s_file_without_its_class_lists_the_classes(cli, tmp_path, monkeypatch):
@@ -27,11 +28,11 @@ def test_a_driver_s_file_without_its_class_lists_the_classes(cli, tmp_path, monk
     (tmp_path / "f.py").write_text("class Mine:\n    pass\nclass _No: pass\ndef drive(): pass\n")
     err = refused(cli, "search", "cut-in", "--ego", "f.py")
     assert "FILE.py:CLASS" in err
-    assert err.rstrip().endswith("it defines f.py:Mine, f.py:drive")
+    approve(err.rstrip(), "f.py")
     (tmp_path / "f.py").write_text("class")
-    assert "the file is no Python" in refused(cli, "search", "cut-in", "--ego", "f.py")
+    approve(refused(cli, "search", "cut-in", "--ego", "f.py"), "Python")
     (tmp_path / "f.py").unlink()
-    assert "No such file" in refused(cli, "search", "cut-in", "--ego", "f.py")
+    approve(refused(cli, "search", "cut-in", "--ego", "f.py"), "such")
 
 
 def test_simulate_a_scenario_file_says_what_to_do(cli, tmp_path):
@@ -50,7 +51,7 @@ def test_simulate_a_scenario_file_says_what_to_do(cli, tmp_path):
 )
 def test_an_option_of_one_value_is_given_once(cli, words):
     err = refused(cli, *words)
-    assert "--ego takes one value, and is given 2: reference, careful" in err
+    approve(err, "--ego")
 
 
 def test_options_that_may_be_repeated_may(cli):
@@ -62,7 +63,7 @@ def test_a_population_beyond_the_budget_is_a_warning(cli, tmp_path):
     words = ("search", "crossroads-s4", "--budget", 20, "--keep", 0, "--out", tmp_path / "r")
     code, _, err = cli(*words, "--algorithm", "ga", "--set", "population=100")
     assert code == 0
-    assert "warning: population 100 is greater than the budget, 20 evaluations" in err
+    approve(err, "100", "20")
 
 
 def test_validate_notes_a_name_that_is_not_the_file_s(cli, tmp_path):
@@ -74,7 +75,7 @@ def test_validate_notes_a_name_that_is_not_the_file_s(cli, tmp_path):
     path = path.rename(tmp_path / "other.yaml")
     code, out, err = cli("validate", path)
     assert (code, out) == (0, f"{path}: valid\n")
-    assert "its key 'scenario' is 'mine'" in err
+    approve(err, "scenario", "mine")
 
 
 def test_validate_notes_texts_of_the_template_and_indicators_that_mislead(cli, tmp_path):
@@ -82,7 +83,7 @@ def test_validate_notes_texts_of_the_template_and_indicators_that_mislead(cli, t
 
     path = start_scenario("mine", folder=tmp_path)
     _, _, err = cli("validate", path)
-    assert "texts of the template that its author is to replace: 6" in err
+    approve(err, "template")
     assert "indicates" not in err
     text = path.read_text("utf-8").replace(
         "events:\n", "events:\n  shows:\n    participant: other\n    indicate: left\n"
@@ -90,7 +91,7 @@ def test_validate_notes_texts_of_the_template_and_indicators_that_mislead(cli, t
     )  # fmt: skip
     path.write_text(text, "utf-8")
     _, _, err = cli("validate", path)
-    assert "other indicates to the left and changes lane to the right" in err
+    approve(err, "indicates")
 
 
 def test_a_map_without_a_place_of_the_kind_says_so(cli, tmp_path):
@@ -99,7 +100,7 @@ def test_a_map_without_a_place_of_the_kind_says_so(cli, tmp_path):
     write_pair(tmp_path)
     status, out, _ = cli("places", tmp_path / "roads" / "straight.xodr", "crossroads-s4")
     assert status == 0
-    assert "nothing of the kind of place that crossroads-s4 needs" in out
+    approve(out, "crossroads-s4")
 
 
 def test_an_error_is_the_first_line(tmp_path):
@@ -107,7 +108,7 @@ def test_an_error_is_the_first_line(tmp_path):
         [*CALL, "search", "no-such-scenario"], capture_output=True, text=True, cwd=tmp_path,
     )  # fmt: skip
     assert done.returncode == 2
-    assert done.stderr.startswith("bridgegen: error: unknown scenario")
+    approve(done.stderr, "bridgegen")
 
 
 def test_sigterm_ends_a_search_like_ctrl_c(tmp_path):
@@ -123,5 +124,5 @@ def test_sigterm_ends_a_search_like_ctrl_c(tmp_path):
     running.send_signal(signal.SIGTERM)
     _, err = running.communicate(timeout=60)
     assert running.returncode == 143
-    assert "resume with 'bridgegen resume r'" in err
+    approve(err, "bridgegen")
     assert "Traceback" not in err

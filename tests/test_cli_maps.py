@@ -4,6 +4,7 @@ import os
 from pathlib import Path
 
 import pytest
+from tests.approval import approve
 
 from .openx.opendrive.test_read import DOCUMENT
 
@@ -21,7 +22,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def test_a_map_is_found_by_its_name(cli, folder):
     code, _, err = cli("import", "Town01")
     assert code == 2
-    assert "neither --maps nor CARLA_ROOT says where CARLA is" in err
+    approve(err, "--maps", "CARLA_ROOT")
     code, _, _ = cli("import", "Town01", "--maps", str(folder))
     assert code == 0
     assert (folder.parent / "Town01.owl").exists()
@@ -39,4 +40,4 @@ def test_the_option_goes_before_the_variable(cli, folder, monkeypatch):
 def test_what_is_no_folder_is_refused(cli, folder):
     code, _, err = cli("validate", "x.xosc", "--maps", str(folder / "none"))
     assert code == 2
-    assert "--maps must be a folder, and is none" in err
+    approve(err, "--maps")

@@ -10,6 +10,7 @@ import pytest
 import yaml
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from tests.approval import approve
 
 import bridgegen as bg
 from bridgegen.base.errors import InputError
@@ -201,13 +202,13 @@ def test_several_runs_are_resumed_and_the_same_to_the_bit(cli, tmp_path, monkeyp
     (tmp_path / "runs/two/second/report.html").unlink()
     code, out, err = cli("search", "two.yaml")
     assert code == 0, err
-    assert "finished already: runs/two/first" in out
+    approve(out, "finished")
     assert (tmp_path / "runs/two/second/report.html").is_file()
     text = (tmp_path / "two.yaml").read_text("utf-8").replace("seed: 1", "seed: 2")
     (tmp_path / "two.yaml").write_text(text, "utf-8")
     code, out, err = cli("search", "two.yaml")
     assert code == 2
-    assert "was begun with these other options" in err
+    approve(err, "options")
 
 
 def test_a_file_is_not_overwritten(cli, tmp_path):
@@ -224,5 +225,5 @@ def test_the_schema_of_run_files(cli, tmp_path):
     jsonschema.Draft7Validator.check_schema(json.loads(out))
     code, _, err = cli("schema", "--of", "rn")
     assert code == 2
-    assert "unknown kind of files 'rn'; did you mean 'run'?" in err
+    approve(err, "rn", "run")
     assert shlex.split(cli("schema", "run", "--out", tmp_path / "s.json")[1])

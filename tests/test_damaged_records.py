@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from tests.approval import refuses
 
 import bridgegen as bg
 from bridgegen.assess.objective import Objective
@@ -235,10 +236,10 @@ def test_what_is_no_record_is_one_error(run, name, text):
 def test_what_never_ends_is_refused(tmp_path, name):
     """A link to a device, as a folder from a stranger may hold one."""
     (tmp_path / name).symlink_to("/dev/zero")
-    with pytest.raises(BridgeGenError, match="not a regular file"):
+    with refuses(BridgeGenError):
         READERS[name](tmp_path / name)
 
 
 def test_a_scenario_of_an_evaluation_that_is_not_there(run):
-    with pytest.raises(BridgeGenError, match="the run has no evaluation"):
+    with refuses(BridgeGenError):
         exported_scenarios(run, 1)

@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from tests.approval import refuses
 
 from bridgegen.base.disk import write_whole
 from bridgegen.base.errors import StorageError
@@ -69,7 +70,7 @@ def test_a_device_is_written_to_and_never_replaced(tmp_path):
     full, null = tmp_path / "full", tmp_path / "null"
     full.symlink_to("/dev/full")
     null.symlink_to("/dev/null")
-    with pytest.raises(StorageError, match="full: cannot be written: No space left on device"):
+    with refuses(StorageError):
         write_whole(full, [b"x" * 100_000])
     write_whole(null, [b"x"])
     assert full.is_symlink()

@@ -7,6 +7,7 @@ import scipy.stats
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
+from tests.approval import refuses
 
 from bridgegen.assess import metrics
 from bridgegen.assess.objective import (
@@ -160,7 +161,7 @@ def test_thresholds_are_the_users():
     objective = Objective.build(PAPER, thresholds=thresholds)
     assert objective.critical(rows, NAMES).tolist() == [True, True, False, True]
     assert paper().critical(rows, NAMES).tolist() == [False, False, True, True]
-    with pytest.raises(InputError, match="threshold d_min_below must be finite, got nan"):
+    with refuses(InputError, "d_min_below", "nan"):
         Thresholds(d_min_below=float("nan"))
 
 
@@ -262,9 +263,9 @@ def test_a_sample_is_needed_for_entropy_weights_and_the_standardised_scale():
     assert needs_sample("fixed", "standardised")
     assert not needs_sample("entropy", "raw", "many")  # weights have no part there
     Objective.build(UNWEIGHTED, weights="entropy", objectives="many")
-    with pytest.raises(ValueError, match="entropy weights on the raw scale need a sample"):
+    with refuses(ValueError):
         Objective.build(UNWEIGHTED, weights="entropy")
-    with pytest.raises(InputError, match="every scenario of it failed"):
+    with refuses(InputError):
         Objective.build(
             UNWEIGHTED, weights="entropy", sample=(np.full((3, 2), np.nan), ("d_min", "v_d"))
         )
@@ -291,20 +292,20 @@ def test_comes_back_from_json_to_the_last_bit(scale, objectives):
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"extra": 1}, r"unknown or missing keys of an objective: \['extra'\]"),
-        ({"weights": [1.0]}, "needs 2 finite weights ≥ 0, got"),
-        ({"weights": "ab"}, "not an objective"),
-        ({"weights": [1.0, float("inf")]}, "needs 2 finite weights"),
-        ({"names": ["d_min", "dmin"]}, "did you mean 'd_min'"),
-        ({"scale": "standardised"}, "'low' needs 2 finite numbers, got"),
-        ({"low": [0.0, 0.0]}, "'low' needs 0 finite numbers"),
-        ({"span": [1.0, 0.0], "low": [0.0, 0.0], "scale": "standardised"}, "'span' needs 2 finite"),
-        ({"thresholds": {"d_min_under": 2.0}}, "not an objective"),
-        ({"thresholds": None}, "not an objective"),
+        ({"extra": 1}, "extra"),
+        ({"weights": [1.0]}, "weights"),
+        ({"weights": "ab"}, "objective"),
+        ({"weights": [1.0, float("inf")]}, "weights"),
+        ({"names": ["d_min", "dmin"]}, "d_min"),
+        ({"scale": "standardised"}, "low"),
+        ({"low": [0.0, 0.0]}, "low"),
+        ({"span": [1.0, 0.0], "low": [0.0, 0.0], "scale": "standardised"}, "span"),
+        ({"thresholds": {"d_min_under": 2.0}}, "objective"),
+        ({"thresholds": None}, "objective"),
     ],
 )
 def test_a_damaged_record_is_refused(change, message):
-    with pytest.raises(InputError, match=message):
+    with refuses(InputError, message):
         Objective.from_dict(paper().to_dict() | change)
 
 
@@ -314,31 +315,31 @@ def test_a_damaged_record_is_refused(change, message):
 @pytest.mark.parametrize(
     ("terms", "settings", "message"),
     [
-        ([("d_mim", 1.0)], {}, "unknown metric 'd_mim'; did you mean 'd_min'?"),
-        (PAPER, {"weights": "entropie"}, "unknown way of weighting 'entropie'; did you mean 'entr"),
-        (PAPER, {"scale": "standardized"}, "unknown scale 'standardized'; did you mean 'standardi"),
-        (PAPER, {"objectives": "two"}, "unknown number of objectives 'two'"),
+        ([("d_mim", 1.0)], {}, "d_mim"),
+        (PAPER, {"weights": "entropie"}, "entropie"),
+        (PAPER, {"scale": "standardized"}, "standardized"),
+        (PAPER, {"objectives": "two"}, "two"),
     ],
 )
 def test_unknown_names_suggest_the_nearest(terms, settings, message):
-    with pytest.raises(UnknownNameError, match=message):
+    with refuses(UnknownNameError, message):
         Objective.build(terms, **settings)
 
 
 @pytest.mark.parametrize(
     ("terms", "settings", "message"),
     [
-        ([], {}, "an objective needs metrics, each once"),
-        ([("d_min", 1.0), ("d_min", 2.0)], {}, "each once, got"),
-        ([("d_min", None), ("v_d", 1.0)], {}, "fixed weights need a weight for d_min"),
-        (PAPER, {"weights": "entropy"}, "entropy weights leave no place for a weight of d_min"),
+        ([], {}, "objective"),
+        ([("d_min", 1.0), ("d_min", 2.0)], {}, "each"),
+        ([("d_min", None), ("v_d", 1.0)], {}, "d_min"),
+        (PAPER, {"weights": "entropy"}, "d_min"),
         ([("d_min", -1.0)], {}, "1 finite weights ≥ 0"),
         ([("d_min", float("nan"))], {}, "1 finite weights ≥ 0"),
-        ([("d_min", 0.0), ("v_d", 0.0)], {}, "needs a weight > 0, all are 0"),
+        ([("d_min", 0.0), ("v_d", 0.0)], {}, "weight"),
     ],
 )
 def test_senseless_objectives_are_refused(terms, settings, message):
-    with pytest.raises(InputError, match=message):
+    with refuses(InputError, message):
         Objective.build(terms, **settings)
 
 
@@ -349,11 +350,11 @@ def test_all_problems_at_once():
 
 
 def test_a_missing_column_is_an_error_not_a_guess():
-    with pytest.raises(ValueError, match="metrics need a column 'v_d', there are"):
+    with refuses(ValueError, "v_d"):
         paper().F([[1.0]], ["d_min"])
-    with pytest.raises(ValueError, match="metrics need a column 'n_collision'"):
+    with refuses(ValueError, "n_collision"):
         paper().critical([[1.0, 2.0]], ["d_min", "v_d"])
-    with pytest.raises(ValueError, match="metrics must have shape"):
+    with refuses(ValueError, "metrics"):
         paper().F([[1.0, 2.0, 3.0]], ["d_min", "v_d"])
 
 
@@ -393,8 +394,8 @@ def test_an_objective_of_an_earlier_version_goes_by_its_thresholds():
 
 @pytest.mark.parametrize(
     ("wrong", "message"),
-    [({"rule": "luck"}, "rule of what is critical"), ({"count": "none"}, "conflicts that count")],
+    [({"rule": "luck"}, "critical"), ({"count": "none"}, "conflicts")],
 )
 def test_unknown_rules_are_refused(wrong, message):
-    with pytest.raises(UnknownNameError, match=message):
+    with refuses(UnknownNameError, message):
         Objective.from_dict({**paper().to_dict(), **wrong})

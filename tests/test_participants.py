@@ -1,10 +1,10 @@
 """Every kind of participant, from a scenario file to the picture; no kind is named in the tests."""
 
-import re
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from tests.approval import refuses
 
 from bridgegen.assess.conflict.analysis import analyse
 from bridgegen.assess.conflict.plausibility import plausibility
@@ -233,12 +233,12 @@ def test_it_is_drawn(kind, pipeline, rollout, entity):
 @pytest.mark.parametrize("name", [one.name for one in ALL if one.on_rails])
 def test_what_runs_on_rails_is_not_steered(name, tmp_path):
     (tmp_path / "kind.yaml").write_text(text_of("car", ego=name), "utf-8")
-    with pytest.raises(ScenarioError, match=rf"its driver can steer, a {name} runs on rails"):
+    with refuses(ScenarioError, name):
         load(tmp_path / "kind.yaml")
     changing = text_of(name) + (
         "events:\n  moves:\n    participant: other\n    lane_change: {lanes: -1, time: 3.0}\n"
         "    when: [{kind: time, value: 1.0}]\n"
     )
     (tmp_path / "kind.yaml").write_text(changing, "utf-8")
-    with pytest.raises(ScenarioError, match=re.escape("runs on rails and changes no lane")):
+    with refuses(ScenarioError):
         load(tmp_path / "kind.yaml")

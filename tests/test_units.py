@@ -9,6 +9,7 @@ import pytest
 import yaml
 from hypothesis import given
 from hypothesis import strategies as st
+from tests.approval import refuses
 
 from bridgegen.base.errors import ScenarioError
 from bridgegen.base.units import WRITTEN, has_unit, in_unit
@@ -126,5 +127,5 @@ def test_a_wrong_unit_says_which_is_needed(cut_in):
 def test_fixed_parameters_with_a_unit():
     space = load("crossroads-s4").space(None, {"ego_speed": "18 km/h"})
     assert space.fixed == {"ego_speed": 5.0}
-    with pytest.raises(ScenarioError, match=r"ego_speed must be a number in m/s, .*got '5 cm'"):
+    with refuses(ScenarioError, "ego_speed"):
         load("crossroads-s4").space(None, {"ego_speed": "5 cm"})

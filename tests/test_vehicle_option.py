@@ -4,6 +4,7 @@ import json
 
 import numpy as np
 import pytest
+from tests.approval import approve
 from tests.campaign.braking import scenario_text, write_pair
 
 import bridgegen as bg
@@ -67,7 +68,7 @@ def test_a_suite_takes_the_file_s_or_another_and_keeps_them_apart(bend, tmp_path
     assert head["settings"]["vehicle"] == "single-track"
     status, _, err = cli(*words, "--out", tmp_path / "out-single-track")
     assert status == 2
-    assert "other settings (vehicle)" in err
+    approve(err, "settings")
 
 
 def test_a_map_of_preventability_and_its_record(tmp_path):
@@ -147,4 +148,4 @@ def test_other_simulators_refuse_it_before_anything_is_written(words, braking, t
 def test_an_ego_that_its_storyboard_drives_refuses_it(braking, cli):
     status, _, err = cli("simulate", braking, "--vehicle", "single-track")
     assert status == 2
-    assert "the vehicle 'single-track' needs a driver" in err
+    approve(err, "single-track")

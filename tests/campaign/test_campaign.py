@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.approval import approve, refuses
 
 import bridgegen as bg
 from bridgegen.assess.conflict.findings import COLUMNS
@@ -172,9 +173,9 @@ def test_causes_can_be_left_out(tmp_path):
     assert run.summary.causes == {}
     assert run.frame()["cause"].isna().all()
     assert "--no-causes" in run.settings.command(run.folder)
-    with pytest.raises(InputError, match="must be sought"):
+    with refuses(InputError):
         bg.run_search("crossroads-s3", causes=False, cause="control", out=tmp_path / "other")
-    with pytest.raises(InputError, match="only planning, control, unavoidable"):
+    with refuses(InputError):
         bg.run_search("crossroads-s3", cause="perception", out=tmp_path / "other")
     assert not (tmp_path / "other").exists()
 
@@ -371,13 +372,13 @@ def test_a_changed_scenario_is_not_gone_on_with(tmp_path):
     run = bg.run_search(file, budget=40, out=tmp_path / "run", keep=0, triage="none")
     assert bg.resume(run.folder).summary == run.summary
     file.write_text(text.replace("high: 3.6", "high: 3.5"), "utf-8")
-    with pytest.raises(StorageError, match="not what it was"):
+    with refuses(StorageError):
         bg.resume(run.folder)
 
 
 @pytest.mark.skipif(not TOWN05.exists(), reason="needs Town05.xodr")
 def test_on_a_map_the_roads_are_the_map_s(tmp_path):
-    with pytest.raises(InputError, match="nothing to search"):
+    with refuses(InputError):
         bg.run_search("crossroads-s4", road_map=TOWN05, axes=["static"], out=tmp_path / "none")
     run = bg.run_search(
         "crossroads-s2", road_map=TOWN05, algorithm="random", budget=80, keep=1, triage="none",
@@ -408,7 +409,7 @@ def test_an_imported_map_is_searched_like_the_map(tmp_path, scenario, junction):
     assert (other.folder / one.scenarios[0].relative_to(one.folder)).exists()
     assert bg.resume(other.folder).summary == other.summary
     road_map.write_bytes(TOWN05.read_bytes() + b"\n")
-    with pytest.raises(InputError, match="import it again"):
+    with refuses(InputError):
         bg.run_search(scenario, road_map=owl, out=tmp_path / "third", **settings)
     assert not (tmp_path / "third").exists()
 
@@ -424,17 +425,17 @@ def test_the_results_are_a_data_frame(tmp_path):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ({"scenario": "crossroads-s5"}, "did you mean 'crossroads-s"),
-        ({"algorithm": "psso"}, "did you mean 'pso'"),
-        ({"ego": "referenze"}, "did you mean 'reference'"),
-        ({"objective": {"d_mim": 1.0}}, "did you mean 'd_min'"),
+        ({"scenario": "crossroads-s5"}, "crossroads-s"),
+        ({"algorithm": "psso"}, "pso"),
+        ({"ego": "referenze"}, "reference"),
+        ({"objective": {"d_mim": 1.0}}, "d_min"),
         ({"axes": ["wether"]}, "weather"),
         ({"weights": "entropie"}, "entropy"),
-        ({"objectives": "more"}, "number of objectives 'more'"),
+        ({"objectives": "more"}, "more"),
     ],
 )
 def test_an_unknown_name_suggests_the_nearest(tmp_path, arguments, message):
-    with pytest.raises(UnknownNameError, match=message):
+    with refuses(UnknownNameError, message):
         bg.run_search(**({"scenario": "crossroads-s4", "out": tmp_path / "run"} | arguments))
     assert not (tmp_path / "run").exists()
 
@@ -447,13 +448,13 @@ def test_an_unknown_name_suggests_the_nearest(tmp_path, arguments, message):
         ({"keep": -1}, "0 <= keep"),
         ({"fixed": {"fog_density": 180.0}}, "fog_density"),
         ({"settings": {"batch": 0}}, "batch"),
-        ({"settings": {"bach": 10}}, "did you mean 'batch'"),
-        ({"fixed": {"fog_densty": 1.0}}, "did you mean 'fog_density'"),
+        ({"settings": {"bach": 10}}, "batch"),
+        ({"fixed": {"fog_densty": 1.0}}, "fog_density"),
         ({"road_map": Path("nowhere.xodr")}, "nowhere.xodr"),
     ],
 )
 def test_a_number_out_of_range_is_one_clear_error(tmp_path, arguments, message):
-    with pytest.raises(InputError, match=message):
+    with refuses(InputError, message):
         bg.run_search("crossroads-s4", out=tmp_path / "run", **arguments)
     assert not (tmp_path / "run").exists()
 
@@ -480,7 +481,7 @@ def test_what_an_algorithm_learnt_is_kept_and_shown(tmp_path):
 
 
 def test_what_an_algorithm_refuses_leaves_no_folder(tmp_path):
-    with pytest.raises(UnknownNameError, match="did you mean 'v_d'"):
+    with refuses(UnknownNameError, "v_d"):
         bg.run_search(
             "crossroads-s2", algorithm="map-elites", settings={"descriptors": "v_e"},
             out=tmp_path / "run",
@@ -506,10 +507,7 @@ def test_a_folder_that_is_deleted_in_mid_run_is_said_to_be(tmp_path, when):
     with pytest.raises(StorageError) as stop:
         bg.run_search("crossroads-s4", budget=200, keep=1, ego="route-follower", causes=False,
                       triage="short", out=folder, callbacks=on)  # fmt: skip
-    assert str(stop.value) == (
-        f"{folder}: run.sqlite was deleted or moved during the run; if it was deleted, "
-        "its evaluations are lost"
-    )
+    approve(str(stop.value), folder, "run.sqlite")
     if when == "batch":
         assert len(batches) == 2  # it stops with the next one
 
@@ -522,7 +520,7 @@ def test_ctrl_c_does_not_say_that_a_deleted_run_can_be_resumed(tmp_path):
         shutil.rmtree(folder)
         raise KeyboardInterrupt
 
-    with pytest.raises(StorageError, match="was deleted or moved"):
+    with refuses(StorageError):
         bg.run_search(
             "crossroads-s4", budget=200, out=folder, callbacks=SearchCallbacks(batch=on_batch)
         )
@@ -535,7 +533,7 @@ def test_an_exported_file_that_is_deleted_while_the_report_is_made_costs_no_eval
         if name == "report":
             shutil.rmtree(folder / "critical")
 
-    with pytest.raises(StorageError, match="the evaluations are kept, 'bridgegen resume"):
+    with refuses(StorageError):
         bg.run_search(
             "crossroads-s4", budget=120, keep=1, ego="route-follower", causes=False,
             triage="none", out=folder, callbacks=SearchCallbacks(stage=on_stage),

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from lxml import etree
+from tests.approval import refuses
 
 import bridgegen as bg
 from bridgegen.base.errors import InputError, UnsupportedError
@@ -327,5 +328,5 @@ conditionEdge="none"><ByValueCondition><SimulationTimeCondition value="1" rule="
     snow = re.sub(r'precipitationType="[^"]*"', 'precipitationType="snow"', text)
     assert snow != text
     refuse(UnsupportedError, "CARLA has no snow", snow)
-    with pytest.raises(InputError, match="the name of one of CARLA's maps"):
+    with refuses(InputError):
         export(source, "carla", town="../Town05", out=tmp_path)

@@ -8,6 +8,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from tests.approval import refuses
 
 from bridgegen.base.errors import InputError, StorageError
 from bridgegen.jobs.search.loop import Progress, Reason, run_loop
@@ -315,22 +316,22 @@ def test_time_goes_on_where_it_stopped(open_store):
 
 
 @pytest.mark.parametrize(
-    ("algorithm", "decoder", "detail"),
+    ("algorithm", "decoder", "place"),
     [
         (
             get("random")(Problem.unnamed(1), 1),
             lambda U: U,
-            r"evaluation 0: U\[0\] is 0\.\d+, recorded 0\.",
+            "U[0]",
         ),
-        (get("pso")(Problem.unnamed(1), 0), lambda U: U, r"evaluation 0: U\[0\]"),
-        (get("random")(Problem.unnamed(1), 0), lambda U: U + 1e-15, r"evaluation 0: X\[0\]"),
-        (Scripted(), lambda U: U, r"the search ends after 0 evaluations \(exhausted\)"),
+        (get("pso")(Problem.unnamed(1), 0), lambda U: U, "U[0]"),
+        (get("random")(Problem.unnamed(1), 0), lambda U: U + 1e-15, "X[0]"),
+        (Scripted(), lambda U: U, "exhausted"),
     ],
 )
-def test_what_cannot_be_repeated_is_not_gone_on_with(algorithm, decoder, detail, open_store):
+def test_what_cannot_be_repeated_is_not_gone_on_with(algorithm, decoder, place, open_store):
     store, simulate = open_store(), Simulator()
     run_loop(get("random")(Problem.unnamed(1), 0), lambda U: U, Simulator(), store, 80)
-    with pytest.raises(StorageError, match=f"the 80 recorded evaluations bit for bit; {detail}"):
+    with refuses(StorageError, "80", place):
         run_loop(algorithm, decoder, simulate, store, 120)
     assert simulate.seen == []
     assert len(store) == 80
@@ -473,7 +474,7 @@ def test_notes_must_be_json(open_store, notes):
         def notes(self):
             return notes
 
-    with open_store() as store, pytest.raises(InputError, match="notes must be JSON"):
+    with open_store() as store, refuses(InputError, "notes"):
         run_loop(Wrong([0.2]), decode, Simulator(), store, 9)
     with open_store() as store:
         assert len(store) == 1

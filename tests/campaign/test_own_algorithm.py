@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.approval import refuses
 
 import bridgegen as bg
 from bridgegen.base.errors import InputError, Interrupted, StorageError
@@ -32,9 +33,9 @@ def test_it_searches_and_is_resumed_when_it_is_named_again(tmp_path):
     whole = bg.run_search("crossroads-s1", algorithm=OWN, budget=80, out=tmp_path / "a", **CHOSEN)
     assert whole.settings.algorithm == OWN
     assert f"--algorithm {OWN}" in whole.settings.command(tmp_path)
-    with pytest.raises(InputError, match=f"its algorithm {OWN} is code; .* --algorithm {OWN}"):
+    with refuses(InputError, OWN, "--algorithm"):
         bg.resume(whole.folder)
-    with pytest.raises(InputError, match=r"must be .*, got pso"):
+    with refuses(InputError, "pso"):
         bg.resume(whole.folder, algorithm="pso")
 
     def stop(progress):
@@ -53,7 +54,7 @@ def test_one_of_ours_needs_no_naming_but_may_not_be_another(tmp_path):
         "crossroads-s1", algorithm="random", budget=20, out=tmp_path / "a", **CHOSEN
     )
     assert bg.resume(run.folder, algorithm="random").summary.evaluations == 20
-    with pytest.raises(InputError, match="must be random, got pso"):
+    with refuses(InputError, "pso"):
         bg.resume(run.folder, algorithm="pso")
 
 
@@ -71,24 +72,24 @@ def test_it_is_compared_under_its_class_s_name(tmp_path):
     folder = tmp_path / "c" / "runs" / "crossroads-s1-Neighbours-0"
     assert bg.Run(folder).settings.settings["step"] == 0.3
     assert f"{own}:Neighbours,random" in result.plan.command()
-    with pytest.raises(InputError, match="algorithm Neighbours must be named once"):
+    with refuses(InputError):
         bg.compare("crossroads-s1", **{**call, "algorithms": [f"{own}:Neighbours", OWN]})
     own.write_text(own.read_text("utf-8") + "# another\n", "utf-8")
-    with pytest.raises(StorageError, match="algorithm Neighbours has changed"):
+    with refuses(StorageError):
         bg.compare("crossroads-s1", **call)
 
 
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("class Mine:\n    pass", "lacks name, description, source, settings, objectives, ask"),
-        ("import nothing_like_it", "cannot be imported"),
+        ("class Mine:\n    pass", "description"),
+        ("import nothing_like_it", "imported"),
     ],
 )
 def test_a_wrong_one_is_told_before_the_search(tmp_path, text, message):
     path = tmp_path / "mine.py"
     path.write_text(text, "utf-8")
-    with pytest.raises(InputError, match=message):
+    with refuses(InputError, message):
         bg.run_search("crossroads-s1", algorithm=f"{path}:Mine", out=tmp_path / "r")
     assert not (tmp_path / "r").exists()
 

@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import pytest
+from tests.approval import approve, refuses
 
 from bridgegen.base.errors import InputError, UnsupportedError
 from bridgegen.engine.simulate import simulate_file
@@ -32,7 +33,7 @@ def test_a_search_outlives_its_driver(tmp_path):
     run = search(tmp_path, "FailsFast", triage="short")
     assert 0 < run.summary.failed < run.summary.evaluations == 30
     (reason, count) = next(iter(run.failures.items()))
-    assert reason.startswith("the driver raised an error: ValueError: too fast for me (drivers.py:")
+    approve(reason, "ValueError", "drivers.py")
     assert count == run.summary.failed
     with Store.open(run.folder) as store:
         assert len(store.failures()) == count
@@ -44,7 +45,7 @@ def test_what_a_folder_or_file_names_is_not_imported(tmp_path, file, name):
     ego = run.settings.ego
     with pytest.raises(InputError, match=f"--ego {ego}"):
         campaign.resume(run.folder)
-    with pytest.raises(InputError, match=rf"must be .*{name}, got reference"):
+    with refuses(InputError, name, "reference"):
         campaign.resume(run.folder, ego="reference")
     assert campaign.resume(run.folder, ego=ego, deliver=False).summary == run.summary
     assert run.scenarios
@@ -58,12 +59,12 @@ def test_what_a_folder_or_file_names_is_not_imported(tmp_path, file, name):
 @pytest.mark.parametrize(
     ("file", "name", "message"),
     [
-        (DRIVERS, "CannotBeMade", "OSError: no weights"),
-        (COMPILED, "misspelt", "there is no field 'curvatur'"),
+        (DRIVERS, "CannotBeMade", "OSError"),
+        (COMPILED, "misspelt", "curvatur"),
     ],
 )
 def test_a_driver_that_cannot_be_made_is_told_before_the_search(tmp_path, file, name, message):
-    with pytest.raises(InputError, match=message):
+    with refuses(InputError, message):
         search(tmp_path, name, file=file)
     assert not (tmp_path / name).exists()
 

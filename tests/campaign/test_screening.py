@@ -6,6 +6,7 @@ from contextlib import suppress
 
 import numpy as np
 import pytest
+from tests.approval import approve, refuses
 
 import bridgegen as bg
 from bridgegen.base.errors import InputError, Interrupted
@@ -116,19 +117,19 @@ def test_an_interrupted_search_becomes_the_same(stop_after, tmp_path):
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"screen": "biased"}, "the screen must be another simulator than the search's.*biased"),
-        ({"screen": None, "screen_budget": 100}, "--screen-budget is for a search with a screen"),
-        ({"screen": None, "screen_batch": 4}, "--screen-batch is for a search with a screen"),
-        ({"screen_budget": 15}, "screen_budget >= budget must hold, got 15 and 16"),
-        ({"screen_batch": 0}, "1 <= screen_batch <= 10000000 must hold, got 0"),
-        ({"screen": "esmini"}, "the screen esmini .*ESMINI_LIB"),
+        ({"screen": "biased"}, "simulator"),
+        ({"screen": None, "screen_budget": 100}, "--screen-budget"),
+        ({"screen": None, "screen_batch": 4}, "--screen-batch"),
+        ({"screen_budget": 15}, "screen_budget"),
+        ({"screen_batch": 0}, "screen_batch"),
+        ({"screen": "esmini"}, "screen"),
         ({"vehicle": "single-track", "simulator": EMBEDDED, "screen": "biased"},
-         "the screen biased .*the vehicle 'single-track'"),
+         "single-track"),
     ],
 )  # fmt: skip
 def test_what_is_no_screen_is_refused(changes, message, tmp_path, monkeypatch):
     monkeypatch.delenv("ESMINI_LIB", raising=False)
-    with pytest.raises(InputError, match=message) as refused:
+    with refuses(InputError, message) as refused:
         search(tmp_path / "run", **changes)
     assert "\n" not in str(refused.value)
     assert not (tmp_path / "run").exists()
@@ -158,10 +159,7 @@ def test_a_screen_that_fails_everywhere_is_said_in_a_line(tmp_path, monkeypatch)
     run = search(tmp_path / "run", 16, callbacks=SearchCallbacks(warning=said.append))
     assert run.summary.evaluations == 16
     (line,) = (one for one in said if "screen" in one)
-    assert line == (
-        "the screen embedded is given up after 0 evaluations: it fails in every scenario; the "
-        "search continues without it"
-    )
+    approve(line)
 
 
 def test_the_page_and_the_command_line_show_the_agreement(tmp_path, capsys, monkeypatch):
@@ -176,7 +174,7 @@ def test_the_page_and_the_command_line_show_the_agreement(tmp_path, capsys, monk
         main()
     (line,) = re.findall(r"^screen +(.*)$", capsys.readouterr().out, re.MULTILINE)
     told = bg.Run(tmp_path / "run").screened
-    assert line.startswith(f"embedded: {told.screen_evaluations} evaluations; of ")
+    approve(line, told.screen_evaluations)
     page = (tmp_path / "run" / "report.html").read_text()
     assert "Agreement with the screen" in page
 

@@ -5,6 +5,7 @@ import json
 
 import numpy as np
 import pytest
+from tests.approval import refuses
 
 from bridgegen.base.errors import InputError, StorageError
 from bridgegen.jobs.search import run_search
@@ -95,12 +96,12 @@ def test_rows_are_written_a_part_at_a_time(runs, tmp_path, monkeypatch):
 
 @pytest.mark.parametrize("share", [0.0, -1.0, 1.1, float("nan")])
 def test_a_share_is_one(runs, tmp_path, share):
-    with pytest.raises(InputError, match="0 < sample <= 1 must hold"):
+    with refuses(InputError):
         write_tables(runs, tmp_path, sample=share)
 
 
 def test_runs_of_one_name_are_refused(runs, tmp_path):
-    with pytest.raises(InputError, match="got twice: one"):
+    with refuses(InputError):
         write_tables([runs[0], runs[0]], tmp_path)
 
 
@@ -111,6 +112,6 @@ def test_what_is_no_run_is_told(tmp_path):
 
 def test_nothing_half_written_stays(runs, tmp_path):
     (tmp_path / "one.parquet").mkdir()
-    with pytest.raises(StorageError, match=r"one\.parquet: cannot be written"):
+    with refuses(StorageError):
         write_tables(runs[:1], tmp_path)
     assert [one.name for one in tmp_path.iterdir()] == ["one.parquet"]

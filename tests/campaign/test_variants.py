@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.approval import approve, refuses
 
 import bridgegen as bg
 from bridgegen.base.errors import FileFormatError
@@ -121,7 +122,7 @@ def test_a_longer_lead_is_hit_earlier(both):
     small, long = parts["small"], parts["long"]
     assert small.distance[0, 1, 0] - long.distance[0, 1, 0] == pytest.approx(1.2, abs=1e-9)
     assert both.runner.kinds == {"Ego": "car", "Lead": "car or truck"}
-    with pytest.raises(ValueError, match="bodies of different sizes"):
+    with refuses(ValueError):
         both.rollout(X)
 
 
@@ -185,13 +186,13 @@ def test_texts_of_value_sets_come_together(tmp_path):
 
 
 def test_a_text_that_makes_no_scenario_is_refused_with_its_value(tmp_path):
-    with pytest.raises(FileFormatError, match=r"'huge'.*\[with Model = 'huge'\]"):
+    with refuses(FileFormatError, "huge"):
         pipeline_of(tmp_path, deterministic(models("small", "huge")))
 
 
 def test_too_many_combinations_are_refused(tmp_path):
     many = value_sets(*({"Model": f"m{k}"} for k in range(300)))
-    with pytest.raises(FileFormatError, match=r"in at most 200 ways.*got 300"):
+    with refuses(FileFormatError, "200", "300"):
         pipeline_of(tmp_path, many)
 
 
@@ -205,7 +206,7 @@ def test_an_end_that_the_constraint_excludes_is_left_out_with_a_note(tmp_path):
     scenario, ranges = write_pair(tmp_path, deterministic(GAPS), text=whole)
     found = load_file_scenario(scenario, ranges)
     assert found.parameters["Gap"].low == 5.25
-    assert "must be greaterThan 5: its range is searched without that end" in found.notes[0]
+    approve(found.notes[0], "greaterThan")
     body = stochastic(("Gap", f"<UniformDistribution>{limits(5, 40)}</UniformDistribution>"))
     scenario, ranges = write_pair(tmp_path, body, text=whole)
     assert 5.0 < load_file_scenario(scenario, ranges).parameters["Gap"].low < 5.0 + 1e-12

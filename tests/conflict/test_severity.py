@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from tests.approval import refuses
 
 from bridgegen.assess.conflict.severity import (
     DIRECTIONS,
@@ -230,17 +231,17 @@ def test_rows_without_contact_stay_nan():
 
 @pytest.mark.parametrize("kind", [-1, len(NAMES)])
 def test_a_kind_that_does_not_exist(kind):
-    with pytest.raises(ValueError, match=f"kind_b must be 0 to {len(NAMES) - 1} .*, got {kind}"):
+    with refuses(ValueError, "kind_b", kind):
         delta_v(CAR, kind, 1.0, 0.0)
 
 
 def test_a_direction_that_does_not_exist():
-    with pytest.raises(ValueError, match=r"direction_a must be 0 to 2 \(front.*, got 3"):
+    with refuses(ValueError, "direction_a"):
         severity(CAR, CAR, 1.0, 0.0, 3, FRONT)
 
 
 def test_a_speed_below_zero():
-    with pytest.raises(ValueError, match=r"speed \[m/s\] must be >= 0, got -1.0"):
+    with refuses(ValueError, "speed", "-1.0"):
         p_mais3(CAR, -1.0, FRONT)
 
 

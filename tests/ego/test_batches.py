@@ -6,6 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
+from tests.approval import refuses
 
 from bridgegen.base.errors import InputError
 from bridgegen.drivers.batches import FixedBatch, blocks
@@ -100,7 +101,7 @@ def test_memory_that_the_network_uses_again_is_no_matter():
 
 @pytest.mark.parametrize("size", [0, -64, 2, 63, 96])
 def test_a_size_that_cuts_vectors_is_refused(size):
-    with pytest.raises(InputError, match=f"1 or a multiple of 64, got {size}"):
+    with refuses(InputError, "64", size):
         FixedBatch(abs, size=size)
 
 
@@ -118,5 +119,5 @@ def test_arrays_of_other_rows_are_refused(given, message):
 
 
 def test_a_network_that_answers_other_rows_is_refused():
-    with pytest.raises(InputError, match=r"64 rows .* got the shape \(2,\)"):
+    with refuses(InputError, "64"):
         FixedBatch(lambda seen: seen.mean(axis=0))(np.zeros((5, 2)))

@@ -6,6 +6,7 @@ import sys
 
 import numpy as np
 import pytest
+from tests.approval import refuses
 
 from bridgegen.base.errors import FileFormatError, InputError
 from bridgegen.drivers.interface import ROUTE_POINTS, Observation, Scene
@@ -96,9 +97,9 @@ def test_no_stop_line_is_far_away(unit):
 
 
 def test_an_unknown_input_or_output_is_refused(unit):
-    with pytest.raises(InputError, match="input 'speed' is not one"):
+    with refuses(InputError, "speed"):
         driven(unit(2, given="speed"))
-    with pytest.raises(InputError, match="must have an output named acceleration or curvature"):
+    with refuses(InputError):
         driven(unit(2, output="curb"))
 
 
@@ -109,5 +110,5 @@ def test_what_is_no_unit_is_refused(tmp_path):
     for content in (None, b"", b"PK\x03\x04 nonsense"):
         if content is not None:
             path.write_bytes(content)
-        with pytest.raises(FileFormatError, match="not a co-simulation unit"):
+        with refuses(FileFormatError, "co-simulation"):
             FmuDriver(path)

@@ -3,6 +3,7 @@ import math
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from tests.approval import refuses
 
 from bridgegen.base.errors import InputError
 from bridgegen.drivers.kinds import CAR, PEDESTRIAN
@@ -43,5 +44,5 @@ def test_the_table_has_a_line_per_weather_and_no_empty_place():
      ("snow", math.inf)],
 )  # fmt: skip
 def test_no_such_sky(name, value):
-    with pytest.raises(InputError, match=f"{name} <= .* must hold, got"):
+    with refuses(InputError, name):
         Sky(**{name: value})

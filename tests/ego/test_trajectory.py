@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from tests.approval import refuses
 
 from bridgegen.base.errors import InputError
 from bridgegen.drivers.interface import ROUTE_POINTS, Observation, Trajectory
@@ -39,12 +40,6 @@ def changed(name, row, state, value):
     return replace(made, **{name: array})
 
 
-def refusal(planned, seen=None):
-    with pytest.raises(InputError) as error:
-        checked_plans(planned, seen or observation(), PERIOD)
-    return str(error.value)
-
-
 def test_a_plan_is_kept_as_it_is():
     states = checked_plans(straight(), observation(), PERIOD).states
     assert states.shape == (N, 12, 6)
@@ -69,43 +64,37 @@ def test_what_is_planned_for_an_ended_scenario_is_not_looked_at():
     made = changed("x", 1, 4, np.nan)
     states = checked_plans(made, observation((True, False, True)), PERIOD).states
     assert np.isfinite(states).all()
-    assert "x [m] must be finite, got nan in state 4" in refusal(made)
+    with refuses(InputError, "x [m]", "nan in state 4"):
+        checked_plans(made, observation(), PERIOD)
 
 
 @pytest.mark.parametrize(
-    ("planned", "message"),
+    ("planned", "what", "value"),
     [
-        (straight(TIME[::-1].copy()), "times must increase, got 0.9 s after 1 s"),
-        (straight(np.repeat(TIME, 2)), "times must increase, got 0 s after 0 s"),
-        (straight(TIME - 0.5), "must not begin in the past, got a first time of -0.5 s"),
-        (straight(TIME + 3.0), "before the driver is asked again, 0.2 s from now, got a first time "
-         "of 3 s; times count from the call"),
-        (straight(TIME / 10.0), "until the driver is asked again, 0.2 s from now, got a last time "
-         "of 0.1 s"),
-        (straight(TIME[:1]), "got a last time of 0 s"),
-        (straight(np.linspace(0.0, 1.0, 1001)), "K in 1..1000, got (1001,)"),
-        (straight(TIME[:0]), "K in 1..1000, got (0,)"),
-        (replace(straight(), y=np.zeros(N)), "y must have the shape (3, 11), got (3,)"),
-        (replace(straight(), v="fast"), "must consist of numbers"),
-        (replace(straight(), h=None), "must have the shape (3, 11), got ()"),
-        (replace(straight(), time=0.5), "time must have the shape (K,) or (3, K)"),
-        (changed("h", 2, 10, np.inf), "h [rad] must be finite, got inf in state 10"),
-        (changed("v", 0, 3, -1.0), "speeds must be >= 0, reverse is not driven; got -1 m/s at "
-         "0.3 s"),
-        (replace(straight(), y=np.full((N, 11), 2.5)), "at most 2.00 m from it, got a first state "
-         "2.50 m away"),
-        (replace(straight(), h=np.full((N, 11), np.pi)), "at most 57° off, got a first heading "
-         "180° off"),
-        (changed("x", 2, 5, 120.0 + 200.0), "must not jump, got 112.00 m from 0.4 s to 0.5 s, "
-         "where its speeds allow 2.90 m"),
-        (changed("x", 1, slice(3, None), 101.0 + np.arange(8)), "must not go backwards, got 1.00 m "
-         "against its heading from 0.2 s to 0.3 s"),
+        (straight(TIME[::-1].copy()), "times", "0.9 s after 1 s"),
+        (straight(np.repeat(TIME, 2)), "times", "0 s after 0 s"),
+        (straight(TIME - 0.5), "first time", "-0.5 s"),
+        (straight(TIME + 3.0), "first time", "3 s"),
+        (straight(TIME / 10.0), "last time", "0.1 s"),
+        (straight(TIME[:1]), "last time", "0 s"),
+        (straight(np.linspace(0.0, 1.0, 1001)), "1..1000", "(1001,)"),
+        (straight(TIME[:0]), "1..1000", "(0,)"),
+        (replace(straight(), y=np.zeros(N)), "y", "(3,)"),
+        (replace(straight(), v="fast"), "a trajectory", "numbers"),
+        (replace(straight(), h=None), "h", "()"),
+        (replace(straight(), time=0.5), "time", "()"),
+        (changed("h", 2, 10, np.inf), "h [rad]", "inf in state 10"),
+        (changed("v", 0, 3, -1.0), "speeds", "-1 m/s at 0.3 s"),
+        (replace(straight(), y=np.full((N, 11), 2.5)), "first state", "2.50 m"),
+        (replace(straight(), h=np.full((N, 11), np.pi)), "first heading", "180°"),
+        (changed("x", 2, 5, 120.0 + 200.0), "from 0.4 s to 0.5 s", "112.00 m"),
+        (changed("x", 1, slice(3, None), 101.0 + np.arange(8)), "from 0.2 s to 0.3 s", "1.00 m"),
     ],
 )  # fmt: skip
-def test_a_bad_plan_is_refused_in_one_sentence(planned, message):
-    said = refusal(planned)
-    assert message in said
-    assert "\n" not in said
+def test_a_bad_plan_is_refused_in_one_sentence(planned, what, value):
+    with refuses(InputError, what, value) as error:
+        checked_plans(planned, observation(), PERIOD)
+    assert "\n" not in str(error.value)
 
 
 def test_rounding_is_no_fault():
@@ -125,7 +114,7 @@ def test_a_period_is_a_whole_number_of_steps():
 
 @pytest.mark.parametrize("period", [0.0, -1.0, 0.04, 0.6, float("nan"), "0.1", True, 10**400])
 def test_what_is_no_period(period):
-    with pytest.raises(InputError, match=r"period \[s\] must be in 0.05..0.5, got"):
+    with refuses(InputError, "period"):
         traits_of({"period": period})
 
 

@@ -5,6 +5,7 @@ import json
 import numpy as np
 import pytest
 from scipy import stats
+from tests.approval import approve, refuses
 
 from bridgegen.base.errors import BridgeGenError, InputError
 from bridgegen.cli import main
@@ -83,7 +84,7 @@ def test_the_file_is_the_exposure(fit, scenario, tmp_path):
     path.write_text(fit.text, "utf-8")
     again = read_exposure(path, scenario)
     assert np.array_equal(again.sample(50, 1).X, fit.exposure.sample(50, 1).X)
-    assert again.source.startswith("Fitted by BridgeGen")
+    approve(again.source, "BridgeGen")
 
 
 def test_the_same_seed_gives_the_same_bits(scenario, events):
@@ -132,7 +133,7 @@ def test_a_heavy_tail_is_found_where_there_are_exceedances():
 
 def test_too_few_rows_say_how_many_are_needed(scenario, events):
     few = {name: values[: LEAST_ROWS - 1] for name, values in events.items()}
-    with pytest.raises(InputError, match=r"a fit needs 47 events .* got 46 of 46"):
+    with refuses(InputError, "47", "46"):
         fit_exposure(scenario, few, others="default")
 
 
@@ -151,19 +152,19 @@ def test_values_outside_are_counted_with_a_range_that_holds_them(scenario, event
 @pytest.mark.parametrize(
     ("change", "rule"),
     [
-        ({"speed": 1.0}, "the column 'speed' is no parameter of cut-in"),
-        ({"gap": 30.0}, r"gap \[m\] has one value, 30, in all rows"),
+        ({"speed": 1.0}, "speed"),
+        ({"gap": 30.0}, "30"),
     ],
 )
 def test_a_column_that_cannot_be_fitted_is_refused(scenario, events, change, rule):
     few = {name: values[:60] for name, values in events.items()}
     few |= {name: np.full(60, value) for name, value in change.items()}
-    with pytest.raises(InputError, match=rule):
+    with refuses(InputError, rule):
         fit_exposure(scenario, few, others="default")
 
 
 def test_searched_parameters_without_a_column_must_be_spoken_of(scenario, events):
-    with pytest.raises(InputError, match=r"others must say .*, cut_in_distance, change_time$"):
+    with refuses(InputError, "others", "cut_in_distance"):
         fit_exposure(scenario, {name: values[:60] for name, values in events.items()})
 
 
@@ -193,13 +194,12 @@ def test_the_command_writes_exposure_page_and_distribution(tmp_path, events, mon
     words += ["--out", tmp_path / "e.yaml"]
     status, _, err = _run(monkeypatch, capsys, *words)
     assert status == 2
-    assert "the column 'id' is no parameter of cut-in" in err
-    assert "ignore it by --ignore id" in err
+    approve(err, "id", "cut-in", "--ignore")
     words += ["--ignore", "id"]
     status, out, err = _run(monkeypatch, capsys, *words, "--xosc", tmp_path / "d.xosc")
     assert status == 0
-    assert "60 of 60 events fitted" in out
-    assert "OpenSCENARIO has no correlations" in err
+    approve(out, "60")
+    approve(err, "OpenSCENARIO")
     page = (tmp_path / "e.html").read_text("utf-8")
     assert page.count("<svg") == 4
     assert "script" not in page

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import assume, example, given
 from hypothesis import strategies as st
+from tests.approval import refuses
 
 from bridgegen.assess.metrics.braking import MOST, btn, drac
 from bridgegen.assess.metrics.times import TARGET, tet, thw, tit, ttc
@@ -179,7 +180,7 @@ def test_btn_is_a_share_of_what_tyres_give_and_has_a_ceiling(rollout_of):
     assert btn(two(rollout_of, x=3.0)) == pytest.approx([MOST / GRIP])
     assert btn(two(rollout_of, x=4.01)) == pytest.approx([MOST / GRIP])
     for wrong in (0.0, -1.0, np.nan, np.inf):
-        with pytest.raises(ValueError, match=r"available \[m/s²\] must be finite and > 0"):
+        with refuses(ValueError, "available"):
             btn(rollout, available=wrong)
 
 

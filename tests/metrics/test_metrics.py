@@ -6,6 +6,7 @@ import sys
 
 import numpy as np
 import pytest
+from tests.approval import approve, refuses
 
 from bridgegen.assess import metrics
 from bridgegen.assess.metrics.braking import a_change, n_brake
@@ -168,14 +169,14 @@ def test_offset_counts_to_either_side_and_only_the_egos(rollout_of):
 @pytest.mark.parametrize(
     ("call", "message"),
     [
-        (lambda r: n_collision(r, merge_within=0.0), r"merge_within \[s\] must be finite and > 0"),
-        (lambda r: a_change(r, window=np.nan), r"window \[s\] must be finite and > 0, got nan"),
-        (lambda r: n_brake(r, threshold=-3.0), r"threshold \[m/s²\] must be finite and > 0"),
-        (lambda r: n_brake(r, threshold=0.0), r"threshold \[m/s²\] must be finite and > 0"),
+        (lambda r: n_collision(r, merge_within=0.0), "merge_within"),
+        (lambda r: a_change(r, window=np.nan), "window"),
+        (lambda r: n_brake(r, threshold=-3.0), "threshold"),
+        (lambda r: n_brake(r, threshold=0.0), "threshold"),
     ],
 )
 def test_senseless_arguments_are_refused(rollout_of, call, message):
-    with pytest.raises(ValueError, match=message):
+    with refuses(ValueError, message):
         call(rollout_of(x=np.zeros((1, 2, 3))))
 
 
@@ -188,7 +189,7 @@ def test_a_small_threshold_is_one(rollout_of):
 def test_a_state_that_is_not_finite_is_refused(driven, field):
     rollout = driven(2, 2, 5)
     getattr(rollout, field)[1, 0, 2] = np.nan
-    with pytest.raises(ValueError, match=rf"{field}.* must be finite, got nan at \[1, 0, 2\]"):
+    with refuses(ValueError, field, "nan"):
         metrics.evaluate(rollout, ALL)
 
 
@@ -278,9 +279,7 @@ def test_whole_steps_of_a_duration(seconds, time_step, expected):
 
 def test_unknown_metric_suggests_the_nearest(driven):
     for call in (lambda: metrics.get("dmin"), lambda: metrics.evaluate(driven(1), ["ttc", "dmin"])):
-        with pytest.raises(
-            UnknownNameError, match=r"unknown metric 'dmin'; did you mean 'd_min'\?"
-        ):
+        with refuses(UnknownNameError, "dmin", "d_min"):
             call()
 
 
@@ -332,11 +331,8 @@ def test_who_asks_for_what_is_not_perceived_is_told_who_perceives():
     with pytest.raises(InputError) as error:
         metrics.require(("ttc", "iou", "r_red"), (), "the recording")
     first, second = error.value.problems
-    assert first == (
-        "the metric 'iou' needs detections, and the recording has none; drivers that perceive "
-        "(--ego): reference"
-    )
-    assert second == "the metric 'r_red' needs lights, and the recording has none"
+    approve(first, "iou", "--ego")
+    approve(second, "r_red")
 
 
 def test_which_metrics_exist_depends_on_what_a_rollout_holds():
@@ -349,7 +345,7 @@ def test_which_metrics_exist_depends_on_what_a_rollout_holds():
 
 def test_what_a_rollout_does_not_hold_is_refused(rollout_of):
     for name in ("iou", "e_position", "map"):
-        with pytest.raises(ValueError, match=r"rollout\.detections must have shape"):
+        with refuses(ValueError):
             metrics.get(name).compute(rollout_of(x=np.zeros((1, 2, 3))))
 
 
@@ -363,9 +359,9 @@ def test_columns_come_in_the_order_asked_for(driven):
 
 
 def test_a_metric_needs_a_sense_and_a_finite_cap():
-    with pytest.raises(ValueError, match="sense must be"):
+    with refuses(ValueError, "sense"):
         Metric("x", "m", "", "higher", 0.0, d_min)  # type: ignore[arg-type]
-    with pytest.raises(ValueError, match=r"cap \[m\] of x must be finite, got inf"):
+    with refuses(ValueError, "inf"):
         Metric("x", "m", "", "smaller", np.inf, d_min)
 
 

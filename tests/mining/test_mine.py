@@ -5,6 +5,7 @@ import json
 from dataclasses import replace
 
 import pytest
+from tests.approval import approve, refuses
 from tests.mining.lanes.test_lanelets import with_lanelets as write_two_lanes
 from tests.openx.opendrive.kinds import model
 from tests.recordings import writers as w
@@ -36,7 +37,7 @@ def test_hours_and_kilometres_are_those_of_all_participants(tmp_path):
 def test_a_bad_file_ends_it_and_is_listed_if_that_is_asked_for(tmp_path):
     good, bad = w.write_ind(tmp_path), tmp_path / "bad.csv"
     bad.write_text("time,entity,x,y,h,speed\n0,a,1,2,3,x\n")
-    with pytest.raises(FileFormatError, match=r"bad.csv, line 2(.|\n)*--lenient"):
+    with refuses(FileFormatError):
         mine([good, bad], out=tmp_path / "mined")
     assert not (tmp_path / "mined").exists()
     found = mine([good, bad], out=tmp_path / "mined", lenient=True)
@@ -44,7 +45,7 @@ def test_a_bad_file_ends_it_and_is_listed_if_that_is_asked_for(tmp_path):
     assert "bad.csv, line 2: speed must be a number" in (
         tmp_path / "mined" / "recordings.html"
     ).read_text(encoding="utf-8")
-    with pytest.raises(FileFormatError, match="no recording could be read"):
+    with refuses(FileFormatError):
         mine([bad], out=tmp_path / "mined", lenient=True)
 
 
@@ -126,9 +127,7 @@ def test_lanes_of_a_map_and_a_map_of_another_place(cli, tmp_path):
     assert {row["source"] for row in rows(out / "lanes.csv")} == {"map"}
     code, _, err = cli("mine", path, "--map", map_of["elsewhere"], "--out", out)
     assert code == 2
-    assert "0% of the states of vehicles that drive are on lanes of the map" in " ".join(
-        err.split()
-    )
+    approve(" ".join(err.split()), "vehicles")
     code, _, err = cli("mine", path, "--map", tmp_path / "none.xodr", "--out", out)
     assert code != 0
     assert "none.xodr" in err

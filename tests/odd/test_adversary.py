@@ -1,5 +1,6 @@
 import numpy as np
 import pytest
+from tests.approval import refuses
 
 from bridgegen.base.errors import InputError, UnknownNameError
 from bridgegen.scenario.language.adversary import (
@@ -71,5 +72,5 @@ def test_who_cannot_be_driven_is_named(name, who, message):
 
 
 def test_who_is_not_there_is_named():
-    with pytest.raises(UnknownNameError, match="did you mean 'bv'"):
+    with refuses(UnknownNameError, "bv"):
         adversarial(load("crossroads-s4"), "bw")

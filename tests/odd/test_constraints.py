@@ -1,6 +1,7 @@
 from itertools import pairwise
 
 import pytest
+from tests.approval import approve, refuses
 
 from bridgegen.base.errors import ScenarioError
 from bridgegen.scenario.language.constraints import order, problems_of
@@ -45,7 +46,7 @@ def test_cycle_is_refused_by_the_space(build, make_parameter):
     scenario = build(
         [make_parameter("a"), make_parameter("b")], [("a", "b", None), ("b", "a", None)]
     )
-    with pytest.raises(ScenarioError, match="must not form a cycle"):
+    with refuses(ScenarioError):
         scenario.space()
 
 
@@ -64,7 +65,7 @@ def test_all_problems_at_once(build, make_parameter):
         "unknown name 'alpha' in 'a >= alpha'",
         "unknown name 'bb' in 'e = bb'",
     ]
-    assert problems[4].endswith("did you mean 'b'?")
+    approve(problems[4], "b")
 
 
 def test_names_declared_wrongly_are_not_called_unknown(build, make_parameter):

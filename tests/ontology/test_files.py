@@ -10,6 +10,7 @@ import pytest
 import rdflib
 from hypothesis import given
 from hypothesis import strategies as st
+from tests.approval import refuses
 
 from bridgegen.base.errors import FileFormatError, StorageError
 from bridgegen.scenario.ontology import files
@@ -142,14 +143,14 @@ def test_texts_survive(text):
 def test_saving_is_whole_or_not_at_all(individuals, tmp_path, monkeypatch):
     target = tmp_path / "s.owl"
     target.write_text("before")
-    with pytest.raises(StorageError, match="cannot be written"):
+    with refuses(StorageError):
         save(individuals, tmp_path / "missing" / "s.owl")
 
     def full(*_):
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr("pathlib.Path.replace", full)
-    with pytest.raises(StorageError, match="No space left on device") as caught:
+    with refuses(StorageError) as caught:
         save(individuals, target)
     assert len(caught.value.problems) == 1
     assert target.read_text() == "before"
@@ -287,7 +288,7 @@ def test_a_type_is_a_class(individuals):
     data = to_bytes(individuals).replace(
         b'<rdf:type rdf:resource="', b'<rdf:type>x</rdf:type><rdf:type rdf:resource="', 1
     )
-    with pytest.raises(FileFormatError, match="must be a class, got 'x'"):
+    with refuses(FileFormatError, "x"):
         from_bytes(data)
 
 
@@ -307,9 +308,9 @@ def test_no_damage_gives_a_traceback(individuals, junk, place):
 
 
 def test_missing_file_and_folder(tmp_path):
-    with pytest.raises(FileFormatError, match="cannot be read: No such file"):
+    with refuses(FileFormatError):
         load(tmp_path / "none.owl")
-    with pytest.raises(FileFormatError, match="cannot be read: not a file"):
+    with refuses(FileFormatError):
         load(tmp_path)
 
 
@@ -327,7 +328,7 @@ def test_an_unreadable_file(tmp_path, monkeypatch):
         raise PermissionError(13, "Permission denied")
 
     monkeypatch.setattr("pathlib.Path.read_bytes", refuse)
-    with pytest.raises(FileFormatError, match="cannot be read: Permission denied"):
+    with refuses(FileFormatError):
         load(path)
 
 
@@ -335,7 +336,7 @@ def test_too_large_a_file_is_not_even_read(tmp_path):
     path = tmp_path / "big.owl"
     with path.open("wb") as file:
         file.truncate(files.MAX_BYTES + 1)  # sparse: takes no room
-    with pytest.raises(FileFormatError, match="may have at most 104857600 bytes, got 104857601"):
+    with refuses(FileFormatError, "104857601", "104857600"):
         load(path)
 
 

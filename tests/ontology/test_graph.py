@@ -5,6 +5,7 @@ import pyoxigraph as ox
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from tests.approval import refuses
 
 from bridgegen.base.errors import OntologyError
 from bridgegen.scenario.ontology.graph import Individuals
@@ -63,7 +64,7 @@ def test_a_number_may_have_any_numeric_datatype(literal, value):
 )
 def test_what_is_no_finite_number_is_refused(literal):
     individuals = graph(*ROAD, ("r", "has_length", literal))
-    with pytest.raises(OntologyError, match=r"has_length \[m\] of A \(Road\) must be a finite"):
+    with refuses(OntologyError, "has_length"):
         individuals.number(node("r"), "has_length")
     with pytest.raises(OntologyError):
         individuals.optional_number(node("r"), "has_length")
@@ -73,7 +74,7 @@ def test_a_whole_number_may_be_written_as_a_double():
     individuals = graph(("l", "a", "Lane"), ("l", "has_lane_id", typed("-2.0", "double")))
     assert individuals.integer(node("l"), "has_lane_id") == -2
     half = graph(("l", "a", "Lane"), ("l", "has_lane_id", typed("1.5", "double")))
-    with pytest.raises(OntologyError, match=r"a whole number, got 1\.5"):
+    with refuses(OntologyError, "1.5"):
         half.integer(node("l"), "has_lane_id")
 
 
@@ -88,7 +89,7 @@ def test_a_whole_number_may_be_written_as_a_double():
 )
 def test_a_missing_value_is_named_with_its_individual(reader, name):
     individuals = graph(*ROAD)
-    with pytest.raises(OntologyError, match=rf"A \(Road\) must have {name}.*, and has none"):
+    with refuses(OntologyError, name):
         getattr(individuals, reader)(node("r"), name)
     assert getattr(individuals, f"optional_{reader}")(node("r"), name) is None
 
@@ -97,29 +98,27 @@ def test_two_values_are_one_too_many():
     individuals = graph(
         *ROAD, ("r", "has_length", ox.Literal(1.0)), ("r", "has_length", ox.Literal(2.0))
     )
-    with pytest.raises(OntologyError, match="must be one value, got 1, 2"):
+    with refuses(OntologyError):
         individuals.number(node("r"), "has_length")
     individuals = graph(
         *ROAD, ("r", "has_continuation", node("s")), ("r", "has_continuation", node("t"))
     )
-    with pytest.raises(OntologyError, match="must be one individual, got s, t"):
+    with refuses(OntologyError, "s"):
         individuals.link(node("r"), "has_continuation")
 
 
 def test_a_link_is_no_value_and_a_value_no_link():
     individuals = graph(*ROAD, ("r", "has_length", node("s")), ("r", "has_lane", ox.Literal("s")))
-    with pytest.raises(OntologyError, match="must be a value"):
+    with refuses(OntologyError):
         individuals.number(node("r"), "has_length")
-    with pytest.raises(OntologyError, match="must be an individual, got 's'"):
+    with refuses(OntologyError, "s"):
         individuals.links(node("r"), "has_lane")
 
 
 def test_one_wants_exactly_one():
-    with pytest.raises(OntologyError, match=r"class Road is needed, got 0$"):
+    with refuses(OntologyError):
         graph().one("Road")
-    with pytest.raises(
-        OntologyError, match=r"class Road is needed, got 2 \(A \(Road\), s \(Road\)\)|s"
-    ):
+    with refuses(OntologyError):
         graph(*ROAD, ("s", "a", "Road")).one("Road")
     assert graph(*ROAD).one("Road") == node("r")
 
@@ -182,7 +181,7 @@ def test_two_parameters_of_one_value_contradict_each_other():
         ("p", "has_name", ox.Literal("x")), ("p", "binds_property", ox.Literal("has_rate")),
         ("q", "has_name", ox.Literal("y")), ("q", "binds_property", ox.Literal("has_rate")),
     )  # fmt: skip
-    with pytest.raises(OntologyError, match="bound to one parameter, got x, y"):
+    with refuses(OntologyError, "x"):
         individuals.parameter(node("a"), "has_rate")
 
 

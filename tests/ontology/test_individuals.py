@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from tests.approval import approve, refuses
 
 from bridgegen.base.errors import OntologyError
 from bridgegen.scenario.language.expression import parse
@@ -82,7 +83,7 @@ def test_number_of_lanes(count):
 
 @pytest.mark.parametrize("count", [1.5, float("nan"), float("inf")])
 def test_half_a_lane_is_refused(count):
-    with pytest.raises(OntologyError, match="lanes_per_direction must be a whole number"):
+    with refuses(OntologyError, "lanes_per_direction"):
         build_static({**STATIC, "lanes_per_direction": count})
 
 
@@ -252,7 +253,7 @@ def test_static_parameters_are_bound_wherever_they_show(individuals):
 def test_constraints_are_annotated_for_people(individuals):
     query = f"SELECT ?c WHERE {{ <{BG}has_cloudiness> <{BG}constraint> ?c }}"
     (row,) = individuals.store.query(query)
-    assert row["c"].value.startswith("cloudiness >= precipitation: Rain falls from clouds")
+    approve(row["c"].value, "precipitation")
     assert "\n" not in row["c"].value
 
 
@@ -331,7 +332,7 @@ def test_missing_values_are_named_all_at_once(scenario, values):
 
 def test_a_site_without_the_leg(scenario, values):
     site = replace(chained(), legs=chained().legs[:2])
-    with pytest.raises(OntologyError, match="leg C in, lane 1 needs leg C"):
+    with refuses(OntologyError, "lane 1"):
         build(scenario, values, driver="x", site=site)
 
 
@@ -383,5 +384,5 @@ def test_an_event_called_like_something_else(scenario, values, name):
     """One IRI for two things would merge them without a word."""
     event = replace(scenario.events[0], name=name)
     odd = replace(scenario, story=replace(scenario.story, events=(event,)))
-    with pytest.raises(OntologyError, match=f"'{name}' must name one thing only"):
+    with refuses(OntologyError, name):
         build(odd, values, driver="x")

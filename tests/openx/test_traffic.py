@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.approval import refuses
 
 from bridgegen.base.errors import FileFormatError
 from bridgegen.engine.simulate import simulate_file
@@ -214,14 +215,12 @@ def test_numbers_that_rows_could_not_vary_are_refused():
 value="0.5"/></ParameterDeclarations><CatalogLocations/>"""
     data = file(source(0.5)).replace(b'rate="0.5"', b'rate="$r"')
     data = data.replace(b"<CatalogLocations/>", declared.encode())
-    with pytest.raises(
-        FileFormatError, match=r"must have numbers, got parameter r: .*\(line \d+\)"
-    ):
+    with refuses(FileFormatError, "parameter"):
         populated(read(data, "s"), ROADS, "s")
 
 
 def test_all_traffic_together_is_bounded():
-    with pytest.raises(FileFormatError, match=rf"all traffic may have {MOST} vehicles, got"):
+    with refuses(FileFormatError, MOST):
         populated(read(file(source(6.0), source(6.0, s=300.0)), "s"), ROADS, "s")
 
 

@@ -4,6 +4,7 @@ from pathlib import Path
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from tests.approval import refuses
 
 from bridgegen.base.errors import FileFormatError
 from bridgegen.openx import xml
@@ -39,7 +40,7 @@ def test_what_is_hostile_or_broken_is_one_error_that_names_the_place(text):
 def test_a_file_may_not_be_larger_than_the_limit(tmp_path, monkeypatch):
     path = tmp_path / "large.xml"
     path.write_bytes(b"<a/>" + b" " * 100)
-    with pytest.raises(FileFormatError, match="at most 50 bytes, got 104"):
+    with refuses(FileFormatError, "104", "50"):
         read_bytes(path, limit=50)
     monkeypatch.setattr(xml, "MAX_BYTES", 50)
     with pytest.raises(FileFormatError, match="50 bytes"):
@@ -48,7 +49,7 @@ def test_a_file_may_not_be_larger_than_the_limit(tmp_path, monkeypatch):
 
 @pytest.mark.parametrize("name", ["missing.xml", "."])
 def test_what_cannot_be_read_is_named(tmp_path, name):
-    with pytest.raises(FileFormatError, match="cannot be read"):
+    with refuses(FileFormatError):
         parse_xml(tmp_path / name)
 
 

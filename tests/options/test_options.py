@@ -7,6 +7,7 @@ from dataclasses import fields, replace
 
 import numpy as np
 import pytest
+from tests.approval import refuses
 
 import bridgegen as bg
 from bridgegen.base.errors import InputError
@@ -53,48 +54,48 @@ def test_keywords_are_those_of_the_options():
 @pytest.mark.parametrize(
     ("function", "given", "named", "said"),
     [
-        (bg.run_search, ("cut-in",), {"bugdet": 10}, "'bugdet'; did you mean 'budget'?"),
-        (bg.run_search, (), {}, "run_search: missing a required argument: 'scenario'"),
-        (bg.run_search, ("cut-in", 3), {}, "run_search: too many positional arguments"),
-        (bg.run_search, (5,), {}, "scenario must be str | pathlib.Path, got 5"),
-        (bg.compare, ("cut-in",), {"sedes": 3}, "'sedes'; did you mean 'seeds'?"),
-        (bg.compare, ("cut-in",), {"seeds": "x"}, "seeds must be a whole number, got 'x'"),
-        (evaluate_suite, ("cut-in",), {"samples": "x"}, "samples must be a whole number, got 'x'"),
-        (bg.resume, ("runs/a",), {"eog": "x"}, "'eog'; did you mean 'ego'?"),
-        (bg.confirm, ("runs/a",), {}, "confirm: missing a required argument: 'simulator'"),
-        (bg.estimate_risk, ("cut-in",), {"evnet": "x"}, "'evnet'; did you mean 'event'?"),
-        (bg.map_preventability, ("cut-in",), {"gird": 3}, "argument of map_preventability 'gird'"),
-        (bg.simulate_file, ("a.xosc",), {"eog": "x"}, "'eog'; did you mean 'ego'?"),
+        (bg.run_search, ("cut-in",), {"bugdet": 10}, "bugdet"),
+        (bg.run_search, (), {}, "run_search"),
+        (bg.run_search, ("cut-in", 3), {}, "run_search"),
+        (bg.run_search, (5,), {}, "5"),
+        (bg.compare, ("cut-in",), {"sedes": 3}, "sedes"),
+        (bg.compare, ("cut-in",), {"seeds": "x"}, "x"),
+        (evaluate_suite, ("cut-in",), {"samples": "x"}, "x"),
+        (bg.resume, ("runs/a",), {"eog": "x"}, "eog"),
+        (bg.confirm, ("runs/a",), {}, "confirm"),
+        (bg.estimate_risk, ("cut-in",), {"evnet": "x"}, "evnet"),
+        (bg.map_preventability, ("cut-in",), {"gird": 3}, "gird"),
+        (bg.simulate_file, ("a.xosc",), {"eog": "x"}, "eog"),
     ],
 )
 def test_a_wrong_argument_is_an_error_of_input(function, given, named, said):
-    with pytest.raises(InputError, match=said):
+    with refuses(InputError, said):
         function(*given, **named)
 
 
 @pytest.mark.parametrize(
     ("named", "said"),
     [
-        ({"budget": "many"}, "budget must be a whole number, got 'many'"),
-        ({"seed": 1.5}, "seed must be a whole number, got 1.5"),
-        ({"keep": None}, "keep must be a whole number, got None"),
-        ({"time_limit": "1"}, "time_limit must be a number, got '1'"),
-        ({"causes": "no"}, "causes must be True or False, got 'no'"),
-        ({"ego": 5}, "ego must be a text, got 5"),
-        ({"axes": 3}, "axes must be names, got 3"),
-        ({"metrics": [3]}, r"metrics must be names, got \[3\]"),
-        ({"fixed": "fog_density"}, "fixed must read NAME=VALUE, got 'fog_density'"),
-        ({"fixed": [1]}, r"fixed must be values by name, got \[1\]"),
-        ({"objective": {"d_min": "x"}}, "objective must be a name, or metrics and their weights"),
-        ({"objective": "d_min=x"}, "objective must read NAME=NUMBER, got 'd_min=x'"),
-        ({"objective": "harmm"}, "unknown metric 'harmm'; did you mean 'harm'?"),
-        ({"objective": "papre"}, "unknown metric 'papre'; did you mean 'paper'?"),
-        ({"criteria": 3}, "criteria must be criteria, got 3"),
-        ({"simulator": "esmni"}, "unknown simulator 'esmni'; did you mean 'esmini'?"),
+        ({"budget": "many"}, "many"),
+        ({"seed": 1.5}, "seed"),
+        ({"keep": None}, "keep"),
+        ({"time_limit": "1"}, "time_limit"),
+        ({"causes": "no"}, "causes"),
+        ({"ego": 5}, "ego"),
+        ({"axes": 3}, "axes"),
+        ({"metrics": [3]}, "metrics"),
+        ({"fixed": "fog_density"}, "fog_density"),
+        ({"fixed": [1]}, "fixed"),
+        ({"objective": {"d_min": "x"}}, "objective"),
+        ({"objective": "d_min=x"}, "d_min=x"),
+        ({"objective": "harmm"}, "harmm"),
+        ({"objective": "papre"}, "papre"),
+        ({"criteria": 3}, "criteria"),
+        ({"simulator": "esmni"}, "esmni"),
     ],
 )
 def test_a_wrong_value_is_an_error_of_input(named, said, tmp_path):
-    with pytest.raises(InputError, match=said):
+    with refuses(InputError, said):
         bg.run_search("cut-in", **named, out=tmp_path / "run")
     assert not (tmp_path / "run").exists()
 

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.approval import approve, refuses
 
 from bridgegen.base.errors import InputError, Interrupted, StorageError, UnknownNameError
 from bridgegen.cli import main
@@ -128,9 +129,7 @@ def test_a_stopped_map_is_resumed_and_ends_the_same(whole, tmp_path, monkeypatch
         if done >= 100:
             raise KeyboardInterrupt
 
-    with pytest.raises(
-        Interrupted, match=r"stopped after 100 of 195 cells; resume with 'bridgegen prev"
-    ):
+    with refuses(Interrupted, "100", "195"):
         map_preventability(
             "r157/cut-in", whole.drivers, grid=GRID, out=out, callbacks=JobCallbacks(progress=stop)
         )
@@ -150,10 +149,10 @@ def test_a_stopped_map_is_resumed_and_ends_the_same(whole, tmp_path, monkeypatch
 
 
 def test_a_folder_with_another_map_or_something_else_is_refused(whole, tmp_path):
-    with pytest.raises(StorageError, match=r"holds a map with other settings, .*: grid was"):
+    with refuses(StorageError):
         map_preventability("r157/cut-in", whole.drivers, grid=GRID[:2], out=whole.folder)
     (tmp_path / "notes.txt").write_text("mine")
-    with pytest.raises(StorageError, match="holds no map, so it is left alone"):
+    with refuses(StorageError):
         map_preventability("r157/cut-in", "un-r157", grid=GRID, out=tmp_path)
 
 
@@ -170,7 +169,7 @@ def test_a_driver_of_one_s_own_and_one_that_fails(tmp_path):
     assert (halts == CellClass.AVOIDED).all()
     assert fails.tolist() == [[CellClass.AVOIDED] * 2, [CellClass.NO_RESULT] * 2]
     file.write_text(HALT + "\n# changed\n")
-    with pytest.raises(StorageError, match="files of drivers has changed"):
+    with refuses(StorageError):
         map_preventability(
             "r157/cut-in", found.drivers,
             grid={"ego_speed": GridAxis("60 km/h", "90 km/h", 2), "gap": GridAxis(60.0, 90.0, 2)},
@@ -181,17 +180,17 @@ def test_a_driver_of_one_s_own_and_one_that_fails(tmp_path):
 @pytest.mark.parametrize(
     ("arguments", "error", "message"),
     [
-        ({"ego": "un-r158"}, UnknownNameError, "did you mean 'un-r157'"),
-        ({"ego": "un-r157", "models": ["fsn"]}, UnknownNameError, "unknown ego driver 'fsn'"),
-        ({"ego": []}, InputError, "a map needs a driver at least"),
-        ({"ego": "fsm", "models": []}, InputError, "a map needs a model at least"),
-        ({"ego": ["fsm", "fsm"]}, InputError, "got twice: fsm"),
-        ({"ego": "fsm", "fixed": {"gap": 20.0}}, InputError, "cannot be held at a value: gap"),
-        ({"ego": "fsm", "workers": 0}, InputError, "workers must be"),
+        ({"ego": "un-r158"}, UnknownNameError, "un-r157"),
+        ({"ego": "un-r157", "models": ["fsn"]}, UnknownNameError, "fsn"),
+        ({"ego": []}, InputError, "driver"),
+        ({"ego": "fsm", "models": []}, InputError, "model"),
+        ({"ego": ["fsm", "fsm"]}, InputError, "twice"),
+        ({"ego": "fsm", "fixed": {"gap": 20.0}}, InputError, "held"),
+        ({"ego": "fsm", "workers": 0}, InputError, "workers"),
     ],
 )
 def test_wrong_arguments_are_refused(tmp_path, arguments, error, message):
-    with pytest.raises(error, match=message):
+    with refuses(error, message):
         map_preventability("r157/cut-in", **({"grid": GRID, "out": tmp_path / "m"} | arguments))
 
 
@@ -221,5 +220,5 @@ def test_an_error_of_the_command_line_is_one_message(monkeypatch, capsys):
     with pytest.raises(SystemExit) as end:
         main()
     assert end.value.code == 2
-    assert "bridgegen: error: --grid gap: N must be at least 1, got 0" in capsys.readouterr().err
+    approve(capsys.readouterr().err, "--grid")
     assert not Path("preventability").exists()

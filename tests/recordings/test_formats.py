@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
+from tests.approval import refuses
 
 from bridgegen.base.errors import FileFormatError
 from bridgegen.drivers.kinds import CAR, TRUCK
@@ -142,8 +143,8 @@ def test_traffic_lights_of_scenarionet_change_when_they_are_recorded_to(tmp_path
 
 
 @pytest.mark.parametrize(("wrong", "rule"), [
-    ({"stop_point": ["a"]}, "stop_point must be an array of numbers"),
-    ({"state": {"object_state": "red"}}, "object_state must be a list"),
+    ({"stop_point": ["a"]}, "stop_point"),
+    ({"state": {"object_state": "red"}}, "object_state"),
 ])  # fmt: skip
 def test_lights_of_scenarionet_are_checked(tmp_path, wrong, rule):
     path = w.write_scenarionet(tmp_path)
@@ -151,7 +152,7 @@ def test_lights_of_scenarionet_are_checked(tmp_path, wrong, rule):
     whole["dynamic_map_states"] = {"1": {"state": {"object_state": []}, "lane": [1]} | wrong}
     whole["map_features"] = {"[1]": {"polyline": [[0.0, 0.0], [1.0, 0.0]]}}
     path.write_bytes(pickle.dumps(whole))
-    with pytest.raises(FileFormatError, match=rule):
+    with refuses(FileFormatError, rule):
         list(read(path))
 
 

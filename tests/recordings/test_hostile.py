@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from tests.approval import approve, refuses
 
 from bridgegen.base.errors import FileFormatError
 from bridgegen.recordings.readers.clean import clean
@@ -48,7 +49,7 @@ class Calls:
 def test_a_pickle_runs_nothing(tmp_path, protocol):
     trace, path = tmp_path / "was-here", tmp_path / "bad.pkl"
     path.write_bytes(pickle.dumps({"tracks": Runs(trace)}, protocol))
-    with pytest.raises(FileFormatError, match="refused: it asks for"):
+    with refuses(FileFormatError):
         list(read(path))
     assert not trace.exists()
     pickle.loads(path.read_bytes())
@@ -126,7 +127,7 @@ def test_a_database_whose_texts_are_no_utf_8_is_refused(tmp_path):
     whole[4060] = 0x80  # in the SQL of a table, which SQLite quotes in its error
     path.write_bytes(whole)
     _, error = _cleaned(path)
-    assert "is no valid database" in error
+    approve(error, "database")
 
 
 @settings(max_examples=100, deadline=None)
@@ -154,13 +155,13 @@ def test_time_that_runs_backwards_is_an_error_with_its_row(tmp_path):
     path = _edit(
         w.write_ind(tmp_path), lambda lines: [*lines[:9], lines[10], lines[9], *lines[11:]]
     )
-    with pytest.raises(FileFormatError, match=r"07_tracks.csv, line 11: the times of .* '1' must"):
+    with refuses(FileFormatError, "07_tracks", "07_tracks.csv"):
         list(read(path))
 
 
 def test_an_instant_that_comes_twice_is_an_error_with_its_row(tmp_path):
     path = _edit(w.write_interaction(tmp_path), lambda lines: [*lines[:5], *lines[4:]])
-    with pytest.raises(FileFormatError, match=r"line 6: .* comes twice"):
+    with refuses(FileFormatError, "line 6"):
         list(read(path))
 
 
@@ -174,7 +175,7 @@ def test_missing_metadata_are_named(tmp_path):
 def test_tracks_without_metadata_are_named(tmp_path):
     path = w.write_ind(tmp_path)
     _edit(tmp_path / "07_tracksMeta.csv", lambda lines: lines[:-1])
-    with pytest.raises(FileFormatError, match=r"says nothing of 1 tracks .*: 7"):
+    with refuses(FileFormatError):
         list(read(path))
 
 
@@ -184,7 +185,7 @@ def test_ids_that_teleport_all_over_are_refused(tmp_path):
                             for k, line in enumerate(lines[1:]))]  # fmt: skip
 
     (found,) = read(_edit(w.write_interaction(tmp_path), mixed))
-    with pytest.raises(FileFormatError, match=r"line \d+: positions say"):
+    with refuses(FileFormatError):
         clean(found)
 
 
@@ -195,7 +196,7 @@ def test_a_history_whose_tables_are_views_is_refused(tmp_path):
                      "SELECT i + 1 FROM n) SELECT i FROM n")  # fmt: skip
         base.execute("CREATE TABLE Vehicle (id, type, length, width)")
     base.close()
-    with pytest.raises(FileFormatError, match="no table Trajectory"):
+    with refuses(FileFormatError):
         list(read(path))
 
 
@@ -204,7 +205,7 @@ def test_texts_where_a_history_has_numbers_are_refused(tmp_path):
     with sqlite3.connect(path) as base:
         base.execute("UPDATE Trajectory SET speed = 'fast' WHERE vehicle_id = 2")
     base.close()
-    with pytest.raises(FileFormatError, match="speed in Trajectory must be a number, got 'fast'"):
+    with refuses(FileFormatError, "fast"):
         list(read(path))
 
 

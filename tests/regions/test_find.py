@@ -1,5 +1,6 @@
 import numpy as np
 import pytest
+from tests.approval import approve, refuses
 
 from bridgegen.base.errors import InputError
 from bridgegen.scenario.language.box_sampling import in_box
@@ -28,7 +29,7 @@ def test_a_planted_region_is_found_and_confirmed(space, world):
     (region,) = found.regions
     assert region.confirmed
     assert rule(region.box, space).startswith("bv_start ≤ ")
-    assert " and bv_trigger_time ≥ " in rule(region.box, space)
+    approve(rule(region.box, space), "bv_trigger_time")
     assert region.box.high[column(space, "bv_start")] == pytest.approx(12.0, abs=0.3)
     assert region.box.low[column(space, "bv_trigger_time")] == pytest.approx(4.0, abs=0.3)
     assert (region.fresh.rows, region.fresh.failed) == (300, 0)
@@ -75,7 +76,7 @@ def test_fresh_rows_are_new_feasible_and_in_the_region(every, world):
     found = find_regions(every, simulator, X, critical, samples=100)
     (region,) = found.regions
     assert region.confirmed
-    assert "lanes_per_direction ≥ 2 and " in rule(region.box, every)
+    approve(rule(region.box, every), "lanes_per_direction")
     (rows,) = simulator.asked
     assert rows.shape == (100, len(every.names))
     assert every.violations(rows) == []
@@ -169,20 +170,20 @@ def test_rules_are_short_and_progress_is_told(space, world):
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        ({"samples": 0}, "1 <= samples <= 100000 must hold, got 0"),
-        ({"at_least": 1.0}, "0 < at_least < 1 must hold, got 1"),
-        ({"at_least": float("nan")}, "0 < at_least < 1 must hold, got nan"),
+        ({"samples": 0}, "100000"),
+        ({"at_least": 1.0}, "at_least"),
+        ({"at_least": float("nan")}, "at_least"),
     ],
 )
 def test_numbers_out_of_range_are_refused(space, world, change, said):
     X, critical = world(space, planted).random(100)
-    with pytest.raises(InputError, match=said):
+    with refuses(InputError, said):
         find_regions(space, world(space, planted), X, critical, **change)
 
 
 def test_without_a_critical_row_there_is_nothing_to_find(space, world):
     X, critical = world(space, planted).random(100)
-    with pytest.raises(InputError, match="none of 100 evaluations is critical"):
+    with refuses(InputError, "100"):
         find_regions(space, world(space, planted), X, critical & False)
-    with pytest.raises(InputError, match="none of 0 evaluations is critical"):
+    with refuses(InputError):
         find_regions(space, world(space, planted), X[:0], critical[:0])

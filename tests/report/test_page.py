@@ -8,6 +8,7 @@ from html.parser import HTMLParser
 from pathlib import Path
 
 import pytest
+from tests.approval import refuses
 
 from bridgegen.base.errors import StorageError
 from bridgegen.pages import page, templates
@@ -189,13 +190,13 @@ def test_a_page_needs_no_heavy_package():
 
 def test_a_missing_folder_is_one_clear_error(tmp_path, report):
     path = tmp_path / "nowhere" / "report.html"
-    with pytest.raises(StorageError, match=r"nowhere/report.html: cannot be written"):
+    with refuses(StorageError):
         write_report(path, report)
 
 
 def test_a_folder_in_its_place_is_one_clear_error(tmp_path, report):
     (tmp_path / "report.html").mkdir()
-    with pytest.raises(StorageError, match="cannot be written"):
+    with refuses(StorageError):
         write_report(tmp_path / "report.html", report)
     assert [f.name for f in tmp_path.iterdir()] == ["report.html"]
 
@@ -206,7 +207,7 @@ def test_a_full_disk_keeps_the_old_report_and_leaves_no_part(tmp_path, report, w
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, hard))  # writing on fails, as when full
     try:
-        with pytest.raises(StorageError, match="cannot be written"):
+        with refuses(StorageError):
             write_report(path, report)
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))

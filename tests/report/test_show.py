@@ -4,6 +4,7 @@ import subprocess
 import sys
 
 import pytest
+from tests.approval import refuses
 
 from bridgegen.base.errors import FileFormatError, InputError, StorageError
 from bridgegen.pages.scenario_page import show_file
@@ -56,20 +57,20 @@ def test_an_earlier_picture_is_replaced_and_nothing_else_is(owl):
     show_file(owl)
     assert page.read_bytes() != before
     page.write_text("my notes")
-    with pytest.raises(StorageError, match="is not a picture, and is not overwritten"):
+    with refuses(StorageError):
         show_file(owl)
     assert page.read_text() == "my notes"
 
 
 def test_mistakes_are_one_clear_error(owl, tmp_path):
-    with pytest.raises(InputError, match=r"picture\.svg: .* must end in \.html"):
+    with refuses(InputError):
         show_file(owl, tmp_path / "picture.svg")
-    with pytest.raises(FileFormatError, match="cannot be read"):
+    with refuses(FileFormatError):
         show_file(tmp_path / "none.owl")
-    with pytest.raises(StorageError, match="cannot be written"):
+    with refuses(StorageError):
         show_file(owl, tmp_path / "nowhere" / "it.html")
     owl.with_suffix(".html").mkdir()
-    with pytest.raises(StorageError, match="cannot be written"):
+    with refuses(StorageError):
         show_file(owl)
 
 

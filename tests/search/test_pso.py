@@ -1,5 +1,6 @@
 import numpy as np
 import pytest
+from tests.approval import refuses
 
 from bridgegen.search.algorithms import Problem, Results
 from bridgegen.search.algorithms.evolved import PSO
@@ -120,12 +121,12 @@ def test_a_failed_row_is_no_particles_best_for_long():
 def test_only_what_was_asked_can_be_told():
     pso = PSO(Problem.unnamed(2), 0)
     U = pso.ask()
-    with pytest.raises(ValueError, match="first rows that were asked for"):
+    with refuses(ValueError):
         pso.tell(U[::-1], Results.of_F(np.zeros((40, 1))))
-    with pytest.raises(ValueError, match="first rows that were asked for"):
+    with refuses(ValueError):
         pso.tell(U[:20], Results.of_F(np.zeros((20, 1))))  # particles move together
     pso.tell(U, Results.of_F(np.zeros((40, 1))))
-    with pytest.raises(ValueError, match="first rows that were asked for"):
+    with refuses(ValueError):
         pso.tell(U, Results.of_F(np.zeros((40, 1))))
 
 

@@ -3,6 +3,7 @@ import sys
 from importlib.metadata import EntryPoint, EntryPoints
 
 import pytest
+from tests.approval import refuses
 
 from bridgegen.base.errors import InputError, UnknownNameError
 from bridgegen.search.algorithms import ALGORITHMS, Problem, get, names
@@ -43,7 +44,7 @@ def test_names_and_classes_agree():
 
 
 def test_unknown_name_suggests_the_nearest():
-    with pytest.raises(UnknownNameError, match="unknown algorithm 'randon'; did you mean 'random'"):
+    with refuses(UnknownNameError, "randon", "random"):
         get("randon")
 
 
@@ -51,30 +52,30 @@ def test_a_package_adds_its_own(installed):
     installed(lazy=f"{__name__}:Lazy")
     assert names()[-1] == "lazy"
     assert get("lazy") is Lazy
-    with pytest.raises(UnknownNameError, match="did you mean 'lazy'"):
+    with refuses(UnknownNameError, "lazy"):
         get("lasy")
 
 
 @pytest.mark.parametrize(
     ("name", "value", "message"),
     [
-        ("gone", "no_such_module_here:Thing", "cannot be loaded: ModuleNotFoundError"),
-        ("gone", f"{__name__}:Nothing", "cannot be loaded: AttributeError"),
-        ("wrong", f"{__name__}:Wrong", "lacks description, source, settings, objectives, ask"),
-        ("lazy", f"{__name__}:NOT_A_CLASS", "is not a class"),
-        ("idle", f"{__name__}:Lazy", "has the name 'lazy'"),
-        ("random", f"{__name__}:Lazy", "declared more than once: bridgegen, "),
+        ("gone", "no_such_module_here:Thing", "ModuleNotFoundError"),
+        ("gone", f"{__name__}:Nothing", "AttributeError"),
+        ("wrong", f"{__name__}:Wrong", "description"),
+        ("lazy", f"{__name__}:NOT_A_CLASS", "class"),
+        ("idle", f"{__name__}:Lazy", "lazy"),
+        ("random", f"{__name__}:Lazy", "bridgegen"),
     ],
 )
 def test_a_package_that_is_wrong_is_named(installed, name, value, message):
     installed(**{name: value})
-    with pytest.raises(InputError, match=message):
+    with refuses(InputError, message):
         get(name)
 
 
 def test_two_packages_may_not_share_a_name(installed):
     installed(lazy=f"{__name__}:Lazy", lazy_=f"{__name__}:Random")
-    with pytest.raises(InputError, match=r"more than once: .*:Lazy, .*:Random"):
+    with refuses(InputError):
         get("lazy")
 
 

@@ -4,6 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from sklearn.tree import DecisionTreeClassifier
+from tests.approval import refuses
 
 from bridgegen.search.algorithms.tree import Leaf, fit_leaves
 
@@ -151,12 +152,12 @@ def test_depth_and_pruning_keep_a_tree_small():
         ({"X": [[0.5, 1.5]]}, "low <= X <= high"),
         ({"X": [[0.5, np.nan]]}, "finite"),
         ({"X": [[0.5]]}, "shape"),
-        ({"critical": [True, False]}, "critical must have shape"),
+        ({"critical": [True, False]}, "critical"),
         ({"min_rows": 0}, "min_rows >= 1"),
     ],
 )
 def test_what_is_no_input_is_refused(change, said):
-    with pytest.raises(ValueError, match=said):
+    with refuses(ValueError, said):
         fit_leaves(**({"X": [[0.5, 0.5]], "critical": [True], **CUBE2, "min_rows": 1} | change))
 
 

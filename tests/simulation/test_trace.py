@@ -4,6 +4,7 @@ import csv
 
 import numpy as np
 import pytest
+from tests.approval import refuses
 
 from bridgegen.base.errors import InputError, StorageError
 from bridgegen.cli import main
@@ -57,17 +58,17 @@ def test_a_smaller_step_tells_the_same_story(xosc):
 
 @pytest.mark.parametrize("step", [0.0, -0.05, 1.5, float("nan"), float("inf")])
 def test_a_step_out_of_range(xosc, step):
-    with pytest.raises(InputError, match=r"0\.0001 <= time_step <= 1 \[s\] must hold, got"):
+    with refuses(InputError, "time_step", "0.0001"):
         simulate_file(xosc, time_step=step)
 
 
 def test_where_it_goes(xosc, tmp_path):
     rollout = simulate_file(xosc).rollout
-    with pytest.raises(InputError, match=r"must end in \.csv"):
+    with refuses(InputError):
         write_trace(tmp_path / "trace.txt", rollout)
     (tmp_path / "mine.csv").write_text("mine")
-    with pytest.raises(StorageError, match="exists already, and is not overwritten"):
+    with refuses(StorageError):
         write_trace(tmp_path / "mine.csv", rollout)
-    with pytest.raises(StorageError, match="cannot be written"):
+    with refuses(StorageError):
         write_trace(tmp_path / "nowhere" / "trace.csv", rollout)
     assert (tmp_path / "mine.csv").read_text() == "mine"

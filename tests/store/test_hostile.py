@@ -8,6 +8,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from tests.approval import refuses
 
 from bridgegen.base.errors import StorageError
 from bridgegen.results.store import Checkpoint, Store
@@ -152,7 +153,7 @@ def test_it_is_one_error(script, write, tmp_path):
     folder = make(tmp_path / "run")
     change(folder, script)
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    with pytest.raises(StorageError, match=r"the file is damaged|is not a run|schema must be") as e:
+    with refuses(StorageError) as e:
         read_all(folder, write)
     assert "\n" not in str(e.value)
     assert str(folder / "run.sqlite") in str(e.value)
@@ -165,7 +166,7 @@ def test_a_schema_that_changes_after_the_file_was_opened(tmp_path):
     folder = make(tmp_path / "run")
     with Store.open(folder) as store:
         change(folder, HOSTILE["a view for failures"])
-        with pytest.raises(StorageError, match="the file is damaged: it holds a view or a trigger"):
+        with refuses(StorageError):
             store.failures()
 
 

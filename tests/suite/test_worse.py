@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 from lxml import etree
+from tests.approval import refuses
 
 from bridgegen.base.errors import InputError
 from bridgegen.cli.verdict.of_difference import DifferenceCriteria
@@ -90,7 +91,7 @@ def test_junit_has_a_test_for_what_is_broken_and_for_the_search(compared, tmp_pa
 
 def test_conditions_name_figures_that_exist():
     assert DifferenceCriteria.read(["worse_modes > 0", "broken > 2"]).conditions
-    with pytest.raises(InputError, match="unknown figure of --fail-if 'worst'"):
+    with refuses(InputError, "worst", "--fail-if"):
         DifferenceCriteria.read(["worst > 0"])
 
 

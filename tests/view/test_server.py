@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from tests.approval import refuses
 
 from bridgegen.base.errors import InputError, StorageError
 from bridgegen.jobs.view.server import LOOPBACK, Server, answer
@@ -177,10 +178,10 @@ def test_every_answer_tells_the_browser_to_keep_it_to_itself(server):
 
 def test_a_port_that_is_taken_or_none_is_one_clear_error(server):
     port = server.server_address[1]
-    with pytest.raises(InputError, match=f"port {port} of 127.0.0.1 is not available: .*--port"):
+    with refuses(InputError, port, "127.0", "--port"):
         Server(Site(), port)
     for none in (-1, 65_536):
-        with pytest.raises(InputError, match=f"0 <= port <= 65535 must hold, got {none}"):
+        with refuses(InputError, "65535", none):
             Server(Site(), none)
 
 

@@ -4,9 +4,9 @@ from collections import deque
 from typing import Any
 
 import numpy as np
-import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from tests.approval import refuses
 
 from bridgegen.base.errors import WorkersError
 from bridgegen.engine.workers import Lost, Recipe
@@ -169,7 +169,7 @@ def test_a_machine_that_fails_takes_idle_workers_with_it(X, at_once, workers):
 
 def test_workers_that_never_start_are_an_error():
     pool = SimulatedPool(2, [100] * 10)
-    with pytest.raises(WorkersError, match=r"3 workers in a row .* ready: by decree"):
+    with refuses(WorkersError):
         pool.map(Tripler(1), Tripler.triple, np.array([1.0]), frozenset())
     assert pool.deaths == MAX_START_FAILURES
     assert not pool.caches  # all have been let go

@@ -4,7 +4,7 @@ import threading
 import time
 
 import numpy as np
-import pytest
+from tests.approval import refuses
 
 from bridgegen.base import extras
 from bridgegen.base.errors import InputError
@@ -66,7 +66,7 @@ def test_the_latest_used_are_kept():
 def test_without_ray_the_extra_is_named(monkeypatch):
     monkeypatch.setattr(extras, "find_spec", lambda name: None)
     with (
-        pytest.raises(InputError, match=r"needs the extra 'ray': pip install 'bridgegen\[ray\]'"),
+        refuses(InputError, "ray", "bridgegen[ray]"),
         open_workers("ray"),
     ):
         pass

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.approval import refuses
 
 from bridgegen.base.errors import WorkersError
 from bridgegen.engine.workers import Lost, Threads, Workers
@@ -92,7 +93,7 @@ def test_workers_that_never_start_are_an_error(doubles):
         closing(pool.stream(doubles.Unmakeable(), doubles.Unmakeable.double)) as rows,
     ):
         rows.submit(X)
-        with pytest.raises(WorkersError, match="ended before they were ready"):
+        with refuses(WorkersError):
             rows.take(1)
 
 

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from tests.approval import refuses
 from tests.ego.planners.roads import LANE_WIDTH, road_map
 
 from bridgegen.adapters.planners._corridor import Corridor
@@ -62,7 +63,7 @@ def test_the_road_goes_straight_on_beyond_its_ends():
 
 
 def test_a_route_off_the_lanes_is_refused():
-    with pytest.raises(InputError, match="needs a route on them, got none"):
+    with refuses(InputError):
         Corridor(road_map((2,), keep=[]))
 
 

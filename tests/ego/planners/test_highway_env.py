@@ -6,6 +6,7 @@ import sys
 
 import numpy as np
 import pytest
+from tests.approval import refuses
 from tests.ego.planners.roads import CENTRE, DT, World, drive, road_map, scene
 
 from bridgegen.adapters.planners import highway_env
@@ -110,7 +111,7 @@ def test_without_the_planner_the_error_says_how_to_get_it(monkeypatch):
 
     wanting = replace(highway_env.PLANNER, requires=("highway-env==0.0.1",))
     monkeypatch.setattr(highway_env, "PLANNER", wanting)
-    with pytest.raises(InputError, match=r"pip install '?highway-env==0\.0\.1"):
+    with refuses(InputError, "highway-env"):
         highway_env.HighwayEnvDriver()
 
 

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from tests.approval import refuses
 from tests.ego.planners.observed import (
     BODY_LENGTH,
     CENTRE,
@@ -146,7 +147,7 @@ def test_where_north_is_does_not_matter():
 
 def test_without_a_checkout_one_sentence_says_how_to_get_it(monkeypatch):
     monkeypatch.delenv(checkout.VARIABLE, raising=False)
-    with pytest.raises(InputError, match=r"needs openpilot: .*git clone"):
+    with refuses(InputError):
         openpilot.OpenpilotLongitudinal()
 
 
@@ -163,7 +164,7 @@ def test_a_folder_of_something_else_is_refused(monkeypatch, tmp_path, header, sa
     if header is not None:
         (tmp_path / "common" / "version.h").write_text(header)
     monkeypatch.setenv(checkout.VARIABLE, str(tmp_path))
-    with pytest.raises(InputError, match=f"a checkout of openpilot 0.11, .*{says}"):
+    with refuses(InputError, "0.11", says):
         openpilot.OpenpilotLongitudinal()
 
 
@@ -174,7 +175,7 @@ def test_a_checkout_that_lacks_files_is_refused_and_nothing_of_it_stays(monkeypa
     (tmp_path / "openpilot" / "__init__.py").write_text("import cereal.log\n")
     monkeypatch.setenv(checkout.VARIABLE, str(tmp_path))
     before = set(sys.modules), list(sys.path), list(sys.meta_path)
-    with pytest.raises(InputError, match="openpilot cannot be imported from"):
+    with refuses(InputError):
         openpilot.OpenpilotLongitudinal()
     assert (set(sys.modules), list(sys.path), list(sys.meta_path)) == before
     assert [one.name for one in (tmp_path / "openpilot").iterdir()] == ["__init__.py"]

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
+from tests.approval import refuses
 
 from bridgegen.drivers.remote import messages, server
 from bridgegen.drivers.remote.messages import DTYPES, MAX_DEPTH, ProtocolError, length, pack, unpack
@@ -92,45 +93,45 @@ def test_a_changed_byte_of_a_message_is_a_message_or_a_protocol_error(
     ("message", "error"),
     [
         (struct.pack(">B", 0xC1), "no msgpack"),
-        (msgpack.packb([1]), "must be a map with a text 'type'"),
-        (msgpack.packb({"type": 3}), "must be a map with a text 'type'"),
-        (msgpack.packb({1: 2}), "keys of a map must be texts"),
-        (msgpack.packb({"type": "a"}) + b"\x00", "more follows its end"),
-        (msgpack.packb({"type": "a"})[:-1], "no msgpack.* incomplete"),
-        (b"\x82\xa4type\xa1a\xa1x" + b"\x91" * MAX_DEPTH + b"\xc0", "nested too deeply"),
-        (b"\x82\xa4type\xa1a\xa1x" + b"\x91" * 5000 + b"\xc0", "nested too deeply"),
+        (msgpack.packb([1]), "type"),
+        (msgpack.packb({"type": 3}), "type"),
+        (msgpack.packb({1: 2}), "texts"),
+        (msgpack.packb({"type": "a"}) + b"\x00", "follows"),
+        (msgpack.packb({"type": "a"})[:-1], "msgpack"),
+        (b"\x82\xa4type\xa1a\xa1x" + b"\x91" * MAX_DEPTH + b"\xc0", "nested"),
+        (b"\x82\xa4type\xa1a\xa1x" + b"\x91" * 5000 + b"\xc0", "nested"),
         (b"\x81\xa4type\xdd\xff\xff\xff\xff", "too large"),
-        (msgpack.packb({"type": "a", "x": [[0] * 400] * 3}), "too many parts"),
-        (msgpack.packb({"type": "a", "x": msgpack.ExtType(5, b"")}), "extension of msgpack: 5"),
+        (msgpack.packb({"type": "a", "x": [[0] * 400] * 3}), "parts"),
+        (msgpack.packb({"type": "a", "x": msgpack.ExtType(5, b"")}), "extension"),
         (
             msgpack.packb({"type": "a", "x": {"dtype": "object", "shape": [1], "data": b""}}),
-            "dtype must be one of float64, .* got 'object'",
+            "dtype",
         ),
         (
             msgpack.packb({"type": "a", "x": {"dtype": "int8", "shape": [-1], "data": b""}}),
-            "shape of an array must be a list of sizes",
+            "shape",
         ),
         (
             msgpack.packb(
                 {"type": "a", "x": {"dtype": "float64", "shape": [3], "data": b"12345678"}}
             ),
-            r"float64 of shape \(3,\) must have 24 bytes, got 8",
+            "24",
         ),
         (
             msgpack.packb({"type": "a", "x": {"dtype": "int8", "shape": [2**26] * 8, "data": b""}}),
-            "must have .* bytes, got 0",
+            "bytes",
         ),
     ],
 )
 def test_what_is_no_message(message, error):
-    with pytest.raises(ProtocolError, match=error):
+    with refuses(ProtocolError, error):
         unpack(message, max_items=1024)
 
 
 def test_a_length_is_bounded():
-    with pytest.raises(ProtocolError, match=r"at most 64 MiB long, got 1024.0 MiB"):
+    with refuses(ProtocolError, "1024.0", "64 MiB"):
         length(struct.pack("<I", 2**30))
-    with pytest.raises(ProtocolError, match=r"at most 64 MiB"):
+    with refuses(ProtocolError, "64 MiB"):
         pack({"type": "act", "x": np.zeros(2**23 + 1)})
 
 

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.approval import refuses
 from tests.ego.remote import ros2_stub
 from tests.ego.remote.asked import observation, scene
 
@@ -80,7 +81,7 @@ def test_a_stack_that_says_nothing_is_an_error(stack, bridge, monkeypatch):
     driver = bridge.Ros2Driver()
     driver.reset(1, scene())
     stack.is_mute = True
-    with pytest.raises(TimeoutError, match="no command of this instant"):
+    with refuses(TimeoutError):
         driver.act(seen())
 
 

@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import pytest
+from tests.approval import refuses
 
 from bridgegen.base.errors import FileFormatError
 from bridgegen.openx.convert import import_file
@@ -46,10 +47,10 @@ def test_import_writes_here_and_not_into_carla(
 
 def test_what_is_not_found(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("CARLA_ROOT", raising=False)
-    with pytest.raises(FileFormatError, match="neither --maps nor CARLA_ROOT says where CARLA is"):
+    with refuses(FileFormatError, "--maps", "CARLA_ROOT"):
         map_path(Path("Town01"))
     monkeypatch.setenv("CARLA_ROOT", str(tmp_path))
-    with pytest.raises(FileFormatError, match="Town99: neither a file nor the name"):
+    with refuses(FileFormatError):
         map_path(Path("Town99"))
     with pytest.raises(FileFormatError, match="letters, digits"):
         map_path(Path("T*"))

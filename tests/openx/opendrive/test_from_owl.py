@@ -11,6 +11,7 @@ import pyoxigraph as ox
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from tests.approval import refuses
 
 from bridgegen.base.errors import BridgeGenError, InputError, OntologyError
 from bridgegen.openx.opendrive.from_owl import opendrive_from_owl
@@ -291,9 +292,7 @@ def test_turn_that_no_car_can_drive() -> None:
         leg("C", "3", 20.0, (3.5,), (3.5,)),
         leg("D", "4", 0.0, (3.5,), (3.5,)),
     ]
-    with pytest.raises(
-        OntologyError, match=r"right turn from leg D to leg C must have a radius ≥ 2"
-    ):
+    with refuses(OntologyError):
         opendrive_from_owl(build_static(site(*legs, size=41.0)))
 
 
@@ -315,20 +314,20 @@ def test_lane_that_leads_nowhere() -> None:
 @pytest.mark.parametrize("count", [1, 6])
 def test_two_to_five_legs(count: int) -> None:
     legs = [leg("ABCDEF"[k], str(k + 1), 60.0 * k, (3.5,), (3.5,)) for k in range(count)]
-    with pytest.raises(OntologyError, match=rf"must have 2 to 5 legs .* got {count}"):
+    with refuses(OntologyError, count):
         opendrive_from_owl(build_static(site(*legs)))
 
 
 def test_legs_too_close_together() -> None:
     legs = [leg(n, str(k + 1), h, (3.5,), (3.5,)) for k, (n, h) in
             enumerate((("A", 270.0), ("B", 230.0), ("D", 0.0)))]  # fmt: skip
-    with pytest.raises(OntologyError, match="legs must be 45° apart at least, B and A are 40°"):
+    with refuses(OntologyError, "legs", "45"):
         opendrive_from_owl(build_static(site(*legs)))
 
 
 def test_map_that_exists() -> None:
     place = dataclasses.replace(crossroads(DEFAULT), map_file="Town05.xodr")
-    with pytest.raises(InputError, match=r"is the file 'Town05\.xodr'"):
+    with refuses(InputError, "Town05.xodr"):
         opendrive_from_owl(build_static(place))
 
 

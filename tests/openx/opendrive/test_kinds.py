@@ -2,9 +2,9 @@
 
 import itertools
 import math
-import re
 
 import pytest
+from tests.approval import refuses
 
 from bridgegen.base.errors import InputError
 from bridgegen.openx.opendrive.lanes import lane_pose
@@ -152,5 +152,5 @@ def test_a_sign_in_the_road_and_a_light_off_an_intersection_are_refused():
         return ox.Quad(quad.subject, quad.predicate, ox.Literal(1.0)) if sign else quad
 
     inside = Individuals(moved(quad) for quad in individuals("t-junction").quads)
-    with pytest.raises(OntologyError, match=re.escape("must stand beside the road, has_t [m]")):
+    with refuses(OntologyError, "has_t"):
         opendrive_from_owl(inside)

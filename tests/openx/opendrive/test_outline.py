@@ -6,6 +6,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 from shapely.geometry import LineString, Polygon
+from tests.approval import refuses
 
 from bridgegen.base.errors import InputError
 from bridgegen.openx.opendrive.model import Lane, OpenDrive, RoadMark, Width
@@ -102,5 +103,5 @@ def test_one_junction_of_town05(town05: OpenDrive) -> None:
 
 
 def test_no_such_junction(crossroads: Callable[..., OpenDrive]) -> None:
-    with pytest.raises(InputError, match="junction '7' is not in the road network; it has 100"):
+    with refuses(InputError, "100"):
         outline(crossroads(), "7")

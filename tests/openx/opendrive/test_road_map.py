@@ -4,6 +4,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from tests.approval import refuses
 
 from bridgegen.base.errors import FileFormatError
 from bridgegen.openx.convert import import_file
@@ -39,16 +40,14 @@ def test_an_import_is_its_map(road_map: Path, tmp_path: Path) -> None:
 def test_the_map_must_be_there(road_map: Path) -> None:
     owl, _ = import_file(road_map)
     road_map.rename(road_map.with_name("elsewhere.xodr"))
-    with pytest.raises(
-        FileFormatError, match=r"map\.owl: its map must be there .*map\.xodr: cannot"
-    ):
+    with refuses(FileFormatError, "map.owl"):
         load_map(owl)
 
 
 def test_the_map_must_be_what_it_was(road_map: Path) -> None:
     owl, _ = import_file(road_map)
     road_map.write_bytes(road_map.read_bytes() + b"\n")
-    with pytest.raises(FileFormatError, match=r"but has changed; import it again"):
+    with refuses(FileFormatError):
         load_map(owl)
 
 
@@ -61,7 +60,7 @@ def test_what_is_no_import(road_map: Path, tmp_path: Path) -> None:
         load_map(silent)
     for name, these in (("made", individuals("signals")), ("nothing", Individuals([]))):
         save(these, tmp_path / f"{name}.owl")
-        with pytest.raises(FileFormatError, match="must be a map that 'bridgegen import' made"):
+        with refuses(FileFormatError):
             load_map(tmp_path / f"{name}.owl")
-    with pytest.raises(FileFormatError, match="cannot be read"):
+    with refuses(FileFormatError):
         load_map(tmp_path / "nowhere.owl")

@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from tests.approval import approve, refuses
 
 from bridgegen.base.errors import InputError, UnsupportedError
 from bridgegen.openx.opendrive.from_owl import opendrive_from_owl
@@ -107,35 +108,29 @@ def test_several_and_none_is_named(town05: OpenDrive) -> None:
     with pytest.raises(InputError) as caught:
         find_site(town05, map_name="another.xodr")
     (problem,) = caught.value.problems
-    assert "another has 13 such, one of them must be named, or best: 53 (4 legs)" in problem
-    assert "965 (4 legs)" in problem
-    assert "1260 (3 legs)" in problem
+    approve(problem, "13", "53", "965", "1260")
 
 
 def test_no_such_junction(town05: OpenDrive) -> None:
-    with pytest.raises(
-        InputError, match="junction '1' is not in the road network; it has 53, 139,"
-    ):
+    with refuses(InputError, "53", "139"):
         find_site(town05, "1")
 
 
 def test_three_legs(town05: OpenDrive) -> None:
-    with pytest.raises(UnsupportedError, match=r"224 .* 4 legs .* got 3 \(roads 19, 20, 48\)"):
+    with refuses(UnsupportedError, "224", "19"):
         find_site(town05, "224")
 
 
 def test_no_junction_at_all(crossroads: Callable[..., OpenDrive]) -> None:
     empty = dataclasses.replace(crossroads(), junctions=())
-    with pytest.raises(UnsupportedError, match="crossroads has no junctions"):
+    with refuses(UnsupportedError):
         find_site(empty)
 
 
 def test_several_junctions_that_all_will_not_do(town05: OpenDrive) -> None:
     few = tuple(one for one in town05.junctions if one.id in ("224", "905"))
     roads = tuple(one for one in town05.roads if one.junction in ("-1", "224", "905"))
-    with pytest.raises(
-        UnsupportedError, match=r"none of that kind: 224 \(3 legs\), 905 \(3 legs\)"
-    ):
+    with refuses(UnsupportedError, "224", "905"):
         find_site(dataclasses.replace(town05, junctions=few, roads=roads))
 
 
@@ -248,13 +243,10 @@ def test_what_a_junction_lacks_is_one_error(town05: OpenDrive) -> None:
     with pytest.raises(UnsupportedError) as caught:
         site_for(load("red-light-runner"), town05, "685", "Town05.xodr")
     (problem,) = caught.value.problems
-    assert problem == (
-        "junction 685 of Town05 must have what red-light-runner uses, at one of 4 rotations; it "
-        "has 4 legs; missing: a traffic light on leg A; a traffic light on leg D"
-    )
-    with pytest.raises(InputError, match=r"motorway-merge takes place at a merge; .* has 0"):
+    approve(problem, "685", "red-light-runner")
+    with refuses(InputError, "motorway-merge"):
         site_for(load("motorway-merge"), town05, "685", "Town05.xodr")
-    with pytest.raises(UnsupportedError, match="a crosswalk where walker crosses"):
+    with refuses(UnsupportedError):
         site_for(load("pedestrian-at-night"), town05, "965")
 
 
@@ -299,7 +291,7 @@ def test_the_rotation_at_which_a_scenario_fits(crossroads: Callable[..., OpenDri
 def test_the_best_junction_of_a_town(town05: OpenDrive) -> None:
     best = site_for(unlit("red-light-runner"), town05, "best", "Town05.xodr")
     assert missing(unlit("red-light-runner"), town05, best) == []
-    with pytest.raises(UnsupportedError, match="pedestrian-at-night fits no junction of Town05"):
+    with refuses(UnsupportedError, "pedestrian-at-night"):
         site_for(load("pedestrian-at-night"), town05, "best", "Town05.xodr")
 
 
@@ -319,5 +311,5 @@ def test_a_route_that_ends_beyond_its_leg_is_shortened(town05: OpenDrive) -> Non
     end = placed.story.participants[0].end
     assert end is not None
     assert end.distance == pytest.approx(leg.length - 1.0)
-    assert "the route of ego ends" in note
+    approve(note, "route")
     assert adapted(scenario, town05, site) == (scenario, [])

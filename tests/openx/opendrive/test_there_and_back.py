@@ -23,6 +23,7 @@ import pyoxigraph as ox
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from tests.approval import refuses
 
 from bridgegen.openx.opendrive.from_owl import opendrive_from_owl
 from bridgegen.openx.opendrive.model import OpenDrive
@@ -243,7 +244,7 @@ def test_maps_that_others_made_are_not_made_again(town05: OpenDrive) -> None:
     from bridgegen.base.errors import UnsupportedError
 
     imported = individuals_from_opendrive(town05, "Town05.xodr")
-    with pytest.raises(UnsupportedError, match="one intersection in this version, got 21"):
+    with refuses(UnsupportedError, "21"):
         opendrive_from_owl(without_file(imported))
 
 

@@ -4,9 +4,9 @@ import dataclasses
 from collections.abc import Callable
 from typing import Any
 
-import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from tests.approval import refuses
 
 from bridgegen.base.errors import InputError
 from bridgegen.openx.opendrive import furniture, model, plan_view, user_data
@@ -153,5 +153,5 @@ def test_same_text_every_time(crossroads: Callable[..., OpenDrive]) -> None:
 def test_name_that_xml_cannot_hold(crossroads: Callable[..., OpenDrive]) -> None:
     made = crossroads()
     header = dataclasses.replace(made.header, name="a\x00b")
-    with pytest.raises(InputError, match="cannot be written as XML"):
+    with refuses(InputError):
         to_xml(dataclasses.replace(made, header=header))

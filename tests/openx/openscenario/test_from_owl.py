@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from tests.approval import refuses
 
 from bridgegen.base.errors import OntologyError, UnsupportedError
 from bridgegen.openx.openscenario import model as osc
@@ -423,7 +424,7 @@ def test_two_events_need_two_names(individuals, edited):
     again = edited(again, "bv_sets_off_action", "has_who", "bv")
     again = edited(again, "bv_sets_off_action", "has_what", "bv_sets_off_action")
     again = edited(again, "bv_sets_off_action", "has_when", "bv_sets_off_trigger")
-    with pytest.raises(OntologyError, match="events must have different names"):
+    with refuses(OntologyError, "events"):
         convert(again)
 
 
@@ -431,5 +432,5 @@ def test_lanes_must_go_on_along_the_leg(individuals, town, road, edited):
     narrow = town(C=(road("17", 11.614, "end", lanes=1), road("47", 54.414, "end")))
     source = individuals("crossroads-s1", site=narrow)
     near = edited(source, "ego_start", "has_distance", 5.0)
-    with pytest.raises(OntologyError, match="must continue on road 17, which has 1 lanes"):
+    with refuses(OntologyError, "road 17"):
         convert(near)

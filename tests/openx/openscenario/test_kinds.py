@@ -7,6 +7,7 @@ import pyoxigraph as ox
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from tests.approval import approve, refuses
 
 from bridgegen.base.errors import FileFormatError, OntologyError
 from bridgegen.openx.opendrive.from_owl import opendrive_from_owl
@@ -75,8 +76,8 @@ def test_a_word_that_is_not_allowed_is_found():
     )
     assert said in [str(one) for one in check(them, SCENARIO)]
     (found,) = check(them)  # by the names that the individuals state themselves
-    assert "a category has one of its names" in str(found)
-    with pytest.raises(OntologyError, match=r"manner must be one of .*, got 'wild'"):
+    approve(str(found), "category")
+    with refuses(OntologyError, "manner", "wild"):
         openscenario_from_owl(them, "made.xodr")
 
 
@@ -84,8 +85,7 @@ def test_a_formula_that_the_names_break_is_found():
     them = individuals(np.full(SPACE.n_var, 0.5))  # firm
     found = [str(one) for one in check(with_word(them, "gentle"), SCENARIO)]
     assert len(found) == 1
-    assert "deceleration = (2 if manner == gentle" in found[0]
-    assert "(= 2.2 with manner = gentle, wind_from = 360)" in found[0]
+    approve(found[0], "deceleration", "wind_from", "2.2")
 
 
 # -- a file whose text varies ----------------------------------------------------------------------
@@ -132,11 +132,11 @@ def test_weights_of_texts_are_kept():
 @pytest.mark.parametrize(
     ("name", "words", "message"),
     [
-        ("manner", ("gentle", "wild"), "parameter manner must be equalTo"),
-        ("nobody", ("x",), "declares no parameter 'nobody'"),
+        ("manner", ("gentle", "wild"), "parameter"),
+        ("nobody", ("x",), "nobody"),
     ],
 )
 def test_texts_that_cannot_vary_are_refused(name, words, message):
     made = exported()
-    with pytest.raises(FileFormatError, match=message):
+    with refuses(FileFormatError, message):
         ranges_of(made, of(name, *words))

@@ -4,6 +4,7 @@ from typing import Any
 
 import pytest
 from lxml import etree
+from tests.approval import refuses
 
 from bridgegen.base.errors import OntologyError
 from bridgegen.openx.opendrive.from_owl import opendrive_from_owl
@@ -88,18 +89,18 @@ def test_every_condition_can_be_run(individuals, condition):
 @pytest.mark.parametrize(
     ("action", "text"),
     [
-        (("SynchronizeAction", {"has_entity_ref": "<ego>"}), "must have has_position"),
+        (("SynchronizeAction", {"has_entity_ref": "<ego>"}), "has_position"),
         (("SynchronizeAction", {"has_entity_ref": "<leg_A>",
                                 "has_position": stories.on_lane("leg_A_in_1", 1.0),
                                 "has_master_position": stories.on_lane("leg_A_in_1", 1.0)}),
-         "must be a participant"),
+         "participant"),
         (("LaneOffsetAction", {}), "has_target_offset"),
-        (("LongitudinalDistanceAction", {"has_entity_ref": "<ego>"}), "must have one of has_kept"),
+        (("LongitudinalDistanceAction", {"has_entity_ref": "<ego>"}), "has_kept"),
         (("DeleteEntityAction", {}), "has_entity_ref"),
     ],
 )  # fmt: skip
 def test_what_they_lack_is_named(individuals, action, text):
-    with pytest.raises(OntologyError, match=text):
+    with refuses(OntologyError, text):
         story(individuals(), action)
 
 
@@ -108,7 +109,7 @@ def test_it_does_not_rain_and_snow_at_once(individuals):
     stage = stories.Stage(source)
     weather = source.link(source.one("Scenario"), "has_weather")
     stage.put(weather, "has_snow", stage.thing("snow", "Snow", {"has_snowfall": 1.0}))
-    with pytest.raises(OntologyError, match="has_rain or has_snow, not both"):
+    with refuses(OntologyError, "has_rain", "has_snow"):
         openscenario_from_owl(stage.individuals(), "road.xodr")
 
 

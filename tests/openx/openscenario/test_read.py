@@ -3,6 +3,7 @@ import re
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from tests.approval import approve, refuses
 
 from bridgegen.base.errors import FileFormatError, InputError, UnsupportedError
 from bridgegen.openx.openscenario.read import read
@@ -90,7 +91,7 @@ def test_a_flood_of_mistakes_is_cut_off(s4):
     with pytest.raises(UnsupportedError) as caught:
         read(data)
     assert len(caught.value.problems) == MAX_PROBLEMS + 1
-    assert caught.value.problems[-1] == "… and at least 950 more problems"
+    approve(caught.value.problems[-1], "950")
 
 
 @pytest.mark.parametrize(
@@ -99,15 +100,15 @@ def test_a_flood_of_mistakes_is_cut_off(s4):
         (b"", "not well-formed"),
         (b"<OpenSCENARIO>", "not well-formed"),
         (b"\x00\xff", "not well-formed"),
-        (b"<OpenDRIVE/>", "root element must be OpenSCENARIO, got OpenDRIVE"),
-        (b"<OpenSCENARIO/>", "must have FileHeader"),
+        (b"<OpenDRIVE/>", "OpenDRIVE"),
+        (b"<OpenSCENARIO/>", "FileHeader"),
         (b'<!DOCTYPE x [<!ENTITY a "b">]><OpenSCENARIO/>', "DOCTYPE"),
         (b'<!DOCTYPE x SYSTEM "file:///etc/passwd"><OpenSCENARIO/>', "DOCTYPE"),
         (b"<OpenSCENARIO>" + b"<Event>" * 100 + b"</Event>" * 100 + b"</OpenSCENARIO>", "deep"),
     ],
 )
 def test_hostile_and_broken_files(data, text):
-    with pytest.raises(FileFormatError, match=text):
+    with refuses(FileFormatError, text):
         read(data)
 
 

@@ -8,6 +8,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from lxml import etree
+from tests.approval import refuses
 
 from bridgegen.openx.openscenario import model as osc
 from bridgegen.openx.openscenario.element import Element, declaration, walk
@@ -231,12 +232,12 @@ def test_a_class_that_declares_nonsense_is_a_programming_error():
 @pytest.mark.parametrize(
     ("bad", "text"),
     [
-        (osc.Route("r", False, ()), "Route must have at least 2 Waypoint"),
+        (osc.Route("r", False, ()), "Waypoint"),
         (osc.Property("a", "\0"), "Property"),
         (osc.Property("a", "$a"), "reference"),
-        (osc.TransitionDynamics("sideways", "time", 0.0), "sideways"),
+        (osc.TransitionDynamics("sideways", "time", 0.0), "TransitionDynamics"),
     ],
 )
 def test_what_no_file_can_hold_is_not_written(bad, text):
-    with pytest.raises(ValueError, match=text):
+    with refuses(ValueError, text):
         fill(etree.Element("Any"), type(bad).__name__, bad, bare=False)

@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from lxml import etree
+from tests.approval import approve, refuses
 from tests.openx.openscenario.strangers import FILE, KNOWN, changed, moves_as, over_time
 
 from bridgegen.base.errors import BridgeGenError, FileFormatError, UnsupportedError
@@ -88,7 +89,7 @@ def pressing(active: str) -> str:
 def test_a_pedal_that_is_held_matters_and_one_that_is_let_go_of_does_not(plain, folder):
     whole, before = plain.read_text(), "<PrivateAction><LongitudinalAction>"
     plain.write_text(whole.replace(before, pressing("true"), 1))
-    with pytest.raises(UnsupportedError, match=r"ControllerAction .*in the ontology"):
+    with refuses(UnsupportedError, "ControllerAction"):
         import_file(plain, ego="Hero", strict=True)
     owl, _ = import_file(plain, ego="Hero")
     moves_as(plain, owl, folder)
@@ -186,7 +187,7 @@ def test_a_weather_that_contradicts_itself_is_noticed(individuals, s4):
     """Our own properties say one thing, the standard's elements another."""
     roads = opendrive_from_owl(individuals())
     data = re.sub(rb'visualRange="[^"]*"', b'visualRange="77"', s4)
-    with pytest.raises(UnsupportedError, match=r'visualRange="77.0" of Fog \(it would become'):
+    with refuses(UnsupportedError, "77.0"):
         individuals_from_openscenario(read(data), roads, "map.xodr")
 
 
@@ -217,7 +218,7 @@ def test_hostile_files_are_refused_like_any_other(folder):
     with pytest.raises(FileFormatError):
         import_file(folder / "bomb.xosc", partial=True)
     (folder / "map.xodr").unlink()
-    with pytest.raises(FileFormatError, match=r"map\.xodr: cannot be read"):
+    with refuses(FileFormatError, "map.xodr"):
         import_file(folder / "their.xosc", ego="Hero", strict=True)
     changed(folder, ('<LogicFile filepath="map.xodr"/>', ""))
     with pytest.raises(FileFormatError, match="needs a LogicFile"):
@@ -379,7 +380,7 @@ def test_what_never_begins_is_left_out_and_named(plain, folder):
     start = text.rindex("<StartTrigger>", 0, end)
     plain.write_text(text[:start] + "<StartTrigger/>" + text[end:])
     owl, (note,) = import_file(plain, ego="Hero")
-    assert "which never begins: its StartTrigger is empty" in note
+    approve(note, "StartTrigger")
     assert load_owl(owl).of_class("StoryboardEvent") == []
     moves_as(plain, owl, folder)
     now, _ = import_file(plain, folder / "now.owl", ego="Hero", empty_trigger="now")
@@ -431,10 +432,10 @@ def test_the_end_and_its_variables_come_in(plain, folder):
 @pytest.mark.parametrize(
     ("text", "problem"),
     [
-        ("<PrivateAction>", "has_openscenario of .* Premature|not well-formed|cannot be read"),
-        ("<Position/>", "must be PrivateAction or GlobalAction, got Position"),
-        ("<PrivateAction/>", "PrivateAction must have"),
-        ('<!DOCTYPE a [<!ENTITY b "c">]><PrivateAction>&b;</PrivateAction>', "DTD|entit"),
+        ("<PrivateAction>", "has_openscenario"),
+        ("<Position/>", "PrivateAction"),
+        ("<PrivateAction/>", "PrivateAction"),
+        ('<!DOCTYPE a [<!ENTITY b "c">]><PrivateAction>&b;</PrivateAction>', "entit"),
     ],
 )
 def test_what_is_quoted_is_not_trusted(plain, folder, text, problem):
@@ -445,5 +446,5 @@ def test_what_is_quoted_is_not_trusted(plain, folder, text, problem):
     first, last = whole.index(">", start) + 1, whole.index("</bg:has_openscenario>")
     hostile = text.replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;")
     owl.write_text(whole[:first] + hostile + whole[last:], "utf-8")
-    with pytest.raises(BridgeGenError, match=problem):
+    with refuses(BridgeGenError, problem):
         convert_file(owl, folder / "again")

@@ -3,6 +3,7 @@
 import re
 
 import pytest
+from tests.approval import approve, refuses
 from tests.openx.openscenario.strangers import KNOWN, line_of, moves_as, over_time
 
 from bridgegen.base.errors import InputError, UnsupportedError
@@ -70,7 +71,7 @@ def test_what_has_no_words_is_named_all_at_once(folder):
     for words in KNOWN:
         (problem,) = [one for one in caught.value.problems if words in one]
         assert problem.startswith(str(folder / "their.xosc"))
-        assert "cannot be said in the ontology" in problem
+        approve(problem, "ontology")
         place = line_of(words.partition(" of")[0])
         assert problem.endswith(f"(line {place})")
     assert not (folder / "their.owl").exists()
@@ -85,16 +86,16 @@ def test_in_part_the_rest_comes_in(folder):
 
 def test_the_first_entity_is_the_ego_where_none_is_called_so(plain, tmp_path):
     owl, notes = import_file(plain, tmp_path / "first.owl")
-    assert f"{plain}: Hero, the first entity, is the ego; --ego chooses another" in notes
+    approve(notes, plain, "--ego")
     named, _ = import_file(plain, tmp_path / "named.owl", ego="Hero")
     assert named.read_text("utf-8") == owl.read_text("utf-8")
 
 
 def test_the_ego_is_an_entity_of_the_file(plain):
-    with pytest.raises(InputError, match="no entity has the name 'Nobody'; there are Hero"):
+    with refuses(InputError, "Nobody"):
         import_file(plain, ego="Nobody")
     scenario = read(plain)
-    with pytest.raises(InputError, match="another entity has that name"):
+    with refuses(InputError):
         rename_entity(scenario, "Hero", "the other one")
     assert rename_entity(rename_entity(scenario, "Hero", "x"), "x", "Hero") == scenario
 
@@ -181,8 +182,8 @@ def test_who_cannot_be_said_takes_along_what_is_about_them(plain):
     second = text.rindex('vehicleCategory="car"')
     plain.write_text(text[:second] + 'vehicleCategory="train"' + text[second + 21 :])
     owl, left_out = import_file(plain, partial=True, ego="Hero", strict=True)
-    assert any("a Vehicle of the category train" in one for one in left_out)
-    assert any("the other one, an entity that is not stated" in one for one in left_out)
+    approve(left_out, "category")
+    approve(left_out, "entity")
     found = load_owl(owl)
     assert len(found.of_class("TrafficParticipant")) == 1
     assert found.of_class("Event") == []
@@ -231,8 +232,8 @@ def test_who_waits_for_what_cannot_be_said_goes_too(plain):
     lateral = event.replace("cartesianDistance", "lateral")
     plain.write_text(text[:start] + "\n".join([lateral, *more]) + text[end:])
     owl, left_out = import_file(plain, partial=True, ego="Hero", strict=True)
-    assert any("the Event third, which waits for second" in one for one in left_out)
-    assert any("the Event second, which waits for sets off!" in one for one in left_out)
+    approve(left_out, "second")
+    approve(left_out, "second")
     found = load_owl(owl)
     names = {found.text(one, "has_name") for one in found.of_class("Event")}
     assert names == {"fine", "fourth"}
@@ -265,7 +266,7 @@ def test_a_detail_does_not_keep_a_file_out(plain, folder, old, new, text):
     with pytest.raises(UnsupportedError):
         import_file(plain, ego="Hero", strict=True)
     owl, (note,) = import_file(plain, ego="Hero")
-    assert "details on which nothing depends that happens" in note
+    approve(note, "details")
     assert text in note
     assert check(load_owl(owl)) == []
     moves_as(plain, owl, folder)

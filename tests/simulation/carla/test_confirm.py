@@ -1,6 +1,7 @@
 """A run that is confirmed in CARLA: its scenarios, and where the two part."""
 
 import pytest
+from tests.approval import refuses
 
 import bridgegen as bg
 from bridgegen.base.errors import InputError
@@ -44,6 +45,6 @@ def test_without_a_server_what_was_confirmed_stays(folder, machine):
     path = folder / "confirmation-carla.json"
     before = path.read_bytes()
     machine.die()
-    with pytest.raises(InputError, match="no server answers"):
+    with refuses(InputError):
         confirm(folder, machine)
     assert path.read_bytes() == before

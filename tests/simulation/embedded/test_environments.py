@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from tests.approval import refuses
 
 from bridgegen.base.errors import UnsupportedError
 from bridgegen.drivers import _weather_columns as column
@@ -147,7 +148,7 @@ priority="override" maximumExecutionCount="1"><Action name="a">{fog}</Action><St
 def test_fog_in_a_box_is_refused():
     text = """<Fog visualRange="60"><BoundingBox><Center x="0" y="0" z="0"/>
 <Dimensions width="1" length="1" height="1"/></BoundingBox></Fog>"""
-    with pytest.raises(UnsupportedError, match="the BoundingBox of a Fog is not supported"):
+    with refuses(UnsupportedError, "BoundingBox"):
         felt(weather(text))
 
 

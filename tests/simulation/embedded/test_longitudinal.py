@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from tests.approval import approve
 
 from bridgegen.base.errors import UnsupportedError
 
@@ -364,7 +365,7 @@ def test_a_relative_speed_over_a_time_is_kept_from_then_on():
     names = ("ego", "lead", "bv")
     places = "".join(start(name, lane(1, 1, 90.0 - 20.0 * i), 0.0) for i, name in enumerate(names))
     (note,) = simulator(scenario(names, places, events(*rows)), None).program.notes
-    assert 'continuous="true" over a time: there in time, and kept from then on' in note
+    approve(note, "continuous")
 
 
 UNSUPPORTED = {

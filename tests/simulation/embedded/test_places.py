@@ -8,6 +8,7 @@ import math
 
 import numpy as np
 import pytest
+from tests.approval import approve, refuses
 
 from bridgegen.base.errors import InputError, UnsupportedError
 from bridgegen.engine.simulate import simulate_file
@@ -161,10 +162,10 @@ def test_rows_may_vary_a_position():
 
 
 def test_a_position_that_is_nowhere():
-    with pytest.raises(InputError, match=r"test.xosc, line \d+: road 3 has lanes"):
+    with refuses(InputError, "test.xosc", "road 3"):
         placed(position("LanePosition", orientation(math.pi), roadId=3, laneId=7, s=20))
     rollout = placed(position("RelativeLanePosition", entityRef="third", dLane=9, ds=0))
-    assert STATUS_MESSAGES[int(rollout.status[0])] == "a position that is not on the road network"
+    approve(STATUS_MESSAGES[int(rollout.status[0])])
 
 
 def test_straight_on_across_the_junction():
@@ -323,7 +324,7 @@ def test_a_lane_of_a_route_that_is_no_number():
 <Waypoint routeStrategy="shortest">{lane(1, -1, 80.0)}</Waypoint></Route></RouteRef>
 <InRoutePosition><FromLaneCoordinates pathS="30" laneId="left"/></InRoutePosition></RoutePosition>
 </Position>"""
-    with pytest.raises(UnsupportedError, match=r'laneId="left" \(a whole number is needed\)'):
+    with refuses(UnsupportedError):
         placed(text)
 
 
@@ -435,7 +436,7 @@ def test_without_roads_everybody_goes_by_the_world(tmp_path, network):
     assert rollout.x[0, 0] == pytest.approx(10.0)
     assert rollout.y[0, 0, 200] == pytest.approx(40.0)
     file.write_text(text.replace("map.xodr", "none.xodr"))
-    with pytest.raises(InputError, match=r"none\.xodr: cannot be read"):
+    with refuses(InputError, "none.xodr"):
         simulate_file(file)
 
 

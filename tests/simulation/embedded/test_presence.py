@@ -6,6 +6,7 @@ the instants are 0.05 s apart. A car is 4 m long, its front 3.4 m ahead of its r
 
 import numpy as np
 import pytest
+from tests.approval import refuses
 
 from bridgegen.base.errors import InputError, UnsupportedError
 from bridgegen.drivers import DRIVERS
@@ -310,11 +311,11 @@ def test_who_comes_back_may_count_from_where_it_went():
 
 
 def test_who_is_never_there_is_a_mistake():
-    with pytest.raises(InputError, match="'bv' needs an initial TeleportAction, or an AddEntity"):
+    with refuses(InputError, "bv", "TeleportAction"):
         scene(privates=LATER)
     come = ("come", (add("ego", lane(3, 1, 60.0)),), after(2.0))
     text = scenario(("ego", "cv"), LATER, act(come))
-    with pytest.raises(InputError, match="'ego' needs an initial"):
+    with refuses(InputError, "ego"):
         run(text)
     assert not run(text, None).present[0, 0, :40].any()  # the storyboard's ego may come later
 
@@ -348,7 +349,7 @@ def test_a_driver_of_one_s_own_is_told_who_is_there():
 
 
 def test_the_ego_that_a_driver_drives_does_not_go():
-    with pytest.raises(UnsupportedError, match="DeleteEntityAction of the ego, which a driver"):
+    with refuses(UnsupportedError, "DeleteEntityAction"):
         scene(("gone", (delete("ego"),), after(2.0)))
     rollout = scene(("gone", (delete("ego"),), after(2.0)), ego=None)
     assert there(rollout, "ego") == (0, 40)

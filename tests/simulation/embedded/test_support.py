@@ -6,6 +6,7 @@ from types import UnionType
 from typing import Annotated, Union, get_args, get_origin, get_type_hints
 
 import pytest
+from tests.approval import refuses
 
 from bridgegen.base.errors import UnsupportedError
 from bridgegen.openx.openscenario import model as osc
@@ -48,7 +49,7 @@ def test_the_simulator_does_what_the_page_says(name: str, runs: str):
     if runs == "yes":
         assert run(EXAMPLES[name]).status[0] == 0
     else:
-        with pytest.raises(UnsupportedError, match=r"test\.xosc, line \d+: .*not supported"):
+        with refuses(UnsupportedError, "test.xosc"):
             run(EXAMPLES[name])
 
 

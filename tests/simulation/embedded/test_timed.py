@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from tests.approval import refuses
 
 from bridgegen.base.errors import InputError, UnsupportedError
 from bridgegen.drivers import DRIVERS
@@ -87,7 +88,7 @@ def test_the_ego_too_and_nobody_drives_it():
     assert out.n_steps[0] == 201  # the end of its line is not the scenario's
     made = EmbeddedSimulator(read(text.encode()), "test")
     assert made.driver == "storyboard"
-    with pytest.raises(UnsupportedError, match="the driver 'reference' cannot drive an ego"):
+    with refuses(UnsupportedError, "reference"):
         play(text, "reference")
 
 
@@ -141,27 +142,27 @@ def test_events_tell_when_they_began():
 @pytest.mark.parametrize(
     ("privates", "events", "text"),
     [
-        (timed("bv", vertex(0, 0.0, 0.0), vertex(None, 1.0, 0.0)), "", "a Vertex without a time"),
-        (timed("bv", vertex(1, 0.0, 0.0), vertex(1, 1.0, 0.0)), "", r"at 1 s after one at 1 s"),
+        (timed("bv", vertex(0, 0.0, 0.0), vertex(None, 1.0, 0.0)), "", "Vertex"),
+        (timed("bv", vertex(1, 0.0, 0.0), vertex(1, 1.0, 0.0)), "", "1 s"),
         (timed("bv", *LINE, more=' initialDistanceOffset="3"'), "", 'initialDistanceOffset="3'),
     ],
 )  # fmt: skip
 def test_refusals(privates, events, text):
-    with pytest.raises(UnsupportedError, match=text):
+    with refuses(UnsupportedError, text):
         play(scenario(("ego", "bv"), EGO + privates, events))
 
 
 @pytest.mark.parametrize(
     ("vertices", "text"),
     [
-        ([vertex(0, 0.0, 0.0), vertex("INF", 1.0, 0.0)], "a Vertex at inf s"),
+        ([vertex(0, 0.0, 0.0), vertex("INF", 1.0, 0.0)], "Vertex"),
         ([vertex(0, 0.0, 0.0), '<Vertex time="1"><Position><WorldPosition x="INF" y="0"/>'
-          "</Position></Vertex>"], "must be finite"),
-        ([vertex(0, 0.0, 0.0), vertex(1, 1e6, 0.0)], "at most 100000 m long, got 1e[+]06 m"),
+          "</Position></Vertex>"], "finite"),
+        ([vertex(0, 0.0, 0.0), vertex(1, 1e6, 0.0)], "100000 m"),
     ],
 )  # fmt: skip
 def test_hostile_numbers(vertices, text):
-    with pytest.raises(InputError, match=text):
+    with refuses(InputError, text):
         play(scenario(("ego", "bv"), EGO + timed("bv", *vertices)))
 
 

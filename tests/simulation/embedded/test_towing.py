@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from tests.approval import approve, refuses
 
 from bridgegen.assess.conflict.analysis import Responsible, analyse
 from bridgegen.assess.conflict.plausibility import plausibility
@@ -180,9 +181,7 @@ def test_the_ego_s_trailer_is_part_of_it():
     found = analyse(wide)
     assert found.body[0].tolist() == [0, 2, 0]
     assert Responsible(int(found.responsible[0, 1])) == Responsible.EGO
-    assert sentence(found, 0, 1).startswith(
-        "The front of the ego's trailer struck the left side of 'walker' at 5.0 m/s"
-    )
+    approve(sentence(found, 0, 1), "walker", "5.0 m/s")
     assert plausibility(wide).labels == [""]  # it is the ego's, not others', collision
 
 
@@ -300,5 +299,5 @@ def test_a_vehicle_that_tows_itself():
     ring = trailer("a", f'<TrailerHitch dx="-1"/>{behind("b")}')
     ring += trailer("b", f'<TrailerHitch dx="-1"/>{behind("a")}')
     text = scenario(("ego", "bv"), EGO + SOUTH).replace("</Entities>", ring + "</Entities>")
-    with pytest.raises(UnsupportedError, match="'a' as a trailer of itself"):
+    with refuses(UnsupportedError):
         run(text, None)

@@ -1,6 +1,7 @@
 """Values that change as the scenario runs: parameters, variables, the time of day, lights."""
 
 import pytest
+from tests.approval import refuses
 
 from bridgegen.base.errors import UnsupportedError
 
@@ -268,5 +269,5 @@ def test_a_light_changes_after_an_entity_is_deleted_that_has_its_number():
 
 def test_an_end_beyond_all_numbers_is_refused():
     text = scenario(("ego",), start("ego", lane(1, 1, 60.0), 5.0))
-    with pytest.raises(UnsupportedError, match="the stop trigger's simulation time must take 1 to"):
+    with refuses(UnsupportedError):
         simulator(text.replace('value="10.0" rule', 'value="1e308" rule'))

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from tests.approval import refuses
 
 import bridgegen as bg
 from bridgegen.assess.cause import Cause
@@ -124,7 +125,7 @@ def test_an_exported_file_states_it_and_does_the_same(vehicle, tmp_path):
     text = path.read_text()
     assert f'"vehicle" value="{vehicle}"' in text
     path.write_text(text.replace(f'"vehicle" value="{vehicle}"', '"vehicle" value="tank"'))
-    with pytest.raises(InputError, match=r"one.xosc, line \d+: property vehicle: .*'tank'"):
+    with refuses(InputError, "one.xosc", "tank"):
         simulate_file(path)
     assert vehicle not in str(with_vehicle(read(text.encode(), "one.xosc"), "kinematic"))
 
@@ -146,13 +147,11 @@ def test_a_run_records_it_and_resumes_with_it(tmp_path):
 
 
 def test_where_it_cannot_be():
-    with pytest.raises(
-        UnknownNameError, match="'tank'; known: kinematic, multi-body, single-track"
-    ):
+    with refuses(UnknownNameError, "tank", "multi-body"):
         made(vehicle="tank")
     file = made().runner.concrete(rows(made())[0]).storyboard
     simulator = SimulatorChoice("esmini")
-    with pytest.raises(InputError, match="'single-track' is of the embedded simulator; esmini"):
+    with refuses(InputError, "single-track"):
         simulator.around(EmbeddedSimulator(file, "here", vehicle="single-track"), file)
 
 
@@ -167,9 +166,7 @@ def changed(tmp_path, old, new):
 
 def test_a_multi_body_is_a_car_s(tmp_path):
     lorry = changed(tmp_path, "type: car", "type: truck")
-    with pytest.raises(
-        InputError, match=r"the vehicle 'multi-body' must be a car without a trailer, .* a truck"
-    ):
+    with refuses(InputError, "multi-body"):
         made(lorry, vehicle="multi-body")
     single = made(lorry)
     assert (single.rollout(rows(single)).status == 0).all()
