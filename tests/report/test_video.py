@@ -12,7 +12,8 @@ from PIL import Image, ImageColor
 
 from bridgegen.base.errors import InputError, StorageError
 from bridgegen.pages import video as ffmpeg
-from bridgegen.pages.frames import FINE, PLAYERS, Film, _overlap
+from bridgegen.pages.birdseye import PLAYERS, View, overlap
+from bridgegen.pages.frames import FINE, Film
 from bridgegen.pages.video import write_video
 
 
@@ -44,10 +45,11 @@ def test_the_same_bytes_twice(playback, tmp_path):
     assert (tmp_path / "a.gif").read_bytes() == (tmp_path / "b.gif").read_bytes()
 
 
-def test_the_ego_moves_as_it_does(playback):
+def test_the_ego_moves_as_it_does(playback, monkeypatch):
     """Without labels or trails: bodies alone, the camera at rest."""
     film = Film(playback, (960, 540), 0, 60)
-    film._draw_labels = film._draw_trail = lambda *_: None
+    monkeypatch.setattr(View, "labels", lambda *_: None)
+    monkeypatch.setattr(View, "trail", lambda *_: None)
     film._follows, film._middle = False, film.centres[0, 40]
     ahead = playback.entities[0].center_ahead
     pixels, metres = [], []
@@ -62,16 +64,16 @@ def test_the_ego_moves_as_it_does(playback):
     assert moved == pytest.approx(np.subtract(*metres), abs=0.3)
 
 
-def test_no_label_covers_the_contact(playback):
+def test_no_label_covers_the_contact(playback, monkeypatch):
     hit = replace(playback, distance=np.where(np.arange(401) < 100, 5.0, 0.0))
     film = Film(hit, (960, 540), 60, 130)
-    drawn, pill = [], film._pill
-    film._pill = lambda *given: drawn.append(pill(*given)) or drawn[-1]
+    drawn, pill = [], View.pill
+    monkeypatch.setattr(View, "pill", lambda *given: drawn.append(pill(*given)) or drawn[-1])
     film.frame(110)
     u, v = film.contact(110)
     cross = (FINE * u - 14, FINE * v - 14, FINE * u + 14, FINE * v + 14)
     assert len(drawn) >= 3  # the clock and two labels
-    assert [one for one in drawn if _overlap(one, cross)] == []
+    assert [one for one in drawn if overlap(one, cross)] == []
 
 
 def test_the_contact_is_red_in_a_gif_that_ends_elsewhere(playback, tmp_path):

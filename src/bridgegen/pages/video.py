@@ -14,7 +14,8 @@ from PIL import Image
 
 from bridgegen.base.disk import write_whole
 from bridgegen.base.errors import InputError, StorageError
-from bridgegen.pages.frames import HIT, Film
+from bridgegen.pages.birdseye import HIT
+from bridgegen.pages.frames import Film
 from bridgegen.pages.playback import Playback
 
 # --- Films as MP4 or WebM: frames are piped to the program ffmpeg ---

@@ -14,6 +14,7 @@ from bridgegen.drivers.kinds import BICYCLE, MOTORCYCLE, NAMES, PEDESTRIAN
 from bridgegen.jobs.mine import near_misses as conflicts
 from bridgegen.jobs.mine.mine import CRITICAL, PATHS_SHOWN, Mined, Summary
 from bridgegen.pages import charts, exposure, templates
+from bridgegen.pages.moving import moving_picture
 from bridgegen.pages.templates import counted
 from bridgegen.recordings.cells import cell
 from bridgegen.recordings.events.playback import SHOWN, caption
@@ -21,7 +22,6 @@ from bridgegen.recordings.events.tables import FOLDER, against_in_words, kind_ro
 from bridgegen.recordings.events.tables import HEAD as EVENTS_HEAD
 from bridgegen.recordings.events.tables import TABLE as EVENTS
 from bridgegen.recordings.lanes.account import LanesFound
-from bridgegen.recordings.replays.write import moving_picture
 from bridgegen.recordings.scenarios.files import ENDINGS
 from bridgegen.recordings.scenarios.files import FOLDER as SCENARIOS
 from bridgegen.recordings.scenarios.mined import MinedScenario, Unmade

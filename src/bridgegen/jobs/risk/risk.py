@@ -36,7 +36,7 @@ from bridgegen.jobs.risk.result import Likely, Risk
 from bridgegen.jobs.search.run import Run
 from bridgegen.jobs.search.scenario_files import write_scenario
 from bridgegen.jobs.search.scenarios import driven_by, load
-from bridgegen.recordings.replays.write import moving_picture
+from bridgegen.pages.moving import moving_picture
 from bridgegen.results.store import Store
 from bridgegen.scenario.exposure import Exposure
 from bridgegen.scenario.exposure.fit import Fit, fit_exposure
