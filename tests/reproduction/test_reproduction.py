@@ -21,7 +21,6 @@ from shapely.geometry import Point, box
 import bridgegen as bg
 from bridgegen.base.errors import InputError, Interrupted, StorageError
 from bridgegen.cli import main
-from bridgegen.jobs.compare.figures import DARK
 from bridgegen.jobs.compare.runs import RunsProgress
 from bridgegen.jobs.search.restored import pipeline_of
 from bridgegen.results.store import Store
@@ -35,6 +34,7 @@ from bridgegen_reproduction import (
 )
 from bridgegen_reproduction.figures.crossroads import collision_points, crossing_of
 from bridgegen_reproduction.figures.fronts import spread_curve
+from bridgegen_reproduction.figures.look import DARK
 from bridgegen_reproduction.protocol import PRINTED
 from bridgegen_reproduction.runs import of
 

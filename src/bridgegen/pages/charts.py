@@ -102,19 +102,28 @@ class Plot:
                 "rect", class_="bar", x=a, y=y, width=max(b - a - 1.0, 0.5), height=self.base - y
             )
 
-    def band(self, x: Float, low: Float, high: Float) -> None:
+    def band(self, x: Float, low: Float, high: Float, kind: str = "band") -> None:
         """Add the area between two curves."""
         points = self._points(np.concatenate([x, x[::-1]]), np.concatenate([high, low[::-1]]))
-        self.add("polygon", class_="band", points=points)
+        self.add("polygon", class_=kind, points=points)
 
-    def line(self, x: Float, y: Float, kind: str = "line") -> None:
+    def line(self, x: Float, y: Float, kind: str = "line", dash: str | None = None) -> None:
         """Add a curve."""
-        self.add("polyline", class_=kind, points=self._points(x, y))
+        points = self._points(x, y)
+        self.add("polyline", class_=kind, stroke_dasharray=dash, points=points)
 
     def dots(self, x: Float, y: Float, radius: float = 1.8) -> None:
         """Add a dot for each pair of values."""
         for a, b in zip(self._x(x).tolist(), self._y(y).tolist(), strict=True):
             self.add("circle", class_="dot", cx=a, cy=b, r=radius)
+
+    def grid(self, x: int = 0, y: int = 0) -> None:
+        """Add lines at so many round numbers of each axis, as `frame` has them."""
+        for tick in ticks(*self._ranges[0], x) if x else ():
+            self.add("path", class_="grid", d=f"M{self.at(tick):.1f} {self.base:g}V{self.top:g}")
+        for tick in ticks(*self._ranges[1], y) if y else ():
+            y_ = self.height(tick)
+            self.add("path", class_="grid", d=f"M{self.left:g} {y_:.1f}H{self.right:g}")
 
     def image(self, address: str) -> None:
         """Add a picture that fills the plot."""
