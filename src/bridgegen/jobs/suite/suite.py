@@ -294,6 +294,8 @@ def work(job: Job, say: Callable[..., None]) -> EntryResult:
 
 def _append(path: Path, text: str) -> None:
     try:
+        # A line a result, synced: what was run is kept whatever happens; a torn last line is
+        # dropped by `_read`.
         with path.open("ab") as file:
             file.write(text.encode())
             file.flush()
@@ -315,6 +317,7 @@ def _done(
         line = Header(settings=settings).model_dump_json() + "\n"
         write_whole(path, [line.encode()])
         return {}
+    # Through JSON, as the file has them: tuples are lists there.
     if header.settings != json.loads(json.dumps(settings)):
         other = [name for name in settings if header.settings.get(name) != settings[name]]
         raise StorageError(
@@ -344,6 +347,7 @@ def _read(path: Path) -> tuple[Header | None, list[EntryResult], bool]:
         StorageError: it cannot be read, or is damaged.
     """
     try:
+        # A results file may come from others: its size is bounded before it is read.
         size = path.stat().st_size
         if size > MOST_BYTES:
             raise StorageError(f"{path}: may have at most {MOST_BYTES} bytes, got {size}")

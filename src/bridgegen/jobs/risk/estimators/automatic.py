@@ -53,6 +53,7 @@ def estimate(
         part = replace(aim, budget=int(SECOND_SHARE * (aim.budget - spent)))
         found = subset.estimate(problem, part, seed + 1)
         spent += found.evaluations
+        # Subset simulation is not believed below what importance sampling has shown at least.
         if not found.doubts and found.probability(aim.threshold).high >= least:
             why = f"{why}, and importance sampling is in doubt ({doubt})"
             return "subset", why, replace(found, evaluations=spent)
