@@ -24,6 +24,7 @@ app = Application(
     help="Search an operational design domain for scenarios in which a driving stack fails.",
     invoke_without_command=True,
     pretty_exceptions_enable=False,
+    # Rich's markup takes 0.1 s to import; `PanelledGroup` prints the panels as plain text.
     rich_markup_mode=None,
 )
 listing = Application(
@@ -91,6 +92,8 @@ def main() -> None:
 
     def terminate(number: int, frame: object) -> None:
         terminations.append(number)
+        # SIGTERM ends a search as Ctrl-C does: the batch is recorded, and worker processes are
+        # ended.
         raise KeyboardInterrupt
 
     before = signal.signal(signal.SIGTERM, terminate)

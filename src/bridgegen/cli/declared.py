@@ -44,6 +44,7 @@ def expand(
         folded = fold({name: values.pop(name) for name in options})
         command(**values, **{parameter: folded})
 
+    # typer reads a command's signature and annotations; both have to say the expanded options.
     wrapper.__signature__ = signature.replace(parameters=parameters)  # type: ignore[attr-defined]
     wrapper.__annotations__ = {item.name: item.annotation for item in parameters}
     return wrapper

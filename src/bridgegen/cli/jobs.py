@@ -82,6 +82,7 @@ def command_of(job: Job) -> Any:
             chosen = common.read_simulator(simulator, simulator_set, connection)
             options = replace(options, simulator=chosen) if chosen else options
         with JobProgress() as live:
+            # Criteria are read before, so that a mistake in them costs no run.
             result = job.run(replace(options, callbacks=live.callbacks))
         _print(result, live.seconds, as_json=as_json)
         if not print_outcomes(judges.judge(result)):

@@ -242,6 +242,7 @@ def _moved(key: Key, value: Any, move: Callable[[str], object]) -> Any:
     moved = str(move(value))
     is_file = value.lower().endswith((*_YAML, ".xosc", ".csv"))
     is_path = is_file or Path(value).is_dir() or Path(moved).is_dir()
+    # A name of the catalogue stays a name, also in a file of another folder.
     return moved if key.name in _FILES and is_path else value
 
 
@@ -279,6 +280,7 @@ def is_recorded(out: Path, values: Values, keys: Mapping[str, Key]) -> bool:
     record = out.parent / f"{out.name}.yaml"
     text = _text(record, values, keys)
     if record.is_file():
+        # Compared as data: comments and order that people have changed are no other options.
         if read_run_document(record).data != read_plain_yaml(text.encode(), "").data:
             raise StorageError(
                 f"{record}: the run in {out} was begun with these other options; name another "
@@ -360,6 +362,7 @@ def with_run_files(
             given = {
                 name: value
                 for name, value in values.items()
+                # Only what the command line states overrides a file: its parser's defaults do not.
                 if str(getattr(context.get_parameter_source(name), "name", "")) == "COMMANDLINE"
             }
             save = values.pop(SAVE)

@@ -66,6 +66,8 @@ def search_all(
         values = {**filed_run.values, "out": out}
         print(f"\n{filed_run.name}", flush=True)
         try:
+            # A folder's options are recorded before its run begins: a second call resumes, and
+            # other options are refused.
             if not is_recorded(out, values, keys):
                 command(values)
             elif Run(out).finished and Run(out).report.is_file():

@@ -79,6 +79,7 @@ class Camera:
         half = np.array(self.half) / self.scale
         low, high = points.min(axis=0), points.max(axis=0)
         middle = np.array([self.x, self.y])
+        # By bounding boxes: a shape too many costs a line, one too few would be missing.
         return bool((low <= middle + half).all() and (high >= middle - half).all())
 
 

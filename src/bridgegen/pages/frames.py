@@ -133,6 +133,7 @@ class Film:
     def frame(self, k: int) -> Image.Image:
         """Return the picture of an instant."""
         camera = self._camera(k)
+        # The road is drawn anew only where the camera moves.
         if self._ground is None or self._ground[0] != camera:
             ground = Image.new("RGB", self._big, GROUND)
             View(Pixels(ground), camera, self._unit).road(self.playback.lanes)

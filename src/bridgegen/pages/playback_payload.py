@@ -171,6 +171,7 @@ def _sensed(s: Sensed, p: Playback) -> dict[str, Any]:
         cos, sin = np.cos(p.h[e, k]), np.sin(p.h[e, k])
         turn = s.h[e, kept][detected] - p.h[e, k]
         columns = [
+            # Relative to the body: small numbers, which deflate well.
             (s.x[e, kept][detected] - (p.x[e, k] + body.center_ahead * cos)) * SCALE["length"],
             (s.y[e, kept][detected] - (p.y[e, k] + body.center_ahead * sin)) * SCALE["length"],
             (turn - 2.0 * math.pi * np.round(turn / (2.0 * math.pi))) * SCALE["h"],

@@ -97,6 +97,7 @@ def playbacks(
         )
         for k, (name, evaluation, files) in enumerate(kept)
     ]
+    # Export and page share one simulation of the kept rows; each made its own before.
     replays = pipeline.replays(some.X, plans=not brief) if replays is None else replays
     played = _all_played(pipeline, shown, replays, brief=brief)
     return played if brief else beside_others(played, some.X, others_of(pipeline))

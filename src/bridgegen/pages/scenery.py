@@ -48,6 +48,7 @@ class Scenery:
         """Return the drawing of a row's road network, the same objects for the same network."""
         space, source = self._runner.space, self._runner.source
         names = (*source.variant_names, *source.static_names)
+        # Rows of one road network share one drawing, and a page holds it once.
         key = x[[space.index(name) for name in names]].tobytes()
         if key not in self._known:
             model = self._runner.concrete(x).roads

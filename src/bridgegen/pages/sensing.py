@@ -8,6 +8,7 @@ from bridgegen.drivers.kinds import NAMES
 from bridgegen.pages.playback import Sensed
 from bridgegen.simulation.rollout import Rollout
 
+# The strictest of nuScenes's average precision, from which on a detection is no hit.
 TOLERANCE = float(THRESHOLDS[0])
 """Largest distance of a matching detection at the strictest of nuScenes's thresholds [m]."""
 
@@ -19,6 +20,7 @@ def sensed(rollout: Rollout) -> list[Sensed]:
     """
     if not rollout.detections.size:
         return []
+    # Which entities count is taken from the metrics, so that page and figures agree.
     counts = perceived(rollout).counts
     found = []
     for row, n_steps in enumerate(rollout.n_steps.tolist()):

@@ -67,6 +67,7 @@ class Live:
         if self._count.is_set() or is_compiled():
             return
         self.console.print("First run: compiling the simulator; later runs start at once.")
+        # Compilation blocks this thread, so another one counts.
         threading.Thread(target=self._count_kernels, daemon=True).start()
 
     def _count_kernels(self) -> None:

@@ -19,6 +19,7 @@ from bridgegen.cli.verdict.fail_if import Outcome
 
 Problem = Literal["failure", "error", "skipped"]
 
+# XML 1.0 has no other characters, not even escaped; names come from files of others.
 _ILLEGAL = re.compile("[^\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 _PROBLEMS: Mapping[str, Problem | None] = {
     "passed": None,

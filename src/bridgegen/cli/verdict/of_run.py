@@ -126,6 +126,7 @@ class PassFailCriteria:
         The first outcome is whether the run supports a verdict; without criteria and JUnit XML
         there is none but that, and it only where the run was not judged.
         """
+        # A run that says nothing of its driver never passes, whatever was asked.
         if not self.conditions and self.junit is None:
             return () if run.verdict != NOT_JUDGED else (_searched(run),)
         figures = figures_of(run)
@@ -133,6 +134,8 @@ class PassFailCriteria:
             *(condition.judge(figures) for condition in self.conditions),
             *(_outcome_of(criterion) for criterion in run.criteria),
         )
+        # What is critical is the product of a search, so it fails nothing by itself: tests fail in
+        # the XML exactly where the exit status is 3.
         outcomes = (_searched(run), *unless_judged(stated, _why_not(run), _NOT_OF_THE_EGO))
         if self.junit is not None:
             write_junit(self.junit, _suites(run, outcomes))
@@ -157,6 +160,7 @@ def figures_of(run: Run) -> dict[str, float]:
         **_of_triage(run),
     }
     figures |= {criterion.criterion.quantity: criterion.violated for criterion in run.criteria}
+    # Nothing was measured: each figure is unknown, an error and not a pass.
     if s.failed == s.evaluations:
         figures = dict.fromkeys(figures, nan)
     return figures | {"evaluations": s.evaluations, "failed": s.failed, "seconds": s.seconds}
@@ -229,6 +233,8 @@ def _suites(run: Run, outcomes: Sequence[Outcome]) -> list[Suite]:
         facts |= {f"mode {mode.number}": mode_in_words(mode, run.triage) for mode in run.modes}
     cases = [case_of(group, outcome) for outcome in outcomes]
     broken = [outcome for outcome in outcomes if outcome.verdict == "failed"]
+    # Jenkins' schema (junit-10.xsd) allows properties of a suite and not of a test: each scenario
+    # is a suite of its own.
     scenarios = [_scenario(run, path, name, group, broken) for path in run.scenarios]
     return [Suite(f"{name} criteria", cases, facts, run.summary.seconds), *scenarios]
 

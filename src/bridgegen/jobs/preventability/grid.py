@@ -164,6 +164,8 @@ class Grid:
             if bound.hi is not None:
                 hi = np.minimum(hi, bound.hi.evaluate(table))
         value = given[name] if name in given else np.full(n, self.space.defaults[name])
+        # A cell that breaks a constraint stays empty; moving it inside would show another cell's
+        # outcome in its place.
         ok &= (value >= lo - slack(lo)) & (value <= hi + slack(hi))
         return value
 
