@@ -298,6 +298,7 @@ def _text(path: Path, values: Values, keys: Mapping[str, Key]) -> str:
 
     folder = path.resolve().parent
     data = {}
+    # In the order of the command's options, whatever the order of the call.
     for spelling, key in keys.items():
         if key.name in values:
             value = _moved(key, values[key.name], lambda name: os.path.relpath(name, folder))

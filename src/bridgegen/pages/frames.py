@@ -52,6 +52,8 @@ class Film:
         path = path[np.isfinite(path).all(axis=1)]
         low, high = path.min(axis=0) - _MARGIN, path.max(axis=0) + _MARGIN
         fit = min(self._big[0] / (high[0] - low[0]), 0.8 * self._big[1] / (high[1] - low[1]))
+        # A scale at which cars can be told apart matters more than the whole path: then the camera
+        # follows.
         self._follows = bool(fit < _SCALE[0] * self._unit)
         self._scale = float(np.clip(fit, _SCALE[0] * self._unit, _SCALE[1] * self._unit))
         self._middle = 0.5 * (low + high)
@@ -110,6 +112,8 @@ class Film:
         ego, other = (
             view.corners(self.playback.entities[e], self._poses[e, k]) for e in (0, self.partner)
         )
+        # Points on all edges: the cross stands between the two that are nearest, wherever the
+        # bodies touch.
         grid = np.linspace(0.0, 1.0, 21)[:, np.newaxis]
         edges = [
             np.concatenate([a + grid * (b - a) for a, b in zip(c, np.roll(c, 1, 0), strict=True)])

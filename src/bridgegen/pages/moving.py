@@ -44,6 +44,7 @@ def moving_picture(
         follow: metres from top to bottom of a view that follows the ego; by default the view holds
             the whole paths of both.
     """
+    # From left to right: the picture is wide.
     motion = _turned(motion)
     kinds = [NAMES[code] for code in motion.kinds.tolist()] or ["car"] * len(motion.names)
     entities = bodies(motion, dict(zip(motion.names, kinds, strict=True)))[:most]

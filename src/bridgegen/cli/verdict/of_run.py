@@ -275,6 +275,7 @@ def _scenario(run: Run, path: Path, name: str, group: str, broken: Sequence[Outc
 
 def _contributes(facts: Facts, figures: Sequence[str]) -> bool:
     """Return whether a critical scenario contributes to a failed criterion, by its quick cause."""
+    # The figures of a run count quick causes; a file may state the tested one.
     cause = facts.quick_cause if "quick_cause" in facts.model_fields_set else facts.cause
     for name in figures:
         if name.startswith(PREFIX):

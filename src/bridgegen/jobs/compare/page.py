@@ -36,6 +36,8 @@ def write_page(comparison: Comparison) -> None:
         (comparison.folder / FIGURES).mkdir(exist_ok=True)
     except OSError as error:
         raise StorageError(f"{comparison.folder}: cannot be written: {error.strerror}") from None
+    # Durations differ each time: they have a file of their own, and the page is the same to the
+    # byte.
     settled = [measure for measure in comparison.measures if not measure.timed]
     templates.write_page(
         comparison.page,

@@ -66,6 +66,7 @@ def worst_rollout(run: "Run") -> Rollout | None:
     would have to be imported, which happens only if it is asked for.
     """
     path = _worst(run)
+    # A notebook that shows a run must not import code that the run's folder names.
     if not path or is_spec(run.settings.ego) or run.settings.simulator != EMBEDDED:
         return None
     try:
@@ -84,6 +85,7 @@ def _draw_space(run: "Run", axes: "Axes") -> None:
         (rows.critical, RED, "critical"),
     ):
         at = np.flatnonzero(chosen)
+        # Evenly over the run: the same figure each time.
         at = at[:: max(1, -(-len(at) // MOST_POINTS))]
         x, y = rows.X[at, first], rows.X[at, second]
         axes.plot(x, y, ".", color=colour, markersize=4, label=label)

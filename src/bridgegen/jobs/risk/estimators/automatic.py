@@ -33,6 +33,7 @@ def estimate(
     first = monte_carlo.estimate(problem, replace(aim, budget=look, precision=0.0), seed)
     hits = int(first.there(aim.threshold).sum())
     wanted = aim.precision or 0.05
+    # The binomial's: rows for a relative error of `wanted` at 95 %.
     needed = (_NORMAL / wanted) ** 2 * (look / hits - 1.0) if hits else float("inf")
     if hits >= FEWEST and needed <= aim.budget - look:
         return (

@@ -114,7 +114,11 @@ class _Chains:
     def step(self, Z: Float, found: Float, level: Level) -> tuple[Float, Float, Bool]:
         """Move points on by one proposal each; those that leave the level stay."""
         noise = self.random.standard_normal(Z.shape)
+        # This proposal keeps the standard normal distribution, so that only the level decides on
+        # acceptance.
         moved = np.sqrt(1.0 - level.scale**2) * Z + level.scale * noise
+        # What breaks a constraint is rejected unevaluated: feasibility costs nothing, a simulation
+        # does.
         good = self.problem.feasible(moved)
         at = np.flatnonzero(good)
         if at.size:
