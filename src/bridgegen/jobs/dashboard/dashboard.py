@@ -263,6 +263,8 @@ def build_dashboard(given: DashboardOptions) -> Dashboard:
     ):
         raise FileFormatError(*damaged)  # it may name modes that seem to be new
     modes = failure_modes(project.results, decisions_of(own, project))
+    # Without --update nothing is written but the page, so that a nightly job leaves the working
+    # tree clean.
     new = {} if not update else undecided(modes, own)
     moved = {id: failure for id, failure in old.items() if id not in file.failures}
     if update and (new or moved):

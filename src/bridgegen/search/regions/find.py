@@ -216,6 +216,7 @@ class _Search:
     def _keep(self, region: Region, fresh: Float) -> None:
         """Record a region; its fresh rows estimate how much it adds to the confirmed space."""
         if region.confirmed:
+            # Boxes may overlap: what is in one that was confirmed before counts once.
             new = np.ones(len(fresh), np.bool_)
             for other in self._verified:
                 if other.confirmed:

@@ -170,6 +170,8 @@ class Known:
     def anywhere(self, n: int, rng: np.random.Generator) -> Float:
         """Return n new rows drawn at random, fewer where there are no more; snapped."""
         if 0 < self.columns.count <= FEW:
+            # Where there are few rows in all, the last unknown ones are found by listing, not by
+            # luck.
             rows = self.columns.everything()
             return rng.permutation(rows[self.new(rows)])[:n]
         rows = self.columns.snapped(rng.random((n, self.U.shape[1])))
