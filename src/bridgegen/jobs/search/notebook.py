@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
+from markupsafe import Markup
 from matplotlib.figure import Figure
 
 from bridgegen.assess.criteria import headline as judged
@@ -196,7 +197,9 @@ def player(rollout: Rollout) -> str:
     )
     first = f"{closest * rollout.time_step:.2f}"
     page = _PLAYER.replace("SECONDS", f"{seconds:.2f}").replace("FIRST", first)
-    return page.replace("PICTURE", picture)
+    # The picture fills the frame, whatever its width: on a phone its ends are cut, not its scale.
+    filling = picture.replace("<svg", Markup('<svg preserveAspectRatio="xMidYMid slice"'), 1)
+    return page.replace("PICTURE", filling)
 
 
 def _closest(rollout: Rollout, n: int) -> int:
