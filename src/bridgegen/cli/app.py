@@ -100,6 +100,7 @@ def main() -> None:
     try:
         _run()
     except SystemExit as end:
+        # What was complete when the signal came has its own status, 0.
         if terminations and end.code:
             raise SystemExit(TERMINATED) from None
         raise
@@ -125,6 +126,7 @@ def _run() -> None:
         _drop_output()
         sys.exit(1)
     except OSError as error:
+        # Writing to stdout fails without a file's name; any other such error is a bug.
         if error.filename is not None or error.errno not in _FULL:
             raise
         _drop_output()
@@ -135,6 +137,7 @@ def _run() -> None:
 def _drop_output() -> None:
     """Discard the remaining output, since its target cannot be written."""
     with suppress(OSError, ValueError):
+        # Python flushes stdout at exit, and would fail again.
         nowhere = os.open(os.devnull, os.O_WRONLY)
         os.dup2(nowhere, sys.stdout.fileno())
         os.close(nowhere)

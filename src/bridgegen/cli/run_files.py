@@ -140,6 +140,7 @@ def read_run_document(path: Path) -> "Document":
 
     try:
         with path.open("rb") as file:
+            # One byte more than allowed: the reader refuses a large file that is not read whole.
             return read_plain_yaml(file.read(MAX_BYTES + 1), str(path))
     except OSError as error:
         raise FileFormatError(f"cannot be read: {error.strerror} ({path})") from None
@@ -171,6 +172,7 @@ def read_runs(path: Path, keys: Mapping[str, Key], argument: str = SCENARIO) -> 
         problems.append(f"runs must be a mapping, NAME: OPTIONS ({document.at(('runs',))})")
     else:
         for name, item in data["runs"].items():
+            # The name becomes a folder's: no separators, and no leading dot.
             if not name.replace("-", "").replace("_", "").replace(".", "").isalnum() or (
                 name.startswith(".")
             ):
@@ -372,9 +374,11 @@ def with_run_files(
             path, filed = Path(first), is_run_file(first)
             runs = [FiledRun("", given)]
             if filed:
+                # The argument was the file itself; the scenario is in it.
                 del given[argument]
                 read = read_runs(path, keys, argument)
                 runs = [FiledRun(run.name, _over(run.values, given)) for run in read]
+            # Written here and not by the command, which cannot tell what was given from defaults.
             if save is not None:
                 if len(runs) > 1 or runs[0].name:
                     raise InputError("--save writes one run, and this file has several")
@@ -382,12 +386,15 @@ def with_run_files(
             if filed and runs[0].name:
                 several(path, runs, keys, lambda record: command(**{**values, **record}))
             else:
+                # What the parser returned holds all defaults, so that a run need only have what
+                # differs.
                 command(**{**values, **runs[0].values})
 
         context = inspect.Parameter(
             "context", inspect.Parameter.POSITIONAL_OR_KEYWORD, annotation=typer.Context
         )
         parameters = [context, *signature.parameters.values()]
+        # typer makes the options of the signature: it has to see the context, too.
         wrapper.__signature__ = signature.replace(  # type: ignore[attr-defined]
             parameters=parameters
         )

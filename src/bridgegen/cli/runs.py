@@ -70,6 +70,7 @@ def search_all(
             # other options are refused.
             if not is_recorded(out, values, keys):
                 command(values)
+            # A run that ended before its report was written is resumed to write it.
             elif Run(out).finished and Run(out).report.is_file():
                 print(f"finished already: {out}")
             else:
@@ -83,6 +84,7 @@ def search_all(
                     )
                 print_summary(run, live.seconds)
         except Interrupted as stop:
+            # The command that goes on with all runs of the file, and not only with this one.
             raise Interrupted(
                 stop.folder, stop.evaluations, stop.budget, command=f"bridgegen search {path}"
             ) from None

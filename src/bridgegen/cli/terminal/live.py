@@ -109,6 +109,7 @@ class JobProgress(Live):
             progress=lambda what, done, total, facts: self.show(
                 what=what, done=done, total=total, facts=facts
             ),
+            # A path may contain brackets, which are rich's markup.
             say=lambda text: self.console.print(
                 text, markup=False, highlight=False, soft_wrap=True
             ),

@@ -175,6 +175,7 @@ def _read(text: str, known: Collection[str]) -> FailCondition:
     for part in _AND.split(text):
         match = _COMPARISON.fullmatch(part)
         number = float(match[3]) if match else float("nan")
+        # "1e999" matches and is infinite.
         if match is None or not isfinite(number):
             raise InputError(
                 "--fail-if must read FIGURE < NUMBER (or <=, >, >=, ==, !=), several joined by "

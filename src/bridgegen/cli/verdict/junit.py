@@ -121,6 +121,7 @@ def refuse_junit(path: Path) -> None:
     Raises:
         StorageError: its folder cannot be created, or a file exists that is not JUnit XML.
     """
+    # Asked before the run, too, which may take hours: the folder is made only after it.
     folder = next(parent for parent in path.absolute().parents if parent.exists())
     if not folder.is_dir() or not os.access(folder, os.W_OK):
         raise StorageError(f"{path}: cannot be written: {folder} is not a writable folder")

@@ -112,6 +112,7 @@ class PassFailCriteria:
         if not texts and junit is None:
             return cls((), None)
         settings = Run(folder).settings
+        # The run's own settings decide which figures exist, not the options of this call.
         names = [read_criterion(criterion).quantity for criterion in settings.criteria]
         return cls.read(texts, junit, causes=settings.causes, criteria=names)
 
@@ -242,6 +243,7 @@ def _suites(run: Run, outcomes: Sequence[Outcome]) -> list[Suite]:
 def _scenario(run: Run, path: Path, name: str, group: str, broken: Sequence[Outcome]) -> Suite:
     """Return an exported scenario as a test, failed if it contributes to a failed criterion."""
     facts = read_facts(path.with_suffix(".json"))
+    # Files of a folder can be edited: what the message needs is checked.
     if missing := {"d_min", "v_d", "n_collision"} - facts.metrics.keys():
         raise StorageError(
             f"{path.with_suffix('.json')}: is not what was exported: it has no "
