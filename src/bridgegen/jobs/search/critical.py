@@ -223,6 +223,7 @@ def _write_alone(
     conflict = summarise(analyse(rollout), 0, pipeline.objective.count)
     metrics = pipeline.measure(rollout)
     harm = float(metrics[0, pipeline.metrics.index(pipeline.objective.harm)])
+    # Written so that NaN is refused, too.
     if not harm >= NEAR_MISS:
         return (f"it is not harmful as it is exported: harm {harm:.2g} of {NEAR_MISS:g}",)
     critical = pipeline.objective.critical(metrics, pipeline.metrics)
