@@ -22,6 +22,7 @@ def element(name: str, *content: object, **attributes: object) -> Markup:
 
 
 def _rounded(value: object) -> object:
+    # A tenth of a pixel is not seen, and a page may hold thousands of points.
     return f"{value:.1f}".removesuffix(".0") if isinstance(value, float) else value
 
 
@@ -76,6 +77,7 @@ class Plot:
 
     def _x(self, x: Float) -> Float:
         low, high = self._ranges[0]
+        # A range of one value must not divide by 0: its marks stand at the start.
         share = (np.clip(x, low, high) - low) / ((high - low) or 1.0)
         return self.left + share * (self.right - self.left)
 
@@ -172,9 +174,13 @@ def ticks(low: float, high: float, most: int = 7) -> list[float]:
     if low == high:
         return [low]
     step = 10.0 ** np.floor(np.log10((high - low) / (most - 2.0)))
+    # Round numbers are 1, 2 and 5 times a power of ten; 10 for what rounding leaves over.
     step *= next(value for value in (1.0, 2.0, 5.0, 10.0) if (high - low) / (step * value) <= most)
+    # The tolerance keeps ticks at the ends, where a division such as 0.3 / 0.1 misses a whole
+    # number.
     first = np.ceil(low / step - 1e-9)
     return [
+        # Without the digits of rounding; and -0 becomes 0.
         float(f"{k * step:.10g}") + 0.0
         for k in np.arange(first, np.floor(high / step + 1e-9) + 1.0)
     ]
@@ -199,6 +205,7 @@ def intervals(lines: Sequence[Interval], label: str, longest: int = 48) -> Marku
         label: of the picture.
         longest: characters of a line's words that are shown.
     """
+    # A lower end of 0 has no place on a logarithmic axis: a tenth of the estimate stands for it.
     least = min(line.low if line.low > 0.0 else line.estimate / 10.0 for line in lines)
     first = math.floor(math.log10(least))
     last = max(math.ceil(math.log10(max(line.high for line in lines))), first + 1)

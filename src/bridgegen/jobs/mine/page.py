@@ -73,6 +73,7 @@ def refuse_foreign(out: Path, more: Sequence[str] = ()) -> None:
     if out.exists() and not out.is_dir():
         raise StorageError(f"{out}: exists already, and is no folder")
     refuse_other(out / PAGE, GENERATOR, "page of recordings")
+    # The page marks a folder as ours: without it, the folders in it are somebody's.
     for folder in (CRITICAL, FOLDER, SCENARIOS, *more):
         if (out / folder).exists() and not (out / PAGE).exists():
             raise StorageError(
@@ -87,6 +88,7 @@ def refuse_foreign(out: Path, more: Sequence[str] = ()) -> None:
     ):
         try:
             with (out / name).open("rb") as file:
+                # Of a table, the first line tells; a file of others may have a line without end.
                 ours = file.readline(4096).decode("utf-8", "replace").strip() == ",".join(head)
         except FileNotFoundError:
             continue
@@ -201,6 +203,7 @@ def _csv(head: Iterable[str], rows: Iterable[Iterable[object]]) -> Iterator[byte
     writer.writerow(head)
     for row in rows:
         writer.writerow([cell(value) for value in row])
+    # Names come from recordings, and may hold what UTF-8 cannot.
     yield text.getvalue().encode("utf-8", "replace")
 
 
