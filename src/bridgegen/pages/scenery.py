@@ -106,6 +106,7 @@ def vehicle_lamps(rollout: Rollout, sirens: Int) -> npt.NDArray[np.int8]:
     if rollout.lamps.size:
         found |= rollout.lamps
     elif rollout.kinds.size:
+        # An acceleration acts from its instant on: the lamp is seen one instant later.
         brakes = rollout.a[:, :, :-1] <= -BRAKE_LIGHTS_FROM
         lit = brakes & np.array(IS_VEHICLE)[rollout.kinds][:, np.newaxis]
         found[:, :, 1:][lit] = BRAKE

@@ -28,6 +28,7 @@ def sensed(rollout: Rollout) -> list[Sensed]:
         steps = np.flatnonzero((detections[1:, :, column.SEEN_BY] >= column.MISSED).any(axis=0))
         frames = detections[:, steps]
         seen_by = frames[:, :, column.SEEN_BY].astype(np.int64)
+        # The ego does not see itself.
         seen_by[0] = -1
         if rollout.present.size:
             seen_by[~rollout.present[row][:, steps]] = -1
