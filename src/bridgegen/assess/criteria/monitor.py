@@ -138,6 +138,8 @@ class Monitor:
 
         for j, criterion in enumerate(self.criteria):
             found = robustness(criterion.formula, given, n_steps, rollout.time_step)
+            # Failed rows stay NaN: their motion ends at the failure, and says nothing of a
+            # criterion.
             out[ok, j] = np.clip(found[ok], -LARGEST, LARGEST)
         return out
 
@@ -158,6 +160,7 @@ class Monitor:
         ]
         wrong, _ = check_units(criterion.formula, _dimension)
         ahead = horizon(criterion.formula)
+        # The tolerance is for sums of bounds such as 0.1 + 0.2, which round upwards.
         if ahead > duration * (1.0 + 1e-9):
             wrong.append(
                 f"'{criterion.states}' looks {ahead:g} s ahead, and the scenario ends at "
