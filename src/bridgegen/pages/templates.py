@@ -63,6 +63,7 @@ def _environment(package: str) -> "Environment":
     made = Environment(
         loader=ChoiceLoader([PackageLoader(name, ".") for name in (package, "bridgegen")]),
         autoescape=True,
+        # A name that is misspelt in a template fails, and is not an empty text.
         undefined=StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,

@@ -138,8 +138,6 @@ class Monitor:
 
         for j, criterion in enumerate(self.criteria):
             found = robustness(criterion.formula, given, n_steps, rollout.time_step)
-            # Failed rows stay NaN: their motion ends at the failure, and says nothing of a
-            # criterion.
             out[ok, j] = np.clip(found[ok], -LARGEST, LARGEST)
         return out
 

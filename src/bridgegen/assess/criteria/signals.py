@@ -90,8 +90,8 @@ def _gap(rollout: Rollout, e: int) -> Float:
     return np.asarray(rollout.distance[:, e])
 
 
-# The kernels return the least value over time of each scenario; with one instant each, that is the
-# value over time.
+# The kernels return the least value over a scenario's time: scenarios of one instant each give the
+# value at every instant.
 def _by_instant(of: Float, e: int) -> Float:
     """Return the ego's and another's states as scenarios of one instant, ``(N T, 2, 1)``."""
     n, _, t = of.shape

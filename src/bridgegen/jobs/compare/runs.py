@@ -81,6 +81,7 @@ class RunsProgress:
         if failure is not None:
             self._failed += 1
             self._callbacks.say(f"{name} failed: {failure}")
+        # A run may end before its budget: what it will not make is no longer to come.
         self._total -= self._budget - self._evaluations.get(name, 0)
         self._show()
 

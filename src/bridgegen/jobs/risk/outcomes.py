@@ -106,8 +106,8 @@ def _outcomes(runner: Runner, X: Float, count: Count) -> tuple[Float, npt.NDArra
     values = np.zeros((len(X), len(Column)))
     # Neither a failed row nor one whose traffic could not happen counts as an event.
     ok = (rollout.status == 0) & (gate.code == Implausible.NONE)
-    # Harm alone is 0 where the ego is not responsible: levels that followed it ended in front of such
-    # conflicts (cut-in, `careful`: at 0.2, never at 0.3).
+    # Harm alone is 0 where the ego is not responsible: levels that followed it ended in front of
+    # such conflicts (cut-in, `careful`: at 0.2, never at 0.3).
     led = np.where(score >= NEAR_MISS, score, ALMOST * np.minimum(near, NEAR_MISS))
     values[ok, Column.SCORE], values[ok, Column.OWN] = led[ok], own[ok]
     values[ok, Column.SEVERITY] = conflicts.severity[rows, other][ok]

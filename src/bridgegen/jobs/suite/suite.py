@@ -173,6 +173,7 @@ def run_entries(job: frame.Job, given: ScenariosOptions) -> SuiteRun:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise StorageError(f"{folder}: cannot be written: {error.strerror}") from None
+    # Two processes would append to one file, and each would run all that the other has not ended.
     lock = Lock(folder / LOCK)
     try:
         done = _done(path, settings, jobs)
@@ -221,6 +222,7 @@ def _folder(files: Sequence[str | Path]) -> Path:
     """Return the folder of results by default: none of those that hold the scenarios."""
     names = [Path(file).resolve().stem for file in files]
     folder = Path("suites") / ("-".join(names[:3]) + ("-and-more" if len(names) > 3 else ""))
+    # A folder of scenarios in `suites` would be its own folder of results.
     if folder.resolve() in {Path(file).resolve() for file in files}:
         return folder.with_name(f"{folder.name}-results")
     return folder
@@ -267,6 +269,8 @@ def _run(
 
     def ended(job: Job, result: EntryResult | None, crash: str | None) -> None:
         if result is None:
+            # Without a digest: a worker that crashed is run again by the next call, see
+            # `Job.is_of`.
             result = EntryResult(
                 entry=job.entry.name,
                 ego=job.ego or "",
