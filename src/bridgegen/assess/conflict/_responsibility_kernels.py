@@ -421,8 +421,6 @@ def leaves_route(scene, k):
     Unknown of recordings, which state no friction: their offset may be from the road that the ego
     leaves when it turns off.
     """
-    # A recording has no friction and no route of its own: sliding is known of simulated rollouts
-    # only.
     if scene.friction == math.inf:
         return False
     before = max(k - int(LATELY / scene.dt), 0)
