@@ -142,6 +142,7 @@ class PageRows:
         Args:
             rows: ``(N,)`` bool.
         """
+        # All columns of one page ask for the same rows: the store is read once.
         if self._rows is None or not np.array_equal(rows, self._rows):
             self._rows, self._values = rows.copy(), self.table[rows]
         return self._values

@@ -235,6 +235,7 @@ def p_mais3(kind: npt.ArrayLike, speed: npt.ArrayLike, direction: npt.ArrayLike)
     logistic = 1.0 / (
         1.0 + elementary.exp(-(_INTERCEPT[kind, direction] + _SLOPE[kind, direction] * v))
     )
+    # A logistic curve is above 0 at standstill; `FADE` takes it there.
     return np.asarray(-elementary.expm1(-np.square(v / FADE)) * logistic)
 
 
@@ -332,6 +333,8 @@ def severity(
 
 def _on_curve(kind: Int, share: Float) -> Float:
     """Return the factor from `effective_speed` to the variable of a party's curve."""
+    # The curves of those without a body around them are by closing speed with a passenger car:
+    # other partners count by the change of velocity that they cause.
     against_a_car = MASS[CAR] / (MASS[CAR] + MASS[kind])
     return np.where(_UNPROTECTED[kind], share / against_a_car, share)
 

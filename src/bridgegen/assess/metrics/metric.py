@@ -160,6 +160,7 @@ def _motion(rollout: Rollout) -> Motion:
     if v.size and v.min() < 0.0:
         reverses = _reverses(v)
         cosine, sine, v, a = (np.where(reverses, -array, array) for array in (cosine, sine, v, a))
+        # A body that stands has the sign of before; its noise must not make it drive the other way.
         v = np.maximum(v, 0.0)
     half = 0.5 * box[:, :2]
     return Motion(
