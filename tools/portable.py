@@ -130,6 +130,10 @@ def link_late() -> None:
 
 def symbol_of(kernel: Any, kinds: tuple[Any, ...]) -> str:
     """Compile a kernel for arguments of some types; return the symbol of its code."""
+    if (known := kernel.overloads.get(kinds)) and not known.library.inner:
+        del kernel.overloads[
+            kinds
+        ]  # Python has called it, and what is made for it has another form
     found: str = compiled.compile_for_kernels(kernel, kinds).fndesc.llvm_func_name
     return found
 

@@ -37,6 +37,7 @@ from bridgegen.pages.playbacks import (
     playbacks,
 )
 from bridgegen.pages.screened_payload import screened_payload
+from bridgegen.pages.simulation_payload import simulation_payload
 from bridgegen.results.confirmation.record import Record
 from bridgegen.results.store import Recorded, Rows
 from bridgegen.results.store.summary import Summary
@@ -187,6 +188,7 @@ def build_report(
         criteria=judged,
         screened=screened_payload(notes, pipeline.space),
         happening=happening,
+        simulation=simulation_payload(pipeline) if more else None,
     )
 
 

@@ -16,7 +16,7 @@ from bridgegen.pages import convergence, sentences
 from bridgegen.pages.confirmation_payload import margins_shown
 from bridgegen.pages.data import WHOLE, Column, Evaluations, ReportData
 from bridgegen.pages.findings_payload import findings_payload, implausible_payload
-from bridgegen.pages.packed import packed_files, packed_motions, road_key
+from bridgegen.pages.packed import deflated, packed_files, packed_motions, road_key
 from bridgegen.pages.picture_payload import pictures_payload
 from bridgegen.pages.playback_payload import ROAD_SCALE, SCALE, playback_payload, road_payload
 from bridgegen.pages.sections import sections_payload
@@ -93,6 +93,7 @@ def payload(data: ReportData, code: int = 0) -> dict[str, Any]:
         "roads": roads,
         "kept": kept,
         "files": packed_files(data.files),
+        "simulation": _simulation(data, shown),
         "pictures": pictures_payload([p.picture for p in pictured if p.picture]),
     }
     most = SIZE + SIZE_OF_ROW * max(0, data.evaluations.status.size - 1000)
@@ -100,8 +101,19 @@ def payload(data: ReportData, code: int = 0) -> dict[str, Any]:
     room = max(0, most - code - len(script_json(page)))
     page["packed"] = motions = packed_motions(data.more, index, room, of_rows=True)
     if not shown[motions["evaluations"]].all():  # of a long run
-        page |= _of_rows(data, _shown(data.evaluations, wanted + motions["evaluations"]))
+        shown = _shown(data.evaluations, wanted + motions["evaluations"])
+        page |= _of_rows(data, shown) | {"simulation": _simulation(data, shown)}
     return page
+
+
+def _simulation(data: ReportData, shown: Bool) -> dict[str, Any] | None:
+    """Return what the page simulates with, and its rows' values with all their bits."""
+    if data.simulation is None or "refused" in data.simulation:
+        return None if data.simulation is None else dict(data.simulation)
+    columns = [column for column in data.evaluations.parameters if column.searched]
+    values = np.stack([column.values[shown] for column in columns], axis=1)
+    rows = {"names": [column.name for column in columns], "data": deflated(values.tobytes())}
+    return {**data.simulation, "rows": rows}
 
 
 def _of_rows(data: ReportData, shown: Bool) -> dict[str, Any]:

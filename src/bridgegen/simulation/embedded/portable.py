@@ -49,11 +49,6 @@ def sources() -> str:
     return found.hexdigest()[:16]
 
 
-def is_current() -> bool:
-    """Return whether the module is there, and of these kernels."""
-    return MODULE.is_file() and MODULE.read_bytes().endswith(b"\x09bridgegen" + sources().encode())
-
-
 def tables(program: Program, roads: Network, network: int = 0) -> dict[str, Any]:
     """Return what the module's host needs to simulate rows of a storyboard, as JSON has it.
 
