@@ -35,8 +35,8 @@ MODULE = PACKAGE / "pages" / "web" / "kernels.wasm"
 def sources() -> str:
     """Return the digest of what the module is made of: code, not comments and not docstrings."""
     found = hashlib.sha256()
-    here = Path(__file__)
-    for path in sorted(with_imported([here.with_name("_rollout_kernels.py"), here])):
+    entries = (Path(__file__).with_name(name) for name in ("_rollout_kernels.py", "addresses.py"))
+    for path in sorted(with_imported(entries)):
         tree = ast.parse(path.read_text("utf-8"))
         for node in ast.walk(tree):
             if isinstance(body := getattr(node, "body", None), list):
