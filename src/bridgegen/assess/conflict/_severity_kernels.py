@@ -15,9 +15,8 @@ from bridgegen.base import _elementary_kernels as elementary
 from bridgegen.base.compiled import kernel
 from bridgegen.drivers.kinds import CAR, IS_OBSTACLE
 
-SPEED, CHANGE_A, CHANGE_B, INJURY_A, INJURY_B, SEVERITY = range(6)
 RESULTS = 6
-"""Rows of what ``collisions`` finds, and their number."""
+"""Number of rows of what ``collisions`` finds."""
 
 
 @kernel
@@ -82,7 +81,10 @@ def severity(a, b, normal, tangential, direction_a, direction_b, movable_b):
 def collisions(
     kind_a, kind_b, normal, tangential, direction_a, direction_b, movable_a, movable_b, out
 ):
-    """Fill ``out`` ``(RESULTS, N)``: speed, changes of velocity, injuries, and the severity."""
+    """Fill ``out`` ``(RESULTS, N)``.
+
+    Its rows: the effective speed, the changes of both velocities, both injuries, the severity.
+    """
     for i in range(len(kind_a)):
         found = collision(
             kind_a[i], kind_b[i], normal[i], tangential[i], direction_a[i], direction_b[i],

@@ -13,6 +13,32 @@ from bridgegen.assess.metrics.metric import motion, recorded, shared
 from bridgegen.base.arrays import Bool, Float, Int
 from bridgegen.simulation.rollout import Rollout
 
+WHOLES = {
+    "kind": codes.KIND,
+    "type": codes.TYPE,
+    "responsible": codes.RESPONSIBLE,
+    "rule": codes.RULE,
+    "instant": codes.INSTANT,
+    "decided": codes.DECIDED,
+    "zone_ego": codes.ZONE_EGO,
+    "zone_other": codes.ZONE_OTHER,
+}
+IS_SO = {"leads_ego": codes.LEADS_EGO, "preventable": codes.PREVENTABLE}
+NUMBERS = {
+    "ttc": codes.TTC,
+    "needed": codes.NEEDED,
+    "closing_normal": codes.ACROSS,
+    "closing_tangential": codes.ALONG,
+    "v_ego": codes.V_EGO,
+    "v_other": codes.V_OTHER,
+    "stood_ego": codes.STOOD_EGO,
+    "stood_other": codes.STOOD_OTHER,
+    "overlap": codes.OVERLAP,
+    "left": codes.LEFT_TO_ACT,
+    "nearness": codes.NEARNESS,
+}
+"""Columns of kernels by the name in `Conflicts`: whole numbers, truths, and numbers."""
+
 
 @dataclass(frozen=True)
 class Conflicts:
@@ -212,37 +238,13 @@ def _of_one_body(rollout: Rollout) -> Conflicts:
         _is_routed(rollout), recorded(rollout, "v"), reverses, np.empty((e, t)), whole, real,
         potential, severity, changes,
     )  # fmt: skip
-    columns = {
-        "kind": codes.KIND,
-        "type": codes.TYPE,
-        "responsible": codes.RESPONSIBLE,
-        "rule": codes.RULE,
-        "instant": codes.INSTANT,
-        "decided": codes.DECIDED,
-        "zone_ego": codes.ZONE_EGO,
-        "zone_other": codes.ZONE_OTHER,
-    }
-    numbers = {
-        "ttc": codes.TTC,
-        "needed": codes.NEEDED,
-        "closing_normal": codes.ACROSS,
-        "closing_tangential": codes.ALONG,
-        "v_ego": codes.V_EGO,
-        "v_other": codes.V_OTHER,
-        "stood_ego": codes.STOOD_EGO,
-        "stood_other": codes.STOOD_OTHER,
-        "overlap": codes.OVERLAP,
-        "left": codes.LEFT_TO_ACT,
-        "nearness": codes.NEARNESS,
-    }
-    found: dict[str, Any] = {name: whole[:, :, column] for name, column in columns.items()}
-    found |= {name: real[:, :, column] for name, column in numbers.items()}
+    found: dict[str, Any] = {name: whole[:, :, column] for name, column in WHOLES.items()}
+    found |= {name: whole[:, :, column] > 0 for name, column in IS_SO.items()}
+    found |= {name: real[:, :, column] for name, column in NUMBERS.items()}
     return Conflicts(
         names=rollout.names,
         time_step=rollout.time_step,
         **found,
-        leads_ego=whole[:, :, codes.LEADS_EGO] > 0,
-        preventable=whole[:, :, codes.PREVENTABLE] > 0,
         severity=severity,
         potential=potential,
         delta_v_ego=changes[:, :, 0],
