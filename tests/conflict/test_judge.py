@@ -146,7 +146,8 @@ def driven():
 SCENARIOS = (
     "pedestrian-at-night", "cyclist-swings-out", "cyclist-right-turn", "left-across-path",
     "red-light-runner", "emergency-vehicle-on-red", "jam-tail-in-fog", "bus-pulls-out",
-    "road-works", "wrong-way-driver", "crossroads-s3", "roundabout-entry", "pedestrian-behind-parked",
+    "road-works", "wrong-way-driver", "crossroads-s3", "roundabout-entry",
+    "pedestrian-behind-parked",
 )  # fmt: skip
 
 

@@ -329,7 +329,7 @@ def never_moves(v):
 
 @kernel
 def weigh(kinds, v, whole, real, potential, severity, changes):
-    """Fill the severity of a row's contacts and near misses; ``v`` are speeds as recorded.
+    """Fill the severity of a row's contacts and near misses.
 
     ``potential`` and ``severity`` are ``(E,)``, ``changes`` of velocity ``(E, 2)``.
     """
@@ -347,13 +347,12 @@ def weigh(kinds, v, whole, real, potential, severity, changes):
 @kernel
 def analyse_rows(
     failed, half, kinds, x, y, c, s, v, a, offset, distance, n_steps, dt, claims, crosswalks,
-    friction, stop_entities, stop_lights, stop_lines, lights, lamps, routed, recorded, reverses,
+    friction, stop_entities, stop_lights, stop_lines, lights, lamps, routed, reverses,
     gone, whole, real, potential, severity, changes,
 ):  # fmt: skip
     """Analyse N rows; failed ones stay as they are.
 
-    Fills ``whole`` ``(N, E, INTEGERS)``, ``real`` ``(N, E, FLOATS)`` and what `weigh` does, from
-    the speeds ``recorded``.
+    Fills ``whole`` ``(N, E, INTEGERS)``, ``real`` ``(N, E, FLOATS)`` and what `weigh` does.
     """
     for i in range(len(n_steps)):
         if failed[i]:
@@ -364,7 +363,7 @@ def analyse_rows(
             lights[i], lamps[i], routed, gone, whole[i], real[i],
         )  # fmt: skip
         name_zones(reverses[i], whole[i])
-        weigh(kinds, recorded[i], whole[i], real[i], potential[i], severity[i], changes[i])
+        weigh(kinds, v[i], whole[i], real[i], potential[i], severity[i], changes[i])
 
 
 @kernel

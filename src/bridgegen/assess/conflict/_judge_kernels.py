@@ -144,7 +144,7 @@ def judge_row(n_steps, status, path, friction, facts, record, verdict):
         record.lights, record.lamps, True, verdict.gone, whole, real,
     )  # fmt: skip
     name_zones(verdict.reverses, whole)
-    weigh(facts.kinds, record.v, whole, real, verdict.potential, verdict.severity, verdict.changes)
+    weigh(facts.kinds, verdict.v, whole, real, verdict.potential, verdict.severity, verdict.changes)
     if path == 0:
         violate(
             facts.corridor, facts.half, facts.kinds, record.x, record.y, verdict.x, verdict.y,

@@ -235,7 +235,7 @@ def _of_one_body(rollout: Rollout) -> Conflicts:
         np.ascontiguousarray(rollout.stop_entities, dtype=np.int64),
         np.ascontiguousarray(rollout.stop_lights, dtype=np.int64), np.ascontiguousarray(lines),
         np.ascontiguousarray(lights, dtype=np.int8), np.ascontiguousarray(lamps, dtype=np.int8),
-        _is_routed(rollout), recorded(rollout, "v"), reverses, np.empty((e, t)), whole, real,
+        _is_routed(rollout), reverses, np.empty((e, t)), whole, real,
         potential, severity, changes,
     )  # fmt: skip
     found: dict[str, Any] = {name: whole[:, :, column] for name, column in WHOLES.items()}
