@@ -49,6 +49,7 @@ from bridgegen.assess.conflict._codes import (
 from bridgegen.assess.conflict._geometry_kernels import (
     Scene,
     displaced,
+    falls_below,
     lengths,
     meeting,
     meets_at,
@@ -210,7 +211,7 @@ def is_serious(time, needed, v, distance, k, end, dt):
         return False
     if k > 0 and needed <= (v[k - 1] - v[k]) / dt:
         return False
-    return is_emergency(needed, v[k]) or distance[k:end].min() < CLOSE_CALL
+    return is_emergency(needed, v[k]) or falls_below(distance, k, end, CLOSE_CALL)
 
 
 @kernel
