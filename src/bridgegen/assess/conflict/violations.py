@@ -6,6 +6,7 @@ is known.
 """
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -50,6 +51,6 @@ def with_violations(rollout: Rollout, found: Conflicts) -> Conflicts:
     )  # fmt: skip
     if not any_violation:
         return found
-    changed = {name: whole[:, :, column] for name, column in WHOLES.items()}
+    changed: dict[str, Any] = {name: whole[:, :, column] for name, column in WHOLES.items()}
     changed |= {name: real[:, :, column] for name, column in NUMBERS.items()}
     return replace(found, **changed, potential=potential, aside=aside, breach=breach)
