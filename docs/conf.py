@@ -1,8 +1,10 @@
 """The documentation site: sphinx-build -W -b html docs site. Extra: docs. It needs no network."""
 
+import shutil
 import sys
 from importlib.metadata import version as version_of
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 HERE = Path(__file__).parent
@@ -33,6 +35,7 @@ html_theme = "furo"
 html_title = "BridgeGen"
 html_static_path = ["static"]
 html_css_files = ["site.css"]
+html_extra_path = ["generated/extra"]
 html_copy_source = False
 html_show_sphinx = False
 html_show_search_summary = False  # from disk, a browser may not fetch the pages for it
@@ -43,8 +46,19 @@ def setup(app: Any) -> None:
     """Write the pages that are made of the code before Sphinx reads them."""
     import make_reference
 
+    write_trial(HERE / "generated" / "extra")
     app.connect("builder-inited", lambda _: make_reference.write(HERE / "generated"))
     app.connect("doctree-resolved", dash)
+
+
+def write_trial(folder: Path) -> None:
+    """Write ``try.html``: the report of a search, which simulates in the reader's browser."""
+    import bridgegen as bg
+
+    with TemporaryDirectory() as runs:
+        run = bg.run_search("crossroads-s4", budget=300, keep=6, out=Path(runs) / "run")
+        folder.mkdir(parents=True, exist_ok=True)
+        shutil.copy(run.folder / "report.html", folder / "try.html")
 
 
 def dash(_app: Any, tree: Any, _page: str) -> None:

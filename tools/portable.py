@@ -1,81 +1,141 @@
 """Link the kernels into one WebAssembly module, which simulates any row of any storyboard.
 
-    .venv/bin/python tools/portable.py           # some minutes; writes src/bridgegen/pages/web/rollout.wasm
+    .venv/bin/python tools/portable.py      # two minutes; writes pages/web/kernels.wasm
 
-Numba types and lowers each kernel as always; its bitcode is linked before any optimisation for this
-processor, and LLVM writes it for another one. Nothing is specialised to a storyboard: a bundle is a
-table of where its arrays lie, and a kernel that is called by its address has one in the module's
-table of functions, which `address` returns by its number.
-
+Numba types and lowers each kernel as always; the bitcode of all is linked before anything has been
+optimised for this processor, and LLVM writes it for another one. Nothing is specialised to a
+storyboard: a bundle is a table of where its arrays lie, and a kernel that is called by its address
+has one in the module's table of functions, which ``address`` returns by its number in ``CALLED``.
 LLVM's object file is a module whose relocations hold already, so no linker is needed.
 """
 
+import gzip
 import os
 import re
-import sys
 import tempfile
 import time
 from collections.abc import Iterable, Iterator
-from pathlib import Path
 from typing import Any
 
-KERNELS = tempfile.mkdtemp(prefix="bridgegen-portable-")
-os.environ["NUMBA_CACHE_DIR"] = KERNELS  # code that is not optimised must not reach the cache
+# Bitcode that is not optimised must not reach the cache, whose folder is chosen at import.
+os.environ["NUMBA_CACHE_DIR"] = tempfile.mkdtemp(prefix="bridgegen-portable-")
 
 from llvmlite import binding as llvm
+from numba import types
 from numba.core import codegen
 from numba.core.runtime import rtsys
 
+from bridgegen.base import _elementary_kernels as elementary
 from bridgegen.base import compiled
 from bridgegen.base.compilation.library import KernelLibrary
 from bridgegen.engine.options import PipelineOptions
 from bridgegen.engine.pipeline import Pipeline
 from bridgegen.scenario.language.reader import load
 from bridgegen.simulation.embedded import _rollout_kernels as rollout
+from bridgegen.simulation.embedded import portable
 from bridgegen.simulation.embedded.addresses import CALLED
 
-EXPORTS = ("simulate", "address")
-
-OUT = Path(__file__).parents[1] / "src" / "bridgegen" / "pages" / "web" / "rollout.wasm"
 TRIPLE = "wasm32-unknown-unknown"
 FEATURES = "+bulk-memory,+bulk-memory-opt,+nontrapping-fptoint,+sign-ext,+mutable-globals"
+EXPORTS = ("simulate", "function", "address")
+
+RUNTIME = """
+@heap = global i32 0
+
+define internal void @NRT_incref(ptr %p) alwaysinline {{ ret void }}
+define internal void @NRT_decref(ptr %p) alwaysinline {{ ret void }}
+
+define internal ptr @NRT_MemInfo_alloc_aligned(i64 %size, i32 %align) noinline {{
+  %at = load i32, ptr @heap
+  %p = inttoptr i32 %at to ptr
+  %short = trunc i64 %size to i32
+  %more = add i32 %short, 127
+  %whole = and i32 %more, -64
+  %next = add i32 %at, %whole
+  store i32 %next, ptr @heap
+  %data = getelementptr i8, ptr %p, i32 64
+  store ptr %data, ptr %p
+  ret ptr %p
+}}
+
+define internal ptr @NRT_MemInfo_alloc_safe_aligned(i64 %size, i32 %align) alwaysinline {{
+  %p = call ptr @NRT_MemInfo_alloc_aligned(i64 %size, i32 %align)
+  ret ptr %p
+}}
+
+define internal ptr @NRT_MemInfo_data_fast(ptr %p) alwaysinline {{
+  %data = load ptr, ptr %p
+  ret ptr %data
+}}
+
+define internal {{ i64, i1 }} @product(i64 %a, i64 %b) alwaysinline {{
+  %p = mul i64 %a, %b
+  %r = insertvalue {{ i64, i1 }} {{ i64 undef, i1 false }}, i64 %p, 0
+  ret {{ i64, i1 }} %r
+}}
+
+define void @simulate(ptr %plan, ptr %roads, ptr %state, ptr %record, i32 %heap) {{
+  %answer = alloca i64
+  %error = alloca ptr
+  store i32 %heap, ptr @heap
+  call i32 @"{simulate}"(ptr %answer, ptr %error, ptr %plan, ptr %roads, ptr %state, ptr %record)
+  ret void
+}}
+
+define double @function(i32 %which, double %x, double %y) {{
+  %answer = alloca double
+  %error = alloca ptr
+  %number = zext i32 %which to i64
+  call i32 @"{function}"(ptr %answer, ptr %error, i64 %number, double %x, double %y)
+  %value = load double, ptr %answer
+  ret double %value
+}}
+
+define i32 @address(i32 %code) {{
+  switch i32 %code, label %none [ {cases} ]
+none:
+  ret i32 0
+{blocks}
+}}
+"""
+"""What the module has besides kernels, in LLVM's IR: entries, and memory that grows during a row.
+
+A product of two lengths cannot overflow here, so that the check, which would need 128 bits, goes.
+"""
 
 
 def link_late() -> None:
     """Have Numba keep each kernel's bitcode as it lowers it, and link none into another."""
-    KernelLibrary.is_large = property(lambda self: bool(self.symbol))
-    KernelLibrary._optimize_final_module = lambda self: None
-    codegen.CPUCodeLibrary._optimize_functions = _lay_out
-    codegen.CPUCodeLibrary._optimize_final_module = lambda self: None
-    add = codegen.CodeLibrary.add_linking_library
-    codegen.CodeLibrary.add_linking_library = lambda self, library: (
-        None if library is rtsys.library else add(self, library)
-    )
-    finalize = KernelLibrary.finalize
+    add, finalize = codegen.CodeLibrary.add_linking_library, KernelLibrary.finalize
 
-    def without_runtime(self: Any) -> None:
-        self._linking_libraries = [x for x in self._linking_libraries if x is not rtsys.library]
+    def lay_out(self: Any, module: Any) -> None:
+        module.data_layout = self._codegen._data_layout
+
+    def finalize_without_runtime(self: Any) -> None:
+        own = [library for library in self._linking_libraries if library is not rtsys.library]
+        self._linking_libraries = own
         finalize(self)
 
-    KernelLibrary.finalize = without_runtime
+    def add_what_is_ours(self: Any, library: Any) -> None:
+        if library is not rtsys.library:
+            add(self, library)
+
+    KernelLibrary.is_large = property(lambda self: bool(self.symbol))
+    KernelLibrary.finalize = finalize_without_runtime
+    KernelLibrary._optimize_final_module = lambda self: None
+    codegen.CPUCodeLibrary._optimize_functions = lay_out
+    codegen.CPUCodeLibrary._optimize_final_module = lambda self: None
+    codegen.CodeLibrary.add_linking_library = add_what_is_ours
 
 
-def _lay_out(self: Any, module: Any) -> None:
-    module.data_layout = self._codegen._data_layout
-
-
-def compile_all() -> tuple[str, list[str]]:
-    """Return the symbols of the kernel of a row, and of those that are called by their address."""
-    logical = load("crossroads-s4")
-    pipeline = Pipeline(logical, logical.space(), PipelineOptions(ego="reference"))
-    batch = pipeline.runner.nominal_batch()
-    kinds = batch.kinds()
-    entry = compiled.compile_for_kernels(rollout.simulate_row, kinds).fndesc.llvm_func_name
-    called = []
-    for kernel, first in CALLED.items():
-        found = compiled.compile_for_kernels(kernel, (*first, *kinds))
-        called.append(found.fndesc.llvm_func_name)
-    return entry, called
+def symbol_of(kernel: Any, kinds: tuple[Any, ...]) -> str:
+    """Compile a kernel for arguments of some types; return the symbol of its code."""
+    if (known := kernel.overloads.get(kinds)) and not known.library.inner:
+        del kernel.overloads[
+            kinds
+        ]  # Python has called it, and what is made for it has another form
+    found: str = compiled.compile_for_kernels(kernel, kinds).fndesc.llvm_func_name
+    return found
 
 
 def reachable(roots: Iterable[str]) -> set[str]:
@@ -89,87 +149,50 @@ def reachable(roots: Iterable[str]) -> set[str]:
     return found
 
 
-RUNTIME = """
-declare i32 @"{entry}"(ptr, ptr, ptr, ptr, ptr, ptr)
-{declared}
-@heap = global i32 0
-define internal void @NRT_incref(ptr %p) alwaysinline {{ ret void }}
-define internal void @NRT_decref(ptr %p) alwaysinline {{ ret void }}
-define internal ptr @NRT_MemInfo_alloc_aligned(i64 %size, i32 %align) noinline {{
-  %at = load i32, ptr @heap
-  %p = inttoptr i32 %at to ptr
-  %small = trunc i64 %size to i32
-  %more = add i32 %small, 127
-  %whole = and i32 %more, -64
-  %next = add i32 %at, %whole
-  store i32 %next, ptr @heap
-  %d = getelementptr i8, ptr %p, i32 64
-  store ptr %d, ptr %p
-  ret ptr %p
-}}
-define internal ptr @NRT_MemInfo_alloc_safe_aligned(i64 %size, i32 %align) alwaysinline {{
-  %p = call ptr @NRT_MemInfo_alloc_aligned(i64 %size, i32 %align)
-  ret ptr %p
-}}
-define internal ptr @NRT_MemInfo_data_fast(ptr %p) alwaysinline {{
-  %d = load ptr, ptr %p
-  ret ptr %d
-}}
-define internal {{ i64, i1 }} @product(i64 %a, i64 %b) alwaysinline {{
-  %p = mul i64 %a, %b
-  %r = insertvalue {{ i64, i1 }} {{ i64 undef, i1 false }}, i64 %p, 0
-  ret {{ i64, i1 }} %r
-}}
-define i32 @simulate(ptr %plan, ptr %roads, ptr %state, ptr %record, i32 %heap) {{
-  %answer = alloca i64
-  %error = alloca ptr
-  store i32 %heap, ptr @heap
-  %r = call i32 @"{entry}"(ptr %answer, ptr %error, ptr %plan, ptr %roads, ptr %state, ptr %record)
-  ret i32 %r
-}}
-define i32 @address(i32 %code) {{
-  switch i32 %code, label %none [ {cases} ]
-none:
-  ret i32 0
-{blocks}
-}}
-"""
-
-
-def linked(entry: str, called: list[str]) -> Any:
-    """Return one module of all kernels, for no machine yet."""
-    declared = "\n".join(f'@"{symbol}" = external global i8' for symbol in dict.fromkeys(called))
-    cases = " ".join(f"i32 {code}, label %c{code}" for code in range(1, len(called) + 1))
-    blocks = "\n".join(
-        f'c{code}:\n  ret i32 ptrtoint (ptr @"{symbol}" to i32)'
-        for code, symbol in enumerate(called, 1)
+def linked() -> str:
+    """Return all kernels as one module in LLVM's IR, for no machine yet."""
+    logical = load("crossroads-s4")
+    pipeline = Pipeline(logical, logical.space(), PipelineOptions(ego="reference"))
+    rows = pipeline.runner.nominal_batch().kinds()
+    entries = {
+        "simulate": symbol_of(rollout.simulate_row, rows),
+        "function": symbol_of(elementary.value, (types.int64, types.float64, types.float64)),
+    }
+    called = [symbol_of(kernel, (*first, *rows)) for kernel, first in CALLED.items()]
+    symbols = sorted(reachable([*entries.values(), *called]))
+    print(f"{len(symbols)} kernels", flush=True)
+    module = llvm.parse_bitcode(KernelLibrary.by_symbol[symbols[0]]._bitcode)
+    for symbol in symbols[1:]:
+        module.link_in(llvm.parse_bitcode(KernelLibrary.by_symbol[symbol]._bitcode))
+    return _without_machine(str(module)) + RUNTIME.format(
+        **entries,
+        cases=" ".join(f"i32 {code}, label %c{code}" for code in range(1, len(called) + 1)),
+        blocks="\n".join(
+            f'c{code}:\n  ret i32 ptrtoint (ptr @"{symbol}" to i32)'
+            for code, symbol in enumerate(called, 1)
+        ),
     )
-    texts = []
-    module = None
-    for symbol in sorted(reachable([entry, *called])):
-        part = llvm.parse_bitcode(KernelLibrary.by_symbol[symbol]._bitcode)
-        if module is None:
-            module = part
-        else:
-            module.link_in(part)
-    text = str(module)
-    text = re.sub(r'target (datalayout|triple) = "[^"]*"', "", text)
-    text = re.sub(r'"target-(cpu|features)"="[^"]*"', "", text)
-    text = re.sub(r"^declare [^@\n]*@llvm\.smul\.with\.overflow\.i64\(.*$", "", text, flags=re.M)
+
+
+def _without_machine(text: str) -> str:
+    """Return a module's IR without what is said of a machine, and without Numba's run time."""
+    for pattern in (
+        r'target (datalayout|triple) = "[^"]*"',
+        r'"target-(cpu|features)"="[^"]*"',
+        r"^declare [^@\n]*@(llvm\.smul\.with\.overflow\.i64|NRT_\w+)\(.*$",
+        r"^define [^@\n]*@NRT_\w+\([^\n]*\{\n(.*\n)*?\}\n",
+    ):
+        text = re.sub(pattern, "", text, flags=re.MULTILINE)
     text = text.replace("@llvm.smul.with.overflow.i64(", "@product(")
-    text = re.sub(r"^declare [^@\n]*@NRT_\w+\(.*$", "", text, flags=re.M)
-    text = re.sub(r"^define [^@\n]*@NRT_\w+\([^\n]*\{\n(.*\n)*?\}\n", "", text, flags=re.M)
-    for plain in ("sqrt", "ceil", "floor", "fabs", "trunc", "rint"):
-        text = re.sub(rf"@{plain}\(", f"@llvm.{plain}.f64(", text)
-        text = re.sub(rf"^(declare [^@\n]*@llvm\.{plain}\.f64\(.*)$", "", text, flags=re.M)
-        text += f"\ndeclare double @llvm.{plain}.f64(double)"
-    runtime = RUNTIME.format(entry=entry, declared="", cases=cases, blocks=blocks)
-    runtime = re.sub(r'^declare i32 @"_ZN.*$', "", runtime, flags=re.M)
-    return text + runtime
+    for name in ("sqrt", "ceil", "floor", "fabs", "trunc", "rint"):
+        text = text.replace(f"@{name}(", f"@llvm.{name}.f64(")  # an instruction, not a library's
+        text = re.sub(rf"^declare [^@\n]*@llvm\.{name}\.f64\(.*$", "", text, flags=re.MULTILINE)
+        text += f"\ndeclare double @llvm.{name}.f64(double)"
+    return text
 
 
 def emitted(text: str) -> bytes:
-    """Return WebAssembly's object file of a module, optimised."""
+    """Return LLVM's object file of a module for WebAssembly, optimised."""
     llvm.initialize_all_targets()
     llvm.initialize_all_asmprinters()
     machine = llvm.Target.from_triple(TRIPLE).create_target_machine(
@@ -177,32 +200,90 @@ def emitted(text: str) -> bytes:
     )
     module = llvm.parse_assembly(text)
     module.triple, module.data_layout = TRIPLE, str(machine.target_data)
-    for function in module.functions:
-        if not function.is_declaration and function.name not in EXPORTS:
-            function.linkage = llvm.Linkage.internal
-    for variable in module.global_variables:
-        if not variable.is_declaration and not variable.name.startswith("llvm."):
-            variable.linkage = llvm.Linkage.internal
+    for part in (*module.functions, *module.global_variables):
+        if not part.is_declaration and part.name not in EXPORTS and "llvm." not in part.name:
+            part.linkage = llvm.Linkage.internal
     options = llvm.create_pipeline_tuning_options(2)
     options.loop_vectorization = options.slp_vectorization = False
     builder = llvm.create_pass_builder(machine, options)
     builder.getModulePassManager().run(module, builder)
-    declared = [function.name for function in module.functions if function.is_declaration]
-    print("declared:", declared, [v.name for v in module.global_variables])
     return bytes(machine.emit_object(module))
 
 
-def sections(data: bytes) -> Iterator[tuple[int, bytes]]:
-    """Yield the number and the content of each section of a module."""
+# --- The module of an object file: its exports instead of what linkers read ---
+
+
+def exporting(data: bytes) -> bytes:
+    """Return an object file as a module that exports ``EXPORTS``.
+
+    The section "bridgegen" says of which kernels it is: see `portable.sources`.
+    """
+    parts = list(_sections(data))
+    (symbols,) = (_functions(body) for kind, body in parts if kind == 0 and b"linking" in body[:9])
+    exports = _leb(len(EXPORTS)) + b"".join(
+        _leb(len(name)) + name.encode() + b"\0" + _leb(symbols[name]) for name in EXPORTS
+    )
+    found = bytearray(data[:8])
+    for kind, body in parts:
+        if kind in (9, 12, 10, 11) and exports:  # the sections that come after the exports
+            found += b"\7" + _leb(len(exports)) + exports
+            exports = b""
+        if kind != 0:
+            found += bytes([kind]) + _leb(len(body)) + body
+    said = b"\x09bridgegen" + portable.sources().encode()
+    return bytes(found) + b"\0" + _leb(len(said)) + said
+
+
+def _sections(data: bytes) -> Iterator[tuple[int, bytes]]:
     at = 8
     while at < len(data):
         kind = data[at]
-        size, start = number(data, at + 1)
+        size, start = _number(data, at + 1)
         yield kind, data[start : start + size]
         at = start + size
 
 
-def number(data: bytes, at: int) -> tuple[int, int]:
+def _functions(body: bytes) -> dict[str, int]:
+    """Return the number of each function that the section "linking" names."""
+    size, at = _number(body, 0)
+    _, at = _number(body, at + size)  # version
+    found = {}
+    while at < len(body):
+        kind = body[at]
+        size, at = _number(body, at + 1)
+        end = at + size
+        if kind == 8:  # the table of symbols
+            count, at = _number(body, at)
+            for _ in range(count):
+                name, index, at = _symbol(body, at)
+                if name:
+                    found[name] = index
+        at = end
+    return found
+
+
+def _symbol(body: bytes, at: int) -> tuple[str, int, int]:
+    """Return name and number of a symbol, "" if it is no function; and where it ends."""
+    what = body[at]
+    flags, at = _number(body, at + 1)
+    is_imported, is_named = bool(flags & 0x10), bool(flags & 0x40)
+    if what == 3:  # a section
+        return "", 0, _number(body, at)[1]
+    if what == 1:  # data
+        size, at = _number(body, at)
+        at += size
+        for _ in range(0 if is_imported else 3):
+            _, at = _number(body, at)
+        return "", 0, at
+    index, at = _number(body, at)
+    if is_imported and not is_named:
+        return "", index, at
+    size, at = _number(body, at)
+    name = body[at : at + size].decode() if what == 0 else ""
+    return name, index, at + size
+
+
+def _number(data: bytes, at: int) -> tuple[int, int]:
     """Return a number in LEB128, and where it ends."""
     value = shift = 0
     while True:
@@ -213,91 +294,23 @@ def number(data: bytes, at: int) -> tuple[int, int]:
             return value, at
 
 
-def leb(value: int) -> bytes:
-    """Return a number in LEB128."""
+def _leb(value: int) -> bytes:
     found = bytearray()
     while value > 127:
-        found.append(value & 127 | 128)
+        found.append((value & 127) | 128)
         value >>= 7
     return bytes([*found, value])
 
 
-def exporting(data: bytes) -> bytes:
-    """Return an object file as a module that exports `EXPORTS`, without what linkers read."""
-    parts = list(sections(data))
-    (symbols,) = (functions(body) for kind, body in parts if kind == 0 and is_linking(body))
-    exports = leb(len(EXPORTS)) + b"".join(
-        leb(len(name)) + name.encode() + b"\0" + leb(symbols[name]) for name in EXPORTS
-    )
-    found = bytearray(data[:8])
-    for kind, body in parts:
-        if kind == 0:
-            continue
-        if kind in (9, 12, 10, 11) and exports:  # they come after the exports
-            found += b"\7" + leb(len(exports)) + exports
-            exports = b""
-        found += bytes([kind]) + leb(len(body)) + body
-    return bytes(found)
-
-
-def is_linking(body: bytes) -> bool:
-    size, at = number(body, 0)
-    return body[at : at + size] == b"linking"
-
-
-def functions(body: bytes) -> dict[str, int]:
-    """Return the number of each function that the section "linking" names."""
-    size, at = number(body, 0)
-    at += size
-    _, at = number(body, at)  # version
-    found = {}
-    while at < len(body):
-        kind = body[at]
-        size, at = number(body, at + 1)
-        end = at + size
-        if kind == 8:  # symbol table
-            count, at = number(body, at)
-            for _ in range(count):
-                what = body[at]
-                flags, at = number(body, at + 1)
-                if what == 3:  # section
-                    _, at = number(body, at)
-                    continue
-                if what == 1:  # data
-                    size, at = number(body, at)
-                    at += size
-                    if not flags & 0x10:
-                        for _ in range(3):
-                            _, at = number(body, at)
-                    continue
-                index, at = number(body, at)
-                if not flags & 0x10 or flags & 0x40:
-                    size, at = number(body, at)
-                    if what == 0:
-                        found[body[at : at + size].decode()] = index
-                    at += size
-        at = end
-    return found
+def main() -> None:
+    """Write the module."""
+    clock = time.time()
+    link_late()
+    module = exporting(emitted(linked()))
+    portable.MODULE.write_bytes(module)
+    packed = len(gzip.compress(module))
+    print(f"{portable.MODULE}: {len(module):,} B, {packed:,} packed, {time.time() - clock:.0f} s")
 
 
 if __name__ == "__main__":
-    clock = time.time()
-    if len(sys.argv) < 2:
-        link_late()
-        entry, called = compile_all()
-        print(
-            f"{len(reachable([entry, *called]))} kernels, {time.time() - clock:.0f} s", flush=True
-        )
-        text = linked(entry, called)
-        Path("/tmp/pw/all.ll").write_text(text)
-    text = Path("/tmp/pw/all.ll").read_text()
-    data = emitted(text)
-    Path("/tmp/pw/all.o").write_bytes(data)
-    print(f"{len(data):,} B, {time.time() - clock:.0f} s", flush=True)
-    module = exporting(data)
-    Path("/tmp/pw/all.wasm").write_bytes(module)
-    import gzip
-
-    print(
-        f"{len(module):,} B, packed {len(gzip.compress(module)):,} B, {time.time() - clock:.0f} s"
-    )
+    main()

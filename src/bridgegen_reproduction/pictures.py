@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bridgegen.jobs.compare.figures import DARK, LIGHT, Theme, pdf, png
 from bridgegen.jobs.compare.record import points
 from bridgegen.jobs.compare.result import Comparison
 from bridgegen.scenario.language.reader import load
@@ -18,6 +17,7 @@ from bridgegen_reproduction.figures.causes import causes
 from bridgegen_reproduction.figures.crossroads import collision_points, crossing_of
 from bridgegen_reproduction.figures.distributions import Violin, iterations, violins
 from bridgegen_reproduction.figures.fronts import curves_of, hypervolume_and_spread
+from bridgegen_reproduction.figures.look import DARK, LIGHT, Theme, pdf, png
 from bridgegen_reproduction.figures.ontology import ontology, picture_of
 from bridgegen_reproduction.protocol import PRINTED
 from bridgegen_reproduction.runs import Run, of

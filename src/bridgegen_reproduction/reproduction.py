@@ -244,7 +244,7 @@ def _write(found: Found, document: Document) -> None:
     write_whole(out / RUNS_FILE, [_csv(_runs(found, k)).encode()])
     write_whole(out / TIMES_FILE, [_csv(_times(found, k)).encode()])
     write_whole(out / README, [markdown(document).encode()])
-    write_whole(out / PAGE, [html(document).encode()])
+    write_whole(out / PAGE, [html(document)])
 
 
 def _write_picture(folder: Path, picture: Picture) -> None:

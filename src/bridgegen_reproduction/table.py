@@ -1,11 +1,10 @@
-"""A table, and how it is written: Markdown, CSV, LaTeX, HTML."""
+"""A table, and how it is written: Markdown, CSV, LaTeX; the page has its own."""
 
 import csv
 import io
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
-from html import escape
 
 
 @dataclass(frozen=True)
@@ -67,38 +66,6 @@ def to_markdown(table: Table) -> str:
 
 def _markdown(text: str) -> str:
     return re.sub(r"([\\|*_<`\[])", r"\\\1", text).replace("\n", " ")
-
-
-def to_html(table: Table) -> str:
-    """Return a table and its notes as HTML; the title is its caption."""
-    head = "".join(
-        f'<th scope="col"{" class=text" if k < table.texts else ""}>{escape(name)}</th>'
-        for k, name in enumerate(table.head)
-    )
-    rows = "".join(
-        f'<tr><th scope="row">{escape(row[0])}</th>'
-        + "".join(
-            f"<td{' class=text' if k < table.texts else ''}>{_html(cell)}</td>"
-            for k, cell in enumerate(row[1:], 1)
-        )
-        + "</tr>"
-        for row in table.rows
-    )
-    notes = "".join(f"<li>{escape(note)}</li>" for note in table.notes)
-    return (
-        f'<div class="card" id="{escape(table.name)}"><h3>{escape(table.title)}</h3>'
-        '<div class="wide" tabindex="0"><table class="data">'
-        f"<thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table>"
-        f"</div>{f'<ul class=notes>{notes}</ul>' if notes else ''}</div>"
-    )
-
-
-def _html(cell: str) -> str:
-    """Return a cell; what is in brackets after a number goes below it."""
-    number, bracket, rest = cell.partition(" (")
-    if bracket and " to " in rest and rest.endswith(")"):
-        return f"{escape(number)} <small>({escape(rest)}</small>"
-    return escape(cell)
 
 
 _LATEX = {

@@ -13,6 +13,7 @@ from bridgegen.base.errors import InputError, StorageError, UnknownNameError
 from bridgegen.engine.pipeline import Pipeline
 from bridgegen.engine.replays import Replays
 from bridgegen.pages import page
+from bridgegen.pages.birdseye import INK, MARKING, PLAYERS
 from bridgegen.pages.playbacks import playbacks
 from bridgegen.pages.scenario_page import show_scenario, story_lines
 from bridgegen.pages.sketch import HEIGHT, WIDTH, sketch
@@ -35,7 +36,7 @@ def test_the_picture_shows_everybody_who_matters(name):
     assert "nan" not in text
     assert len(text) < 60_000
     # The page gives every colour its counterpart of the dark theme; lamps are lit in both.
-    style = page.WEB.joinpath("scenario.css").read_text("utf-8")
+    style = page.WEB.joinpath("birdseye.css").read_text("utf-8")
     lamps = {"#ff4d4d", "#ffd23f", "#38d39f", "#3a434e"}
     drawn = {colour for _, colour in re.findall(r'(fill|stroke)="(#\w+)"', text)} - lamps
     assert [colour for colour in sorted(drawn) if f'="{colour}"]' not in style] == []
@@ -56,15 +57,16 @@ def test_bodies_are_drawn_where_they_are():
         [np.cos(heading[1]) - np.cos(heading[0]), np.sin(heading[1]) - np.sin(heading[0])]
     )
     root = ElementTree.fromstring(sketch(pipeline.runner, x))
-    bodies = [
-        one.get("transform")
-        for one in root.iter(f"{SVG}g")
-        if one.find(f"{SVG}rect").get("fill") not in (None, "none")
+    places = [
+        np.mean([[float(v) for v in pair.split(",")] for pair in one.get("points").split()], axis=0)
+        for colour in PLAYERS[:2]
+        for one in root.iter(f"{SVG}polygon")
+        if (one.get("fill"), one.get("stroke")) == (colour, MARKING)
     ]
-    places = [np.array(re.findall(r"-?\d+\.\d", text)[:2], float) for text in bodies]
-    (bar,) = root.findall(f"{SVG}path")[-1:]
-    metres = float(root.findall(f"{SVG}text")[-1].text.split()[0])
-    scale = float(re.search(r"h(\d+\.\d)", bar.get("d")).group(1)) / metres
+    bar = next(one for one in root.iter(f"{SVG}polyline") if one.get("stroke") == INK)
+    left, right = (float(bar.get("points").split()[k].split(",")[0]) for k in (1, 2))
+    metres = next(one.text for one in root.iter(f"{SVG}text") if one.text.endswith(" m"))
+    scale = (right - left) / float(metres.split()[0])
     assert len(places) == 2
     np.testing.assert_allclose((places[1] - places[0]) / scale, gap * [1, -1], atol=0.05)
 

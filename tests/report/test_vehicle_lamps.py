@@ -14,6 +14,7 @@ from PIL import Image
 from bridgegen.drivers.kinds import BLUE, BRAKE, HAZARD, LEFT, RIGHT
 from bridgegen.engine.options import PipelineOptions
 from bridgegen.engine.pipeline import Pipeline
+from bridgegen.pages.birdseye import View
 from bridgegen.pages.frames import FINE, Film
 from bridgegen.pages.playbacks import playbacks
 from bridgegen.scenario.language.reader import load
@@ -72,10 +73,11 @@ def found(picture, at, heading, scale, body):
 
 
 @pytest.mark.parametrize(("what", "corners"), SHOWN)
-def test_a_film_shows_which_side_indicates(shows, what, corners):
+def test_a_film_shows_which_side_indicates(shows, monkeypatch, what, corners):
     p = shows(what)
     film = Film(p, (960, 540), LIT - 20, UNLIT)
-    film._draw_labels = film._draw_trail = lambda *_: None
+    monkeypatch.setattr(View, "labels", lambda *_: None)
+    monkeypatch.setattr(View, "trail", lambda *_: None)
     for k, expected in ((LIT, corners), (UNLIT, set())):
         camera = film._camera(k)
         at = np.array(camera.of(film.centres[1:2, k])[0]) / FINE

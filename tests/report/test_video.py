@@ -13,7 +13,8 @@ from tests.approval import refuses
 
 from bridgegen.base.errors import InputError, StorageError
 from bridgegen.pages import video as ffmpeg
-from bridgegen.pages.frames import HIT, PLAYERS, Film
+from bridgegen.pages.birdseye import HIT, PLAYERS
+from bridgegen.pages.frames import Film
 from bridgegen.pages.video import write_video
 
 
@@ -63,7 +64,7 @@ def test_bodies_move_as_they_do(playback):
         assert apart == pytest.approx([x[1] - x[0], y[0] - y[1]], abs=0.05)
 
 
-def test_no_label_covers_the_contact(playback):
+def test_no_label_covers_the_contact(playback, monkeypatch):
     hit = replace(playback, distance=np.where(np.arange(401) < 100, 5.0, 0.0))
     film = Film(hit, (960, 540), 60, 130)
     lines = elements(film, 110, "polyline", stroke=HIT)

@@ -2,8 +2,8 @@
 
 import pytest
 
-from bridgegen.jobs.compare.figures import DARK, LIGHT, blank, png
 from bridgegen_reproduction.document import Document, Folded, Picture, Points, Section, Shown
+from bridgegen_reproduction.figures.look import DARK, LIGHT, blank, png
 from bridgegen_reproduction.page import html
 from bridgegen_reproduction.table import Table
 
@@ -26,7 +26,7 @@ def test_it_loads_and_nothing_but_tables_and_figures_is_wider_than_the_screen(
                          Folded("Every run", runs, "runs.csv"))),),
     )  # fmt: skip
     path = tmp_path / "index.html"
-    path.write_text(html(document), "utf-8")
+    path.write_bytes(html(document))
     page = browser.new_page(viewport={"width": width, "height": height})
     complaints, requests = [], []
     page.on("console", lambda message: complaints.append(message.text))

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from matplotlib.patches import FancyBboxPatch
 
-from bridgegen.jobs.compare.figures import DARK, LIGHT, blank, pdf, png
 from bridgegen.scenario.language.reader import load
 from bridgegen.scenario.ontology.structure import LAYERS
 from bridgegen_reproduction.figures.causes import causes
 from bridgegen_reproduction.figures.distributions import Violin, by_iteration, iterations, violins
+from bridgegen_reproduction.figures.look import DARK, LIGHT, blank, pdf, png
 from bridgegen_reproduction.figures.ontology import blocks, ontology, picture_of
 from bridgegen_reproduction.perception import Causes
 from bridgegen_reproduction.runs import Run

@@ -229,6 +229,8 @@ class Objective:
         x = self._scaled(positivised(metrics, names, self.names))
         ok: Bool = np.logical_not(np.isnan(x).any(axis=1)) & np.asarray(fit, dtype=np.bool_)
         caps = np.array([[quantity(name).cap for name in self.names]])
+        # A failed row counts as one whose metrics are all at their caps: no scenario is less
+        # critical.
         x[~ok] = self._scaled(positivised(caps, self.names, self.names))
         if self.objectives == "many":
             return 0.0 - x, ok

@@ -24,6 +24,7 @@ app = Application(
     help="Search an operational design domain for scenarios in which a driving stack fails.",
     invoke_without_command=True,
     pretty_exceptions_enable=False,
+    # Rich's markup takes 0.1 s to import; `PanelledGroup` prints the panels as plain text.
     rich_markup_mode=None,
 )
 listing = Application(
@@ -91,12 +92,15 @@ def main() -> None:
 
     def terminate(number: int, frame: object) -> None:
         terminations.append(number)
+        # SIGTERM ends a search as Ctrl-C does: the batch is recorded, and worker processes are
+        # ended.
         raise KeyboardInterrupt
 
     before = signal.signal(signal.SIGTERM, terminate)
     try:
         _run()
     except SystemExit as end:
+        # What was complete when the signal came has its own status, 0.
         if terminations and end.code:
             raise SystemExit(TERMINATED) from None
         raise
@@ -122,6 +126,7 @@ def _run() -> None:
         _drop_output()
         sys.exit(1)
     except OSError as error:
+        # Writing to stdout fails without a file's name; any other such error is a bug.
         if error.filename is not None or error.errno not in _FULL:
             raise
         _drop_output()
@@ -132,6 +137,7 @@ def _run() -> None:
 def _drop_output() -> None:
     """Discard the remaining output, since its target cannot be written."""
     with suppress(OSError, ValueError):
+        # Python flushes stdout at exit, and would fail again.
         nowhere = os.open(os.devnull, os.O_WRONLY)
         os.dup2(nowhere, sys.stdout.fileno())
         os.close(nowhere)

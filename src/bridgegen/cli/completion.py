@@ -28,6 +28,7 @@ def completing(kind: str) -> Complete | None:
             known = list(names(ctx))
         except Exception:  # a scenario that cannot be read, say: a shell expects no message
             return []
+        # Values may be lists, NAME,NAME: the last one is completed.
         before, comma, last = incomplete.rpartition(",")
         return [f"{before}{comma}{name}" for name in known if name.startswith(last)]
 

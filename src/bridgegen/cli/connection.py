@@ -167,6 +167,7 @@ def _root(maps: Path | None) -> Iterator[None]:
     if not maps.is_dir():
         raise InputError(f"{maps}: --maps must be a folder, and is none")
     before = os.environ.get(ROOT)
+    # In the environment, so that processes which this one starts find the maps, too.
     os.environ[ROOT] = str(maps)
     try:
         yield

@@ -44,6 +44,7 @@ def expand(
         folded = fold({name: values.pop(name) for name in options})
         command(**values, **{parameter: folded})
 
+    # typer reads a command's signature and annotations; both have to say the expanded options.
     wrapper.__signature__ = signature.replace(parameters=parameters)  # type: ignore[attr-defined]
     wrapper.__annotations__ = {item.name: item.annotation for item in parameters}
     return wrapper
@@ -58,6 +59,8 @@ def with_declared_options(command: Callable[..., None]) -> Callable[..., None]:
     declared = {option.name: option for option in options_of(kind) if option.form.kind is not None}
 
     def fold(values: dict[str, Any]) -> PipelineOptions:
+        # What is not given has the default of the options' class, which is the only place that
+        # states it.
         given = {name: value for name, value in values.items() if value is not None}
         needed = {name: option.spelling for name, option in declared.items() if option.is_required}
         if missing := [needed[name] for name in needed if name not in given]:

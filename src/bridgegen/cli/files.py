@@ -200,8 +200,10 @@ def schema(
     from bridgegen.jobs.safety_case.model import json_schema
     from bridgegen.scenario.language.json_schema import as_text, schema_of, write_schema
 
+    # Argument and option are two spellings of one value: both may be given if they agree.
     if None not in (kind, of) and kind != of:
         raise InputError(f"the schema of one kind of file is printed, got {kind} and --of {of}")
+    # Functions and not schemas: only the one that is asked for is made.
     known: dict[str, Callable[[], dict[str, Any]]] = {
         **{job.name: partial(job_schema, job) for job in JOBS if argument_of(job)},
         "run": run_file_schema,

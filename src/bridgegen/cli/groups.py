@@ -69,6 +69,7 @@ class GroupedCommand(TyperCommand):
             if spelling in single:
                 name = single[spelling].opts[0]
                 values.setdefault(name, []).append(value if equals else next(words, ""))
+        # Click takes the last of two values without a word.
         if twice := [
             f"{name} takes one value, and is given {len(found)}: {', '.join(found)}"
             for name, found in values.items()

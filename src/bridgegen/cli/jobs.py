@@ -82,6 +82,7 @@ def command_of(job: Job) -> Any:
             chosen = common.read_simulator(simulator, simulator_set, connection)
             options = replace(options, simulator=chosen) if chosen else options
         with JobProgress() as live:
+            # Criteria are read before, so that a mistake in them costs no run.
             result = job.run(replace(options, callbacks=live.callbacks))
         _print(result, live.seconds, as_json=as_json)
         if not print_outcomes(judges.judge(result)):
@@ -107,6 +108,7 @@ def command_of(job: Job) -> Any:
 
 def _criteria_of(job: Job) -> Any:
     """Return the class of the criteria for a job's results."""
+    # By name: the command line starts without the criteria's modules.
     module, _, name = _CRITERIA.get(job.name, "of_job:JobCriteria").partition(":")
     return getattr(import_module(f"bridgegen.cli.verdict.{module}"), name)
 
@@ -145,6 +147,7 @@ def run_all(
             command({**({"out": folder} if job.has_folder else {}), **run.values})
         except typer.Exit as ended:
             status = max(status, ended.exit_code)
+        # Ctrl-C ends all of them, not only this one.
         except Interrupted:
             raise
         except BridgeGenError as error:

@@ -74,6 +74,7 @@ def places(
         junctions = {fit.id for fit in fits if fit.kind == "junction"} if scenario else None
         roads = {fit.id: fit.legs[0] for fit in fits if fit.kind != "junction"}
         write_map_picture(picture, model, junctions, roads)
+        # With --json, stdout holds JSON and nothing else.
         print(picture, file=sys.stderr if as_json else sys.stdout)
 
 

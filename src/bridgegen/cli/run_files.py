@@ -140,6 +140,7 @@ def read_run_document(path: Path) -> "Document":
 
     try:
         with path.open("rb") as file:
+            # One byte more than allowed: the reader refuses a large file that is not read whole.
             return read_plain_yaml(file.read(MAX_BYTES + 1), str(path))
     except OSError as error:
         raise FileFormatError(f"cannot be read: {error.strerror} ({path})") from None
@@ -171,6 +172,7 @@ def read_runs(path: Path, keys: Mapping[str, Key], argument: str = SCENARIO) -> 
         problems.append(f"runs must be a mapping, NAME: OPTIONS ({document.at(('runs',))})")
     else:
         for name, item in data["runs"].items():
+            # The name becomes a folder's: no separators, and no leading dot.
             if not name.replace("-", "").replace("_", "").replace(".", "").isalnum() or (
                 name.startswith(".")
             ):
@@ -242,6 +244,7 @@ def _moved(key: Key, value: Any, move: Callable[[str], object]) -> Any:
     moved = str(move(value))
     is_file = value.lower().endswith((*_YAML, ".xosc", ".csv"))
     is_path = is_file or Path(value).is_dir() or Path(moved).is_dir()
+    # A name of the catalogue stays a name, also in a file of another folder.
     return moved if key.name in _FILES and is_path else value
 
 
@@ -279,6 +282,7 @@ def is_recorded(out: Path, values: Values, keys: Mapping[str, Key]) -> bool:
     record = out.parent / f"{out.name}.yaml"
     text = _text(record, values, keys)
     if record.is_file():
+        # Compared as data: comments and order that people have changed are no other options.
         if read_run_document(record).data != read_plain_yaml(text.encode(), "").data:
             raise StorageError(
                 f"{record}: the run in {out} was begun with these other options; name another "
@@ -296,6 +300,7 @@ def _text(path: Path, values: Values, keys: Mapping[str, Key]) -> str:
 
     folder = path.resolve().parent
     data = {}
+    # In the order of the command's options, whatever the order of the call.
     for spelling, key in keys.items():
         if key.name in values:
             value = _moved(key, values[key.name], lambda name: os.path.relpath(name, folder))
@@ -360,6 +365,7 @@ def with_run_files(
             given = {
                 name: value
                 for name, value in values.items()
+                # Only what the command line states overrides a file: its parser's defaults do not.
                 if str(getattr(context.get_parameter_source(name), "name", "")) == "COMMANDLINE"
             }
             save = values.pop(SAVE)
@@ -368,9 +374,11 @@ def with_run_files(
             path, filed = Path(first), is_run_file(first)
             runs = [FiledRun("", given)]
             if filed:
+                # The argument was the file itself; the scenario is in it.
                 del given[argument]
                 read = read_runs(path, keys, argument)
                 runs = [FiledRun(run.name, _over(run.values, given)) for run in read]
+            # Written here and not by the command, which cannot tell what was given from defaults.
             if save is not None:
                 if len(runs) > 1 or runs[0].name:
                     raise InputError("--save writes one run, and this file has several")
@@ -378,12 +386,15 @@ def with_run_files(
             if filed and runs[0].name:
                 several(path, runs, keys, lambda record: command(**{**values, **record}))
             else:
+                # What the parser returned holds all defaults, so that a run need only have what
+                # differs.
                 command(**{**values, **runs[0].values})
 
         context = inspect.Parameter(
             "context", inspect.Parameter.POSITIONAL_OR_KEYWORD, annotation=typer.Context
         )
         parameters = [context, *signature.parameters.values()]
+        # typer makes the options of the signature: it has to see the context, too.
         wrapper.__signature__ = signature.replace(  # type: ignore[attr-defined]
             parameters=parameters
         )

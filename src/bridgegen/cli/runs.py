@@ -66,8 +66,11 @@ def search_all(
         values = {**filed_run.values, "out": out}
         print(f"\n{filed_run.name}", flush=True)
         try:
+            # A folder's options are recorded before its run begins: a second call resumes, and
+            # other options are refused.
             if not is_recorded(out, values, keys):
                 command(values)
+            # A run that ended before its report was written is resumed to write it.
             elif Run(out).finished and Run(out).report.is_file():
                 print(f"finished already: {out}")
             else:
@@ -81,6 +84,7 @@ def search_all(
                     )
                 print_summary(run, live.seconds)
         except Interrupted as stop:
+            # The command that goes on with all runs of the file, and not only with this one.
             raise Interrupted(
                 stop.folder, stop.evaluations, stop.budget, command=f"bridgegen search {path}"
             ) from None

@@ -332,6 +332,11 @@ class Runner:
         return runner
 
     @property
+    def has_variants(self) -> bool:
+        """Whether rows may have several storyboards; see ``by_variant``."""
+        return bool(self._variants.names)
+
+    @property
     def has_one_network(self) -> bool:
         """Whether all rows have the same road network."""
         return self._roads is not None

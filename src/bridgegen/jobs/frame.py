@@ -219,6 +219,7 @@ def command_of(name: str, options: JobOptions, out: Path, **resolved: Any) -> st
         out: its folder.
         resolved: options that it has resolved, by name.
     """
+    # No result depends on workers, so the command that repeats a job does not name them.
     values = {**vars(options), "workers": None, "out": None, **resolved}
     of_places = [item for item in options_of(type(options)) if item.is_argument]
     rest = [item for item in options_of(type(options)) if not item.is_argument]

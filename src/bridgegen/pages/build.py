@@ -37,6 +37,7 @@ from bridgegen.pages.playbacks import (
     playbacks,
 )
 from bridgegen.pages.screened_payload import screened_payload
+from bridgegen.pages.simulation_payload import simulation_payload
 from bridgegen.results.confirmation.record import Record
 from bridgegen.results.store import Recorded, Rows
 from bridgegen.results.store.summary import Summary
@@ -174,6 +175,8 @@ def build_report(
         _coverage(pipeline, rows) if coverage else None,
         tables({key: note for key, note in notes.items() if key != NOTE}, pipeline.space),
         regions,
+        # An iterator: motions are rolled out until the page is full. A page that rolled out a tenth
+        # of 10⁶ rows, with room for a few hundred, took 5,440 MiB.
         more=further_playbacks(pipeline, rows, {evaluation for _, evaluation, _ in kept}, first)
         if more
         else (),
@@ -185,6 +188,7 @@ def build_report(
         criteria=judged,
         screened=screened_payload(notes, pipeline.space),
         happening=happening,
+        simulation=simulation_payload(pipeline) if more else None,
     )
 
 
@@ -255,6 +259,8 @@ def _evaluations(pipeline: Pipeline, rows: Rows | Recorded) -> Evaluations:
             name,
             pipeline.units[name],
             rows.metrics[:, j]
+            # Only columns that the page summarises are held whole; others are read of the rows that
+            # it shows.
             if name in WHOLE or name.startswith(PREFIX)
             else Deferred(measured, j),
             quantity(name).description,

@@ -22,6 +22,7 @@ def element(name: str, *content: object, **attributes: object) -> Markup:
 
 
 def _rounded(value: object) -> object:
+    # A tenth of a pixel is not seen, and a page may hold thousands of points.
     return f"{value:.1f}".removesuffix(".0") if isinstance(value, float) else value
 
 
@@ -76,6 +77,7 @@ class Plot:
 
     def _x(self, x: Float) -> Float:
         low, high = self._ranges[0]
+        # A range of one value must not divide by 0: its marks stand at the start.
         share = (np.clip(x, low, high) - low) / ((high - low) or 1.0)
         return self.left + share * (self.right - self.left)
 
@@ -102,19 +104,28 @@ class Plot:
                 "rect", class_="bar", x=a, y=y, width=max(b - a - 1.0, 0.5), height=self.base - y
             )
 
-    def band(self, x: Float, low: Float, high: Float) -> None:
+    def band(self, x: Float, low: Float, high: Float, kind: str = "band") -> None:
         """Add the area between two curves."""
         points = self._points(np.concatenate([x, x[::-1]]), np.concatenate([high, low[::-1]]))
-        self.add("polygon", class_="band", points=points)
+        self.add("polygon", class_=kind, points=points)
 
-    def line(self, x: Float, y: Float, kind: str = "line") -> None:
+    def line(self, x: Float, y: Float, kind: str = "line", dash: str | None = None) -> None:
         """Add a curve."""
-        self.add("polyline", class_=kind, points=self._points(x, y))
+        points = self._points(x, y)
+        self.add("polyline", class_=kind, stroke_dasharray=dash, points=points)
 
     def dots(self, x: Float, y: Float, radius: float = 1.8) -> None:
         """Add a dot for each pair of values."""
         for a, b in zip(self._x(x).tolist(), self._y(y).tolist(), strict=True):
             self.add("circle", class_="dot", cx=a, cy=b, r=radius)
+
+    def grid(self, x: int = 0, y: int = 0) -> None:
+        """Add lines at so many round numbers of each axis, as `frame` has them."""
+        for tick in ticks(*self._ranges[0], x) if x else ():
+            self.add("path", class_="grid", d=f"M{self.at(tick):.1f} {self.base:g}V{self.top:g}")
+        for tick in ticks(*self._ranges[1], y) if y else ():
+            y_ = self.height(tick)
+            self.add("path", class_="grid", d=f"M{self.left:g} {y_:.1f}H{self.right:g}")
 
     def image(self, address: str) -> None:
         """Add a picture that fills the plot."""
@@ -163,9 +174,13 @@ def ticks(low: float, high: float, most: int = 7) -> list[float]:
     if low == high:
         return [low]
     step = 10.0 ** np.floor(np.log10((high - low) / (most - 2.0)))
+    # Round numbers are 1, 2 and 5 times a power of ten; 10 for what rounding leaves over.
     step *= next(value for value in (1.0, 2.0, 5.0, 10.0) if (high - low) / (step * value) <= most)
+    # The tolerance keeps ticks at the ends, where a division such as 0.3 / 0.1 misses a whole
+    # number.
     first = np.ceil(low / step - 1e-9)
     return [
+        # Without the digits of rounding; and -0 becomes 0.
         float(f"{k * step:.10g}") + 0.0
         for k in np.arange(first, np.floor(high / step + 1e-9) + 1.0)
     ]
@@ -190,6 +205,7 @@ def intervals(lines: Sequence[Interval], label: str, longest: int = 48) -> Marku
         label: of the picture.
         longest: characters of a line's words that are shown.
     """
+    # A lower end of 0 has no place on a logarithmic axis: a tenth of the estimate stands for it.
     least = min(line.low if line.low > 0.0 else line.estimate / 10.0 for line in lines)
     first = math.floor(math.log10(least))
     last = max(math.ceil(math.log10(max(line.high for line in lines))), first + 1)

@@ -117,6 +117,7 @@ def _varies(values: Float) -> bool:
 
 
 def _smirnov(a: Float, b: Float) -> float:
+    # Kolmogorov and Smirnov's distance of the two samples.
     both = np.concatenate([a, b])
     rank_a = np.searchsorted(np.sort(a), both, side="right") / a.size
     rank_b = np.searchsorted(np.sort(b), both, side="right") / b.size

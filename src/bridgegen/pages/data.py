@@ -142,6 +142,7 @@ class PageRows:
         Args:
             rows: ``(N,)`` bool.
         """
+        # All columns of one page ask for the same rows: the store is read once.
         if self._rows is None or not np.array_equal(rows, self._rows):
             self._rows, self._values = rows.copy(), self.table[rows]
         return self._values
@@ -258,6 +259,7 @@ class ReportData:
         criteria: how the evaluations meet the pass criteria, whose margins are metrics.
         screened: how far the run's screen agrees, as `screened_payload` returns it.
         happening: which events began, and who came near the ego, if the run recorded it.
+        simulation: what the page simulates with; see `simulation_payload`. None: it does not.
     """
 
     summary: RunSummary
@@ -275,6 +277,7 @@ class ReportData:
     criteria: tuple[CriterionSummary, ...] = ()
     screened: Mapping[str, Any] | None = None
     happening: Happening | None = None
+    simulation: Mapping[str, Any] | None = None
 
     def __post_init__(self) -> None:
         n = self.evaluations.iteration.size

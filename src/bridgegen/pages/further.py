@@ -42,9 +42,12 @@ def further_playbacks(
     first = [evaluation for evaluation in wanted if evaluation not in kept]
     best = best[:most]
     rest = np.setdiff1d(np.flatnonzero(rows.status == 0), [*kept, *best[: most // 2]])
+    # Half the most critical ones, half spread evenly over the search: the others play in `bridgegen
+    # view`.
     spread = rest[spread_evenly(rest.size, most)]
     turns = [item for pair in zip_longest(best.tolist(), spread.tolist()) for item in pair]
     order = [turn for turn in dict.fromkeys([*first, *turns]) if turn is not None][:most]
+    # A user's driver may be slow, and runs only where it is asked for.
     if pipeline.driver.is_own:
         order = []
     return _Further(pipeline, rows, order)
@@ -63,6 +66,7 @@ def spread_evenly(n: int, most: int) -> Int:
     k = np.arange(2**bits)
     numbers = np.zeros_like(k)
     for i in range(bits):
+        # Van der Corput's sequence: bits in reverse.
         numbers |= (k >> i & 1) << (bits - 1 - i)
     return numbers[numbers < n][:most]
 

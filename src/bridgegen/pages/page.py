@@ -23,6 +23,8 @@ from bridgegen.pages.sections import SECTIONS
 # ``function``, # ``class``, ``const`` or ``let`` that declares one name.
 
 
+# A bundler would need Node where the package is built; 150 lines here do, since imports have one
+# form and anything else is an error.
 IMPORT = re.compile(r'^import (?:\{([^{}]*)\} from )?"\./([\w.-]+\.js)";\n', re.MULTILINE)
 DECLARED = re.compile(
     r"^(export )?(?:(?:async )?function\*?|class|const|let|var) ([\w$]+)", re.MULTILINE
@@ -98,6 +100,7 @@ class _Graph:
     def add(self, name: str, importer: str = "") -> Module:
         if name in self.done:
             return self.done[name]
+        # A circle would leave a name used before its declaration, which only a browser would show.
         if name in self.open:
             circle = " → ".join([*self.open[self.open.index(name) :], name])
             raise ModuleError(f"circular import: {circle}")
@@ -133,6 +136,7 @@ def in_order(entries: Iterable[str], read: Callable[[str], str | None]) -> list[
     owner: dict[str, str] = {}
     for module in graph.done.values():
         for name in module.declared:
+            # One scope holds all modules: two equal names would be one.
             if name in owner:
                 raise ModuleError(f"`{name}` is declared by {owner[name]} and by {module.name}")
             owner[name] = module.name
@@ -186,6 +190,7 @@ def report_page(data: ReportData, *, live: bool = False) -> bytes:
     """
     title = f"{data.summary.scenario}: {data.summary.title}"
     modules, connect = (SERVED, "self") if live else (REPORT, "none")
+    # The data are cut to what the code leaves of the page's size.
     code = len(_page("page.html", modules, title, "", connect=connect))
     text = to_json(data, live=live, code=code)
     return _page("page.html", modules, title, text, connect=connect)

@@ -65,6 +65,7 @@ def playback_payload(p: Playback, road: int, picture: int | None) -> dict[str, A
     """
     real = slice(0, p.n_steps)
     contact = p.distance[real] <= 0.0  # before rounding: a miss by 0.1 mm is a miss
+    # A contact that lasts is one mark, at its first instant.
     begins = np.flatnonzero(contact & ~np.concatenate([[False], contact[:-1]]))
     finite = np.where(np.isfinite(p.distance[real]), p.distance[real], np.inf)
     lights = [] if p.street_lights is None else np.round(p.street_lights, 1).tolist()
@@ -122,6 +123,7 @@ def _series(p: Playback) -> dict[str, Any]:
 
 def _beside(beside: Beside, n_steps: int) -> dict[str, Any]:
     x = beside.x[:, :n_steps]
+    # x is NaN where an entity is absent; then nothing of it is sent.
     y, h = (np.where(np.isnan(x), np.nan, row[:, :n_steps]) for row in (beside.y, beside.h))
     series = {"x": x, "y": y, "h": h}
     return {
@@ -171,6 +173,7 @@ def _sensed(s: Sensed, p: Playback) -> dict[str, Any]:
         cos, sin = np.cos(p.h[e, k]), np.sin(p.h[e, k])
         turn = s.h[e, kept][detected] - p.h[e, k]
         columns = [
+            # Relative to the body: small numbers, which deflate well.
             (s.x[e, kept][detected] - (p.x[e, k] + body.center_ahead * cos)) * SCALE["length"],
             (s.y[e, kept][detected] - (p.y[e, k] + body.center_ahead * sin)) * SCALE["length"],
             (turn - 2.0 * math.pi * np.round(turn / (2.0 * math.pi))) * SCALE["h"],
@@ -204,6 +207,7 @@ def _course(c: Course, n_steps: int) -> dict[str, Any]:
     steps = c.steps[kept]
     shift = c.shift[kept]
     moved = np.ones(len(shift), dtype=np.bool_)
+    # Only where it changes: most of the time, a driver keeps its lane.
     moved[1:] = (shift[1:] != shift[:-1]).any(axis=1)
     if not shift.any():
         moved[:] = False

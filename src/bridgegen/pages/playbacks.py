@@ -97,6 +97,7 @@ def playbacks(
         )
         for k, (name, evaluation, files) in enumerate(kept)
     ]
+    # Export and page share one simulation of the kept rows; each made its own before.
     replays = pipeline.replays(some.X, plans=not brief) if replays is None else replays
     played = _all_played(pipeline, shown, replays, brief=brief)
     return played if brief else beside_others(played, some.X, others_of(pipeline))
@@ -189,6 +190,7 @@ def _beside(label: str, playback: Playback, rollout: Rollout, row: int) -> Besid
         motion["x"][~rollout.present[row]] = np.nan
     both = min(int(rollout.n_steps[row]), playback.n_steps)
     x, y = (motion[name][:, :both] - getattr(playback, name)[:, :both] for name in "xy")
+    # At instants at which one of both is absent (NaN), nothing is compared.
     apart = np.nan_to_num(np.hypot(x, y), nan=0.0).max(axis=1, initial=0.0) > APART
     return Beside(label, tuple(np.flatnonzero(apart).tolist()), *(motion[n][apart] for n in "xyh"))
 
@@ -202,6 +204,7 @@ def nominal_playback(pipeline: Pipeline, name: str) -> Playback:
         FileFormatError: it has no result.
     """
     X = pipeline.space.row({})[np.newaxis]
+    # One row has one storyboard, hence one part.
     ((_, replay),) = pipeline.replays(X, plans=False).parts
     rollout = replay.rollout
     if rollout.status[0] != 0:
@@ -333,6 +336,8 @@ def _thin(line: Float) -> Float:
     """Return a line without the points that it does not need to stay within ``THIN`` of itself."""
     kept = np.zeros(len(line), dtype=np.bool_)
     kept[[0, -1]] = True
+    # Douglas and Peucker's simplification, with a stack in place of recursion, whose depth Python
+    # limits.
     parts = [(0, len(line) - 1)]
     while parts:
         first, last = parts.pop()

@@ -48,6 +48,7 @@ class Scenery:
         """Return the drawing of a row's road network, the same objects for the same network."""
         space, source = self._runner.space, self._runner.source
         names = (*source.variant_names, *source.static_names)
+        # Rows of one road network share one drawing, and a page holds it once.
         key = x[[space.index(name) for name in names]].tobytes()
         if key not in self._known:
             model = self._runner.concrete(x).roads
@@ -105,6 +106,7 @@ def vehicle_lamps(rollout: Rollout, sirens: Int) -> npt.NDArray[np.int8]:
     if rollout.lamps.size:
         found |= rollout.lamps
     elif rollout.kinds.size:
+        # An acceleration acts from its instant on: the lamp is seen one instant later.
         brakes = rollout.a[:, :, :-1] <= -BRAKE_LIGHTS_FROM
         lit = brakes & np.array(IS_VEHICLE)[rollout.kinds][:, np.newaxis]
         found[:, :, 1:][lit] = BRAKE

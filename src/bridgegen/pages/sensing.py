@@ -8,6 +8,7 @@ from bridgegen.drivers.kinds import NAMES
 from bridgegen.pages.playback import Sensed
 from bridgegen.simulation.rollout import Rollout
 
+# The strictest of nuScenes's average precision, from which on a detection is no hit.
 TOLERANCE = float(THRESHOLDS[0])
 """Largest distance of a matching detection at the strictest of nuScenes's thresholds [m]."""
 
@@ -19,6 +20,7 @@ def sensed(rollout: Rollout) -> list[Sensed]:
     """
     if not rollout.detections.size:
         return []
+    # Which entities count is taken from the metrics, so that page and figures agree.
     counts = perceived(rollout).counts
     found = []
     for row, n_steps in enumerate(rollout.n_steps.tolist()):
@@ -26,6 +28,7 @@ def sensed(rollout: Rollout) -> list[Sensed]:
         steps = np.flatnonzero((detections[1:, :, column.SEEN_BY] >= column.MISSED).any(axis=0))
         frames = detections[:, steps]
         seen_by = frames[:, :, column.SEEN_BY].astype(np.int64)
+        # The ego does not see itself.
         seen_by[0] = -1
         if rollout.present.size:
             seen_by[~rollout.present[row][:, steps]] = -1

@@ -4,6 +4,8 @@ import html
 from collections.abc import Sequence
 from typing import Any
 
+from markupsafe import Markup
+
 Point = tuple[float, float]
 
 ANCHORS = {"m": "middle", "l": "start", "r": "end"}
@@ -29,13 +31,19 @@ class SvgDraw:
         width: int = 1,
     ) -> None:
         """Draw a closed shape."""
-        self._add("polygon", {"points": _points(xy)}, fill, outline, width)
+        # Between two areas of one colour, browsers show a hairline unless the areas have edges.
+        self._add("polygon", {"points": _points(xy)}, fill, outline or fill, width)
 
     def line(
         self, xy: Sequence[Point], fill: str | None = None, width: int = 1, joint: str | None = None
     ) -> None:
         """Draw a line; a joint "curve" is round."""
         given = {"points": _points(xy)} | ({"stroke-linejoin": "round"} if joint else {})
+        self._add("polyline", given, None, fill, width)
+
+    def dashes(self, xy: Sequence[Point], fill: str, width: int, dash: float) -> None:
+        """Draw a line of dashes with gaps of the same length; `birdseye.Pixels` does so, too."""
+        given = {"points": _points(xy), "stroke-dasharray": _number(dash)}
         self._add("polyline", given, None, fill, width)
 
     def circle(
@@ -76,14 +84,36 @@ class SvgDraw:
         }
         self._parts.append(f"<text {_attributes(given)}>{html.escape(text)}</text>")
 
-    def svg(self, size: tuple[int, int]) -> str:
-        """Return the whole picture with a width and height [pixels]."""
-        head = (
-            f'<svg xmlns="http://www.w3.org/2000/svg" width="{size[0]}" height="{size[1]}" '
-            f'viewBox="0 0 {self._size[0]} {self._size[1]}" font-weight="700" '
-            'font-family="DejaVu Sans, Verdana, sans-serif">'
-        )
-        return "\n".join([head, *self._parts, "</svg>\n"])
+    def add(self, part: Markup) -> None:
+        """Add an element that is made elsewhere."""
+        self._parts.append(part)
+
+    def carry(self, animation: Markup) -> None:
+        """Put what was drawn so far, but the ground, into a group that an animation moves."""
+        self._parts[1:] = [f"<g>{animation}{self.inside()}</g>"]
+
+    def inside(self) -> Markup:
+        """Return what was drawn, without the ground."""
+        return Markup("".join(self._parts[1:]))
+
+    def svg(
+        self, size: tuple[int, int] | None = None, title: str = "", *, is_file: bool = True
+    ) -> str:
+        """Return the whole picture.
+
+        Args:
+            size: its width and height [pixels]; by default as large as where it is shown.
+            title: what it says to those who do not see it.
+            is_file: whether it may stand alone; in a page, it needs no namespace.
+        """
+        given = {"class": "birdseye", "role": "img"}
+        given |= {"xmlns": "http://www.w3.org/2000/svg"} if is_file else {}
+        given |= {"viewBox": f"0 0 {self._size[0]} {self._size[1]}", "font-weight": "700"}
+        given |= {"font-family": "DejaVu Sans, Verdana, sans-serif"}
+        if size:
+            given |= {"width": str(size[0]), "height": str(size[1])}
+        named = [f"<title>{html.escape(title)}</title>"] if title else []
+        return "\n".join([f"<svg {_attributes(given)}>", *named, *self._parts, "</svg>\n"])
 
     def _add(
         self, name: str, given: dict[str, str], fill: str | None, stroke: str | None, width: int

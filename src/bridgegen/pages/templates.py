@@ -36,31 +36,34 @@ def write_page(path: Path, template: str, **values: Any) -> None:
     write_whole(path, [page(template, **values)])
 
 
-def page(template: str, **values: Any) -> bytes:
+def page(template: str, *, package: str = "bridgegen", **values: Any) -> bytes:
     """Return a page as UTF-8; what Unicode cannot encode becomes a question mark.
 
     Args:
         template: its path in the package ("jobs/risk/page.html").
+        package: the package.
         values: what it prints; ``css`` is its whole style, by default `style`'s.
     """
-    values.setdefault("css", Markup(style(template.removesuffix(".html") + ".css")))
-    text = _environment().get_template(template).render(values)
+    values.setdefault("css", Markup(style(template.removesuffix(".html") + ".css", package)))
+    text = _environment(package).get_template(template).render(values)
     return text.encode("utf-8", "replace")
 
 
-def style(own: str = "") -> str:
+def style(own: str = "", package: str = "bridgegen") -> str:
     """Return the style of a page without scripts: the common one, and its own if there is one."""
-    found = (ROOT.joinpath(name) for name in (*STYLES, own) if name)
+    found = [ROOT.joinpath(name) for name in STYLES]
+    found += [files(package).joinpath(own)] if own else []
     return "".join(traversable.read_text("utf-8") for traversable in found if traversable.is_file())
 
 
 @cache
-def _environment() -> "Environment":
-    from jinja2 import Environment, PackageLoader, StrictUndefined
+def _environment(package: str) -> "Environment":
+    from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined
 
     made = Environment(
-        loader=PackageLoader("bridgegen", "."),
+        loader=ChoiceLoader([PackageLoader(name, ".") for name in (package, "bridgegen")]),
         autoescape=True,
+        # A name that is misspelt in a template fails, and is not an empty text.
         undefined=StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,

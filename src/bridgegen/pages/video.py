@@ -14,7 +14,8 @@ from PIL import Image
 
 from bridgegen.base.disk import write_whole
 from bridgegen.base.errors import InputError, StorageError
-from bridgegen.pages.frames import HIT, Film
+from bridgegen.pages.birdseye import HIT
+from bridgegen.pages.frames import Film
 from bridgegen.pages.playback import Playback
 
 # --- Films as MP4 or WebM: frames are piped to the program ffmpeg ---
@@ -70,8 +71,10 @@ def encode(frames: Iterable[Image.Image], size: tuple[int, int], fps: int, kind:
         command = [
             program(), "-hide_banner", "-loglevel", "error", "-y",
             "-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{size[0]}x{size[1]}", "-r", str(fps),
+            # Frames go through a pipe: a codec in Python would be 30 to 70 MB of installation.
             "-i", "-", "-an", "-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2", *CODECS[kind], str(out),
         ]  # fmt: skip
+        # A file, not a pipe: a pipe that nobody reads fills up, and ffmpeg would stop.
         with (Path(folder) / "said").open("w+b") as said:
             process = subprocess.Popen(
                 command, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=said
@@ -86,6 +89,7 @@ def encode(frames: Iterable[Image.Image], size: tuple[int, int], fps: int, kind:
             limit.start()
             try:
                 assert process.stdin is not None
+                # ffmpeg that ends early closes the pipe; its own message says why.
                 with suppress(BrokenPipeError), process.stdin as pipe:
                     for frame in frames:
                         pipe.write(frame.tobytes())

@@ -3,8 +3,7 @@
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from bridgegen.jobs.compare.figures import Theme
-from bridgegen_reproduction.figures.look import SIZE, legend, panels, title_of
+from bridgegen_reproduction.figures.look import SIZE, Theme, legend, panels, title_of
 from bridgegen_reproduction.perception import CAUSES, Causes
 
 if TYPE_CHECKING:

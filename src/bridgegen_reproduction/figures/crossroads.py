@@ -9,13 +9,12 @@ import numpy as np
 
 from bridgegen.base.arrays import Float
 from bridgegen.jobs import search as campaign
-from bridgegen.jobs.compare.figures import Theme, blank
 from bridgegen.jobs.search.restored import pipeline_of
 from bridgegen.pages.playback import AREA_KINDS, Outline
 from bridgegen.pages.scenery import Scenery
 from bridgegen.scenario.language.scenario import LogicalScenario
 from bridgegen.simulation.accidents import accidents
-from bridgegen_reproduction.figures.look import SIZE, WIDE, legend
+from bridgegen_reproduction.figures.look import SIZE, WIDE, Theme, blank, legend
 from bridgegen_reproduction.paper import DESIGNS, POINTS
 from bridgegen_reproduction.runs import Run
 

@@ -8,8 +8,7 @@ import numpy as np
 
 from bridgegen.base.arrays import Float
 from bridgegen.base.statistics import Quartiles, quartiles
-from bridgegen.jobs.compare.figures import Theme
-from bridgegen_reproduction.figures.look import SIZE, legend, looks, panels, title_of
+from bridgegen_reproduction.figures.look import SIZE, Theme, legend, looks, panels, title_of
 from bridgegen_reproduction.paper import POPULATION
 from bridgegen_reproduction.runs import Run
 

@@ -7,12 +7,11 @@ import numpy as np
 
 from bridgegen.base.arrays import Float
 from bridgegen.base.statistics import quartiles
-from bridgegen.jobs.compare.figures import Theme
 from bridgegen.jobs.compare.fronts import spread
 from bridgegen.jobs.compare.measures import Measured
 from bridgegen.jobs.compare.plan import Cell
 from bridgegen.jobs.compare.record import Record
-from bridgegen_reproduction.figures.look import legend, looks, panels, title_of
+from bridgegen_reproduction.figures.look import Theme, legend, looks, panels, title_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

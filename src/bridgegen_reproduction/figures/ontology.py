@@ -5,13 +5,12 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from bridgegen.jobs.compare.figures import Theme, blank
 from bridgegen.openx.source import source_of
 from bridgegen.pages.painter import paint
 from bridgegen.pages.picture import Picture
 from bridgegen.pages.picture_payload import pictures_payload
 from bridgegen.scenario.language.scenario import LogicalScenario
-from bridgegen_reproduction.figures.look import WIDE
+from bridgegen_reproduction.figures.look import WIDE, Theme, blank
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

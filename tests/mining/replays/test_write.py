@@ -11,11 +11,12 @@ from tests.recordings.test_clean import drive, traffic
 
 from bridgegen.engine.simulate import simulate_file
 from bridgegen.openx.opendrive.geometry import pose
+from bridgegen.pages.moving import moving_picture
 from bridgegen.recordings.conflicts.find import conflicts_of
 from bridgegen.recordings.excerpt import clock_of
 from bridgegen.recordings.readers.clean import clean
 from bridgegen.recordings.replays.scenario import BEFORE, along
-from bridgegen.recordings.replays.write import moving_picture, prepare, write
+from bridgegen.recordings.replays.write import prepare, write
 
 
 def bend(n=80, v=8.0, radius=25.0, y=0.0):
@@ -131,9 +132,10 @@ def test_the_picture_moves_everyone_and_names_are_text(prepared):
     root = ElementTree.fromstring(picture)
     moves = root.findall(".//animateTransform[@type='translate']")
     assert len(moves) == len(prepared.motion.names)
-    assert root.get("aria-label") == 'a "<b>" & c'
+    assert root.find("title").text == 'a "<b>" & c'
     counts = {len(one.get("values").split(";")) for one in moves}
     assert len(counts) == 1
     first, *_, last = moves[-1].get("values").split(";")
-    assert first == "0.00 0.00"  # the ego begins at the origin, and goes to the right
-    assert float(last.split()[0]) > 5.0
+    (x, y), (further, same) = (map(float, at.split()) for at in (first, last))
+    assert further > x + 50.0  # the ego goes to the right
+    assert same == y

@@ -146,6 +146,8 @@ def braked_and_stood(scene, a, b, k, start, braking, stands):
             if m <= start:
                 harder = follows(apart, speed, v[b, min(m - 1, until)])
             elif (m - start) * dt > REACTION + 1e-9:
+                # Not 0.774 g on every road: the tyres limit it, less what holds the car in its
+                # bend.
                 harder = min(slowed + JERK * dt, braking, gives(scene, a, i, speed))
             after = max(speed - 0.5 * (slowed + harder) * dt, 0.0)
             slowed = harder

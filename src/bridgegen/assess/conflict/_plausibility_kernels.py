@@ -92,6 +92,8 @@ def _motion(i, e, x, y, h, v, c, s, present, limits, last, window, dt, found):
         if slide > most:
             found[0], found[1], found[2], found[3] = SIDEWAYS, k + 1, slide, most
             return moves, longest
+        # Changes count over 0.25 s, as brakes need to build up: a linear lane change has kinks, but
+        # hardly differs from what a car can do.
         j = k + 1 - window  # from j to k + 1
         if j < since:
             continue
@@ -177,6 +179,8 @@ def judge(
                 if at > last or at > best:
                     continue
                 stand = a > 0 and not (moves[a] or moves[b])
+                # Props may stand in each other, as the parts of a barrier do; parked vehicles may
+                # not.
                 if stand and limits[a, IS_PROP] > 0.0 and limits[b, IS_PROP] > 0.0:
                     continue
                 until = at if is_ego_s or stand else min(best, last)

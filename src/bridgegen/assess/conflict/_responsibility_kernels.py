@@ -139,25 +139,37 @@ def judge(scene, e, k, at, kind, own, own_part, appears, whole, real):
     its share of the closing speed; ``appears``: one of the two appears inside the other.
     """
     on_foot = IS_VULNERABLE[scene.kinds[e]]
+    # A risk only once the ego could see it: a driver does not brake for what it cannot know.
     entry, side = entered(scene, 0, e, k, MARGIN_ON_FOOT if on_foot else MARGIN)
     risk = visible_from(scene, e, entry, k)
     since, stands = risk, still_since(scene.v[e], scene.first, k)
+    # A moving participant was once a risk as soon as it was on the ego's strip: `un-r157`, the
+    # regulation's own driver, had 271 critical rows of 1,000 in cut-in, each said to be avoidable
+    # by that driver.
     if stands > risk + 1:  # a moving body is a risk only once the two are near in time, or it stops
         since = max(risk, min(stands, k - int(HORIZON / scene.dt)))
     seen = since
     signal = 0
     if kind in (SIDE_SWIPE, REAR_END_STRIKING) and scene.kinds[e] == BUS and side != 0:
         signal = RIGHT if side > 0 else LEFT  # it leaves its stop
+    # Crossing and turning traffic and cyclists are a danger earlier, on a collision course along
+    # their routes; so is a bus that leaves its stop and indicates (StVO § 20 (5): it is to be let
+    # go).
     if kind in (CROSSING, TURNING) or IS_CYCLE[scene.kinds[e]] or signal > 0:
         early = evident_since(scene, e, k, entry, signal)
         seen = min(since, early) if early < entry else since
         if signal > 0:
             since = seen
+    # "An ego that stands is still run into" excused every contact with one that came: 39 of 63
+    # failures of `un-r157` in wrong-way-driver were missed.
     comes = kind == HEAD_ON and not scene.near  # standing does not avoid it unless it stops, too
     level = braked_and_stood(scene, 0, e, seen, seen, BRAKING, comes)
+    # The 4 s are counted in what happened, so an ego that brakes too late, and so meets the other
+    # later, would be asked too late; here they count by the speeds of each instant.
     if (comes or kind == REAR_END_STRIKING) and level != CLEAR and risk < seen < stands:
         seen = foreseen_since(scene, e, risk, seen)
         level = braked_and_stood(scene, 0, e, seen, seen, BRAKING, comes)
+    # One that stands cannot avoid it by braking, and nobody can avoid one that is placed into it.
     avoidable = real[STOOD_EGO] <= 0.0 and level == CLEAR and not appears
     whole[DECIDED], whole[PREVENTABLE] = seen, avoidable
     if appears:
@@ -225,6 +237,8 @@ def evident_since(scene, e, k, entry, signal):
     Source: of the trust in others: StVO § 1 and the case law on it (Vertrauensgrundsatz); IEEE
     2846-2022, reasonably foreseeable behaviour. Of buses: StVO § 20 (5).
     """
+    # From one that must give way, or has a red light, the ego may expect that it stops (StVO § 1,
+    # the trust in others; IEEE 2846-2022), until it could not any more by 3 m/s².
     line = ran_red(scene, e, k, k)
     expected = scene.claims[e] > 0 or line >= 0
     stops_at = scene.gone[e, entry if line < 0 else min(line, entry)]
@@ -277,12 +291,15 @@ def decide(
     The other has been visible in the ego's way from ``risk`` on, a danger from ``since`` on, and
     stands from ``stands`` on (k + 1: it moves); ``late``: it was hidden before ``risk``.
     """
+    # The order of these rules is that of the table in docs/conflicts.md: the first that applies
+    # decides.
     if kind == EGO_STANDING:
         return of_standing(scene, e, k, whole)
     if kind != REAR_END_STRIKING and kind != REAR_END_STRUCK:
         last = ahead_until(scene, k, real[TTC]) if scene.near else k
         mine, its = ran_red(scene, 0, k, last), ran_red(scene, e, k, last)
         if scene.claims[e] == -SIREN:
+            # StVO § 38 (1): an emergency vehicle with blue light and siren may pass a red light.
             its = -1  # with due regard, it may
         if mine >= 0 or its >= 0:
             if mine >= 0:
@@ -298,6 +315,8 @@ def decide(
         return OTHER, LEFT_ITS_LANE
     if kind in (REAR_END_STRIKING, OBJECT):
         return of_striking(scene, e, k, risk, since, side, late, stands, avoidable, whole)
+    # StVO § 3 (1): one has to stop within the distance seen for what stands there, not for what
+    # comes.
     if real[STOOD_OTHER] >= STOOD and could_stop_since(scene, e, risk, since, stands, avoidable):
         if stands > risk + 1:
             whole[DECIDED] = stands
@@ -318,6 +337,8 @@ def of_standing(scene, e, k, whole):
     claim = scene.claims[e]
     if claim < 0 and claim != -SIREN:
         came, _ = entered(scene, e, 0, k, 0.0)
+        # Either since the ego came into its way, or since it stands there: who could brake
+        # comfortably from one of these on had no need to run into it.
         for since in (came, min(still_since(scene.v[0], scene.first, k), k)):
             if braked(scene, e, 0, since, since, COMFORT) == COLLIDES:
                 whole[DECIDED] = since
@@ -331,6 +352,8 @@ def could_stop_since(scene, e, risk, since, stands, avoidable):
 
     Before, it was no standing obstacle, however long it was to be seen.
     """
+    # A wrong-way driver that stops is an obstacle only since it stands: it was once judged as one
+    # that had stood all along, up to 1 km ahead.
     if stands <= max(risk + 1, since):
         return avoidable
     return braked(scene, 0, e, stands, stands, BRAKING) == CLEAR
@@ -349,6 +372,8 @@ def of_vulnerable(scene, e, k, kind, own, since, avoidable, whole):
     """Decide where the ego and a pedestrian, a cyclist or an animal meet."""
     what = scene.kinds[e]
     if IS_PEDESTRIAN[what]:
+        # On a crosswalk a pedestrian has priority (Vienna Convention, Art. 21 (2); StVO § 26 (1)),
+        # so the question is only whether there was time.
         since = on_crosswalk_since(scene, e, k)
         if since <= k:
             since = visible_from(scene, e, since, k)
@@ -360,6 +385,7 @@ def of_vulnerable(scene, e, k, kind, own, since, avoidable, whole):
         if claim < 0:
             return EGO, rule_of(claim)
         mine, its = turns(scene.c, scene.s, e, scene.first, scene.n, k, scene.dt)
+        # StVO § 9 (3): who turns off lets pass who goes straight on along the same road.
         if mine and not its and claim == 0 and same_road(scene, e, k):
             return EGO, TURNING_GIVES_WAY
         item, other = steering(scene, e, k, JUST_NOW)
@@ -411,6 +437,7 @@ def of_struck(scene, e, k, whole):
     moved = ego_came_over(scene, e, since, 0)
     if side != 0 and (mine or moved):
         whole[DECIDED] = since
+        # UN R157, 5.2.5.2, and UN R79, 5.6.4.7: a lane change must not ask more of the one behind.
         if braked(scene, e, 0, since, since, COMFORT) == CLEAR:
             return OTHER, REAR_DISTANCE
         claim = scene.claims[e]
@@ -419,6 +446,8 @@ def of_struck(scene, e, k, whole):
         if claim == 0:
             return EGO, (CUT_IN if moved else TURNING_GIVES_WAY)
         return OTHER, rule_of(claim)
+    # StVO § 4 (1): who drives ahead must not brake hard without a reason, but the one behind keeps
+    # its distance all the same: both are responsible.
     for i in range(max(k - int(JUST_NOW / scene.dt), 0), k):
         if scene.a[0, i] <= -HARD and scene.v[0, i] > STANDS and not has_reason(scene, i):
             whole[DECIDED] = i
@@ -429,6 +458,7 @@ def of_struck(scene, e, k, whole):
 @kernel
 def of_striking(scene, e, k, risk, since, side, late, stands, avoidable, whole):
     """Decide where the ego drives into the rear of the other, or into an object."""
+    # From when it is revealed, too: one that had been in sight for longer is not revealed late.
     in_time = since != risk and braked(scene, 0, e, risk, risk, BRAKING) == CLEAR
     if late and not avoidable and not in_time:
         return NEITHER, REVEALED_LATE
@@ -443,6 +473,8 @@ def of_striking(scene, e, k, risk, since, side, late, stands, avoidable, whole):
             return EGO, STANDING_AHEAD
         return NEITHER, UNSAFE_START
     if side != 0 and not moved and not mine:
+        # Not from half a metre beside the strip: against the Commission's code, 400 random cut-ins
+        # then agree in more than 96 % of the contacts.
         begins, _ = entered(scene, 0, e, k, 0.0)  # UN R157: the bodies overlap across the way
         begins = visible_from(scene, e, begins, k)
         if scene.kinds[e] == BUS:  # it is to be let go, see `evident_since`
@@ -451,10 +483,14 @@ def of_striking(scene, e, k, risk, since, side, late, stands, avoidable, whole):
         whole[DECIDED], whole[PREVENTABLE] = begins, could
         if could:
             return EGO, CUT_IN_PREVENTABLE
+        # 5.2.5.2 asks more of a system than Annex 3's model of a human does: all 43 contacts that
+        # an outside reading found excused were above its limit. It asks that a collision is
+        # avoided, so near misses stay excused.
         if not scene.near and is_required(scene, e, risk, k):
             whole[DECIDED] = risk
             return EGO, CUT_IN_REQUIRED
         return OTHER, (rule_of(claim) if its and claim > 0 else CUT_IN)
+    # A careful driver does not brake at the start for a vehicle ahead that brakes later.
     start = max(slowing_since(v[e], scene.first, min(stands, k), scene.dt), risk)
     level = braked(scene, 0, e, start, start, BRAKING)
     if level == CLEAR:
@@ -542,6 +578,8 @@ def of_leaving(scene, e, k, kind, own, since, avoidable):
 def of_crossing(scene, e, k, own, risk, avoidable, whole):
     """Decide where two paths cross, or one turns into the other's."""
     since, _ = entered(scene, e, 0, k, 0.0)
+    # RSS, principle 3; StVO § 11 (3): a right of way does not hold against one that came so early
+    # that comfortable braking would do.
     it_could = braked(scene, e, 0, since, since, COMFORT) != COLLIDES
     ego_could = braked(scene, 0, e, risk, risk, COMFORT) != COLLIDES
     claim = scene.claims[e]
@@ -574,6 +612,7 @@ def of_siren(scene, e, k, whole):
     Siren and blue light say that it will come into the way, so the ego must act before it does.
     """
     earliest = k - int(HORIZON / scene.dt)
+    # From when siren and blue light can be perceived, not from when the vehicle is in the way.
     heard = visible_from(scene, e, scene.first, k)
     since = max(heard, earliest)
     could = braked(scene, 0, e, since, since, BRAKING) == CLEAR

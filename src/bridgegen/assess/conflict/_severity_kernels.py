@@ -43,6 +43,7 @@ def shares(a, b, movable_a, movable_b):
 @kernel
 def p_mais3(kind, v, direction):
     """Return the probability that a person in or on a participant is injured at MAIS3+."""
+    # A logistic curve is above 0 at standstill; `FADE` takes it there.
     power = -(INTERCEPTS[kind, direction] + SLOPES[kind, direction] * v)
     logistic = 1.0 / (1.0 + elementary.exp(power))
     slow = v / FADE
@@ -52,6 +53,8 @@ def p_mais3(kind, v, direction):
 @kernel
 def injury(kind, share, speed, direction):
     """Return the probability of MAIS3+ of a party with a share of a collision's speed."""
+    # The curves of those without a body around them are by closing speed with a passenger car:
+    # other partners count by the change of velocity that they cause.
     if UNPROTECTED[kind]:
         share = share / (MASS[CAR] / (MASS[CAR] + MASS[kind]))
     return p_mais3(kind, share * speed, direction)

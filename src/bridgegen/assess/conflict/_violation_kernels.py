@@ -120,6 +120,7 @@ def leaving(corridor, x, y, c, s, v, offset, half_width, begin, until, whole, re
     """
     n, i, worst = samples(corridor), -1, -math.inf
     for k in range(begin, until if n else 0):
+        # Corridors are made only where an ego strays by more.
         if abs(offset[k]) <= STRAYS:
             if whole[AT] >= 0:
                 return
@@ -129,6 +130,8 @@ def leaving(corridor, x, y, c, s, v, offset, half_width, begin, until, whole, re
         if i == 0 or i == n - 1:  # before or behind the route
             continue
         h = corridor[i, HEADING]
+        # The rear axle: the front and the corners of a body sweep more than its lane in a turn,
+        # although its driver follows the route.
         half = half_width * abs(c[k] * elementary.cos(h) + s[k] * elementary.sin(h))
         aside = beside(corridor, i, x[k], y[k])
         side = 1 if aside > 0.0 else -1
@@ -144,6 +147,7 @@ def leaving(corridor, x, y, c, s, v, offset, half_width, begin, until, whole, re
         elif lane <= 0.0 or side != whole[SIDE]:  # it is back
             return
         whole[END] = k + 1
+        # A slide begins in its lane: leaving the road takes the place of leaving the lane.
         if off and whole[ROAD] == 0:
             whole[ROAD], real[0], worst = 1, 0.0, -math.inf
         if not out or (whole[ROAD] == 1 and not off):
@@ -177,11 +181,14 @@ def passing(corridor, half, kinds, e, x, y, c, s, v, distance, dt, until, whole,
         faster = v[0, k] - v[e, k] * cosine
         if level < 0:
             level, entry, own = k, distance[k], its
+            # Whom it drew level with sooner after the start than it takes to slow down to that
+            # speed is not its doing.
             early = ahead < 0.0 or k * dt < REACTION + max(faster, 0.0) / COMFORT
         if early or cosine < SAME_WAY or ahead > half[0, 0] - half[e, 0]:
             continue
         if faster < PASSES or v[0, k] < WALKING_PACE:
             continue
+        # Who waits is not overtaken, and StVO § 5 (4) does not hold.
         if IS_PEDESTRIAN[kinds[e]] and v[e, k] < CREEPS:
             continue
         if its > corridor[i, _TO_LANES] or -its > corridor[i, _TO_LANES + 1]:
@@ -212,6 +219,8 @@ def is_excused(corridor, half, x, y, c, s, v, distance, dt, leave, whole):
         left = (dy * ahead_x - dx * ahead_y) * leave[SIDE]  # how far towards where the ego leaves
         if abs((at - whole[e, INSTANT]) * dt) <= HORIZON and left < 0.0:
             return True
+    # A first definition let a departure from the road pass as a way round what is ahead, and missed
+    # 117 of 572 slides, which begin in the junction and end behind it.
     if leave[ROAD] == 1 or not knows_edges(corridor, sample):
         return False  # within a junction, it passes none
     for e in range(1, len(whole)):
@@ -273,6 +282,7 @@ def violate(
     ``leave`` ``(LEAVINGS,)``, ``over`` ``(1,)``, ``passed`` ``(PASSINGS,)`` and ``gaps`` ``(2,)``
     are scratch. A departure has the ego's own column, 0.
     """
+    # Only what happens up to the ego's first contact counts.
     until, any_violation = n, False
     for e in range(len(whole)):
         if whole[e, KIND] == CONTACT:
@@ -308,6 +318,8 @@ def violate(
     )  # fmt: skip
     aside[0], breach[0] = leave[SIDE] * over[0], 1.0
     speed = v[0, worst]
+    # Severity is that of what the departure may lead to: a solid obstacle beside the road, or a car
+    # that comes on the next lane.
     if off:
         grip = friction if math.isfinite(friction) else 0.0
         struck = math.sqrt(max(speed * speed - 2.0 * grip * CLEAR_ZONE, 0.0))

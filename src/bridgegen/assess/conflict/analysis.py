@@ -170,6 +170,7 @@ def _analyse(rollout: Rollout) -> Conflicts:
     own = [e for e in range(rollout.shape[1]) if rollout.is_ego_s(e)]
     if len(own) == 1:
         return _of_one_body(rollout)
+    # Of a tractor and its trailers the worst conflict counts, of two contacts the earlier one.
     found, *more = (_of_one_body(_seen_from(rollout, e, own)) for e in own)
     for e, part in zip(own[1:], more, strict=True):
         worse = part.kind > found.kind
@@ -217,6 +218,8 @@ def _of_one_body(rollout: Rollout) -> Conflicts:
     crosswalks = rollout.crosswalks
     if not crosswalks.size:
         crosswalks = np.zeros((n, 0, 5))
+    # A recording does not state friction: its road counts as dry, and only the driver's braking
+    # limits.
     friction = rollout.friction if rollout.friction.size else np.full(n, np.inf)
     lines = rollout.stop_lines if rollout.stop_entities.size else np.zeros((n, 0, 3))
     lights = rollout.lights if len(rollout.lights) else np.zeros((n, 0, 0), np.int8)

@@ -67,6 +67,7 @@ class Findings:
     def __post_init__(self) -> None:
         if not len(self.happened):
             blank = np.full(len(self.conflict), "", dtype=object)
+            # The dataclass is frozen; the default depends on the length of another field.
             object.__setattr__(self, "happened", blank)
 
     def __len__(self) -> int:
@@ -99,6 +100,7 @@ class Findings:
         def words(codes: Int, labels: Sequence[str]) -> npt.NDArray[np.object_]:
             return np.array(labels, dtype=object)[codes[rows, other]]
 
+        # A collision course that came to nothing has nobody responsible.
         serious = conflicts.kind[rows, other] >= NEAR_MISS
         names = np.array(["", *conflicts.names[1:]], dtype=object)
         return cls(

@@ -81,6 +81,7 @@ def happened(rollout: Rollout, *, may_stop: bool = False) -> npt.NDArray[np.obje
     others = [e for e in range(1, rollout.shape[1]) if not rollout.is_ego_s(e)]
     if rollout.kinds.size:  # cones and barriers take no part
         others = [e for e in others if not IS_OBSTACLE[rollout.kinds[e]]]
+    # An ego that is struck from behind before anything begins has shown nothing.
     last = _last_judged(rollout)
     at = np.where(rollout.began <= last[:, np.newaxis] + 1, rollout.began, -1)
     began = at >= 0 if len(at) == n else np.zeros((n, 0), np.bool_)
@@ -98,6 +99,8 @@ def happened(rollout: Rollout, *, may_stop: bool = False) -> npt.NDArray[np.obje
     ]
     met = np.zeros((n, len(acting)), np.bool_)
     for k, (i, actors) in enumerate(acting):
+        # Whoever acts is to be met: an ego once came "near" a jam while the scenario's pedestrian
+        # crossed 180 m ahead.
         met[:, k] = began[:, i] & (last_near[:, actors].max(axis=1) >= at[:, i])
     code = np.full((n, 4), -1, np.int64)  # at its end; behind whom, metres driven and left
     if known := bool(len(rollout.progress)):
@@ -107,6 +110,7 @@ def happened(rollout: Rollout, *, may_stop: bool = False) -> npt.NDArray[np.obje
         rows, behind = stuck(rollout)
         code[rows, 1] = behind
         code[rows, 2:] = np.rint(rollout.progress[rows])
+    # Few rows differ: a text is made once for each kind of row, not for each row.
     keys, which = np.unique(np.hstack([began, near, met, code]), axis=0, return_inverse=True)
     names, v = [rollout.names[e] for e in others], began.shape[1]
     w = v + len(names)
@@ -124,6 +128,8 @@ def happened(rollout: Rollout, *, may_stop: bool = False) -> npt.NDArray[np.obje
         if known:
             who = rollout.names[behind] if behind > 0 else None
             where = {"behind": who, "driven": driven, "left": left}
+            # A scenario whose criteria alone decide states what the ego has to do; to stop may be
+            # right there. Of a test that asks to stop, 24 to 39 of 41 rows were "stuck" before.
             where |= {"may_stop": True} if may_stop else {}
             found |= {"end": bool(end), "stuck": where if behind >= 0 else False}
         return json.dumps(found, ensure_ascii=False, separators=(",", ":"))

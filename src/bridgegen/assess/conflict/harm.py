@@ -37,6 +37,7 @@ LIGHT = 1e-4
 """Severity [1] below which collisions hardly differ. Ours: that of two cars that close at walking
 pace, 1.2 m/s. From there on, each factor of ten adds about 0.175 to harm."""
 
+# A tenth would rank a pedestrian missed at 47 km/h with two cars that close at 70 km/h.
 NEARLY = 0.01
 """Severity of the most urgent near miss, as a share [1] of that of the collision that it nearly
 was. Ours: a pedestrian that is nearly hit at 13 m/s ranks with two cars that collide at 7 m/s."""
@@ -62,6 +63,8 @@ def harm_of_pairs(conflicts: Conflicts, count: Count = "ego") -> Float:
         [1.0, VIOLATES],
         NEARLY * urgency(conflicts),
     )
+    # Severities span five powers of ten: on a linear scale 83 % of 3,259 collisions lay within
+    # 0.02, and a touch at 0.23 m/s outranked a pedestrian missed at 13 m/s.
     severe = np.log1p(share * conflicts.potential / LIGHT) / np.log1p(1.0 / LIGHT)
     worth = NEAR_MISS + (1.0 - NEAR_MISS) * severe
     value = _of_kinds(conflicts, count, contact=worth, near=worth)
@@ -76,6 +79,8 @@ def closeness_of_pairs(conflicts: Conflicts, count: Count) -> Float:
     As harm below a near miss; near misses from ``NEAR_MISS`` to ``2 NEAR_MISS`` by urgency; and
     collisions from there on by severity. Estimators of rare events climb it.
     """
+    # Not on the logarithmic scale: the estimators of risk climb this one, and their probabilities
+    # were to stay as they were.
     least = 2.0 * NEAR_MISS
     return _of_kinds(
         conflicts,
@@ -96,6 +101,7 @@ def _of_kinds(conflicts: Conflicts, count: Count, contact: Float, near: Float) -
         COURSE * conflicts.nearness,
     )
     if count == "ego":
+        # 0, not a little less: a search turns away from conflicts that the ego could not prevent.
         value[(touches | nearly) & ~conflicts.at_fault] = 0.0
     value[:, 0] = 0.0
     value[~conflicts.ok] = 0.0
@@ -112,6 +118,8 @@ def decisive(conflicts: Conflicts, count: Count = "ego") -> tuple[Int, Float]:
     """
     harm = harm_of_pairs(conflicts, count)
     happened = harm >= COURSE
+    # Rows without harm are told apart by the kind of their conflict, so that each has a decisive
+    # one.
     order = harm + np.where(happened, 4.0, conflicts.kind.astype(np.float64))
     order += happened & (conflicts.kind == analysis.CONTACT)
     order[conflicts.kind[:, 0] != analysis.VIOLATION, 0] = -1.0

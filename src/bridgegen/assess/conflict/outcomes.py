@@ -42,6 +42,7 @@ def with_outcomes(
         for node in individuals.links(scenario, "has_participant")
     }
     writer = _Writer(individuals, scenario)
+    # What is no participant is part of the road.
     standing = [name for name in rollout.names if name not in participants]
     conflicts = analyse(rollout)
     for accident in accidents(rollout, row, standing):
@@ -78,6 +79,7 @@ def with_outcomes(
     ]
     for queue in queues(rollout, row, vehicles, model, set(lanes)):
         who = {participants[name] for name in queue.who}
+        # The scenario's own queue, unless somebody has joined it.
         if any(who <= group for group in declared):
             continue
         node = writer.node("queue", "TrafficJam")
@@ -106,6 +108,7 @@ def _conflict_of(conflicts: Conflicts, row: int, accident: Accident) -> Conflict
         return None
     other = conflicts.names.index(next(name for name in accident.who if name != ego))
     step = round(accident.time / conflicts.time_step)
+    # The analysis has one conflict for each pair, so a later contact of the same two is not it.
     if conflicts.kind[row, other] != CONTACT or conflicts.instant[row, other] != step:
         return None
     return of_pair(conflicts, row, other)

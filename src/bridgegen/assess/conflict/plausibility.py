@@ -166,6 +166,7 @@ class Plausibility:
 def _last_conflict(rollout: Rollout) -> Int:
     """Return the instant up to which each row's motion belongs to its conflicts, ``(N,)``."""
     found = encounters(rollout)
+    # Near misses and contacts count alike; collision courses only where there is neither.
     worst = np.where(found.kind >= NEAR_MISS, NEAR_MISS, found.kind)
     counts = (worst == worst.max(axis=1, keepdims=True)) & (worst >= COURSE)
     after = round(AFTER / rollout.time_step)

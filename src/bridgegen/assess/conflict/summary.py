@@ -125,6 +125,8 @@ def _event(conflicts: Conflicts, row: int, other: int, name: str) -> str:
             f"{stood:.1f} s, {speed}"
         )
     by_other = kind in (ConflictType.REAR_END_STRUCK, ConflictType.VRU_INTO_SIDE)
+    # Whose front meets a side strikes: of 401 sentences, 40 once said that the ego's side struck
+    # the other's front.
     if by_other or (kind in _CROSSINGS and "front" in its and "front" not in own):
         return f"The {its} of {name} {strikes} the {mine} {speed}"
     verb = "met" if kind == ConflictType.SIDE_SWIPE and strikes == "struck" else strikes

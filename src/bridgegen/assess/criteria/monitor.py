@@ -158,6 +158,7 @@ class Monitor:
         ]
         wrong, _ = check_units(criterion.formula, _dimension)
         ahead = horizon(criterion.formula)
+        # The tolerance is for sums of bounds such as 0.1 + 0.2, which round upwards.
         if ahead > duration * (1.0 + 1e-9):
             wrong.append(
                 f"'{criterion.states}' looks {ahead:g} s ahead, and the scenario ends at "

@@ -42,6 +42,7 @@ def _held(rollout: Rollout, e: int, values: Float) -> Float:
         return values
     there: Bool = rollout.present[:, e]
     instants = np.arange(there.shape[1])
+    # The greatest number of an instant so far at which it was there; -1 before the first.
     last = np.maximum.accumulate(np.where(there, instants, -1), axis=1)
     first = np.where(there.any(axis=1), there.argmax(axis=1), 0)[:, np.newaxis]
     return np.take_along_axis(values, np.where(last < 0, first, last), axis=1)
@@ -60,6 +61,7 @@ def _until_end(rollout: Rollout, values: Float) -> Float:
     n = len(values)
     last = np.asarray(rollout.n_steps) - 1
     values[np.arange(n), last] = values[np.arange(n), np.maximum(last - 1, 0)]
+    # One instant has no rate.
     values[last == 0, 0] = 0.0
     return values
 
@@ -88,6 +90,8 @@ def _gap(rollout: Rollout, e: int) -> Float:
     return np.asarray(rollout.distance[:, e])
 
 
+# The kernels return the least value over a scenario's time: scenarios of one instant each give the
+# value at every instant.
 def _by_instant(of: Float, e: int) -> Float:
     """Return the ego's and another's states as scenarios of one instant, ``(N T, 2, 1)``."""
     n, _, t = of.shape
@@ -162,6 +166,7 @@ def read(rollout: Rollout, name: str, of: tuple[str, ...]) -> Float:
     entity = of[-1]
     if (name, entity) not in known:
         if entity == ANY and signal.pair:
+            # The ego's own trailer is no other.
             others = [e for e in range(1, len(rollout.names)) if not rollout.is_ego_s(e)]
             n, _, t = rollout.shape
             found = np.full((n, t), np.inf)

@@ -25,6 +25,7 @@ def when(q: float, u: float, b: float) -> float:
         return 0.0
     if squared <= 0.0 or q == math.inf:
         return math.inf
+    # The form of the root that loses no digits for a small b, and holds for b = 0.
     return 2.0 * q / (u + math.sqrt(squared))
 
 
@@ -54,6 +55,7 @@ def to_stay_below(
         end = last
         for j in range(i + 1, 3):
             if slope[j] > slope[i]:
+                # A line is the highest until a steeper one crosses it.
                 end = min(end, (low[i] - low[j]) / (slope[j] - slope[i]))
         if end < q:
             continue  # a steeper one is the highest already
@@ -66,6 +68,8 @@ def to_stay_below(
         needed = max(needed, at_most(v, t_q, s_q), at_most(v, t_end, s_end))
         closing = v - slope[i] * u
         if slope[i] > 0.0 and low[i] > 0.0 and closing > 0.0:
+            # Relative to the line the ego comes to rest there; earlier or later, the ends of the
+            # piece decide.
             touch = 2.0 * low[i] / closing
             if t_q < touch < moves:  # alongside a line that still moves
                 needed = max(needed, closing * closing / (2.0 * low[i]) - slope[i] * b)
@@ -136,6 +140,7 @@ def required(
             highest = min(highest, (along + reach_along + first) / c)
     if v * t_first > min(high + high_slope * first, highest):
         return 0.0
+    # Lines by ascending slope, as `to_stay_below` wants them: c and 1 / c are both negative.
     if c < 0.0:
         low[0], low[2] = low[2], low[0]
         slope[0], slope[2] = slope[2], slope[0]
@@ -166,6 +171,7 @@ def largest_required(
         best = 0.0
         for e in range(1, n_entities):
             for k in range(n_steps[i]):
+                # It is absent.
                 if distance[i, e, k] == math.inf:
                     continue
                 if distance[i, e, k] == 0.0:

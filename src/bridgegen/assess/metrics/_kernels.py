@@ -93,6 +93,7 @@ def acceleration_change(a: Float, n_steps: Int, window: int, out: Float) -> None
         while 2 * length <= window + 1:
             widen(high, low, length, n)
             length *= 2
+        # The rest of the window: both halves overlap, which neither maximum nor minimum minds.
         if window + 1 > length:
             widen(high, low, window + 1 - length, n)
         most = 0.0
@@ -172,6 +173,7 @@ def turn_round(cosine: Float, sine: Float, v: Float, a: Float, reverses: Bool) -
         first += 1
     backwards = first < n and v[first] < 0.0
     for k in range(n):
+        # A body that stands has the sign of before; its noise must not make it drive the other way.
         if first == n or abs(v[k]) > STANDS:
             backwards = v[k] < 0.0
         reverses[k] = backwards
@@ -226,6 +228,7 @@ def red_lights(
                 py = (y[i, 0, k] - lines[i, j, 1]) + front * sine[i, 0, k]
                 past = px * c + py * s
                 if before <= 0.0 and past > 0.0 and abs(py * c - px * s) <= aside:
+                    # The state before the step in which the line was passed.
                     state = lights[i, light, k - 1]
                     ran[light] = ran[light] or state in (RED, RED_AND_YELLOW)
                 before = past

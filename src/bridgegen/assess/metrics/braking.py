@@ -93,6 +93,7 @@ N_BRAKE = Metric(
 # --- drac: deceleration rate to avoid a crash ---
 
 
+# An objective must be finite.
 MOST = 20.0
 """Largest deceleration that is counted [m/s²], twice what a tyre gives: anything harder counts as
 this, and so does a contact."""

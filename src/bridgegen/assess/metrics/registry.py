@@ -88,6 +88,8 @@ def _checked(found: object, name: str) -> Metric:
                 f"{ADDED.place(name)} must return {n} numbers, one for each scenario, got an array "
                 f"of the shape {values.shape}"
             )
+        # NaN means a failed row to every reader: one that is missing, or one too many, would pass
+        # for it.
         if bad := np.flatnonzero(np.isnan(values) != failed).size:
             raise InputError(
                 f"{ADDED.place(name)} must be NaN exactly where a scenario failed; it is otherwise "

@@ -77,6 +77,7 @@ def r_red(rollout: Rollout) -> Float:
         raise ValueError(f"rollout.stop_lights must be in 0..{n_lights - 1}, got {stop_lights}")
     box = rollout.box[0]
     _light_kernels.red_lights(
+        # The middle of the front bumper crosses the line.
         float(box[2] + 0.5 * box[0]),
         recorded(rollout, "x"),
         recorded(rollout, "y"),

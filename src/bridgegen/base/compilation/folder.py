@@ -10,7 +10,7 @@ import re
 import stat
 import sys
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -101,15 +101,21 @@ def digest(source: Path) -> str:
         source: its file; for one outside this package, the digest is of all kernels.
     """
     known = {source} if source.is_relative_to(PACKAGE) else set(PACKAGE.rglob("_*_kernels.py"))
+    digest = hashlib.sha256()
+    for path in sorted(with_imported(known)):
+        digest.update(_content(path))
+    return digest.hexdigest()[:16]
+
+
+def with_imported(sources: Iterable[Path]) -> set[Path]:
+    """Return the files of modules, and of all that they import of this package."""
+    known = set(sources)
     new = list(known)
     while new:
         found = _imported(new.pop()) - known
         known |= found
         new += found
-    digest = hashlib.sha256()
-    for path in sorted(known):
-        digest.update(_content(path))
-    return digest.hexdigest()[:16]
+    return known
 
 
 @cache

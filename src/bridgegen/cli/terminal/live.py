@@ -67,6 +67,7 @@ class Live:
         if self._count.is_set() or is_compiled():
             return
         self.console.print("First run: compiling the simulator; later runs start at once.")
+        # Compilation blocks this thread, so another one counts.
         threading.Thread(target=self._count_kernels, daemon=True).start()
 
     def _count_kernels(self) -> None:
@@ -108,6 +109,7 @@ class JobProgress(Live):
             progress=lambda what, done, total, facts: self.show(
                 what=what, done=done, total=total, facts=facts
             ),
+            # A path may contain brackets, which are rich's markup.
             say=lambda text: self.console.print(
                 text, markup=False, highlight=False, soft_wrap=True
             ),

@@ -43,6 +43,7 @@ def print_table(
     widths = [max(map(cell_len, column)) for column in zip(head, *shown, strict=True)]
     whole, widest = sum(widths) + 2 * (len(head) - 1), max(range(len(head)), key=widths.__getitem__)
     console = Console(markup=False, emoji=False, highlight=False)
+    # Written without rich's wrapping: what reads a pipe wants a row a line.
     if not console.is_terminal:
         for row in (head, *shown):
             spaces = [

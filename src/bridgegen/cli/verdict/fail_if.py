@@ -95,6 +95,8 @@ class FailCondition:
         known = [
             comparison for comparison in self.comparisons if not isnan(values[comparison.figure])
         ]
+        # Three values: where one comparison is known not to hold, the condition does not hold,
+        # whatever the unknown ones are.
         verdict: Verdict = "failed" if len(known) == len(self.comparisons) else "unknown"
         if any(not comparison.holds(values[comparison.figure]) for comparison in known):
             verdict = "passed"
@@ -118,6 +120,7 @@ def unless_judged(
 
     return tuple(
         replace(outcome, verdict="unknown", details=f"{outcome.details}; not judged: {why}")
+        # A failure stays one: a driver that fails outside its domain has failed.
         if why and outcome.verdict == "passed" and not passes(outcome)
         else outcome
         for outcome in outcomes
@@ -172,6 +175,7 @@ def _read(text: str, known: Collection[str]) -> FailCondition:
     for part in _AND.split(text):
         match = _COMPARISON.fullmatch(part)
         number = float(match[3]) if match else float("nan")
+        # "1e999" matches and is infinite.
         if match is None or not isfinite(number):
             raise InputError(
                 "--fail-if must read FIGURE < NUMBER (or <=, >, >=, ==, !=), several joined by "

@@ -19,6 +19,7 @@ from bridgegen.cli.verdict.fail_if import Outcome
 
 Problem = Literal["failure", "error", "skipped"]
 
+# XML 1.0 has no other characters, not even escaped; names come from files of others.
 _ILLEGAL = re.compile("[^\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 _PROBLEMS: Mapping[str, Problem | None] = {
     "passed": None,
@@ -120,6 +121,7 @@ def refuse_junit(path: Path) -> None:
     Raises:
         StorageError: its folder cannot be created, or a file exists that is not JUnit XML.
     """
+    # Asked before the run, too, which may take hours: the folder is made only after it.
     folder = next(parent for parent in path.absolute().parents if parent.exists())
     if not folder.is_dir() or not os.access(folder, os.W_OK):
         raise StorageError(f"{path}: cannot be written: {folder} is not a writable folder")

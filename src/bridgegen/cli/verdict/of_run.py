@@ -112,6 +112,7 @@ class PassFailCriteria:
         if not texts and junit is None:
             return cls((), None)
         settings = Run(folder).settings
+        # The run's own settings decide which figures exist, not the options of this call.
         names = [read_criterion(criterion).quantity for criterion in settings.criteria]
         return cls.read(texts, junit, causes=settings.causes, criteria=names)
 
@@ -126,6 +127,7 @@ class PassFailCriteria:
         The first outcome is whether the run supports a verdict; without criteria and JUnit XML
         there is none but that, and it only where the run was not judged.
         """
+        # A run that says nothing of its driver never passes, whatever was asked.
         if not self.conditions and self.junit is None:
             return () if run.verdict != NOT_JUDGED else (_searched(run),)
         figures = figures_of(run)
@@ -133,6 +135,8 @@ class PassFailCriteria:
             *(condition.judge(figures) for condition in self.conditions),
             *(_outcome_of(criterion) for criterion in run.criteria),
         )
+        # What is critical is the product of a search, so it fails nothing by itself: tests fail in
+        # the XML exactly where the exit status is 3.
         outcomes = (_searched(run), *unless_judged(stated, _why_not(run), _NOT_OF_THE_EGO))
         if self.junit is not None:
             write_junit(self.junit, _suites(run, outcomes))
@@ -157,6 +161,7 @@ def figures_of(run: Run) -> dict[str, float]:
         **_of_triage(run),
     }
     figures |= {criterion.criterion.quantity: criterion.violated for criterion in run.criteria}
+    # Nothing was measured: each figure is unknown, an error and not a pass.
     if s.failed == s.evaluations:
         figures = dict.fromkeys(figures, nan)
     return figures | {"evaluations": s.evaluations, "failed": s.failed, "seconds": s.seconds}
@@ -229,6 +234,8 @@ def _suites(run: Run, outcomes: Sequence[Outcome]) -> list[Suite]:
         facts |= {f"mode {mode.number}": mode_in_words(mode, run.triage) for mode in run.modes}
     cases = [case_of(group, outcome) for outcome in outcomes]
     broken = [outcome for outcome in outcomes if outcome.verdict == "failed"]
+    # Jenkins' schema (junit-10.xsd) allows properties of a suite and not of a test: each scenario
+    # is a suite of its own.
     scenarios = [_scenario(run, path, name, group, broken) for path in run.scenarios]
     return [Suite(f"{name} criteria", cases, facts, run.summary.seconds), *scenarios]
 
@@ -236,6 +243,7 @@ def _suites(run: Run, outcomes: Sequence[Outcome]) -> list[Suite]:
 def _scenario(run: Run, path: Path, name: str, group: str, broken: Sequence[Outcome]) -> Suite:
     """Return an exported scenario as a test, failed if it contributes to a failed criterion."""
     facts = read_facts(path.with_suffix(".json"))
+    # Files of a folder can be edited: what the message needs is checked.
     if missing := {"d_min", "v_d", "n_collision"} - facts.metrics.keys():
         raise StorageError(
             f"{path.with_suffix('.json')}: is not what was exported: it has no "
@@ -269,6 +277,7 @@ def _scenario(run: Run, path: Path, name: str, group: str, broken: Sequence[Outc
 
 def _contributes(facts: Facts, figures: Sequence[str]) -> bool:
     """Return whether a critical scenario contributes to a failed criterion, by its quick cause."""
+    # The figures of a run count quick causes; a file may state the tested one.
     cause = facts.quick_cause if "quick_cause" in facts.model_fields_set else facts.cause
     for name in figures:
         if name.startswith(PREFIX):

@@ -113,6 +113,7 @@ def _all_pass(suite: SuiteRun, ego: str) -> Outcome:
         details += f"; regression: {', '.join(again)} {'was' if len(again) == 1 else 'were'} fixed"
         details += f", and {'fails' if len(again) == 1 else 'fail'} again"
     verdict: Verdict = "passed"
+    # A failure comes before what could not be judged: it stays one, however much else is missing.
     if number["failed"] > known:
         verdict = "failed"
     elif (why := unjudged_entries(results)) or number["not run"] or not number["passed"] + known:
@@ -194,6 +195,7 @@ def _cases(suite: SuiteRun, entry_result: EntryResult, group: str) -> list[Case]
     )
     return [
         each
+        # What failed stays failed, and that it ran is known; only passes are taken back.
         if each.problem or each.name == "runs"
         else replace(why, name=each.name, message=f"not judged: {entry_result.unjudged}")
         for each in cases

@@ -118,6 +118,7 @@ def task_of(plan: Plan, cell: Cell, *, deliver: bool = False) -> Task:
         plan.scenarios[cell.scenario],
         plan.options_of(cell),
         deliver=deliver,
+        # A planner may refuse a scenario, and that costs its run alone.
         may_be_refused=True,
     )
 
@@ -139,6 +140,8 @@ def chosen(plan: Plan, failed: Mapping[Cell, str]) -> tuple[Cell, ...]:
         run = Run(plan.folder(cell))
         own = set(failures_of(run, run.rows()).ways)
         group = (cell.scenario, cell.driver, cell.column)
+        # A triage is dear: a run that adds no way of failing to those of earlier seeds is not
+        # triaged.
         if group not in ways or own - ways[group]:
             found.append(cell)
         ways.setdefault(group, set()).update(own)

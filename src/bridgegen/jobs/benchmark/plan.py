@@ -149,6 +149,7 @@ class Plan:
         )
         return SearchOptions(
             ego=cell.driver,
+            # A driver without sensors is told the truth anyway.
             ideal=("perception",) if perceives and cell.column == PERFECT else (),
             algorithm=self.algorithm,
             budget=self.budget,
@@ -385,4 +386,5 @@ def _seconds(entrant: Entrant, scenario: str) -> float:
         if took[n] > SLOW:
             break
     pipeline.runner.simulator.stop()
+    # Of the larger batch: the time to begin a batch weighs least there.
     return took[max(took)] / max(took)

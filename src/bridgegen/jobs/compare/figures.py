@@ -1,165 +1,98 @@
-"""The figures of a comparison, drawn by matplotlib in colours for the colour-blind."""
+"""The figures of a comparison as SVG, in colours for the colour-blind."""
 
-import io
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from markupsafe import Markup
 
 from bridgegen.base.arrays import Float
 from bridgegen.base.statistics import quartiles
+from bridgegen.pages.charts import Plot, element
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+WIDTH = 480.0
+"""Width of a figure [pixels]: its text can be read where a phone shows it at 350."""
 
-# --- Style of the figures: two themes, axes that match them, and output as files ---
+_ROW = 28.0  # pixels, of an algorithm's box
+_LETTER = 7.5  # pixels, of a letter of an algorithm's name, at most
+_MOST_COLUMNS = 4  # of the legend
 
+LIGHT = ("#17202c", "#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
+"""Colours on white paper, the baseline's first: ink, then Okabe and Ito's (2008), without yellow,
+which is invisible there."""
 
-WIDTH = 5.4
-"""Width of a figure [inches]: text of nine points can be read where a phone shows it at 350
-pixels."""
+DARK = ("#e7ecf3", "#3d9fe0", "#ff7f3f", "#1fc796", "#e39ac6", "#f2b73a", "#a5d8f5")
+"""Colours on a dark page: the hues of `LIGHT`, lighter."""
 
-DPI = 180
+DASHES = ("", "9 4", "3 3")
+"""Dashes of lines; each is used with all colours before the next."""
 
+_MARKS = """
+.figure .line, .figure .box { fill: none; stroke-width: 2 } .figure .median { stroke-width: 4 }
+.figure .band { fill-opacity: 0.16 } .figure .dot { fill-opacity: 0.65 }
+"""
 
-@dataclass(frozen=True)
-class Theme:
-    """The colours of a figure.
-
-    Attributes:
-        paper: of the background.
-        ink: of text, and the baseline.
-        muted: of axes.
-        grid: of the grid.
-        colours: of the other algorithms.
-    """
-
-    paper: str
-    ink: str
-    muted: str
-    grid: str
-    colours: tuple[str, ...]
+_PAPER = """
+svg { background: #ffffff; font: 13px system-ui, sans-serif } text { fill: #17202c }
+.axis { fill: none; stroke: #566273 } .grid { fill: none; stroke: #e4e9f0 }
+"""
 
 
-LIGHT = Theme(
-    "#ffffff",
-    "#17202c",
-    "#566273",
-    "#e4e9f0",
-    ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9"),
-)
-"""Theme on white paper: Okabe and Ito's colours (2008), without black, and yellow, which is
-invisible there."""
-
-DARK = Theme(
-    "#171e27",
-    "#e7ecf3",
-    "#9ba8b8",
-    "#2c3643",
-    ("#3d9fe0", "#ff7f3f", "#1fc796", "#e39ac6", "#f2b73a", "#a5d8f5"),
-)
-"""Theme on a dark page: the hues of `LIGHT`, lighter."""
+def style() -> Markup:
+    """Return what a page needs to show figures, light or dark."""
+    dark = f"@media (prefers-color-scheme: dark) {{\n{_coloured(DARK)}}}\n"
+    return Markup(f"{_MARKS}{_coloured(LIGHT)}{dark}")
 
 
-def canvas(height: float, theme: Theme) -> "tuple[Figure, Axes]":
-    """Return a figure of `WIDTH` by ``height`` inches with one pair of axes."""
-    figure = blank(WIDTH, height, theme)
-    axes = figure.add_subplot()
-    dress(axes, theme)
-    return figure, axes
+def _coloured(colours: Sequence[str]) -> str:
+    return "".join(
+        f".figure .line.k{i}, .figure .box.k{i} {{ stroke: {colour} }} "
+        f".figure .band.k{i}, .figure .dot.k{i} {{ fill: {colour} }}\n"
+        for i, colour in enumerate(colours)
+    )
 
 
-def blank(width: float, height: float, theme: Theme) -> "Figure":
-    """Return an empty figure [inches]."""
-    from matplotlib.figure import Figure
-
-    # Not pyplot's: this leaves the caller's settings and figures alone.
-    return Figure((width, height), dpi=DPI, facecolor=theme.paper, layout="constrained")
-
-
-def dress(axes: "Axes", theme: Theme, *, size: float = 9.0) -> None:
-    """Give axes a theme's colours; only their left and lower sides are drawn.
-
-    Args:
-        axes: to style.
-        theme: its colours.
-        size: of the numbers [points].
-    """
-    axes.set_facecolor(theme.paper)
-    axes.tick_params(colors=theme.muted, labelsize=size)
-    axes.xaxis.label.set(color=theme.ink, fontsize=size + 0.5)
-    axes.yaxis.label.set(color=theme.ink, fontsize=size + 0.5)
-    for name, spine in axes.spines.items():
-        spine.set_color(theme.muted)
-        spine.set_visible(name in ("left", "bottom"))
-    axes.set_axisbelow(True)
+def as_file(figure: Markup) -> bytes:
+    """Return a figure as an SVG file, on white paper."""
+    look = element("style", Markup(f"{_PAPER}{_MARKS}{_coloured(LIGHT)}"))
+    start, rest = str(figure).split(">", 1)
+    return f'{start} xmlns="http://www.w3.org/2000/svg">{look}{rest}\n'.encode()
 
 
-def png(figure: "Figure") -> bytes:
-    """Return a figure as a PNG, the same bytes every time."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-
-    FigureCanvasAgg(figure)
-    buffer = io.BytesIO()
-    figure.savefig(buffer, format="png", metadata={"Software": None})
-    return buffer.getvalue()
-
-
-def pdf(figure: "Figure") -> bytes:
-    """Return a figure as a PDF for papers, its text as text, the same bytes every time."""
-    from matplotlib import rc_context
-    from matplotlib.backends.backend_pdf import FigureCanvasPdf
-
-    FigureCanvasPdf(figure)
-    buffer = io.BytesIO()
-    unsigned = {"Creator": None, "Producer": None, "CreationDate": None}
-    with rc_context({"pdf.fonttype": 42}):  # TrueType: publishers require it
-        figure.savefig(buffer, format="pdf", metadata=unsigned)
-    return buffer.getvalue()
-
-
-STYLES: tuple[Any, ...] = ("-", (0, (5, 2)), (0, (1.5, 1.5)))
-"""Line styles; each is used with all colours before the next."""
-
-
-def boxes(samples: Mapping[str, Float], baseline: str, label: str, theme: Theme) -> bytes:
-    """Draw a box and every run's value for each algorithm; return a PNG.
+def boxes(samples: Mapping[str, Float], baseline: str, label: str) -> Markup:
+    """Draw a box and every run's value for each algorithm.
 
     Args:
         samples: ``(n,)`` float64, finite, by algorithm, the first on top; none where n = 0.
         baseline: drawn in ink.
         label: of the axis.
-        theme: what to draw in.
     """
-    names = list(samples)
-    figure, axes = canvas(0.9 + 0.34 * len(names), theme)
-    for row, (name, colour, _) in enumerate(_looks(names, baseline, theme)):
-        values = samples[name]
-        if not len(values):
+    values = np.concatenate([np.zeros(0), *samples.values()])
+    low, high = (float(values.min()), float(values.max())) if len(values) else (0.0, 1.0)
+    edge = 0.04 * (high - low) or 0.5
+    left = 14.0 + _LETTER * max(map(len, samples))
+    size = (WIDTH, 52.0 + _ROW * len(samples))
+    plot = Plot(size, (low - edge, high + edge), (0.0, 1.0), (left, 10.0, 6.0, 46.0))
+    plot.grid(7)
+    for row, (name, kind, _) in enumerate(_looks(list(samples), baseline)):
+        y = plot.top + _ROW * (row + 0.5)
+        plot.text(left - 8.0, y + 4.0, name, "end")
+        if not len(samples[name]):
             continue
-        line = {"color": colour, "linewidth": 1.4}
-        axes.boxplot(
-            [values],
-            positions=[row],
-            orientation="horizontal",
-            widths=0.6,
-            whis=(0, 100),
-            showcaps=False,
-            manage_ticks=False,
-            boxprops=line,
-            whiskerprops=line,
-            medianprops={"color": colour, "linewidth": 3.2, "solid_capstyle": "butt"},
-        )
+        span, ends = quartiles(samples[name]), (samples[name].min(), samples[name].max())
+        a, b = plot.at(span.low), plot.at(span.high)
+        plot.add("rect", class_=f"box {kind}", x=a, y=y - 8.0, width=b - a, height=16.0)
+        for one, other in ((float(ends[0]), span.low), (span.high, float(ends[1]))):
+            path = f"M{plot.at(one):.1f} {y:.1f}H{plot.at(other):.1f}"
+            plot.add("path", class_=f"box {kind}", d=path)
+        middle = f"M{plot.at(span.median):.1f} {y - 8.0:.1f}v16"
+        plot.add("path", class_=f"box median {kind}", d=middle)
         # Beside one another in the order of the seeds, so that equal values do not hide each other.
-        aside = np.linspace(-0.2, 0.2, len(values)) if len(values) > 1 else np.zeros(1)
-        axes.plot(values, row + aside, ".", color=colour, markersize=4.5, alpha=0.65)
-    axes.set_yticks(range(len(names)), names, color=theme.ink)
-    axes.set_ylim(len(names) - 0.5, -0.5)
-    axes.set_xlabel(label)
-    axes.grid(axis="x", color=theme.grid, linewidth=0.8)
-    return png(figure)
+        n = len(samples[name])
+        aside = np.linspace(-5.0, 5.0, n) if n > 1 else np.zeros(1)
+        for value, off in zip(samples[name].tolist(), aside.tolist(), strict=True):
+            plot.add("circle", class_=f"dot {kind}", cx=plot.at(value), cy=y + off, r=2.4)
+    plot.frame(label)
+    return plot.svg(label, "chart figure")
 
 
 def curves(
@@ -167,53 +100,59 @@ def curves(
     points: Sequence[int],
     baseline: str,
     label: str,
-    theme: Theme,
     *,
     from_zero: bool = True,
-) -> bytes:
-    """Draw the median over runs, and the band between the quartiles, by evaluations; a PNG.
+) -> Markup:
+    """Draw the median over runs, and the band between the quartiles, by evaluations.
 
     Args:
         samples: ``(n, c)`` float64 by algorithm: n runs, c points; none where n = 0.
         points: c numbers of evaluations.
         baseline: drawn in ink.
         label: of the vertical axis.
-        theme: what to draw in.
         from_zero: whether the vertical axis begins at 0; else where the curves are after a tenth of
             the evaluations, so that similar ends are distinguishable.
     """
-    names = [name for name in samples if len(samples[name])]
-    figure, axes = canvas(3.1 + 0.2 * -(-len(names) // 4), theme)
-    for name, colour, style in _looks(list(samples), baseline, theme):
-        if name not in names:
-            continue
-        spans = [quartiles(column) for column in samples[name].T]
-        x = [0, *points]
-        low, median, high = (
-            [0.0, *(getattr(span, part) for span in spans)] for part in ("low", "median", "high")
+    spans = {
+        name: [quartiles(column) for column in runs.T]
+        for name, runs in samples.items()
+        if len(runs)
+    }
+    early = min((some[len(points) // 10].low for some in spans.values()), default=0.0)
+    low = 0.0 if from_zero else float(np.floor(20.0 * early) / 20.0)
+    high = max((span.high for some in spans.values() for span in some), default=0.0)
+    longest = max(map(len, spans), default=0)
+    columns = max(1, min(_MOST_COLUMNS, int(WIDTH / (40.0 + _LETTER * longest))))
+    rows = -(-len(spans) // columns)
+    top = high + 0.03 * (high - low) if high > low else low + 1.0
+    size = (WIDTH, 286.0 + 18.0 * rows)
+    plot = Plot(size, (0.0, points[-1]), (low, top), (52.0, 12.0, 8.0, 52.0 + 18.0 * rows))
+    plot.grid(7, 7)
+    x = np.array([0, *points], np.float64)
+    shown = [look for look in _looks(list(samples), baseline) if look[0] in spans]
+    for name, kind, _ in shown:
+        lows, highs = (
+            np.array([0.0, *(getattr(span, part) for span in spans[name])])
+            for part in ("low", "high")
         )
-        axes.fill_between(x, low, high, color=colour, alpha=0.16, linewidth=0)
-        axes.plot(x, median, color=colour, linestyle=style, linewidth=2, label=name)
-    axes.set_xlim(0, points[-1])
-    early = [float(quartiles(samples[name][:, len(points) // 10]).low) for name in names]
-    axes.set_ylim(bottom=0 if from_zero or not early else np.floor(20 * min(early)) / 20)
-    axes.set_xlabel("evaluations")
-    axes.set_ylabel(label)
-    axes.grid(color=theme.grid, linewidth=0.8)
-    if names:
-        legend = figure.legend(
-            loc="outside lower center", ncols=4, frameon=False, fontsize=9, handlelength=2.6
-        )
-        for text in legend.get_texts():
-            text.set_color(theme.ink)
-    return png(figure)
+        plot.band(x, lows, highs, f"band {kind}")
+    for number, (name, kind, dash) in enumerate(shown):
+        median = np.array([0.0, *(span.median for span in spans[name])])
+        plot.line(x, median, f"line {kind}", dash or None)
+        row, column = divmod(number, columns)
+        u, v = 12.0 + column * (WIDTH - 12.0) / columns, plot.base + 60.0 + 18.0 * row
+        path = f"M{u:.1f} {v - 4.0:.1f}h24"
+        plot.add("path", class_=f"line {kind}", stroke_dasharray=dash or None, d=path)
+        plot.text(u + 30.0, v, name, "start")
+    plot.frame("evaluations", label)
+    return plot.svg(label, "chart figure")
 
 
-def _looks(names: Sequence[str], baseline: str, theme: Theme) -> list[tuple[str, str, Any]]:
-    """Return each algorithm with its colour and line style."""
+def _looks(names: Sequence[str], baseline: str) -> list[tuple[str, str, str]]:
+    """Return each algorithm with the class of its colour and its dashes."""
     others = [name for name in names if name != baseline]
-    looks = {baseline: (theme.ink, STYLES[0])}
+    looks = {baseline: ("k0", "")}
     for k, name in enumerate(others):
-        hue, style = k % len(theme.colours), k // len(theme.colours) % len(STYLES)
-        looks[name] = (theme.colours[hue], STYLES[style])
+        hue, dash = k % (len(LIGHT) - 1), k // (len(LIGHT) - 1) % len(DASHES)
+        looks[name] = (f"k{hue + 1}", DASHES[dash])
     return [(name, *looks[name]) for name in names]

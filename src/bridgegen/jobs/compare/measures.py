@@ -144,6 +144,8 @@ def measure(records: Mapping[Cell, Record], budget: int, baseline: str) -> Measu
     m = len(next(iter(records.values())).terms)
     ranges = [(record.low, record.high) for record in records.values()]
     known = [(low, high) for low, high in ranges if low is not None and high is not None]
+    # Scaled by what all runs met, not by the metrics' caps: d_min's is 200 m where S4 knows 33, and
+    # v_d has none on the critical side.
     scale = Scale.pooled(known, m)
     final = {cell: scale.objectives(record.fronts[-1]) for cell, record in records.items()}
     reference = front(np.concatenate(list(final.values())))
@@ -162,6 +164,8 @@ def measure(records: Mapping[Cell, Record], budget: int, baseline: str) -> Measu
             **{f"to_{n}": count for n, count in record.reached.items()},
             "modes": float(record.modes),
             **{f"to_{n}_modes": count for n, count in record.modes_reached.items()},
+            # Bins and distances of other parameters (an adversary's decisions) cannot be
+            # compared.
             **(
                 dict.fromkeys(_in_parameters(record), float("nan"))
                 if cell.algorithm in strange

@@ -1,17 +1,16 @@
 """The comparison on one self-contained page: sentences, tables, figures, and every run."""
 
-import base64
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
+from markupsafe import Markup
 
 from bridgegen.assess.criteria import quantity
 from bridgegen.assess.metrics import Quantity
 from bridgegen.base.disk import write_whole
 from bridgegen.base.errors import StorageError
 from bridgegen.jobs.compare import figures, words
-from bridgegen.jobs.compare.figures import DARK, LIGHT
 from bridgegen.jobs.compare.measures import Measure, ordinal, waited_for
 from bridgegen.jobs.compare.plan import RUNS, Cell
 from bridgegen.jobs.compare.record import points
@@ -37,6 +36,8 @@ def write_page(comparison: Comparison) -> None:
         (comparison.folder / FIGURES).mkdir(exist_ok=True)
     except OSError as error:
         raise StorageError(f"{comparison.folder}: cannot be written: {error.strerror}") from None
+    # Durations differ each time: they have a file of their own, and the page is the same to the
+    # byte.
     settled = [measure for measure in comparison.measures if not measure.timed]
     templates.write_page(
         comparison.page,
@@ -54,6 +55,7 @@ def write_page(comparison: Comparison) -> None:
         tenth=ordinal(10),
         boxes=_boxes(comparison),
         command=plan.command(),
+        figure_style=figures.style(),
     )
 
 
@@ -150,8 +152,8 @@ def _median(line: Line, measure: Measure, best: float) -> dict[str, object]:
     }
 
 
-def _figures(comparison: Comparison, scenario: str) -> Iterator[tuple[str, str, str]]:
-    """Yield each figure in a light and a dark theme, and its caption; write the light ones."""
+def _figures(comparison: Comparison, scenario: str) -> Iterator[tuple[Markup, str]]:
+    """Yield each figure and its caption; write it as a file, too."""
     plan, measured = comparison.plan, comparison.measured[scenario]
 
     def of(name: str) -> list[Cell]:
@@ -174,24 +176,23 @@ def _figures(comparison: Comparison, scenario: str) -> Iterator[tuple[str, str, 
     }
     at = points(plan.budget).tolist()
     band = "Median over the runs, and the band between the quartiles"
-    drawn = []
-    for theme in (LIGHT, DARK):
-        different = figures.curves(
-            distinct, at, plan.baseline, "different critical scenarios", theme
-        )
-        critical = figures.curves(found, at, plan.baseline, "critical scenarios", theme)
-        volume = figures.curves(volumes, at, plan.baseline, "hypervolume", theme, from_zero=False)
-        shares_drawn = figures.boxes(shares, plan.baseline, "R_critic", theme)
-        drawn.append((different, shares_drawn, critical, volume))
+    base = plan.baseline
+    drawn = (
+        figures.curves(distinct, at, base, "different critical scenarios"),
+        figures.boxes(shares, base, "R_critic"),
+        figures.curves(found, at, base, "critical scenarios"),
+        figures.curves(volumes, at, base, "hypervolume", from_zero=False),
+    )
     captions = (
         f"Different critical scenarios found. {band}.",
         "R_critic: the critical share of each run (points), quartiles and median.",
         f"Critical scenarios found. {band}.",
         f"Hypervolume of the front. {band}.",
     )
-    for kind, light, dark, caption in zip(FIGURE_NAMES, *drawn, captions, strict=True):
-        write_whole(comparison.folder / FIGURES / f"{scenario}-{kind}.png", [light])
-        yield _data(light), _data(dark), caption
+    for kind, figure, caption in zip(FIGURE_NAMES, drawn, captions, strict=True):
+        path = comparison.folder / FIGURES / f"{scenario}-{kind}.svg"
+        write_whole(path, [figures.as_file(figure)])
+        yield figure, caption
 
 
 def _run(comparison: Comparison, cell: Cell, measures: Sequence[Measure]) -> dict[str, object]:
@@ -230,7 +231,3 @@ def _boxes(comparison: Comparison) -> str:
         )
         for name, measured in comparison.measured.items()
     )
-
-
-def _data(png: bytes) -> str:
-    return f"data:image/png;base64,{base64.b64encode(png).decode()}"

@@ -145,13 +145,16 @@ class Plan:
             "version": version("bridgegen"),
             "budget": self.budget,
             **given,
+            # By content: a map that was moved is the same, one that was edited is not.
             "map": None if road_map is None else _digest(Path(road_map)),
         }
         same |= {f"scenario {name}": mark for name, mark in self.fingerprints.items()}
         for name, settings in self.algorithms.items():
             method = self.methods[name]
+            # A setting that is given its default is the same as one that is not given.
             known = {key: setting.default for key, setting in toolkit.get(method).settings.items()}
             same[f"settings of {name}"] = {**known, **settings}
+            # A user's own algorithm has no version: its file's content stands for it.
             if (file := file_of(method)) is not None:
                 same[f"algorithm {name}"] = _digest(file)
         return _plain(same)
@@ -191,6 +194,7 @@ def make_plan(
         raise InputError(*problems)
     first = label_of(baseline or algorithms[0])
     for name, method in methods.items():
+        # Only for what it refuses, before anything is run.
         resolve(toolkit.get(method), Problem.unnamed(1), 0, settings.get(name, {}))
     for name in [*settings, first]:
         if name not in methods:
@@ -237,6 +241,7 @@ def begin(plan: Plan) -> None:
 
 def _plain(value: Any) -> dict[str, Any]:
     """Return an object as JSON's types."""
+    # What is compared with a file must have passed through JSON: tuples become lists there.
     plain: dict[str, Any] = json.loads(json.dumps(value))
     return plain
 

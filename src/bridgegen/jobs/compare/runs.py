@@ -81,6 +81,7 @@ class RunsProgress:
         if failure is not None:
             self._failed += 1
             self._callbacks.say(f"{name} failed: {failure}")
+        # A run may end before its budget: what it will not make is no longer to come.
         self._total -= self._budget - self._evaluations.get(name, 0)
         self._show()
 
@@ -130,8 +131,11 @@ def attempt(
         batch(progress.evaluations)
 
     callbacks = SearchCallbacks(stage=stage, batch=count)
+    # The way of a user: `run_search` and `resume`. So every cell is a run that can be viewed,
+    # resumed, repeated and measured.
     how: dict[str, Any] = {
         "deliver": task.deliver,
+        # One thread each: the cores are shared by the runs.
         "workers": cluster or Threads(1),
         "callbacks": callbacks,
     }
@@ -222,6 +226,9 @@ def _run_in_processes(
             failures[task.name] = why
         progress.ended(task.name, why)
 
+    # Processes by `subprocess`: forked ones have threads and compiled code of their parent, and
+    # `multiprocessing` would run a user's script again. One that crashes is one failed run; a
+    # `ProcessPoolExecutor` would end them all.
     TaskPool(tasks, make, (cluster,), heard=heard, ended=ended).run(at_once)
     return failures
 
@@ -232,5 +239,6 @@ def make(task: Task, cluster: str | None, say: Callable[..., None]) -> str | Non
         task,
         cluster,
         lambda evaluations: say("batch", evaluations),
+        # Where nothing is compiled yet, one process compiles and the others begin after it.
         lambda stage: say(READY) if stage == "search" else say("stage", stage),
     )

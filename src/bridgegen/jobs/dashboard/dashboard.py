@@ -252,8 +252,10 @@ def build_dashboard(given: DashboardOptions) -> Dashboard:
     page = folder / PAGE if given.out is None else Path(given.out)
     status_path = folder / FILE
     file, old = read_failures(folder), read_old_file(folder)
+    # The newer file counts where both name a failure mode.
     own = {**old, **file.failures}
     declared = tuple(map(read_criterion, given.criteria))
+    # Before the results are read, which may take long.
     refuse_other(page, GENERATOR, "dashboard")
     project = read_project(
         folder, lambda number, total: given.callbacks.progress("folders", number, total, "")
@@ -263,7 +265,10 @@ def build_dashboard(given: DashboardOptions) -> Dashboard:
     ):
         raise FileFormatError(*damaged)  # it may name modes that seem to be new
     modes = failure_modes(project.results, decisions_of(own, project))
+    # Without --update nothing is written but the page, so that a nightly job leaves the working
+    # tree clean.
     new = {} if not update else undecided(modes, own)
+    # Also what an earlier version's file holds: it moves to the new file at the first update.
     moved = {id: failure for id, failure in old.items() if id not in file.failures}
     if update and (new or moved):
         write_failures(file, {**moved, **new})

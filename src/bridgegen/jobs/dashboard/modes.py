@@ -89,6 +89,8 @@ class Decisions:
         )
         for mode_key in (replace(key, scenario=failure.searched or key.scenario), in_file, key.id):
             if some := self.others.get(mode_key, []):
+                # Of several blocks about one mode (by cause), the first of new, known, accepted,
+                # fixed counts: what is undecided for one cause is undecided.
                 return min(some, key=lambda pair: STATUSES.index(pair[1].status))
         return "", self.own.get(key.id) or Block()
 
@@ -120,6 +122,7 @@ def decisions_of(own: Mapping[str, Block], project: Project) -> Decisions:
                 ModeKey(scenario, "", requirement=criterion.id) for criterion in block.violates
             ]
             for key in (happens, *violated):
+                # A failure that a growing suite keeps has its status in the suite's file alone.
                 found.others[key] = [(f"{place}: {id}", block)]
     return found
 
@@ -204,6 +207,7 @@ def undecided(modes: Sequence[OpenMode], own: Mapping[str, Block]) -> dict[str, 
             driver=_clean(mode.key.driver),
         )
         for mode in modes
+        # Blocks that are there are never changed: the file is the user's, and belongs into git.
         if not mode.decided and mode.key.id not in own
     }
 
@@ -222,6 +226,8 @@ def contradictions(modes: Sequence[OpenMode], own: Mapping[str, Block]) -> list[
 
 def _clean(text: str) -> str:
     """Return a text, which may come from a stranger's file, as a block takes it."""
+    # A title may come from a stranger's file: a control character would change what a terminal or
+    # an editor shows.
     return "".join(c if c.isprintable() else "\ufffd" for c in text[:MOST_TEXT])
 
 

@@ -95,6 +95,7 @@ def read_project(folder: Path, begun: Callable[[int, int], None] | None = None) 
         if begun is not None:
             begun(number, len(found))
         reader.read(path)
+    # Said on the page: a cut that is not seen would look like success.
     if len(found) >= MOST_RUNS:
         why = f"a dashboard reads at most {MOST_RUNS:,} folders; the others are left out"
         reader.problems.append(Problem(".", why))
@@ -105,6 +106,7 @@ def _kind(folder: Path) -> str | None:
     """Return the file that identifies a folder of results; None if it is another folder."""
     for name in _FILES:
         file = folder / name
+        # Links are not followed: they may lead out of the project.
         if file.is_file() and not file.is_symlink():
             return name
     return None
@@ -173,6 +175,7 @@ class _Reader:
     def _decisions(self) -> dict[Path, FailureFile]:
         beside = [path.parent for suite in self.suites for path in suite.files.values()]
         found = {}
+        # That of the project's own folder is read by `build_dashboard`.
         for folder in sorted({*self.deciding, *beside} - {self.root}):
             try:
                 found[folder] = read_failures(folder)

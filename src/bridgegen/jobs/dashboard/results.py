@@ -89,6 +89,7 @@ def place_of(text: str, project: Path) -> str:
     path = Path(text)
     if not path.is_absolute():
         tried = (project / path, project.parent / path, Path.cwd() / path)
+        # The same file from wherever a run was started: two machines name one scenario.
         path = next((item for item in tried if item.exists()), path)
         if not path.is_absolute():
             return path.as_posix()
@@ -138,6 +139,7 @@ class ModeKey:
     def id(self) -> str:
         """Short and the same on every machine: a digest of all of it, never like a number."""
         text = "\0".join(vars(self).values())
+        # With letters in front: YAML reads a digest of digits, or like 1e5, as a number.
         return f"fm-{sha256(text.encode('utf-8', 'surrogatepass')).hexdigest()[:10]}"
 
 
@@ -209,6 +211,7 @@ class Seen:
         for mine, its in ((self.bins, other.bins), (self.bands, other.bands)):
             for name, counts in its.items():
                 held = mine.setdefault(name, [0] * len(counts))
+                # A scenario whose bins have changed since cannot be added up.
                 if len(held) == len(counts):
                     mine[name] = [a + b for a, b in zip(held, counts, strict=True)]
         for name, count in other.outside.items():
@@ -278,6 +281,8 @@ def current(results: Iterable[Result]) -> list[Result]:
         held.setdefault((result.scenario, result.driver.name, result.kind), []).append(result)
     found = []
     for some in held.values():
+        # Results of the version that was tested last are current, all of them; where the version is
+        # not known, the latest alone.
         last = next((result for result in reversed(some) if result.finished), some[-1])
         version = last.driver.version
         found += (

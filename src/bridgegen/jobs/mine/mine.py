@@ -191,6 +191,7 @@ def mine(given: MineOptions) -> Mined:
     out = Path(given.out or "mined")
     update, scenarios = _paths(given.update), _paths(given.scenarios)
     time_step = given.time_step
+    # What can be refused is refused before the first recording is read, which may take long.
     _refuse_replaced([*update, *scenarios], out / MINED)
     refuse_same_names(update)
     refuse_foreign(out, [f"{path.name}{DIFF}" for path in update])
@@ -212,6 +213,8 @@ def mine(given: MineOptions) -> Mined:
                 summary = summarise(traffic, cleaned, located, conflicts)
                 found.append(summary)
                 clock = clock_of(cleaned.traffic)
+                # Of each recording only the closest events are kept, with an excerpt: its traffic
+                # is not.
                 played = closest(played, cleaned.traffic, clock, summary.events, counts)
                 counts.update({each.kind.name: len(each) for each in summary.events.kinds})
                 kept = _most_critical(kept, cleaned.traffic, clock, conflicts, given.keep)
@@ -283,6 +286,7 @@ def _most_critical(
     keep: int,
 ) -> list[Prepared]:
     """Return the most critical events of earlier recordings and of one more."""
+    # The conflicts of a recording are in this order already: no later one can be kept.
     more = [prepare(traffic, clock, conflict) for conflict in conflicts[:keep]]
     return sorted([*kept, *more], key=lambda prepared: order(prepared.event))[:keep]
 

@@ -3,9 +3,10 @@
 from collections.abc import Iterator, Sequence
 
 from bridgegen.jobs.mine.mine import CRITICAL, Mined, Summary
+from bridgegen.pages.moving import moving_picture
 from bridgegen.pages.templates import counted
 from bridgegen.recordings.conflicts.find import RecordedConflict
-from bridgegen.recordings.replays.write import Replay, moving_picture
+from bridgegen.recordings.replays.write import Replay
 
 HEAD = (
     "recording", "file", "ego", "other", "time_s", "conflict", "type", "responsible", "ttc_s",

@@ -14,6 +14,7 @@ from bridgegen.drivers.kinds import BICYCLE, MOTORCYCLE, NAMES, PEDESTRIAN
 from bridgegen.jobs.mine import near_misses as conflicts
 from bridgegen.jobs.mine.mine import CRITICAL, PATHS_SHOWN, Mined, Summary
 from bridgegen.pages import charts, exposure, templates
+from bridgegen.pages.moving import moving_picture
 from bridgegen.pages.templates import counted
 from bridgegen.recordings.cells import cell
 from bridgegen.recordings.events.playback import SHOWN, caption
@@ -21,7 +22,6 @@ from bridgegen.recordings.events.tables import FOLDER, against_in_words, kind_ro
 from bridgegen.recordings.events.tables import HEAD as EVENTS_HEAD
 from bridgegen.recordings.events.tables import TABLE as EVENTS
 from bridgegen.recordings.lanes.account import LanesFound
-from bridgegen.recordings.replays.write import moving_picture
 from bridgegen.recordings.scenarios.files import ENDINGS
 from bridgegen.recordings.scenarios.files import FOLDER as SCENARIOS
 from bridgegen.recordings.scenarios.mined import MinedScenario, Unmade
@@ -73,6 +73,7 @@ def refuse_foreign(out: Path, more: Sequence[str] = ()) -> None:
     if out.exists() and not out.is_dir():
         raise StorageError(f"{out}: exists already, and is no folder")
     refuse_other(out / PAGE, GENERATOR, "page of recordings")
+    # The page marks a folder as ours: without it, the folders in it are somebody's.
     for folder in (CRITICAL, FOLDER, SCENARIOS, *more):
         if (out / folder).exists() and not (out / PAGE).exists():
             raise StorageError(
@@ -87,6 +88,7 @@ def refuse_foreign(out: Path, more: Sequence[str] = ()) -> None:
     ):
         try:
             with (out / name).open("rb") as file:
+                # Of a table, the first line tells; a file of others may have a line without end.
                 ours = file.readline(4096).decode("utf-8", "replace").strip() == ",".join(head)
         except FileNotFoundError:
             continue
@@ -201,6 +203,7 @@ def _csv(head: Iterable[str], rows: Iterable[Iterable[object]]) -> Iterator[byte
     writer.writerow(head)
     for row in rows:
         writer.writerow([cell(value) for value in row])
+    # Names come from recordings, and may hold what UTF-8 cannot.
     yield text.getvalue().encode("utf-8", "replace")
 
 

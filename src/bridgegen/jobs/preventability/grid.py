@@ -84,6 +84,7 @@ class Grid:
         problems: list[str] = []
         if not axes:
             raise InputError("a map needs an axis at least (--grid NAME=LOW:HIGH:N)")
+        # Only for the message, which names first what the user would vary.
         searched_first = sorted(space.parameters, key=lambda name: name not in space.variables)
         numbers = [name for name in searched_first if _is_number(space.parameters[name])]
         values = []
@@ -142,6 +143,8 @@ class Grid:
         ok = np.ones(stop - start, np.bool_)
         table: dict[str, Float | float] = {}
         with np.errstate(all="ignore"):  # of cells that break a constraint
+            # Bounds and derived values are of parameters that come before: each is computed after
+            # them.
             for name in space.order:
                 if name in space.derived:
                     value = np.broadcast_to(space.derived[name].value.evaluate(table), len(X))
@@ -164,6 +167,8 @@ class Grid:
             if bound.hi is not None:
                 hi = np.minimum(hi, bound.hi.evaluate(table))
         value = given[name] if name in given else np.full(n, self.space.defaults[name])
+        # A cell that breaks a constraint stays empty; moving it inside would show another cell's
+        # outcome in its place.
         ok &= (value >= lo - slack(lo)) & (value <= hi + slack(hi))
         return value
 

@@ -64,6 +64,8 @@ def map_preventability(given: MapOptions) -> PreventabilityMap:
         "drivers": list(drivers),
         "models": list(judges),
         **({"vehicle": vehicle} if vehicle else {}),
+        # A map may be resumed long after: a driver whose file has changed since would give another
+        # map.
         "files of drivers": {name: digest_of(name) for name in names},
     }
     axes = [
@@ -127,6 +129,7 @@ class _Run:
             m = self._names.index(name)
             if name not in self._drivers:
                 found[m, open_] = self._outcomes(name, X[open_])
+            # A model is asked only where the drivers collide and no earlier model has avoided it.
             open_ &= found[m] != Outcome.AVOIDED
         return found
 

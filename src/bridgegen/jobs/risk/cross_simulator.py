@@ -33,6 +33,8 @@ from bridgegen.simulation.choice import SimulatorChoice
 CLOSE = 3.0
 """Largest weight of the rows examined that are closest to the event, as a multiple of the
 event's."""
+# Two phases spend what is cheap: of 200 rows in both simulators, 5 effective ones were harmful in
+# cut-in.
 HERE = 16_384  # rows that are simulated here
 AT_A_TIME = 32  # rows there, between two entries of the ledger
 MOST_FAILED = 0.2  # of the rows there: the others may be a biased choice
@@ -157,6 +159,8 @@ def look_elsewhere(
 def _closest(scores: Float, weights: Float, is_event: Bool) -> Bool:
     """Return which rows that are not the event come closest to it, `CLOSE`."""
     order = np.argsort(np.where(is_event, np.inf, -scores), kind="stable")[: int(np.sum(~is_event))]
+    # By weight, not by harm: rows of half a near miss's harm were 480 times as likely as harm in
+    # cut-in, and no hit among 100 of them left the factor open up to 18.
     most = CLOSE * float(weights[is_event].sum())
     found = np.zeros(len(scores), np.bool_)
     found[order[np.cumsum(weights[order]) <= most]] = True

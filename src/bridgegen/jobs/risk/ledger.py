@@ -65,9 +65,13 @@ class Ledger:
         try:
             data = io.BytesIO(read_bytes(self._path()))
             with zipfile.ZipFile(data) as members:
+                # A compressed member may be any size when it is read; ours are stored.
                 if any(info.compress_type != zipfile.ZIP_STORED for info in members.infolist()):
                     return None
+            # A pickle would be code, and the folder may come from others.
             found = np.load(data, allow_pickle=False)
+            # An estimate that is resumed asks for the same points, batch by batch, by its seed;
+            # other points are simulated.
             if str(found["digest"]) != _digest(Z, least):
                 return None
             at, held = found["at"], found["values"]
@@ -93,6 +97,8 @@ class Ledger:
         Raises:
             StorageError: they cannot be written.
         """
+        # Of 10⁵ to 10¹⁰ rows only those near the event are kept, by five numbers each; a row of a
+        # search's store has some 700 bytes.
         at = np.flatnonzero(outcomes.values[:, Column.SCORE] >= least)
         data = io.BytesIO()
         without = np.flatnonzero(outcomes.values[:, Column.RESULT] != 1.0)

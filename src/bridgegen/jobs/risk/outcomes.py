@@ -58,6 +58,7 @@ class Outcomes:
         modes: dict[str, int] = {}
         values = []
         for part in parts:
+            # Each part numbers its modes from 0 on: the same words get the same number here.
             numbers = np.array([modes.setdefault(mode, len(modes)) for mode in part.modes], float)
             found = part.values.copy()
             has = found[:, Column.MODE] >= 0.0
@@ -103,7 +104,10 @@ def _outcomes(runner: Runner, X: Float, count: Count) -> tuple[Float, npt.NDArra
     )
     rows = np.arange(len(X))
     values = np.zeros((len(X), len(Column)))
+    # Neither a failed row nor one whose traffic could not happen counts as an event.
     ok = (rollout.status == 0) & (gate.code == Implausible.NONE)
+    # Harm alone is 0 where the ego is not responsible: levels that followed it ended in front of
+    # such conflicts (cut-in, `careful`: at 0.2, never at 0.3).
     led = np.where(score >= NEAR_MISS, score, ALMOST * np.minimum(near, NEAR_MISS))
     values[ok, Column.SCORE], values[ok, Column.OWN] = led[ok], own[ok]
     values[ok, Column.SEVERITY] = conflicts.severity[rows, other][ok]
@@ -201,9 +205,11 @@ def data_band(exposure: Exposure, weighted: Weighted, threshold: float, fit: Fit
     X = exposure.from_normal(weighted.Z[at])
     weights, before = weighted.weights[at], fit.exposure.log_density(X)
     good = np.isfinite(before)
+    # A row that the fitted exposure excludes has no ratio of densities.
     X, weights, before = X[good], weights[good], before[good]
     factors = []
     for replicate in replicates:
+        # Capped, so that exp does not overflow.
         parts: Float = weights * np.exp(np.minimum(replicate.log_density(X) - before, 50.0))
         total, squares = float(parts.sum()), float(np.sum(parts * parts))
         if squares > 0.0 and total * total / squares >= FEWEST:

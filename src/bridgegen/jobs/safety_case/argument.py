@@ -154,6 +154,7 @@ class RunArgument(Part):
             f"{at}.1",
             f"{self._n('drawn_harmful')} of {self._n('drawn_known')} draws with a result are "
             f"harmful ({self._n('share')}); {self._n('drawn')} were drawn: {rows}.",
+            # Fresh rows are no evaluations of the run: they are in the triage's record.
             evidence=[self._files.triage if space.drawn == "fresh" else self._files.run],
         )
 
@@ -251,6 +252,7 @@ class RunArgument(Part):
                     number=self._numbers.id(f"confirmed:{name}"),
                     equals=self._numbers.id(f"ran:{name}"),
                 ),
+                # No scenario ran there: "0 of 0" would hold, and support nothing.
                 undeveloped=not ran,
             )
             if ran:

@@ -243,6 +243,7 @@ def drawing(found: Layout, label: str) -> Markup:
 
 
 def _edge(edge: Edge) -> Markup:
+    # The last piece with a length gives the arrow its direction: a line may end where it turned.
     (x0, y0), (x, y) = next(
         pair for pair in reversed([*pairwise(edge.points)]) if pair[0] != pair[1]
     )

@@ -97,6 +97,7 @@ def _over(runs: Sequence[Facts], numbers: dict[str, Number]) -> Draft:
     of = Numbers("all")
     bounded = sum(bool(run.triage.bound.space.rows) for run in runs)
     if bounded > 1:
+        # Bonferroni's inequality: the intervals need not be independent.
         of.add("joint", max(0.0, round(1.0 - bounded * (1.0 - CONFIDENCE), 12)), "percent")
         numbers |= {number.id: number for number in of.all}
         strategy.add(
@@ -233,6 +234,7 @@ def export_safety_case(given: SafetyCaseOptions) -> Exported:
         if given.out
         else (folders[0] / FOLDER if len(folders) == 1 else Path(FOLDER))
     )
+    # All runs are read before the folder is made: a refusal leaves nothing behind.
     found = [read_facts(path) for path in folders]
     if folder.resolve() in seen:
         raise InputError(f"{folder}: is the folder of a run; choose another --out")

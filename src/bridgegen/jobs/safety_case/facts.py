@@ -236,6 +236,7 @@ class Files:
             ("json", "its metrics"),
         ):
             path = self._folder / FOLDER / f"{stem}.{kind}"
+            # The stem is of a record, which is untrusted: it must not name files outside the run.
             inside = path.resolve().is_relative_to(self._folder.resolve())
             if stem and inside and path.is_file():
                 yield path, f"{stem}: {shows}"

@@ -127,6 +127,7 @@ def run_search(given: SearchArguments) -> Run:
         raise InputError(*problems)
     require_screen(given, budget)
     effort(given.triage)
+    # Before anything else depends on it: the run records the algorithm that `auto` stands for.
     given = _with_algorithm(given, catalogue, budget)
     method = toolkit.get(given.algorithm)
     require_asynchronous(given, method)
@@ -178,6 +179,8 @@ def run_search(given: SearchArguments) -> Run:
             callbacks.warning(domain)
         callbacks.stage("compile")
         pipeline.warm_up()
+        # What the ontology says of lanes and participants is checked before the budget is spent: an
+        # export that SHACL refuses once came after it.
         require_exportable(pipeline)
         chosen = pipeline.choose_objective(objectives=columns, seed=seed)
         made_with = Settings.of(
@@ -202,6 +205,7 @@ def run_search(given: SearchArguments) -> Run:
             optimised=chosen.to_dict(),
             criteria=[criterion.to_dict() for criterion in pipeline.monitor],
         )
+        # Before the folder is made, so that a refused call leaves none.
         searcher = searcher_of(pipeline, made_with, callbacks.warning)  # it may refuse
         with Store.create(
             folder,
@@ -254,6 +258,8 @@ def resume(
     with Store.open(folder, write=True) as store, open_workers(workers) as pool:
         callbacks.workers(pool)
         run = Run.of(store)
+        # Code that a run's folder names is never imported unasked: a user's driver or algorithm has
+        # to be named again.
         check_named(run.settings.algorithm, algorithm, "algorithm", run.folder, "resume")
         require_asynchronous(run.settings, toolkit.get(run.settings.algorithm))
         pipeline = pipeline_of(
@@ -308,6 +314,7 @@ def _go(
             )
     except WorkersError as error:
         raise _workers_lost(error, store) from error
+    # A folder that was removed meanwhile: SQLite goes on in a file without a name.
     store.require_there()
     if result.reason is Reason.INTERRUPTED:
         raise Interrupted(store.folder, result.evaluations, settings.budget)
@@ -364,6 +371,7 @@ def _finish(
     callbacks.stage("export")
     chosen = rows.take(best)
     # One simulation, for the files and the playback.
+    # Files and page took one simulation each before.
     replays = pipeline.replays(chosen.X) if len(best) else None
     drawn = failing_draws(pipeline.space, record, settings.keep)
     exported = export_critical(

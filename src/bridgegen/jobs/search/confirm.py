@@ -214,6 +214,8 @@ class _GrowingRecord:
         """Write all, most critical first."""
         order = sorted(self._found, key=lambda k: self._merit.get(k, len(self._merit)))
         scenarios = [
+            # By merit and not by time of arrival: the tracks that are kept are of the most critical
+            # ones.
             scenario if place < MOST_TRACKS else scenario.model_copy(update={"tracks": ()})
             for place, scenario in enumerate(self.of(order))
         ]
@@ -257,6 +259,7 @@ def _merit(every: Rows) -> dict[int, int]:
     """Return the places of all critical evaluations, 0 for the most critical."""
     critical = np.flatnonzero(every.critical & (every.status == 0))
     order = critical[by_merit(every.F[critical])]
+    # Places and not merits: F has several columns, which only by_merit puts in order.
     return {k: place for place, k in enumerate(order.tolist())}
 
 
@@ -282,6 +285,8 @@ def _known(folder: Path, empty: Record, every: Rows) -> dict[int, Scenario]:
     if earlier is None:
         return {}
     check_rows(path, earlier.scenarios, every.X, every.metrics)
+    # A record is of one simulator as it was set and of one objective: results of others do not add
+    # up to counts.
     for name in ("label", "settings", "ego", "thresholds", "rule", "count", "objectives"):
         was, would = getattr(earlier, name), getattr(empty, name)
         if was != would:

@@ -70,6 +70,7 @@ def export_critical(
     Raises:
         StorageError: the folder cannot be written.
     """
+    # Written beside, then renamed: an interruption never leaves half of an export under its name.
     target, fresh = folder / FOLDER, folder / f"{FOLDER}.part"
     exported, refused = [], []
     motions = _motions(replays, pipeline.objective.count)
@@ -103,6 +104,7 @@ def export_critical(
                     conflict=conflict,
                 )
             except OntologyError as error:
+                # One scenario that the ontology refuses costs that one alone.
                 refused.append(Refused(name, int(rows.id[i]), error.problems))
                 continue
             files.append(fresh / f"{name}.json")
@@ -221,6 +223,7 @@ def _write_alone(
     conflict = summarise(analyse(rollout), 0, pipeline.objective.count)
     metrics = pipeline.measure(rollout)
     harm = float(metrics[0, pipeline.metrics.index(pipeline.objective.harm)])
+    # Written so that NaN is refused, too.
     if not harm >= NEAR_MISS:
         return (f"it is not harmful as it is exported: harm {harm:.2g} of {NEAR_MISS:g}",)
     critical = pipeline.objective.critical(metrics, pipeline.metrics)

@@ -123,11 +123,13 @@ def _scenario(
     """Return the comparison of evaluation k, whose motion here is a row of a rollout."""
     objective = here.objective
     known = _outcome(here, every.metrics[k], every.F[k], every.findings.row(k))
+    # A record is only used with the row that it is of.
     digest = digest_of(every.X[k], every.metrics[k])
     if isinstance(ran, str) or ran.rollout.status[ran.row] != 0:
         failure = _legal(ran if isinstance(ran, str) else _failure(ran))
         ours = known.model_copy(update={"contact": first_contact(motion, row)})
         return Scenario(evaluation=k, name=None, row=digest, here=ours, failure=failure)
+    # By the run's own objective: a difference is then of the motion, and not of the rule.
     F, _ = objective.F(ran.metrics[np.newaxis], here.metrics)
     partner = known.partner if objective.rule == "harm" else ""
     found = compare(motion, ran.rollout, row, ran.row, partner)

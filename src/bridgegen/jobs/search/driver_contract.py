@@ -160,12 +160,14 @@ def _in_short(done: Sequence[Check]) -> Iterator[Check]:
 
 def _in_one(name: str, pipeline: Pipeline, X: Float, rng: np.random.Generator) -> Iterator[Check]:
     start = time.perf_counter()
+    # Also the time from which the size of the last batch is chosen.
     whole = pipeline.rollout(X)
     took = time.perf_counter() - start
     yield Check(name, DRIVEN, _failures(pipeline, X, whole))
     rows = np.flatnonzero(whole.status == 0)
     if not len(rows):
         return
+    # A row that fails has no motion to compare.
     X, whole = X[rows], whole.take(rows)
     problem = _difference(whole, pipeline.rollout(X), rows)
     yield Check(name, AGAIN, problem)
@@ -180,6 +182,7 @@ def _in_one(name: str, pipeline: Pipeline, X: Float, rng: np.random.Generator) -
         (BEFORE, lambda: _after(pipeline, X[::-1], X[half]), half),
         (ALONE, lambda: pipeline.rollout(X[order[:1]]), order[:1]),
     )
+    # Where repetition alone changes the motion, order and company cannot be told apart from it.
     for rule, run, at in () if problem else tries:
         own.process.call_seconds.clear()
         yield Check(name, rule, _difference(anew.take(at), run(), rows[at]))

@@ -180,8 +180,10 @@ def _write(files: Mapping[Path, bytes], folder: Path, sources: Sequence[Path]) -
     try:
         folder.mkdir(parents=True, exist_ok=True)
         for target in files:
+            # Links make other names of one file: samefile asks the disk.
             if target.exists() and any(target.samefile(source) for source in sources):
                 raise StorageError(f"{target}: is what is exported, and is not overwritten")
+        # Only after all targets are checked: a refusal leaves no part of an export.
         for target, data in files.items():
             target.write_bytes(data)
     except OSError as error:

@@ -43,6 +43,7 @@ def corners(pipeline: Pipeline) -> tuple[Float, tuple[str, ...]]:
             u = np.full(space.n_var, 0.5)
         cube = [np.zeros(space.n_var), np.ones(space.n_var)]
         words += ["with all parameters at their lowest", "with all parameters at their highest"]
+        # One parameter at a time: the corners of n ranges would be 2**n rows.
         for i, name in enumerate(space.variables[:MOST_CORNERS]):
             for value, which in ((0.0, "lowest"), (1.0, "highest")):
                 item = u.copy()
@@ -85,6 +86,7 @@ def _export_problems(
     more = np.linspace(first, len(X) - 1, checked - first).astype(int) if len(X) > first else ()
     for i in dict.fromkeys([*range(first), *map(int, more)]):
         concrete = pipeline.runner.concrete(X[i], "roads.xodr")
+        # Only for what it raises, as the export would; the text is not needed.
         scenario_xml(concrete.storyboard)
         if concrete.individuals is None:
             return

@@ -129,6 +129,7 @@ def not_exported(folder: Path) -> tuple[Refused, ...]:
     path = folder / NOT_EXPORTED
     try:
         data = read_bytes(path)
+        # Only for what it refuses and pydantic takes: infinite numbers, lone surrogates.
         parse_json(data)
         return tuple(_REFUSED.validate_json(data, strict=True))
     except FileNotFoundError:

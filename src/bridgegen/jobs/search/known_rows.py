@@ -34,12 +34,15 @@ class KnownRows:
             X: ``(n, k)`` float64, without −0.0.
             most: at most so many rows are known; the id of a further new one is −1.
         """
+        # Digests in an array with a hash table of ids take 24 to 32 bytes a row; a dict took 130
+        # more, at the same speed.
         whole = b"".join([blake2b(row.tobytes(), digest_size=16).digest() for row in X])
         keys = np.frombuffer(whole, np.uint64).reshape(-1, 2).tolist()
         ids, fresh, n = [-1] * len(keys), [], len(self)
         slots, digests, mask = self._slots, self._digests, len(self._slots) - 1
         for k, (low, high) in enumerate(keys):
             at = low & mask
+            # Linear probing; at most half of the slots are full.
             while (known := slots[at]) >= 0:
                 if digests[2 * known] == low and digests[2 * known + 1] == high:
                     ids[k] = known

@@ -164,6 +164,8 @@ def run_loop(
     session = _Session(algorithm, decode, stream, store, budget, on_batch, ahead)
     reason: Reason | None = Reason.BUDGET if n_before >= budget else None
     try:
+        # Replaying from the seed is the way to resume: no pickle, no state to forget. A million
+        # evaluations of PSO replay in a minute and a half.
         if reason is None:
             session.restore()
         while reason is None:
@@ -171,6 +173,8 @@ def run_loop(
         if reason.final and store.finished != reason:
             store.finish(reason)
     except KeyboardInterrupt:
+        # Notes are kept after Ctrl-C, too; after a kill they are missing until the run is resumed:
+        # writing them after each batch would double the writes.
         reason = Reason.INTERRUPTED
     session.keep_notes()
     return LoopResult(
@@ -257,6 +261,8 @@ class _Session:
         if saved is None or not isinstance(algorithm, Restorable):
             return
         for rows in self._store.rows(0, saved.evaluations):
+            # The decoder is not part of the saved state: rows that it gives otherwise now would be
+            # other scenarios under the same numbers.
             X = as_float("X", self._decode(rows.U), rows.X.shape) + 0.0
             self._compare("X", X, rows.X, int(rows.id[0]))
             self._known.add(X, self._budget)
@@ -295,7 +301,11 @@ class _Session:
 
         self._idle = 0 if fresh else self._idle + 1
         converged = self._idle >= PATIENCE
+        # The first batch is told whole: no model of four rows, no archive whose ranges are those of
+        # two.
         may_wait = 0 if converged or self.batches == 1 else self._ahead
+        # By number of rows, in the order in which they were asked for: told by whichever ends
+        # first, a search would depend on the machine's load.
         self._tell(len(self._untold) - may_wait)
         return self._nothing_new(Reason.CONVERGED) if converged else None
 
@@ -322,6 +332,8 @@ class _Session:
         if last and not isinstance(self._algorithm, TakesNotes):
             return
         self._algorithm.tell(told.U, self._log.results(told.ids))
+        # With `--ahead` a state would have to hold the rows in flight, too: none is saved, and a
+        # search that resumes replays.
         if not last and not self._ahead and len(self._known) >= self._recorded:
             self._save()
 
@@ -336,9 +348,14 @@ class _Session:
 
     def _save(self) -> None:
         if isinstance(self._algorithm, Restorable):
+            # In a transaction of its own right after `tell`. Killed in between, the last batch is
+            # asked again on the state before it, compared bit for bit and answered from the store:
+            # no instant is left at which the two disagree.
             self._store.save(Checkpoint(len(self._known), self._idle, self._algorithm.state()))
 
     def _ask(self) -> Float:
+        # An algorithm of the user's may return anything: it is checked here, where the error can
+        # name it.
         name, n_var = self._algorithm.name, self._store.columns.n_var
         try:
             # A copy: the algorithm may reuse its array.
@@ -360,6 +377,7 @@ class _Session:
 
     def _compare(self, name: str, now: Float, then: Float, start: int) -> None:
         """Check that rows are those that were recorded."""
+        # Bit for bit: a difference in the last digit is another search from there on.
         differ = np.argwhere(now != then)
         if len(differ):
             k, j = (int(i) for i in differ[0])

@@ -3,12 +3,12 @@
 import base64
 import html
 import io
-import json
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
+from markupsafe import Markup
 from matplotlib.figure import Figure
 
 from bridgegen.assess.criteria import headline as judged
@@ -17,6 +17,7 @@ from bridgegen.base.arrays import Bool, Float
 from bridgegen.base.errors import BridgeGenError
 from bridgegen.drivers import is_spec
 from bridgegen.engine.simulate import simulate_file
+from bridgegen.pages.moving import EVERY, moving_picture
 from bridgegen.simulation.choice import EMBEDDED
 from bridgegen.simulation.rollout import Rollout
 
@@ -66,6 +67,7 @@ def worst_rollout(run: "Run") -> Rollout | None:
     would have to be imported, which happens only if it is asked for.
     """
     path = _worst(run)
+    # A notebook that shows a run must not import code that the run's folder names.
     if not path or is_spec(run.settings.ego) or run.settings.simulator != EMBEDDED:
         return None
     try:
@@ -84,6 +86,7 @@ def _draw_space(run: "Run", axes: "Axes") -> None:
         (rows.critical, RED, "critical"),
     ):
         at = np.flatnonzero(chosen)
+        # Evenly over the run: the same figure each time.
         at = at[:: max(1, -(-len(at) // MOST_POINTS))]
         x, y = rows.X[at, first], rows.X[at, second]
         axes.plot(x, y, ".", color=colour, markersize=4, label=label)
@@ -129,36 +132,26 @@ def _draw_worst(rollout: Rollout, name: str, axes: "Axes") -> None:
     axes.legend(fontsize="small", frameon=False)
 
 
-MOST_FRAMES = 300
+MOST_STATES = 300
 MOST_ENTITIES = 30
 """Largest number of entities of a playback, so that a notebook stays small."""
 
 _PLAYER = """<!doctype html><meta charset="utf-8"><style>
 body{margin:0;font:13px system-ui,sans-serif;color:#17202c;background:#fff}
-canvas{display:block;width:100%;height:260px;background:#eef1f5}
+svg{display:block;width:100%;height:260px;background:#dfe5da}
 div{display:flex;gap:.6em;align-items:center;padding:.4em}input{flex:1}
-</style><canvas id="c"></canvas><div><button id="b">Play</button>
-<input id="t" type="range" min="0" value="0" aria-label="time"><span id="s"></span></div>
+</style>PICTURE<div><button id="b">Play</button>
+<input id="t" type="range" min="0" max="SECONDS" step="any" value="FIRST" aria-label="time">
+<span id="s"></span></div>
 <script>
-const d=DATA,c=document.getElementById("c"),g=c.getContext("2d"),t=document.getElementById("t");
-const b=document.getElementById("b"),s=document.getElementById("s"),n=d.frames.length;
-t.max=n-1;t.value=d.first;let timer=0;
-function paint(){const k=+t.value,f=d.frames[k],w=c.clientWidth,h=c.clientHeight;
-const r=devicePixelRatio||1;c.width=w*r;c.height=h*r;g.setTransform(r,0,0,r,0,0);
-const z=h/d.metres;g.font="11px system-ui";
-g.strokeStyle="#b8c2cf";f.forEach((e,i)=>{g.beginPath();d.frames.forEach(o=>{if(o[i])
-g.lineTo(w/2+(o[i][0]-f[0][0])*z,h/2-(o[i][1]-f[0][1])*z)});g.stroke()});
-f.forEach((e,i)=>{if(!e)return;const[l,q,a]=d.box[i];
-const X=w/2+(e[0]-f[0][0])*z,Y=h/2-(e[1]-f[0][1])*z;
-g.save();g.translate(X,Y);g.rotate(-e[2]);g.fillStyle=i?"#d55e00":"#0072b2";
-g.fillRect((a-l/2)*z,-q/2*z,Math.max(l*z,2),Math.max(q*z,2));g.restore();
-g.fillStyle="#17202c";g.fillText(d.names[i],X+6,Y-8)});
-s.textContent=(k*d.step).toFixed(2)+" s"}
-t.oninput=paint;onresize=paint;
-b.onclick=()=>{if(timer){clearInterval(timer);timer=0;b.textContent="Play";return}
-if(+t.value>=n-1)t.value=0;b.textContent="Stop";
-timer=setInterval(()=>{if(+t.value>=n-1){b.click();return}t.value=+t.value+1;paint()},d.step*1000)};
-paint()</script>"""
+const v=document.querySelector("svg"),t=document.getElementById("t");
+const b=document.getElementById("b"),s=document.getElementById("s");let timer=0;
+function say(){s.textContent=(+t.value).toFixed(2)+" s"}
+t.oninput=()=>{v.setCurrentTime(+t.value);say()};
+b.onclick=()=>{if(timer){clearInterval(timer);timer=0;v.pauseAnimations();b.textContent="Play";return}
+v.unpauseAnimations();b.textContent="Stop";
+timer=setInterval(()=>{t.value=v.getCurrentTime()%t.max;say()},50)};
+v.pauseAnimations();t.oninput()</script>"""
 
 
 def run_html(run: "Run") -> str:
@@ -190,28 +183,23 @@ def run_html(run: "Run") -> str:
 def player(rollout: Rollout) -> str:
     """Return a page that plays the first scenario of a rollout, seen from above."""
     n = int(rollout.n_steps[0])
-    stride = -(-n // MOST_FRAMES)
-    steps = np.unique([*range(0, n, stride), n - 1])
-    names = rollout.names[:MOST_ENTITIES]
-    present = rollout.present[0] if rollout.present.size else None
-    frames = [
-        [
-            None
-            if present is not None and not present[i, k]
-            else [round(float(array[0, i, k]), 3) for array in (rollout.x, rollout.y, rollout.h)]
-            for i in range(len(names))
-        ]
-        for k in steps.tolist()
-    ]
-    data = {
-        "names": names,
-        "box": np.round(rollout.box[: len(names)], 3).tolist(),
-        "frames": frames,
-        "step": stride * rollout.time_step,
-        "metres": 40.0,
-        "first": int(np.argmin(np.abs(steps - _closest(rollout, n)))),
-    }
-    return _PLAYER.replace("DATA", json.dumps(data).replace("</", "<\\/"))
+    seconds = (n - 1) * rollout.time_step
+    closest = _closest(rollout, n)
+    gaps = rollout.distance[0, :, min(closest, n - 1)]
+    picture = moving_picture(
+        rollout,
+        int(gaps[:MOST_ENTITIES].argmin()) if np.isfinite(gaps[:MOST_ENTITIES]).any() else 0,
+        closest * rollout.time_step,
+        "the worst scenario, from above",
+        every=max(EVERY, seconds / MOST_STATES),
+        most=MOST_ENTITIES,
+        follow=40.0,
+    )
+    first = f"{closest * rollout.time_step:.2f}"
+    page = _PLAYER.replace("SECONDS", f"{seconds:.2f}").replace("FIRST", first)
+    # The picture fills the frame, whatever its width: on a phone its ends are cut, not its scale.
+    filling = picture.replace("<svg", Markup('<svg preserveAspectRatio="xMidYMid slice"'), 1)
+    return page.replace("PICTURE", filling)
 
 
 def _closest(rollout: Rollout, n: int) -> int:

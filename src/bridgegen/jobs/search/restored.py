@@ -58,12 +58,17 @@ def pipeline_of(
     """
     settings, folder = run.settings, run.folder
     if elsewhere is not None:
+        # Where to compare with another simulator, neither causes nor the other driver are asked
+        # for.
         settings = replace(settings, simulator=elsewhere, cause=None, worse_than=None)
+    # A run's folder may come from somebody else: code that it names is not imported unless the user
+    # names it again.
     check_named(settings.ego, ego, "ego", folder, command)
     if settings.worse_than is not None:
         if compares or worse_than is not None or not is_spec(settings.worse_than):
             check_named(settings.worse_than, worse_than, "worse-than", folder, command)
         else:
+            # No row is evaluated, so nothing asks the other driver: its code need not be imported.
             settings = replace(settings, worse_than=None)
     scenario, space, roads = searched(run)
     pipeline = Pipeline(
@@ -149,6 +154,7 @@ def searched(run: Run) -> tuple[SearchedScenario, SearchSpace, RoadMap | None]:
         )
     logical = as_judged(logical, Objective.from_dict(settings.optimised).gated)
     there, roads = placed(logical, settings.road_map, settings.junction)
+    # The fingerprint above is of the scenario without its map: the map has a digest of its own.
     if roads and hashlib.sha256(roads.data).hexdigest() != settings.map_digest:
         raise StorageError(
             f"{folder}: map {settings.road_map} is not what it was when the run began"

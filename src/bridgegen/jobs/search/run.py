@@ -68,6 +68,7 @@ class Run:
             store: of the run.
             rows: all of its evaluations, where they have been read: the summary is of these.
         """
+        # __init__ would open the store a second time.
         self = cls.__new__(cls)
         self._take(store)
         if rows is not None:
@@ -166,6 +167,7 @@ class Run:
 
         It fails by harm, or by a pass criterion. It is not judged before it has ended.
         """
+        # Pass criteria come first: one that is violated is so whether or not harm could be judged.
         if any(criterion.violated for criterion in self.criteria):
             return "fails"
         if self.triage is None or not self.triage.bound.judged:
@@ -222,6 +224,7 @@ def judged(store: Store, settings: Settings) -> tuple[CriterionSummary, ...]:
     of, n = dict(zip(store.metrics, store.columns.metrics, strict=True)), len(store)
     names = [criterion.quantity for criterion in criteria]
     if missing := sorted({*names} - of.keys()):
+        # The settings and the columns of a damaged store need not fit each other.
         raise StorageError(f"{store.folder}: the margins of {', '.join(missing)} are not recorded")
     margins, at = np.empty((n, len(names))), 0
     for found in store.select([of[name] for name in names], 0, n):

@@ -80,6 +80,7 @@ def write_scenario(
         individuals = _with_findings(individuals, cause, conflict)
         violations = check(individuals, pipeline.runner.source.constraints)
         if violations:
+            # Before any file is written: a refused scenario leaves none behind.
             raise OntologyError(*(f"{name}.owl: {violation}" for violation in violations))
     xodr.write_bytes(concrete.road_data)
     storyboard = _with_header(concrete.storyboard, cause, conflict)
@@ -111,6 +112,7 @@ def _with_header(
         property_ for property_ in before.properties if property_.name not in (*FINDINGS, SEVERITY)
     )
     added = tuple(osc.Property(name, value) for name, value in stated.items())
+    # Untouched then, so that a header without properties does not get an empty element.
     if (*others, *added) == before.properties:
         return storyboard
     properties = replace(before, properties=(*others, *added))
@@ -121,6 +123,7 @@ def keyed(scenario: osc.OpenScenario, key: str) -> osc.OpenScenario:
     """Return a scenario that states the key of its driver's random numbers, unless it does."""
 
     def changed(before: osc.Properties) -> osc.Properties:
+        # A key that is stated decides what the driver sees: it is kept.
         if before.get(NOISE_KEY) is not None:
             return before
         return replace(before, properties=(*before.properties, osc.Property(NOISE_KEY, key)))

@@ -217,6 +217,7 @@ def chosen_objective(
         if len(metrics) > 1 or metrics[PAPER] is not None:
             raise InputError(f"the objective '{PAPER}' stands alone, without a weight")
         spec, metrics = replace(PAPERS, critical=spec.critical), None
+    # Who optimises harm means it to decide what is critical, too.
     if metrics is not None and HARM in metrics:
         spec = replace(spec, rule="harm", weights="fixed", gated=True)
         if len(metrics) == 1:
@@ -240,6 +241,7 @@ def chosen_objective(
         terms = tuple(Term(name, weight) for name, weight in metrics.items())
     elif way == "entropy":
         terms = tuple(Term(term.metric) for term in terms)
+    # One column would leave nothing to trade off.
     if columns == "many" and [term.metric for term in terms] == [HARM]:
         terms = (*terms, Term(BESIDE_HARM))
     ways: dict[str, Any] = {"weights": way, "scale": scale or spec.scale}

@@ -108,6 +108,7 @@ class FailingDriver:
     def __init__(self, store: Store, driver: str, budget: int) -> None:
         self._store, self._driver, self._budget = store, driver, budget
         self._failed, self._drives = 0, False
+        # A resumed run counts the rows of its store here, so after_batch skips what is replayed.
         for rows in store.rows():
             self._count(rows.status)
             if self._drives:

@@ -144,8 +144,12 @@ def _letter(
 ) -> str:
     if row.problem:
         return NOT_RUN
+    # Before the verdicts: in traffic that could not happen, neither passing nor failing says
+    # anything.
     if row.implausible:
         return NOT_APPLICABLE
+    # Before the models: that no driver could have avoided a collision excuses no violated
+    # criterion.
     if any(ids[i] in criteria for i in row.violated):
         return FAILED
     if collisions is None or found == CellClass.AVOIDED:
@@ -171,10 +175,12 @@ def _classes(
     touching = np.array([row.collisions > 0 and not row.problem for row in rows], np.bool_)
     if touching.any():
         ego[touching] = outcomes(pipeline, X[touching])
+    # Without models there is still a column, which says below that one of them collided, too.
     theirs = np.full((max(len(models), 1), len(rows)), Outcome.NOT_NEEDED, np.int8)
     open_ = ego == Outcome.COLLIDED
     if not models:
         theirs[:, open_] = Outcome.COLLIDED
+    # The models are asked for collisions only.
     scenario = replace(pipeline.scenario, criteria=())
     for codes, name in zip(theirs, models, strict=False):
         if not open_.any():
@@ -187,5 +193,6 @@ def _classes(
             workers=Threads(1),
         )
         codes[open_] = outcomes(model, X[open_])
+        # One model that avoids a collision decides on it: the next need not drive there.
         open_ &= codes != Outcome.AVOIDED
     return classes(ego, theirs)

@@ -106,6 +106,7 @@ class Difference:
 
         counts = self.counts
         n = counts["fixed"] + counts["broken"]
+        # McNemar's exact test: variations that change nothing say nothing of the difference.
         return float(binomtest(counts["broken"], n).pvalue) if n else 1.0
 
 

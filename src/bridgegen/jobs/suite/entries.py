@@ -61,6 +61,8 @@ class Entry:
             if self.criteria or self.count:
                 made.update(json.dumps([self.criteria, self.count], sort_keys=True).encode())
             for name in filter(None, (self.scenario, self.distribution)):
+                # Maps and catalogues belong to it: the same storyboard on another map is another
+                # scenario.
                 for path in (Path(name), *files_named_in(Path(name))):
                     made.update(hashlib.sha256(path.read_bytes()).digest())
         except (BridgeGenError, OSError):
@@ -110,6 +112,7 @@ def find_entries(given: Sequence[str | Path]) -> tuple[Entry, ...]:
         raise InputError(*problems)
     if not found:
         raise InputError(f"no scenario in {', '.join(map(str, given))}")
+    # A storyboard with a distribution stands for its variations, and is no entry besides.
     varied = {Path(item.scenario).resolve() for item in found.values() if item.distribution}
     kept = [
         item
@@ -172,11 +175,13 @@ def _files(folder: Path) -> Iterable[Path]:
     Variations that were run again are none; see `bridgegen.jobs.suite.replay`.
     """
     found, again = [], set[Path]()
+    # Sorted, so that entries have one order on every file system.
     for count, path in enumerate(sorted(folder.rglob("*"))):
         if count >= MOST_FILES:
             raise InputError(f"{folder}: a suite has at most {MOST_FILES} files")
         if path.name == RESULTS:  # sorted before the folder beside it
             again.add(path.parent / VARIATIONS)
+        # What `suite replay` has exported lies inside the suite's folder, and is no scenario of it.
         if again and not again.isdisjoint(path.parents):
             continue
         hidden = any(part.startswith(".") for part in path.relative_to(folder).parts)

@@ -58,6 +58,8 @@ def _digest_of_command(name: str) -> str:
     for path in (Path(word) for word in (command.program or "", *command.words[1:])):
         if path.is_file():
             stat = path.stat()
+            # Asked for each entry of a suite: a file is read once, and again if its time or size
+            # changes.
             digest.update(_digest_of_file(path, stat.st_mtime_ns, stat.st_size))
     return digest.hexdigest()
 
@@ -162,6 +164,7 @@ def pipeline_of(job: Job) -> Pipeline:
     )
     spec = chosen_objective(scenario.objective, options, "one")
     scenario = as_judged(replace(scenario, objective=spec), spec.gated)
+    # Entries are spread over the workers; the rows of each share one thread.
     pipeline = Pipeline(
         scenario, scenario.space(), options, simulator=job.simulator, workers=Threads(1)
     )

@@ -277,6 +277,7 @@ def _of_mode(
             why = "no scenario of it was exported; search again, and --keep more"
             return NotFailing(f"{folder}, mode {mode.number}", why)
         made = failing(minimal.name, f"minimal form of evaluation {mode.shown + 1}")
+        # The row's own metrics are not those of its minimal form.
         metrics = {"harm": minimal.harm, "severity": minimal.severity}
         return replace(made, key=key, metrics=metrics, needs=minimal.sentence)
     name = only if only in kept else kept[0]
@@ -330,6 +331,7 @@ def _of_rows(job: Job, result: EntryResult, source: str) -> Iterator[Failing | N
         return
     seen = set()
     several = len(result.rows) > 1
+    # The worst of each mode; of equal ones the first variation.
     order = sorted(range(len(failed)), key=lambda k: (-found[k].harm, failed[k]))
     for k in order:
         way, number = found[k], failed[k] + 1
@@ -355,6 +357,8 @@ def _of_rows(job: Job, result: EntryResult, source: str) -> Iterator[Failing | N
 def scenario_name(pipeline: Pipeline) -> str:
     """Return the scenario's name; of a file that BridgeGen exported, that of the searched one."""
     if isinstance(pipeline.scenario, FileScenario):
+        # A file that was exported here says in its header which scenario was searched, so a failure
+        # found again has the same id.
         header = pipeline.scenario.storyboard.file_header
         if str(header.author) == OURS and str(header.description):
             return str(header.description)

@@ -129,6 +129,7 @@ def _add(found: Failing | NotFailing, to: Path, replace_worse: bool) -> Addition
             )
         failure, notes, is_same = _kept(found, replace(way, key=key), id, to)
         if before is not None:
+            # What people have decided on a failure outlives its worse form.
             own = {"status": before.status, "comment": before.comment}
             failure = failure.model_copy(update=own)
             for name in {*before.files} - {*failure.files}:
@@ -152,6 +153,8 @@ def _add(found: Failing | NotFailing, to: Path, replace_worse: bool) -> Addition
 def identity(scenario: str, key: Key, way: Way) -> str:
     """Return the id of a failure: of its scenario and mode, whatever found it and when."""
     ids = sorted(str(violate["id"]) for violate in way.violates)
+    # Of the scenario and the mode alone, so that another run that finds the same mode finds the
+    # failure known.
     parts = ["violates", *ids] if key == NO_KEY else list(key)
     digest = hashlib.sha256(json.dumps([scenario, *parts]).encode()).hexdigest()[:8]
     what = "-".join(parts[:2]) if key == NO_KEY else key.conflict_type
@@ -172,6 +175,7 @@ def _kept(found: Failing, way: Way, id: str, to: Path) -> tuple[Failure, str, bo
     files, needs = [f"{id}.xosc"], "" if found.minimal else found.needs
     try:
         shutil.rmtree(stage, ignore_errors=True)
+        # In a folder beside, moved when all is well: a refused failure leaves nothing in the suite.
         stage.mkdir(parents=True)
         there = _put(found.job, way, stage, id)
         is_same = _is_same(way, there.metrics) and _is_same(there, found.metrics)

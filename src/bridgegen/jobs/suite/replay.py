@@ -99,6 +99,7 @@ def replay(
     suite = read_suite(folder)
     before = _result(suite, entry, ego)
     job = replace(job_of(suite, before, simulator), only=number - 1)
+    # Another file under the same name would give another result.
     if job.entry.digest != before.digest:
         raise StorageError(
             f"{folder}: scenario {job.entry.distribution or job.entry.scenario} is not what it was "
@@ -123,6 +124,8 @@ def replay(
         tuple(files),
         target,
         replay_command(folder, before, number - 1),
+        # Both are said: the same row again, and the exported file, which goes through writer and
+        # reader.
         is_same=result.rows[0] == before.rows[number - 1],
         is_same_exported=_moves_alike(result.rows[0], _of_file(job, pipeline, files[-1])),
     )
@@ -207,6 +210,7 @@ def refuse_code(results: Sequence[EntryResult], named: Sequence[str], command: s
     Raises:
         InputError: which they are, and how to name them.
     """
+    # A file of results may come from others: code that only it names is not imported unasked.
     code = {result.ego for result in results if is_spec(result.ego)} - {*named}
     if code:
         raise InputError(

@@ -186,6 +186,7 @@ class EntryResult(Strict):
     def verdict(self) -> Verdict:
         """The worst of its rows: failed, else not run; else whether it is judged."""
         verdicts = {row.verdict for row in self.rows}
+        # A failure is one whatever else did not run: it is never hidden by a missing result.
         if "failed" in verdicts:
             return "failed"
         if self.problem or not self.rows or "not run" in verdicts:
@@ -240,9 +241,11 @@ class EntryResult(Strict):
         """
         if not self.rows:
             return NOT_RUN
+        # A row without a result has no letters.
         found = "".join(row.clauses[clause : clause + 1] or NOT_RUN for row in self.rows)
         if not self._says_nothing:
             return found
+        # Failures stay: only what would pass says nothing.
         return found.replace(PASSED, NOT_APPLICABLE).replace(EXCUSED, NOT_APPLICABLE)
 
     def worst_of(self, criterion: int) -> int | None:

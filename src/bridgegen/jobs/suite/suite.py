@@ -173,6 +173,7 @@ def run_entries(job: frame.Job, given: ScenariosOptions) -> SuiteRun:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise StorageError(f"{folder}: cannot be written: {error.strerror}") from None
+    # Two processes would append to one file, and each would run all that the other has not ended.
     lock = Lock(folder / LOCK)
     try:
         done = _done(path, settings, jobs)
@@ -221,6 +222,7 @@ def _folder(files: Sequence[str | Path]) -> Path:
     """Return the folder of results by default: none of those that hold the scenarios."""
     names = [Path(file).resolve().stem for file in files]
     folder = Path("suites") / ("-".join(names[:3]) + ("-and-more" if len(names) > 3 else ""))
+    # A folder of scenarios in `suites` would be its own folder of results.
     if folder.resolve() in {Path(file).resolve() for file in files}:
         return folder.with_name(f"{folder.name}-results")
     return folder
@@ -267,6 +269,8 @@ def _run(
 
     def ended(job: Job, result: EntryResult | None, crash: str | None) -> None:
         if result is None:
+            # Without a digest: a worker that crashed is run again by the next call, see
+            # `Job.is_of`.
             result = EntryResult(
                 entry=job.entry.name,
                 ego=job.ego or "",
@@ -294,6 +298,8 @@ def work(job: Job, say: Callable[..., None]) -> EntryResult:
 
 def _append(path: Path, text: str) -> None:
     try:
+        # A line a result, synced: what was run is kept whatever happens; a torn last line is
+        # dropped by `_read`.
         with path.open("ab") as file:
             file.write(text.encode())
             file.flush()
@@ -315,6 +321,7 @@ def _done(
         line = Header(settings=settings).model_dump_json() + "\n"
         write_whole(path, [line.encode()])
         return {}
+    # Through JSON, as the file has them: tuples are lists there.
     if header.settings != json.loads(json.dumps(settings)):
         other = [name for name in settings if header.settings.get(name) != settings[name]]
         raise StorageError(
@@ -344,6 +351,7 @@ def _read(path: Path) -> tuple[Header | None, list[EntryResult], bool]:
         StorageError: it cannot be read, or is damaged.
     """
     try:
+        # A results file may come from others: its size is bounded before it is read.
         size = path.stat().st_size
         if size > MOST_BYTES:
             raise StorageError(f"{path}: may have at most {MOST_BYTES} bytes, got {size}")

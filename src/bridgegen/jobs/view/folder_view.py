@@ -38,6 +38,7 @@ class FolderView:
 
     def _find(self) -> None:
         known = set(self._runs)  # a run keeps its number
+        # Appended, never sorted anew: open pages address runs by number.
         self._runs += [run for run in find_runs(self.folder) if run not in known]
 
     def page(self) -> bytes:

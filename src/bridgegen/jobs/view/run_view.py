@@ -48,6 +48,7 @@ class RunView:
         self.folder, self.settings = self._run.folder, self._run.settings
         self._rows: Recorded | None = None
         self._pipeline = pipeline_of(self._run, "view", ego=ego, simulator=simulator)
+        # The server's threads share the rows in memory, which each request may extend.
         self._lock = threading.Lock()
 
     def fragment(self, evaluation: int) -> str:
@@ -105,6 +106,7 @@ class RunView:
         names |= {file_name(name) for name in SIMULATORS}
         names |= {TRIAGE_FILE, *further_files(self.folder)}
         try:
+            # Only names that this run has written: a request is untrusted.
             return read_inside(self.folder, name) if name in names else None
         except FileNotFoundError:
             return None

@@ -25,6 +25,8 @@ from urllib.parse import parse_qs, unquote, urlsplit
 
 from bridgegen.base.errors import BridgeGenError, InputError
 
+# Any website open in the same browser can send requests here, and so can other users of the
+# machine: the rules below are for these two.
 LOOPBACK = "127.0.0.1"
 MAX_PORT = 65_535
 
@@ -141,6 +143,8 @@ def _of_site(site: Site, path: str, query: Mapping[str, list[str]]) -> Answer:
         evaluation = _number(path.removeprefix("/motion/"))
         motion = None if evaluation is None else site.motion(evaluation)
         return _nothing() if motion is None else _json(motion)
+    # A site answers from a list of exported files, never by a path: neither `..` nor a link leads
+    # out of the run.
     body = site.file(path.removeprefix("/"))
     if body is None:
         return _nothing()
@@ -150,6 +154,7 @@ def _of_site(site: Site, path: str, query: Mapping[str, list[str]]) -> Answer:
 
 def _number(text: str) -> int | None:
     """Return a number of evaluations; None of anything else."""
+    # `int` takes signs, spaces, underscores and digits of all scripts.
     return int(text) if text.isascii() and text.isdigit() and len(text) < 12 else None
 
 
@@ -176,6 +181,7 @@ class _Handler(BaseHTTPRequestHandler):
 
     def _found(self) -> Answer | None:
         """Return the answer; None if the browser has hung up."""
+        # Against DNS rebinding: a name of a stranger's that resolves to this machine.
         if self.headers.get_all("Host", []) not in ([name] for name in self.server.names):
             text = b"This server is for the machine that it runs on.\n"
             return Answer(HTTPStatus.MISDIRECTED_REQUEST, "text/plain", text)
@@ -185,6 +191,7 @@ class _Handler(BaseHTTPRequestHandler):
         if elsewhere and self.headers.get("Sec-Fetch-Dest") != "document":
             return Answer(HTTPStatus.FORBIDDEN, "text/plain", b"Not for other websites.\n")
         token, slash, rest = self.path.removeprefix("/").partition("/")
+        # The token keeps out other users of the machine; compared in constant time.
         if not (slash and hmac.compare_digest(token.encode(), self.server.token.encode())):
             text = b"The address must be the one that 'bridgegen view' printed, with its token.\n"
             return Answer(HTTPStatus.FORBIDDEN, "text/plain", text)

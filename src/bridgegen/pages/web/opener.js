@@ -5,6 +5,7 @@ import { $ } from "./common.js";
 import { worstViolation } from "./criteria_rows.js";
 import { data, rows } from "./data.js";
 import { fillDetails, showPicture } from "./details.js";
+import { Explorer, simulated } from "./explore.js";
 import { nearestToHarm } from "./findings.js";
 import { number } from "./numbers.js";
 import { minimals, playbacks } from "./playbacks.js";
@@ -45,7 +46,7 @@ export class Opener {
     this.wanted = evaluation;
     if (playbacks.keptAt.has(evaluation)) return this.kept(playbacks.keptAt.get(evaluation), play);
     $("player").setAttribute("aria-busy", "true");
-    const playback = playbacks.source(evaluation) ? await playbacks.get(evaluation) : null;
+    const playback = (playbacks.source(evaluation) ? await playbacks.get(evaluation) : null) ?? (await simulated(i, factsOf(i)));
     if (playback && !playback.metrics) { // one in the page's data, which has them by row
       const { parameters, metrics } = factsOf(i);
       Object.assign(playback, { parameters, metrics });
@@ -61,6 +62,8 @@ export class Opener {
     $("player").classList.remove("still");
     this.player.show(playback, play);
     this.detail(playback);
+    this.explorer ??= new Explorer(this.player);
+    this.explorer.show(playback);
   }
 
   // The figures, and how to see the motion.

@@ -7,6 +7,7 @@ export const SOURCES = {
   kept: "Exported as files; play it",
   packed: "Play it",
   served: "Play it: it is simulated when asked for",
+  simulated: "Play it: the page simulates it",
   none: "Its motion is not in this page; show its figures, and the command that plays it",
 };
 
@@ -23,12 +24,13 @@ class Playbacks {
   source(evaluation) {
     if (this.keptAt.has(evaluation)) return "kept";
     if (this.packed.has(evaluation)) return "packed";
-    return data.live ? "served" : null;
+    return data.live ? "served" : data.simulation && !data.simulation.refused && data.kept.length ? "simulated" : null;
   }
 
   // Of one that was not exported; null if it is unavailable.
   async get(evaluation) {
     if (this.packed.has(evaluation)) return this.packed.get(evaluation);
+    if (this.source(evaluation) === "simulated") return null; // explore.js does
     const playback = this.fetched.get(evaluation) ?? (await this.ask(evaluation));
     if (playback) this.fetched.set(evaluation, playback);
     return playback;

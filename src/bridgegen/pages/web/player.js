@@ -61,6 +61,20 @@ export class Player {
     this.begin();
   }
 
+  // Shows another motion of the same bodies on the same road, at the same time of it.
+  swap(kept) {
+    this.pause();
+    this.kept = kept;
+    $("scrub").max = this.last;
+    $("to-contact").hidden = !kept.contacts.length;
+    $("to-closest").hidden = kept.closest === null || kept.contacts.includes(kept.closest);
+    this.scene.show(kept);
+    this.curves.show(kept);
+    this.showLegend();
+    fillConflict(kept);
+    this.seek(this.position, false);
+  }
+
   // Plays from the start, unless the reader wants no motion.
   begin() {
     if (CALM.matches) return;

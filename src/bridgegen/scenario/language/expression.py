@@ -139,6 +139,14 @@ class Expression:
         with np.errstate(all="ignore"):
             return np.asarray(self._program(arrays), dtype=np.float64)
 
+    def as_json(self) -> Any:
+        """Return the formula for other programs: numbers, names, and lists of operator and parts.
+
+        Operators are Python's: ``["+", "a", 2.0]``; also ``["neg", a]``, ``["if", test, a, b]``,
+        and a function's name with its arguments.
+        """
+        return _as_json(self.tree)
+
     def __str__(self) -> str:
         return self.source
 
@@ -155,6 +163,10 @@ class Lookup(Expression):
     """
 
     values: tuple[float, ...]
+
+    def as_json(self) -> Any:
+        """See `Expression`: ``["lookup", name, value, …]``."""
+        return ["lookup", *self.names, *self.values]
 
     def __reduce__(self) -> tuple[Callable[..., Expression], tuple[Any, ...]]:
         (index,) = self.names
@@ -216,6 +228,34 @@ def parse(
     names = frozenset(node.id for node in _nodes(tree) if isinstance(node, ast.Name))
     own = tuple((name, tuple(categories[name])) for name in sorted(names & categories.keys()))
     return Expression(source, names, tree, _compile(tree), categories=own)
+
+
+_SIGNS: dict[type[ast.AST], str] = {
+    ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/", ast.Mod: "%", ast.Pow: "**",
+    ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">=", ast.Eq: "==", ast.NotEq: "!=",
+    ast.And: "and", ast.Or: "or", ast.USub: "neg", ast.Not: "not",
+}  # fmt: skip
+
+
+def _as_json(node: ast.expr) -> Any:
+    match node:
+        case ast.Constant(value=value):
+            return float(value)  # type: ignore[arg-type]
+        case ast.Name(id=name):
+            return name
+        case ast.UnaryOp(op=op, operand=operand):
+            return [_SIGNS[type(op)], _as_json(operand)]
+        case ast.BinOp(op=operator, left=left, right=right):
+            return [_SIGNS[type(operator)], _as_json(left), _as_json(right)]
+        case ast.Compare(left=left, ops=[comparison], comparators=[right]):
+            return [_SIGNS[type(comparison)], _as_json(left), _as_json(right)]
+        case ast.BoolOp(op=bool_op, values=values):
+            return [_SIGNS[type(bool_op)], *map(_as_json, values)]
+        case ast.IfExp(test=test, body=body, orelse=orelse):
+            return ["if", _as_json(test), _as_json(body), _as_json(orelse)]
+        case ast.Call(func=ast.Name(id=name), args=arguments):
+            return [name, *map(_as_json, arguments)]
+    raise AssertionError(f"no formula has a {type(node).__name__}")
 
 
 class _RefusedError(Exception):

@@ -113,6 +113,7 @@ class Generations:
         if asked is None or len(asked) == 0:  # every child is a known row
             self.restart()
             asked = self.algorithm.ask()
+        # The population holds the clipped rows: `tell` recognises rows by their bits.
         U: Float = np.clip(asked.get("X").astype(np.float64), *self._box)
         asked.set("X", U)
         self._size = self._size or len(asked)
@@ -142,6 +143,8 @@ class Generations:
             item.individual.F = F
             item.individual.set("failed", is_failed)
             item.individual.set("unscaled", F)
+            # Rows of an earlier start are told in vain: with `--ahead`, they may come after a
+            # restart.
             if (item.start, item.has_population) == self._phase:
                 told.append(item.individual)
         if not self.algorithm.is_initialized:

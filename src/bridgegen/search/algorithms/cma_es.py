@@ -73,13 +73,17 @@ class CMAES:
         self._kind, self._most, self._used = kind, most, 0
         from cmaes import CMA  # loads a part of SciPy
 
+        # `cmaes` has a generator of its own: its seed is drawn from ours, so that restarts are part
+        # of one sequence and the whole follows from the run's seed.
         mean, seed = self._rng.random(self._n_var), int(self._rng.integers(2**32))
         self._search: Any = CMA(mean, step, seed=seed, population_size=population)
         self._best: list[float] = []
 
     def _restart(self) -> None:
         """Start a large or a small search, whichever kind has had fewer evaluations."""
+        # BIPOP: both regimes are given the same number of evaluations (Hansen 2009, section 2).
         if self._spent["large"] <= self._spent["small"]:
+            # At most nine doublings (Hansen 2009).
             self._large = min(2 * self._large, 2**9 * self._first)
             self._begin("large", self._large, self._step)
             return
@@ -92,7 +96,11 @@ class CMAES:
 
     def ask(self) -> Float:
         """Return the next generation, one row each."""
+        # The distribution learns from the rows as drawn, not as reflected: so the objective goes on
+        # as its mirror image beyond a face, and an optimum in a corner is no harder than one
+        # inside.
         self._drawn = np.array([self._search.ask() for _ in range(self._search.population_size)])
+        # `tell` needs the mean that this generation was drawn around; `cmaes` moves it.
         self._mean = self._search.mean.copy()
         return reflected(self._drawn)
 
@@ -104,6 +112,7 @@ class CMAES:
         self._search.tell(list(zip(self._drawn, F.tolist(), strict=True)))
         n, rows = self._n_var, len(F)
         deviations = np.sqrt(((self._drawn - self._mean) ** 2).mean(axis=0))
+        # A history of equal values (arXiv:1604.00772, B.3).
         patience = 10 + int(np.ceil(30 * n / rows))
         self._best = [*self._best[1 - patience :], float(F.min())]
         if (

@@ -258,6 +258,8 @@ class ScenarioVectorEnv(VectorEnv[Observation, Action, npt.NDArray[Any]]):
         """Evaluate the rows that the actions lead to, and the first ones of new episodes."""
         U, begin = self._episodes.next_rows(actions), self._ended
         for k in np.flatnonzero(begin).tolist():
+            # Each environment draws from its own generator: its episodes do not depend on the
+            # others'.
             U[k] = self._episodes.first_row(self._generators[k], None)
         moved = self._episodes.move(U, begin)
         observations, rewards, terminated, truncated, infos = moved

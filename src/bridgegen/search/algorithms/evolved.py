@@ -207,6 +207,7 @@ class SPEA2(Genetic):
     def _algorithm(self, **parts: Any) -> Any:
         from pymoo.algorithms.moo import spea2
 
+        # SPEA2's density is a distance in F: `scaled` puts all objectives on one scale before.
         return spea2.SPEA2(survival=spea2.SPEA2Survival(normalize=False), **parts)
 
 
@@ -264,7 +265,11 @@ class PSO(Evolved):
             w=values["w"],
             c1=values["c1"],
             c2=values["c2"],
+            # Constant, as in the paper; pymoo's adaptive variant would replace w, c1 and c2 after
+            # the first generation.
             adaptive=False,
+            # pymoo's own initial velocities are never negative: the swarm would first drift to a
+            # corner.
             initial_velocity="zero",
             max_velocity_rate=values["max_velocity"],
             pertube_best=values["mutate_best"],

@@ -20,6 +20,7 @@ from bridgegen.search.algorithms.algorithm import (
 )
 from bridgegen.search.algorithms.sampling import latin_hypercube
 
+# The archive is a full grid of plain arrays, not a sparse one.
 CELLS_AT_MOST = 100_000
 ELITES_KEPT = 1000
 """Maximum number of elites in the run's notes, the most critical ones."""
@@ -57,10 +58,14 @@ class MAPElites:
             "metrics or parameters that distinguish kinds of scenarios, optionally with ranges: "
             "v_d=0:15,ttc (a parameter's range in shares of it); empty: the first two parameters",
         ),
+        # 20 per descriptor make 400 cells of two descriptors, which is all that 1,000 rows can
+        # fill: R_critic .14 and .08 (S1, S4) instead of .44 and .15 with 10
+        # (docs/decisions/search.md).
         "cells": Setting(10, "cells per descriptor", 1, 10_000),
         "population": Setting(40, "rows per batch", 1, 100_000),
         "initial": Setting(40, "number of initial space-filling rows", 1, 1_000_000),
         "near": Setting(0.02, "standard deviation of a row's random step", 0.0, 1.0),
+        # Distinct critical rows with 0.2 / 0.5 / 1.0: 17 / 43 / 71 in S1, 10 / 23 / 40 in S4.
         "line": Setting(1.0, "that of its step along the line, per distance", 0.0, 2.0),
     }
     objectives: ClassVar[Arity] = "one"
@@ -166,6 +171,8 @@ class _Archive:
         shares = (within - self.low) / (self.high - self.low)
         places = np.minimum((shares * self._sizes[0]).astype(np.int64), self._sizes[0] - 1)
         cells = np.ravel_multi_index(tuple(places.T), self._sizes)
+        # Sorted by cell, then by F: the first of each cell is its best row, and of equal ones the
+        # earliest.
         order = np.lexsort((F, cells))
         best = order[np.unique(cells[order], return_index=True)[1]]
         best = best[F[best] < self.F[cells[best]]]
@@ -203,6 +210,7 @@ class _Descriptor:
         """Return where its cells begin and end, by default by the first rows' values."""
         if isfinite(self.low):
             return self.low, self.high
+        # Differences of values near the largest float64 would be inf.
         known = np.clip(values[np.isfinite(values)], -1e300, 1e300)  # their distance is finite
         low, high = (float(known.min()), float(known.max())) if len(known) else (0.0, 1.0)
         # A constant is in the middle cells; later values may differ.
@@ -218,6 +226,8 @@ def _parse(text: str, problem: Problem) -> tuple[_Descriptor, ...]:
         InputError: an invalid range, or a duplicate name.
     """
     parts = [part.strip() for part in text.split(",") if part.strip()]
+    # Parameters, not metrics, tell kinds apart by default: their ranges are known before any row,
+    # and every cell can be reached.
     parts = parts or list(problem.parameters[:2])
     found = []
     for part in parts:

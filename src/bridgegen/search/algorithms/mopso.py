@@ -104,6 +104,8 @@ class MOPSO:
         """Add rows to the front, each point of the objective space once, and cut it to size."""
         everything = np.concatenate([self._front, x])
         all_F = np.concatenate([self._front_F, F])
+        # Rows of equal F have no distance from each other, so crowding would count them as the
+        # densest.
         first = np.sort(np.unique(all_F, axis=0, return_index=True)[1])
         at = first[non_dominated(all_F[first])]
         at = at[thin(all_F[at], self._archive_size)]
@@ -119,6 +121,7 @@ class MOPSO:
         leaders = self._best[rng.integers(len(self._best), size=len(self._x))]
         if len(self._front):
             distance = crowding(self._front_F)
+            # A binary tournament by crowding: leaders come from where the front is thin.
             pairs = rng.integers(len(self._front), size=(len(self._x), 2))
             second = distance[pairs[:, 1]] > distance[pairs[:, 0]]
             leaders = self._front[np.where(second, pairs[:, 1], pairs[:, 0])]
@@ -126,8 +129,10 @@ class MOPSO:
         c1, c2 = rng.uniform(0.75 * self._pull, 1.25 * self._pull, size=(2, len(self._x), 1))
         pulls = c1 * rng.random(shape) * (self._best - self._x)
         pulls += c2 * rng.random(shape) * (leaders - self._x)
+        # Clerc and Kennedy's constriction is real from c1 + c2 = 4 on; below, it is 1.
         total = np.maximum(c1 + c2, 4.0)
         chi = 2.0 / (total - 2.0 + np.sqrt(total * total - 4.0 * total))
+        # SMPSO's speed limit: half of each range, which is 1 in the unit cube.
         self._v = np.clip(chi * (self._w * self._v + pulls), -0.5, 0.5)
         x = self._x + self._v
         self._v = np.where((x < 0.0) | (x > 1.0), TURNED * self._v, self._v)

@@ -39,6 +39,7 @@ class Observer:
         self._seen = [j for j, name in enumerate(problem.metrics) if name not in MEASURED]
         known = [METRICS.get(problem.metrics[j]) for j in self._seen]
         self._sign = np.array([1.0 if metric is None else metric.sign for metric in known])
+        # What is infinite (no collision ever) is observed as the metric's cap.
         floor = [-np.inf if metric is None else metric.sign * metric.cap for metric in known]
         self._floor = np.array(floor, dtype=np.float64)
         self.size = problem.n_var + len(known)

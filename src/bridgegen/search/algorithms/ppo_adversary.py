@@ -93,6 +93,8 @@ class PPOAdversary(Saved):
             half = np.arange(n // 2)
             near = self._best_U[rng.integers(known, size=len(half))]
             U[half] = step_from(near, self._values["near"] * rng.standard_normal(near.shape))
+        # The agent plays the scenario to fill the row; the campaign then evaluates the row like any
+        # other, so store, resumption and export need no second path.
         with self._own((self._seed, 2, batch)):
             self._duel.begin()
             return self._arena.play(U, self._duel.act)
@@ -103,6 +105,8 @@ class PPOAdversary(Saved):
         good = results.ok & np.isfinite(F)
         reward = self._reward(F, good).astype(np.float64)
         avoidable = results.critical & (results.cause != Cause.UNAVOIDABLE)
+        # A failure that remains with a more careful driver in the ego's place shows nothing of the
+        # ego, so it is worth no more than an average scenario.
         reward[avoidable] += self.BONUS
         reward[results.critical & ~avoidable] = 0.0
         ranked = np.where(good, reward, -np.inf)

@@ -110,6 +110,8 @@ class PPO(Agent):
         "epochs": Setting(32, "passes over a batch, K_epochs", 1, 1000),
         "lr_actor": Setting(3e-4, "learning rate of the policy", 0.0, 1.0),
         "lr_critic": Setting(1e-3, "learning rate of the value function", 0.0, 1.0),
+        # At the actor's 3e-4, 25 updates leave the deviations where they began: R_critic with rows
+        # 0.50 instead of 0.64 on S1, 0.51 instead of 0.60 on S4.
         "lr_std": Setting(3e-3, "learning rate of the standard deviations", 0.0, 1.0),
         "std": Setting(1.0, "initial standard deviation of the policy", 1e-3, 10.0),
         "clip": Setting(0.2, "how far an update may change an action's probability", 1e-3, 1.0),

@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 CANDIDATES = 512
 """Number of rows anywhere that a model chooses from, and as many near good rows; a power of two."""
 
+# Bounded: fitting costs the cube of this number, and half of these rows are the best ones
+# (`telling`).
 MODEL_ROWS = 300
 """Maximum number of rows that a process is fitted to."""
 
@@ -64,9 +66,14 @@ class Surrogate(Saved):
     settings: ClassVar[Mapping[str, Setting]] = {
         "initial": Setting(20, "number of initial space-filling rows", 2, 100_000),
         "batch": Setting(10, "rows per batch, at least", 1, 10_000),
+        # Always 10 rows a batch took twice as long at 1,000 rows and found no more; growth by all
+        # rows found the rarest failures later, so batches grow with what has been found
+        # (docs/decisions/search.md).
         "growth": Setting(
             0.2, "rows per batch at least, as a share of the critical ones known", 0.0, 1.0
         ),
+        # The expected objective less some deviations, without random rows, found nothing in 3 of 3
+        # seeds on left-across-path: it stays at a local optimum of near misses.
         "explore": Setting(0.2, "share of a batch that is drawn at random", 0.0, 1.0),
         "critical": Setting(
             0.7,
@@ -101,6 +108,7 @@ class Surrogate(Saved):
     def _next(self) -> Float:
         """Return the next rows."""
         known, rng = self._known, self._rng
+        # A tenth of all rows counts as critical, so a batch has 2 % of all rows at least.
         many = max(int(known.critical.sum()), len(known) // 10)
         n = max(self._values["batch"], int(self._values["growth"] * many))
         if known.exhausted:
@@ -109,20 +117,26 @@ class Surrogate(Saved):
             rows = latin_hypercube(rng, self._values["initial"], self._n_var)
             return known.columns.snapped(rows)
         batch = known.anywhere(round(n * self._values["explore"]), rng)
+        # A process of a constant label would say nothing.
         mixed = known.critical.any() and not known.critical.all()
         likely = round((n - len(batch)) * self._values["critical"]) if mixed else 0
         if likely:
+            # The label has a process of its own, since harm leaps where a row becomes critical
+            # (0.15 to 0.6), which a process of the objective smooths away: 5 critical rows became
+            # 27. Divided by the deviation, so that the prior variance of 1 fits.
             label = -known.critical.astype(np.float64) / known.critical.std()
             model = self._fitted(label, self._of_label)
             self._of_label = model.parameters
             rows, points = self._candidates(known.U[known.distinct[-FOUND:]], batch)
             mean, deviation = model.predict(points)
+            # One path for all of these rows: what keeps them apart is the distance alone.
             paths = np.tile(mean - CAUTION * deviation, (likely, 1))
             batch = self._joined(batch, rows, points, paths)
         scores = known.scores()
         model = self._fitted(scores, self._of_objective)
         self._of_objective = model.parameters
         rows, points = self._candidates(known.U[np.argsort(scores, kind="stable")[:BEST]], batch)
+        # Thompson sampling: rows of a batch differ without a penalty between them.
         paths = model.sample(points, max(n - len(batch), 0), rng)
         return self._joined(batch, rows, points, paths)
 
@@ -138,6 +152,7 @@ class Surrogate(Saved):
         anywhere = sobol_rows(rng, CANDIDATES, self._n_var)
         base = bases[rng.integers(len(bases), size=CANDIDATES)]
         scale = REACH * 2.0 ** (-3.0 * rng.random((CANDIDATES, 1)))
+        # At most some twenty parameters change, as in TuRBO.
         share = min(1.0, 20.0 / self._n_var) * rng.random((CANDIDATES, 1))
         moved = rng.random(shape) < share
         moved[np.arange(CANDIDATES), rng.integers(self._n_var, size=CANDIDATES)] = True
@@ -147,6 +162,7 @@ class Surrogate(Saved):
         near[:, levels] = np.where(moved, drawn, base)[:, levels]
         rows = known.columns.snapped(np.concatenate([batch, anywhere, near]))
         new = known.new(rows)
+        # The batch stands first, so that a candidate equal to one of its rows is not new.
         rows = rows[new[new >= len(batch)]]
         if not len(rows):
             rows = known.anywhere(self._values["batch"], rng)
@@ -155,6 +171,8 @@ class Surrogate(Saved):
     def _joined(self, batch: Float, rows: Float, points: Float, paths: Float) -> Float:
         """Return a batch and, for each path, the row where it is least that is far enough away."""
         known, apart = self._known, self._values["apart"]
+        # Rows that are asked for and not told count like known critical ones: with `--ahead`, the
+        # next batch would else return to them.
         others = np.concatenate(
             [known.points[known.distinct], known.pending, known.columns.points(batch)]
         )

@@ -97,6 +97,8 @@ def fit_leaves(
         values = rows[:, node.column]
         edge = _between(float(values[lower.inside].max()), float(values[upper.inside].min()))
         below, above = high.copy(), low.copy()
+        # Neighbouring leaves share no float64, so a row is in exactly one; `box.joined` relies on
+        # that gap.
         below[node.column], above[node.column] = edge, np.nextafter(edge, np.inf)
         stack += [(upper, above, high), (lower, low, below)]
     return found
@@ -142,16 +144,19 @@ def _grown(rows: Float, labels: Bool, min_rows: int, max_depth: int | None) -> l
 def _best_split(rows: Float, labels: Bool, min_rows: int) -> tuple[int, Bool] | None:
     """Return the column whose cut leaves the least impurity, and which rows lie below the cut."""
     n = len(rows)
+    # Exact float64 values: scikit-learn splits values that are rounded to float32.
     order = np.argsort(rows, axis=0, kind="stable")
     values = np.take_along_axis(rows, order, axis=0)
     below = np.arange(1, n)[:, np.newaxis]
     critical = np.cumsum(labels[order], axis=0)[:-1]
     others = labels.sum() - critical
+    # Gini impurity of both halves for all columns and cuts at once, up to a factor.
     impurity = critical * (below - critical) / below + others * (n - below - others) / (n - below)
     is_cut = (values[1:] > values[:-1]) & (below >= min_rows) & (n - below >= min_rows)
     if not is_cut.any():
         return None
     impurity[~is_cut] = np.inf
+    # Transposed, so that of equal cuts the first column's lowest one wins.
     column, cut = divmod(int(impurity.T.argmin()), n - 1)
     return column, rows[:, column] <= values[cut, column]
 

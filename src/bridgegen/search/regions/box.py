@@ -67,6 +67,7 @@ def readable(leaf: Leaf, space: SearchSpace, outer: Box) -> Box:
         )
         if not step > 0.0:
             continue  # the range is a single value
+        # Edges are rounded before anything is measured: the printed rule is the verified one.
         digits = -math.floor(math.log10(step))
         if low[k] > outer.low[k]:
             low[k] = max(round(float(low[k]), digits) + 0.0, outer.low[k])  # no −0.0

@@ -97,6 +97,7 @@ def carriers(
             if node in paths and _has(individuals, node, carried, parameters, name, values)
         ]
         if ways:
+            # The shortest path, then by name: the same class in each run.
             _, path, carried = min(ways)
             found[name] = Carrier(path, carried, tbox().ranges[carried])
     return found
@@ -229,6 +230,7 @@ class _Writer:
         for k in box.narrows(outer).nonzero()[0].tolist():
             name = self._space.variables[k]
             carrier = self._carried[name]
+            # An end of the whole range needs no facet: no scenario lies beyond it.
             low = float(box.low[k]) if box.low[k] > outer.low[k] else None
             high = float(box.high[k]) if box.high[k] < outer.high[k] else None
             names = self._space.parameters[name].kind.within(float(box.low[k]), float(box.high[k]))
@@ -236,6 +238,8 @@ class _Writer:
             value = self._some(carrier.property, values)
             bound = self._some("has_parameter", self._named(name))
             there = self._all([bound, value])
+            # From the inside out: the class expression of the last step is the filler of the one
+            # before.
             for step in reversed(carrier.path):
                 there = self._some(step, there)
             found.append(there)

@@ -152,12 +152,15 @@ class Saved:
 COMMON = {
     "population": Setting(40, "environments side by side, and rows per batch", 2, 10_000),
     "horizon": Setting(2, "steps of an episode", 1, 10_000),
+    # Episodes that begin at the best 40 rows instead of 10: R_critic 0.818 instead of 0.895 on S1,
+    # 0.709 instead of 0.805 on S4; after the first batch the best 40 of 40 are all.
     "elite": Setting(10, "best rows so far, at one of which an episode begins", 1, 10_000),
     "gamma": Setting(0.99, "discount of future rewards", 0.0, 1.0),
     "width": Setting(64, "units in each of the networks' two hidden layers", 1, 4096),
 }
 """Settings of all reinforcement-learning algorithms."""
 
+# 0.2 instead of 0.1: R_critic 0.737 instead of 0.818 on S1, 0.624 instead of 0.709 on S4 (2 seeds).
 STEP = Setting(0.1, "size of a step, as a share of each parameter's range", 1e-4, 1.0)
 MEMORY = Setting(2000, "size of the replay buffer, in transitions", 1, 1_000_000)
 ACTION = Setting("step", "what an action is: a step from the last row, or a row", choices=ENCODINGS)

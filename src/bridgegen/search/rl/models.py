@@ -33,8 +33,12 @@ def own_generators(seed: Iterable[int]) -> Iterator[None]:
     torch_before, threads = torch.get_rng_state(), torch.get_num_threads()
     try:
         np.random.seed(int(state[0]))  # noqa: NPY002
+        # Stable-Baselines3 draws from torch's and NumPy's global generators. They are seeded for
+        # each batch and put back afterwards, so that no generator's state has to be saved and other
+        # code that draws from them has no effect.
         # Not manual_seed: it would seed every device.
         torch.default_generator.manual_seed(int(state[1]))
+        # Sums over threads would depend on their number; a seed has one result.
         torch.set_num_threads(1)
         yield
     finally:

@@ -276,6 +276,8 @@ class Pool:
         nearest = _nearest(rows.U, run)
         chosen: list[int] = []
         for _ in range(min(n, len(rows.U))):
+            # A row near one that is evaluated, or chosen for this batch, is worth little: it would
+            # show the same.
             score = worth * (1.0 - np.exp(-0.5 * (nearest / APART) ** 2))
             score[chosen] = -np.inf
             chosen.append(int(np.argmax(score)))

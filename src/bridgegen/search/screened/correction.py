@@ -76,6 +76,7 @@ class Correction:
             _share(critical[~screened], MISSED),
             _share(critical[screened], CONFIRMED),
         )
+        # Kernel regression; a Gaussian process, and a length for each parameter, were not measured.
         self._width = self._best_width()
         n_obj = by_screen.shape[1]
         self.spread = np.sqrt(np.mean(self._difference**2, axis=0)) if len(U) else np.zeros(n_obj)

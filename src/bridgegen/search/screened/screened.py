@@ -29,6 +29,8 @@ from bridgegen.search.screened.correction import Correction
 LEAD = 0.25
 """Share of the screen's budget that is spent before the first row is asked for."""
 
+# Critical rows of 300: 13 became 26 with the first bias of docs/decisions/search.md in
+# crossroads-s1, 262 became 258 in crossroads-s4 (4 seeds).
 NEAR = 0.25
 """Share of the screen's later evaluations that lie near the best rows of the run's simulator."""
 
@@ -40,6 +42,7 @@ CHECKS = 8
 """Number of rows of which one is random: it shows what the screen does not, and how far both
 agree."""
 
+# A screen that says nothing costs these rows.
 LEAST = 24
 """Number of compared rows before a screen is judged."""
 
@@ -219,6 +222,8 @@ class Screened:
                 self._converged = True
                 return
             results, fresh = self._keep(U)
+            # The algorithm is told what the run's simulator is expected to say: a screen that is
+            # wrong about every critical row still points near.
             self._proposer.tell(U, self._corrected(U, results))
             idle = 0 if fresh.any() else idle + 1
             self._converged = idle >= PATIENCE
@@ -266,6 +271,8 @@ class Screened:
 
     def _disagree(self, found: Compared) -> bool:
         """Return whether the screen says nothing of the run's simulator."""
+        # Giving up whatever is not significantly correlated gave up a useful screen, too (1
+        # critical row instead of 24).
         if (rank_correlation(*found.sums()) or 0.0) > 0.0:
             return False
         claimed = found.critical[found.screened]

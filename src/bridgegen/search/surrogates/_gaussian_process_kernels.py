@@ -21,6 +21,8 @@ def product(A: Float, B: Float) -> Float:
     n, m = A.shape[0], B.shape[1]
     C = np.zeros((n, m))
     for i in range(n):
+        # This order of loops adds in one order, whatever the number of threads: a BLAS would give
+        # other last bits on a loaded machine.
         for k in range(A.shape[1]):
             a = A[i, k]
             for j in range(m):

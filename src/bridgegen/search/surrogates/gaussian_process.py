@@ -56,6 +56,7 @@ def prior(d: int) -> tuple[Float, Float]:
     return mean, spread
 
 
+# The likelihood is computed anew at every step: its cost is the cube of this number.
 LEARN_FROM = 128
 """Maximum number of rows of which the likelihood is computed."""
 
@@ -63,6 +64,7 @@ FIRST_STEPS, NEXT_STEPS = 30, 5
 """Numbers of steps of the likelihood's maximisation: from the prior, and from the previous
 parameters."""
 
+# Wilson's pathwise conditioning: a path needs no factor of the candidates' covariance.
 FEATURES = 512
 """Number of random features of a sample path."""
 
@@ -89,6 +91,7 @@ def learnt(points: Float, values: Float, parameters: Parameters | None) -> Param
         density, gradient = _density(points, values, logs)
         if density > greatest:
             best, greatest = logs, density
+        # Rprop: only signs of the gradient count, so that a step needs no scale of the density.
         turned = gradient * before
         step = np.clip(step * np.where(turned > 0.0, 1.2, np.where(turned < 0.0, 0.5, 1.0)), 0, 1)
         before = np.where(turned < 0.0, 0.0, gradient)
@@ -146,6 +149,7 @@ class GaussianProcess:
             self.parameters = learnt(points[few], centred[few], parameters)
         self._scaled, self._centred = points / self.parameters.lengths, centred
         K = kernels.covariance(self._scaled, self._scaled, self.parameters.variance)
+        # The factor is kept for all predictions: factorising is what costs most.
         # Noise of 1e-4 at least: K can always be factorised.
         self._R = K + self.parameters.noise * np.eye(len(K))
         kernels.factorise(self._R)

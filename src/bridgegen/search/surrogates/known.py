@@ -34,6 +34,7 @@ class Columns:
         numbers = np.array(self.levels, np.float64)
         self.discrete = numbers > 0.0
         count = prod(self.levels)
+        # Beyond 2**62 the number of rows counts as infinite: no search comes near it.
         self.count = count if count < 2**62 else 0
         self._of = numbers[self.discrete]
 
@@ -48,6 +49,7 @@ class Columns:
         """Return what a model sees of rows: ``(n, n_var)`` float64 in the unit cube."""
         points = U.copy()
         number = np.minimum(np.floor(U[:, self.discrete] * self._of), self._of - 1.0)
+        # One number per level, so that no model distinguishes rows of one scenario.
         points[:, self.discrete] = number / np.maximum(self._of - 1.0, 1.0)
         return points
 
@@ -149,6 +151,8 @@ class Known:
         self.critical = np.concatenate([self.critical, ok & critical])
         self._rows.update(_keys(self.columns.snapped(U)))
         for k in before + np.flatnonzero(ok & critical):
+            # A greedy net in the order of the rows; `compare` counts distinct scenarios in the same
+            # way.
             if distances(self.points[[k]], self.points[self.distinct])[0] >= self._apart:
                 self.distinct = np.append(self.distinct, k)
 
@@ -166,6 +170,8 @@ class Known:
     def anywhere(self, n: int, rng: np.random.Generator) -> Float:
         """Return n new rows drawn at random, fewer where there are no more; snapped."""
         if 0 < self.columns.count <= FEW:
+            # Where there are few rows in all, the last unknown ones are found by listing, not by
+            # luck.
             rows = self.columns.everything()
             return rng.permutation(rows[self.new(rows)])[:n]
         rows = self.columns.snapped(rng.random((n, self.U.shape[1])))

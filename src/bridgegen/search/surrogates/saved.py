@@ -34,6 +34,8 @@ class Saved(ABC):
             ValueError, TypeError, KeyError, IndexError: it did not return this.
         """
 
+    # The known rows determine all but the generator and the models' parameters; a replay would fit
+    # every model again.
     def state(self) -> bytes:
         """Return a line of JSON, then the known rows as plain numbers."""
         known = self._known
@@ -52,6 +54,7 @@ class Saved(ABC):
         line, _, rest = state.partition(b"\n")
         try:
             head = json.loads(line)
+            # A state of other settings would continue another search without a word.
             if {key: head[key] for key in self._header()} != self._header():
                 raise ValueError(f"it is not a state of {self.name} with these settings")
             table = np.frombuffer(rest, np.float64).reshape(-1, n_var + 2)

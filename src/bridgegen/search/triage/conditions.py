@@ -30,6 +30,9 @@ from bridgegen.scenario.language.space import SearchSpace
 from bridgegen.search.triage.moves import nearest, searched
 from bridgegen.search.triage.record import Condition, Probes
 
+# Conditions that moved one parameter at a time were harmless one step outside for 54 % of 133, and
+# 34 % of random points inside were harmful. With these probes, of 1,680 fresh points inside 99.7 %
+# were harmful, of 1,436 outside 1.3 %.
 INSIDE, OUTSIDE = 40, 20
 """Numbers of random probes inside all conditions, and outside each one."""
 
@@ -131,6 +134,7 @@ class Conditions:
     def _harmful(self, V: Float) -> tuple[Bool, Float]:
         """Return which rows are harmful, in any mode, and their feasible values ``(n, n_var)``."""
         if len(V) > self._left:
+            # What is not confirmed within the budget becomes an example, never a condition.
             raise _SpentError
         self._left -= len(V)
         X = nearest(self._space, V)
@@ -146,6 +150,8 @@ class Conditions:
 
     def _spans(self, needed: Sequence[int]) -> dict[int, _Span]:
         """Return where each parameter's harm ends, if it has ended with the nominal value."""
+        # Harm of any mode: where another one takes over with the nominal value, the condition does
+        # not decide.
         harmless = ~self._harmful(self._moved([(i, self._nominal[i]) for i in needed]))[0]
         asked = [i for i, item in zip(needed, harmless.tolist(), strict=True) if item]
         single = [i for i in asked if self._kinds[i].names]
@@ -159,6 +165,7 @@ class Conditions:
             parameter = self._space.parameters[self._space.variables[i]]
             least = not below and low > parameter.low + 1e-9 * self._steps[i]
             most = not above and high < parameter.high - 1e-9 * self._steps[i]
+            # Inwards, and before it is verified: what is printed is what was tested.
             low = self._rounded(i, low, 1.0) if below or least else low
             high = self._rounded(i, high, -1.0) if above or most else high
             spans[i] = _Span(low, high, below, above, closed=least or most)
@@ -255,6 +262,8 @@ class Conditions:
         if 2 * len(V) >= INSIDE and harmful.all():
             self._region = probes
             return Probes(rows=len(V), harmful=len(V))
+        # A region is slanted, and the product of intervals holds much that is harmless: the
+        # parameter that tells these points apart becomes an example instead of a condition.
         del left[self._telling(probes, harmful, left)]
         return None
 
@@ -315,6 +324,8 @@ class Conditions:
             others = [k for k in range(len(parameter.kind.names)) if k != span.low]
             V[:, i] = self._random.choice(others, OUTSIDE)
         else:
+            # A step away from the bound: closer than that, the statement is only as exact as its
+            # digits.
             beyond = []
             if span.below:
                 fixed.append((i, span.low - step))

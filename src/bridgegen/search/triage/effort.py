@@ -40,6 +40,8 @@ class Effort:
         return self.per_mode > 0
 
 
+# A full triage simulates some 3,000 scenarios: seconds with our drivers, 20 minutes with a planner
+# of 0.4 s each.
 FULL = Effort(
     per_mode=3,
     spare=2,
@@ -51,6 +53,7 @@ FULL = Effort(
     sampled=8,
     fresh=256,
 )
+# Fewer findings are tested, each as well as ever: 990 to 1,210 simulations in two measured runs.
 SHORT = Effort(
     per_mode=1,
     spare=0,

@@ -21,6 +21,7 @@ def draw(space: SearchSpace, seed: int, n: int) -> tuple[Float, Float]:
         seed: of the run.
         n: how many.
     """
+    # They follow from the seed, so no record of a run has to hold them.
     U = np.random.Generator(np.random.PCG64([seed, _STREAM])).random((n, space.n_var))
     return U, space.decode(U) + 0.0
 

@@ -51,6 +51,7 @@ def influences(space: SearchSpace, X: Numbers, fails: Bool, ok: Bool) -> tuple[I
     for k, name in enumerate(space.variables):
         parameter = space.parameters[name]
         distance, p = ks_2samp(V[:, k], W[:, k], method="asymp")
+        # Bonferroni: of many parameters, one would else be significant by chance.
         p = min(1.0, float(p) * space.n_var)
         if p >= SIGNIFICANT:
             continue

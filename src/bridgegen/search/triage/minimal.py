@@ -105,6 +105,8 @@ class Minimiser:
         alive = self._holds(ladders, ways, [at[np.newaxis] for at in here])
         modes = [m for m in range(len(X)) if alive[m][0]]
         self._descend(ladders, ways, here, modes, SHARES, MOST_ROUNDS, self._holds)
+        # The minimal scenario lies at the edge of the harm, where half of its neighbours may be
+        # harmless.
         frail = self._move_back(ladders, ways, here, modes)
         if not self._effort.descends_robustly:
             frail = []
@@ -186,6 +188,7 @@ class Minimiser:
             )
         fine = self._holds(ladders, ways, tried)
         frail, best = list(modes), dict.fromkeys(modes, -1.0)
+        # All five steps at once gave the same result with 160 instead of 66 simulations a mode.
         for k in range(len(BACK)):  # one after the other: most modes are robust soon
             asked = [m for m in frail if fine[m][k]]
             shares = self._robustness([(m, tried[m][k]) for m in asked], ladders)
@@ -269,6 +272,8 @@ class Minimiser:
     ) -> list[Bool]:
         """Return, per mode, at which rungs ``(n, n_var)`` its harm persists."""
         parts = [self._rows(ladder, at) for ladder, at in zip(ladders, tried, strict=True)]
+        # The noise of the row that is minimised, in every trial: it is a function of the row, and
+        # would else change with each step.
         noise = np.repeat(self._bases, [len(part) for part in parts], axis=0)
         trials = self._pipeline.try_all(np.concatenate(parts), noise=noise)
         keys = keys_of(

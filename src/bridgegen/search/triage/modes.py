@@ -153,13 +153,16 @@ def clusters(U: Float) -> Int:
     from scipy.cluster.hierarchy import fcluster, linkage
     from scipy.spatial import cKDTree
 
+    # So that Euclid's distance is the root mean square over the parameters, whatever their number.
     scaled = U / np.sqrt(U.shape[1])
     some = scaled[:MOST_CLUSTERED]
+    # k = 2: the nearest row to each is the row itself.
     distance = np.asarray(cKDTree(some).query(some, k=2)[0])
     cut = max(APART, GAPS * float(np.median(distance[:, 1])))
     labels = fcluster(linkage(some, "single"), cut, "distance").astype(np.int64)
     numbers, counts = np.unique(labels, return_counts=True)
     large = numbers[counts >= max(LEAST_ROWS, LEAST_SHARE * len(some))]
+    # Clusters too small to count join others; with one left, nothing is divided.
     if len(large) < 2:
         return array
     core = np.flatnonzero(np.isin(labels, large))
@@ -167,6 +170,7 @@ def clusters(U: Float) -> Int:
     found = labels[core][nearest]
     _, first, inverse = np.unique(found, return_index=True, return_inverse=True)
     rank = np.empty(len(first), dtype=np.int64)
+    # Numbered by their first row, which is the worst: scipy's numbers depend on its tree.
     rank[np.argsort(first)] = np.arange(len(first))
     return rank[inverse.reshape(-1)]
 
@@ -217,6 +221,7 @@ def title(key: Key, rules: Sequence[str] = (), count: str = "ego") -> str:
     partner = _ARTICLES.get(key.partner, f"a {key.partner}")
     if (*rules[:1], key.responsible) == (Rule.EMERGENCY_VEHICLE.label, "ego"):  # a car by its kind
         partner = "an emergency vehicle"
+    # A violation has the words of a near miss: nobody was hit.
     text = (contact if key.conflict == "contact" else near).format(partner)
     if key.place:
         text += f" {key.place}"
@@ -241,6 +246,7 @@ def where(U: Float, others: Float, names: Sequence[str]) -> tuple[int, float, fl
     """
     if not len(others) or not len(names):
         return None
+    # Gap over spread, which has no unit: columns may have different ones.
     spread = np.concatenate([U, others]).std(axis=0)
     gap = np.abs(np.median(U, axis=0) - np.median(others, axis=0))
     k = int(np.argmax(np.divide(gap, spread, out=np.zeros_like(gap), where=spread > 0.0)))

@@ -29,6 +29,7 @@ def nearest(space: SearchSpace, V: Float) -> Float:
     number = {name: k for k, name in enumerate(space.variables)}
     table: dict[str, Float | float] = {}
     X = np.empty((len(wanted), len(space.names)))
+    # In the decoder's order: a bound of a parameter may depend on those before it.
     for name in space.order:
         if name in space.derived:
             value: Float | float = space.derived[name].value.evaluate(table)

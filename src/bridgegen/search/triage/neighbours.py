@@ -18,6 +18,7 @@ from bridgegen.engine.pipeline import Pipeline
 from bridgegen.search.triage.moves import around
 from bridgegen.search.triage.record import Neighbourhood, Treatment
 
+# The same number with every effort: fewer would give "robust" another meaning from run to run.
 NEIGHBOURS = 32
 RADIUS = 0.025
 """Maximum move of each searched parameter, a share of its range."""
@@ -103,6 +104,7 @@ def _simulate(
             for x, i in zip(X, evaluations.tolist(), strict=True)
         ]
     )  # (K, 2, NEIGHBOURS, n)
+    # Noise is that of the finding's row, so that a neighbour differs in its parameters alone.
     # Neighbour by neighbour, so that those of one road network are simulated by one worker.
     rows = np.stack([near[:, int(variant == _MOVED)] for variant in variants], axis=2)
     noise = np.broadcast_to(X[:, np.newaxis, np.newaxis], rows.shape)
@@ -124,6 +126,7 @@ def _neighbourhood(
     low, high = wilson(hits, rows)
     placebo, treatments = None, []
     if fixes:
+        # A random move removes some harm, too: a fix must remove significantly more than that.
         placebo = treatment(PLACEBO, "", harmful[:, [0, 1]], ok[:, [0, 1]])
         for k, fix in enumerate(fixes, start=2):
             pair = [0, k]

@@ -398,6 +398,7 @@ class Bound(_Model):
     @property
     def judged(self) -> bool:
         """Whether the run supports a statement on its driver."""
+        # Records of earlier versions have no verdict.
         known = self.evaluations - self.failed - self.implausible
         return self.verdict != NOT_JUDGED if self.verdict else known > 0
 
@@ -460,6 +461,7 @@ class Triage(_Model):
             raise ValueError("modes must not hold more rows than are harmful")
         named = [i for mode in self.modes for i in (mode.worst, mode.shown, *mode.examples)]
         named += [neighbourhood.evaluation for neighbourhood in self.neighbourhoods]
+        # A record may be damaged or another's: readers index the store's rows by these numbers.
         if max(named, default=-1) >= self.bound.evaluations:
             raise ValueError(f"evaluation {max(named)} must be one of the run's")
         return self
@@ -498,6 +500,7 @@ def read_record(path: Path, results: str | None = None) -> Triage | None:
         StorageError: it cannot be read.
     """
     record = read_model(path, Triage, _not_ours)
+    # Rows may have been added since (resume): what is said of others would be wrong of these.
     if record is not None and results is not None and record.results != results:
         raise _not_ours(path, "it was made from other evaluations than the run's")
     return record

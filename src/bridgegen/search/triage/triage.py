@@ -145,6 +145,7 @@ class _Triage:
         harmful, self._harm = harmful_rows(
             rows.metrics, pipeline.metrics, name, rows.status, rows.findings
         )
+        # A search for one cause has found only what is critical for it.
         if pipeline.cause is not None:  # harm of another cause does not count
             harmful &= rows.critical
         if pipeline.baseline is not None:  # nor does what the baseline's driver fails in, too
@@ -192,6 +193,8 @@ class _Triage:
         first, rest = np.split(order, [self._effort.placed])
         place = np.full(len(order), "", dtype=object)
         trials = self._pipeline.try_all(self._rows.X[self._at[first]])
+        # Recorded rows do not say where on the route they failed, so the worst ones are simulated
+        # once more; the others take the place of their nearest row of the same kind.
         place[first] = trials.place
         self._preventable = dict(zip(first.tolist(), trials.avoidable, strict=True))
         if not len(rest):
@@ -220,6 +223,8 @@ class _Triage:
 
     def _test_robustness(self, groups: Sequence[Group], U: Float, harm: Float) -> list[int]:
         """Simulate neighbours of the worst rows; return the row that represents each mode."""
+        # By what happened, not by parameters: drivers that do not look do not depend on weather,
+        # and 41 of 716 exports were one event under other weather.
         events = self._happened()
         worst = [distinct(events, item.rows, self._effort.per_mode) for item in groups]
         every = by_harm(harm, U)
@@ -235,6 +240,7 @@ class _Triage:
         critical = self._rows.critical[self._at]
         first = sorted((i for i in shown if critical[i]), key=lambda i: self._rank(i, harm))
         events = self._happened()
+        # In nine runs of the default algorithm 14 of 70 exports were copies of others.
         first = [i for k, i in enumerate(first) if not _is_copy(events, i, first[:k])]
         first = first[: self._keep]
         every = by_harm(harm, U)
@@ -307,6 +313,8 @@ class _Triage:
         found: list[Minimal | None] = [None] * len(groups)
         first: dict[Any, int] = {}
         for k, item in enumerate(groups if not self._space.decisions else ()):
+            # `way` is a key without its cause: a minimal scenario keeps how the ego fails, whatever
+            # causes it.
             first.setdefault((item.key.way, item.part), k)
         at = list(first.values())[: self._effort.minimal]
         if at:
@@ -321,6 +329,8 @@ class _Triage:
         """Return the harmful share of the space, that of each mode, and the fresh rows drawn."""
         rows = self._rows
         fit = int(((rows.status == 0) & ~_implausible(rows)).sum())
+        # Only rows that were drawn without regard to results estimate a share. Of a particle
+        # swarm's leaves that are 80 to 100 % critical, 2 to 98 % of random scenarios are.
         if self._algorithm in UNBIASED:
             drawn: Drawn = "sobol" if self._algorithm == "sobol" else "random"
             each = [estimate(drawn, len(item.rows), fit) for item in groups]
@@ -482,6 +492,7 @@ class _Triage:
 def _baseline_fails(pipeline: Pipeline, rows: Rows | Recorded) -> Bool:
     """Return which rows the baseline's driver fails in, ``(N,)``, or has no usable result of."""
     column = rows.metrics[:, pipeline.metrics.index(f"{OF_BASELINE}{HARM}")]
+    # Written so that a baseline without a result counts as failing: the row shows no difference.
     fails: Bool = ~(np.nan_to_num(column, nan=1.0) < NEAR_MISS)
     return fails | ~rows.critical if pipeline.objective.rule == "harm" else fails
 

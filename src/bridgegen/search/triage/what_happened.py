@@ -69,6 +69,7 @@ def _coordinates(numbers: Float, least: Float, labels: Sequence[npt.NDArray[np.g
 # --- Rows that differ from each other ---
 
 
+# At 0.1 alone, ten exported scenarios of PSO on S4 were one scenario in ten weathers.
 DISTINCT = (0.2, 0.1)
 """Least distances between two kept scenarios: root mean square over what happened in them, or over
 the searched parameters, each scaled to 0..1. The second distance counts where too few differ by the

@@ -45,6 +45,9 @@ _BY_FIELD = {
     "begins_waiting": begin_waiting,
 }
 
+FIELDS = (*_BY_FIELD, "begins", "moves_chassis", "driver_code")
+"""Fields of `Plan` that hold addresses of kernels; 0: of none."""
+
 _NUMBER, _TWO = (types.int64,), (types.int64, types.int64)
 _MOTION = (types.int64, types.float64, types.float64)
 

@@ -74,6 +74,7 @@ class Batch:
     Attributes:
         record: x, y, h, v, a, offset ``(N, E, T)`` and more, up to the present instant.
         state: all else that a driver may look at; see ``_memory_kernels.State``.
+        plan: the compiled storyboard, with the addresses that this process needs.
 
     Raises:
         InputError: a road network that is not there, or a value that is not finite.
@@ -93,7 +94,7 @@ class Batch:
         if n and not (rows.min() >= 0 and rows.max() < roads.n_networks):
             raise InputError(f"rows must name one of {roads.n_networks} road networks")
         self._program, self._roads, self._rows = program, roads, rows
-        self._plan = _plan(program, until_collision and not len(program.tows))
+        self.plan = _plan(program, until_collision and not len(program.tows))
         slots = program.fill(values, n)
         key = noise_keys(program, values, n) if noise is None else noise
         state = _state(program, roads, rows, slots, key, own)
@@ -120,8 +121,8 @@ class Batch:
             return
         self._has_addresses = True
         drives = DEMANDS.get(self._program.driver.name)
-        at = here(self._plan, self._roads.tables, self.state, self.record)
-        self._plan = addressed(self._plan, drives, at)
+        at = here(self.plan, self._roads.tables, self.state, self.record)
+        self.plan = addressed(self.plan, drives, at)
 
     def run(self, simulate_rows: Callable[..., Any] = kernels.simulate_rows) -> Rollout:
         """Roll all rows out with the compiled driver; runs without the GIL.
@@ -150,7 +151,7 @@ class Batch:
         demanded, curvature = np.zeros((2, len(self._rows)))
         tables = self._roads.tables
         kernels.demand_rows(
-            k, self._plan, tables, self._rows, self.state, self.record, demanded, curvature
+            k, self.plan, tables, self._rows, self.state, self.record, demanded, curvature
         )
         return demanded, curvature
 
@@ -184,15 +185,16 @@ class Batch:
         return self.rollout()
 
     def kinds(self) -> tuple[Any, ...]:
+        """Return the types of what kernels of a row take: plan, roads, state and record."""
         rows = (self._roads.tables, self.state, self.record)
-        return (row_type(self._plan, 0), *map(row_type, rows))
+        return (row_type(self.plan, 0), *map(row_type, rows))
 
     def _do(self, kernel: Callable[..., Any], *arguments: int | Float) -> None:
         """Call a kernel; rows for which a way is not planned yet do the same again when it is."""
         self.take_addresses()
         before = self._block.copy(), self.record.began.copy()
         messages = kernel(
-            *arguments, self._plan, self._roads.tables, self._rows, self.state, self.record
+            *arguments, self.plan, self._roads.tables, self._rows, self.state, self.record
         )
         self._messages |= messages or {}
         while (
@@ -208,7 +210,7 @@ class Batch:
                 for argument in arguments
             )
             messages = kernel(
-                *mine, self._plan, self._roads.tables, self._rows[again], state, record
+                *mine, self.plan, self._roads.tables, self._rows[again], state, record
             )
             self._messages |= {int(again[row]): text for row, text in (messages or {}).items()}
             _put_back(self.state, state, again)
@@ -235,7 +237,7 @@ class Batch:
         """
         observe_rows(
             k,
-            self._plan,
+            self.plan,
             self._roads.tables,
             self._rows,
             self.state,
@@ -260,7 +262,7 @@ class Batch:
     def see_conflicts(self, k: int, found: Float) -> None:
         """Fill the conflicts of running rows ``(N, M, W, CONFLICT)``, after ``observe``."""
         tables, rows = self._roads.tables, self._rows
-        see_conflicts_of_rows(k, self._plan, tables, rows, self.state, self.record, found)
+        see_conflicts_of_rows(k, self.plan, tables, rows, self.state, self.record, found)
 
     def maps(self) -> tuple[tuple[RoadMap, ...], Int]:
         """Return the road maps of the rows, and which of them each row has, ``(N,)``."""
@@ -270,18 +272,18 @@ class Batch:
     def impose(self, k: int, bodies: Int, states: Float) -> None:
         """Move bodies ``(B,)`` of the running rows to poses ``(N, B, 4)``; see `CoSimulation`."""
         drivers.impose_rows(
-            k, bodies, states, self._plan, self._roads.tables, self._rows, self.state, self.record
+            k, bodies, states, self.plan, self._roads.tables, self._rows, self.state, self.record
         )
 
     def egos_are_through(self) -> Bool:
         """Return ``(N,)``: whether a driven ego is at the end of its route, or of the road."""
         through = np.zeros(len(self._rows), dtype=np.bool_)
-        drivers.egos_are_through(self._plan, self._roads.tables, self._rows, self.state, through)
+        drivers.egos_are_through(self.plan, self._roads.tables, self._rows, self.state, through)
         return through
 
     def fill_inputs(self, k: int) -> None:
         """Fill the inputs of a user's compiled driver for the running rows."""
-        fill_input_rows(k, self._plan, self._roads.tables, self._rows, self.state, self.record)
+        fill_input_rows(k, self.plan, self._roads.tables, self._rows, self.state, self.record)
 
     def fail(self, status: int, message: str) -> None:
         """End all running rows, where they are, with a status and a message."""

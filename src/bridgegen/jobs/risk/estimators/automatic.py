@@ -33,6 +33,7 @@ def estimate(
     first = monte_carlo.estimate(problem, replace(aim, budget=look, precision=0.0), seed)
     hits = int(first.there(aim.threshold).sum())
     wanted = aim.precision or 0.05
+    # The binomial's: rows for a relative error of `wanted` at 95 %.
     needed = (_NORMAL / wanted) ** 2 * (look / hits - 1.0) if hits else float("inf")
     if hits >= FEWEST and needed <= aim.budget - look:
         return (
@@ -53,6 +54,7 @@ def estimate(
         part = replace(aim, budget=int(SECOND_SHARE * (aim.budget - spent)))
         found = subset.estimate(problem, part, seed + 1)
         spent += found.evaluations
+        # Subset simulation is not believed below what importance sampling has shown at least.
         if not found.doubts and found.probability(aim.threshold).high >= least:
             why = f"{why}, and importance sampling is in doubt ({doubt})"
             return "subset", why, replace(found, evaluations=spent)

@@ -11,6 +11,9 @@ from bridgegen.jobs.risk.estimators.mixture import Kernels
 from bridgegen.jobs.risk.estimators.problem import SCORE, Aim, Problem, block_of
 from bridgegen.jobs.risk.estimators.weighted import Weighted
 
+# Where subset simulation was in doubt, 20,000 uniform rows had 20 to 30 effective harmful ones.
+# Rows of wider normal distributions had 2 to 6 of 25,000: far ends of the weather break
+# constraints.
 MOST = 20_000  # points
 FEWEST = 5.0
 """Effective number of spread points of the event below which it is not known well."""
@@ -182,6 +185,8 @@ class SinglePoints:
         looks, tested, evaluations = alone(points, BESIDE)
         if not looks.any():
             return cls(0.0, evaluations)
+        # Points of a thin region look single, too: they are asked again much closer. No point is
+        # single then in eleven pairs without noise, and 9 to 36 % are with `reference`.
         single, again, more = alone(points[looks][:AGAIN], CLOSE)
         share = float(looks.sum() / tested * single.sum() / max(again, 1))
         return cls(share, evaluations + more)

@@ -52,6 +52,8 @@ class Evidence:
         It is compared with subset simulation and then with exploration, unless these are in doubt.
         The first one that agrees raises the upper end by what it may have missed.
         """
+        # Whoever of subset simulation and exploration is not in doubt and agrees with the result
+        # bounds what the proposals do not cover.
         believed = [weighted for weighted in (self.levels, self.spread) if not weighted.doubts]
         if not believed:
             believed = [self.spread if len(self.spread.Z) and not self.helped else self.levels]
@@ -115,6 +117,8 @@ class Evidence:
             if len(sums) < 2 or not sums.mean() > 0.0:
                 return MOST_UNSEEN
             error = float(sums.std(ddof=1) / sums.mean())
+            # As many independent harmful rows as the error is worth: a region that n of them all
+            # miss has less than 3 / n of the probability (95 %).
             n = len(sums) / max(error * error, 1e-12)
         else:
             n = known.hits(there)
@@ -177,6 +181,8 @@ def learn(
         points = np.concatenate(found)
         if not len(points):
             continue
+        # Fitted twice, to the last proposals' rows alone, 150,000 rows in cut-in were worth 8
+        # harmful ones.
         weights = 1.0 / np.mean([1.0 / item.weights(points) for item in drawn], axis=0)
         size = float(weights.sum() ** 2 / np.sum(weights * weights))
         proposals = replace(Proposals.of(points, weights, size, random), kernels=first.kernels)
@@ -211,6 +217,9 @@ def estimate(problem: Problem, aim: Aim, seed: int, start: Float | None = None) 
     less = replace(aim, budget=max(int(PREPARED * aim.budget), 1), precision=FOUND)
     levels = subset.simulate(problem, less, seed)
     left = aim.budget - levels.evaluations
+    # Always, not only where subset simulation is in doubt: a score that led to a fifth of the
+    # probability, and said nothing of the rest, gave 0.20 to 0.21 of the truth with a narrow
+    # interval.
     check = min(int(CHECKED * left), levels.evaluations)
     rest = replace(aim, budget=int(EXPLORED * left) if levels.doubts else check)
     spread = exploration.explore(problem, rest, seed)
@@ -227,9 +236,14 @@ def estimate(problem: Problem, aim: Aim, seed: int, start: Float | None = None) 
     size = spread.hits(spread.there(aim.threshold)) if explored else len(Z) / OF_CHAIN
     proposals = Proposals.of(Z, weights, size, random)
     if spread.doubts and not levels.doubts:
+        # Narrow kernels alone: as a part of what mixtures are fitted to, one point that weighed
+        # more than all others left a tenth of the effective rows in 20 dimensions.
         proposals = proposals.also_around(_heaviest_points(spread, aim))
     single = SinglePoints.of(problem, aim, seed, *seen, proposals.kernels)
     spent += single.evaluations
+    # Noise is a function of the row: proposals draw rows around harmful ones, and meet harm that
+    # noise makes no more often than on the road. lead-brakes with `reference` was estimated at
+    # 2.6e-4 where 3.4e-4 are counted.
     if single.doubt:
         known, facts = spread if levels.doubts else levels, {"single": single.share, "reached": 0.0}
         doubts = (single.doubt, *known.doubts)

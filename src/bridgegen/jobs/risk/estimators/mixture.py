@@ -80,6 +80,7 @@ class Kernels:
         own = scipy.linalg.solve_triangular(self.factor, self.points.T, lower=True).T
         other = scipy.linalg.solve_triangular(self.factor, Z.T, lower=True).T
         square = scipy.spatial.distance.cdist(other, own, "sqeuclidean")
+        # The nearest kernel's exponent is taken out, or all would underflow far from the points.
         nearest = square.min(axis=1)
         mean = np.exp(-0.5 * (square - nearest[:, np.newaxis])).mean(axis=1)
         scale = np.log(np.diag(self.factor)).sum() + 0.5 * d * np.log(2.0 * np.pi)

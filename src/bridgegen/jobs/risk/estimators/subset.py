@@ -28,6 +28,8 @@ DEEPEST = 20  # levels, at most: a probability of 1e-20
 STUCK = 0.01  # of a level at least must reach the next one
 MOST_TIED = 0.5  # of a level's points at most may be in the next one
 TOGETHER = 20  # repetitions that run side by side
+# All repetitions have the same number. A last round of smaller ones, made of what was left of the
+# budget and counted as much as the others, had 8 to 9 % of intervals that missed the truth.
 POINTS, FEWEST_POINTS = 250, 25  # of a repetition; all have the same number
 FEWEST_ROUNDS = 2  # so that the first one says what repetitions cost
 MARGIN = 1.3  # of evaluations: repetitions take more or fewer
@@ -112,7 +114,11 @@ class _Chains:
     def step(self, Z: Float, found: Float, level: Level) -> tuple[Float, Float, Bool]:
         """Move points on by one proposal each; those that leave the level stay."""
         noise = self.random.standard_normal(Z.shape)
+        # This proposal keeps the standard normal distribution, so that only the level decides on
+        # acceptance.
         moved = np.sqrt(1.0 - level.scale**2) * Z + level.scale * noise
+        # What breaks a constraint is rejected unevaluated: feasibility costs nothing, a simulation
+        # does.
         good = self.problem.feasible(moved)
         at = np.flatnonzero(good)
         if at.size:
@@ -127,6 +133,9 @@ class _Chains:
         self, Z: Float, found: Float, owner: Int, times: float, level: Level
     ) -> tuple[Float, Float, Int]:
         """Make each point several of its level, ``times`` on average: itself, and its chain."""
+        # Copies in a fixed number (generalised splitting, Botev and Kroese 2012): resampling
+        # survivors to a constant number of points was 4 to 6 % too high, because the length of a
+        # chain depends on the number of survivors.
         length = int(times) + (self.random.random(len(Z)) < times - int(times))
         parts, active = [(Z, found, owner)], np.arange(len(Z))
         for turn in range(1, int(length.max())):
@@ -149,6 +158,7 @@ def pilot(problem: Problem, aim: Aim, seed: int) -> Pilot:
     before, reached = -np.inf, False
     while len(levels) < DEEPEST:
         scores = found[:, SCORE]
+        # Levels are chosen once, by the pilot run, and kept: adaptive ones are biased.
         level = min(_next_level(scores, before), aim.threshold)
         there = scores >= level
         share = float(there.mean())
@@ -174,6 +184,7 @@ def pilot(problem: Problem, aim: Aim, seed: int) -> Pilot:
             except _OutOfBudget:
                 break
             took.append(float(moved.mean()))
+            # Robbins and Monro: towards the aimed acceptance, by ever smaller steps.
             scale *= float(np.exp((took[-1] - ACCEPTED) / np.sqrt(turn)))
             parts.append(now)
             results.append(last)
@@ -264,6 +275,7 @@ def simulate(problem: Problem, aim: Aim, seed: int) -> Weighted:
         limit = aim.budget - spent
         if MARGIN * cost * points * TOGETHER > limit:
             break
+        # A stream for each round, so that a resumed estimate repeats the same rows from the ledger.
         random = block_of(seed, rounds + 1)
         try:
             Z, found, weights, owner, took = repeat(problem, first, points, TOGETHER, random, limit)
@@ -274,6 +286,8 @@ def simulate(problem: Problem, aim: Aim, seed: int) -> Weighted:
         number = owner[kept] + TOGETHER * (rounds - 1)
         parts.append((Z[kept], found[kept], weights[kept], number))
         spent += took
+        # Costs grow with the estimate, so this makes rare estimates up to 4 % too high where the
+        # budget allows two rounds.
         cost = max(cost, took / (points * TOGETHER))
         result = _result(problem, parts, TOGETHER * rounds, spent)
         if result.probability(aim.threshold).precision <= aim.precision:
@@ -326,5 +340,7 @@ def _result(
         np.concatenate(pair) for pair in zip(*(parts or [none]), strict=True)
     )
     share = weights / max(count, 1)
+    # The interval allows for one more repetition like the largest: misses of Student's lie mostly
+    # below the mean, which is the side that matters.
     largest = float(share.max(initial=0.0))
     return Weighted(Z, found, share, 0, owner, count, largest, (1.0, 1.0, 1.0), spent)

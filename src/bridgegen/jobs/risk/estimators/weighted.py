@@ -119,8 +119,10 @@ class Weighted:
         else:
             held = parts[parts > 0.0]
             each = held[0] if held.size else self.largest
+            # Equal weights are a count, whose interval is exact; none needs the approximation.
             is_count = not held.size or np.ptp(held) == 0.0
             found = of_counts(held.size, self.rows, each) if is_count else of_weights(held)
+        # The factor has an uncertainty of its own: the ends move by it.
         low, middle, high = self.share
         return found.widened(low / middle, high / middle)
 
@@ -159,6 +161,7 @@ def of_weights(parts: Float) -> Probability:
 
     def quantile(confidence: float) -> float:
         end = more
+        # Doubled until the root lies between the ends: brentq needs a change of sign.
         while below(end) < confidence:
             end *= 2.0
         return float(

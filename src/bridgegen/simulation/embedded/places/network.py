@@ -37,6 +37,8 @@ class Network:
         tables: all arrays, as they are now; a newer one holds all that an older one does.
         station: ``(P, E, 2)`` float64: an entity that starts at s on its road starts a + b·s along
             its path.
+        station: ``(P, E, 2)`` float64 [m, 1]: where entities start along their first paths, and
+            how it grows with where they start along the road; see ``stations``.
         sides: ``(P, E)`` float64: 1 for an entity that starts along its road's direction, -1
             against it; what is to its left, then, of what is to the road's.
         scene: what a driver with stages knows of them.
@@ -67,7 +69,7 @@ class Network:
             for i, point in enumerate(program.points):
                 self._points[p, i] = position(program, model, point)
         e = len(program.names)
-        self._station: Float = np.array([each.station[:e] for each in self._ways])
+        self.station: Float = np.array([each.station[:e] for each in self._ways])
         self.sides: Float = np.array([each.sides[:e] for each in self._ways], dtype=np.float64)
         self._zones: list[list[Float]] = [[] for _ in models]
         pairs = zip(models, self._ways, strict=True)
@@ -99,7 +101,7 @@ class Network:
             rows: ``(N,)`` number of each row's road network.
             s: ``(N, E)`` along the roads on which they start [m].
         """
-        found = self._station[rows, :, 0] + self._station[rows, :, 1] * s
+        found = self.station[rows, :, 0] + self.station[rows, :, 1] * s
         for p, ways in enumerate(self._ways):
             for e, road in ways.uneven.items():
                 at = np.flatnonzero(rows == p)
@@ -107,6 +109,10 @@ class Network:
                 assert route is not None
                 found[at, e] = route.stations(road, s[at, e])
         return np.ascontiguousarray(found)
+
+    def is_uneven(self, p: int) -> bool:
+        """Return whether an entity's place along its path is no linear function of its road's."""
+        return bool(self._ways[p].uneven)
 
     @property
     def n_networks(self) -> int:

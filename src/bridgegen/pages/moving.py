@@ -1,0 +1,134 @@
+"""An event as a moving picture: SVG that needs no script."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+from markupsafe import Markup
+
+from bridgegen.base.arrays import Bool, Float
+from bridgegen.drivers.kinds import NAMES
+from bridgegen.pages.birdseye import ASPHALT, GROUND, INK, PLAYERS, Camera, View, centre_of
+from bridgegen.pages.charts import element
+from bridgegen.pages.playback import Entity
+from bridgegen.pages.scenery import bodies
+from bridgegen.pages.svg import SvgDraw
+from bridgegen.simulation.rollout import Rollout
+
+WIDTH, HEIGHT = 900, 320
+EVERY = 0.2  # s, between two states of the picture
+SPACE = 12.0  # m, around both paths
+LEAST = 30.0  # m, that the picture shows
+STANDS = 1.0  # m; over a shorter way the ego's heading says where it goes
+
+
+def moving_picture(
+    motion: Rollout,
+    other: int,
+    when: float,
+    caption: str,
+    *,
+    every: float = EVERY,
+    most: int | None = None,
+    follow: float | None = None,
+) -> Markup:
+    """Return the picture of an event, seen from above, over and over.
+
+    Args:
+        motion: N = 1; the ego is entity 0.
+        other: the entity that the conflict is with; 0 if there is none.
+        when: of the conflict [s].
+        caption: what the picture says to those who do not see it.
+        every: time between two states of the picture [s].
+        most: participants that are shown, the first ones; by default all.
+        follow: metres from top to bottom of a view that follows the ego; by default the view holds
+            the whole paths of both.
+    """
+    # From left to right: the picture is wide.
+    motion = _turned(motion)
+    kinds = [NAMES[code] for code in motion.kinds.tolist()] or ["car"] * len(motion.names)
+    entities = bodies(motion, dict(zip(motion.names, kinds, strict=True)))[:most]
+    n = min(int(motion.n_steps[0]), motion.shape[2])
+    poses = np.stack([motion.x[0], motion.y[0], motion.h[0]], axis=-1)[:most, :n]  # (E, T, 3)
+    is_there = np.ones(motion.x[0].shape, np.bool_)
+    there = (motion.present[0] if motion.present.size else is_there)[:most, :n]
+    draw = SvgDraw((WIDTH, HEIGHT), GROUND)
+    camera = _camera(poses[[0, other]][there[[0, other]]])
+    if follow is not None:
+        camera = Camera(0.0, 0.0, HEIGHT / follow, (WIDTH / 2, HEIGHT / 2))
+    view = View(draw, camera, 1.2)
+    colours = {**dict.fromkeys(range(len(entities)), ASPHALT), other: PLAYERS[1], 0: PLAYERS[0]}
+    moment = int(np.clip(round(when / motion.time_step), 0, n - 1))
+    step = max(1, round(every / motion.time_step))
+    for e in dict.fromkeys((other, 0)):
+        path = centre_of(entities[e], poses[e, there[e]])[::step]
+        view.trail(path, colours[e], max(1, round(1.0 / step / motion.time_step)))
+        view.start(entities[e], poses[e, moment], colours[e])
+    at = np.arange(0, n, step)
+    timing = {
+        "dur": f"{max((len(at) - 1) * step * motion.time_step, every):.2f}s",
+        "repeatCount": "indefinite",
+    }
+    for e in sorted(colours, key=lambda e: (e == 0, e == other)):  # these two over all others
+        given = (entities[e], colours[e], poses[e, at], there[e, at], view, timing)
+        draw.add(_carried(*given, above=e == 0))
+    if follow is not None:
+        ways = [f"{WIDTH / 2 - u:.1f} {HEIGHT / 2 - v:.1f}" for u, v in camera.of(poses[0, at])]
+        draw.carry(_moves("translate", ways, timing))
+    view.scale_bar()
+    return Markup(draw.svg(title=caption, is_file=False))
+
+
+def _turned(motion: Rollout) -> Rollout:
+    """Return the motion with the ego's way from left to right, from (0, 0) on."""
+    x, y = motion.x[0, 0], motion.y[0, 0]
+    dx, dy = float(x[-1] - x[0]), float(y[-1] - y[0])
+    angle = math.atan2(dy, dx) if math.hypot(dx, dy) > STANDS else float(motion.h[0, 0, 0])
+    cosine, sine = math.cos(angle), math.sin(angle)
+    to_x, to_y = motion.x - x[0], motion.y - y[0]
+    return replace(
+        motion, x=to_x * cosine + to_y * sine, y=to_y * cosine - to_x * sine, h=motion.h - angle
+    )
+
+
+def _camera(poses: Float) -> Camera:
+    """Return the view that holds poses (·, 3)."""
+    low, high = poses[:, :2].min(axis=0), poses[:, :2].max(axis=0)
+    wide, high_ = np.maximum(high - low + 2.0 * SPACE, LEAST * np.array([1.0, HEIGHT / WIDTH]))
+    x, y = (0.5 * (low + high)).tolist()
+    return Camera(x, y, float(min(WIDTH / wide, HEIGHT / high_)), (WIDTH / 2, HEIGHT / 2))
+
+
+def _moves(kind: str, values: list[str], timing: dict[str, str]) -> Markup:
+    given = {"attributeName": "transform", "type": kind, "values": ";".join(values)}
+    return element("animateTransform", **given, **timing)
+
+
+def _carried(
+    body: Entity,
+    colour: str,
+    poses: Float,
+    there: Bool,
+    view: View,
+    timing: dict[str, str],
+    *,
+    above: bool,
+) -> Markup:
+    """Return a body with its name that goes through poses ``(n, 3)``, hidden while not there."""
+    # The body is drawn at the origin, heading to the right; the animation carries it from there.
+    alone, name = SvgDraw((WIDTH, HEIGHT), GROUND), SvgDraw((WIDTH, HEIGHT), GROUND)
+    camera = Camera(0.0, 0.0, view.camera.scale, (0.0, 0.0))
+    View(alone, camera, view.unit).body(body, np.zeros(3), colour)
+    # Names of the ego and of who meets it would hide each other on one side of their bodies.
+    off = 0.5 * body.length * camera.scale + 4.0 * view.unit
+    place, anchor = (-off, "mb") if above else (off, "ma")
+    name.text((0.0, place), body.name, INK, view.font, anchor=anchor)
+    at = [f"{u:.1f} {v:.1f}" for u, v in view.camera.of(poses)]
+    turns = [f"{value:.1f}" for value in np.degrees(-np.unwrap(poses[:, 2]))]
+    parts = [_moves("translate", at, timing)]
+    if not there.all():
+        values = ";".join("visible" if item else "hidden" for item in there)
+        shows = {"attributeName": "visibility", "calcMode": "discrete", "values": values}
+        parts.append(element("animate", **shows, **timing))
+    turned = element("g", _moves("rotate", turns, timing), alone.inside())
+    return element("g", *parts, turned, name.inside())

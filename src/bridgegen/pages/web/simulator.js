@@ -1,0 +1,162 @@
+// Simulates rows of a storyboard: the kernels that Python runs, as WebAssembly, with the same bits.
+//
+// `tables` is what `portable.tables` made: bundles of arrays, and how a row's state follows from its values.
+
+const STACK = 1 << 20; // bytes below the arrays, for the module's stack
+const SIZE = { f8: 8, i8: 8, u8: 8, i1: 1, b1: 1 };
+const WORD = (1n << 64n) - 1n;
+
+// What a formula's operators do; those of IEEE 754 are the same everywhere, functions are the module's.
+const OPERATORS = {
+  "+": (a, b) => a + b, "-": (a, b) => a - b, "*": (a, b) => a * b, "/": (a, b) => a / b, neg: (a) => -a,
+  "%": (a, b) => { const rest = a % b; return rest && (rest < 0) !== (b < 0) ? rest + b : rest; },
+  "<": (a, b) => a < b, "<=": (a, b) => a <= b, ">": (a, b) => a > b, ">=": (a, b) => a >= b,
+  "==": (a, b) => a === b, "!=": (a, b) => a !== b,
+  and: (...parts) => parts.every(Boolean), or: (...parts) => parts.some(Boolean), not: (a) => !a,
+  abs: Math.abs, ceil: Math.ceil, floor: Math.floor, max: Math.max, min: Math.min, sign: Math.sign, sqrt: Math.sqrt,
+  round: (a) => Math.floor(a) + (a - Math.floor(a) >= 0.5 ? 1 : 0),
+};
+const RENAMED = { "**": "power" };
+
+export class Simulator {
+  /**
+   * @param {WebAssembly.Module} module
+   * @param {any} tables
+   * @param {Uint8Array} data the tables' data, inflated
+   */
+  constructor(module, tables, data) {
+    this.tables = tables;
+    this.data = data;
+    this.memory = new WebAssembly.Memory({ initial: 64, maximum: 4096 });
+    const { exports } = new WebAssembly.Instance(module, { env: {
+      __linear_memory: this.memory,
+      __stack_pointer: new WebAssembly.Global({ value: "i32", mutable: true }, STACK),
+      __indirect_function_table: new WebAssembly.Table({ initial: 256, element: "anyfunc" }),
+      fmod: (a, b) => a % b, // exact, as the processor's
+    } });
+    this.exports = exports;
+    this.codes = new Set(tables.codes);
+    this.numbers = new Map(tables.functions.map((name, i) => [name, i]));
+    this.top = STACK;
+    this.at = {};
+    this.bundles = {};
+    for (const name of ["plan", "roads", "state", "record"]) this.bundles[name] = this.put(tables[name], name);
+    this.heap = this.top;
+    this.take(1 << 18);
+  }
+
+  /** A place for some bytes, which move nowhere. */
+  take(bytes) {
+    const at = (this.top + 15) & ~15;
+    this.top = at + bytes;
+    const lack = this.top - this.memory.buffer.byteLength;
+    if (lack > 0) this.memory.grow(Math.ceil(lack / 65536));
+    return at;
+  }
+
+  // A bundle is a number of 8 bytes, or an array: two unused pointers, counts, where it lies, shape and strides.
+  put(bundle, name) {
+    const arrays = (this.at[name] = {});
+    const placed = bundle.map((part) => (part.length === 3 ? null : this.take(SIZE[part[1]] * part[2].reduce((a, b) => a * b, 1) + 8)));
+    const place = this.take(bundle.reduce((sum, part) => sum + (part.length === 3 ? 8 : 32 + 16 * part[2].length), 0));
+    const view = new DataView(this.memory.buffer);
+    let at = place;
+    const whole = (value, where) => view.setBigInt64(where, BigInt(value), true);
+    bundle.forEach((part, i) => {
+      if (part.length === 3) {
+        const [field, value, isReal] = part;
+        if (isReal) view.setFloat64(at, value, true);
+        else whole(this.codes.has(field) && value ? this.exports.address(value) : value, at);
+        at += 8;
+        return;
+      }
+      const [field, kind, shape] = part, count = shape.reduce((a, b) => a * b, 1);
+      arrays[field] = { kind, shape, count, from: part[3], place: placed[i] };
+      whole(count, at + 8);
+      whole(SIZE[kind], at + 16);
+      view.setInt32(at + 24, placed[i], true);
+      at += 32;
+      for (const length of shape) { whole(length, at); at += 8; }
+      let stride = SIZE[kind];
+      const strides = shape.map((_, axis) => shape.slice(axis + 1).reduce((a, b) => a * b, stride));
+      for (const each of strides) { whole(each, at); at += 8; }
+    });
+    this.reset(name);
+    if (name === "plan") {
+      for (const field of this.codes) {
+        const array = arrays[field];
+        if (array) for (let i = 0; i < array.count; i++) { const code = Number(view.getBigInt64(array.place + 8 * i, true)); whole(code ? this.exports.address(code) : 0, array.place + 8 * i); }
+      }
+    }
+    return place;
+  }
+
+  reset(name) {
+    const bytes = new Uint8Array(this.memory.buffer);
+    for (const { kind, count, from, place } of Object.values(this.at[name])) {
+      const size = count * SIZE[kind];
+      if (from < 0) bytes.fill(0, place, place + size);
+      else bytes.set(this.data.subarray(from, from + size), place);
+    }
+  }
+
+  /** An array of a bundle, as long as no memory is added. */
+  array(name, field) {
+    const { kind, count, place } = this.at[name][field];
+    const Type = { f8: Float64Array, i8: BigInt64Array, u8: BigUint64Array, i1: Int8Array, b1: Uint8Array }[kind];
+    return new Type(this.memory.buffer, place, count);
+  }
+
+  /** The value of a formula of named values, with the bits that Python gets. */
+  evaluate(formula, values) {
+    if (typeof formula === "number") return formula;
+    if (typeof formula === "string") return values[formula];
+    const [operator, ...parts] = formula;
+    if (operator === "if") return this.evaluate(parts[this.evaluate(parts[0], values) ? 1 : 2], values);
+    if (operator === "lookup") return parts[1 + values[parts[0]]];
+    const given = parts.map((part) => this.evaluate(part, values));
+    if (OPERATORS[operator]) return OPERATORS[operator](...given);
+    return this.exports.function(this.numbers.get(RENAMED[operator] ?? operator), given[0], given[1] ?? 0);
+  }
+
+  /**
+   * Simulates a row. Its record then lies in the arrays of "record", until the next one.
+   * @param {Record<string, number>} values by parameter
+   * @returns {{steps: number, status: number}} real instants, and a status; −1: a way is missing, so it ended early
+   */
+  run(values) {
+    const { tables } = this, known = { ...tables.parameters };
+    for (const name of Object.keys(known)) if (name in values) known[name] = values[name];
+    this.reset("state");
+    this.reset("record");
+    const slots = this.array("state", "slots");
+    tables.slots.forEach((slot, i) => { slots[i] = this.evaluate(slot, known); });
+    const { station, aside } = tables, along = this.array("state", "station"), across = this.array("state", "aside");
+    station.slots.forEach((slot, e) => { along[e] = station.first[e] + station.each[e] * slots[Math.max(slot, 0)]; });
+    aside.slots.forEach((slot, e) => { across[e] = slot >= 0 ? aside.each[e] * slots[slot] : 0; });
+    this.array("state", "key")[0] = this.key(known);
+    this.exports.simulate(this.bundles.plan, this.bundles.roads, this.bundles.state, this.bundles.record, this.heap);
+    const ending = this.array("state", "ending");
+    return { steps: Number(ending[0]), status: Number(ending[1]) };
+  }
+
+  // The key of a row's random numbers: SplitMix64 over the bits of its values.
+  key(values) {
+    const { noise } = this.tables;
+    if (noise.key) return BigInt(noise.key);
+    const bits = new DataView(new ArrayBuffer(8));
+    let key = 0n;
+    for (const [name, word] of Object.entries(noise.words)) {
+      bits.setFloat64(0, values[name] + 0);
+      key = mix((mix(key ^ BigInt(word)) + bits.getBigUint64(0)) & WORD);
+    }
+    return key;
+  }
+}
+
+function mix(word) {
+  word = (word + 0x9E3779B97F4A7C15n) & WORD;
+  word = ((word ^ (word >> 30n)) * 0xBF58476D1CE4E5B9n) & WORD;
+  word = ((word ^ (word >> 27n)) * 0x94D049BB133111EBn) & WORD;
+  return word ^ (word >> 31n);
+}

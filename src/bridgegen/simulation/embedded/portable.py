@@ -1,0 +1,127 @@
+"""A storyboard as the module of all kernels takes it, which runs elsewhere: in a browser.
+
+The module (`tools/portable.py`) is the same for all storyboards: what it simulates lies in tables
+that its host, ``simulator.js``, puts into its memory. This makes them of a batch, and says how a
+row's state follows from its parameter values.
+"""
+
+import ast
+import hashlib
+import zlib
+from base64 import b64encode
+from functools import cache
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from bridgegen.base._elementary_kernels import FUNCTIONS
+from bridgegen.base.compilation.folder import PACKAGE, with_imported
+from bridgegen.base.errors import InputError
+from bridgegen.openx.openscenario.values import Expr, ParameterRef, Value
+from bridgegen.simulation.embedded.addresses import CALLED, FIELDS, addressed
+from bridgegen.simulation.embedded.drivers import DEMANDS
+from bridgegen.simulation.embedded.places.network import Network
+from bridgegen.simulation.embedded.program import Program
+
+UNSET = ("x", "y", "h", "v", "a", "offset", "lights")
+"""Arrays of `Record` that hold anything before a row runs."""
+
+MODULE = PACKAGE / "pages" / "web" / "kernels.wasm"
+"""The module of all kernels."""
+
+
+@cache
+def sources() -> str:
+    """Return the digest of what the module is made of: code, not comments and not docstrings."""
+    found = hashlib.sha256()
+    entries = (Path(__file__).with_name(name) for name in ("_rollout_kernels.py", "addresses.py"))
+    for path in sorted(with_imported(entries)):
+        tree = ast.parse(path.read_text("utf-8"))
+        for node in ast.walk(tree):
+            if isinstance(body := getattr(node, "body", None), list):
+                node.body = [  # type: ignore[attr-defined]
+                    part
+                    for part in body
+                    if not (isinstance(part, ast.Expr) and isinstance(part.value, ast.Constant))
+                ]
+        found.update(ast.dump(tree).encode())
+    return found.hexdigest()[:16]
+
+
+def tables(program: Program, roads: Network, network: int = 0) -> dict[str, Any]:
+    """Return what the module's host needs to simulate rows of a storyboard, as JSON has it.
+
+    "plan", "roads", "state", "record": bundles, each a list of ``[name, number, is float]`` and,
+    for arrays, ``[name, type, shape, at]``: their content begins at that byte of "data" (deflated,
+    in base64), or is zeros, where it is −1. "slots": numbers, and formulas (`Expression.as_json`).
+
+    Args:
+        program: the compiled storyboard.
+        roads: its road networks, in which all ways are planned that rows may need.
+        network: number of the one that rows have.
+
+    Raises:
+        InputError: it has no such form; the part that has none.
+    """
+    from bridgegen.simulation.embedded.batch import Batch  # numba is slow to import
+
+    if program.driver.is_own or program.driver.home:
+        raise InputError(f"the driver '{program.driver.name}' is no compiled one of BridgeGen's")
+    if roads.is_uneven(network):
+        raise InputError("an entity starts on a road whose length its path does not share")
+    batch = Batch(program, roads, np.array([network]), {})
+    order = list(CALLED)
+    plan = addressed(
+        batch.plan, DEMANDS.get(program.driver.name), lambda kernel: 1 + order.index(kernel)
+    )
+    unset: Any = {name: np.zeros_like(getattr(batch.record, name)) for name in UNSET}
+    data = bytearray()
+    first, each = np.moveaxis(roads.station[network], -1, 0).tolist()
+    return {
+        "plan": _bundle(plan, data),
+        "roads": _bundle(roads.tables, data, network),
+        "state": _bundle(batch.state, data, 0),
+        "record": _bundle(batch.record._replace(**unset), data, 0),
+        "data": b64encode(zlib.compress(bytes(data), 9)).decode("ascii"),
+        "codes": FIELDS,
+        "functions": FUNCTIONS,
+        "parameters": dict(program.parameters),
+        "slots": [_as_json(slot) for slot in program.slots],
+        "station": {"slots": program.start_slots.tolist(), "first": first, "each": each},
+        "aside": {"slots": program.aside_slots.tolist(), "each": roads.sides[network].tolist()},
+        "noise": _noise(program),
+    }
+
+
+def _as_json(slot: Value) -> Any:
+    if isinstance(slot, Expr):
+        return slot.expression.as_json()
+    return slot.name if isinstance(slot, ParameterRef) else float(slot)
+
+
+def _bundle(arrays: NamedTuple, data: bytearray, row: int | None = None) -> list[list[Any]]:
+    found: list[list[Any]] = []
+    for name, value in zip(arrays._fields, arrays, strict=True):
+        if not isinstance(value, np.ndarray):
+            found.append([name, value, isinstance(value, float)])
+            continue
+        array = np.ascontiguousarray(value if row is None else value[row])
+        at = -1
+        if array.view(np.uint8).any() if array.size else False:
+            data += bytes(-len(data) % 8)
+            at = len(data)
+            data += array.tobytes()
+        found.append([name, array.dtype.str[1:], list(array.shape), at])
+    return found
+
+
+def _noise(program: Program) -> dict[str, Any]:
+    """Return the key of the row's random numbers, or what it is made of; see `drivers.noise`."""
+    if program.noise_key is not None:
+        return {"key": str(program.noise_key)}
+    words = {
+        name: str(int.from_bytes(hashlib.blake2b(name.encode(), digest_size=8).digest(), "little"))
+        for name in sorted(program.parameters)
+    }
+    return {"words": words}

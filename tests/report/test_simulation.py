@@ -1,0 +1,143 @@
+"""What a page simulates has the bits that Python gets."""
+
+import hashlib
+import json
+import shutil
+import subprocess
+from importlib.resources import files
+
+import numpy as np
+import pytest
+
+import bridgegen as bg
+from bridgegen.engine.options import PipelineOptions
+from bridgegen.engine.pipeline import Pipeline
+from bridgegen.pages.simulation_payload import simulation_payload
+from bridgegen.scenario.language.reader import load, names
+from bridgegen.simulation.embedded import portable
+
+STATES = ("x", "y", "h", "v", "a")
+
+HOST = """
+import { createHash } from "node:crypto";
+import { readFileSync } from "node:fs";
+import { inflateSync } from "node:zlib";
+import { Simulator } from "./simulator.mjs";
+
+const { simulation, rows } = JSON.parse(readFileSync("given.json", "utf8"));
+const data = (text) => new Uint8Array(inflateSync(Buffer.from(text, "base64")));
+const kernels = new WebAssembly.Module(data(simulation.kernels));
+const simulator = new Simulator(kernels, simulation, data(simulation.data));
+for (const values of rows) {
+  const { steps, status } = simulator.run(values), hash = createHash("sha256");
+  const [count, length] = simulator.at.record.x.shape;
+  for (const name of "xyhva") {
+    const states = simulator.array("record", name);
+    for (let e = 0; e < count; e++) hash.update(states.subarray(e * length, e * length + steps));
+  }
+  console.log(`${steps} ${status} ${hash.digest("hex").slice(0, 16)}`);
+}
+"""
+
+
+def made(scenario, driver):
+    logical = load(scenario)
+    return Pipeline(logical, logical.space(), PipelineOptions(ego=driver))
+
+
+def here(pipeline, X):
+    """Return number of instants, status and digest of each row, as ``HOST`` prints them."""
+    rollout = pipeline.runner.run(X)
+    for i in range(len(X)):
+        steps, digest = int(rollout.n_steps[i]), hashlib.sha256()
+        for name in STATES:
+            for states in getattr(rollout, name)[i]:
+                digest.update(states[:steps].tobytes())
+        yield f"{steps} {rollout.status[i]} {digest.hexdigest()[:16]}"
+
+
+def elsewhere(pipeline, X, folder):
+    node = shutil.which("node")
+    if node is None:
+        pytest.skip("node is not installed")
+    rows = [pipeline.space.values(x) for x in X]
+    given = {"simulation": simulation_payload(pipeline), "rows": rows}
+    (folder / "given.json").write_text(json.dumps(given))
+    script = files("bridgegen.pages") / "web" / "simulator.js"
+    (folder / "simulator.mjs").write_text(script.read_text("utf-8"))
+    (folder / "host.mjs").write_text(HOST)
+    found = subprocess.run(
+        [node, "host.mjs"], cwd=folder, capture_output=True, text=True, check=False
+    )
+    assert found.returncode == 0, found.stderr
+    return found.stdout.splitlines()
+
+
+def rows_of(pipeline, n, seed):
+    space = pipeline.space
+    return space.decode(np.random.default_rng(seed).random((n, space.n_var)))
+
+
+@pytest.mark.parametrize(
+    ("scenario", "driver"),
+    [
+        ("crossroads-s4", "route-follower"),
+        ("crossroads-s2", "reference"),  # perceives, with noise
+        ("cut-in", "un-r157"),  # others are attentive and change lanes
+        ("emergency-vehicle-on-red", "careful"),  # lights, sirens
+    ],
+)
+def test_a_page_gets_the_same_bits(scenario, driver, tmp_path):
+    pipeline = made(scenario, driver)
+    X = rows_of(pipeline, 24, 7)
+    want = list(here(pipeline, X))  # the ways that these rows need are planned now
+    assert elsewhere(pipeline, X, tmp_path) == want
+
+
+def test_the_module_is_of_these_kernels():
+    """Else run ``tools/portable.py``, which takes two minutes."""
+    assert portable.MODULE.read_bytes().endswith(b"\x09bridgegen" + portable.sources().encode())
+
+
+def test_most_of_the_catalogue_is_simulated_in_pages():
+    refused = {}
+    for name in names():
+        found = simulation_payload(made(name, "route-follower"))
+        if "refused" in found:
+            refused[name] = found["refused"]
+    assert len(refused) < len(names()) / 2, refused
+
+
+def test_a_drivers_page_says_why_it_replays_only(tmp_path):
+    path = tmp_path / "driver.py"
+    path.write_text(
+        "class Still:\n    def reset(self, n, step): pass\n"
+        "    def drive(self, seen):\n        return seen.v * 0.0 - 1.0\n"
+    )
+    found = simulation_payload(made("cut-in", f"{path}:Still"))
+    assert list(found) == ["refused"]
+    assert "Still" in found["refused"]
+
+
+@pytest.mark.browser
+def test_a_slider_changes_the_encounter_and_rows_play_without_their_motion(browser, tmp_path):
+    run = bg.run_search("crossroads-s4", budget=60, keep=2, triage="none", out=tmp_path / "run")
+    page = browser.new_page(viewport={"width": 1280, "height": 900})
+    asked = []
+    page.on("request", lambda request: asked.append(request.url))
+    errors = []
+    page.on("pageerror", lambda error: errors.append(str(error)))
+    page.goto((run.folder / "report.html").as_uri())
+    page.wait_for_selector("#explore input")
+    page.evaluate(
+        """() => { const slider = document.querySelector('#explore input[aria-label="bv_start"]');
+        slider.value = slider.max; slider.dispatchEvent(new Event("input")); }"""
+    )
+    page.wait_for_function("/collision/i.test(document.querySelector('.tried').textContent)")
+    said = page.inner_text(".tried")
+    page.click("text=As found")
+    page.wait_for_function(f"document.querySelector('.tried').textContent !== {said!r}")
+    assert "Collision with bv" in page.inner_text(".tried")
+    assert not errors
+    assert len(asked) == 1  # the page alone
+    page.close()
