@@ -59,7 +59,7 @@ def _compare(text: str, named: tuple[object, ...]) -> None:
     if item.config.getoption("approve_messages"):
         item.user_properties.append(("message", message))
         return
-    known = approved().get(item.nodeid, [])
+    known = approved().get(_id(item.nodeid), [])
     if met >= len(known):
         pytest.fail(f"a message that is not approved yet: {message}\n{_command(item)}")
     if message != known[met]:
@@ -70,6 +70,11 @@ def _command(item: Any) -> str:
     return f"If it is meant: pytest --approve-messages {item.location[0]}"
 
 
+def _id(test: str) -> str:
+    """Return a test's id as it is on every machine: a parameter may be a path."""
+    return test.replace(sys.executable, "<python>").replace(str(ROOT), "<repository>")
+
+
 def _same_everywhere(text: str, config: Any) -> str:
     """Replace what differs by machine, run and version, and layout."""
     text = re.sub(r"\x1b\[[0-9;?]*[A-Za-z]", "", text).replace(sys.executable, "<python>")
@@ -77,7 +82,10 @@ def _same_everywhere(text: str, config: Any) -> str:
     text = re.sub(base + r"(/[\w.-]+)?", "<tmp>", text).replace(str(ROOT), "<repository>")
     text = re.sub(r"(\.py(?::|, line |\", line ))\d+", r"\1<line>", text)
     text = re.sub(r"\b(?:Input|String|List) should [\w ]+(?:, unable [\w ]+)?", "<pydantic>", text)
-    text = re.sub(r"(127\.0\.0\.1:|\bport )\d{4,5}\b", r"\1<port>", text)
+    text = re.sub(r"(127\.0\.0\.1:|localhost:|\bport )\d{4,5}\b", r"\1<port>", text)
+    text = re.sub(r"\(\d+ s\)", "(<duration>)", text)
+    text = re.sub(r"\b[\d,]+ scenarios/s\b", "<rate> scenarios/s", text)
+    text = re.sub(r"\bstopped after [\d,]+ of\b", "stopped after <some> of", text)
     text = re.sub(r"\b(BridgeGen \(?)\d+\.\d+\.\d+", r"\1<version>", text)
     text = re.sub(r"<frozen [\w.]+>:\d+", "<frozen>", text)
     text = re.sub(r"(; known: (?:[^,\n]+, ){3})(?:[^,\n]+, ){5}[^\n]*", r"\1…", text)
@@ -152,15 +160,15 @@ class Approval:
     @pytest.hookimpl(wrapper=True)
     def pytest_runtest_call(self, item: Any) -> Any:
         result = yield
-        known = approved().get(item.nodeid, [])
+        known = approved().get(_id(item.nodeid), [])
         if _Now.met < len(known) and not item.config.getoption("approve_messages"):
             pytest.fail(f"approved, and not met: {known[_Now.met]}\n{_command(item)}")
         return result
 
     def pytest_runtest_logreport(self, report: Any) -> None:
-        self._seen.add(report.nodeid)
+        self._seen.add(_id(report.nodeid))
         if report.when == "call" and report.passed:
-            self._ran[report.nodeid] = [
+            self._ran[_id(report.nodeid)] = [
                 m for name, m in report.user_properties if name == "message"
             ]
 

@@ -101,7 +101,7 @@ def _wang(table: str, intercept: float, per_mph: float) -> Curve:
 
 
 _FRONT = _wang("A-6 (and 4-3), frontal", -6.9774, 0.1620)
-_LOG_ODDS = -2.197224577336219  # ln(0.1 / 0.9), without the compiler
+_LOG_ODDS = -2.197224577336219  # ln(0.1 / 0.9); to call for it here would import the compiler
 _SIDE_TEN_PERCENT = 73.0 / 2.0 / _KMH  # delta-v of equal masses that close at 73 km/h
 
 CURVES = {
