@@ -1,5 +1,6 @@
 """Laws of the conflict analysis and of harm, over bodies that turn, stop and meet."""
 
+import math
 from dataclasses import fields, replace
 
 import numpy as np
@@ -11,12 +12,13 @@ from bridgegen.assess.conflict import quantities
 from bridgegen.assess.conflict import severity as injury
 from bridgegen.assess.conflict._codes import CONTACT, COURSE, NEAR_MISS, NO_CONFLICT
 from bridgegen.assess.conflict._conflict_kernels import urgency
-from bridgegen.assess.conflict._limits import HORIZON
+from bridgegen.assess.conflict._limits import FLUSH, HORIZON, SAME_WAY
 from bridgegen.assess.conflict.analysis import Conflicts, Responsible, Zone, analyse
 from bridgegen.assess.conflict.harm import NEAR_MISS as CRITICAL
 from bridgegen.assess.conflict.harm import closeness_of_pairs, decisive, harm_of_pairs
 from bridgegen.assess.conflict.plausibility import plausibility
 from bridgegen.assess.conflict.types import Rule
+from bridgegen.base import elementary
 from bridgegen.drivers.kinds import CAR, PEDESTRIAN
 from bridgegen.simulation.rollout import Rollout
 
@@ -388,3 +390,12 @@ def test_the_kernels_urgency_is_that_of_harm(ttc, needed):
     course = pair(kind=COURSE, ttc=ttc, needed=needed)
     assert course == pytest.approx(0.1 + 0.2 * urgency(ttc, needed))
     assert urgency(HORIZON, needed) == 0.0
+
+
+def test_constants_have_the_bits_of_elementary_functions():
+    """They are written out: importing them must not import the compiler."""
+    assert elementary.sin(math.radians(8.0)) == FLUSH
+    assert elementary.cos(math.radians(35.0)) == SAME_WAY
+    side, front = injury.CURVES["side"], injury.CURVES["front"]
+    at_ten_percent = 73.0 / 2.0 / 3.6
+    assert side.intercept == elementary.log(0.1 / 0.9) - front.slope * at_ten_percent

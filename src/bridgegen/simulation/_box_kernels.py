@@ -9,7 +9,7 @@ import math
 import numpy as np
 
 from bridgegen.base import _elementary_kernels as elementary
-from bridgegen.base.arrays import Float, Int
+from bridgegen.base.arrays import Bool, Float, Int
 from bridgegen.base.compiled import kernel
 
 
@@ -135,23 +135,51 @@ def directions_of(h: Float, n_steps: Int, cosine: Float, sine: Float) -> None:
 
 
 @kernel
+def row_distance(
+    box: Float,
+    x: Float,
+    y: Float,
+    cosine: Float,
+    sine: Float,
+    n: int,
+    dx: Float,
+    dy: Float,
+    out: Float,
+) -> None:
+    """Fill ``out`` (E, T) with a row's distances; ``dx`` and ``dy`` (T,) are scratch."""
+    ahead_a = box[0, 2]
+    out[0, :] = np.inf
+    for e in range(1, x.shape[0]):
+        ahead_b = box[e, 2]
+        for k in range(n):
+            # Differences first: far from the origin they lose no digits.
+            dx[k] = (x[e, k] - x[0, k]) + (ahead_b * cosine[e, k] - ahead_a * cosine[0, k])
+            dy[k] = (y[e, k] - y[0, k]) + (ahead_b * sine[e, k] - ahead_a * sine[0, k])
+        gaps(box[0], box[e], dx, dy, cosine[0], sine[0], cosine[e], sine[e], n, out[e])
+        out[e, n:] = out[e, n - 1]
+
+
+@kernel
 def box_distance(
     box: Float, x: Float, y: Float, cosine: Float, sine: Float, n_steps: Int, out: Float
 ) -> None:
     """Fill ``out`` (N, E, T) with the distances from entity 0's box to each other's."""
-    n_rows, n_entities, n_instants = x.shape
-    dx, dy = np.empty(n_instants), np.empty(n_instants)
-    ahead_a = box[0, 2]
-    for i in range(n_rows):
-        n = n_steps[i]
-        out[i, 0, :] = np.inf
-        cos_a, sin_a = cosine[i, 0], sine[i, 0]
-        for e in range(1, n_entities):
-            cos_b, sin_b = cosine[i, e], sine[i, e]
-            ahead_b = box[e, 2]
-            for k in range(n):
-                # Differences first: far from the origin they lose no digits.
-                dx[k] = (x[i, e, k] - x[i, 0, k]) + (ahead_b * cos_b[k] - ahead_a * cos_a[k])
-                dy[k] = (y[i, e, k] - y[i, 0, k]) + (ahead_b * sin_b[k] - ahead_a * sin_a[k])
-            gaps(box[0], box[e], dx, dy, cos_a, sin_a, cos_b, sin_b, n, out[i, e])
-            out[i, e, n:] = out[i, e, n - 1]
+    dx, dy = np.empty(x.shape[2]), np.empty(x.shape[2])
+    for i in range(x.shape[0]):
+        row_distance(box, x[i], y[i], cosine[i], sine[i], n_steps[i], dx, dy, out[i])
+
+
+@kernel
+def leave_out(present: Bool, e: int, out: Float) -> None:
+    """Set a row's distances from body e to +inf where one of the two is not present."""
+    for other in range(out.shape[0]):
+        for k in range(out.shape[1]):
+            if not (present[other, k] and present[e, k]):
+                out[other, k] = np.inf
+
+
+@kernel
+def leave_out_of_rows(present: Bool, e: int, out: Float) -> None:
+    """Do in N rows what ``leave_out`` does in one."""
+    for i in range(out.shape[0]):
+        leave_out(present[i], e, out[i])

@@ -3,7 +3,7 @@
 import numpy as np
 import numpy.typing as npt
 
-from bridgegen.base.arrays import Float, Int, as_float
+from bridgegen.base.arrays import Bool, Float, Int, as_float
 
 
 def box_distance(
@@ -59,6 +59,16 @@ def directions(h: npt.ArrayLike, n_steps: npt.ArrayLike) -> tuple[Float, Float]:
     cosine, sine = np.empty(h.shape), np.empty(h.shape)
     _box_kernels.directions_of(h, as_steps(n_steps, h.shape[0], h.shape[2]), cosine, sine)
     return cosine, sine
+
+
+def leave_out(present: Bool, e: int, distance: Float) -> Float:
+    """Return distances from body e ``(N, E, T)``, +inf where one of the two is not present."""
+    from bridgegen.simulation import _box_kernels
+
+    present = np.ascontiguousarray(present, dtype=np.bool_)
+    distance = np.ascontiguousarray(distance)
+    _box_kernels.leave_out_of_rows(present, e, distance)
+    return distance
 
 
 def as_steps(n_steps: npt.ArrayLike, n: int, t: int) -> Int:

@@ -184,7 +184,7 @@ class Rollout:
 
     def _distance_from(self, e: int) -> Float:
         """Return the distances from one body to all, as ``distance``."""
-        from bridgegen.simulation.boxes import box_distance
+        from bridgegen.simulation.boxes import box_distance, leave_out
 
         order = [e, *(other for other in range(len(self.names)) if other != e)]
         box, x, y, h = self.box, self.x, self.y, self.h
@@ -196,7 +196,7 @@ class Rollout:
         if e:
             found = found[:, np.argsort(order)]
         if self.present.size:
-            found[~(self.present & self.present[:, e : e + 1])] = np.inf
+            found = leave_out(self.present, e, found)
         return found
 
     def is_ego_s(self, e: int) -> bool:

@@ -9,6 +9,7 @@ up to the ego's first contact with any body count.
 
 import math
 
+from bridgegen.assess.conflict import severity as injury
 from bridgegen.assess.conflict._careful_driver_kernels import gains, is_emergency
 from bridgegen.assess.conflict._circumstances_kernels import stops_at_red
 from bridgegen.assess.conflict._codes import (
@@ -16,6 +17,8 @@ from bridgegen.assess.conflict._codes import (
     ALONG,
     CONTACT,
     COURSE,
+    EGO,
+    EGO_STANDING,
     FRONT,
     FRONT_LEFT,
     FRONT_RIGHT,
@@ -25,21 +28,28 @@ from bridgegen.assess.conflict._codes import (
     NEAR_MISS,
     NEARNESS,
     NEEDED,
+    NO_ZONE,
     OVERLAP,
+    PREVENTABLE,
     REAR_END_STRIKING,
     REAR_END_STRUCK,
+    RESPONSIBLE,
+    SHARED,
+    SIDE_SWIPE,
     STOOD_EGO,
     STOOD_OTHER,
     TTC,
     TYPE,
     V_EGO,
     V_OTHER,
+    VRU_INTO_SIDE,
     ZONE_EGO,
     ZONE_OTHER,
 )
 from bridgegen.assess.conflict._geometry_kernels import (
     Scene,
     displaced,
+    falls_below,
     lengths,
     meeting,
     meets_at,
@@ -67,10 +77,19 @@ from bridgegen.assess.conflict._limits import (
     STANDS,
 )
 from bridgegen.assess.conflict._responsibility_kernels import judge
+from bridgegen.assess.conflict._severity_kernels import collision
 from bridgegen.assess.conflict._type_kernels import type_of
 from bridgegen.assess.metrics._time_kernels import STANDSTILL, time_to_contact
 from bridgegen.base import _elementary_kernels as elementary
 from bridgegen.base.compiled import kernel
+from bridgegen.drivers.kinds import IS_OBSTACLE
+
+_SIDE, _FRONT, _REAR = injury.SIDE, injury.FRONT, injury.REAR
+STRUCK = (_SIDE, _FRONT, _FRONT, _SIDE, _REAR, _REAR, _REAR, _SIDE, _FRONT)
+"""The direction of the force by `Zone`; a corner counts as its end."""
+
+BY_OTHERS = (REAR_END_STRUCK, SIDE_SWIPE, EGO_STANDING, VRU_INTO_SIDE)
+"""Types in which the other drives, rides or walks into the ego."""
 
 
 @kernel
@@ -202,7 +221,7 @@ def is_serious(time, needed, v, distance, k, end, dt):
     # Braking within what a comfort function may is no near miss, unless the bodies come within 0.5
     # m: ACC's limit alone would drop egos that brake by 5 to 7.6 m/s² and stop 0.04 to 0.33 m from
     # a bus.
-    return is_emergency(needed, v[k]) or distance[k:end].min() < CLOSE_CALL
+    return is_emergency(needed, v[k]) or falls_below(distance, k, end, CLOSE_CALL)
 
 
 @kernel
@@ -277,27 +296,107 @@ def analyse_pair(
 
 
 @kernel
-def analyse_rows(
-    half, kinds, x, y, c, s, v, a, offset, distance, n_steps, dt, claims, crosswalks, friction,
+def analyse_row(
+    half, kinds, x, y, c, s, v, a, offset, distance, n, dt, claims, crosswalks, friction,
     stop_entities, stop_lights, stop_lines, lights, lamps, routed, gone, whole, real,
 ):  # fmt: skip
-    """Fill ``whole`` ``(N, E, INTEGERS)`` and ``real`` ``(N, E, FLOATS)`` of N rows.
+    """Fill the rows of the ego and each other body; ``gone`` ``(E, T)`` is scratch."""
+    n_entities = x.shape[0]
+    end = first_contact(distance, n)
+    for e in range(n_entities):
+        lengths(x[e], y[e], n, gone[e])
+    for e in range(1, n_entities):
+        real[e, NEARNESS] = nearness(half, x, y, c, s, v, distance[e], e, min(end + 1, n))
+        analyse_pair(
+            e, n, dt, end, half, kinds, x, y, c, s, v, a, offset, distance, gone, claims[0],
+            crosswalks, friction, stop_entities, stop_lights, stop_lines, lights, lamps, routed,
+            whole[e], real[e],
+        )  # fmt: skip
 
-    ``gone`` ``(E, T)`` is scratch.
+
+@kernel
+def turned_round(zone):
+    """Return the zone of a body whose rear was taken for its front."""
+    return zone if zone == NO_ZONE else (zone - FRONT + 4) % 8 + FRONT
+
+
+@kernel
+def name_zones(reverses, whole):
+    """Name the zones of bodies that reverse, ``(E, T)``; none where it is empty."""
+    for e in range(len(reverses)):
+        instant = whole[e, INSTANT]
+        if reverses[0, instant]:
+            whole[e, ZONE_EGO] = turned_round(whole[e, ZONE_EGO])
+        if reverses[e, instant]:
+            whole[e, ZONE_OTHER] = turned_round(whole[e, ZONE_OTHER])
+
+
+@kernel
+def never_moves(v):
+    """Return whether a body never moves, like a barrier."""
+    k = 0
+    while k < len(v) and v[k] == 0.0:
+        k += 1
+    return k == len(v)
+
+
+@kernel
+def weigh(kinds, v, whole, real, potential, severity, changes):
+    """Fill the severity of a row's contacts and near misses.
+
+    ``potential`` and ``severity`` are ``(E,)``, ``changes`` of velocity ``(E, 2)``.
     """
-    n_rows, n_entities, _ = x.shape
-    for i in range(n_rows):
-        n = n_steps[i]
-        end = first_contact(distance[i], n)
-        for e in range(n_entities):
-            lengths(x[i, e], y[i, e], n, gone[e])
-        for e in range(1, n_entities):
-            real[i, e, TTC] = math.inf
-            real[i, e, NEARNESS] = nearness(
-                half, x[i], y[i], c[i], s[i], v[i], distance[i, e], e, min(end + 1, n)
-            )
-            analyse_pair(
-                e, n, dt, end, half, kinds, x[i], y[i], c[i], s[i], v[i], a[i], offset[i],
-                distance[i], gone, claims[i, 0], crosswalks[i], friction[i], stop_entities,
-                stop_lights, stop_lines[i], lights[i], lamps[i], routed, whole[i, e], real[i, e],
-            )  # fmt: skip
+    for e in range(1, len(kinds)):
+        if whole[e, KIND] < NEAR_MISS:
+            continue
+        # What never moves in the whole scenario, like a barrier, counts as fixed to the ground.
+        _, mine, its, _, _, potential[e] = collision(
+            kinds[0], kinds[e], real[e, ACROSS], real[e, ALONG], STRUCK[whole[e, ZONE_EGO]],
+            STRUCK[whole[e, ZONE_OTHER]], True, not (IS_OBSTACLE[kinds[e]] and never_moves(v[e])),
+        )  # fmt: skip
+        if whole[e, KIND] == CONTACT:
+            severity[e], changes[e, 0], changes[e, 1] = potential[e], mine, its
+
+
+@kernel
+def analyse_rows(
+    failed, half, kinds, x, y, c, s, v, a, offset, distance, n_steps, dt, claims, crosswalks,
+    friction, stop_entities, stop_lights, stop_lines, lights, lamps, routed, reverses,
+    gone, whole, real, potential, severity, changes,
+):  # fmt: skip
+    """Analyse N rows; failed ones stay as they are.
+
+    Fills ``whole`` ``(N, E, INTEGERS)``, ``real`` ``(N, E, FLOATS)`` and what `weigh` does.
+    """
+    for i in range(len(n_steps)):
+        if failed[i]:
+            continue
+        analyse_row(
+            half, kinds, x[i], y[i], c[i], s[i], v[i], a[i], offset[i], distance[i], n_steps[i],
+            dt, claims[i], crosswalks[i], friction[i], stop_entities, stop_lights, stop_lines[i],
+            lights[i], lamps[i], routed, gone, whole[i], real[i],
+        )  # fmt: skip
+        name_zones(reverses[i], whole[i])
+        weigh(kinds, v[i], whole[i], real[i], potential[i], severity[i], changes[i])
+
+
+@kernel
+def is_at_fault(kind, what, responsible, leads_ego, preventable):
+    """Return whether the ego has failed in a conflict of a kind and type; see `Conflicts`."""
+    by_front = leads_ego and what not in BY_OTHERS
+    return responsible in (EGO, SHARED) or (kind == CONTACT and preventable and by_front)
+
+
+@kernel
+def fails(pair):
+    """Return whether the ego has failed, by a pair's row of whole numbers."""
+    return is_at_fault(
+        pair[KIND], pair[TYPE], pair[RESPONSIBLE], pair[LEADS_EGO] > 0, pair[PREVENTABLE] > 0
+    )
+
+
+@kernel
+def faults(kind, what, responsible, leads_ego, preventable, out):
+    """Fill ``out`` ``(N,)`` with `is_at_fault`."""
+    for i in range(len(out)):
+        out[i] = is_at_fault(kind[i], what[i], responsible[i], leads_ego[i], preventable[i])

@@ -83,6 +83,14 @@ class Scene(NamedTuple):
 
 
 @kernel
+def falls_below(values, first, end, limit):
+    """Return whether one of the values from ``first`` to before ``end`` is below a limit."""
+    while first < end and not values[first] < limit:
+        first += 1
+    return first < end
+
+
+@kernel
 def meeting(dx, dy, wx, wy, ca, sa, cb, sb, la, wa, lb, wb, still):
     """Return when boxes A and B first touch, ≥ 0, and which axis closes last.
 

@@ -87,6 +87,7 @@ from bridgegen.assess.conflict._codes import (
 from bridgegen.assess.conflict._geometry_kernels import (
     beside,
     entered,
+    falls_below,
     hidden,
     time_along_paths,
     visible_from,
@@ -524,7 +525,8 @@ def is_required(scene, e, since, k):
         return False
     j, now = beside(x[0], y[0], c[0], s[0], scene.first, scene.n, seen, x[e, seen], y[e, seen])
     _, then = beside(x[0], y[0], c[0], s[0], scene.first, scene.n, j, x[e, before], y[e, before])
-    if abs(then) - abs(now) < LATERAL_MOVE or v[e, since : k + 1].min() < v[e, since] - MOVES:
+    slows = falls_below(v[e], since, k + 1, v[e, since] - MOVES)
+    if abs(then) - abs(now) < LATERAL_MOVE or slows:
         return False
     ahead = (x[e, since] - x[0, since]) * c[0, since] + (y[e, since] - y[0, since]) * s[0, since]
     gap = ahead - scene.half[0, 0] - scene.half[e, 0]

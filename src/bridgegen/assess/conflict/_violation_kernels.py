@@ -1,23 +1,56 @@
-"""Compiled search for where the ego leaves its lane or the road, and whom it passes how closely."""
+"""Compiled search for where the ego leaves its lane or the road, and whom it passes how closely.
+
+Public wrapper: ``violations.with_violations``.
+"""
 
 # mypy: allow-untyped-defs
 # Numba infers what kernels take; their wrappers are typed.
 
 import math
 
+from bridgegen.assess.conflict import severity as injury
+from bridgegen.assess.conflict._codes import (
+    CLOSE_PASS,
+    CONTACT,
+    COURSE,
+    DECIDED,
+    DID_NOT_KEEP_LANE,
+    EGO,
+    INSTANT,
+    KIND,
+    LANE_DEPARTURE,
+    LEFT_THE_ROAD,
+    NEAR_MISS,
+    PASSED_TOO_CLOSE,
+    RESPONSIBLE,
+    ROAD_DEPARTURE,
+    RULE,
+    TYPE,
+    V_EGO,
+    V_OTHER,
+    VIOLATION,
+)
+from bridgegen.assess.conflict._conflict_kernels import fails
 from bridgegen.assess.conflict._limits import (
+    CLEAR_ZONE,
+    CLOSE,
+    CLOSE_TIME,
     COMFORT,
     CREEPS,
     EDGE_MARGIN,
+    HORIZON,
     LINE_MARGIN,
+    PASSED_AHEAD,
+    PASSED_BESIDE,
     PASSES,
     REACTION,
     SAME_WAY,
     WALKING_PACE,
 )
+from bridgegen.assess.conflict._severity_kernels import severity
 from bridgegen.base import _elementary_kernels as elementary
 from bridgegen.base.compiled import kernel
-from bridgegen.drivers.kinds import IS_PEDESTRIAN, NEEDS_ROOM
+from bridgegen.drivers.kinds import CAR, IS_PEDESTRIAN, NEEDS_ROOM, OTHER
 from bridgegen.drivers.lane_tables import EDGES, HEADING, LANES, STRAYS, TOWN
 
 AT, WORST, ROAD, SIDE, SAMPLE, END = range(6)
@@ -169,33 +202,147 @@ def passing(corridor, half, kinds, e, x, y, c, s, v, distance, dt, until, whole,
 
 
 @kernel
-def find_rows(
-    rows, corridors, corridor_of, half, kinds, rear_x, rear_y, x, y, c, s, v, offset,
-    distance, dt, begins, until, leavings, over, passings, clearances,
-):  # fmt: skip
-    """Fill the departures ``(N, LEAVINGS)`` and passes ``(N, E, PASSINGS)`` of some rows.
+def knows_edges(corridor, i):
+    """Return whether the road's edges are known at a sample."""
+    return math.isfinite(corridor[i, _TO_EDGES]) and math.isfinite(corridor[i, _TO_EDGES + 1])
 
-    Departures count from the instants ``begins`` on; the rows' columns are -1.
-    """
-    for i in rows:
-        corridor = corridors[corridor_of[i]]
-        leaving(
-            corridor,
-            rear_x[i, 0],
-            rear_y[i, 0],
-            c[i, 0],
-            s[i, 0],
-            v[i, 0],
-            offset[i, 0],
-            half[0, 1],
-            begins[i],
-            until[i],
-            leavings[i],
-            over[i],
+
+@kernel
+def is_excused(corridor, half, x, y, c, s, v, distance, dt, leave, whole):
+    """Return whether a departure is another's fault, or leads round what is in the ego's lane."""
+    at, sample = leave[AT], leave[SAMPLE]
+    ahead_x, ahead_y = c[0, at], s[0, at]
+    for e in range(len(whole)):
+        if whole[e, KIND] < NEAR_MISS or fails(whole[e]):
+            continue
+        dx, dy = x[e, at] - x[0, at], y[e, at] - y[0, at]
+        left = (dy * ahead_x - dx * ahead_y) * leave[SIDE]  # how far towards where the ego leaves
+        if abs((at - whole[e, INSTANT]) * dt) <= HORIZON and left < 0.0:
+            return True
+    # A first definition let a departure from the road pass as a way round what is ahead, and missed
+    # 117 of 572 slides, which begin in the junction and end behind it.
+    if leave[ROAD] == 1 or not knows_edges(corridor, sample):
+        return False  # within a junction, it passes none
+    for e in range(1, len(whole)):
+        its_speed = v[e, at] * (c[e, at] * ahead_x + s[e, at] * ahead_y)
+        if not (distance[e, at] < PASSED_AHEAD and v[0, at] - its_speed > PASSES):
+            continue
+        i, least = 0, math.inf
+        for j in range(len(corridor)):
+            apart = elementary.hypot(corridor[j, 0] - x[e, at], corridor[j, 1] - y[e, at])
+            if apart < least:
+                i, least = j, apart
+        its, reach = beside(corridor, i, x[e, at], y[e, at]), half[e, 1]
+        overlaps = (
+            its + reach > -corridor[i, _TO_LANES + 1] and its - reach < corridor[i, _TO_LANES]
         )
-        for e in range(1, x.shape[1]):
-            if NEEDS_ROOM[kinds[e]]:
-                passing(
-                    corridor, half, kinds, e, x[i], y[i], c[i], s[i], v[i], distance[i, e], dt,
-                    until[i], passings[i, e], clearances[i, e],
-                )  # fmt: skip
+        if i >= sample and overlaps:
+            return True
+    return False
+
+
+@kernel
+def departure(
+    corridor, half, rear_x, rear_y, x, y, c, s, v, offset, distance, dt, until, whole, leave, over
+):
+    """Find the ego's first departure that is not excused; ``leave`` is -1 if there is none."""
+    others, begin = False, 0
+    for e in range(len(whole)):
+        others |= whole[e, KIND] >= NEAR_MISS and not fails(whole[e])
+    while True:  # what comes after a departure that is excused is looked at, too
+        leave[:], over[0] = -1, 0.0
+        leaving(
+            corridor, rear_x[0], rear_y[0], c[0], s[0], v[0], offset[0], half[0, 1], begin, until,
+            leave, over,
+        )  # fmt: skip
+        if leave[AT] < 0:
+            return
+        passes = leave[ROAD] == 0 and knows_edges(corridor, leave[SAMPLE])
+        if not (passes or others):
+            return
+        if not is_excused(corridor, half, x, y, c, s, v, distance, dt, leave, whole):
+            return
+        begin = leave[END]
+
+
+@kernel
+def put(pair, real, what, rule, instant, decided, v_ego):
+    """Make a violation of the ego's of a pair."""
+    pair[KIND], pair[RESPONSIBLE], pair[TYPE], pair[RULE] = VIOLATION, EGO, what, rule
+    pair[INSTANT], pair[DECIDED], real[V_EGO] = instant, decided, v_ego
+
+
+@kernel
+def violate(
+    corridor, half, kinds, rear_x, rear_y, x, y, c, s, v, offset, distance, friction, dt, n, whole,
+    real, potential, aside, breach, leave, over, passed, gaps,
+):  # fmt: skip
+    """Put the ego's violations among the conflicts of a row; return whether there are any.
+
+    ``leave`` ``(LEAVINGS,)``, ``over`` ``(1,)``, ``passed`` ``(PASSINGS,)`` and ``gaps`` ``(2,)``
+    are scratch. A departure has the ego's own column, 0.
+    """
+    # Only what happens up to the ego's first contact counts.
+    until, any_violation = n, False
+    for e in range(len(whole)):
+        if whole[e, KIND] == CONTACT:
+            until = min(until, whole[e, INSTANT])
+    departure(
+        corridor, half, rear_x, rear_y, x, y, c, s, v, offset, distance, dt, until, whole, leave,
+        over,
+    )  # fmt: skip
+    for e in range(1, len(whole)):
+        if not NEEDS_ROOM[kinds[e]] or whole[e, KIND] >= NEAR_MISS:
+            continue
+        passed[:], gaps[:] = -1, 0.0
+        passing(corridor, half, kinds, e, x, y, c, s, v, distance[e], dt, until, passed, gaps)
+        moment, clearance, faster = passed[MOMENT], gaps[0], gaps[1]
+        if moment < 0:
+            continue
+        limit = PASSED_BESIDE[passed[IN_TOWN]]
+        closest = min(CLOSE + CLOSE_TIME * faster, limit)
+        if not clearance < (closest if whole[e, KIND] == COURSE else limit):
+            continue
+        any_violation = True
+        put(whole[e], real[e], CLOSE_PASS, PASSED_TOO_CLOSE, moment, moment, v[0, moment])
+        front = severity(kinds[0], kinds[e], faster, 0.0, injury.FRONT, injury.REAR, True)
+        real[e, V_OTHER], aside[e] = v[e, moment], clearance
+        potential[e] = front * max(1.0 - clearance / closest, 0.0)
+        breach[e] = min((limit - clearance) / max(limit - closest, 1e-9), 1.0)
+    if leave[AT] < 0:
+        return any_violation
+    worst, off = leave[WORST], leave[ROAD] == 1
+    put(
+        whole[0], real[0], ROAD_DEPARTURE if off else LANE_DEPARTURE,
+        LEFT_THE_ROAD if off else DID_NOT_KEEP_LANE, worst, leave[AT], v[0, worst],
+    )  # fmt: skip
+    aside[0], breach[0] = leave[SIDE] * over[0], 1.0
+    speed = v[0, worst]
+    # Severity is that of what the departure may lead to: a solid obstacle beside the road, or a car
+    # that comes on the next lane.
+    if off:
+        grip = friction if math.isfinite(friction) else 0.0
+        struck = math.sqrt(max(speed * speed - 2.0 * grip * CLEAR_ZONE, 0.0))
+        potential[0] = severity(kinds[0], OTHER, struck, 0.0, injury.FRONT, injury.FRONT, False)
+    else:
+        share = min(over[0] / (2.0 * half[0, 1]), 1.0)
+        potential[0] = share * severity(
+            kinds[0], CAR, 2.0 * speed, 0.0, injury.FRONT, injury.FRONT, True
+        )
+    return True
+
+
+@kernel
+def violate_rows(
+    known, corridors, corridor_of, half, kinds, rear_x, rear_y, x, y, c, s, v, offset, distance,
+    friction, dt, n_steps, whole, real, potential, aside, breach, leave, over, passed, gaps,
+):  # fmt: skip
+    """Put the ego's violations among the conflicts of some rows; return whether there are any."""
+    any_violation = False
+    for i in known:
+        any_violation |= violate(
+            corridors[corridor_of[i]], half, kinds, rear_x[i], rear_y[i], x[i], y[i], c[i], s[i],
+            v[i], offset[i], distance[i], friction[i], dt, n_steps[i], whole[i], real[i],
+            potential[i], aside[i], breach[i], leave, over, passed, gaps,
+        )  # fmt: skip
+    return any_violation

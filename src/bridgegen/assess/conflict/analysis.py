@@ -5,40 +5,39 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from bridgegen.assess.conflict import _codes as codes
-from bridgegen.assess.conflict import severity as injury
 from bridgegen.assess.conflict._codes import CONTACT, COURSE, NEAR_MISS, NO_CONFLICT, VIOLATION
 from bridgegen.assess.conflict.types import ConflictType, Responsible, Rule, Zone
 from bridgegen.assess.metrics.metric import motion, recorded, shared
 from bridgegen.base.arrays import Bool, Float, Int
-from bridgegen.drivers.kinds import IS_OBSTACLE
 from bridgegen.simulation.rollout import Rollout
 
-_DIRECTION = np.array(
-    [
-        injury.SIDE,
-        injury.FRONT,
-        injury.FRONT,
-        injury.SIDE,
-        injury.REAR,
-        injury.REAR,
-        injury.REAR,
-        injury.SIDE,
-        injury.FRONT,
-    ]
-)
-"""The direction of the force by `Zone`; a corner counts as its end."""
-
-
-_BY_OTHERS = (
-    ConflictType.REAR_END_STRUCK,
-    ConflictType.SIDE_SWIPE,
-    ConflictType.EGO_STANDING,
-    ConflictType.VRU_INTO_SIDE,
-)
-"""Types in which the other drives, rides or walks into the ego."""
+WHOLES = {
+    "kind": codes.KIND,
+    "type": codes.TYPE,
+    "responsible": codes.RESPONSIBLE,
+    "rule": codes.RULE,
+    "instant": codes.INSTANT,
+    "decided": codes.DECIDED,
+    "zone_ego": codes.ZONE_EGO,
+    "zone_other": codes.ZONE_OTHER,
+}
+IS_SO = {"leads_ego": codes.LEADS_EGO, "preventable": codes.PREVENTABLE}
+NUMBERS = {
+    "ttc": codes.TTC,
+    "needed": codes.NEEDED,
+    "closing_normal": codes.ACROSS,
+    "closing_tangential": codes.ALONG,
+    "v_ego": codes.V_EGO,
+    "v_other": codes.V_OTHER,
+    "stood_ego": codes.STOOD_EGO,
+    "stood_other": codes.STOOD_OTHER,
+    "overlap": codes.OVERLAP,
+    "left": codes.LEFT_TO_ACT,
+    "nearness": codes.NEARNESS,
+}
+"""Columns of kernels by the name in `Conflicts`: whole numbers, truths, and numbers."""
 
 
 @dataclass(frozen=True)
@@ -139,9 +138,12 @@ class Conflicts:
         It is responsible, alone or with the other; or its front, or in reverse its rear, meets
         another in a contact that it could have prevented.
         """
-        blamed = (self.responsible == Responsible.EGO) | (self.responsible == Responsible.SHARED)
-        by_front = self.leads_ego & ~np.isin(self.type, _BY_OTHERS)
-        fault: Bool = blamed | ((self.kind == CONTACT) & self.preventable & by_front)
+        from bridgegen.assess.conflict import _conflict_kernels as kernels
+
+        whole = (np.asarray(a, np.int64).ravel() for a in (self.kind, self.type, self.responsible))
+        is_so = (np.asarray(a, np.bool_).ravel() for a in (self.leads_ego, self.preventable))
+        fault = np.empty(self.kind.shape, np.bool_)
+        kernels.faults(*whole, *is_so, fault.reshape(-1))
         return fault
 
 
@@ -223,8 +225,12 @@ def _of_one_body(rollout: Rollout) -> Conflicts:
     lights = rollout.lights if len(rollout.lights) else np.zeros((n, 0, 0), np.int8)
     lamps = rollout.lamps if len(rollout.lamps) else np.zeros((n, 0, 0), np.int8)
     kinds = rollout.kinds if rollout.kinds.size else np.zeros(e, np.int64)
+    ok = np.asarray(rollout.status) == 0
+    real[:, :, codes.TTC] = np.inf
+    potential, severity, changes = np.zeros((n, e)), np.zeros((n, e)), np.zeros((n, e, 2))
+    reverses = np.zeros((n, 0, 0), np.bool_) if moving.reverses is None else moving.reverses
     kernels.analyse_rows(
-        moving.half, np.ascontiguousarray(kinds, dtype=np.int64), moving.x, moving.y,
+        ~ok, moving.half, np.ascontiguousarray(kinds, dtype=np.int64), moving.x, moving.y,
         moving.cosine, moving.sine, moving.v, moving.a, recorded(rollout, "offset"),
         moving.distance, moving.n_steps, rollout.time_step,
         np.ascontiguousarray(claims, dtype=np.int64), np.ascontiguousarray(crosswalks),
@@ -232,73 +238,20 @@ def _of_one_body(rollout: Rollout) -> Conflicts:
         np.ascontiguousarray(rollout.stop_entities, dtype=np.int64),
         np.ascontiguousarray(rollout.stop_lights, dtype=np.int64), np.ascontiguousarray(lines),
         np.ascontiguousarray(lights, dtype=np.int8), np.ascontiguousarray(lamps, dtype=np.int8),
-        _is_routed(rollout), np.empty((e, t)), whole,
-        real,
+        _is_routed(rollout), reverses, np.empty((e, t)), whole, real,
+        potential, severity, changes,
     )  # fmt: skip
-    if moving.reverses is not None:
-        _turn_round(whole, moving.reverses)
-    ok = np.asarray(rollout.status) == 0
-    whole[~ok], real[~ok] = 0, 0.0
-    real[~ok, :, codes.TTC] = np.inf
-    real[:, :1, codes.TTC] = np.inf
-    own, other = np.broadcast_arrays(kinds[0], kinds)
-    touched = whole[:, :, codes.KIND] == CONTACT
-    rows, entities = np.nonzero(whole[:, :, codes.KIND] >= NEAR_MISS)
-    potential, dv_ego, dv_other = (np.zeros((n, e)) for _ in range(3))
-    if len(rows):
-        kind_a, kind_b = own[entities], other[entities]
-        normal = real[rows, entities, codes.ACROSS]
-        tangential = real[rows, entities, codes.ALONG]
-        # What never moves in the whole scenario, like a barrier, counts as fixed to the ground.
-        fixed = np.array(IS_OBSTACLE)[kind_b] & _never_moves(rollout)[rows, entities]
-        potential[rows, entities] = injury.severity(
-            kind_a,
-            kind_b,
-            normal,
-            tangential,
-            _DIRECTION[whole[rows, entities, codes.ZONE_EGO]],
-            _DIRECTION[whole[rows, entities, codes.ZONE_OTHER]],
-            True,
-            ~fixed,
-        )
-        dv_ego[rows, entities], dv_other[rows, entities] = injury.delta_v(
-            kind_a, kind_b, normal, tangential, True, ~fixed
-        )
-    columns = {
-        "kind": codes.KIND,
-        "type": codes.TYPE,
-        "responsible": codes.RESPONSIBLE,
-        "rule": codes.RULE,
-        "instant": codes.INSTANT,
-        "decided": codes.DECIDED,
-        "zone_ego": codes.ZONE_EGO,
-        "zone_other": codes.ZONE_OTHER,
-    }
-    numbers = {
-        "ttc": codes.TTC,
-        "needed": codes.NEEDED,
-        "closing_normal": codes.ACROSS,
-        "closing_tangential": codes.ALONG,
-        "v_ego": codes.V_EGO,
-        "v_other": codes.V_OTHER,
-        "stood_ego": codes.STOOD_EGO,
-        "stood_other": codes.STOOD_OTHER,
-        "overlap": codes.OVERLAP,
-        "left": codes.LEFT_TO_ACT,
-        "nearness": codes.NEARNESS,
-    }
-    found: dict[str, Any] = {name: whole[:, :, column] for name, column in columns.items()}
-    found |= {name: real[:, :, column] for name, column in numbers.items()}
+    found: dict[str, Any] = {name: whole[:, :, column] for name, column in WHOLES.items()}
+    found |= {name: whole[:, :, column] > 0 for name, column in IS_SO.items()}
+    found |= {name: real[:, :, column] for name, column in NUMBERS.items()}
     return Conflicts(
         names=rollout.names,
         time_step=rollout.time_step,
         **found,
-        leads_ego=whole[:, :, codes.LEADS_EGO] > 0,
-        preventable=whole[:, :, codes.PREVENTABLE] > 0,
-        severity=np.where(touched, potential, 0.0),
+        severity=severity,
         potential=potential,
-        delta_v_ego=np.where(touched, dv_ego, 0.0),
-        delta_v_other=np.where(touched, dv_other, 0.0),
+        delta_v_ego=changes[:, :, 0],
+        delta_v_other=changes[:, :, 1],
         ok=ok,
         body=np.zeros((n, e), np.int64),
         aside=np.zeros((n, e)),
@@ -306,28 +259,9 @@ def _of_one_body(rollout: Rollout) -> Conflicts:
     )
 
 
-def _turn_round(whole: Int, reverses: Bool) -> None:
-    """Name the zones of bodies that reverse: the analysis took their rear for the front."""
-    instant = whole[:, :, codes.INSTANT]
-    rows, entities = np.indices(instant.shape)
-    for column, backwards in (
-        (codes.ZONE_EGO, reverses[rows, 0, instant]),
-        (codes.ZONE_OTHER, reverses[rows, entities, instant]),
-    ):
-        zone = whole[:, :, column]
-        turned = (zone - Zone.FRONT + 4) % 8 + Zone.FRONT
-        whole[:, :, column] = np.where(backwards & (zone != Zone.NONE), turned, zone)
-
-
 def _is_routed(rollout: Rollout) -> bool:
     """Return whether offsets are known: in a rollout on a map, or if a recording has them."""
     return bool(rollout.claims.size) or bool(rollout.offset.any())
-
-
-def _never_moves(rollout: Rollout) -> Bool:
-    """``(N, E)``: which participants never move, like barriers."""
-    still: npt.NDArray[np.bool_] = (rollout.v == 0.0).all(axis=2)
-    return still
 
 
 __all__ = [

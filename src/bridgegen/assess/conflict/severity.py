@@ -21,9 +21,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from bridgegen.base import elementary
-from bridgegen.base.arrays import Bool, Float, Int
-from bridgegen.drivers.kinds import CAR, IS_OBSTACLE, NAMES
+from bridgegen.base.arrays import Float, Int
+from bridgegen.drivers.kinds import CAR, NAMES
 from bridgegen.scenario.participants import OBJECT_CLASSES
 
 FRONT, REAR, SIDE = range(3)
@@ -102,7 +101,7 @@ def _wang(table: str, intercept: float, per_mph: float) -> Curve:
 
 
 _FRONT = _wang("A-6 (and 4-3), frontal", -6.9774, 0.1620)
-# The logit of 10 %, ln(0.1/0.9), is below: to call for it here would import the compiler.
+_LOG_ODDS = -2.197224577336219  # ln(0.1 / 0.9); to call for it here would import the compiler
 _SIDE_TEN_PERCENT = 73.0 / 2.0 / _KMH  # delta-v of equal masses that close at 73 km/h
 
 CURVES = {
@@ -112,7 +111,7 @@ CURVES = {
     "front": _FRONT,
     "rear": _wang("A-9, rear-end", -8.0329, 0.1793),
     "side": Curve(
-        -2.1972245773362196 - _FRONT.slope * _SIDE_TEN_PERCENT,
+        _LOG_ODDS - _FRONT.slope * _SIDE_TEN_PERCENT,
         _FRONT.slope,
         "delta-v",
         "TARGET setting for high severity collisions: tolerance-based assessment of risk for "
@@ -140,11 +139,13 @@ def _tables() -> tuple[Float, Float]:
     return intercept, slope
 
 
-_INTERCEPT, _SLOPE = _tables()
-_IS_OBSTACLE: Bool = np.array(IS_OBSTACLE)
-_UNPROTECTED: Bool = np.array(
-    [object_class.injury not in (None, "occupant") for object_class in OBJECT_CLASSES]
+INTERCEPTS, SLOPES = _tables()
+"""Of the curve by kind and direction of the force."""
+
+UNPROTECTED = tuple(
+    object_class.injury not in (None, "occupant") for object_class in OBJECT_CLASSES
 )
+"""Whether the curve of each kind is of the closing speed to a car."""
 
 
 def effective_speed(closing_normal: npt.ArrayLike, closing_tangential: npt.ArrayLike) -> Float:
@@ -163,9 +164,7 @@ def effective_speed(closing_normal: npt.ArrayLike, closing_tangential: npt.Array
         ``(N,)`` [m/s], ≥ 0; strictly increasing in the normal part, increasing in the size of the
         tangential part.
     """
-    normal = np.maximum(np.asarray(closing_normal, dtype=np.float64), 0.0)
-    tangential = np.abs(np.asarray(closing_tangential, dtype=np.float64))
-    return np.asarray(elementary.hypot(normal, np.minimum(FRICTION * normal, tangential)))
+    return _collide(CAR, CAR, closing_normal, closing_tangential)[0]
 
 
 def delta_v(
@@ -196,11 +195,10 @@ def delta_v(
     Raises:
         ValueError: a kind does not exist.
     """
-    share_a, share_b = _shares(
-        _codes("kind_a", kind_a, NAMES), _codes("kind_b", kind_b, NAMES), movable_a, movable_b
+    _, change_a, change_b, *_ = _collide(
+        kind_a, kind_b, closing_normal, closing_tangential, FRONT, FRONT, movable_a, movable_b
     )
-    speed = effective_speed(closing_normal, closing_tangential)
-    return share_a * speed, share_b * speed
+    return change_a, change_b
 
 
 def p_mais3(kind: npt.ArrayLike, speed: npt.ArrayLike, direction: npt.ArrayLike) -> Float:
@@ -226,6 +224,8 @@ def p_mais3(kind: npt.ArrayLike, speed: npt.ArrayLike, direction: npt.ArrayLike)
 
     Source: `CURVES`.
     """
+    from bridgegen.assess.conflict import _severity_kernels as kernels  # which imports this one
+
     kind, direction = (
         _codes("kind", kind, NAMES),
         _codes("direction", direction, DIRECTIONS),
@@ -233,11 +233,10 @@ def p_mais3(kind: npt.ArrayLike, speed: npt.ArrayLike, direction: npt.ArrayLike)
     v = np.asarray(speed, dtype=np.float64)
     if (v < 0.0).any():
         raise ValueError(f"speed [m/s] must be >= 0, got {v[v < 0.0][0]}")
-    logistic = 1.0 / (
-        1.0 + elementary.exp(-(_INTERCEPT[kind, direction] + _SLOPE[kind, direction] * v))
-    )
-    # A logistic curve is above 0 at standstill; `FADE` takes it there.
-    return np.asarray(-elementary.expm1(-np.square(v / FADE)) * logistic)
+    given = np.broadcast_arrays(kind, v, direction)
+    found = np.empty(given[0].shape)
+    kernels.probabilities(*(array.ravel() for array in given), found.reshape(-1))
+    return found
 
 
 def injuries(
@@ -273,15 +272,17 @@ def injuries(
     Raises:
         ValueError: a kind or direction does not exist.
     """
-    kind_a, kind_b = _codes("kind_a", kind_a, NAMES), _codes("kind_b", kind_b, NAMES)
-    direction_a = _codes("direction_a", direction_a, DIRECTIONS)
-    direction_b = _codes("direction_b", direction_b, DIRECTIONS)
-    share_a, share_b = _shares(kind_a, kind_b, movable_a, movable_b)
-    speed = effective_speed(closing_normal, closing_tangential)
-    return (
-        p_mais3(kind_a, _on_curve(kind_a, share_a) * speed, direction_a),
-        p_mais3(kind_b, _on_curve(kind_b, share_b) * speed, direction_b),
+    *_, injury_a, injury_b, _ = _collide(
+        kind_a,
+        kind_b,
+        closing_normal,
+        closing_tangential,
+        direction_a,
+        direction_b,
+        movable_a,
+        movable_b,
     )
+    return injury_a, injury_b
 
 
 def severity(
@@ -316,45 +317,46 @@ def severity(
     Raises:
         ValueError: a kind or direction does not exist.
     """
-    return np.asarray(
-        np.maximum(
-            *injuries(
-                kind_a,
-                kind_b,
-                closing_normal,
-                closing_tangential,
-                direction_a,
-                direction_b,
-                movable_a,
-                movable_b,
-            )
-        )
+    *_, worst = _collide(
+        kind_a,
+        kind_b,
+        closing_normal,
+        closing_tangential,
+        direction_a,
+        direction_b,
+        movable_a,
+        movable_b,
     )
+    return worst
 
 
-def _on_curve(kind: Int, share: Float) -> Float:
-    """Return the factor from `effective_speed` to the variable of a party's curve."""
-    # The curves of those without a body around them are by closing speed with a passenger car:
-    # other partners count by the change of velocity that they cause.
-    against_a_car = MASS[CAR] / (MASS[CAR] + MASS[kind])
-    return np.where(_UNPROTECTED[kind], share / against_a_car, share)
+def _collide(
+    kind_a: npt.ArrayLike,
+    kind_b: npt.ArrayLike,
+    closing_normal: npt.ArrayLike,
+    closing_tangential: npt.ArrayLike,
+    direction_a: npt.ArrayLike = FRONT,
+    direction_b: npt.ArrayLike = FRONT,
+    movable_a: npt.ArrayLike = True,
+    movable_b: npt.ArrayLike = True,
+) -> tuple[Float, ...]:
+    """Return what ``_severity_kernels.collisions`` finds of collisions, ``(N,)`` each."""
+    from bridgegen.assess.conflict import _severity_kernels as kernels  # which imports this one
 
-
-def _shares(
-    kind_a: Int, kind_b: Int, movable_a: npt.ArrayLike, movable_b: npt.ArrayLike
-) -> tuple[Float, Float]:
-    """Return each party's share of the closing speed: the inverse masses over their sum."""
-    a, b = (
-        np.where(
-            _IS_OBSTACLE[kind] & ~np.asarray(movable, dtype=np.bool_),
-            0.0,
-            1.0 / MASS[kind],
-        )
-        for kind, movable in ((kind_a, movable_a), (kind_b, movable_b))
+    given = np.broadcast_arrays(
+        _codes("kind_a", kind_a, NAMES),
+        _codes("kind_b", kind_b, NAMES),
+        np.asarray(closing_normal, dtype=np.float64),
+        np.asarray(closing_tangential, dtype=np.float64),
+        _codes("direction_a", direction_a, DIRECTIONS),
+        _codes("direction_b", direction_b, DIRECTIONS),
+        np.asarray(movable_a, dtype=np.bool_),
+        np.asarray(movable_b, dtype=np.bool_),
     )
-    total = a + b
-    total = np.where(total > 0.0, total, 1.0)
-    return a / total, b / total
+    found = np.empty((kernels.RESULTS, *given[0].shape))
+    flat = found.reshape(kernels.RESULTS, given[0].size)
+    kernels.collisions(*(array.ravel() for array in given), flat)
+    return tuple(np.asarray(array) for array in found)
 
 
 def _codes(name: str, value: npt.ArrayLike, names: tuple[str, ...]) -> Int:

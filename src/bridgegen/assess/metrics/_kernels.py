@@ -8,11 +8,27 @@ import math
 import numpy as np
 
 from bridgegen.base import _elementary_kernels as elementary
-from bridgegen.base.arrays import Float, Int
+from bridgegen.base.arrays import Bool, Float, Int
 from bridgegen.base.compiled import kernel
 
 TIE = 1e-9
 """Difference up to which distances are equal [m]."""
+
+
+@kernel
+def closest_of(distance: Float, n: int) -> tuple[float, int]:
+    """Return what ``closest`` writes, of one scenario."""
+    best, at = np.inf, -1
+    for e in range(1, distance.shape[0]):
+        for k in range(n):
+            best = min(best, distance[e, k])
+    if best < np.inf:
+        for e in range(1, distance.shape[0]):
+            for k in range(n if at < 0 else at):
+                if distance[e, k] <= best + TIE:
+                    at = k
+                    break
+    return best, at
 
 
 @kernel
@@ -22,21 +38,8 @@ def closest(distance: Float, n_steps: Int, least: Float, instant: Int) -> None:
     The instant is the first within ``TIE`` of the least: at a constant gap, the last bits do not
     choose it.
     """
-    n_rows, n_entities, _ = distance.shape
-    for i in range(n_rows):
-        best = np.inf
-        for e in range(1, n_entities):
-            for k in range(n_steps[i]):
-                best = min(best, distance[i, e, k])
-        at = -1
-        if best < np.inf:
-            for e in range(1, n_entities):
-                for k in range(n_steps[i] if at < 0 else at):
-                    if distance[i, e, k] <= best + TIE:
-                        at = k
-                        break
-        least[i] = best
-        instant[i] = at
+    for i in range(distance.shape[0]):
+        least[i], instant[i] = closest_of(distance[i], n_steps[i])
 
 
 @kernel
@@ -117,6 +120,25 @@ def braking_edges(a: Float, n_steps: Int, threshold: float, out: Float) -> None:
 
 
 @kernel
+def place_row(
+    box: Float,
+    x: Float,
+    y: Float,
+    cosine: Float,
+    sine: Float,
+    n: int,
+    centre_x: Float,
+    centre_y: Float,
+) -> None:
+    """Write the centre of each body's box, ``(E, T)``."""
+    for e in range(x.shape[0]):
+        ahead = box[e, 2]
+        for k in range(n):
+            centre_x[e, k] = x[e, k] + ahead * cosine[e, k]
+            centre_y[e, k] = y[e, k] + ahead * sine[e, k]
+
+
+@kernel
 def place(
     box: Float,
     x: Float,
@@ -128,13 +150,45 @@ def place(
     centre_y: Float,
 ) -> None:
     """Write the centre of each body's box."""
-    n_rows, n_entities, _ = x.shape
-    for i in range(n_rows):
-        for e in range(n_entities):
-            ahead = box[e, 2]
-            for k in range(n_steps[i]):
-                centre_x[i, e, k] = x[i, e, k] + ahead * cosine[i, e, k]
-                centre_y[i, e, k] = y[i, e, k] + ahead * sine[i, e, k]
+    for i in range(x.shape[0]):
+        place_row(box, x[i], y[i], cosine[i], sine[i], n_steps[i], centre_x[i], centre_y[i])
+
+
+# --- Compiled turning round of bodies that reverse; public wrapper: ``metric.motion`` ---
+
+
+STANDS = 0.05
+"""Speed below which a body stands, and does not turn round by the sign of noise [m/s]."""
+
+
+@kernel
+def turn_round(cosine: Float, sine: Float, v: Float, a: Float, reverses: Bool) -> None:
+    """Have a body ``(T,)`` that reverses drive forwards in the opposite direction, in place.
+
+    ``reverses`` becomes when it does: while it stands, as it did before. One that has not driven
+    yet stands as it will drive; where it never drives, its sign decides.
+    """
+    n, first = len(v), 0
+    while first < n and abs(v[first]) <= STANDS:
+        first += 1
+    backwards = first < n and v[first] < 0.0
+    for k in range(n):
+        # A body that stands has the sign of before; its noise must not make it drive the other way.
+        if first == n or abs(v[k]) > STANDS:
+            backwards = v[k] < 0.0
+        reverses[k] = backwards
+        if backwards:
+            cosine[k], sine[k], v[k], a[k] = -cosine[k], -sine[k], -v[k], -a[k]
+        if v[k] <= 0.0:
+            v[k] = 0.0
+
+
+@kernel
+def turn_rows_round(cosine: Float, sine: Float, v: Float, a: Float, reverses: Bool) -> None:
+    """Turn the bodies of N rows round, ``(N, E, T)``."""
+    for i in range(v.shape[0]):
+        for e in range(v.shape[1]):
+            turn_round(cosine[i, e], sine[i, e], v[i, e], a[i, e], reverses[i, e])
 
 
 # --- Compiled count of red lights run; public wrapper: ``r_red.r_red`` ---

@@ -111,10 +111,6 @@ def without_failed(rollout: Rollout, values: Float) -> Float:
 # --- Shared by the metrics beyond Table I: every body's position and direction, computed once ---
 
 
-STANDS = 0.05
-"""Speed below which a body stands, and does not turn round by the sign of noise [m/s]."""
-
-
 @dataclass(frozen=True)
 class Motion:
     """A rollout's bodies for compiled code; instants from ``n_steps`` on are unset.
@@ -126,7 +122,7 @@ class Motion:
             its heading, the opposite one where it reverses. Its box is the same either way.
         v: ``(N, E, T)`` float64 [m/s], ≥ 0, in that direction.
         a: ``(N, E, T)`` float64 [m/s²], likewise.
-        reverses: ``(N, E, T)`` bool, at more than `STANDS`; None where no speed is < 0.
+        reverses: ``(N, E, T)`` bool, see ``_kernels.turn_round``; None where no speed is < 0.
         distance: ``(N, E, T)`` float64 [m], from the ego's box; +inf where absent.
         n_steps: ``(N,)`` int64.
     """
@@ -158,26 +154,10 @@ def _motion(rollout: Rollout) -> Motion:
     _motion_kernels.place(box, x, y, cosine, sine, n_steps, centre_x, centre_y)
     a, reverses = recorded(rollout, "a"), None
     if v.size and v.min() < 0.0:
-        reverses = _reverses(v)
-        cosine, sine, v, a = (np.where(reverses, -array, array) for array in (cosine, sine, v, a))
-        # A body that stands has the sign of before; its noise must not make it drive the other way.
-        v = np.maximum(v, 0.0)
+        reverses = np.empty(v.shape, np.bool_)
+        cosine, sine, v, a = (array.copy() for array in (cosine, sine, v, a))
+        _motion_kernels.turn_rows_round(cosine, sine, v, a, reverses)
     half = 0.5 * box[:, :2]
     return Motion(
         half, centre_x, centre_y, cosine, sine, v, a, reverses, distance(rollout), n_steps
     )
-
-
-def _reverses(v: Float) -> Bool:
-    """Return when bodies drive backwards, ``(N, E, T)``: while one stands, as it did before.
-
-    One that has not driven yet stands as it will drive; where it never drives, its sign decides.
-    """
-    drives = np.abs(v) > STANDS
-    instants = np.arange(v.shape[-1])
-    last = np.maximum.accumulate(np.where(drives, instants, -1), axis=-1)
-    first = np.argmax(drives, axis=-1, keepdims=True)
-    ever = np.asarray(drives.any(axis=-1, keepdims=True))
-    decides = np.where(ever, np.where(last < 0, first, last), instants)
-    backwards: Bool = np.take_along_axis(v, decides, axis=-1) < 0.0
-    return backwards
