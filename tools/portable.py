@@ -20,24 +20,28 @@ from typing import Any
 # Bitcode that is not optimised must not reach the cache, whose folder is chosen at import.
 os.environ["NUMBA_CACHE_DIR"] = tempfile.mkdtemp(prefix="bridgegen-portable-")
 
+import numpy as np
 from llvmlite import binding as llvm
 from numba import types
 from numba.core import codegen
 from numba.core.runtime import rtsys
 
+from bridgegen.assess.conflict._judge_kernels import judge_row
 from bridgegen.base import _elementary_kernels as elementary
-from bridgegen.base import compiled
 from bridgegen.base.compilation.library import KernelLibrary
+from bridgegen.base.compiled import compile_for_kernels, row_type
+from bridgegen.drivers.lane_tables import CORRIDOR
 from bridgegen.engine.options import PipelineOptions
 from bridgegen.engine.pipeline import Pipeline
+from bridgegen.pages.simulation_payload import facts_of, verdict_of
 from bridgegen.scenario.language.reader import load
-from bridgegen.simulation.embedded import _rollout_kernels as rollout
 from bridgegen.simulation.embedded import portable
+from bridgegen.simulation.embedded._rollout_kernels import simulate_row
 from bridgegen.simulation.embedded.addresses import CALLED
 
 TRIPLE = "wasm32-unknown-unknown"
 FEATURES = "+bulk-memory,+bulk-memory-opt,+nontrapping-fptoint,+sign-ext,+mutable-globals"
-EXPORTS = ("simulate", "function", "address")
+EXPORTS = ("simulate", "judge", "function", "address")
 
 RUNTIME = """
 @heap = global i32 0
@@ -79,6 +83,21 @@ define void @simulate(ptr %plan, ptr %roads, ptr %state, ptr %record, i32 %heap)
   %error = alloca ptr
   store i32 %heap, ptr @heap
   call i32 @"{simulate}"(ptr %answer, ptr %error, ptr %plan, ptr %roads, ptr %state, ptr %record)
+  ret void
+}}
+
+define void @judge(
+  i32 %steps, i32 %status, i32 %path, double %friction, ptr %facts, ptr %record, ptr %verdict
+) {{
+  %answer = alloca i64
+  %error = alloca ptr
+  %n = sext i32 %steps to i64
+  %s = sext i32 %status to i64
+  %p = sext i32 %path to i64
+  call i32 @"{judge}"(
+    ptr %answer, ptr %error, i64 %n, i64 %s, i64 %p, double %friction,
+    ptr %facts, ptr %record, ptr %verdict
+  )
   ret void
 }}
 
@@ -134,7 +153,7 @@ def symbol_of(kernel: Any, kinds: tuple[Any, ...]) -> str:
         del kernel.overloads[
             kinds
         ]  # Python has called it, and what is made for it has another form
-    found: str = compiled.compile_for_kernels(kernel, kinds).fndesc.llvm_func_name
+    found: str = compile_for_kernels(kernel, kinds).fndesc.llvm_func_name
     return found
 
 
@@ -153,9 +172,15 @@ def linked() -> str:
     """Return all kernels as one module in LLVM's IR, for no machine yet."""
     logical = load("crossroads-s4")
     pipeline = Pipeline(logical, logical.space(), PipelineOptions(ego="reference"))
-    rows = pipeline.runner.nominal_batch().kinds()
+    batch = pipeline.runner.nominal_batch()
+    rows = batch.kinds()
+    rollout = batch.run()
+    facts = facts_of(rollout, 0, np.zeros((0, CORRIDOR)))
+    judged = [row_type(bundle, 0) for bundle in (facts, verdict_of(*rollout.shape[1:]))]
+    numbers = (types.int64, types.int64, types.int64, types.float64)
     entries = {
-        "simulate": symbol_of(rollout.simulate_row, rows),
+        "simulate": symbol_of(simulate_row, rows),
+        "judge": symbol_of(judge_row, (*numbers, judged[0], rows[3], judged[1])),
         "function": symbol_of(elementary.value, (types.int64, types.float64, types.float64)),
     }
     called = [symbol_of(kernel, (*first, *rows)) for kernel, first in CALLED.items()]

@@ -6,9 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bridgegen.assess.conflict import _codes as codes
-from bridgegen.assess.conflict._judge_kernels import Facts, Verdict, judge_row
-from bridgegen.assess.conflict._violation_kernels import LEAVINGS, PASSINGS
+from bridgegen.assess.conflict._judge_kernels import judge_row
 from bridgegen.assess.conflict.analysis import (
     CONTACT,
     IS_SO,
@@ -24,6 +22,8 @@ from bridgegen.drivers.kinds import BICYCLE, CAR
 from bridgegen.drivers.lane_tables import CORRIDOR
 from bridgegen.engine.options import PipelineOptions
 from bridgegen.engine.pipeline import Pipeline
+from bridgegen.pages.simulation_payload import facts_of
+from bridgegen.pages.simulation_payload import verdict_of as room_of
 from bridgegen.scenario.language.reader import load
 from bridgegen.simulation.embedded._memory_kernels import Record
 
@@ -34,35 +34,12 @@ def judge(n_steps, status, path, friction, facts, records, i, verdict):
     judge_row(n_steps, status, path, friction, bundled(facts), record, bundled(verdict))
 
 
-def facts_of(rollout, row, corridor):
-    return Facts(
-        box=rollout.box,
-        half=0.5 * rollout.box[:, :2],
-        kinds=rollout.kinds,
-        claims=rollout.claims[row],
-        crosswalks=rollout.crosswalks[row],
-        stop_entities=rollout.stop_entities,
-        stop_lights=rollout.stop_lights,
-        stop_lines=rollout.stop_lines[row],
-        corridor=corridor,
-        time_step=rollout.time_step,
-        own_bodies=sum(map(rollout.is_ego_s, range(rollout.shape[1]))),
-    )
-
-
 def verdict_of(e, t):
     """A verdict full of what a row before may have left."""
-    shapes = dict.fromkeys(Verdict._fields, (e, t))
-    shapes |= dict.fromkeys(("potential", "severity", "aside", "breach", "at_fault"), (e,))
-    shapes |= {"whole": (e, codes.INTEGERS), "real": (e, codes.FLOATS), "changes": (e, 2)}
-    shapes |= {"is_judged": (1,), "least": (1,), "over": (1,), "instants": (2,), "gaps": (2,)}
-    shapes |= {"apart": (2, t), "leave": (LEAVINGS,), "passed": (PASSINGS,)}
-    values = {name: np.full(shape, math.nan) for name, shape in shapes.items()}
-    values |= {name: np.full(shapes[name], 77) for name in ("whole", "instants", "leave", "passed")}
-    values |= {
-        name: np.ones(shapes[name], np.bool_) for name in ("is_judged", "at_fault", "reverses")
-    }
-    return Verdict(**values)
+    verdict = room_of(e, t)
+    for array in verdict:
+        array[...] = math.nan if array.dtype == float else 77
+    return verdict
 
 
 def record_of(rollout):

@@ -4,15 +4,26 @@ from typing import Any
 
 import numpy as np
 
+from bridgegen.assess.conflict import _codes as codes
+from bridgegen.assess.conflict._judge_kernels import Facts, Verdict
+from bridgegen.assess.conflict._violation_kernels import LEAVINGS, PASSINGS
+from bridgegen.assess.conflict.findings import KINDS
+from bridgegen.assess.conflict.types import ConflictType, Responsible, Rule
+from bridgegen.base.arrays import Float
 from bridgegen.base.errors import InputError
 from bridgegen.engine.pipeline import Pipeline
 from bridgegen.pages.packed import deflated
 from bridgegen.scenario.language.space import SearchSpace
 from bridgegen.simulation.adversary import AdversarySource
 from bridgegen.simulation.embedded import portable
+from bridgegen.simulation.rollout import Rollout
 
 TRIED = 64
 """Number of random rows that are run first, so that the ways are planned that rows may need."""
+
+
+COLUMNS = ("KIND", "TYPE", "RESPONSIBLE", "RULE", "INSTANT", "DECIDED", "ZONE_EGO", "ZONE_OTHER")
+"""Columns of a verdict's whole numbers that the page reads."""
 
 
 def simulation_payload(pipeline: Pipeline) -> dict[str, Any]:
@@ -23,14 +34,62 @@ def simulation_payload(pipeline: Pipeline) -> dict[str, Any]:
         X = space.decode(np.random.default_rng(0).random((TRIED, space.n_var)))
         runner.run(X)
         roads, _ = runner.roads_of(X[:1])
-        found = portable.tables(runner.embedded.program, roads)
+        rollout = runner.nominal_batch().run()
+        facts = facts_of(rollout, 0, roads.corridors([0])[0])
+        room = verdict_of(*rollout.shape[1:])
+        program = runner.embedded.program
+        found = portable.tables(program, roads, facts=facts, verdict=room)
     except InputError as error:
         return {"refused": str(error)}
     return found | {
         "kernels": deflated(portable.MODULE.read_bytes()),
         "space": _space(space),
+        "judged": {
+            "columns": {name.lower(): getattr(codes, name) for name in COLUMNS},
+            "kinds": [KINDS.get(kind, "") for kind in range(codes.VIOLATION + 1)],
+            "types": [kind.label for kind in ConflictType],
+            "responsible": [who.label for who in Responsible],
+            "rules": [rule.label for rule in Rule],
+        },
         "unused": [name for name in space.names if name in runner.source.unused_names],
     }
+
+
+def facts_of(rollout: Rollout, row: int, corridor: Float) -> Facts:
+    """Return what judging a row needs besides its record.
+
+    Args:
+        rollout: of rows of the same storyboard.
+        row: one on the same road network.
+        corridor: of the ego's first path there; see `Facts`.
+    """
+    e = rollout.shape[1]
+    stops = rollout.stop_entities.size
+    return Facts(
+        box=rollout.box,
+        half=0.5 * rollout.box[:, :2],
+        kinds=np.ascontiguousarray(rollout.kinds, dtype=np.int64),
+        claims=rollout.claims[row] if rollout.claims.size else np.zeros((e, e), np.int64),
+        crosswalks=rollout.crosswalks[row] if rollout.crosswalks.size else np.zeros((0, 5)),
+        stop_entities=np.ascontiguousarray(rollout.stop_entities, dtype=np.int64),
+        stop_lights=np.ascontiguousarray(rollout.stop_lights, dtype=np.int64),
+        stop_lines=rollout.stop_lines[row] if stops else np.zeros((0, 3)),
+        corridor=corridor,
+        time_step=rollout.time_step,
+        own_bodies=sum(rollout.is_ego_s(entity) for entity in range(e)),
+    )
+
+
+def verdict_of(e: int, t: int) -> Verdict:
+    """Return room for the verdict on a row of E entities and T instants."""
+    shapes: dict[str, tuple[int, ...]] = dict.fromkeys(Verdict._fields, (e, t))
+    shapes |= dict.fromkeys(("potential", "severity", "aside", "breach", "at_fault"), (e,))
+    shapes |= {"whole": (e, codes.INTEGERS), "real": (e, codes.FLOATS), "changes": (e, 2)}
+    shapes |= {"is_judged": (1,), "least": (1,), "over": (1,), "instants": (2,), "gaps": (2,)}
+    shapes |= {"apart": (2, t), "leave": (LEAVINGS,), "passed": (PASSINGS,)}
+    kinds: dict[str, Any] = dict.fromkeys(("whole", "instants", "leave", "passed"), np.int64)
+    kinds |= dict.fromkeys(("is_judged", "at_fault", "reverses"), np.bool_)
+    return Verdict(**{n: np.zeros(shape, kinds.get(n, float)) for n, shape in shapes.items()})
 
 
 def _refuse_what_is_not_portable(pipeline: Pipeline) -> None:

@@ -2,9 +2,8 @@
 
 import { $, copy, element } from "./common.js";
 import { columns, data } from "./data.js";
-import { boxCorners, nearestTo, stateAt } from "./geometry.js";
 import { inflated } from "./inflate.js";
-import { number, quantity, turned, worded } from "./numbers.js";
+import { number, quantity, shareText, turned, worded } from "./numbers.js";
 import { Simulator } from "./simulator.js";
 import { unpack } from "./unpack.js";
 
@@ -52,7 +51,7 @@ function playbackOf(base, simulator, values) {
   };
   const made = {
     ...base, x: rows("x"), y: rows("y"), h: rows("h"), v: rows("v"), a: rows("a"), n_steps: steps, ttc: null, tried: true,
-    players: undefined, conflict: null, sensed: null, course: null, plans: [], planAt: new Int32Array(steps).fill(-1), beside: [], lamps: lampsOf(base, simulator, steps),
+    players: undefined, conflict: null, distance: null, sensed: null, course: null, plans: [], planAt: new Int32Array(steps).fill(-1), beside: [], lamps: lampsOf(base, simulator, steps),
     weather: values === base.parameters ? base.weather : [], // its words are of other values
   };
   const present = simulator.at.record.present;
@@ -60,28 +59,48 @@ function playbackOf(base, simulator, values) {
     const there = simulator.array("record", "present");
     for (const name of "xyva") made[name].forEach((row, e) => row.forEach((_, k) => { if (!there[e * length + k]) row[k] = null; }));
   }
-  measure(made);
+  judge(made, simulator, status);
   return { made, status };
 }
 
-// Distances of the boxes, where they touch, and when they are closest.
-function measure(made) {
-  made.distance = new Array(made.n_steps).fill(null);
-  for (let k = 0; k < made.n_steps; k++) {
-    const state = stateAt({ ...made, distance: made.distance }, k), near = nearestTo(made, state);
-    if (near) made.distance[k] = overlaps(made, state, near.entity) ? 0 : near.distance;
-  }
+// Distances, contacts and the decisive conflict, as the search judges them.
+function judge(made, simulator, status) {
+  simulator.judge(made.n_steps, status);
+  const [count, length] = simulator.at.verdict.distance.shape, apart = simulator.array("verdict", "distance");
+  made.distance = made.x[0].map((_, k) => {
+    let least = Infinity;
+    for (let e = 1; e < count; e++) least = Math.min(least, apart[e * length + k]);
+    return least < Infinity ? least : null;
+  });
   made.contacts = made.distance.flatMap((d, k) => (d === 0 && made.distance[k - 1] !== 0 ? [k] : []));
-  const found = made.distance.filter((d) => d !== null);
-  made.closest = found.length ? made.distance.indexOf(Math.min(...found)) : null;
+  const closest = Number(simulator.array("verdict", "instants")[1]);
+  made.closest = closest < 0 ? null : closest;
+  made.conflict = conflictOf(made, simulator);
 }
 
-function overlaps(made, { entities }, other) {
-  const boxes = [0, other].map((e) => boxCorners(made.entities[e], entities[e].x, entities[e].y, entities[e].h));
-  return [entities[0].h, entities[other].h].every((h) => [[Math.cos(h), Math.sin(h)], [-Math.sin(h), Math.cos(h)]].every(([ux, uy]) => {
-    const [own, its] = boxes.map((box) => box.map(([x, y]) => x * ux + y * uy));
-    return Math.max(...own) >= Math.min(...its) && Math.max(...its) >= Math.min(...own);
-  }));
+const labels = given?.judged;
+
+// The conflict that decides: one that counts before one that does not, contacts first, then the more severe one.
+function conflictOf(made, simulator) {
+  const { shape: [count, width] } = simulator.at.verdict.whole, whole = simulator.array("verdict", "whole");
+  const [fault, breach, potential] = ["at_fault", "breach", "potential"].map((name) => simulator.array("verdict", name));
+  const read = (e, column) => Number(whole[e * width + labels.columns[column]]);
+  const any = data.summary.harm === "harm_any";
+  let best = null;
+  for (let e = 0; e < count; e++) {
+    const kind = labels.kinds[read(e, "kind")];
+    if (!kind || kind === "collision course") continue;
+    const counts = kind === "violation" ? breach[e] >= 1 : any || Boolean(fault[e]);
+    const merit = [counts, kind === "contact", potential[e]];
+    if (!best || merit.map((value, i) => Number(value) - Number(best.merit[i])).find((d) => d) > 0) best = { e, kind, counts, merit };
+  }
+  if (!best) return null;
+  const { e, kind, counts } = best, words = (list, column) => labels[list][read(e, column)] ?? "";
+  return {
+    conflict: kind, counts, type: words("types", "type"), responsible: words("responsible", "responsible"), rule: words("rules", "rule"),
+    partner: e ? made.entities[e].name : "", partner_number: e, instant: read(e, "instant"), decided: read(e, "decided"),
+    zones: [read(e, "zone_ego"), read(e, "zone_other")], severity: simulator.array("verdict", "severity")[e],
+  };
 }
 
 function lampsOf(base, simulator, steps) {
@@ -97,7 +116,7 @@ function lampsOf(base, simulator, steps) {
 }
 
 /** Whether the page simulates; not where it only says why it cannot. */
-export const simulates = Boolean(given && !given.refused);
+const simulates = Boolean(given && !given.refused);
 
 /** @type {Promise<Float64Array> | null} */
 let exact = null;
@@ -206,14 +225,18 @@ export class Explorer {
   }
 
   tell(made) {
-    const seconds = (k) => `${(k * made.time_step).toFixed(2)}\u00a0s`;
-    const [contact] = made.contacts;
-    this.said.classList.toggle("hit", contact !== undefined);
-    if (contact !== undefined) {
-      const near = nearestTo(made, stateAt(made, contact));
-      this.said.textContent = `Collision with ${made.entities[near.entity].name} at ${seconds(contact)}, ego at ${quantity(made.v[0][contact], "m/s")}.`;
-    } else if (made.closest !== null) this.said.textContent = `No collision; closest ${quantity(made.distance[made.closest], "m")} at ${seconds(made.closest)}.`;
-    else this.said.textContent = "No collision.";
+    const seconds = (k) => `${(k * made.time_step).toFixed(2)}\u00a0s`, found = made.conflict;
+    const fails = Boolean(found?.counts && data.summary.harm); // other rules count otherwise, which the page does not know
+    this.said.classList.toggle("hit", fails);
+    const least = made.closest === null ? "" : `; closest ${quantity(made.distance[made.closest], "m")} at ${seconds(made.closest)}`;
+    let text = `No conflict${least}.`;
+    if (found) {
+      const whom = found.partner ? ` with ${found.partner}` : "", severe = found.conflict === "contact" ? `, MAIS3+ ${shareText(found.severity)}` : "";
+      const named = found.conflict === "contact" ? "collision" : found.conflict;
+      text = `${fails ? "FAILS: " : ""}${named}${whom} at ${seconds(found.instant)}: ${[found.type, found.rule].filter(Boolean).join(", ")}; responsible: ${found.responsible}${severe}${fails || !data.summary.harm ? "" : ". Not counted"}.`;
+      found.sentence = found.bare = text;
+    }
+    this.said.textContent = text[0].toUpperCase() + text.slice(1);
     this.player.swap(made);
   }
 

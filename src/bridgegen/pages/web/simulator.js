@@ -40,7 +40,7 @@ export class Simulator {
     this.top = STACK;
     this.at = {};
     this.bundles = {};
-    for (const name of ["plan", "roads", "state", "record"]) this.bundles[name] = this.put(tables[name], name);
+    for (const name of ["plan", "roads", "state", "record", "facts", "verdict"]) this.bundles[name] = this.put(tables[name], name);
     this.heap = this.top;
     this.take(1 << 18);
   }
@@ -138,6 +138,13 @@ export class Simulator {
     this.exports.simulate(this.bundles.plan, this.bundles.roads, this.bundles.state, this.bundles.record, this.heap);
     const ending = this.array("state", "ending");
     return { steps: Number(ending[0]), status: Number(ending[1]) };
+  }
+
+  /** Judges the row that was simulated last; what is found then lies in the arrays of "verdict". */
+  judge(steps, status) {
+    const { facts, record, verdict } = this.bundles;
+    const path = Number(this.array("state", "on")[0]), friction = this.array("state", "weather")[this.tables.friction];
+    this.exports.judge(steps, status, path, friction, facts, record, verdict);
   }
 
   // The key of a row's random numbers: SplitMix64 over the bits of its values.

@@ -18,6 +18,7 @@ import numpy as np
 from bridgegen.base._elementary_kernels import FUNCTIONS
 from bridgegen.base.compilation.folder import PACKAGE, with_imported
 from bridgegen.base.errors import InputError
+from bridgegen.drivers._weather_columns import FRICTION
 from bridgegen.openx.openscenario.values import Expr, ParameterRef, Value
 from bridgegen.simulation.embedded.addresses import CALLED, FIELDS, addressed
 from bridgegen.simulation.embedded.drivers import DEMANDS
@@ -35,7 +36,9 @@ MODULE = PACKAGE / "pages" / "web" / "kernels.wasm"
 def sources() -> str:
     """Return the digest of what the module is made of: code, not comments and not docstrings."""
     found = hashlib.sha256()
-    entries = (Path(__file__).with_name(name) for name in ("_rollout_kernels.py", "addresses.py"))
+    here = Path(__file__)
+    entries = [here.with_name(name) for name in ("_rollout_kernels.py", "addresses.py")]
+    entries.append(PACKAGE / "assess" / "conflict" / "_judge_kernels.py")
     for path in sorted(with_imported(entries)):
         tree = ast.parse(path.read_text("utf-8"))
         for node in ast.walk(tree):
@@ -49,7 +52,9 @@ def sources() -> str:
     return found.hexdigest()[:16]
 
 
-def tables(program: Program, roads: Network, network: int = 0) -> dict[str, Any]:
+def tables(
+    program: Program, roads: Network, network: int = 0, **more: NamedTuple
+) -> dict[str, Any]:
     """Return what the module's host needs to simulate rows of a storyboard, as JSON has it.
 
     "plan", "roads", "state", "record": bundles, each a list of ``[name, number, is float]`` and,
@@ -60,6 +65,7 @@ def tables(program: Program, roads: Network, network: int = 0) -> dict[str, Any]
         program: the compiled storyboard.
         roads: its road networks, in which all ways are planned that rows may need.
         network: number of the one that rows have.
+        more: further bundles by name.
 
     Raises:
         InputError: it has no such form; the part that has none.
@@ -83,8 +89,10 @@ def tables(program: Program, roads: Network, network: int = 0) -> dict[str, Any]
         "roads": _bundle(roads.tables, data, network),
         "state": _bundle(batch.state, data, 0),
         "record": _bundle(batch.record._replace(**unset), data, 0),
+        **{name: _bundle(arrays, data) for name, arrays in more.items()},
         "data": b64encode(zlib.compress(bytes(data), 9)).decode("ascii"),
         "codes": FIELDS,
+        "friction": FRICTION,
         "functions": FUNCTIONS,
         "parameters": dict(program.parameters),
         "slots": [_as_json(slot) for slot in program.slots],
