@@ -124,7 +124,8 @@ KEYWORDS = {*re.findall(r"\w+", """
 CONTEXTUAL = {"as", "async", "from", "get", "of", "static"}
 """Those that may be names as well."""
 GLOBALS = {*re.findall(r"\w+", """
-  ArrayBuffer BigInt BigInt64Array BigUint64Array DataView Date Int8Array MediaRecorder WebAssembly
+    ArrayBuffer BigInt BigInt64Array BigUint64Array DataView Date Int8Array MediaRecorder
+    MessageChannel WebAssembly
     Array Blob Boolean CSS CustomEvent DecompressionStream Error Float64Array Infinity Int32Array
     IntersectionObserver JSON Map Math Number Object Path2D ResizeObserver Response Set
     String TextDecoder TypeError URL Uint8Array addEventListener atob clearTimeout

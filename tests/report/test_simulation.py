@@ -133,11 +133,17 @@ def test_a_slider_changes_the_encounter_and_rows_play_without_their_motion(brows
         """() => { const slider = document.querySelector('#explore input[aria-label="bv_start"]');
         slider.value = slider.max; slider.dispatchEvent(new Event("input")); }"""
     )
-    page.wait_for_function("/collision/i.test(document.querySelector('.tried').textContent)")
-    said = page.inner_text(".tried")
+    page.wait_for_selector(".tried:has-text('No conflict')")
     page.click("text=As found")
-    page.wait_for_function(f"document.querySelector('.tried').textContent !== {said!r}")
-    assert "Collision with bv" in page.inner_text(".tried")
+    page.wait_for_selector(".tried:has-text('FAILS: collision with bv')")
+    said = page.inner_text(".tried")
+    metrics = json.loads((run.folder / "critical" / "0001.json").read_text())
+    conflict = metrics["conflict"]
+    assert conflict["type"] in said
+    assert conflict["rule"] in said
+    assert f"responsible: {conflict['responsible']}" in said
+    page.click("#explore summary")
+    page.wait_for_selector(".map p:has-text('3,600 encounters')")
     assert not errors
     assert len(asked) == 1  # the page alone
     page.close()

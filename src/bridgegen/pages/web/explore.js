@@ -1,6 +1,7 @@
 // Other values of the chosen scenario's parameters, simulated in the page while they change.
 
 import { $, copy, element } from "./common.js";
+import { ExploreMap } from "./explore_map.js";
 import { columns, data } from "./data.js";
 import { inflated } from "./inflate.js";
 import { number, quantity, shareText, turned, worded } from "./numbers.js";
@@ -181,10 +182,31 @@ export class Explorer {
         button("Defaults", () => this.set(Object.fromEntries(given.space.map((part) => [part.name, part.default]))), "The scenario's own defaults"),
         button("Copy values", (event) => this.copy(event.currentTarget), "The values, as options of bridgegen draw and search"))),
       element("div", { class: "sliders" }, ...lines));
+    if (this.sliders.size > 1) this.addMap();
   }
 
   refuse(why) {
     this.box.replaceChildren(element("p", { class: "muted small" }, `Its motion is replayed, not simulated here: ${why}.`));
+  }
+
+  addMap() {
+    const parts = given.space.filter(({ name }) => this.sliders.has(name));
+    // First those that the failures differ in most from other rows.
+    const telling = data.rows.telling.filter((name) => this.sliders.has(name));
+    parts.sort((a, b) => (telling.indexOf(a.name) + 1 || 99) - (telling.indexOf(b.name) + 1 || 99));
+    const ready = async () => {
+      const kernels = await simulator();
+      return (values) => {
+        const { steps, status } = kernels.run(completed(kernels, { ...this.values, ...values }).row);
+        if (status !== 0) return -1;
+        kernels.judge(steps, status);
+        const found = conflictOf(this.base, kernels);
+        if (!found) return 0;
+        return !found.counts ? 1 : found.conflict === "contact" ? 3 : 2;
+      };
+    };
+    this.map = new ExploreMap(parts, ready, (values) => this.set({ ...this.values, ...values }));
+    this.box.append(this.map.box);
   }
 
   slider(part) {
@@ -218,6 +240,7 @@ export class Explorer {
       if (status < 0) this.said.textContent = "Not simulated here: it needs a way that this page does not hold.";
       else if (status > 0) this.said.textContent = "These values make no scenario.";
       else this.tell(made);
+      if (!(moved && [this.map?.x.value, this.map?.y.value].includes(moved))) this.map?.draw();
     } finally {
       this.busy = false;
     }

@@ -36,6 +36,7 @@ export class Simulator {
     } });
     this.exports = exports;
     this.codes = new Set(tables.codes);
+    this.unset = new Set(tables.unset);
     this.numbers = new Map(tables.functions.map((name, i) => [name, i]));
     this.top = STACK;
     this.at = {};
@@ -93,7 +94,8 @@ export class Simulator {
 
   reset(name) {
     const bytes = new Uint8Array(this.memory.buffer);
-    for (const { kind, count, from, place } of Object.values(this.at[name])) {
+    for (const [field, { kind, count, from, place }] of Object.entries(this.at[name])) {
+      if (name === "record" && this.unset.has(field)) continue; // a row fills them
       const size = count * SIZE[kind];
       if (from < 0) bytes.fill(0, place, place + size);
       else bytes.set(this.data.subarray(from, from + size), place);

@@ -92,6 +92,7 @@ def tables(
         **{name: _bundle(arrays, data) for name, arrays in more.items()},
         "data": b64encode(zlib.compress(bytes(data), 9)).decode("ascii"),
         "codes": FIELDS,
+        "unset": UNSET,
         "friction": FRICTION,
         "functions": FUNCTIONS,
         "parameters": dict(program.parameters),

@@ -1,0 +1,88 @@
+// A map of verdicts over two parameters around the present values, computed while one looks.
+
+import { element } from "./common.js";
+import { palette } from "./colours.js";
+import { quantity } from "./numbers.js";
+
+const CELLS = 60;
+const COARSE = [8, 4, 2, 1]; // strides of the passes: the whole is seen at once, then in full
+const BREATH = 12; // ms between two frames
+
+/** Verdicts by what they are called, with their colour. */
+const SHADES = [
+  ["no conflict", () => palette.soft], ["conflict that does not count", () => palette.plain],
+  ["near miss or violation", () => palette.critical], ["collision", () => palette.hit],
+];
+
+// Lets the page draw and hear; a timer would wait for 4 ms each time.
+function breathe() {
+  return new Promise((resolve) => {
+    const { port1, port2 } = new MessageChannel();
+    port1.onmessage = resolve;
+    port2.postMessage(null);
+  });
+}
+
+export class ExploreMap {
+  /**
+   * @param {{name: string, low: number, high: number}[]} parameters
+   * @param {() => Promise<(values: Record<string, number>) => number>} ready what gives the number of the verdict, −1: none, at values of two parameters
+   * @param {(values: Record<string, number>) => void} choose
+   */
+  constructor(parameters, ready, choose) {
+    Object.assign(this, { parameters, ready, run: 0 });
+    const options = () => parameters.map(({ name }) => element("option", {}, name));
+    const select = (label, chosen) => {
+      const made = element("select", { "aria-label": label }, ...options());
+      made.selectedIndex = Math.min(chosen, parameters.length - 1);
+      made.addEventListener("change", () => this.draw());
+      return made;
+    };
+    this.x = select("parameter along the map", 0);
+    this.y = select("parameter up the map", 1);
+    this.canvas = element("canvas", { width: CELLS, height: CELLS, role: "img", "aria-label": "Map of verdicts; a click sets both parameters" });
+    this.canvas.addEventListener("click", ({ offsetX, offsetY }) => {
+      const { clientWidth, clientHeight } = this.canvas;
+      choose(this.at(Math.floor((CELLS * offsetX) / clientWidth), CELLS - 1 - Math.floor((CELLS * offsetY) / clientHeight)));
+    });
+    this.note = element("p", { class: "muted small", role: "status" });
+    const legend = SHADES.map(([name, colour]) => {
+      const dot = element("i", { "aria-hidden": "true" });
+      dot.style.background = colour();
+      return element("span", { class: "swatch" }, dot, name);
+    });
+    this.box = element("details", { class: "map" }, element("summary", {}, "Map of two parameters"),
+      element("div", { class: "controls" }, element("label", {}, "along ", this.x), element("label", {}, "up ", this.y)), this.canvas, element("p", { class: "legend" }, ...legend), this.note);
+    this.box.addEventListener("toggle", () => this.draw());
+  }
+
+  at(i, j) {
+    const value = ({ low, high }, k) => low + ((k + 0.5) / CELLS) * (high - low);
+    const [x, y] = [this.x, this.y].map(({ selectedIndex }) => this.parameters[selectedIndex]);
+    return { [x.name]: value(x, i), [y.name]: value(y, j) };
+  }
+
+  // In passes, each finer than the one before; a later call ends an earlier one.
+  async draw() {
+    const run = ++this.run;
+    if (!this.box.open) return;
+    const judge = await this.ready(), context = this.canvas.getContext("2d"), began = performance.now();
+    let done = 0, breath = began;
+    for (const stride of COARSE) {
+      for (let j = 0; j < CELLS; j += stride) {
+        for (let i = 0; i < CELLS; i += stride) {
+          if (stride < COARSE[0] && i % (2 * stride) === 0 && j % (2 * stride) === 0) continue; // of the pass before
+          const verdict = judge(this.at(i, j));
+          context.fillStyle = verdict < 0 ? palette.card : SHADES[verdict][1]();
+          context.fillRect(i, CELLS - j - stride, stride, stride);
+          done++;
+          if (performance.now() - breath < BREATH) continue;
+          await breathe();
+          if (run !== this.run) return;
+          breath = performance.now();
+        }
+      }
+    }
+    this.note.textContent = `${done.toLocaleString("en")} encounters in ${quantity((performance.now() - began) / 1000, "s", 2)}; the other parameters as above.`;
+  }
+}
