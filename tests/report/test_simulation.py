@@ -24,10 +24,11 @@ import { readFileSync } from "node:fs";
 import { inflateSync } from "node:zlib";
 import { Simulator } from "./simulator.mjs";
 
-const { simulation, rows } = JSON.parse(readFileSync("given.json", "utf8"));
+const { simulation, rows, driver } = JSON.parse(readFileSync("given.json", "utf8"));
 const data = (text) => new Uint8Array(inflateSync(Buffer.from(text, "base64")));
 const kernels = new WebAssembly.Module(data(simulation.kernels));
 const simulator = new Simulator(kernels, simulation, data(simulation.data));
+if (driver) simulator.choose(driver);
 for (const values of rows) {
   const { steps, status } = simulator.run(values), hash = createHash("sha256");
   const [count, length] = simulator.at.record.x.shape;
@@ -56,12 +57,12 @@ def here(pipeline, X):
         yield f"{steps} {rollout.status[i]} {digest.hexdigest()[:16]}"
 
 
-def elsewhere(pipeline, X, folder):
+def elsewhere(pipeline, X, folder, driver=None):
     node = shutil.which("node")
     if node is None:
         pytest.skip("node is not installed")
     rows = [pipeline.space.values(x) for x in X]
-    given = {"simulation": simulation_payload(pipeline), "rows": rows}
+    given = {"simulation": simulation_payload(pipeline), "rows": rows, "driver": driver}
     (folder / "given.json").write_text(json.dumps(given))
     script = files("bridgegen.pages") / "web" / "simulator.js"
     (folder / "simulator.mjs").write_text(script.read_text("utf-8"))
@@ -92,6 +93,19 @@ def test_a_page_gets_the_same_bits(scenario, driver, tmp_path):
     X = rows_of(pipeline, 24, 7)
     want = list(here(pipeline, X))  # the ways that these rows need are planned now
     assert elsewhere(pipeline, X, tmp_path) == want
+
+
+@pytest.mark.parametrize(("own", "other"), [("route-follower", "fsm"), ("reference", "careful")])
+def test_another_driver_at_the_wheel_drives_as_in_its_own_run(own, other, tmp_path):
+    pipeline = made("crossroads-s2", own)
+    X = rows_of(pipeline, 16, 5)
+    want = list(here(made("crossroads-s2", other), X))
+    assert elsewhere(pipeline, X, tmp_path, other) == want
+    assert want != list(here(pipeline, X))
+
+
+def test_a_driver_that_perceives_is_offered_only_where_roads_say_what_it_predicts_by():
+    assert "reference" not in simulation_payload(made("crossroads-s2", "careful"))["drivers"]
 
 
 def test_the_module_is_of_these_kernels():
@@ -133,15 +147,17 @@ def test_a_slider_changes_the_encounter_and_rows_play_without_their_motion(brows
         """() => { const slider = document.querySelector('#explore input[aria-label="bv_start"]');
         slider.value = slider.max; slider.dispatchEvent(new Event("input")); }"""
     )
-    page.wait_for_selector(".tried:has-text('No conflict')")
+    page.wait_for_selector(".tried:has-text('no conflict')")
     page.click("text=As found")
-    page.wait_for_selector(".tried:has-text('FAILS: collision with bv')")
+    page.wait_for_selector(".tried:has-text('route-follower FAILS: collision with bv')")
     said = page.inner_text(".tried")
     metrics = json.loads((run.folder / "critical" / "0001.json").read_text())
     conflict = metrics["conflict"]
     assert conflict["type"] in said
     assert conflict["rule"] in said
     assert f"responsible: {conflict['responsible']}" in said
+    page.select_option("#explore select[aria-label=Driver]", "un-r157")
+    page.wait_for_selector(".tried:has-text('un-r157')")
     page.click("#explore summary")
     page.wait_for_selector(".map p:has-text('3,600 encounters')")
     assert not errors

@@ -135,6 +135,7 @@ export async function simulated(i, facts) {
   if (!simulates || !base) return null;
   const kernels = await simulator(), values = await exactValues(i);
   if (!agrees(kernels)) return null;
+  kernels.choose(given.driver);
   const row = { ...completed(kernels, values).row, ...values };
   const { made, status } = playbackOf(unpack(base), kernels, row);
   return status === 0 ? { ...made, ...facts, tried: false, parameters: row, picture: null } : null;
@@ -146,6 +147,7 @@ let isSame = null;
 // Whether the page simulates what the run recorded: kernels that have changed since must not pass for the run's.
 function agrees(kernels) {
   if (isSame !== null || !data.kept.length) return isSame ?? true;
+  kernels.choose(given.driver);
   const base = unpack(data.kept[0]), { made } = playbackOf(base, kernels, base.parameters);
   isSame = made.n_steps === base.n_steps && [..."xy"].every((name) => made[name].every((row, e) => row.every((value, k) => {
     const recorded = base[name][e][k];
@@ -155,7 +157,6 @@ function agrees(kernels) {
 }
 
 export class Explorer {
-  /** @param {import("./player.js").Player} player */
   constructor(player) {
     this.player = player;
     this.box = $("explore");
@@ -168,6 +169,7 @@ export class Explorer {
     this.base = kept;
     if (given.refused) return this.refuse(given.refused);
     this.values = { ...kept.parameters };
+    this.driver = given.driver;
     this.sliders = new Map();
     const lines = given.space.filter(({ searched, name }) => searched && !given.unused.includes(name)).map((part) => this.slider(part));
     this.said = element("p", { class: "tried", role: "status" }, "Try other values: move a slider.");
@@ -176,9 +178,10 @@ export class Explorer {
       made.addEventListener("click", act);
       return made;
     };
+    const drivers = Object.keys(given.drivers);
     this.box.replaceChildren(
       element("div", { class: "said" }, this.said, element("div", { class: "presets" },
-        button("As found", () => this.set(this.base.parameters), "The values of the chosen scenario"),
+        ...(drivers.length > 1 ? [this.drivers(drivers)] : []), button("As found", () => this.set(this.base.parameters), "The values of the chosen scenario"),
         button("Defaults", () => this.set(Object.fromEntries(given.space.map((part) => [part.name, part.default]))), "The scenario's own defaults"),
         button("Copy values", (event) => this.copy(event.currentTarget), "The values, as options of bridgegen draw and search"))),
       element("div", { class: "sliders" }, ...lines));
@@ -189,6 +192,14 @@ export class Explorer {
     this.box.replaceChildren(element("p", { class: "muted small" }, `Its motion is replayed, not simulated here: ${why}.`));
   }
 
+  // The driver at the wheel: the run's, or another one that ships.
+  drivers(names) {
+    const made = element("select", { "aria-label": "Driver", title: "Another driver in the same encounter" }, ...names.map((name) => element("option", { value: name }, name)));
+    made.value = given.driver;
+    made.addEventListener("change", () => { this.driver = made.value; this.set(this.values); });
+    return made;
+  }
+
   addMap() {
     const parts = given.space.filter(({ name }) => this.sliders.has(name));
     // First those that the failures differ in most from other rows.
@@ -197,6 +208,7 @@ export class Explorer {
     const ready = async () => {
       const kernels = await simulator();
       return (values) => {
+        kernels.choose(this.driver);
         const { steps, status } = kernels.run(completed(kernels, { ...this.values, ...values }).row);
         if (status !== 0) return -1;
         kernels.judge(steps, status);
@@ -233,6 +245,7 @@ export class Explorer {
     try {
       const kernels = await simulator(); // the first time some 50 ms
       if (!agrees(kernels)) return this.refuse("the kernels of this page give another motion than the run recorded");
+      kernels.choose(this.driver);
       const { row } = completed(kernels, this.values);
       for (const name of this.sliders.keys()) this.write(name, row[name], name === moved && row[name] === Number(this.sliders.get(name).range.value));
       const { made, status } = playbackOf(this.base, kernels, row);
@@ -252,14 +265,14 @@ export class Explorer {
     const fails = Boolean(found?.counts && data.summary.harm); // other rules count otherwise, which the page does not know
     this.said.classList.toggle("hit", fails);
     const least = made.closest === null ? "" : `; closest ${quantity(made.distance[made.closest], "m")} at ${seconds(made.closest)}`;
-    let text = `No conflict${least}.`;
+    let text = `${this.driver}: no conflict${least}.`;
     if (found) {
       const whom = found.partner ? ` with ${found.partner}` : "", severe = found.conflict === "contact" ? `, MAIS3+ ${shareText(found.severity)}` : "";
       const named = found.conflict === "contact" ? "collision" : found.conflict;
-      text = `${fails ? "FAILS: " : ""}${named}${whom} at ${seconds(found.instant)}: ${[found.type, found.rule].filter(Boolean).join(", ")}; responsible: ${found.responsible}${severe}${fails || !data.summary.harm ? "" : ". Not counted"}.`;
+      text = `${fails ? `${this.driver} FAILS: ` : ""}${named}${whom} at ${seconds(found.instant)}: ${[found.type, found.rule].filter(Boolean).join(", ")}; responsible: ${found.responsible}${severe}${fails || !data.summary.harm ? "" : ". Not counted"}.`;
       found.sentence = found.bare = text;
     }
-    this.said.textContent = text[0].toUpperCase() + text.slice(1);
+    this.said.textContent = text;
     this.player.swap(made);
   }
 

@@ -42,6 +42,8 @@ export class Simulator {
     this.at = {};
     this.bundles = {};
     for (const name of ["plan", "roads", "state", "record", "facts", "verdict"]) this.bundles[name] = this.put(tables[name], name);
+    this.records = new Map([[String(this.at.record.detections.shape), { at: this.at.record, place: this.bundles.record }]]);
+    this.driver = tables.driver;
     this.heap = this.top;
     this.take(1 << 18);
   }
@@ -66,6 +68,7 @@ export class Simulator {
     bundle.forEach((part, i) => {
       if (part.length === 3) {
         const [field, value, isReal] = part;
+        if (field === "driver_code") this.code = at;
         if (isReal) view.setFloat64(at, value, true);
         else whole(this.codes.has(field) && value ? this.exports.address(value) : value, at);
         at += 8;
@@ -100,6 +103,20 @@ export class Simulator {
       if (from < 0) bytes.fill(0, place, place + size);
       else bytes.set(this.data.subarray(from, from + size), place);
     }
+  }
+
+  /** Puts another driver that ships at the wheel; one that perceives records its detections. */
+  choose(driver) {
+    if (driver === this.driver) return;
+    const { code, detections } = this.tables.drivers[driver], shape = String(detections);
+    if (!this.records.has(shape)) {
+      const record = this.tables.record.map((part) => (part[0] === "detections" ? [part[0], part[1], detections, -1] : part));
+      const place = this.put(record, "record");
+      this.records.set(shape, { at: this.at.record, place });
+    }
+    ({ at: this.at.record, place: this.bundles.record } = this.records.get(shape));
+    new DataView(this.memory.buffer).setBigInt64(this.code, BigInt(this.exports.address(code)), true);
+    this.driver = driver;
   }
 
   /** An array of a bundle, as long as no memory is added. */

@@ -11,19 +11,24 @@ import zlib
 from base64 import b64encode
 from functools import cache
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from bridgegen.base._elementary_kernels import FUNCTIONS
 from bridgegen.base.compilation.folder import PACKAGE, with_imported
 from bridgegen.base.errors import InputError
+from bridgegen.drivers import STORYBOARD, get
 from bridgegen.drivers._weather_columns import FRICTION
 from bridgegen.openx.openscenario.values import Expr, ParameterRef, Value
+from bridgegen.simulation.embedded import _memory_kernels as memory
 from bridgegen.simulation.embedded.addresses import CALLED, FIELDS, addressed
 from bridgegen.simulation.embedded.drivers import DEMANDS
 from bridgegen.simulation.embedded.places.network import Network
 from bridgegen.simulation.embedded.program import Program
+
+if TYPE_CHECKING:
+    from bridgegen.simulation.embedded.batch import Batch
 
 UNSET = ("x", "y", "h", "v", "a", "offset", "lights")
 """Arrays of `Record` that hold anything before a row runs."""
@@ -77,10 +82,7 @@ def tables(
     if roads.is_uneven(network):
         raise InputError("an entity starts on a road whose length its path does not share")
     batch = Batch(program, roads, np.array([network]), {})
-    order = list(CALLED)
-    plan = addressed(
-        batch.plan, DEMANDS.get(program.driver.name), lambda kernel: 1 + order.index(kernel)
-    )
+    plan = _coded(batch.plan, program)
     unset: Any = {name: np.zeros_like(getattr(batch.record, name)) for name in UNSET}
     data = bytearray()
     first, each = np.moveaxis(roads.station[network], -1, 0).tolist()
@@ -94,6 +96,8 @@ def tables(
         "codes": FIELDS,
         "unset": UNSET,
         "friction": FRICTION,
+        "driver": program.driver.name,
+        "drivers": _others(program, roads, batch, network),
         "functions": FUNCTIONS,
         "parameters": dict(program.parameters),
         "slots": [_as_json(slot) for slot in program.slots],
@@ -101,6 +105,39 @@ def tables(
         "aside": {"slots": program.aside_slots.tolist(), "each": roads.sides[network].tolist()},
         "noise": _noise(program),
     }
+
+
+def _coded(plan: memory.Plan, program: Program) -> memory.Plan:
+    """Return a plan with the numbers of the kernels that it needs, in place of addresses."""
+    order = list(CALLED)
+    drives = DEMANDS.get(program.driver.name)
+    return addressed(plan, drives, lambda kernel: 1 + order.index(kernel))
+
+
+def _others(
+    program: Program, roads: Network, batch: "Batch", network: int
+) -> dict[str, dict[str, Any]]:
+    """Return the number of the kernel of each driver that ships, and the shape of its detections.
+
+    A driver is left out where more differs.
+    """
+    from bridgegen.simulation.embedded.batch import Batch  # numba is slow to import
+
+    found: dict[str, dict[str, Any]] = {}
+    here = _coded(batch.plan, program)
+    for name in DEMANDS if program.driver != STORYBOARD else ():
+        changed = program.changed(driver=get(name))
+        if changed.driver.perceives and not program.driver.perceives:
+            continue  # the road tables of others have no hypotheses to predict by
+        other = Batch(changed, roads, np.array([network]), {})
+        plan = _coded(other.plan, changed)
+        states: Any = zip(batch.state, other.state, strict=True)
+        numbers: Any = zip(here._replace(driver_code=0), plan._replace(driver_code=0), strict=True)
+        same = all(a.shape == b.shape for a, b in states)
+        if same and all(a == b for a, b in numbers if not isinstance(a, np.ndarray)):
+            shape = list(other.record.detections.shape[1:])
+            found[name] = {"code": plan.driver_code, "detections": shape}
+    return found
 
 
 def _as_json(slot: Value) -> Any:
