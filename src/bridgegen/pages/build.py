@@ -104,7 +104,7 @@ def build_report(
         regions: the critical ones, in the form of `regions.record`, if they are known.
         confirmations: of its scenarios in other simulators.
         hashes: digests of the run's inputs and results.
-        coverage: whether to compute coverage.
+        coverage: whether to compute coverage, and what the page simulates with; not for news.
         files: those of ``kept``, by their paths relative to the page, if the page includes them.
         more: whether the page includes the motion of more scenarios than ``kept``.
         triage: failure modes and bound of the run, if they are known.
@@ -188,7 +188,7 @@ def build_report(
         criteria=judged,
         screened=screened_payload(notes, pipeline.space),
         happening=happening,
-        simulation=simulation_payload(pipeline) if more else None,
+        simulation=simulation_payload(pipeline) if coverage else None,
     )
 
 
