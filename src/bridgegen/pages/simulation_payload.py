@@ -1,5 +1,6 @@
 """What a report simulates scenarios with: kernels, a storyboard's tables, the parameters' rules."""
 
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -22,6 +23,9 @@ TRIED = 64
 """Number of random rows that are run first, so that the ways are planned that rows may need."""
 
 
+MOST = 450_000
+"""Maximum number of characters of the tables: those of the catalogue take 16,000 to 400,000."""
+
 COLUMNS = ("KIND", "TYPE", "RESPONSIBLE", "RULE", "INSTANT", "DECIDED", "ZONE_EGO", "ZONE_OTHER")
 """Columns of a verdict's whole numbers that the page reads."""
 
@@ -39,10 +43,13 @@ def simulation_payload(pipeline: Pipeline) -> dict[str, Any]:
         room = verdict_of(*rollout.shape[1:])
         program = runner.embedded.program
         found = portable.tables(program, roads, facts=facts, verdict=room)
+        if (size := len(found["data"])) > MOST:
+            kilobytes = f"{size // 1000} kB of a page, {MOST // 1000} kB at most"
+            raise InputError(f"its road network takes {kilobytes}")
     except InputError as error:
         return {"refused": str(error)}
     return found | {
-        "kernels": deflated(portable.MODULE.read_bytes()),
+        "kernels": _kernels(),
         "space": _space(space),
         "judged": {
             "columns": {name.lower(): getattr(codes, name) for name in COLUMNS},
@@ -53,6 +60,11 @@ def simulation_payload(pipeline: Pipeline) -> dict[str, Any]:
         },
         "unused": [name for name in space.names if name in runner.source.unused_names],
     }
+
+
+@cache
+def _kernels() -> str:
+    return deflated(portable.MODULE.read_bytes())
 
 
 def facts_of(rollout: Rollout, row: int, corridor: Float) -> Facts:
