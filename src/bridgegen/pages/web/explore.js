@@ -4,7 +4,7 @@ import { $, copy, element } from "./common.js";
 import { ExploreMap } from "./explore_map.js";
 import { columns, data } from "./data.js";
 import { inflated } from "./inflate.js";
-import { number, quantity, shareText, turned, worded } from "./numbers.js";
+import { quantity, shareText, turned, worded } from "./numbers.js";
 import { Simulator } from "./simulator.js";
 import { unpack } from "./unpack.js";
 
@@ -183,7 +183,7 @@ export class Explorer {
       element("div", { class: "said" }, this.said, element("div", { class: "presets" },
         ...(drivers.length > 1 ? [this.drivers(drivers)] : []), button("As found", () => this.set(this.base.parameters), "The values of the chosen scenario"),
         button("Defaults", () => this.set(Object.fromEntries(given.space.map((part) => [part.name, part.default]))), "The scenario's own defaults"),
-        button("Copy values", (event) => this.copy(event.currentTarget), "The values, as options of bridgegen draw and search"))),
+        button("Copy values", (event) => this.copy(event.currentTarget), "The values, as options of bridgegen search"))),
       element("div", { class: "sliders" }, ...lines));
     if (this.sliders.size > 1) this.addMap();
   }
@@ -278,6 +278,6 @@ export class Explorer {
 
   copy(button) {
     const row = this.row ?? this.values;
-    copy([...this.sliders.keys()].map((name) => `--fix ${name}=${number(row[name])}`).join(" "), button);
+    copy([...this.sliders.keys()].map((name) => `--fix ${name}=${row[name]}`).join(" "), button);
   }
 }
