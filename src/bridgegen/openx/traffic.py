@@ -215,6 +215,8 @@ class _Populated:
         wanted, made = number(action.number_of_vehicles), 0
         if wanted > MOST:
             raise InputError(f"a swarm may have {MOST} vehicles, got {wanted:g}")
+        # Without replacement, and all at once: drawing again until a place is free would not end on
+        # a map that is full.
         order = random.choice(
             len(weight), int((weight > 0.0).sum()), replace=False, p=weight / weight.sum()
         )
