@@ -200,7 +200,7 @@ def _read(path: Path) -> Iterator[RecordedTraffic]:
     if not with_states:
         raise FileFormatError(f"{path}: holds no osi3.GroundTruth or SensorView with objects")
     notes = [f"not read: {name[:80]}" for name in left_out]
-    # One topic may have the map for all: writers send it once, not with each message.
+    # One topic may have the map for all.
     lanelets = next((trace.lanelets for trace in traces.values() if trace.lanelets), ())
     for trace in with_states:
         yield trace.traffic(trace.lanelets or lanelets, notes)
