@@ -132,6 +132,7 @@ def read_document(path: Path) -> Document:
         if not path.is_file():
             raise FileFormatError(f"no such file: {path}")
         with path.open("rb") as file:
+            # One byte more than allowed, by which the parser sees that there is too much.
             data = file.read(MAX_BYTES + 1)
     except OSError as error:
         raise FileFormatError(f"cannot be read: {error.strerror} ({path})") from None

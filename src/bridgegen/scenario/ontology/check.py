@@ -40,8 +40,7 @@ def check(individuals: Individuals, scenario: "LogicalScenario | None" = None) -
             it, the ranges that the individuals declare themselves.
     """
     compiled, quads = _compiled(scenario), frozenset(individuals.quads)
-    # An exported scenario is checked when it is made and again when it is written; the second is
-    # free.
+    # A scenario may be checked when it is built and again when it is exported; the second is free.
     if quads in compiled.conforming:
         return []
     store = ox.Store()

@@ -113,7 +113,8 @@ def load(path: Path | str) -> Individuals:
 
 def from_bytes(data: bytes, place: str = "document") -> Individuals:
     """Read individuals from RDF/XML text; see `load`."""
-    # By expat, before the RDF parser: that one has no bound of depth, and would expand entities.
+    # Before the RDF parser: depth and DOCTYPE are refused here, with a line, whatever that parser
+    # would make of them.
     _check_xml(data, place)
     try:
         quads = list(ox.parse(data, format=_RDF_XML, base_iri=SCENARIOS + "unnamed"))
