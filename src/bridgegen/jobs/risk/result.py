@@ -281,8 +281,6 @@ class Risk:
         found = {"evaluations": float(self.weighted.evaluations)}
         for name, finding in self.findings.items():
             p, nan = finding.probability, float("nan")
-            # NaN where an estimate is not believed: a limit of `--fail-if` is then not met, so no
-            # doubt passes as success.
             found[name] = nan if p is None else p.estimate
             found[f"{name}_upper"] = nan if p is None else p.upper
             for unit, words in (("h", "hour"), ("km", "km")):

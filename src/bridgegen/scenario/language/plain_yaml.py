@@ -198,7 +198,7 @@ def _scalar(text: str, *, quoted: bool) -> object:
         return _SPECIAL[text]
     if _INTEGER.fullmatch(text):
         # `int` of a long text takes time that grows with its square, and Python refuses more than
-        # 4,300 digits; beyond 309 digits a number is infinite anyway, which the readers refuse.
+        # 4,300 digits.
         return int(text) if len(text) <= 300 else float(text)
     if _FLOAT.fullmatch(text):
         return float(text)
