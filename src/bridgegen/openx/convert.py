@@ -116,6 +116,7 @@ def import_file(
         model = opendrive_read.read(data, str(file), notes)
         individuals = individuals_from_opendrive(model, _seen_from(out, file), digest_of(data))
         notes += losses(model)
+    # An ontology may have been edited by hand, which a second import must not undo.
     if out.exists():
         raise StorageError(f"{out}: exists already, and is not overwritten")
     save(individuals, out)

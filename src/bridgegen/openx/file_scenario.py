@@ -126,6 +126,8 @@ def load_file_scenario(path: Path, distribution: Path | None = None) -> FileScen
     if distribution is not None:
         given = dst.read_distribution(distribution)
         named = distribution.parent / str(given.scenario_file.filepath)
+        # Compared and never opened: a distribution of a stranger's must not make us read a file of
+        # its choice.
         if named.resolve() != path.resolve():
             raise FileFormatError(
                 f"{distribution}: ScenarioFile must name the scenario that is searched, {path}, "
@@ -190,6 +192,8 @@ def _kept(ranges: Ranges) -> tuple[tuple[Bound, ...], tuple[Bound, ...]]:
     }
     shape = tuple(bound for bound in ranges.bounds if bound.target in even)
     try:
+        # Bounds that leave some combination nothing are no shape of a space; they are kept as
+        # checks, so that such a row fails by itself.
         SearchSpace(Constraints(parameters, shape, ranges.derived, tuple(Axis)))
     except ScenarioError:
         shape = ()
@@ -315,6 +319,7 @@ class FileSource:
         """See `Source`."""
         variant = self._scenario.variant(values)
         road_file = road_file or variant.roads.name
+        # An exported file stands elsewhere: references to files beside it would lead nowhere.
         storyboard = with_values(_self_contained(variant.storyboard), values, self._scenario.texts)
         if self._driver is not None:
             storyboard = with_driver(storyboard, self._driver, self._ideal)

@@ -72,6 +72,8 @@ def projection(header: Header, place: str) -> Project:
 
     try:
         crs = CRS.from_user_input(header.geo_reference.strip())
+        # `always_xy`: by its definition EPSG:4326 has latitude first, and tools that follow it swap
+        # the axes.
         to_map = Transformer.from_crs("EPSG:4326", crs.to_2d(), always_xy=True)
     except ProjError as error:
         raise FileFormatError(

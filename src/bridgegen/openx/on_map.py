@@ -106,6 +106,8 @@ def _require_room(scenario: LogicalScenario, road_map: RoadMap) -> None:
     here = on_map(scenario, road_map)
     space = here.space(Axis)
     here.space()
+    # The decoder keeps all constraints, so what it gives at the corners says how far starts really
+    # reach; the declared ranges alone would refuse places that fit.
     X = space.decode(probes(space.n_var))
     queued = {name: jam.participants for jam in here.story.jams for name in jam.participants}
     ranges: dict[str, tuple[float, float]] = {}
@@ -239,6 +241,8 @@ def _on_sites(scenario: LogicalScenario, road_map: RoadMap) -> LogicalScenario:
         name for name, parameter in scenario.parameters.items() if parameter.axis is Axis.STATIC
     }
     names = site_names(road_map)
+    # A category, static as the roads are: values that follow from the place are tables by its
+    # number, so that one search has rows of many junctions.
     index = Parameter(
         PLACE,
         Axis.STATIC,
@@ -264,6 +268,7 @@ def _on_sites(scenario: LogicalScenario, road_map: RoadMap) -> LogicalScenario:
         for name, parameter in scenario.parameters.items()
         if name in static
     ]
+    # A table needs a number for each place; one that no speed reaches bounds nothing.
     limits = [_lowest_limit(site) or _NO_LIMIT for site in road_map.sites]
     sharpest = [_sharpest(site) for site in road_map.sites]
     limit = _LIMIT if min(limits) < _NO_LIMIT else None
@@ -322,6 +327,8 @@ def site_names(road_map: RoadMap) -> tuple[str, ...]:
     """Return a word for each site: its road; or its junction, and the road that is leg A there."""
     words = [re.sub(r"[^a-z0-9]", "_", _word(site).lower()) for site in road_map.sites]
     return tuple(
+        # Cut to a length that a category's names may have; the number keeps those apart that are
+        # then alike.
         word[:56] if words.count(word) == 1 and len(word) < 57 else f"{word[:56]}_{k}"
         for k, word in enumerate(words)
     )

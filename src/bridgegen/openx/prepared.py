@@ -155,13 +155,18 @@ def _route(roads: OpenDrive, starts: Starts, name: str, position: osc.Position |
     road, lane = roads.road(starts.text(where.road_id)), int(starts.text(where.lane_id))
     s = starts.number(where.s)
     here = Stretch(road.id, section_index(road, s), lane)
+    # By a digest of the name, not `hash`, which differs from process to process. Every row, worker
+    # and resumed search then has the same route.
     seed = hashlib.sha256(name.encode()).digest()[:8]
     random = np.random.default_rng(int.from_bytes(seed, "big"))
     places, gone = [osc.LanePosition(road.id, str(lane), s)], 0.0
+    # Sorted: the draw is among a list, whose order must not be that of a set.
     while gone < LONGEST and (following := sorted(set(next_stretches(roads, here)))):
         here = following[int(random.integers(len(following)))]
         begin, end = _ends(roads, here)
         gone += end - begin
+        # Only behind forks: elsewhere the way is the only one, and fewer waypoints are fewer to
+        # plan.
         if len(following) > 1:
             places.append(_at_its_end(roads, here))
     if places[-1] != (last := _at_its_end(roads, here)):
@@ -200,5 +205,7 @@ def prepared(scenario: OpenScenario, roads: OpenDrive, place: str) -> OpenScenar
         InputError: an extra is missing.
         FileFormatError: the map lacks what they need; by line.
     """
+    # In this order: places on the globe become places of the map, on which traffic is put; and
+    # traffic has random routes.
     whole = populated(on_plane(scenario, roads, place), roads, place)
     return with_random_routes(whole, roads, place)

@@ -147,6 +147,8 @@ class OntologySource:
         static = tuple(
             name for name, parameter in scenario.parameters.items() if parameter.axis is Axis.STATIC
         )
+        # A map's roads are what they are, so static parameters leave the search; bounds that depend
+        # on them use the map's own values.
         self.static_names = () if road_map else static
         self.unused_names = static if road_map and not road_map.sites else ()
         types = {
@@ -165,6 +167,8 @@ class OntologySource:
         self.variant_names = tuple(choices)
         counts = (range(len(choice)) for choice in choices.values())
         self.variants = tuple(tuple(map(float, key)) for key in product(*counts)) if choices else ()
+        # Checked here, before anything is read or compiled for them: of so many the user should
+        # hear at once.
         if len(self.variants) > MOST_VARIANTS:
             together = ", ".join(choices)
             raise InputError(
@@ -230,6 +234,7 @@ class OntologySource:
             scenario = at_site(scenario, self._map.model, site, int(values[PLACE]))
         if site and road_file:
             site = replace(site, map_file=road_file)
+        # By way of the individuals, so that what the checks look at is what the files are made of.
         individuals = build(
             scenario,
             values,

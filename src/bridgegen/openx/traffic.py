@@ -139,6 +139,8 @@ class _Populated:
         return None
 
     def _vehicles(self, name: str, action: Source, actions: osc.InitActions) -> Iterator[Made]:
+        # Not `hash`: that of a text differs from process to process, and runs on several workers
+        # must get the same vehicles.
         seed = hashlib.sha256(name.encode()).digest()[:8]
         random = np.random.default_rng(int.from_bytes(seed, "big"))
         kinds = _kinds(action, self._starts)
@@ -165,6 +167,7 @@ class _Populated:
         if rate <= 0.0:
             raise InputError(f"rate [1/s] of a source must be greater than 0, got {rate:g}")
         away = elementary.hypot(self._places.x - at[0], self._places.y - at[1])
+        # Places are STEP apart: a source of a smaller radius, or of none, would miss them all.
         near = np.flatnonzero(away <= max(radius, STEP))
         if not near.size:
             raise InputError(f"no lane is within {radius:g} m of the source")
@@ -196,6 +199,8 @@ class _Populated:
         dx, dy = self._places.x - x, self._places.y - y
         along, aside = dx * c + dy * s - number(action.offset), dy * c - dx * s
         major, minor = number(action.semi_major_axis), number(action.semi_minor_axis)
+        # An axis may be 0. What is so far outside that the quotient overflows is infinitely far,
+        # and stays outside.
         with np.errstate(over="ignore"):
             inside = elementary.hypot(along / max(major, 1e-9), aside / max(minor, 1e-9)) <= 1.0
         inside &= elementary.hypot(along, aside) >= number(action.inner_radius)
@@ -215,6 +220,8 @@ class _Populated:
         wanted, made = number(action.number_of_vehicles), 0
         if wanted > MOST:
             raise InputError(f"a swarm may have {MOST} vehicles, got {wanted:g}")
+        # Without replacement, and all at once: drawing again until a place is free would not end on
+        # a map that is full.
         order = random.choice(
             len(weight), int((weight > 0.0).sum()), replace=False, p=weight / weight.sum()
         )
@@ -299,6 +306,7 @@ def _shares(weights: Sequence[float]) -> list[float]:
     most = max(weights)
     if not 0.0 < most < math.inf:
         raise InputError("the weights of a distribution of traffic must not all be 0")
+    # By the greatest first: the sum of huge weights would be infinite.
     scaled = [weight / most for weight in weights]
     return [value / sum(scaled) for value in scaled]
 

@@ -10,8 +10,12 @@ from bridgegen.recordings.readers.states import centre_ahead
 from bridgegen.recordings.readers.table import RecordedTraffic
 from bridgegen.simulation.rollout import Rollout
 
+# Of WOMD's sample, both near misses that were found at first were fragments of less than 1 s:
+# velocities of 10 states are worth little.
 LONG_ENOUGH = 1.0
 """Time for which a participant must be recorded [s]; with less it is a fragment."""
+# A body that stands must not be turned round by −0.01 m/s: its predicted path led backwards, and a
+# car that braked to a stop 0.4 m before another was in no conflict.
 REVERSES = 0.3
 """Backward speed below which motion is noise of a body that stands [m/s]."""
 
@@ -87,6 +91,8 @@ def excerpt(
     box = np.empty((len(who), 3))
     wanted = np.arange(begin, end + 1)
     for e, p in enumerate(who):
+        # Arrays of a rollout have all instants; who is absent needs a place in them, and `present`
+        # says that it is none.
         kept = np.clip(wanted, clock.begin[p], clock.end[p])
         present[0, e] = kept == wanted
         at = kept - clock.begin[p] + traffic.first[p]
@@ -94,6 +100,8 @@ def excerpt(
         ahead = centre_ahead(int(traffic.kind[p]), float(traffic.length[p]))
         box[e] = traffic.length[p], traffic.width[p], ahead
         cosine, sine = np.cos(h), np.sin(h)
+        # The component along the heading: the norm of a noisy velocity of who stands is 0.6 m/s,
+        # its component 0.
         v = traffic.vx[at] * cosine + traffic.vy[at] * sine
         states[:, 0, e] = (
             traffic.x[at] - ahead * cosine,

@@ -205,6 +205,9 @@ def write_failures(file: FailureFile, changed: Mapping[str, Failure]) -> None:
             "begin another folder"
         )
     try:
+        # The text is edited by lines, not written anew, to keep people's comments. So it is read
+        # again before it replaces theirs: whatever layout the edit did not foresee is refused, and
+        # nothing is written.
         again, why = _parsed(data, file.path).failures, ""
     except FileFormatError as error:
         again, why = {}, f" ({error.problems[0]})"
@@ -246,6 +249,7 @@ _Shape = TypeVar("_Shape", bound=ShapedSection)
 def _bytes(path: Path) -> bytes | None:
     try:
         with path.open("rb") as file:
+            # One byte more than allowed, by which the reader of YAML sees that it is too large.
             return file.read(MAX_BYTES + 1)
     except FileNotFoundError:
         return None
@@ -314,9 +318,11 @@ def _edited(file: FailureFile, changed: Mapping[str, Failure]) -> str:
                 continue
             later = (keys[item][0] for item in names[number:] if item in keys)
             start, end = keys.get(name) or (next(later, blocks[id][1]),) * 2
+            # Comments above a value that is written anew stay above it.
             text = "".join(line for line in lines[start:end] if line.lstrip().startswith("#"))
             text += _entry(name, values[name], inner) if name in values else ""
             edits.append((start, end, f"{number:02}", text))
+    # From the last line to the first: an edit does not move those that are still to come.
     for start, end, _, text in sorted(edits, reverse=True):
         lines[start:end] = [text]
     return "".join(lines)
@@ -367,6 +373,8 @@ def _entry(name: str, value: Any, indent: int) -> str:
 
 _PLAIN = re.compile(r"[A-Za-z]([A-Za-z0-9_./;()%=<>+ -]*[A-Za-z0-9_.)%])?", re.ASCII)
 _UNPRINTABLE = re.compile("[\x7f-\x9f\u2028\u2029\ufeff\ufffe\uffff]")
+# YAML 1.1 reads these as truths or nothing, and readers of 1.1 are still common; quoted, they are
+# texts to all.
 _WORDS = ("true", "false", "null", "yes", "no", "on", "off", "y", "n")
 
 

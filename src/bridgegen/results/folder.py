@@ -45,6 +45,8 @@ def claim(
     Raises:
         StorageError: the folder holds another job or something else, or cannot be written.
     """
+    # Through JSON, as the file's are: tuples become lists, and keys texts, so that equal settings
+    # compare equal.
     made: dict[str, Any] = json.loads(json.dumps(settings))
     path = folder / file
     try:
@@ -64,7 +66,10 @@ def claim(
         raise StorageError(f"{folder}: cannot be written: {error.strerror}") from None
     except ValueError as error:
         raise StorageError(f"{path}: the file is damaged: {error}") from None
+    # Until there is a result, other settings contradict nothing: a first call with a mistake need
+    # not be cleared away by hand.
     known: dict[str, Any] = before if before and has_results else {}
+    # A folder of an earlier version lacks settings that came later; they had their defaults then.
     compared = {**json.loads(json.dumps(defaults or {})), **known} if known else {}
     asked = made if grows else {**made, **known}
     differ = [

@@ -40,6 +40,7 @@ class TargetSpeed:
     def forward(self) -> None:
         """Forward it, if it has changed."""
         asked = self._joint.target_speed
+        # NaN at first, which differs from everything, so that the first speed is forwarded, too.
         if asked != self._last:
             self._last = asked
             self._set_speed(3.6 * asked)
@@ -74,6 +75,8 @@ class Autopilot:
     def begin(self, server: Server) -> None:
         """See `EgoController`."""
         self._ego.set_autopilot(True, self._port)
+        # The route is the scenario's: a lane change of the Traffic Manager's own would be another
+        # test.
         self._manager.auto_lane_change(self._ego, False)
         self._manager.set_path(self._ego, self._path)
 
@@ -180,6 +183,8 @@ class External:
         """
         import carla
 
+        # CARLA does not tell whether a client controls an actor. The ego is held by a control of
+        # ours, and the first that differs from it is the client's.
         hold = carla.VehicleControl(brake=1.0, hand_brake=True)
         self._stage.do(self._stage.drives(hold))
         until = time.monotonic() + WAIT_SECONDS

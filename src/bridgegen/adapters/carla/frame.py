@@ -68,6 +68,8 @@ def placed(
     import carla
 
     x, y, h = float(state[0]), float(state[1]), float(state[2])
+    # The middle of the box is what both worlds have in common: an actor's origin is somewhere in
+    # its model, an entity's reference point is its rear axle.
     ahead, aside = centre - box.location.x, box.location.y  # aside: the origin, left of the centre
     cos, sin = math.cos(h), math.sin(h)
     return carla.Transform(
@@ -107,6 +109,8 @@ def seen(
             x - ahead * cos + aside * sin,
             y - ahead * sin - aside * cos,
             h,
+            # The component along the heading: a car that settles or slides has speed across, which
+            # is no motion of its wheels.
             max(v_x * cos + v_y * sin, 0.0),
         ]
     )

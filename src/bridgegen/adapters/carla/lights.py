@@ -46,6 +46,8 @@ def matched(
     Raises:
         InputError: lights that none is near, all at once.
     """
+    # Nearest pairs first, over all lights at once: light by light, one could take its neighbour's.
+    # The name breaks ties, so that each run matches alike.
     pairs = sorted(
         (min(math.dist(spot, pair) for pair in spots), name, i)
         for name, spot in wanted.items()
@@ -94,6 +96,7 @@ class Lights:
         """Freeze all lights, and switch them off."""
         if self._actors:
             self._world.freeze_all_traffic_lights(True)
+        # No state: so every light is set once, whatever the last scenario left.
         self._shown = [-1] * len(self._actors)
         for i in range(len(self._actors)):
             self._set(i, 0)

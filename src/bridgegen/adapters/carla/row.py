@@ -104,6 +104,8 @@ class CarlaRow:
         while True:
             if self.is_stopped():
                 raise Stopped
+            # The order of an instant is the embedded simulator's: triggers, driver, motion. With a
+            # kinematic ego the rollout then equals the embedded one to the bit.
             joint.decide(k)
             sky = self._environment(server, k, sky, dry)
             if k == 0:
@@ -115,6 +117,8 @@ class CarlaRow:
             control: Any = None
             if self.controller is not None:
                 control = self.controller.control(k)
+                # The ego's own motion here does not count: `impose` replaces it by CARLA's after
+                # the tick.
                 joint.move(k, 0.0, 0.0)
             else:
                 joint.move(k, *joint.demand(k))
@@ -122,6 +126,8 @@ class CarlaRow:
                 return
             k += 1
             moves = stage.moves(joint.states(k), joint.present(k), ego=self.controller is None)
+            # All commands of an instant in one call, before its tick: one by one, each would be a
+            # round trip.
             stage.do([*moves, *stage.drives(control)])
             snapshot = server.tick()
             stage.check(snapshot)
@@ -136,6 +142,8 @@ class CarlaRow:
         sky = self.weather.at(k, joint.weather, joint.events)
         if last is None or sky.fields != last.fields:
             server.world.set_weather(sky.parameters())
+        # The wheels' friction is scaled, where CARLA has friction triggers: a trigger is a box that
+        # changes the tyres of every vehicle in it, and would have to cover the map.
         if self.controller is not None and (last is None or sky.friction != last.friction):
             friction_of(self.stage.ego, sky.friction, dry)
         self.lights.show(joint.lights)

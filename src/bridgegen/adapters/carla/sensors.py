@@ -85,6 +85,8 @@ def matched(answer: Checked, truth: Truth, view: View) -> Float:
     rows = np.zeros((n_entities, column.DETECTION))
     free = [e for e in range(1, n_entities) if truth.present[e]]
     outlines = {e: view.outline(truth.seen(e)) for e in free}
+    # Stable, so that detections of equal confidence are matched in the detector's order, at each
+    # run.
     for i in np.argsort(-answer.confidence, kind="stable").tolist():
         if answer.boxes is not None:
             x, y = truth.to_world(float(answer.boxes[i, 0]), float(answer.boxes[i, 1]))
@@ -138,6 +140,8 @@ def _placed(truth: Truth, e: int, view: View, pixels: Float) -> tuple[float, flo
     """
     outline = view.outline(truth.seen(e))
     assert outline is not None
+    # Both feet by the same projection: a perfect box has no error then, whatever the shape of the
+    # body. Placing by the foot alone would be half a car's length off.
     mine, theirs = view.foot(pixels), view.foot(outline)
     if mine is None or theirs is None:
         return None
@@ -192,6 +196,9 @@ class Eyes:
         self.view = View(WIDTH, HEIGHT, math.radians(FIELD_OF_VIEW), place)
         self._images: queue.SimpleQueue[Any] = queue.SimpleQueue()
         self._scans: queue.SimpleQueue[Any] = queue.SimpleQueue()
+        # Images and points arrive on other threads, some time after the tick that they are of. The
+        # number of a frame says which instant it shows; waiting for them at each tick would make
+        # every tick as slow as the slowest sensor.
         self._held: dict[int, list[Any]] = {}
         stage.attach(
             "sensor.camera.rgb",
@@ -316,6 +323,7 @@ class Eyes:
     def _ask(call: Any, *arguments: Any) -> Any:
         try:
             return call(*arguments)
+        # The detector is a user's own: whatever it raises costs the row, and not the search.
         except Exception as error:
             message = f"the detector: {type(error).__name__}: {error}"
             raise DriverError("raised", message) from error

@@ -49,6 +49,8 @@ class Turn:
         if self._depth == 1 and sys.platform != "win32":
             import fcntl
 
+            # `flock` ends with the process, for whatever reason; a lock that is a file's existence
+            # would outlive a process that is killed.
             self._file = self._path.open("a")
             while True:
                 try:
@@ -156,6 +158,8 @@ class Server:
             RuntimeError: as CARLA raises them.
         """
         world = self.world
+        # Put back after every row, by two calls: a search that is killed between batches leaves no
+        # server that waits for ticks which no client sends.
         before, now, weather = world.get_settings(), world.get_settings(), world.get_weather()
         now.synchronous_mode = True
         now.fixed_delta_seconds = TIME_STEP
@@ -172,6 +176,7 @@ class Server:
         """Advance the world by one step; return its snapshot."""
         frame = self.world.tick(self.access.timeout)
         snapshot = self.world.get_snapshot()
+        # Two clients that tick one server disturb each other without any error of CARLA's.
         if snapshot.frame != frame:
             raise ServerError(
                 ERROR,
@@ -288,6 +293,8 @@ class Server:
             stdin=subprocess.DEVNULL,
             stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,
+            # A session of its own, so that the server and all that its script begins can be ended
+            # together.
             start_new_session=True,
         )
         until = time.monotonic() + START_SECONDS
@@ -324,6 +331,7 @@ def sweep(client: "carla.Client", world: "carla.World") -> None:
         for actor in world.get_actors()
         if actor.attributes.get("role_name", "").startswith(MINE)
     ]
+    # The ego is called ``hero``, as other clients expect, so its name does not say whose it is.
     egos = {item.parent.id for item in mine if item.parent is not None}
     destroy(client, [*(item.id for item in mine), *egos])
 

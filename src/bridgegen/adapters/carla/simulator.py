@@ -96,6 +96,7 @@ class Incidents:
         """
         found = red_lights(rollout)
         last: dict[str, int] = {}
+        # Sensors report on other threads, in any order; what is told twice is one.
         for frame, kind, what in sorted(set(self._told)):
             k = frame - self._first
             if k < 0:  # when it settled
@@ -166,6 +167,7 @@ class Found:
         if self.eyes is not None:
             detections = self.eyes.detections
             n = int(rollout.n_steps[0])
+            # As all states of a rollout: behind its end, the last instant's are repeated.
             detections[:, n:] = detections[:, n - 1 : n]
             rollout = replace(rollout, detections=detections[np.newaxis])
         return rollout
@@ -288,6 +290,7 @@ class CarlaSimulator:
         parts = []
         for i, p in enumerate(rows.tolist()):
             row = {name: float(column[i]) for name, column in columns.items()}
+            # One row a turn, so that other searches on the machine get the server between two rows.
             with self._server.turn:
                 self._number += 1
                 parts.append((np.array([i]), self._row(roads, p, row, driver, dry)))
@@ -307,6 +310,8 @@ class CarlaSimulator:
         dry: bool,
     ) -> Rollout:
         found: Found | None = None
+        # A row is tried again from its start, with a scenario and a driver of their own: half of
+        # one has no meaning.
         for left in reversed(range(TRIES)):
             try:
                 joint = self.embedded.co_simulation(

@@ -159,6 +159,8 @@ class Stage:
         for e, name in enumerate(self._program.names):
             blueprint = library.find(self._model(e, name, known))
             dressed(blueprint, HERO if e == 0 else f"{MINE}.{name}")
+            # CARLA refuses to spawn where something is. Above the road nothing is, and each actor
+            # is higher than the last; the first instant puts them where they belong.
             spot = carla.Transform(frame.location(0.0, 0.0, ALOFT + APART * e))
             actor = self._server.world.spawn_actor(blueprint, spot)
             self.bodies.append(
@@ -167,6 +169,8 @@ class Stage:
             if e == 0:
                 self.ego: Any = actor
         moved = self.bodies if self._ego_is_moved else self.bodies[1:]
+        # Whoever is moved by the storyboard has no physics: else CARLA would drop and push it
+        # between two instants.
         self.do([carla.command.SetSimulatePhysics(body.id, False) for body in moved])
 
     def _model(self, e: int, name: str, known: set[str]) -> str:
@@ -222,6 +226,7 @@ class Stage:
         commands: list[Any] = [carla.command.ApplyTransform(body.id, spot)]
         if body.is_vehicle:
             velocity = frame.velocity(float(state[2]), float(state[3]) if is_there else 0.0)
+            # The velocity, too, though the place is set: sensors and agents read it.
             commands.append(carla.command.ApplyTargetVelocity(body.id, velocity))
         return commands
 
@@ -244,6 +249,8 @@ class Stage:
         brakes = carla.VehicleControl(brake=1.0, hand_brake=True)
         hold = carla.command.ApplyVehicleControl(ego.id, brakes)
         self.do([*self.moves(still, present, ego=True), hold])
+        # A car that is put on its wheels sinks into its suspension; without this, each row would
+        # begin with a jolt.
         for _ in range(SETTLING):
             snapshot = self._server.tick()
         self.check(snapshot)
@@ -310,6 +317,7 @@ class Stage:
 
 def dressed(blueprint: "carla.ActorBlueprint", role: str) -> None:
     """Set the role of a blueprint, and the first value of each of its attributes."""
+    # The first value and not CARLA's random one: images of one scenario are then alike.
     first = dict.fromkeys(("color", "driver_id"), "")
     for attribute in blueprint:
         if attribute.id == "role_name":

@@ -119,6 +119,7 @@ def of_quantities(physical: Float) -> dict[str, float]:
     Args:
         physical: ``(STATED,)`` or more, see ``bridgegen.drivers._weather_columns``.
     """
+    # All fourteen are always set: what is left out keeps the value of the last scenario.
     found = {name: field.preset for name, field in CARLA_FIELDS.items() if field.preset is not None}
     for index, column in enumerate(COLUMNS):
         parameter = STATED_BY.get(column.name)
@@ -146,6 +147,7 @@ def clamped(fields: Mapping[str, float]) -> dict[str, float]:
         value = fields[name]
         if name == "sun_azimuth_angle":
             value %= 360.0
+        # CARLA's client does not clamp.
         result[name] = float(min(max(value, field.low), field.high))
     return result
 

@@ -63,6 +63,7 @@ class Worlds:
     ) -> None:
         """Load a world, unless it is loaded already."""
         present = client.get_world()
+        # The world's id, too: another client may have loaded another one meanwhile.
         if key != self._key or present.id != self._id:
             self.take(make(client))
             self._key = key
@@ -97,6 +98,7 @@ class Generated:
             header = replace(model.header, geo_reference=NOWHERE)
             model = replace(model, header=header)
         self._text = to_xml(model).decode()
+        # By the text: rows with the same roads share a world.
         self.key = hashlib.sha256(self._text.encode()).hexdigest()
 
     def __call__(self, client: "carla.Client") -> "carla.World":
@@ -151,6 +153,8 @@ def check(roads: "carla.Map", way: Float, name: str) -> None:
     Raises:
         InputError: it is not.
     """
+    # CARLA reads broken or other maps without a word, so the route is looked at: some twenty points
+    # tell whether it is the same map.
     for x, y in way[:: max(len(way) // 20, 1)].tolist():
         spot = frame.location(x, y)
         waypoint = roads.get_waypoint(spot, True)

@@ -141,6 +141,7 @@ def imported_from(checkout: Path) -> Iterator[None]:
     before, finder = set(sys.modules), _NamesOnly()
     sys.meta_path.insert(0, finder)
     sys.path.insert(0, str(checkout))
+    # Nothing is written to the user's checkout, compiled files either.
     writes, sys.dont_write_bytecode = sys.dont_write_bytecode, True
     try:
         yield
@@ -149,6 +150,8 @@ def imported_from(checkout: Path) -> Iterator[None]:
         sys.path.remove(str(checkout))
         sys.meta_path.remove(finder)
         for name in set(sys.modules) - before:
+            # Forgotten afterwards: other code of the process may import the real modules of these
+            # names.
             if name.partition(".")[0] == "openpilot" or _is_names_only(name):
                 del sys.modules[name]
 
@@ -216,6 +219,7 @@ def solver(mpc: Any) -> Any:
             f"openpilot-longitudinal needs acados ({error}): pip install comma-deps-acados cython"
         ) from error
     source = Path(mpc.__file__).read_bytes()
+    # What the compiled solver depends on; another version of any of it gets a folder of its own.
     of = (sys.version, version("comma-deps-acados"), version("numpy"), str(acados.DIR))
     digest = hashlib.sha256(source + repr(of).encode()).hexdigest()[:16]
     folder = cache_folder() / f"openpilot-{digest}"

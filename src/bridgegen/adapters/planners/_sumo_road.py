@@ -54,6 +54,8 @@ class StraightRoad:
         self.next: Int = np.full((len(sections), int(self.lanes.max())), -1, dtype=np.int64)
         for k, section in enumerate(sections[:-1]):
             for i, lane in enumerate(section.lanes):
+                # All lanes lead on to the tail: SUMO brakes for a lane that ends, and the
+                # corridor's end is the end of what is known, not of the road.
                 self.next[k, i] = i if k == len(sections) - 2 else lane.next
         self._sections = sections
 
@@ -200,6 +202,8 @@ class Eyes:
         on, _ = road.lane_at(edge, front, aside)
         lanes = road.section(edge).lanes
         most = max(min(float(o.target_speed[i]), lanes[on].at(front)[2]), 0.01)
+        # The part along the road: who crosses has none, and who comes towards the ego would have a
+        # negative one. Both stand for SUMO, which knows neither.
         along = tracks[:, 4] * np.cos(h[1:]) + tracks[:, 5] * np.sin(h[1:])
         there = tracks[:, 0] >= 2.0
         speeds = np.where(there, np.maximum(along, 0.0), 0.0)
@@ -235,6 +239,9 @@ class Eyes:
                     continue
                 if gap < found[0]:
                     found[:3] = gap, speed, j
+                # In SUMO a vehicle is on the lane of its centre. Bodies that reach into the lane
+                # from beside it are kept apart, since the model must be asked about them by
+                # themselves.
                 if gap < found[3] and abs(offset - here[0]) > 0.5 * here[1]:
                     found[3:] = gap, speed, j
         ego = np.array([edge, position, max(o.v[i], 0.0), o.a[i], most, on])

@@ -65,9 +65,13 @@ class Simulation:
             types.write_text(types_text(scene.length, scene.width))
             options = [
                 *("-n", str(net), "-a", str(types), "--step-length", f"{scene.time_step:g}"),
+                # SUMO would take vehicles away that collide or wait for long; here they stay, as
+                # the scenario has them.
                 *("--collision.action", "none", "--time-to-teleport", "-1"),
                 *("--no-internal-links", "--no-step-log", "--no-warnings"),
             ]
+            # libsumo holds one simulation a process, in global variables; another one is loaded
+            # over it.
             if libsumo.isLoaded():
                 libsumo.load(options)
             else:
@@ -78,6 +82,8 @@ class Simulation:
             for j in range(len(scene.names)):
                 libsumo.vehicle.add(f"r{r}o{j}", f"r{r}", typeID="other")
                 self._park(r, j)
+                # No rules of SUMO's for the others: they are put where the scenario has them, at
+                # each instant.
                 libsumo.vehicle.setSpeedMode(f"r{r}o{j}", 0)
                 libsumo.vehicle.setLaneChangeMode(f"r{r}o{j}", 0)
 
@@ -88,6 +94,8 @@ class Simulation:
         ego = f"r{r}ego"
         vehicle.moveTo(ego, _lane(r, int(edge), goal, road.lanes), position)
         vehicle.setMaxSpeed(ego, most)
+        # `moveTo` alone would leave SUMO's own speed of the step before, and models look at how
+        # speed changes.
         vehicle.setPreviousSpeed(ego, speed, acceleration)
         for j, (there, edge, position, lane, speed, change, length) in enumerate(
             seen.others.tolist()
@@ -116,6 +124,7 @@ class Simulation:
         now = seen.ego[2]
         speed = vehicle.getSpeed(ego)
         wish = goal
+        # Having moved to the next edge within the step, its lane there says nothing of a change.
         if vehicle.getRoadID(ego) == f"r{r}e{int(seen.ego[0])}":
             wish = n - 1 - vehicle.getLaneIndex(ego)
         least = max(now - EMERGENCY * self._scene.time_step, 0.0)

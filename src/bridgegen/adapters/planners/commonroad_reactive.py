@@ -107,6 +107,8 @@ class CommonroadReactive:
         return Trajectory(time, plans[:, :, 0], plans[:, :, 1], plans[:, :, 2], plans[:, :, 3])
 
     def _plan(self, o: Observation, i: int) -> Float:
+        # The curvature of the plan that is driven: an observation has none. At the start it is the
+        # route's.
         curvature = self._curvature[i]
         if not np.isfinite(curvature):
             curvature = o.route[i, 0, 3]
@@ -141,6 +143,8 @@ def others_of(tracks: Float, lanes: AlongLanes) -> Float:
     poses = lanes.predict(tracks, np.arange(N_STEPS + 1, dtype=np.float64) * STEP)
     sizes = np.repeat(tracks[:, None, 6:8], N_STEPS + 1, axis=1)
     others = np.concatenate([poses, sizes], axis=2)
+    # NaN and not left out: each participant keeps its row, so that exported observations can be
+    # compared.
     others[tracks[:, 0] < CONFIRMED] = np.nan
     return others
 
@@ -212,6 +216,8 @@ def reference(road_map: RoadMap, route: Float) -> Float:
     )
     kept = [whole[0]]
     for point in whole[1:]:
+        # Points that coincide have no direction between them, which the planner's curvilinear frame
+        # needs.
         if np.hypot(*(point - kept[-1])) >= CLOSE:
             kept.append(point)
     return np.array(kept)

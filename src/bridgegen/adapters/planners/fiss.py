@@ -147,6 +147,8 @@ class Fiss:
             row, which = self._rows[i], self._scene.map_of[i]
             tables = self._tables[which]
             if row is None:
+                # One planner for each scenario, made when it first drives: planners keep what they
+                # planned last.
                 row = self._rows[i] = _Row(
                     self._fiss, self._vehicle, self._roads[which], tables["route"].tolist()
                 )
@@ -201,6 +203,7 @@ def inputs(observation: Observation, scene: Scene, before: Float) -> Inputs:
         before: ``(N,)`` [rad], the ego's heading an instant ago; NaN at the first one.
     """
     o, tracks = observation, observation.tracks
+    # By the unit circle: headings may jump by a whole turn between two instants.
     turned = np.angle(np.exp(1j * (o.h - before))) / scene.time_step
     is_measured = (o.v > CURVATURE_FROM) & np.isfinite(before)
     with np.errstate(invalid="ignore", divide="ignore"):
@@ -332,6 +335,7 @@ class _Row:
                 self._planner.set_stop_line_active(line, is_active)
             obstacles = self._obstacles(told["obstacles"])
             plan = self._planner.step(time, ego, obstacles, float(told["desired"])).trajectory
+            # Without a new plan the last one is followed.
             if len(plan) >= 2:
                 self._plan, self._planned_at = plan, time
         self._calls += 1

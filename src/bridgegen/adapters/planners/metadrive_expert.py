@@ -162,6 +162,7 @@ def weights() -> dict[str, Float]:
     try:
         if path.stat().st_size > MAX_BYTES:
             raise ValueError(f"more than {MAX_BYTES} bytes")
+        # Weights are arrays; a pickle among them would be code.
         with np.load(path, allow_pickle=False) as file:
             for name, (rows, columns) in LAYERS.items():
                 for part, shape in (("kernel", (rows, columns)), ("bias", (columns,))):

@@ -191,6 +191,8 @@ def _way(route: Float, scene: Scene, roads: Sequence[Corridor | None]) -> Float:
             continue
         (s,), (d,), (along,) = road.places(route[i, -1:, 0], route[i, -1:, 1])
         if abs(d) <= ON_THE_ROAD and math.cos(along - route[i, -1, 2]) > math.cos(SAME_WAY):
+            # The observation's route ends before a camera's sight does: straight on, a lead was
+            # seen from 78 m only in a bend.
             beyond[i] = road.poses(s + on)
     return np.concatenate([route[:, :, :3], beyond], axis=1)
 
@@ -255,6 +257,8 @@ class _Row:
         radard = self._openpilot.radard
         for j, (there, distance, left, speed) in enumerate(points.tolist()):
             if not there:
+                # A participant that is lost comes back as a new track, as of a radar: its filter
+                # must not go on from where it was.
                 self._tracks.pop(j, None)
                 continue
             if j not in self._tracks:

@@ -98,6 +98,8 @@ class SumoDriver:
         """See `BatchDriver`."""
         o, scene = observation, self._scene
         rows = np.flatnonzero(o.running).tolist()
+        # All rows are placed before the one step: a process has one simulation of SUMO, in which
+        # each row's road stands beside the others'.
         seen = {i: self._eyes[i].see(o, i) for i in rows}
         for i in rows:
             self._rows[i].find_goal(seen[i])
@@ -158,6 +160,8 @@ class Row:
     def steer(self, seen: Seen, goal: int, o: Observation, i: int) -> float:
         """Return the curvature [1/m] of the course to a goal's lane."""
         s, v = float(seen.place[0]), float(o.v[i])
+        # SUMO says which lane, not how to get there: it has no course between lanes that a body
+        # could follow.
         if goal != self.goal:
             to, now = self._offset(goal, s), self._offset(self.goal, s) + aside_at(self._shift, s)
             length = shift_length(now - to, v, GRAVITY)

@@ -208,6 +208,7 @@ def read(
     with Store.open(folder) as store:
         settings = Run.of(store).settings
         reader = _Reader(terms, store.metrics, points(budget))
+        # Chunk by chunk: a run may be larger than memory, and a comparison has hundreds.
         for rows in store.rows():
             reader.take(rows)
         seconds, ended = store.seconds, store.finished or "not yet"
@@ -310,6 +311,7 @@ class _Reader:
             self.high = high if self.high is None else np.maximum(self.high, high)
         start, end = 0, self.count + len(rows)
         for point in self._points[len(self._found) :].tolist():
+            # A point of the curve may lie within a chunk, so a chunk is seen in pieces.
             stop = min(point, end) - self.count
             self._see(x[start:stop][ok[start:stop]])
             start = stop
@@ -322,5 +324,7 @@ class _Reader:
     def _see(self, x: Float) -> None:
         if len(x):
             seen = -front(-np.concatenate([self._front, x]))
+            # The same array is kept while the front does not change: fifty points of a curve mostly
+            # share a few.
             if not np.array_equal(seen, self._front):
                 self._front = seen

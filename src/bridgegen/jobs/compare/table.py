@@ -216,6 +216,7 @@ def write_csv(path: Path, head: Sequence[str], rows: Iterable[Sequence[object]])
         StorageError: it cannot be written.
     """
     text = io.StringIO()
+    # csv ends lines by \r\n unless told otherwise.
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(head)
     for row in rows:

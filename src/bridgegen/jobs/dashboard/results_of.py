@@ -157,6 +157,7 @@ def _seen(store: Store, settings: Settings, sceneries: Sceneries) -> Seen | None
     stored = dict(zip(store.parameters, store.columns.X, strict=True))
     column = {name: stored[name] for name in sorted(scenery.columns & stored.keys())}
     for rows in store.select(["status", *column.values()], 0, len(store)):
+        # A text where a number belongs shows only here: a database column takes any type.
         with store.damage():
             table: Float = np.array(rows, dtype=np.float64)
         table = table[table[:, 0] == 0.0]

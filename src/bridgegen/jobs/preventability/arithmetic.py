@@ -70,6 +70,8 @@ def _cut_out(columns: Mapping[str, Float], driver: str) -> Bool:
     """The gap to the revealed vehicle, when the one ahead is more than 0.375 m aside."""
     speed = columns["ego_speed"]
     seconds = math.acos(1.0 - 2.0 * SIDE / LANE) / math.pi * LANE / columns["lateral_speed"]
+    # The vehicle ahead moves aside along a cosine over the lane's width: until it is so far out,
+    # the ego has driven on towards what it hides.
     gap = columns["headway"] * speed + LENGTH + columns["gap"] - speed * seconds
     return avoids_cut_out(speed, 0.0, np.maximum(gap, 0.0), driver=driver)
 

@@ -69,6 +69,7 @@ def outcomes(pipeline: Pipeline, X: Float) -> Codes:
     """
     found = np.empty(len(X), np.int8)
     for at, runner in pipeline.runner.by_variant(X):
+        # A cell asks only whether there is a collision, so a row ends with it.
         rollout = runner.run(X[at], until_collision=True)
         code = np.where(collides(rollout), Outcome.COLLIDED, Outcome.AVOIDED)
         implausible = plausibility(rollout).code != Implausible.NONE
@@ -88,6 +89,7 @@ def collides(rollout: Rollout) -> Bool:
     """
     n, _, t = rollout.shape
     within = np.arange(t) < steps(rollout)[:, np.newaxis]
+    # Contacts first: how deep boxes overlap is worked out for these few instants alone.
     row, e, k = np.nonzero((distance(rollout) <= 0.0) & within[:, np.newaxis])
     found = np.zeros(n, np.bool_)
     found[row[_overlap(rollout, row, e, k) > TOUCH]] = True
@@ -141,6 +143,8 @@ def classes(driver: Codes, models: Codes) -> Codes:
     found[driver == Outcome.AVOIDED] = CellClass.AVOIDED
     found[driver == Outcome.NOT_APPLICABLE] = CellClass.NOT_APPLICABLE
     collided = driver == Outcome.COLLIDED
+    # One model that avoids it suffices, whatever the others did. That none avoids it needs an
+    # answer of each: a model without a result leaves the question open.
     prevented = (models == Outcome.AVOIDED).any(axis=0)
     open_ = np.isin(models, (Outcome.FAILED, Outcome.NOT_NEEDED)).any(axis=0)
     judged = (models == Outcome.COLLIDED).any(axis=0) & ~open_

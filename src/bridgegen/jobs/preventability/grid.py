@@ -237,6 +237,8 @@ def coarse_axes(name: str, space: SearchSpace, most: int) -> Mapping[str, GridAx
         return None
     while grid.cells > most:
         longest = max(axes, key=lambda axis: axes[axis].n)
+        # Both ends stay, and of an odd number of values every second one: the coarse map's cells
+        # are the fine one's.
         axes[longest] = replace(axes[longest], n=(axes[longest].n + 1) // 2)
         grid = Grid.of(space, axes)
     return axes

@@ -33,6 +33,7 @@ def png(codes: Codes) -> bytes:
     Args:
         codes: ``(height, width)``, a `CellClass` each, the uppermost row first.
     """
+    # A palette: a byte a cell, and the same colours in the picture and in its legend.
     picture, out = Image.fromarray(codes.astype("u1"), "P"), io.BytesIO()
     picture.putpalette(b"".join(bytes.fromhex(COLOURS[class_][1:]) for class_ in CellClass))
     picture.save(out, "PNG")

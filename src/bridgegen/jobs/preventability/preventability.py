@@ -69,11 +69,13 @@ def map_preventability(given: MapOptions) -> PreventabilityMap:
         "files of drivers": {name: digest_of(name) for name in names},
     }
     axes = [
+        # Seventeen digits, so that the command makes the same grid to the last bit.
         f"{name}={values[0]:.17g}:{values[-1]:.17g}:{len(values)}"
         for name, values in zip(cells.names, cells.values, strict=True)
     ]
     command = command_of("preventability", given, folder, grid=axes)
     store = ChunkStore(folder, settings, len(names), cells.cells)
+    # A byte for each driver and cell: maps may have 50 million cells.
     found = np.empty((len(names), cells.cells), np.int8)
     done = 0
     try:
@@ -84,6 +86,8 @@ def map_preventability(given: MapOptions) -> PreventabilityMap:
                 part = store.read(i)
                 if part is None:
                     part = run.chunk(start, stop)
+                    # Kept chunk by chunk: an interruption costs one chunk at most, and no result
+                    # depends on it.
                     store.write(i, part)
                 found[:, start:stop] = part
                 done = stop

@@ -165,6 +165,8 @@ class PreventabilityMap:
         }
         write_whole(paths[1], [json.dumps(figures, indent=1).encode()])
         write_page(paths[2], self)
+        # The table is a copy for other tools; the arrays hold all of it, and pyarrow (150 MB) is an
+        # extra.
         if is_installed("parquet"):
             paths.append(self.folder / TABLE)
             self._write_table(paths[-1])
@@ -245,6 +247,8 @@ class ChunkStore:
         """Return a chunk's outcomes, ``(drivers, n)``; None if it is not there, whole and sound."""
         start, stop = self.bounds(i)
         try:
+            # A pickle would be code, and the folder may come from others. Whatever is wrong with a
+            # chunk, it is simulated again: the file is a saving, not a source.
             found = np.load(io.BytesIO(read_bytes(self._path(i))), allow_pickle=False)
         except (OSError, ValueError, EOFError):
             return None

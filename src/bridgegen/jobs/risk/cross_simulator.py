@@ -144,6 +144,7 @@ def look_elsewhere(
     random = block_of(seed, 0, _STREAM)
     proposals = Proposals.of(known.Z[at], known.weights[at], at.sum() / OF_CHAIN, random)
     Z, weights = proposals.draw(HERE, random)
+    # What breaks a constraint cannot happen on the road; its weight is 0 in both simulators.
     good = here.feasible(Z)
     Z, weights = Z[good], weights[good]
     scores = here.evaluate(Z)[:, Column.SCORE]
@@ -179,6 +180,8 @@ def _group(
     if not len(Z):
         none = np.empty(0)
         return Group(0.0, 0.0, none, none > 0.0, none > 0.0)
+    # With replacement: each draw is then independent, and a row that is drawn often is simulated
+    # once.
     chosen = random.choice(len(Z), rows, p=weights / weights.sum())
     which, often = np.unique(chosen, return_counts=True)
     found = _evaluated(there, Z[which])
@@ -275,6 +278,8 @@ def _new(event: Group, close: Group) -> Ratio:
 
 
 def _sum(ratio: Ratio, other: Ratio) -> Ratio:
+    # Zou and Donner's interval of a sum: the distances to both ends add like standard errors, so
+    # that skewed intervals stay skewed.
     estimate = ratio.estimate + other.estimate
     low = math.hypot(ratio.estimate - ratio.low, other.estimate - other.low)
     high = math.hypot(ratio.high - ratio.estimate, other.high - other.estimate)

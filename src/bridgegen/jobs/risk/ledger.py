@@ -86,6 +86,8 @@ class Ledger:
         except (OSError, *_DAMAGED):
             return None
         numbers = values[:, Column.MODE]
+        # A number of a mode is an index later on: a damaged file must not make it one that is not
+        # there.
         if not np.isfinite(values).all() or numbers.max(initial=-1.0) >= len(modes):
             return None
         self._number += 1

@@ -198,6 +198,8 @@ def data_band(exposure: Exposure, weighted: Weighted, threshold: float, fit: Fit
         fit: to the events.
     """
     replicates = fit.replicates
+    # Outcomes are weighted anew, not simulated: hundreds of exposures cost no evaluation. Where one
+    # has its harm in places with few rows, its weights are not believed (`FEWEST`).
     hits = np.flatnonzero(weighted.there(threshold))
     at = hits[:: max(1, len(hits) // MOST_ROWS)]
     if not len(at):

@@ -183,8 +183,11 @@ class Risk:
         if each is None or p is None:
             return None
         estimate = each.estimate * p.estimate
+        # An end of 0 has no logarithm; the upper ends multiply, which holds in any case.
         if not (estimate > 0.0 and each.low > 0.0 and p.low > 0.0):
             return Rate(estimate, 0.0, each.high * p.high)
+        # Both factors are positive and skewed: their logarithms add, and so do the squares of the
+        # distances.
         low = math.hypot(math.log(each.estimate / each.low), math.log(p.estimate / p.low))
         high = math.hypot(math.log(each.high / each.estimate), math.log(p.high / p.estimate))
         return Rate(estimate, estimate * math.exp(-low), estimate * math.exp(high))
@@ -194,6 +197,7 @@ class Risk:
         """How harmful rows differ from the road, the most different parameter first."""
         there = self._values(self.event) > 0.0
         X, weights = self._rows(self.event), self.weighted.weights[there]
+        # What parameters do to harm is said of rows that are harmful; too few would show chance.
         if self.weighted.doubts or self.weighted.hits(self._values(self.event)) < FEWEST_HITS:
             return ()
         road = self.exposure.sample(COMPARED, self.seed).X
@@ -332,6 +336,8 @@ class Risk:
     def _values(self, name: str) -> Float:
         """Return what an event's probability is the mean of, ``(M,)``."""
         if name == INJURY:
+            # A serious injury is no event of its own in a simulation: its probability is the mean
+            # of what the injury model says of collisions.
             return self.weighted.outcomes[:, Column.SEVERITY] * self._values("collision")
         return self.weighted.there(EVENTS[name].score)
 
@@ -356,6 +362,8 @@ class Risk:
 
 
 def _share(name: str, unit: str, values: Float, weights: Float, road: Float) -> ParameterShare:
+    # Classes of equal probability on the road: a distance from even shares does not depend on
+    # units, nor on how a parameter is distributed.
     edges = np.quantile(road, np.linspace(0.0, 1.0, BINS + 1)[1:-1])
     total = weights.sum()
     mine = np.bincount(np.searchsorted(edges, values), weights, BINS) / total

@@ -87,6 +87,7 @@ def find_most_likely(
     words = list(experiment.modes)
     found = {}
     for mode in chosen:
+        # A stream for each mode: which others were found changes no mode's row.
         random = block_of(seed, 0, _STREAM, mode)
 
         def happens(outcomes: Float, mode: int = mode) -> Bool:
@@ -208,6 +209,8 @@ def estimate_risk(given: RiskOptions) -> Risk:
             "version": version("bridgegen"),
             "scenario": driven.name,
             "fingerprint": driven.fingerprint,
+            # What the batches depend on, and nothing else: workers, for one, may change between two
+            # calls.
             "exposure": _digest(met),
             "driver": name,
             "file of the driver": CarriedDriver.of(name).digest,
@@ -254,6 +257,7 @@ def estimate_risk(given: RiskOptions) -> Risk:
             beside = None
             if check:
                 plain = Aim(aimed.score, LEAST, check, 0.0)
+                # Another seed, so that the second estimate shares no row with the first.
                 beside = monte_carlo.estimate(experiment, plain, seed + OTHER_ROWS)
             # Looked for, since the likeliest row that the estimate happens to draw had a density
             # too low by factors of 50 to 3,000 in ten dimensions.
@@ -354,6 +358,7 @@ def _points_of(run: Path, exposure: Exposure, event: str) -> Float:
     happens = rows.metrics[:, found.metrics.index("harm")] >= NEAR_MISS
     if event == "collision":
         happens &= rows.findings.conflict == KINDS[CONTACT]
+    # A search may count violations of pass criteria as harm; an event of a risk is a conflict.
     happens &= rows.findings.conflict != KINDS[VIOLATION]
     good = happens & exposure.feasible(rows.X)
     X = rows.X[good]
@@ -366,4 +371,6 @@ def _points_of(run: Path, exposure: Exposure, event: str) -> Float:
 def _digest(exposure: Exposure) -> str:
     """Return a digest of an exposure: of 64 of its rows, and of its source."""
     rows = exposure.sample(64, 0).X
+    # Of rows, and not of the file: an exposure may be an object of Python's, and two files may say
+    # the same.
     return hashlib.sha256(rows.tobytes() + exposure.source.encode()).hexdigest()

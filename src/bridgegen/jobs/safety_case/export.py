@@ -40,6 +40,8 @@ def build(runs: Sequence[Facts], out: Path) -> SafetyCase:
     """
     names = " and ".join(dict.fromkeys(run.triage.scenario for run in runs))
     egos = " and ".join(dict.fromkeys(run.ego for run in runs))
+    # Numbers stand in the argument by their ids, and each says how it follows from the files: the
+    # script beside the case computes them again without BridgeGen.
     numbers: dict[str, Number] = {}
     top = Draft("Goal", "1", _claim(runs[0]))
     if len(runs) > 1:

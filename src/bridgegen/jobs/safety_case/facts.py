@@ -88,6 +88,7 @@ def read_facts(folder: Path) -> Facts:
         FileFormatError: its triage, or a confirmation, is damaged or another run's.
     """
     run = Run(folder)
+    # Such a run counts a row as a failure only where one driver fails and the other does not.
     if run.settings.worse_than is not None:
         raise InputError(
             f"{folder}: compares {run.settings.ego} with {run.settings.worse_than}: failures of "
@@ -140,6 +141,8 @@ def _triage(run: Run) -> Triage:
             f"{folder}: the run must be finished, it has {done} of {budget} evaluations; "
             f"finish it: {resume}"
         )
+    # A digest of the file must be that of all evaluations: what is in SQLite's log is not in the
+    # file yet.
     log = folder / "run.sqlite-wal"
     if log.is_file() and log.stat().st_size:
         raise StorageError(
@@ -248,6 +251,8 @@ class Files:
             StorageError: it cannot be read.
         """
         path = Path(path)
+        # Relative, and with the slashes of POSIX: the case and its runs may be moved together, and
+        # read on another system.
         file = Path(os.path.relpath(path.resolve(), self._out.resolve())).as_posix()
         known = next((item.id for item in self.all if item.file == file), None)
         if known is not None:

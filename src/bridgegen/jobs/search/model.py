@@ -247,6 +247,7 @@ class Model:
         if found.ndim != 1:
             raise InputError(f"{name} must be a column of numbers, got an array {found.shape}")
         if parameter is not None:
+            # Negated, so that NaN is outside, too.
             outside = np.flatnonzero(~((found >= parameter.low) & (found <= parameter.high)))
             if outside.size:
                 raise InputError(

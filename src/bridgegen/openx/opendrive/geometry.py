@@ -25,6 +25,7 @@ TURN_LIMIT = 100.0
 STEEPEST = 10.0
 """Largest slope of a poly3 in its own frame."""
 
+# Eight nodes, moved from [-1, 1] to [0, 1].
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(8)
 _NODES, _WEIGHTS = (_NODES + 1) / 2, _WEIGHTS / 2
 _BLOCK = 4096
@@ -164,6 +165,8 @@ def impossible_shape(geometry: Geometry) -> str | None:
     if isinstance(shape, ParamPoly3):
         table = _table(geometry)
         true = float(table.length[-1])
+        # The length may be inexact, and `scale` makes up for it; but twice or half as much is
+        # another curve than the one that was meant.
         if not 0.5 * length < true < 2.0 * length:
             return f"length [m] must be the length of the paramPoly3, {true:.6g}, got {length:.6g}"
         slowest = float(np.min(_speed(table.u, table.v, table.p))) * float(table.p[-1]) / true
@@ -174,6 +177,8 @@ def impossible_shape(geometry: Geometry) -> str | None:
         turn = length * max(abs(shape.curv_start), abs(shape.curv_end))
     else:
         turn = length * abs(shape.curvature) if isinstance(shape, Arc) else 0.0
+    # The panels of `_spiral` grow with the turn: without a limit a spiral of a stranger's file
+    # costs any amount of time and memory.
     if turn > TURN_LIMIT:
         return f"length · curvature must be ≤ {TURN_LIMIT:g} rad, got {turn:.6g}"
     return None
@@ -193,6 +198,7 @@ def _spiral(curvature: float, rate: float, u: Float) -> tuple[Float, Float]:
     # Each panel turns by about 1 rad at most, where eight nodes are exact to rounding.
     nodes = ((np.arange(panels)[:, None] + _NODES) / panels).ravel()
     weights = np.tile(_WEIGHTS / panels, panels)
+    # In blocks, since points times nodes would be one large array on long spirals.
     block = max(1, _BLOCK * 8 // len(nodes))
     for first in range(0, len(u), block):
         part = u[first : first + block]
@@ -291,6 +297,8 @@ def invert(rate: Callable[[Float], Float], p: Float, total: Float, wanted: Float
     cell = np.clip(np.searchsorted(total, wanted, side="right") - 1, 0, len(p) - 2)
     slope = (p[1:] - p[:-1]) / np.maximum(total[1:] - total[:-1], 1e-300)
     found = np.asarray(p[cell] + (wanted - total[cell]) * slope[cell])
+    # A fixed number of steps, not a tolerance: the bits then depend on the place alone, and not on
+    # what else is asked in the same call.
     for _ in range(3):  # Newton, from an error that is already small
         missing = wanted - total[cell] - integrate(rate, p[cell], found)
         found = found + missing / np.maximum(rate(found), 1e-12)

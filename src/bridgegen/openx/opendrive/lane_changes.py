@@ -56,6 +56,8 @@ def plan_with_changes(model: OpenDrive, places: Sequence[tuple[str, int, float]]
     steps: list[Step] = []
     for start, end in pairwise(stops):
         try:
+            # Without a lane change if there is a way: files of others mostly mean that, and it is
+            # unique.
             steps += leg(model, start, end)
         except InputError:
             steps += change_lanes(model, start, end)
@@ -88,6 +90,8 @@ def change_lanes(model: OpenDrive, start: Place, end: Place) -> list[Step]:
         try:
             return _steps(model, _chain(model, first, start, end, abreast), start, end)
         except InputError:
+            # The first problem is the one to tell: the second search was for a lane that the file
+            # did not name.
             raise error from None
 
 
@@ -127,11 +131,14 @@ def _chain(
         room = abs(end.s - entry) if stretch[:2] in sections else rest
         onward = [(rest, item) for item in next_stretches(model, stretch)]
         if room >= SHORTEST:
+            # With little room a change costs more, so that it takes place where there is much.
             change = _COST * (1.0 + 2.0 * USUAL / room)
             onward += [(change, item) for item in _beside(model, stretch)]
         for more, following in onward:
             if following not in come_from:
                 count += 1
+                # The count breaks ties in the order of discovery, so that equal ways do not depend
+                # on how lanes compare, and one file always gives one route.
                 heapq.heappush(queue, (cost + more, count, following, stretch))
     if found is None:
         raise InputError(f"no lane leads from {start} to {end}, not with lane changes either")
@@ -147,6 +154,7 @@ def _beside(model: OpenDrive, stretch: Stretch) -> Iterator[Stretch]:
     """Yield the driving lanes beside one, in its direction."""
     road = model.road(stretch.road_id)
     for lane in road.sections[stretch.section].lanes:
+        # Lanes of one sign only: a route never leads over the oncoming lane.
         near = abs(lane.id - stretch.lane_id) == 1 and lane.id * stretch.lane_id > 0
         if near and lane.drivable:
             yield stretch._replace(lane_id=lane.id)
@@ -183,12 +191,16 @@ def _change(road: Road, item: Stretch, other: Stretch, s: float, s_end: float) -
     a, b = _centre(road, at_low, low, high)
     c, d = _centre(road, at_high, high, low)
     span = high - low
+    # The cubic with both lanes' places and slopes at its ends: without the slopes, a change in a
+    # taper would begin and end with a kink.
     cubic = (
         a,
         b,
         (3.0 * (c - a) / span - 2.0 * b - d) / span,
         (2.0 * (a - c) / span + b + d) / span**2,
     )
+    # Half of the change counts as on each lane, so that who is asked which lane the entity is on
+    # gets the nearer one.
     middle = 0.5 * (s + s_end)
     for stretch, first, last in ((item, s, middle), (other, middle, s_end)):
         across = shifted(cubic, min(first, last) - low)

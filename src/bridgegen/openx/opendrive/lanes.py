@@ -47,6 +47,7 @@ def rebased(records: Sequence[Cubic], s: float, inside: float) -> Coefficients:
 def shifted(cubic: Coefficients, by: float) -> Coefficients:
     """Return a cubic over the distance from ``by`` instead of from 0."""
     a, b, c, d = cubic
+    # The very numbers of the file where nothing changes, so that a constant width is not rounded.
     if b == c == d == 0.0 or by == 0.0:
         return cubic
     return (
@@ -110,6 +111,8 @@ def lane_along(road: Road, lane_id: int, s: float, way: int) -> int:
     """
     _check_station(road, s)
     section = road.sections[section_index(road, s)]
+    # esmini's files state the road's lane, Vector's Euro NCAP files count from the route. Read as
+    # the road's, the parked cars of CBNA stood behind the bicyclist whom they are to hide.
     if way < 0 < road.direction(lane_id) and section.lane(-lane_id) is not None:
         return -lane_id
     return lane_at(road, lane_id, s).id
@@ -167,6 +170,8 @@ def lane_pose(road: Road, lane_id: int, s: float) -> LanePose:
         width = width_of(section, lane, s, s)[0]
     geometry = road.plan_view[geometry_index(road, s)]
     x, y, h, curvature = pose(geometry, s - geometry.s)
+    # In a taper, or beside a changing lane offset, a lane does not run parallel to the reference
+    # line.
     tilt = elementary.atan2(slope, 1.0 - curvature * t)
     turned = 0.0 if lane_id == 0 or road.direction(lane_id) > 0 else math.pi
     return LanePose(

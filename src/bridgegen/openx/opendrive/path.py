@@ -35,6 +35,8 @@ from bridgegen.openx.opendrive.lanes import (
 from bridgegen.openx.opendrive.model import Lane, LaneSection, Road
 from bridgegen.openx.opendrive.plan_view import Arc, Geometry, Line
 
+# Records that begin at nearly the same s are one change; a piece of no length would have no
+# direction.
 SHORTEST = 1e-9
 """Length below which pieces are left out [m]."""
 MOST_SAMPLES = 2_000_000
@@ -143,6 +145,8 @@ class Taper:
     ) -> "Taper":
         """Return the taper over ``span`` [m] of road from ``start``."""
         entry = 0.0 if direction > 0 else span
+        # A station is looked up between nodes and then corrected by quadrature, so the nodes decide
+        # where to start, not how exact the result is.
         nodes = np.linspace(0.0, span, max(8, math.ceil(span / 0.5)) + 1)
         taper = cls(geometry, start, t, direction, entry, nodes, nodes)
         steps = integrate(taper.speed, nodes[:-1], nodes[1:])
@@ -255,6 +259,8 @@ def _piece(
     s, s_end = (a, b) if direction > 0 else (b, a)
     if direction < 0:
         width = shifted(width, b - a)
+    # A parallel of a line is a line, and of an arc an arc: closed formulas, for most of a map. All
+    # else is followed by quadrature.
     if isinstance(geometry.shape, Line | Arc) and t[1:] == (0.0, 0.0, 0.0):
         x, y, h, curvature = pose(geometry, s - geometry.s)
         stretch = 1.0 - curvature * t[0]
@@ -274,6 +280,7 @@ def _piece(
 
 
 def _check_fold(stretch: float, road: Road, lane: Lane, s: float) -> None:
+    # Beyond the bend's centre a parallel runs backwards: cars on it would turn round on the spot.
     if stretch < 1e-3:
         raise InputError(
             f"a lane's centre must lie on the near side of a bend's centre, but lane {lane.id} of "
@@ -291,6 +298,7 @@ def joined(pieces: list[Piece]) -> list[Piece]:
         else:
             turned = last.taper.at(last.taper.travelled)[2]
             before = last.h + float(turned[-1] - turned[0])
+        # Whole turns only: a kink within the file's tolerance stays in the heading, as it is drawn.
         turns = round((before - piece.h) / math.tau)
         found.append(piece._replace(h=piece.h + turns * math.tau) if turns else piece)
     return found
@@ -327,6 +335,8 @@ def sample(pieces: Sequence[Piece], length: float, ds: float) -> LanePath:
     for index, piece in enumerate(pieces):
         if piece.taper is not None:
             at = np.flatnonzero(which == index)
+            # The taper's own start comes with the samples, so that heading and place along the road
+            # count from it.
             found = piece.taper.at(np.concatenate(([0.0], local[at])))
             x[at], y[at], curvature[at] = found[0][1:], found[1][1:], found[3][1:]
             h[at] = piece.h + (found[2][1:] - found[2][0])

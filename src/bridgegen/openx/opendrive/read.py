@@ -64,6 +64,7 @@ def read(
     """
     path = Path(source) if isinstance(source, str) else source
     place = place or (str(path) if isinstance(path, Path) else "document")
+    # Maps come from strangers: `parse_xml` bounds size and depth, and expands no entity.
     root = parse_xml(path, place)
     if _tag(root) != "OpenDRIVE":
         raise FileFormatError(f"{place}: the root element must be OpenDRIVE, got {_tag(root)}")
@@ -73,6 +74,8 @@ def read(
     assert isinstance(model, OpenDrive)
     if not model.roads and not may_be_empty:
         raise FileFormatError(f"{place}, line {_line(root)}: <OpenDRIVE>: <road> is required")
+    # Repairs work on the model, not on the XML: they see links in both directions. References are
+    # checked afterwards, since a repair may have removed the one that was broken.
     model = repair(model, reader.lines, reader.notes)
     for record, problem in broken_references(model):
         reader.problems.append((reader.lines[id(record)], problem))
@@ -118,6 +121,8 @@ class _Reader:
 
         None where anything in it is wrong (and was noted); `_LEFT_OUT` of decoration.
         """
+        # One odd value never costs a map: what is driven on must be right, while a record of
+        # decoration that cannot be read is left out as a whole, with a warning.
         decoration = getattr(cls, DECORATION, False)
         before = len(self.problems)
         attributes, below, tree = _table(cls)
@@ -145,9 +150,13 @@ class _Reader:
                 if len(items) > 1:
                     self._note(element, f"only one <{_name(field)}> is allowed, got {len(items)}")
                 values[field.name] = items[0] if items else None
+        # A record is made only of valid fields, so no later code meets a half-read one. Reading
+        # goes on in any case, so that one call reports all problems of the file.
         if len(self.problems) > before:
             return self._left_out(element, before) if decoration else None
         record = cls(**values)
+        # Lane sections are repaired here and not in `repair`: borders and gaps in the count concern
+        # one section alone, and the check of the numbering needs the repaired lanes.
         if isinstance(record, LaneSection):
             record = repair_section(record, _line(element), _where(element), self.notes)
             for problem in misnumbered(record):
@@ -201,6 +210,7 @@ class _Reader:
             tag = _tag(item)
             branch = tree.get(tag)
             if isinstance(branch, Field):
+                # The standard lets every tool add userData; that of others means nothing to us.
                 if branch.types[0] is UserData and not _is_ours(item):
                     continue
                 made = self._item(branch, item)
@@ -208,6 +218,8 @@ class _Reader:
                     found.setdefault(branch.name, []).append(made)
             elif branch is not None:
                 self._collect(item, branch, found)
+            # Unknown elements are passed over in silence, this one is not: it moves the signal that
+            # it is in.
             elif (_tag(element), tag) == ("signal", "positionInertial"):
                 what = f"{_where(item)} is passed over: the signal stands at its s and t"
                 self.notes.add("positionInertial", _line(item), what)
@@ -218,6 +230,8 @@ class _Reader:
             return (item.text or "").strip()
         if role == "ids":
             return self._value(ID, str(item.get("id", "")), item)
+        # Valid OpenDRIVE, which the ontology has no words for: the file is "not supported", not
+        # "wrong".
         if field.types[0] is Junction and item.get("type", "default") not in JUNCTION_TYPES:
             self.beyond.append((_line(item), f"{_where(item)}: type '{item.get('type')}'"))
             return None
@@ -234,6 +248,8 @@ class _Reader:
             return _parse(field, raw)
         except ValueError as error:
             unit = f" [{field.form.unit}]" if field.form.unit else ""
+            # A value in a message is cut, for a stranger's file may have megabytes of it in one
+            # attribute.
             shown = raw if len(raw) <= 40 else raw[:40] + "…"
             problem = f"{field.form.path[0]}{unit} must be {error}, got '{shown}'"
             if field.form.fallback is not None:
@@ -302,11 +318,14 @@ def _parse(field: Field, raw: str) -> float | int | bool | str:
         return raw in ("true", "1")
     try:
         value = int(raw) if kind is int else float(raw)
+        # Python's `float` and `int` take "1_000", "nan" and "inf"; the XSD's types do not, or no
+        # length may be such.
         is_number = math.isfinite(value) and "_" not in raw
     except (OverflowError, ValueError):
         is_number = False
     if not is_number:
         raise ValueError("a whole number" if kind is int else "a finite number")
+    # Every number has a bound, stated or not, so that no sum or product of lengths overflows later.
     high = NUMBER_LIMIT if form.high is None else form.high
     if abs(value) > high:
         raise ValueError(f"within ±{high:g}")
@@ -323,6 +342,7 @@ def _is_ours(item: etree._Element) -> bool:
 
 def _tag(element: etree._Element) -> str:
     """Return an element's name without its namespace."""
+    # Some files declare the standard's namespace and some do not; both are read.
     tag = str(element.tag)
     return tag.rpartition("}")[2] if "}" in tag else tag
 

@@ -54,6 +54,8 @@ def _reference_line(road: Road, line: int, notes: Notes) -> Road:
         notes.add("no length", line, f"road {road.id}: a geometry of length 0 m is left out")
         road = replace(road, plan_view=pieces)
     end = pieces[-1].s + pieces[-1].length
+    # Only a geometry that is too short is made the road's length. Continuing it instead would
+    # invent road that nobody drew.
     if end < road.length - SLACK and road.sections[-1].s < end:
         notes.add(
             "short",
@@ -135,6 +137,8 @@ def _counted(
         f"{where}: its lanes must count from {side} without a gap, got "
         f"{sorted(ids, key=abs)}: read with lanes of no width in the gaps",
     )
+    # A lane of no width and type none moves no border and can be driven by nobody: the numbers
+    # count without a gap, and the road is as it was drawn.
     none = (Width(0.0, 0.0, 0.0, 0.0, 0.0),)
     filled = [*lanes, *(Lane(number, "none", widths=none) for number in missing)]
     return tuple(sorted(filled, key=lambda lane: -lane.id))
@@ -145,6 +149,8 @@ def _from_borders(lanes: tuple[Lane, ...], side: float) -> tuple[Lane, ...]:
     if not any(lane.borders for lane in lanes):
         return lanes
     made: dict[int, Lane] = {}
+    # From the inside out, for a width is the difference of two borders. Cubics with different
+    # starts are first brought to common ones (`_sum`), so that the difference is exact.
     inner: tuple[Cubic, ...] = ()  # |t| of the border so far
     for lane in sorted(lanes, key=lambda item: abs(item.id)):
         if lane.borders and not lane.widths:

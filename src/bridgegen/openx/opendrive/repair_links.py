@@ -36,6 +36,7 @@ def repair_links(model: OpenDrive, lines: Lines, notes: Notes) -> OpenDrive:
         Counter(junction.id for junction in model.junctions),
     )
     if any(count > 1 for some in ids for count in some.values()):
+        # With ids that occur twice a link has two ends, and each repair would be a guess.
         return model  # the reader refuses ids that occur twice
     return _Links(model, lines, notes).repaired()
 
@@ -91,6 +92,9 @@ class _Links:
         if link.element_type == "junction" or link.contact_point is not None:
             return link
         other = self._model.roads_by_id[link.element_id]
+        # The contact point is only filled in where the other road says it by its own link. If both
+        # of its ends link back, or none, either choice might invent a way to drive: the road ends
+        # there.
         back = [
             end
             for end in CONTACTS
@@ -156,6 +160,9 @@ class _Links:
         self, junction: Junction, connection: Connection, incoming: Road, way: Road
     ) -> Road | None:
         """Return an incoming road with the link to its junction that it lacks."""
+        # The missing link is added only if the connecting road itself names that end of the
+        # incoming road, and nothing else is there: the way was already in the file, said on one
+        # side.
         link = way.link(connection.contact_point)
         if junction.is_direct or link is None or link.element_id != incoming.id:
             return None

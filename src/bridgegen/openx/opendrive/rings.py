@@ -53,6 +53,8 @@ def rings(model: OpenDrive) -> Iterator[Ring]:
                 continue
             seen.add(key)
             whole = math.tau if model.road(road_id).rule == "RHT" else -math.tau
+            # A block of one-way streets is a cycle, too. Around a roundabout the road turns by one
+            # turn, to the side on which traffic gives way.
             if abs(sum(_turning(model.road(name), ways[name]) for name in cycle) - whole) < _SLACK:
                 ring = _ring(model, cycle)
                 if len(ring.ends) > 1:
@@ -96,6 +98,8 @@ def _cycles(
                 yield path
             elif (
                 following not in path
+                # Each cycle is found from its first road in the file alone; with the bounds of
+                # number and length, the search ends on any map.
                 and order[following] > order[start]
                 and len(path) < _MOST_ROADS
                 and length + model.road(following).length <= LONGEST

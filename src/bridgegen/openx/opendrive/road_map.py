@@ -45,9 +45,12 @@ def map_path(path: Path) -> Path:
     rule = f"{path}: neither a file nor the name of a map of CARLA"
     if not root:
         raise FileFormatError(f"{rule}, as neither --maps nor {ROOT} says where CARLA is")
+    # The name becomes part of a glob, and it may come from a scenario file: with ``..`` or ``*`` it
+    # would name any file.
     if not all(name.isalnum() or name in "_-" for name in path.name):
         raise FileFormatError(f"{rule}, which has letters, digits, _ and - only")
     for place in _PLACES:
+        # The order of a glob is the file system's; sorted, every machine takes the same map.
         found = sorted(Path(root).glob(place.format(name=path.name)))
         if found:
             return found[0]
@@ -107,6 +110,8 @@ def load_map(
     if owl is not None:
         path, digest = map_of(owl)
     data = read_bytes(path) if owl is None else _read_named(path, owl)
+    # The individuals hold neither elevations nor the course of cubics; these are in the map alone.
+    # A scenario that is searched on the ontology takes place on exactly the file it was made of.
     if owl is not None and digest_of(data) != digest:
         raise FileFormatError(
             f"{owl}: its map {path} must be what it was when it was imported, but has changed; "

@@ -117,11 +117,14 @@ def _turned(
             f"as the scenario has ({', '.join(headings)}), got {len(ends)} "
             f"(roads {roads or 'none'})"
         )
+    # Only where traffic drives on the left: mirrored on a road with traffic on the right, a car
+    # from the right would come from the left, and other rules of priority would hold.
     if all(road.rule == "LHT" for road, _ in ends):
         headings = {leg: 180.0 - angle for leg, angle in headings.items()}
     names = sorted(headings, key=lambda leg: headings[leg] % 360.0)
     arms = {id(end): _arm(model, *end) for end in ends}
     sites = []
+    # Every rotation: the best-looking one may lack a lane that the scenario uses.
     for k in range(len(ends)):
         found = dict(zip(names, ends[k:] + ends[:k], strict=True))
         legs = tuple(Leg(leg, heading(*found[leg]), arms[id(found[leg])]) for leg in headings)

@@ -45,6 +45,7 @@ def missing(scenario: LogicalScenario, model: OpenDrive, site: Site) -> list[str
     found = sorted({_missing(site, *place, False) for place in _places(scenario)} - {""})
     found += sorted({_missing(site, end, 0.0, True) for end in ends_of(scenario)} - {""})
     first, last = within = reach(scenario)
+    # A scenario behind a bend (a stopped car that is seen late) is another one on a straight road.
     wanted, there = turning(scenario, *within), site.legs[0].turning(*within)
     if there < SHARE_OF_TURN * wanted:
         found.append(
@@ -401,6 +402,7 @@ def candidates(
         ids = [junction.id for junction in model.junctions]
     for place_id in ids:
         try:
+            # A junction with another number of legs is no candidate, which is no error of the map.
             yield sites_at(scenario, model, place_id, map_name)
         except UnsupportedError:
             continue
@@ -430,6 +432,8 @@ def _unlikeness(scenario: LogicalScenario, site: Site) -> float:
     farthest = max((value(place.distance, values) for place in all_places(scenario)), default=0.0)
     short = max(0.0, 1.0 - site.legs[0].length / max(farthest, 1.0))
     wanted = value(scenario.roads.knobs["speed_limit"], values)
+    # By the ratio: 50 where 30 was meant is as far off as 120 where 72 was. A road without a limit
+    # is taken to have the wanted one.
     limit = elementary.log2(max(road.speed_limit or wanted, 1.0) / wanted)
     within = reach(scenario)
     turned = abs(site.legs[0].turning(*within) - turning(scenario, *within))

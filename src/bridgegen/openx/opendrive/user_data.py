@@ -58,5 +58,7 @@ def exact(data: Sequence[UserData], name: str, measured: float, slack: float = 1
         measured: the geometry's value, with rounding.
         slack: by how much the two may differ, in the property's unit.
     """
+    # The geometry overrules the statement: a tool that moves a junction leaves our userData as it
+    # was. Where both agree, the stated number has the last digits that a measured one lost.
     found = number(data, name)
     return measured if found is None or abs(found - measured) > slack else found

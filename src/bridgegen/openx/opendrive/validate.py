@@ -120,6 +120,7 @@ def problems(model: OpenDrive) -> list[str]:
 
     Ids and references come first; where these are broken, nothing else is looked at.
     """
+    # Everything below follows links, and would stumble over broken ones.
     broken = [sentence for _, sentence in broken_references(model)]
     broken += _collisions(model)
     if broken:
@@ -141,6 +142,7 @@ def problems(model: OpenDrive) -> list[str]:
 
 def _collisions(model: OpenDrive) -> Iterator[str]:
     for junction in model.junctions:
+        # No schema and none of ASAM's checks finds this one.
         if junction.id in model.roads_by_id:
             yield (
                 f"a junction's id must differ from every road's, got '{junction.id}' for both "
@@ -158,6 +160,8 @@ def _reference_line(road: Road) -> Iterator[str]:
             yield f"road {road.id}: geometry {index} must start at {s:.6g} m, got {geometry.s:.6g}"
         s = geometry.s + geometry.length
         shape = geometry.shape
+        # SUMO's netconvert takes 12 GB of memory on such a spiral; others divide by zero. It is
+        # valid by the XSD, so no schema check finds it. Ours writes a line or an arc instead.
         if isinstance(shape, Spiral) and shape.curv_start == shape.curv_end:
             yield (
                 f"road {road.id}: geometry {index}: a spiral's curvatures must differ, got "
@@ -169,6 +173,7 @@ def _reference_line(road: Road) -> Iterator[str]:
     for index, (item, following) in enumerate(pairwise(road.plan_view), start=1):
         end = pose(item, item.length)
         gap = math.dist(end[:2], (following.x, following.y))
+        # `remainder`, because headings in files differ by whole turns.
         kink = abs(math.remainder(end.h - following.hdg, math.tau))
         if gap > GAP or kink > KINK:
             yield (
@@ -218,6 +223,8 @@ def _widths(where: str, lane: Lane, length: float) -> Iterator[str]:
 def _least(cubic: tuple[float, float, float, float], end: float) -> float:
     """Return the smallest value of a cubic on [0, end]."""
     a, b, c, d = cubic
+    # The least of a cubic on an interval is at an end or where its slope is 0; sampling would miss
+    # a narrow dip.
     candidates = [0.0, end]
     if d:
         root = c * c - 3.0 * b * d
@@ -244,6 +251,7 @@ def _along(road: Road) -> Iterator[str]:
                     )
                     if other is None:
                         yield f"{what} is not in the section at s={b.s:.6g} m"
+                    # Only where somebody drives: elsewhere a one-sided link costs no way.
                     elif lane.id not in back and lane.drivable:
                         yield f"{what} must link back to it, got {list(back) or 'nothing'}"
                     elif road.direction(target) != road.direction(lane.id):

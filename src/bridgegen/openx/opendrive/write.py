@@ -18,6 +18,7 @@ def to_xml(model: OpenDrive) -> bytes:
     root = etree.Element("OpenDRIVE")
     try:
         _fill(root, model)
+    # lxml refuses what XML has no characters for (NUL, lone surrogates); names come from users.
     except ValueError as error:
         raise InputError(f"the road network cannot be written as XML: {error}") from None
     return bytes(etree.tostring(root, xml_declaration=True, encoding="UTF-8", pretty_print=True))
@@ -28,6 +29,8 @@ def _fill(element: etree._Element, record: Any) -> None:
     cls: type = type(record)
     for field in plan(cls):
         value = getattr(record, field.name)
+        # What a file need not have is not written, so that OpenDRIVE to model and back adds
+        # nothing.
         if value is None or value == ():
             continue
         role, path = field.form.role, field.form.path
@@ -37,6 +40,8 @@ def _fill(element: etree._Element, record: Any) -> None:
         if role == "choice":
             _fill(etree.SubElement(element, value.TAG), value)
             continue
+        # Children that share a wrapper (``link/predecessor`` and ``link/successor``) get one
+        # wrapper, as the XSD has it.
         for depth in range(1, len(path)):
             if path[:depth] not in wrappers:
                 parent = wrappers[path[: depth - 1]]
@@ -57,4 +62,6 @@ def _text(value: float | int | bool | str) -> str:
         return "true" if value else "false"
     if isinstance(value, str):
         return value
+    # `repr` gives the shortest text that reads back to the same bits, so that model → text → model
+    # is the identity. NumPy's scalars would print with their type's name; hence the conversion.
     return repr(float(value)) if isinstance(value, float) else repr(int(value))

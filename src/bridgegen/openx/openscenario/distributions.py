@@ -266,6 +266,7 @@ def distribution_of(
         case UniformDistribution():
             return Uniform(*_limits(given.range))
         case NormalDistribution():
+            # A variance below 0 becomes the deviation 0, which Normal refuses with a message.
             deviation = math.sqrt(max(given.variance, 0.0))
             return Normal(given.expected_value, deviation, _optional(given.range))
         case LogNormalDistribution():
@@ -285,6 +286,7 @@ def _steps(given: DistributionRange) -> Discrete:
     count = (span.high - span.low) / step
     if count >= MOST_VALUES:
         raise InputError(f"a range may have {MOST_VALUES} steps, got {count:.6g}")
+    # 0.1 to 0.7 in steps of 0.2 has four values, though (0.7 - 0.1) / 0.2 is 2.9999999999999996.
     steps = range(math.floor(count + 1e-9) + 1)
     return Discrete.of([min(span.low + k * step, span.high) for k in steps])
 

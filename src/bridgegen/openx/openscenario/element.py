@@ -194,6 +194,8 @@ class Declaration:
     text: str | None
 
 
+# The annotations are worked out when a class is first read or written: at import they would have to
+# resolve classes that are declared further down, or in other modules.
 _DECLARATIONS: dict[type[Element], Declaration] = {}
 
 
@@ -253,6 +255,7 @@ def _child(
     names = tags if tags else [option.__name__ for option in options]
     by_name = dict(zip(names, options, strict=True))
     by_name |= {mark.cls.__name__: mark.cls for mark in marks if isinstance(mark, OrInFiles)}
+    # Before the aliases come in: those are read and never written.
     by_class = {cls: tag for tag, cls in by_name.items()}
     by_name |= {mark.name: options[0] for mark in marks if isinstance(mark, Alias)}
     wrapper = options[0] if BARE in marks else None

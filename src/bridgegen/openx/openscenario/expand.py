@@ -159,6 +159,8 @@ def _uncoupled(scenario_object: ScenarioObject, taken: set[str]) -> Iterator[Sce
     yield from _uncoupled(replace(inner, name=name), taken)
 
 
+# Entries may name entries, each several others: a few lines of XML can stand for any number of
+# elements. Depth alone does not bound that.
 MAX_ELEMENTS = 200_000
 """Largest number of elements from catalogues, counted wherever they are put."""
 
@@ -188,8 +190,10 @@ def expanded(
             are not there, or that go round in circles; all of it at once.
         UnsupportedError: an entry holds what this version does not know.
     """
+    # Most files refer to nothing, and their elements are then not built a second time.
     if any(map(_refers, walk(file))):
         file = _Expander(file, folder, place, skipped, warnings).result()
+    # Last, because selections and trailers may come from catalogues.
     return with_trailers_apart(without_selections(file))
 
 
@@ -229,6 +233,7 @@ class _Expander:
         self._open: list[Element] = []
         self._missing: list[CatalogReference] = []
         self._elements = 0
+        # A document without a path has no folder, so nothing that it names can be opened.
         self._catalogs = None if folder is None else self._of(folder, skipped)
 
     def _of(self, folder: Path, skipped: list[str] | None) -> Catalogs:
@@ -268,6 +273,9 @@ class _Expander:
             for parameter_declaration in self._declared
             if parameter_declaration.name in self._scope.own
         )
+        # Only the scenario's own parameters stay, for they are what a search varies. A parameter
+        # made of others is put in its place as a formula, not as a value, so that it varies with
+        # them.
         literal = {
             parameter_declaration.name: self._scope.constrained(parameter_declaration)
             for parameter_declaration in own
@@ -289,6 +297,7 @@ class _Expander:
         """
         left = without(scenario, self._missing)
         names = [str(obj.name) for obj in scenario.entities.scenario_objects]
+        # `min` keeps the first of equals: the ego by name, else the first entity.
         ego = min(names, key=lambda name: name.lower() != "ego", default="")
         kept = {str(obj.name) for obj in left.entities.scenario_objects}
         for reference in self._missing:
@@ -300,6 +309,7 @@ class _Expander:
         self, element: E, scope: Scope, depth: int, assigned: dict[str, Value] | None = None
     ) -> E:
         """Return an element in which nothing refers to anything but the scenario's parameters."""
+        # Counted in entries alone: the file itself is bounded by its size.
         if self._open:
             self._elements += 1
         changes: dict[str, Any] = {}
@@ -371,8 +381,10 @@ class _Expander:
                 *(f"CatalogReference {problem}" for problem in error.problems)
             ) from None
         entry = self._catalogs.entry(catalog, name, child.tags)
+        # By identity: two entries of equal contents are two.
         if any(entry is element for element in self._open):
             raise NoEntryError(f"catalogue '{catalog}': the entry '{name}' holds itself")
+        # The bound of a file's own depth, for what stands in it may come from elsewhere.
         if depth + _height(entry) > MAX_DEPTH:
             raise NoEntryError(
                 f"catalogue '{catalog}': with the entry '{name}' elements nest more than "
@@ -386,6 +398,8 @@ class _Expander:
         known = (
             {parameter.name for parameter in declared.parameters} if declared is not None else set()
         )
+        # A warning and no error: files of others do it (three of esmini's examples), and nothing
+        # depends on it.
         for unknown in sorted(assigned.keys() - known):
             self.odd(
                 reference,

@@ -109,6 +109,7 @@ def problems(scenario: OpenScenario) -> list[str]:
             found.append((parameter_declaration.line, f"the value of parameter {name} {error}"))
             value = parameter_declaration.value
         declared[name] = kind, value
+    # All values first: a constraint may refer to a parameter that is declared further down.
     known_values = {name: value for name, (_, value) in declared.items()}
     for name, parameter_declaration in first.items():
         if not isinstance(declared[name][1], str) or declared[name][0] is Kind.STRING:
@@ -299,6 +300,7 @@ def _limit(kind: Kind, text: str, known: Mapping[str, Literal]) -> Literal:
     numbers = {name: item for name in value.names if isinstance(item := known[name], int | float)}
     if texts := sorted(value.names - numbers.keys()):
         raise FileFormatError(f"computes with ${texts[0]}, which is no number")
+    # What overflows or divides by zero is found below, as a limit that is not finite.
     with np.errstate(all="ignore"):
         number = float(value.resolve(numbers))
     if not np.isfinite(number):
@@ -311,6 +313,8 @@ def _nearly(rule: Rule, value: Literal, limit: Literal) -> bool:
     inclusive = rule in (Rule.GREATER_OR_EQUAL, Rule.LESS_OR_EQUAL, Rule.EQUAL_TO)
     if not inclusive or not isinstance(value, float) or not isinstance(limit, float):
         return False
+    # The decoder puts parameters onto their bounds, and a bound that is computed may round either
+    # way; a file that was written must be one that is read.
     return abs(value - limit) <= float(slack(limit))
 
 

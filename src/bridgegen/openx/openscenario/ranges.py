@@ -236,6 +236,8 @@ class _Builder:
                 return
             kind = self._kind(name)
             found = dst.distribution_of(distribution.distribution)
+            # A continuous distribution of a whole number would have to be rounded, and the standard
+            # does not say how.
             if kind.is_integer and not isinstance(found, Discrete | Uniform):
                 raise InputError(
                     f"parameter {name} is a whole number ({kind.value}), and a "
@@ -277,6 +279,8 @@ class _Builder:
             return Discrete.of(kept) if kept else found
         low, high = found.low, found.high
         return Uniform(
+            # The nearest double within the range: a search may then have any value that the
+            # constraint allows.
             math.nextafter(low, high) if low in ends else low,
             math.nextafter(high, low) if high in ends else high,
         )
@@ -328,6 +332,8 @@ class _Builder:
             for constraint in group.constraints
             if constraint.rule is osc.Rule.EQUAL_TO
         ]
+        # The order of the constraint's values, if it lists them, does not depend on what a
+        # distribution picks: so the same text has the same number with any distribution.
         names = tuple(dict.fromkeys(map(str, [*allowed, *words, declaration.value])))
         self._words[name] = names
         return [float(names.index(word)) for word in words]
@@ -441,6 +447,8 @@ class _Builder:
         names: list[str] = []
         choices: list[list[tuple[float, ...]]] = []
         for name, category in self._categories.items():
+            # Each text on which the storyboard depends is read, checked and compiled by itself; one
+            # that only formulas of the header compare costs nothing.
             if name in self._used or name not in compared:
                 assert isinstance(category.distribution, Discrete)
                 names.append(name)
@@ -469,6 +477,8 @@ class _Builder:
         """
         for name in self._numbers:
             text = self._said.get(f"{PARAMETER}.{name}.expression")
+            # What the distribution says of a parameter counts more than the formula that the header
+            # has for it.
             if text is None or name in self._single or name in joint:
                 continue
             formula = parse(text, f"{PARAMETER}.{name}.expression", self._words)
@@ -495,6 +505,8 @@ class _Builder:
             self._unit(name),
             low,
             high,
+            # The declared value is the default even where the distribution leaves it out; a default
+            # must lie in the range.
             min(max(declared, low), high),
             INTEGER if whole else FLOAT,
             distribution=None if isinstance(found, Uniform) else found,
@@ -550,6 +562,7 @@ class _Builder:
 
     def _axis(self, name: str) -> Axis:
         said = self._said.get(f"{PARAMETER}.{name}.axis")
+        # Never static: the map of a scenario file is one file, which no parameter changes.
         return Axis(said) if said in list(Axis) and said != Axis.STATIC else Axis.PARTICIPANTS
 
     def _unit(self, name: str) -> str:

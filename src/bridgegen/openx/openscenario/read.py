@@ -56,6 +56,7 @@ def read(
     path = Path(source) if isinstance(source, str) else source
     place = place or (str(path) if isinstance(path, Path) else "document")
     root = parse_xml(path, place)
+    # Both kinds of file have the same root element, and users give one for the other.
     if (distribution := root.find(DISTRIBUTION)) is not None:
         named = distribution.find("ScenarioFile")
         its_own = "SCENARIO.xosc" if named is None else named.get("filepath", "")
@@ -66,6 +67,8 @@ def read(
     file = _with_texts(verbatim(root, place, skipped, warnings), texts or {})
     folder = path.parent if isinstance(path, Path) else None
     scenario = expanded(file, folder, place, skipped, warnings)
+    # Until nothing is astray: what names an entity that went goes with it, and may take others
+    # along.
     while skipped is not None and (astray := strays(scenario)):
         skipped += [
             f"{place}: {type(element).__name__} of an entity that is not there (line "
@@ -73,6 +76,8 @@ def read(
             for element in astray
         ]
         scenario = without(scenario, astray)
+    # Last, on the scenario as it stands by itself: catalogues may have brought references to
+    # parameters.
     if problems := parameters.problems(scenario):
         raise FileFormatError(*shorten([f"{place}: {problem}" for problem in problems]))
     return scenario

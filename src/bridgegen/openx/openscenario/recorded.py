@@ -117,6 +117,8 @@ def _turning(body: Body) -> Body:
     """Return a body that esmini, too, turns steadily from vertex to vertex, not at corners only."""
     if isinstance(body, osc.ExternalObjectReference):
         return body
+    # By default esmini turns a body at the corners of a polyline only: up to 0.8° off. The property
+    # is its own; others pass over it.
     held = body.properties or osc.Properties()
     if held.get(_TURNING) is not None:
         return body
@@ -146,6 +148,8 @@ def _timetable(
     vertices = tuple(_vertices(recording, e, first, last))
     name = recording.names[e]
     follow = osc.FollowTrajectoryAction(
+        # Absolute times with scale 1 and offset 0: tools divide by the scale or multiply by it, and
+        # add the offset or subtract it.
         osc.TimeReference(osc.Timing(osc.ReferenceContext.ABSOLUTE, 1.0, 0.0)),
         osc.TrajectoryFollowingMode(osc.FollowingMode.POSITION),
         osc.TrajectoryRef(
@@ -187,9 +191,13 @@ def _vertices(recording: Recording, e: int, first: int, last: int) -> Iterator[o
     step = recording.time_step
     still = (np.diff(x) == 0.0) & (np.diff(y) == 0.0) & (np.diff(h) == 0.0)
     for k in range(first, last + 1):
+        # All other vertices stay, however near: esmini plays such files exactly with `--traj_filter
+        # 0`.
         if not (first < k < last and still[k - 1] and still[k]):
             yield _vertex(k * step, x[k], y[k], h[k])
         if k < last and abs(v[k] - v[k + 1]) > SAME_SPEED and not still[k]:
+            # Over half a step at v[k], and half a step at v[k + 1], the entity covers this share of
+            # the way first.
             share = v[k] / (v[k] + v[k + 1])
             yield _vertex(
                 (k + 0.5) * step,
@@ -247,6 +255,7 @@ def _event(event: osc.Event, seconds: float) -> Iterator[osc.Event]:
 
 def _stop(board: osc.Storyboard, recording: Recording) -> osc.Trigger:
     """Return the end: what it was, save where that asks for what is gone, and the last instant."""
+    # A condition on a part of the storyboard that is gone would never be met, or be an error.
     groups = board.stop_trigger.condition_groups if board.stop_trigger else ()
     kept = [
         group

@@ -94,6 +94,9 @@ class Scope:
     ) -> "Scope":
         """Return the scope of a scenario's declarations; see `inner`."""
         declarations = list(declarations)
+        # The literal ones first, wherever they stand: these stay parameters, and the made ones are
+        # formulas of them. All are compared with their constraints last, as a constraint may refer
+        # to any parameter.
         literal = [declaration for declaration in declarations if not is_made(declaration)]
         found = cls().inner(literal, problems, checks=False).names
         own = {
@@ -137,6 +140,8 @@ class Scope:
                 if assigned is not None and is_given
                 else declaration.value
             )
+            # An assigned value comes from outside the element: the names in it are the scenario's
+            # own, and not those that the element declares.
             scope = Scope(self.own, self.own) if is_given else made
             try:
                 names[declaration.name] = scope._bind(declaration, value)
@@ -225,6 +230,8 @@ class Scope:
             return _typed(self.own[value.name], kind)
         if not isinstance(value, Expr):
             return value
+        # Whatever a formula of a file does not define, 1/0 or an overflow, is infinite or NaN, and
+        # refused below with the formula.
         with np.errstate(all="ignore"):
             number = float(value.resolve({name: float(self.own[name].now) for name in value.names}))
         if not np.isfinite(number) or (kind.is_integer and not number.is_integer()):
@@ -281,12 +288,16 @@ def _put_in(value: Expr, bound: Mapping[str, Binding]) -> Expr:
     """Return an expression in which parameters stand for what they are."""
 
     def stands(name: str) -> str:
+        # In parentheses: $a*2 with a = ${$b + 1} must not become $b + 1*2, nor -$a with a = -3
+        # become --3.
         flag = bound[name].value
         if isinstance(flag, Expr):
             return f"({flag.text[2:-1]})"
         return flag.text if isinstance(flag, ParameterRef) else f"({text_of(flag)})"
 
     text = _NAMES.sub(lambda found: stands(found[1]), value.text)
+    # Formulas that refer to each other twice double in length with each level: a small file could
+    # ask for any amount of memory.
     if len(text) > MAX_LENGTH:
         raise FileFormatError(
             f"may have {MAX_LENGTH} characters, {value} has {len(text)} with what it refers to"

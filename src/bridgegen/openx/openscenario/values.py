@@ -25,6 +25,8 @@ from bridgegen.scenario.language.expression import RESERVED, Expression, parse
 V = TypeVar("V")
 
 _REFERENCE = re.compile(r"\$[A-Za-z_][A-Za-z0-9_]*")
+# An alphabet, before any parser sees the text: no quotation marks, brackets or comparisons, which
+# the standard's expressions do not have either.
 _EXPRESSION = re.compile(r"\$\{[ A-Za-z0-9_+\-*/%$().,]*\}")
 _WORD = re.compile(r"\$?[A-Za-z_][A-Za-z0-9_]*|(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?")
 _TRUTHS = {
@@ -80,7 +82,10 @@ _PATTERNS = {
         r"T([01]\d|2[0-3]):[0-5]\d:[0-5]\d(\.\d+)?(Z|[+-]\d\d:\d\d)?",
         re.ASCII,
     ),
+    # By pattern and not by `float`, which takes "nan", "1_000" and digits of all scripts; XSD's
+    # double does not. NaN is left out: no attribute of the standard means it.
     Kind.DOUBLE: re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?|-?INF", re.ASCII),
+    # Twenty digits at most, since `int` of a long text takes time that grows with its square.
     **dict.fromkeys(_RANGES, re.compile(r"[+-]?\d{1,20}", re.ASCII)),
 }
 
@@ -222,6 +227,7 @@ def parse_literal(kind: Kind, text: str) -> Literal:
         return _checked_date(text)
     if kind is Kind.DOUBLE:
         value = float(text)
+        # 7e999 is a double by its form, and would be infinite without anybody having said so.
         if math.isinf(value) and "INF" not in text:
             raise FileFormatError(f"must be of type double, got '{text[:80]}', which overflows")
         return value
@@ -235,6 +241,7 @@ def parse_literal(kind: Kind, text: str) -> Literal:
 def _checked_date(text: str) -> str:
     year, month, day = re.findall(r"\d+", text)[:3]
     try:
+        # Python's dates end with the year 9999, and the XSD's do not.
         date(int(year) % 400 or 400, int(month), int(day))  # the calendar repeats after 400 years
     except ValueError:
         raise FileFormatError(f"must be of type dateTime, got '{text}': no such day") from None
@@ -294,6 +301,7 @@ def format_value(kind: Kind, value: Value) -> str:
     if kind in (Kind.STRING, Kind.DATE_TIME):
         if not isinstance(value, str):
             raise TypeError(f"text is expected, got {value!r}")
+        # What is written must read back as the same: a text that looks like a reference would not.
         if _REFERENCE.fullmatch(value):
             raise ValueError(f"the text '{value}' would be read as a reference to a parameter")
         return value

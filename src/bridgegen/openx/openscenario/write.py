@@ -38,6 +38,8 @@ def to_xml(scenario: "OpenScenario | DistributionFile") -> bytes:
     """
     root = etree.Element("OpenSCENARIO")
     fill(root, "OpenSCENARIO", scenario, bare=scenario.file_header.rev_minor == 0)
+    # The same model gives the same bytes: nothing here depends on the date, on ids of the process
+    # or on the order of a set.
     return etree.tostring(root, xml_declaration=True, encoding="UTF-8", pretty_print=True)
 
 
@@ -95,6 +97,9 @@ def fill(node: etree._Element, tag: str, element: Element, *, bare: bool) -> Non
 VERSIONS = {"1.2": 2, "1.3": 3}
 """The versions that can be written, and their minor revision."""
 
+# Deprecated words are valid still, but tools differ in what they take: `overwrite` is 1.0's and
+# 1.1's word for what is `override` from 1.2 on. So the names are those of the version that is
+# written.
 _RENAMED: dict[Any, Any] = {
     osc.Priority.OVERWRITE: osc.Priority.OVERRIDE,
     osc.RelativeDistanceType.CARTESIAN_DISTANCE: osc.RelativeDistanceType.EUCLIDIAN_DISTANCE,
@@ -183,6 +188,7 @@ def _modern(was: int) -> Callable[[Element], Element]:
     def change(element: Element) -> Element:
         if isinstance(element, osc.Orientation) and element.type is None:
             context = osc.ReferenceContext
+            # The default changed from 1.2 to 1.3. Written out, it cannot be read in two ways.
             element = replace(element, type=context.RELATIVE if was >= 3 else context.ABSOLUTE)
         renamed: dict[str, Any] = {
             attribute.field: _RENAMED[value]
@@ -196,6 +202,8 @@ def _modern(was: int) -> Callable[[Element], Element]:
 
 def _complete(element: Element) -> Element:
     """Return an element with what 1.2 must have and 1.3 need not, and without what it has not."""
+    # 1.3 lets an act without a trigger begin with its story; 1.2 must have one, so it gets one that
+    # fires at the start.
     if isinstance(element, osc.Act) and element.start_trigger is None:
         return replace(element, start_trigger=at_once())
     if isinstance(element, osc.Storyboard) and element.stop_trigger is None:

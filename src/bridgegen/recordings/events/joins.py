@@ -13,6 +13,8 @@ from bridgegen.recordings.events.scene import Scene
 from bridgegen.recordings.lanes.model import NONE, RecordedLanes
 from bridgegen.recordings.readers.table import wrap
 
+# At 10 m, who enters a small roundabout and who is in it differ by more than 120° already, for the
+# ring bends.
 LOOK_BACK = 5.0
 """Distance before two paths join at which courses are compared [m]."""
 LEAST_SHARED = 10.0
@@ -67,6 +69,7 @@ def path_joins(scene: Scene) -> Iterator[Join]:
     for item, other, first_at, other_at, first_length, other_length, shared in zip(
         *columns, strict=True
     ):
+        # Paths that cross are near one another for a while, too, and are no joining.
         if shared < LEAST_SHARED or (item, other) in crossing:
             continue
         if abs(first_at - other_at) * scene.step > WINDOW:
@@ -84,6 +87,9 @@ def path_joins(scene: Scene) -> Iterator[Join]:
         )
         if not ANGLES[0] <= angle <= ANGLES[1] or abs(_degrees(end[1] - end[0])) > ANGLES[0]:
             continue
+        # Not "who turns more": in a roundabout that is who is in it. The bend of the shared part,
+        # continued backwards, leads along the path of the one that was on it, in a ring as on a
+        # straight road.
         bend = np.mean([_degrees(b - a) for a, b in zip(middle, end, strict=True)]) / (0.5 * span)
         first = middle[0] + 0.5 * np.radians(_degrees(middle[1] - middle[0]))
         backwards = first - np.radians(bend) * (0.5 * span + LOOK_BACK)
@@ -161,6 +167,8 @@ def length_left(lanes: RecordedLanes, lane: int) -> float:
         length += float(ends[-1] - ends[0])
         onward = lanes.successors[lane]
         if not onward:
+            # Where all lanes end, the map does. A weaving lane between an entry and an exit does
+            # not end, so it has lane changes and no mergings.
             beside = [int(array[lane]) for array in (lanes.left, lanes.right)]
             goes_on = any(number != NONE and lanes.successors[number] for number in beside)
             return length if goes_on else np.nan
@@ -233,6 +241,7 @@ def _of_two_lanes(scene: Scene) -> Iterator[Join]:
     ]
     steps = steps[np.array(onto, np.bool_)]
     instant = _entered(scene, steps)
+    # By lane and time, so that two that follow one another into a lane are neighbours.
     order = np.lexsort((instant, lane[steps + 1]))
     for i, j in zip(order[:-1].tolist(), order[1:].tolist(), strict=True):
         a, b = int(steps[i]), int(steps[j])

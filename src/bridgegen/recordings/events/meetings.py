@@ -15,6 +15,7 @@ from bridgegen.recordings.excerpt import excerpt
 from bridgegen.recordings.readers.table import wrap
 from bridgegen.scenario.language.event_kinds import EVENT_KINDS
 
+# Not where one could see the other: sight needs a map of buildings, which no recording has.
 AHEAD = 6.0
 """Time before the first of both passes at which a meeting begins, unless both are recorded later
 [s]."""
@@ -92,6 +93,8 @@ def meetings(scene: Scene, egos: Bool, others: Bool) -> list[Meeting]:
         met.other_at.tolist(),
         strict=True,
     ):
+        # Which of two is the ego is not in a recording, so both views count where both are
+        # possible.
         if egos[item] and others[other]:
             found.append(meeting(scene, item, other, first_at, other_at))
         if egos[other] and others[item]:

@@ -23,6 +23,8 @@ from bridgegen.recordings.readers.table import RecordedTraffic, wrap
 BIN = 0.01
 """Bin width of offsets, from which the percentiles are taken [m]."""
 BINS = 1000
+# Of cars that a vehicle recorded, up to 96 % are parked off lanes (nuScenes). Counting them, the
+# lanes of six of 14 files would have been refused.
 DRIVES = 5.0
 """Distance that a vehicle covers if it is not parked [m]; more than the noise of trackers."""
 
@@ -152,6 +154,7 @@ def locate(traffic: RecordedTraffic, road_map: MapLanes | None = None) -> Locate
     if not traffic.facts.lanelets:
         return _on(traffic, infer_lanes(traffic))
     found = _on(traffic, lanes_of_lanelets(traffic.facts.lanelets))
+    # So written, NaN (nobody drives) keeps the lanes that the recording brings.
     if not found.fit.vehicle_share < LEAST_SHARE:
         return found
     note = (
@@ -170,6 +173,8 @@ def _on(traffic: RecordedTraffic, lanes: RecordedLanes) -> Located:
 def _on_map(traffic: RecordedTraffic, road_map: MapLanes) -> Located:
     found = _on(traffic, road_map.lanes)
     share = found.fit.vehicle_share
+    # Recordings are in the map's own coordinates or in those of its projection, and seldom say in
+    # which; the one that fits is taken.
     if share < LEAST_SHARE and road_map.offset is not None:
         moved = _on(traffic, _projected(road_map.lanes, road_map.offset))
         found = moved if moved.fit.vehicle_share > share else found

@@ -38,12 +38,16 @@ def stations_of_groups(strips: "Sequence[Strip]") -> tuple[dict[int, int], dict[
     for a, b in links:
         onward[a].append(b)
         before[b].append(a)
+    # The number comes last in both keys, so that ties are broken in one way, whatever the order of
+    # a set.
     best = {a: min(to, key=lambda b: (-links[a, b], turn[b], b)) for a, to in onward.items()}
     last = {b: min(by, key=lambda a: (-links[a, b], turn[a], a)) for b, by in before.items()}
     following = {a: b for a, b in best.items() if last[b] == a}
     followed = set(following.values())
     carriageway: dict[int, int] = {}
     heads: dict[int, list[int]] = {}
+    # First the groups that nothing leads to; what is left over then are rings, which begin
+    # anywhere.
     for head in [g for g in length if g not in followed] + list(length):
         if head in carriageway:
             continue
@@ -90,6 +94,8 @@ def _turn(strip: "Strip") -> float:
     """Return by how much a lane turns from its beginning to its end [rad], rounded."""
     steps = np.diff(strip.points, axis=0)
     courses = np.arctan2(steps[:, 1], steps[:, 0])
+    # Rounded, so that two straight ways tie, and the last digits of a file do not choose between
+    # them.
     return round(abs(math.remainder(float(courses[-1] - courses[0]), math.tau)), 6)
 
 

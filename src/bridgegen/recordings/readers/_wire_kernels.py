@@ -18,6 +18,8 @@ DEEPEST = 16
 def varint(data: Int, at: int, end: int) -> tuple[int, int]:
     """Return the number at a place, as int64, and the place behind it; −1 if it is cut off."""
     value = np.int64(0)
+    # Ten bytes at most, as the format allows for 64 bits: a longer run of continued bytes is no
+    # number.
     for shift in range(0, 70, 7):
         if at >= end:
             return 0, -1
@@ -41,6 +43,8 @@ def content(data: Int, at: int, end: int, wire: int) -> tuple[int, int]:
         at += 4
     else:
         size, begin = varint(data, at, end)
+        # A length of 2⁶³ or more is negative as int64, and `begin + size` could wrap; so the size
+        # is compared with what is left, not the sum with the end.
         if begin < 0 or size < 0 or size > end - begin:
             return -1, -1
         at = begin + size
@@ -113,6 +117,8 @@ def read_each(
         numbers[k, own[0, 0] : own[0, 1]] = 0.0
         whole[k, own[0, 2] : own[0, 3]] = 0
         while True:
+            # Without recursion: depth is bounded by the shape, for only wanted fields are entered,
+            # however deep a stranger's message nests.
             while depth > 0 and at >= ends[depth]:
                 depth -= 1
             end, node = ends[depth], nodes[depth]
@@ -135,6 +141,8 @@ def read_each(
                 depth += 1
                 ends[depth], nodes[depth], at = last, target, first
                 for c in range(own[target, 0], own[target, 1]):
+                    # Only where it is not known yet: a message that comes in two parts is one, and
+                    # the second must not erase the first.
                     if np.isnan(numbers[k, c]):
                         numbers[k, c] = 0.0
                 for c in range(own[target, 2], own[target, 3]):

@@ -58,12 +58,17 @@ def lanelets_of_centre_lines(
     ]
     total = sum(_length(edge, place, "") for _, edge in (*edges, *outlines))
     total += sum(_length(line.points, place, "") for line in used)
+    # Lines are sampled at this step, so their length bounds memory; a stranger's map may have any.
     if total > MOST_POINTS * STEP:
         raise FileFormatError(
             f"{place}: a map's lines may have {MOST_POINTS * STEP / 1000:,.0f} km in all, got "
             f"{total / 1000:,.0f}"
         )
+    # Geometry decides who is beside whom, not the neighbours that a map names: half of the formats
+    # name none, and where they do, indices of ranges are off by a point.
     field = LineField(used, edges, outlines, place)
+    # A cross-section with stations needs lanes of one length, and lanes of data sets begin and end
+    # anywhere along each other.
     pieces = cuts_of(field)
     widths, measured = half_widths(field)
     lanelets = _linked(field, used, pieces, widths)

@@ -75,6 +75,7 @@ def clean(traffic: RecordedTraffic, time_step: float = TIME_STEP) -> Cleaned:
         raise InputError(
             f"{LEAST_STEP:g} <= time_step <= {MOST_STEP:g} [s] must hold, got {time_step:g}"
         )
+    # Units first: each later rule has thresholds in metres and seconds.
     plausibility.check(traffic)
     quality = Quality()
     kind = _kinds(traffic, quality)
@@ -96,6 +97,8 @@ def clean(traffic: RecordedTraffic, time_step: float = TIME_STEP) -> Cleaned:
             number += 1
             pieces.append(done)
             owner.append(p)
+            # A track that is cut becomes several participants: whether they are one body is what is
+            # not known.
             names.append(traffic.names[p] if number == 1 else f"{traffic.names[p]}#{number}")
     at_jumps.report()
     if not pieces:
@@ -199,6 +202,8 @@ def _complete(
     name = traffic.names[p]
     columns = track.columns
     n, begin = len(track), columns["time"][0]
+    # Instants are multiples of the time step from 0 on, the same for all participants, so that
+    # distances of two need no interpolation. Nothing is extrapolated beyond a track's ends.
     low = int(np.ceil((begin - SAME) / time_step))
     high = int(np.floor((columns["time"][-1] + SAME) / time_step))
     if n < 2 or high <= low:
@@ -229,6 +234,7 @@ def _complete(
         along = vx * np.cos(heading) + vy * np.sin(heading)
         acceleration = np.where(missing, np.gradient(along, time), acceleration)
     at = time_step * np.arange(low, high + 1, dtype=np.float64)
+    # A recording that has these instants already keeps its numbers bit for bit.
     if len(at) == n and np.abs(at - time).max() <= SAME:
         done = {
             "x": columns["x"],
@@ -271,6 +277,8 @@ def _smoothed(traffic: RecordedTraffic, p: int, track: _Track, quality: Quality)
     if misfit > smoothing.MISFIT:
         quality.note(Rule.MISFIT, p, len(track), f"{name}, {misfit:.2g} m/s off")
         if len(track) < smoothing.LEAST_STATES:
+            # Too short to smooth: positions decide where velocities disagree with them, so these
+            # are dropped and made of the positions.
             unknown = np.full(len(track), np.nan)
             return _Track(
                 columns | dict.fromkeys(("vx", "vy", "acceleration"), unknown), track.lane
@@ -289,9 +297,12 @@ def _smoothed(traffic: RecordedTraffic, p: int, track: _Track, quality: Quality)
     given = columns["heading"]
     heading = np.full(count, np.nan)
     if np.isfinite(given).all():
+        # Headings are smoothed with the positions: one that jumps by 0.3 rad moves the rear axle by
+        # 0.4 m, which the replay of a track would have as speed.
         turned = np.interp(time, columns["time"], np.unwrap(given))
         heading = smoothing.smooth(turned, step, 0)
     speed = np.hypot(vx, vy)
+    # Of who stands, the direction of the velocity is noise.
     along = np.divide(ax * vx + ay * vy, speed, out=np.zeros(count), where=speed > 0.1)
     return _Track(
         {

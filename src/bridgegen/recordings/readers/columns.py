@@ -13,6 +13,8 @@ from bridgegen.base.arrays import Float, Int
 from bridgegen.base.errors import FileFormatError
 from bridgegen.openx.xml import read_bytes
 
+# Large enough that NumPy's start does not count, small enough that the lines as Python's objects
+# fit beside the columns of a file of gigabytes.
 CHUNK = 2**24  # bytes
 MOST_BYTES = 8 * 2**30
 LONGEST_LINE = 2**16  # bytes
@@ -60,6 +62,7 @@ def read_columns(
         FileFormatError: unreadable, too large, without the columns, with lines of another number
             of fields, or fields that are no numbers; with the line.
     """
+    # `read_bytes` has the messages for folders, devices and files that are missing.
     read_bytes(path, limit=MOST_BYTES) if not path.is_file() else None
     try:
         with path.open("rb") as file:
@@ -139,6 +142,8 @@ class _Reading:
         """Return numbers and texts; None where a line may be wrong or has quotation marks."""
         fields, separator = len(self.head), self.separator
         if separator:
+            # `numpy.loadtxt` with chosen columns takes lines of any length, so fields are counted
+            # here.
             if {line.count(separator) for line in lines} != {fields - 1}:
                 return None
         elif {len(line.split()) for line in lines} != {fields}:
@@ -149,14 +154,20 @@ class _Reading:
             try:
                 values = self._loaded(lines)
             except ValueError:
+                # Empty fields are rare and cost half as much time again; they are filled in where
+                # NumPy refused.
                 values = self._loaded([_filled(line) for line in lines])
         except ValueError:
             return None
+        # NumPy passes over empty lines, and reads 7e999 as infinite; whoever reads line by line
+        # names the line.
         if len(values) != len(lines) or np.isinf(values).any():
             return None
         return values, [[line.split(separator, k + 1)[k] for line in lines] for k in self.at_texts]
 
     def _loaded(self, lines: list[str]) -> Float:
+        # It rounds correctly to the last digit. A table of 173 MB takes 1.5 s; `pandas` (1.0 s) and
+        # `pyarrow` (0.6 s) are not among the base's packages.
         return np.loadtxt(lines, delimiter=self.separator, usecols=self.at, comments=None, ndmin=2)
 
     def _line_by_line(self, lines: list[str]) -> tuple[Float, list[list[str]]]:
@@ -233,6 +244,8 @@ def _number(text: str) -> float:
     """
     text = text.strip()
     value = float(text) if text else math.nan
+    # Python's `float` takes 1_000 and digits of all scripts, NumPy does not: both readers must
+    # agree.
     if math.isinf(value) or "_" in text or not text.isascii():
         raise ValueError
     return value
@@ -244,6 +257,7 @@ def whole_numbers(path: Path, name: str, values: Float, head: int = 1) -> npt.ND
     Raises:
         FileFormatError: a value is not a whole number.
     """
+    # From 2⁵³ on two ids may be one float64.
     bad = np.flatnonzero(~((values == np.rint(values)) & (np.abs(values) < 2**53)))
     if len(bad):
         raise FileFormatError(

@@ -69,11 +69,13 @@ def _read(path: Path) -> Iterator[RecordedTraffic]:
     found: list[tuple[etree._Element, list[tuple[int, State]]]] = []
     sets = 0
     for element in _obstacles(root, "dynamic"):
+        # A set of places that might be taken is no motion.
         if element.find("trajectory") is None and element.find("occupancySet") is not None:
             sets += 1
             continue
         states = [*element.iterfind("initialState"), *element.iterfind("trajectory/state")]
         found.append((element, [(_line(item), _state(path, item)) for item in states]))
+    # Static obstacles have one state, and stand as long as anybody moves.
     last = max((state[0] for _, states in found for _, state in states), default=1.0)
     for element in _obstacles(root, "static"):
         for item in element.iterfind("initialState"):
@@ -196,6 +198,7 @@ def _value(path: Path, element: etree._Element, name: str) -> float:
         _number(path, element, element.findtext(f"{name}/{end}"), name)
         for end in ("intervalStart", "intervalEnd")
     ]
+    # CommonRoad states uncertainty as an interval; one trajectory needs one value.
     return 0.5 * sum(ends)
 
 
@@ -228,6 +231,8 @@ def _box(path: Path, element: etree._Element) -> tuple[float, float]:
                 for item in shape.iterfind("point")
             ]
             if points:
+                # The polygon stands in the obstacle's own frame, so its extents are length and
+                # width.
                 size = np.ptp(np.array(points), axis=0)
                 return float(size[0]), float(size[1])
     return math.nan, math.nan

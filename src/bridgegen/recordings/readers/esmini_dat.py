@@ -64,6 +64,8 @@ def _version(data: bytes) -> tuple[int, ...] | None:
     if len(data) < 24:
         return None
     major, minor, size, text = struct.unpack_from("<4I", data)
+    # The format has no magic number: plausible versions and lengths tell it apart. Versions 1 and 2
+    # begin with the name of a map and are recognised, so that the refusal can name the version.
     if 3 <= major < 100 and minor < 100 and 12 <= size < 2**16 and text <= size - 4:
         return major, minor
     name = data[4:516].split(b"\0", 1)[0]
@@ -75,6 +77,7 @@ def _version(data: bytes) -> tuple[int, ...] | None:
 def _read(path: Path) -> Iterator[RecordedTraffic]:
     data = read_bytes(path, limit=MOST_BYTES)
     version = _version(data) or ()
+    # No file of an earlier version was at hand to try a reader on.
     if version != VERSION:
         raise FileFormatError(
             f"{path}: version {'.'.join(map(str, version))} of esmini's .dat is not supported, "
@@ -135,6 +138,7 @@ class _Log:
     def _packet(self, code: int, data: bytes, at: int, size: int) -> None:
         if code in (_TIME, _END):
             (time,) = struct.unpack_from("<d", data, at)
+            # esmini ends a log with the time of its last instant again, which is no new one.
             if code == _END and time == self.time:
                 return
             if not abs(time) <= FARTHEST or time <= self.time:
@@ -184,12 +188,15 @@ class _Log:
         if math.isnan(self.time) or not seen:
             return
         unwritten = 0
+        # Instants at which nothing changes are not written, and whoever stands is recorded
+        # throughout. Half a step more than one tells such a gap from a step that is rounded.
         if self.step > 0.0 and until - self.time > 1.5 * self.step:
             unwritten = int(min((until - self.time) / self.step - 0.5, MOST_STATES))
         if len(self.rows) + (1 + unwritten) * len(seen) > MOST_STATES:
             raise FileFormatError(f"{self.source}: may hold {MOST_STATES:,} states, got more")
         for k in range(1 + unwritten):
             for entity in seen:
+                # The pose is x, y, z, heading, pitch, roll.
                 x, y, heading = entity.pose[0], entity.pose[1], entity.pose[3]
                 self.rows.append(
                     (

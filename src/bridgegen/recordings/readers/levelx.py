@@ -116,10 +116,15 @@ def _read_highd(path: Path, stem: str, rate: float, about: dict[str, Float]) -> 
         path.with_name(stem + META), ("id", "width", "height", "drivingDirection"), ("class",)
     )
     rows = _rows(path, stem, "id", meta, tracks)
+    # highD calls a box's extent along the road its width, and the one across its height.
     length, width = meta.numbers["width"][rows], meta.numbers["height"][rows]
+    # highD's y points down the image: all that has a y changes its sign, headings and lanes too.
     vx, vy = data.pop("xVelocity"), -data.pop("yVelocity")
     along = np.where(meta.numbers["drivingDirection"][rows] == LEFTWARDS, np.pi, 0.0)[ids]
     kinds, time = _kinds(meta, rows), data.pop("frame") / rate
+    # highD says how centres move and not how vehicles are turned. The direction of motion would let
+    # the rear axle swing out when a lane change begins, by which a long vehicle's centre was 0.1 m
+    # off.
     heading = _headings(ids, time, vx, vy, along, kinds, length)
     columns: dict[str, npt.NDArray[Any]] = {
         "time": time,

@@ -54,6 +54,8 @@ def read_messages(path: Path) -> Iterator[Stored]:
     reading = _Reading(path)
     try:
         with path.open("rb") as file:
+            # Front to back, without the index at the end: a file that is cut off is refused with
+            # its byte, and damage is found in each record, where the package `mcap` reads on.
             file.seek(len(MAGIC))
             for code, content, offset in _records(file, str(path)):
                 if code == _FOOTER:
@@ -110,6 +112,8 @@ class _Reading:
             self.channels[number] = fields.text(), name, fields.text()
         elif code == _CHUNK and not in_chunk:
             records, place = self._decompressed(fields), f"{source}, chunk at byte {offset}"
+            # A chunk within a chunk is passed over (`in_chunk`), so that decompression nests one
+            # level deep.
             for inner, data, at in _records(io.BytesIO(records), place):
                 yield from self.messages(inner, data, place, at, in_chunk=True)
         if len(self.channels) + len(self.schemas) > MOST_CHANNELS:
@@ -120,6 +124,8 @@ class _Reading:
         method = fields.text()
         (stored,) = fields.take("<Q")
         data = fields.content[fields.at : fields.at + stored]
+        # The stated size is checked before anything is decompressed; afterwards, no more than one
+        # byte beyond it is (`_decompress`), so that a small chunk cannot become gigabytes.
         if size > MOST_RECORD or len(data) < stored:
             raise FileFormatError(
                 f"{fields.place}: a chunk must hold what it says, {MOST_RECORD:,} bytes at most "
@@ -143,6 +149,8 @@ def _decompress(method: str, data: bytes, size: int, place: str) -> bytes:
         import zstandard
 
         try:
+            # A frame may ask for a window of its own size, which zstd allocates before it writes a
+            # byte.
             reader = zstandard.ZstdDecompressor(max_window_size=MOST_RECORD).stream_reader(data)
             return bytes(reader.read(size + 1))
         except zstandard.ZstdError as error:

@@ -63,6 +63,7 @@ def _is_text_file(head: Head) -> bool:
         numbers = [float(field) for field in fields]
     except ValueError:
         return False
+    # A file without a head line is told by the number of its columns and by a plausible time.
     return len(numbers) == len(TEXT_FILE) and EPOCH[0] < numbers[3] < EPOCH[1]
 
 
@@ -89,6 +90,7 @@ def _recording(path: Path, place: str, values: dict[str, Float], lines: Int) -> 
     number, frames = (
         whole_numbers(path, name, values[name], head) for name in ("Vehicle_ID", "Total_Frames")
     )
+    # Numbers of vehicles are used again; number and number of frames together tell who is meant.
     keys, ids = numbered(number * 2**24 + np.clip(frames, 0, 2**24 - 1))
     order = np.lexsort((values["Global_Time"], ids))
     values = {name: column[order] for name, column in values.items()}
@@ -111,6 +113,8 @@ def _recording(path: Path, place: str, values: dict[str, Float], lines: Int) -> 
             for kind, item in zip(kinds.tolist(), length.tolist(), strict=True)
         ]
     )
+    # For headings alone: with raw fronts 5 % of the lane changes seemed to begin before the
+    # recording.
     quiet = _without_noise(time, x, y, bounds)
     heading = headings_behind(*quiet, bounds, np.maximum(arm, SHORTEST_ARM))
     behind = 0.5 * length[ids]

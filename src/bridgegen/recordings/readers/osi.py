@@ -87,6 +87,8 @@ def lanelets_of(truth: Message) -> tuple[tuple[Lanelet, ...], tuple[str, ...]]:
             if len(points) < 2:
                 without += 1
                 continue
+            # OSI's centre line may run against the traffic; ours runs with it, and what follows is
+            # then what OSI lists as before.
             ascending = about["ascending"][k] == 1
             pairs = _PAIR.read(inner, found[_PAIRING])["after" if ascending else "before"]
             borders = np.concatenate([found[_RIGHT_BORDERS], found[_LEFT_BORDERS]])
@@ -160,6 +162,8 @@ def _recognises(head: Head) -> bool:
 
 def _is_trace(data: bytes) -> bool:
     """Return whether a file begins with a message that has a version, or none, and a timestamp."""
+    # A trace has no magic number. What is looked for is the beginning of a first message: a length,
+    # perhaps a version (field 1), and a timestamp (field 2) of at most 17 bytes.
     if len(data) < 6 or not 2 <= struct.unpack_from("<I", data)[0] <= MOST_MESSAGE:
         return False
     at = 4
@@ -176,6 +180,7 @@ def _read(path: Path) -> Iterator[RecordedTraffic]:
         is_mcap = file.read(len(mcap.MAGIC)) == mcap.MAGIC
     if not is_mcap:
         trace = _Trace(path, path.stem)
+        # One message at a time: of each, only the wanted fields stay in memory.
         for message in _messages(path):
             trace.add(message)
         yield trace.traffic(trace.lanelets)
@@ -195,6 +200,7 @@ def _read(path: Path) -> Iterator[RecordedTraffic]:
     if not with_states:
         raise FileFormatError(f"{path}: holds no osi3.GroundTruth or SensorView with objects")
     notes = [f"not read: {name[:80]}" for name in left_out]
+    # One topic may have the map for all.
     lanelets = next((trace.lanelets for trace in traces.values() if trace.lanelets), ())
     for trace in with_states:
         yield trace.traffic(trace.lanelets or lanelets, notes)
@@ -209,6 +215,7 @@ def _messages(path: Path) -> Iterator[Message]:
         with path.open("rb") as file:
             while head := file.read(4):
                 size = int.from_bytes(head, "little")
+                # Before the read: the length is a stranger's, and `read` would allocate it.
                 if size > MOST_MESSAGE:
                     raise FileFormatError(
                         f"{path}, byte {offset}: a message may have {MOST_MESSAGE:,} bytes, got "
@@ -254,11 +261,14 @@ class _Trace:
             self.notes += notes
         if not len(spans) and not len(found[_TRAFFIC_LIGHT]):
             return
+        # The last one counts where a field comes more than once, as Protocol Buffers have it.
         stamp = TIMESTAMP.read(truth, found[_TIMESTAMP][-1:])
         if not len(found[_TIMESTAMP]) or not 0 <= stamp["seconds"][0] < 2**33:
             raise FileFormatError(
                 f"{truth.place(truth.begin)}: the message must have a timestamp ≥ 0 s"
             )
+        # Whole nanoseconds: seconds since 1970 as float64 are exact to 0.2 µs only, and steps would
+        # differ.
         time = int(stamp["seconds"][0]) * 10**9 + int(stamp["nanos"][0])
         if len(found[_TRAFFIC_LIGHT]):
             self.lights.append({**LIGHT.read(truth, found[_TRAFFIC_LIGHT]), "time": time})
@@ -273,6 +283,8 @@ class _Trace:
     def traffic(self, lanelets: tuple[Lanelet, ...], notes: Iterable[str] = ()) -> RecordedTraffic:
         if not self.count:
             raise FileFormatError(f"{self.path}: holds no states")
+        # The messages of an MCAP file need not stand in the order of time; `sorted` keeps equal
+        # ones in the file's order.
         ordered = sorted(range(len(self.order)), key=self.order.__getitem__)
         each = [self.objects[k] for k in ordered]
         counts = [len(record["id"]) for record in each]
@@ -292,6 +304,7 @@ class _Trace:
         if len(nameless):
             raise FileFormatError(f"{where(int(nameless[0]))}: a moving object must have an id")
         begin = min(light["time"] for light in (*each, *self.lights))
+        # A whole second, so that instants stay multiples of the time step.
         start = begin // 10**9 * 10**9 if begin >= LONGEST_CLOCK * 10**9 else 0
         notes = [*self.notes, *notes]
         if start:
@@ -311,6 +324,7 @@ class _Trace:
             notes=tuple(notes),
             lanelets=lanelets,
         )
+        # OSI moved the lane into the classification; older writers give the one that is deprecated.
         lane = np.where(columns["assigned"] >= 0, columns["assigned"], columns["lane"])
         return build(
             facts,
@@ -359,6 +373,8 @@ def _ground_truth(message: Message) -> Message:
         return message
     begin, end = spans[0].tolist()
     inner = message.part(begin, end)
+    # The name of a file says which of both it holds, but people rename files; so the content
+    # decides. An empty timestamp is one at 0 s.
     for first, last in inner.find(_TIMESTAMP)[_TIMESTAMP].tolist():
         if first == last or inner.data[first] & 7 == 0:
             return inner
@@ -372,6 +388,7 @@ def _kinds(ids: Int, types: Int, vehicles: Int) -> Int:
         code[types == number] = kind
     for number, kind in VEHICLE_TYPES.items():
         code[((types == 2) | (types <= 0)) & (vehicles == number)] = kind
+    # By majority, for trackers change their mind about a participant from state to state.
     table = np.zeros((int(ids.max()) + 1, 2 + max(CAR, OTHER, code.max())), dtype=np.int64)
     np.add.at(table, (ids, code + 1), 1)
     table[:, 0] = 0  # an unknown kind counts only where there is no other

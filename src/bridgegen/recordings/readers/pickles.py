@@ -30,6 +30,7 @@ class PickledType:
     """A NumPy type of a pickle."""
 
     def __init__(self, name: object, *_: object) -> None:
+        # Numbers of fixed size only: an array of objects would be a pickle within the pickle.
         if not isinstance(name, str) or not _TYPE.fullmatch(name):
             raise _Refused(f"arrays must be of numbers, got the type {str(name)[:40]!r}")
         self.name, self.order = name.lstrip("|<>="), "<"
@@ -59,9 +60,13 @@ class PickledArray:
             ValueError: its bytes are not those of an array of its shape and type.
         """
         match self.state:
+            # The state that NumPy's ``ndarray.__reduce__`` writes: version, shape, type, order,
+            # bytes. Python's matching checks the types before anything is used.
             case (int(), tuple(shape), PickledType() as kind, bool(fortran), bytes(data)):
                 if not all(isinstance(size, int) and 0 <= size < 2**31 for size in shape):
                     raise ValueError("an array's shape must be of whole numbers")
+                # A view of bytes that are there: a shape of any size costs no memory, for `reshape`
+                # refuses one that does not fit.
                 flat = np.frombuffer(data, dtype=kind.dtype())
                 return flat.reshape(shape, order="F" if fortran else "C")
         raise ValueError("an array must have a shape, a type of numbers, and bytes")
@@ -93,6 +98,7 @@ def _dictionary(*_: object) -> dict[Any, Any]:
 
 
 _ALLOWED: dict[tuple[str, str], Callable[..., Any]] = {
+    # A table of what may be named, not of what may not: a new way to run code has a new name.
     ("numpy", "ndarray"): _Marker,
     ("numpy", "dtype"): PickledType,
     ("collections", "defaultdict"): _dictionary,
@@ -100,6 +106,7 @@ _ALLOWED: dict[tuple[str, str], Callable[..., Any]] = {
     **{("builtins", name): _Marker for name in ("dict", "list", "set", "int", "float")},
     **{
         (f"numpy.{core}.multiarray", name): made
+        # NumPy 2 renamed the module, and files of both versions are about.
         for core in ("core", "_core")
         for name, made in (("_reconstruct", _reconstruct), ("scalar", _scalar))
     },
@@ -114,6 +121,7 @@ class _Reader(pickle.Unpickler):
             raise _Refused(f"it asks for {module[:40]}.{name[:40]}") from None
 
     def persistent_load(self, pid: object) -> Any:
+        # Persistent ids are references to a store of the writer's, which a reader does not have.
         raise _Refused("it asks for an object from outside")
 
 
@@ -132,6 +140,7 @@ def read_pickle(path: Path) -> Any:
             f"{path}: this pickle is refused: {error} (only containers, numbers, texts and arrays "
             "are read; nothing of it was executed)"
         ) from None
+    # A few bytes of a pickle may ask for a text or a list of any size.
     except MemoryError:
         raise FileFormatError(f"{path}: this pickle is refused: it is too large") from None
     except Exception as error:  # whatever a malformed pickle makes the reader raise

@@ -91,6 +91,8 @@ CARS = (2.0, 9.0)
 """Range of the median length of cars [m]."""
 AGREEMENT = 1.25
 """Largest factor between the given speeds and those of the positions (median)."""
+# From state to state, 0.2 m of noise at 10 Hz made traffic that creeps seem to have wrong units,
+# and a good recording was refused.
 OVER = 1.0
 """Time over which positions are compared, so that their noise counts little [s]."""
 LEAST_MOVING = 20  # states
@@ -139,6 +141,8 @@ def _problems(traffic: RecordedTraffic) -> Iterator[str]:
     distance = np.hypot(np.diff(traffic.x), np.diff(traffic.y))
     moved = np.divide(distance, steps, out=np.zeros_like(steps), where=within)
     fast = np.flatnonzero(moved > FASTEST)
+    # A few jumps are a matter of cleaning; many mean that units or ids are wrong, which no rule
+    # mends.
     if len(fast) > LARGEST_SHARE * max(int(within.sum()), 1):
         yield (
             f"{traffic.where(int(fast[0]) + 1)}: positions say {moved[fast[0]]:.4g} m/s, and "
@@ -152,8 +156,10 @@ def _problems(traffic: RecordedTraffic) -> Iterator[str]:
     at = np.flatnonzero((moved > MOVING) & np.isfinite(said))
     if len(at) < LEAST_MOVING:
         return
+    # The median: some tracks may be wrong, the unit is one for all.
     ratio = float(np.median(said[at] / moved[at]))
     if not 1 / AGREEMENT <= ratio <= AGREEMENT:
+        # By the ratio's logarithm, for twice and half are equally far off.
         unit = min(UNITS, key=lambda name: abs(np.log(max(ratio, 1e-9) / UNITS[name])))
         hint = f" ({unit}?)" if abs(ratio / UNITS[unit] - 1.0) < 0.1 else ""
         yield (

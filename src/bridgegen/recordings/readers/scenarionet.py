@@ -59,6 +59,7 @@ def _recognises(head: Head) -> bool:
 
 
 def _read(path: Path) -> Iterator[RecordedTraffic]:
+    # The format is a pickle, which would be code to Python's own reader; ours executes nothing.
     whole = read_pickle(path)
     tracks = whole.get("tracks") if isinstance(whole, dict) else None
     if not isinstance(tracks, dict) or not isinstance(whole.get("metadata"), dict):
@@ -155,6 +156,7 @@ def _beyond_stop(place: str, light: dict[Any, Any], feature: Any) -> npt.NDArray
     if apart[at] > BESIDE_LANE:
         return none
     course = line[min(at + 1, len(line) - 1)] - line[min(at, len(line) - 2)]
+    # The nearest point may lie before the stop line; the line begins on it.
     beyond = line[at:][(line[at:] - stop) @ course > 0.0]
     beyond = beyond if len(beyond) else (stop + course)[None]
     return np.concatenate([stop[None], beyond])

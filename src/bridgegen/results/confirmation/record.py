@@ -42,6 +42,8 @@ Whole = Annotated[int, Field(ge=0, le=10**8)]
 Units = Annotated[int, Field(ge=-(10**9), le=10**9)]
 
 
+# Records lie in folders that may come from others: unknown keys, numbers that are not finite and
+# whole numbers out of bounds are refused.
 class _Model(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
@@ -287,6 +289,7 @@ def digest_of(x: Float, metrics: Float) -> str:
     digest = sha256()
     for array in (x, metrics):
         digest.update(array.astype("<f8").tobytes())
+    # 64 bits identify a row among those of one run.
     return digest.hexdigest()[:16]
 
 

@@ -133,6 +133,7 @@ class Recorded:
     @cached_property
     def _narrow(self) -> Narrow:
         """What memory holds, read in one go."""
+        # The earlier object is let go, so that its arrays do not stay beside the new ones.
         known, self._earlier = self._earlier, None
         if known is not None and len(known) == self._n:
             return known
@@ -154,6 +155,8 @@ class Recorded:
             cause[:at], F[:at] = known.cause, known.F
             for name, values in known.metrics.items():
                 metrics[name][:at] = values
+        # In one pass over the table, and in parts: SQL's rows are Python's objects, ten times the
+        # size of the arrays.
         for found in store.select(names, at, n):
             part, end = slice(at, at + len(found)), 1 + width
             with store.damage():
@@ -236,6 +239,8 @@ class OnDisk:
         if rows.ndim == 0:
             (row,) = self._rows(rows[np.newaxis], columns)
             return np.asarray(row)
+        # Asked for in the order of ids, each once: SQLite reads each page once, and the order that
+        # was wanted is made afterwards.
         rows, inverse = np.unique(_positions(rows, self._n), return_inverse=True)
         whole = self._filled(len(rows), width, self._store.select_at(columns, rows))
         if len(inverse) == len(rows) and _ascends(inverse):

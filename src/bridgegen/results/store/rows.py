@@ -19,6 +19,8 @@ from bridgegen.results.store import sqlite as checkpoint
 
 FIRST = ("id", "batch", "seconds", "u")
 LAST = ("status", "critical", "cause", *COLUMNS)
+# Older runs stay as they are and are read as they are: a store is never migrated, so what was
+# recorded keeps its bytes.
 LAST_OF_SCHEMA = {1: LAST[:2], 2: LAST[:3], 3: LAST[:-1], 4: LAST}
 """The last columns by the schema of the store."""
 
@@ -202,6 +204,8 @@ class Columns:
         """
         n = len(U)
         U = as_float("U", U, (n, self.n_var))
+        # A blob, little-endian on every machine: a search that is resumed compares what its
+        # algorithm asks for with what is stored, bit for bit, and REAL loses the sign of −0.0.
         blobs = [row.tobytes() for row in U.astype("<f8")]
         numbers = np.hstack(
             [
@@ -288,6 +292,8 @@ def column(rows: Sequence[tuple[Any, ...]], name: str, at: int, kind: type[Any])
     """
     values = [row[at] for row in rows]
     wanted = {int, float} if kind is np.float64 else {int}
+    # SQLite's columns take values of any type, whatever their declaration; `bool` is a subclass of
+    # `int`, hence the types themselves.
     if odd := {*map(type, values)} - wanted:
         what = "a number" if kind is np.float64 else "a whole number"
         raise TypeError(f"{name} must be {what}, got a {odd.pop().__name__}")
@@ -336,6 +342,7 @@ def digest_of(rows: Any) -> str:
         rows: with the arrays of `Rows`, or what reads stretches of them.
     """
     digest, n = sha256(), len(rows)
+    # Without batches and seconds, which depend on the machine: the digest is the seed's alone.
     for name in ("U", "X", "metrics", "F", "status", "critical", "cause"):
         values = getattr(rows, name)
         for start in range(0, n, DIGESTED):
@@ -345,6 +352,8 @@ def digest_of(rows: Any) -> str:
     for texts in [texts for name, texts in rows.findings.columns().items() if name != "happened"]:
         for start in range(0, n, DIGESTED):
             said = "\0".join(texts[start : start + DIGESTED].tolist())
+            # The separator between parts makes the digest that of one text, whatever the size of a
+            # part.
             digest.update(("\0" * (start > 0) + said).encode())
     return digest.hexdigest()
 
@@ -412,6 +421,7 @@ def check_columns(connection: sqlite3.Connection, table: str, sql: str) -> None:
     Raises:
         InputError: its columns differ.
     """
+    # SQLite itself says what columns a statement makes: no parser of ours can differ from it.
     with closing(sqlite3.connect(":memory:")) as model:
         model.execute(sql)
         if _columns(model, table) != _columns(connection, table):

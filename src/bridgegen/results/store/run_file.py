@@ -68,6 +68,7 @@ def refuse_used(folder: Path) -> None:
             path is not valid UTF-8.
     """
     refuse_other_names(folder)
+    # What a run leaves that was killed before its file was there; nothing of a user's is named so.
     ours = {LOCK, DRAFT, f"{DRAFT}-journal"}
     with storage_errors(folder, "read"):
         if (folder / FILE).exists():
@@ -85,6 +86,7 @@ def refuse_used(folder: Path) -> None:
 def write_run(folder: Path, columns: Columns, run: Mapping[str, Any]) -> None:
     """Create the run's file atomically."""
     keys = [key for key in (*KEYS, "labels", "domain") if key in run]
+    # JSON and no pickle: a run's folder may come from others, and nothing in it is ever executed.
     values = [(key, json.dumps(run[key], allow_nan=False)) for key in keys]
     draft = folder / DRAFT
     draft.unlink(missing_ok=True)
@@ -94,6 +96,8 @@ def write_run(folder: Path, columns: Columns, run: Mapping[str, Any]) -> None:
             connection.execute(f"CREATE TABLE {RUN}")
             connection.execute(columns.create_sql())
             connection.executemany("INSERT INTO run VALUES (?, ?)", values)
+        # A run's file is there whole or not at all: a killed `create` leaves a draft, which the
+        # next one removes.
         os.replace(draft, folder / FILE)
     except BaseException:
         draft.unlink(missing_ok=True)
@@ -126,6 +130,7 @@ def read_run(connection: sqlite3.Connection, path: Path) -> dict[str, Any]:
             found = connection.execute("PRAGMA table_xinfo(evaluations)").fetchall()
         run = {key: _value(key, text) for key, text in stored}
         schema = run["schema"]
+        # Before the values are looked at: what a later version writes need not look like ours.
         if type(schema) is not int or schema not in READABLE:
             raise StorageError(
                 f"{path}: the store's schema must be at most {SCHEMA}, got {schema!r}: "
@@ -207,6 +212,8 @@ def _check_rows(connection: sqlite3.Connection, n_var: int, n_columns: int) -> N
     )
     size = connection.execute("PRAGMA page_count").fetchone()[0]
     size *= connection.execute("PRAGMA page_size").fetchone()[0]
+    # A hostile file may state the id 2⁶², for which we would allocate arrays: the least size of so
+    # many rows, 8 bytes a parameter and one a column, must fit into the file.
     if first is not None and (first < 0 or (last + 1) * (8 * n_var + n_columns) > size):
         raise InputError(
             f"evaluations {first} to {last} cannot be in a file of {size} bytes: they must be "

@@ -58,6 +58,7 @@ def connect(path: Path, *, write: bool) -> sqlite3.Connection:
 
     A reader never writes, and works on read-only media too.
     """
+    # Never "rwc": a file that is gone must not come back empty.
     mode = "rw"
     if not write and not os.access(path.parent, os.W_OK):
         # SQLite reads a WAL database only where it can create a -shm file, unless the URI says that
@@ -104,6 +105,7 @@ def _authorize(
 @contextmanager
 def transaction(connection: sqlite3.Connection) -> Iterator[None]:
     """Commit everything or nothing, also after Ctrl-C."""
+    # The lock of a writer at once: a deferred one may fail after the first reads, amid a batch.
     connection.execute("BEGIN IMMEDIATE")
     try:
         yield
@@ -176,6 +178,7 @@ def write_checkpoint(connection: sqlite3.Connection, checkpoint: Checkpoint) -> 
     """Replace the checkpoint; within a transaction."""
     connection.execute(f"CREATE TABLE IF NOT EXISTS {TABLE}")
     connection.execute(
+        # One row: only the newest state is kept. PPO's has 150 kB, others below 1 MB.
         "INSERT OR REPLACE INTO checkpoint VALUES (0, ?, ?, ?, ?)",
         (checkpoint.evaluations, checkpoint.idle, _digest(checkpoint), checkpoint.state),
     )
@@ -204,5 +207,6 @@ def read_checkpoint(connection: sqlite3.Connection) -> Checkpoint | None:
 
 def _digest(checkpoint: Checkpoint) -> bytes:
     """Return a checksum of the state; SQLite has none."""
+    # The numbers are the key, so a state beside other numbers does not match, either.
     key = f"{checkpoint.evaluations} {checkpoint.idle}".encode()
     return blake2b(checkpoint.state, digest_size=16, key=key).digest()

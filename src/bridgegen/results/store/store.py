@@ -230,8 +230,12 @@ class Store:
         kept = f"{start} evaluations are kept; resume with: bridgegen resume {self.folder}"
         rows = self.columns.pack(start, batch, seconds, U, X, result)
         with self._writing(kept):
+            # A run that goes on is not finished; in the same transaction, so that no instant says
+            # both.
             if self._finished is not None:
                 self._connection.execute("DELETE FROM run WHERE key = 'finished'")
+            # A batch and its messages are one transaction: whatever ends the process, the store
+            # holds a beginning of the run, whole batches of it.
             self._connection.executemany(self.columns.insert_sql(), rows)
             if result.messages:
                 messages = [(start + row, text) for row, text in sorted(result.messages.items())]
@@ -291,6 +295,8 @@ class Store:
                 found = read_checkpoint(self._connection)
         except InputError as error:
             raise self._damaged(str(error)) from error
+        # Behind is possible: after a kill between a batch and its state, the last batch is asked
+        # again on the state before it. Ahead is not, for a state is written after its batch.
         if found and found.evaluations > len(self):
             raise self._damaged("the saved state of the search is ahead of the evaluations")
         return found
@@ -338,6 +344,8 @@ class Store:
 
     def __len__(self) -> int:
         """The number of recorded evaluations."""
+        # Not count(*), which reads the whole table; ids are 0, 1, 2 without gaps, which each read
+        # checks.
         return self._number("SELECT coalesce(max(id) + 1, 0) FROM evaluations")
 
     @property

@@ -238,6 +238,8 @@ class Exposure:
             feasible += int(good.sum())
             kept.append(X[good])
             have += len(kept[-1])
+        # Blocks have seeds of their own and are cut at the end only, so a longer sample begins with
+        # a shorter one's rows.
         rows = np.concatenate(kept)[:n] if kept else np.empty((0, len(self.space.names)))
         return Sample(rows, proposals, feasible / proposals if proposals else 1.0)
 
@@ -251,7 +253,11 @@ class Exposure:
         tried = kept = 0
         broken: dict[str, int] = {}
         while tried < _TRIED or (kept < _ENOUGH and tried < _MOST_TRIED):
+            # A seed of its own, whatever is sampled: the normalisation of a density must not depend
+            # on who asks.
             X, good = self._proposed(_ESTIMATE, tried // _BLOCK)
+            # Exactly 1 where nothing was broken: an estimate below it would bias what no constraint
+            # touches.
             if kept == tried and good.all() and tried + len(X) >= _TRIED:
                 return FeasibleShare(1.0, *clopper_pearson(_TRIED, _TRIED), _TRIED, {})
             for rule, bad in self.broken(X):
@@ -398,6 +404,8 @@ class Exposure:
             elif name in self.marginals:  # what bounds it may be computed of it later
                 out[:] = space.defaults[name]
             else:
+                # Parameters without a distribution follow the constraints as the decoder has it, so
+                # that one that merely stands at its default makes no row infeasible.
                 lo, hi = self._limits(name, table)
                 out[:] = np.clip(space.defaults[name], lo, np.maximum(lo, hi))
             table[name] = out
@@ -422,6 +430,8 @@ class Exposure:
         scores = np.empty((len(rows), self.dimensions))
         for k, name in enumerate(self.names):
             below, above = self._given(name, table).tails(table[name])
+            # By the lesser tail, whose digits are all there; the greater one is 1 up to rounding
+            # far out.
             tail = np.clip(np.minimum(below, above), _SMALLEST, 0.5)
             scores[:, k] = np.where(below <= above, 1.0, -1.0) * scipy.special.ndtri(tail)
         return scores

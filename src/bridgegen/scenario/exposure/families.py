@@ -325,9 +325,12 @@ class Pareto(Family):
     def _hazard(x: Value, threshold: Value, shape: Value, scale: Value) -> Any:
         """Return minus the logarithm of the probability above."""
         excess = np.maximum(x - threshold, 0.0) / scale
+        # With a negative shape the distribution ends; beyond its end the logarithm has no value.
         inner = np.maximum(shape * excess, -1.0)
         with np.errstate(divide="ignore", invalid="ignore"):
             curved = scipy.special.log1p(inner) / shape
+        # Shape 0 is the exponential distribution, as the limit of both formulas, which divide by
+        # it.
         return np.where(np.asarray(shape) == 0.0, excess, curved)
 
     @staticmethod

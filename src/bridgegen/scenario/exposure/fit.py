@@ -192,6 +192,8 @@ def fit_exposure(
     _refuse_constant(scenario, columns)
     fitted: dict[str, ParameterFit] = {}
     refits: dict[str, list[Form]] = {}
+    # The same resampled events for all parameters: rows are drawn whole, which keeps their
+    # dependence.
     draws = [_generator(seed, 0, k).integers(0, used, used) for k in range(replicates)]
     for number, (name, values) in enumerate(columns.items()):
         if progress is not None:
@@ -216,10 +218,14 @@ def fit_exposure(
             "dependence": {"correlation": _pairs(correlated, correlation)},
         },
     }
+    # The fitted exposure is read from the text that is written, so that the file gives the same
+    # distribution as the fit, rounding included.
     exposure, infeasible = _built(data, scenario, columns)
     if hours is not None or km is not None:
         given = {"hours": hours, "km": km}
         data["exposure"]["encounters"] = {
+            # Only events that the distribution can give: rates and shapes then speak of the same
+            # encounters.
             "count": used - sum(infeasible.values()),
             **{key: float(value) for key, value in given.items() if value is not None},
             "source": f"Events in the scenario's ranges that keep its constraints, {origin}.",
@@ -342,6 +348,8 @@ def _fit_parameter(
     distances, sorted_samples = [], []
     refit = partial(fit, recipe=best.recipe, low=low, high=high, near=best.section)
     for k in range(len(draws)):
+        # A stream for each parameter and sample: a column more changes the others' p values by
+        # nothing.
         uniform = _generator(seed, 1 + number, k).random(n)
         sample = np.sort(_at_share(marginal, uniform))
         again = refit(sample)
@@ -359,6 +367,8 @@ def _fit_parameter(
         form=best.recipe.text,
         ranking=tuple((candidate.recipe.text, candidate.criterion) for candidate in found),
         distance=distance,
+        # Plus one, for the data themselves: a p value of 0 would claim more than so many samples
+        # can say.
         p=(1 + larger) / (1 + len(draws)),
         at=at,
         density=np.exp(marginal.log_density(at)),

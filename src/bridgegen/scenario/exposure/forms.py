@@ -171,6 +171,8 @@ class _Builder:
 
     def kernels(self) -> Polygon:
         name, folder = self.given.file or "", self.naming.folder
+        # A file from somebody else must not have us read any other file, and show its numbers in a
+        # page.
         if folder is None or Path(name).is_absolute() or ".." in Path(name).parts:
             raise InputError(f"the table of a kde lies beside the file that names it, got '{name}'")
         column = self.given.column or self.parameter.name
@@ -319,6 +321,8 @@ class _Builder:
 
 def _between(body: Form, low: float, high: float) -> Form:
     """Return what a body is between the thresholds of its tails."""
+    # A beta distribution is of its range: cut at other ends it would be another one, so it is
+    # clipped.
     if isinstance(body, Truncated) and body.family is not Beta:
         return Truncated(body.family, body.numbers, low, high)
     return Clipped(body, max(low, body.low), min(high, body.high))

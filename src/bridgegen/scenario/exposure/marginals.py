@@ -170,6 +170,8 @@ class Truncated:
             above_low, above_high = (
                 self.family.above(x, *self._all) for x in (self.low, self.high)
             )
+        # In the upper tail the difference of probabilities below would be one of two numbers near
+        # 1, of which no digit is left.
         between = np.where(below_low > 0.5, above_low - above_high, below_high - below_low)
         return below_low, above_low, below_high, above_high, between
 
@@ -181,6 +183,8 @@ class Truncated:
         above = np.where(upper, above_high + part, above_low - part)
         with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
             x = np.where(
+                # Each value by the tail that it is in: so rare ends keep all their digits, on
+                # either side.
                 below <= above,
                 self.family.value_below(np.clip(below, 0.0, 1.0), *self._all),
                 self.family.value_above(np.clip(above, 0.0, 1.0), *self._all),
@@ -465,6 +469,8 @@ class Polygon:
 def _reach(area: Float, near: Float, far: Float, width: Float) -> Float:
     """Return how far from its near end a trapezium holds an area."""
     slope = (far - near) / width
+    # The quadratic's root in the form that adds: the usual one subtracts two near numbers where the
+    # density is nearly constant.
     root = near + np.sqrt(np.maximum(near * near + 2.0 * slope * area, 0.0))
     reach = np.divide(2.0 * area, root, out=np.zeros(len(area)), where=root > 0.0)
     return np.clip(reach, 0.0, width)
@@ -501,6 +507,8 @@ class Mixture:
         """See `Marginal`; by halving the interval between the parts' values."""
         each = [part.value(tail, upper) for part, _ in self.parts]
         below, above = np.minimum.reduce(each), np.maximum.reduce(each)
+        # Halving, and not Newton: a mixture's density may be 0 between its parts. It ends where
+        # both ends are neighbouring doubles, and the result does not depend on a tolerance.
         for _ in range(_HALVINGS):
             middle = below + 0.5 * (above - below)
             if np.all((middle <= below) | (middle >= above)):

@@ -89,6 +89,8 @@ def adversarial(scenario: SearchedScenario, participant: str | None = None) -> L
     driven = scenario.participant(participant)
     own = [event for event in scenario.events if event.participant == participant]
     rest = tuple(event for event in scenario.events if event.participant != participant)
+    # An event that waits for one which the adversary takes away would never begin, and nobody would
+    # see why.
     _refuse_awaited(scenario, own, rest)
     adversary = _adversary(scenario, driven, own)
     # The adversary is its driver.
@@ -103,6 +105,7 @@ def adversarial(scenario: SearchedScenario, participant: str | None = None) -> L
     left = replace(scenario, story=story)
     own_limits = (*adversary.speeds, adversary.lane_width, adversary.rate)
     needed = {quantity for quantity in own_limits if isinstance(quantity, str)}
+    # Parameters that only the events of its script read would be searched without any effect.
     idle = _quantities(own) - _quantities(rest) - needed - _elsewhere(left)
     kept = {name: parameter for name, parameter in left.parameters.items() if name not in idle}
     return replace(

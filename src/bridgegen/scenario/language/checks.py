@@ -95,6 +95,7 @@ def time_problems(document: Document) -> list[str]:
             where = document.at((key,))
             return [f"{key} [s] must be greater than 0 and finite, got {value} ({where})"]
     steps = duration / step
+    # With a tolerance: 0.3 s / 0.1 s is 2.9999999999999996 in binary fractions.
     if 1 <= steps <= MAX_STEPS and abs(steps - round(steps)) <= 1e-6 * steps:
         return []
     return [
@@ -218,6 +219,7 @@ def _places(
             continue
         body, others = (_room(each, columns) for each in (combination, other))
         ahead = _metres(a.distance, columns) - _metres(b.distance, columns)
+        # Distances count from the junction: on the way in, the larger one is farther behind.
         ahead = ahead if a.way == "out" else -ahead
         aside = np.abs(_metres(a.offset, columns) - _metres(b.offset, columns))
         needed = _CLEARANCE + np.where(

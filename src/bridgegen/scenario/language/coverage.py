@@ -75,6 +75,7 @@ class BinnedRows:
         self.n_rows, self.n_critical = len(X), int(hit.sum())
         # Sorted into critical rows, other rows, sample: each is a stretch of columns.
         kind = np.min_scalar_type(max(self.sizes, default=0))
+        # The smallest integers that hold the bins: a run of a million rows is counted in memory.
         self._where = np.empty((len(self.names), len(X) + sample), kind)
         place, end = np.argsort(np.argsort(~hit, kind="stable")), len(X)
         for start in range(0, len(X), _CHUNK):
@@ -114,6 +115,7 @@ class BinnedRows:
             In the critical rows, in the rows, and in the rows or the sample.
         """
         codes, cells = self._codes(chosen), prod(self.sizes[k] for k in chosen)
+        # A table of marks where it fits, else distinct numbers, which cost a sort.
         if cells > _CELLS:
             return [len(np.unique(codes[:end])) for end in self._ends]
         marks, counts, start = np.zeros(cells, np.bool_), [], 0
@@ -153,6 +155,8 @@ class BinnedRows:
 
     def _sampled(self, sample: int) -> Iterator[npt.NDArray[np.int32]]:
         """Yield the bins of the sample, a chunk at a time."""
+        # Always the same sample: what is feasible belongs to the space, and two runs are to be
+        # compared.
         rng = np.random.Generator(np.random.PCG64(0))
         for start in range(0, sample, _CHUNK):
             U = rng.random((min(_CHUNK, sample - start), self.space.n_var))

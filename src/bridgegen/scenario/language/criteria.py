@@ -227,6 +227,7 @@ def _of_text(text: str) -> tuple[Criterion, ...]:
         if not isinstance(document.data, dict):
             raise InputError(f"--criterion must be a mapping in braces, got '{text}'")
         return (read_criterion(document.data, "--criterion"),)
+    # The first colon ends the id: ids have none, and formulas may (`[0:3]`).
     name, colon, formula = text.partition(":")
     if not colon and name in ADDED.names(()):
         return _of_package(name)
@@ -260,6 +261,7 @@ def read_criteria_file(path: FilePath) -> tuple[Criterion, ...]:
     """
     try:
         with path.open("rb") as file:
+            # One byte more than allowed, by which the parser sees that there is too much.
             data = file.read(MAX_BYTES + 1)
     except OSError as error:
         raise FileFormatError(f"cannot be read: {error.strerror} ({path})") from None
@@ -276,6 +278,7 @@ def in_words(criterion: Criterion) -> str:
     given = criterion.to_dict()
     if given.keys() == {"id", "formula"}:
         return f"{criterion.id}: {criterion.states}"
+    # In one line, however long it is: it is one word of a command line.
     text: str = yaml.safe_dump(
         given, default_flow_style=True, allow_unicode=True, sort_keys=False, width=10**6
     )

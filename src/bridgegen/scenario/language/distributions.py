@@ -68,6 +68,8 @@ def shares_within(distribution: Distribution, low: float, high: float) -> tuple[
 
     def first(holds: Callable[[float], bool]) -> float:
         """Return the first share at which the value is so: it is from there on."""
+        # A bisection: `share` gives the middle of the shares of a single value, and not the first.
+        # It ends where no float lies between the two.
         below, above = 0.0, 1.0
         if holds(float(distribution.value(np.array([below]))[0])):
             return below
@@ -112,6 +114,7 @@ class Uniform:
     def share(self, value: Float) -> Float:
         """See `Distribution`."""
         width = self.high - self.low
+        # Every share gives the only value of an empty interval; the middle one is as good as any.
         return (value - self.low) / width if width > 0.0 else np.full(len(value), 0.5)
 
     def density(self, value: Float) -> Float:
@@ -230,6 +233,8 @@ class LogNormal:
             )
         if limits and not limits[0] > 0.0:
             raise InputError(f"a log-normal distribution is above 0, got the limit {limits[0]:g}")
+        # OpenSCENARIO gives the moments of the value itself: m = exp(μ + σ²/2) and v = m²·(exp(σ²)
+        # − 1), solved for σ² and μ.
         square = math.log1p(variance / mean**2)
         logs = (elementary.log(limits[0]), elementary.log(limits[1])) if limits else None
         return cls(Normal(elementary.log(mean) - 0.5 * square, math.sqrt(square), logs))
@@ -306,6 +311,8 @@ class Discrete:
                 f"{_MOST_EXPECTED:g}, got {mean:g}"
             )
         low, high = limits or (0.0, math.inf)
+        # The tails are left out even within limits: wide limits would make a table of values that
+        # have next to no probability.
         first = max(math.ceil(low), math.floor(float(scipy.special.pdtrik(TAIL, mean))), 0)
         last = min(high, math.ceil(float(scipy.special.pdtrik(1.0 - TAIL, mean))))
         counts = np.arange(first, math.floor(last) + 1, dtype=np.float64)
@@ -314,6 +321,7 @@ class Discrete:
                 f"a Poisson distribution (expected value {mean:g}) has a probability below "
                 f"{TAIL:g} from {low:g} to {high:g}"
             )
+        # By logarithms: the powers and the factorials overflow a float for means above about 100.
         weights = elementary.exp(
             counts * elementary.log(mean) - mean - scipy.special.gammaln(counts + 1.0)
         )
@@ -338,6 +346,8 @@ class Discrete:
     def value(self, share: Float) -> Float:
         """See `Distribution`."""
         values, up_to = self._table
+        # Without the last sum, which is 1: a share of 1 would otherwise get the place after the
+        # last value.
         found: Float = values[np.searchsorted(up_to[:-1], share, side="right")]
         return found
 
@@ -351,6 +361,8 @@ class Discrete:
     def density(self, value: Float) -> Float:
         """See `Distribution`: the probability of a value."""
         values, up_to = self._table
+        # A value above all others gets the place after the last one; the comparison below gives it
+        # 0.
         at = np.minimum(np.searchsorted(values, value), len(values) - 1)
         return np.where(values[at] == value, np.diff(up_to, prepend=0.0)[at], 0.0)
 

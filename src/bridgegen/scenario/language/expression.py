@@ -47,6 +47,8 @@ _Program = Callable[[Mapping[str, Any]], Any]
 
 def _round_half_up(value: Any) -> Any:
     floor = np.floor(value)
+    # NumPy's `round` takes halves to the even number; SPARQL and XPath take them up, and both must
+    # agree with the decoder.
     return floor + (value - floor >= 0.5)
 
 
@@ -151,6 +153,8 @@ class Expression:
         return self.source
 
     def __reduce__(self) -> tuple[Callable[..., "Expression"], tuple[Any, ...]]:
+        # A compiled formula is made of closures, which pickle cannot take to a worker; its text is
+        # enough.
         return parse, (self.source, "", dict(self.categories))
 
 
@@ -219,6 +223,8 @@ def parse(
             f"a formula may have {longest} characters, got {len(source)}: '{shown}'{where}"
         )
     try:
+        # Before Python's parser sees the text: no brackets, quotation marks or underscored tricks
+        # reach it.
         unknown = _CHARACTERS.sub("", source)
         if unknown:
             raise _RefusedError(f"{unknown[0]!r} is no part of a formula")
@@ -267,9 +273,11 @@ def _syntax(source: str, deepest: int) -> ast.expr:
         with warnings.catch_warnings():
             warnings.simplefilter("error")  # such as "0if a else b": Python only warns
             tree = ast.parse(source, mode="eval").body
+    # The parser may run out of its own stack on a text within the bound of length.
     except (SyntaxError, ValueError, MemoryError, RecursionError, Warning) as error:
         reason = error.msg if isinstance(error, SyntaxError) else str(error)
         raise _RefusedError(reason or "too deep") from None
+    # Level by level: measuring a depth by recursion would fail on the depth that it is to refuse.
     level: list[ast.AST] = [tree]
     for _ in range(deepest):
         level = [child for node in level for child in ast.iter_child_nodes(node)]
@@ -312,6 +320,8 @@ class _Numbers(ast.NodeTransformer):
             raise _RefusedError(
                 f"'{name}' is one of {', '.join(values)}, got '{ast.unparse(value)}'"
             )
+        # Names become numbers here, once: rows, kernels and SPARQL hold a category as the number of
+        # its name.
         return ast.Compare(category, node.ops, [ast.Constant(float(values.index(value.id)))])
 
     def visit_Name(self, node: ast.Name) -> ast.AST:

@@ -302,11 +302,15 @@ class Whole(Kind):
 
     def at(self, share: Float, lo: Value, hi: Value) -> Float:
         """See `Kind`."""
+        # Each whole number has the same part of the shares; rounding lo + share * (hi - lo) would
+        # give the two ends half of one.
         value = np.floor(lo + share * (hi - lo + 1.0))
         return np.minimum(np.maximum(value, lo), hi)
 
     def share(self, value: Float, lo: Value, hi: Value) -> Float:
         """See `Kind`."""
+        # The middle of the number's part: rounding errors on the way back to `at` do not reach the
+        # next number.
         return _divided(value - lo + 0.5, np.broadcast_to(hi - lo, len(value)) + 1.0)
 
     def shares(self, low: float, high: float, lo: Value, hi: Value) -> tuple[Float, Float]:
@@ -319,6 +323,8 @@ class Whole(Kind):
 
     def narrowed(self, lo: Value, hi: Value) -> tuple[Value, Value, Bool]:
         """See `Kind`."""
+        # A bound that a formula computes may miss a whole number by its rounding error; without the
+        # tolerance that number would be lost.
         lo, hi = np.ceil(lo - TOLERANCE), np.floor(hi + TOLERANCE)
         return lo, hi, ~np.atleast_1d(lo <= hi)
 
@@ -413,6 +419,7 @@ class Category(Whole):
 
     def coordinates(self, value: Float, low: float, high: float) -> Float:
         """See `Kind`: two different names are as far apart as the ends of any other range."""
+        # The corners of a simplex, 1 apart: any two names differ alike, whatever their numbers are.
         return np.eye(len(self.names))[np.rint(value).astype(np.int64)] / math.sqrt(2.0)
 
     def written(self, value: float) -> float | str:
@@ -452,6 +459,8 @@ class Category(Whole):
 
     def sparql_value(self, raw: str) -> str:
         """See `Kind`."""
+        # The numbers of names exist in rows only; a graph holds the words. The query maps the
+        # words, so that both sides compare the same numbers.
         found = f"xsd:double({raw})"
         for number in reversed(range(len(self.names))):
             found = f'IF(STR({raw}) = "{self.names[number]}", {float(number)!r}e0, {found})'
@@ -486,11 +495,14 @@ class Angle(Kind):
     @classmethod
     def declared(cls, names: Sequence[str], low: float | None, high: float | None) -> "Angle":
         """See `Kind`."""
+        # A negative end says that the file counts from -180° to 180°; results are written so, too.
         return cls(0.5 * TURN if min(low or 0.0, high or 0.0) < 0.0 else TURN)
 
     def inner(self, low: float, high: float, default: float) -> tuple[float, float, float]:
         """See `Kind`."""
         if low > high:
+            # A range across the end of the turn, like 350° to 10°, goes on beyond 360°. So all code
+            # that compares low, value and high works on angles as on any number.
             high += TURN
         return low, high, self._into(default, low, high)
 
@@ -517,6 +529,7 @@ class Angle(Kind):
         """See `Kind`: also round the other way."""
         inside = (value >= lo) & (value <= hi)
         above = np.add(lo, np.mod(value - lo, TURN))
+        # Outside the range, the nearer of its ends on the circle: hi below, or lo a turn above.
         beyond = np.where(above - hi <= lo + TURN - above, hi, lo)
         return np.where(inside, value, np.where(above <= hi, above, beyond))
 
@@ -529,6 +542,8 @@ class Angle(Kind):
 
     def shown(self, value: float) -> float:
         """See `Kind`."""
+        # The subtraction may leave digits such as 10.000000000000057 of a given 10°; nine decimals
+        # drop them.
         return round(value - TURN, 9) if value > self.turn else value
 
     def range_text(

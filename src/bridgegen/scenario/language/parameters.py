@@ -50,6 +50,7 @@ def read_axes(axes: Iterable[str]) -> tuple[Axis, ...]:
     Raises:
         UnknownNameError: no such axis.
     """
+    # A single text is an iterable of its letters; it means one axis.
     names = {axes} if isinstance(axes, str) else set(axes)
     for name in sorted(names - set(Axis)):
         raise UnknownNameError("axis", name, list(Axis))
@@ -95,6 +96,7 @@ class Parameter:
         problems += [f"{key} of {label} must be finite, got {values[key]}" for key in unusable]
         if not unusable:
             for key, value in zip(values, self.kind.inner(*values.values()), strict=True):
+                # The dataclass is frozen, and its inner values replace the declared ones.
                 object.__setattr__(self, key, value)
             problems += self.kind.problems(label, self.low, self.high, self.default)
         if self.kind.units and self.unit not in self.kind.units:
@@ -149,6 +151,7 @@ class Parameter:
             ScenarioError: it is not of this kind, or its unit is of another dimension; it may be
                 outside the range.
         """
+        # A category is left out: its names are texts, and no number with a unit.
         if isinstance(given, str) and not self.kind.names and has_unit(given):
             try:
                 given = in_unit(given, self.unit)

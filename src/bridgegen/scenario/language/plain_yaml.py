@@ -96,6 +96,8 @@ def read_plain_yaml(data: bytes, place: str) -> Document:
         raise FileFormatError(f"not UTF-8 at byte {error.start} ({place})") from None
     reader = _Reader(place)
     try:
+        # Events and not `safe_load`: aliases and merges would have been expanded by then (a few
+        # lines become gigabytes), duplicate keys been lost, and lines, too.
         value = reader.document(yaml.parse(text, Loader=_LOADER))
     except yaml.YAMLError as error:
         mark = getattr(error, "problem_mark", None)
@@ -138,6 +140,8 @@ class _Reader:
         self.lines.setdefault(path, _line(event))
         if len(path) > MAX_DEPTH:
             self.refuse(event, f"entries may nest {MAX_DEPTH} deep")
+            # At once, and not collected as other problems are: going on would recurse as deep as
+            # the file says.
             raise FileFormatError(*self.problems)
         if isinstance(event, yaml.AliasEvent):
             self.refuse(event, f"aliases are refused: write out what *{event.anchor} stands for")
@@ -193,6 +197,8 @@ def _scalar(text: str, *, quoted: bool) -> object:
     if text in _SPECIAL:
         return _SPECIAL[text]
     if _INTEGER.fullmatch(text):
+        # `int` of a long text takes time that grows with its square, and Python refuses more than
+        # 4,300 digits.
         return int(text) if len(text) <= 300 else float(text)
     if _FLOAT.fullmatch(text):
         return float(text)
@@ -213,6 +219,7 @@ def replaced(text: str, values: Mapping[Path, str], place: str) -> str:
     """
     found = read_plain_yaml(text.encode(), place).scalars
     mark = len(text) - len(text.removeprefix("\ufeff"))
+    # From the last to the first: a replacement does not move those that are still to come.
     for path in sorted(values, key=lambda value: -found[value].start):
         at = found[path]
         text = text[: mark + at.start] + values[path] + text[mark + at.end :]

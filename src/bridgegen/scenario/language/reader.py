@@ -113,6 +113,8 @@ def document_of(name_or_path: str | Path) -> tuple[Document, Path | None]:
     text = str(name_or_path)
     path = Path(text)
     is_path = isinstance(name_or_path, Path) or path.suffix in (".yaml", ".yml")
+    # A name with a slash is a pack's only where there is such a pack; any other one is a path, and
+    # the message says that the file is missing.
     if not is_path and len(path.parts) > 1:
         is_path = not any(name.startswith(f"{path.parts[0]}/") for name in pack_names())
     if is_path:
@@ -132,6 +134,7 @@ def read_document(path: Path) -> Document:
         if not path.is_file():
             raise FileFormatError(f"no such file: {path}")
         with path.open("rb") as file:
+            # One byte more than allowed, by which the parser sees that there is too much.
             data = file.read(MAX_BYTES + 1)
     except OSError as error:
         raise FileFormatError(f"cannot be read: {error.strerror} ({path})") from None
@@ -227,6 +230,8 @@ class _Declarations:
 
     def number_categories(self) -> None:
         """Read the formulas in which categories are compared with their values."""
+        # A second pass: a category may be declared after the formula that compares it, or in the
+        # file that includes the fragment.
         named = [parameter for parameter in self.parameters if parameter.kind.names]
         categories = {parameter.name: parameter.kind.names for parameter in named}
         self.problems += [
@@ -270,6 +275,7 @@ class _Declarations:
                     )
                 else:
                     self.problems.append(f"{name} is derived: it has no default{at(place)}")
+            # YAML's true is a bool, which is an int in Python.
             elif isinstance(value, int | float | str) and not isinstance(value, bool):
                 parameter = self.parameters[at_[name]]
                 try:
@@ -361,6 +367,7 @@ def _read_fragment(name: str, folder: Path | None) -> Document:
         if name not in known:
             raise UnknownNameError("fragment", name, known)
         return _read_shipped(name)
+    # A scenario may come from a stranger: what it includes must not lead out of its folder.
     if folder is None or Path(name).is_absolute() or ".." in Path(name).parts:
         raise ScenarioError(f"a file to include lies beside the scenario, got '{name}'")
     return read_document(folder / name)
@@ -413,6 +420,7 @@ def build(document: Document, folder: Path | None) -> LogicalScenario:
     board = Storyboard(quantities, roads, declarations.prefixes, jam_members(quantities))
     changes = TemporaryChanges(quantities, roads)
     said_of_others = document.data.get("others")
+    # A wrong word is reported with the shape.
     others = said_of_others if said_of_others in DRIVERS else SCRIPTED
     participants = driven((*board.participants, *changes.participants), board.events, others)
     story = Story(participants, board.events, changes.jams, changes.works)

@@ -200,6 +200,7 @@ class RoadsSpec:
     def closes(self) -> dict[str, Quantity]:
         """The weather parameters beyond which it is closed, with the limits [%]."""
         found = {name: self.knobs[f"closing_{name}"] for name in ("fog_density", "precipitation")}
+        # Weather goes to 100 %: that limit never closes the road.
         return {name: limit for name, limit in found.items() if limit != 100.0}
 
     def length(self, leg: str) -> Quantity | None:
@@ -237,6 +238,7 @@ def usual(template: Template = "crossroads", **knobs: Quantity) -> RoadsSpec:
     """
     found: dict[str, Quantity] = {name: knob.usual for name, knob in KNOBS[template].items()}
     for name, value in knobs.items():
+        # For its KeyError: a misspelt knob would be carried along, and do nothing.
         _ = KNOBS[template][name]
         found[name] = value
     legs = {name: LegSpec(heading) for name, heading in HEADINGS[template].items()}

@@ -239,6 +239,9 @@ class LogicalScenario(SearchedScenario):
     def fingerprint(self) -> str:
         """See `SearchedScenario`; what a scenario does without has no part in it."""
         content = content_of(self)
+        # These fields came after the first runs recorded a digest. They are left out of the repr,
+        # and count only where they are set: the digests of scenarios without them stay as they
+        # were.
         bare = ("", "scripted")
         drivers = {
             participant.name: participant.driver

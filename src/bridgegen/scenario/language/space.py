@@ -97,6 +97,8 @@ class SearchSpace:
             name: tuple(b for b in constraints.bounds if b.target == name) for name in parameters
         }
         self.order = order(self.names, constraints.bounds, constraints.derived)
+        # Tried when it is made: constraints that leave a parameter no value somewhere are told to
+        # the author, and not to whom a search meets them after hours.
         self._decode(probes(self.n_var))
 
     @property
@@ -188,6 +190,8 @@ class SearchSpace:
             lo, hi = self.interval(name, table)
             cube[:, number] = self.parameters[name].share(table[name], lo, hi)
         back = self._decode(cube)
+        # Decoded again: an infeasible row, or one of another space, has shares, too, but not its
+        # own values.
         wrong = np.argwhere(np.abs(rows - back) > slack(back)).tolist()
         if wrong:
             raise ScenarioError(
@@ -385,6 +389,7 @@ def _fixed_problems(fixed: Mapping[str, float], constraints: Constraints) -> lis
 
 def probes(n_var: int) -> Float:
     """Return points that show what a space can hold: corners (all, if few) and others."""
+    # A seed of its own: whether a scenario can be searched must not depend on the search.
     random = np.random.default_rng(0)
     if 2**n_var <= _CORNERS:
         corners = np.array(list(product((0.0, 1.0), repeat=n_var)))

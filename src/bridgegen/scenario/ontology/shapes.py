@@ -222,7 +222,10 @@ def _rule(
     if limit is not None:
         lines.append(binds(limit, "limit"))
     lines.append(f"BIND({_raw(target)} AS ?value)")
+    # What has no value (a root of a negative number) breaks the rule, as the check of rows has it.
     lines.append(f"FILTER(!COALESCE({kept}, false))")
+    # An imported map has roads of its own, and no static parameters: their absence is no fault
+    # then.
     if axis is Axis.STATIC:
         map_file = "$this bg:has_road_network/bg:has_map_file ?map_file"
         lines.append(f"FILTER(BOUND({_raw(target)}) || NOT EXISTS {{ {map_file} }})")

@@ -27,6 +27,7 @@ class Searched(float):
         made.parameter = parameter
         return made
 
+    # Copying and pickling a float call `__new__` with its value alone, which has no parameter then.
     def __getnewargs__(self) -> tuple[float, str]:  # type: ignore[override]
         """Return what a copy is made of."""
         return float(self), self.parameter

@@ -51,6 +51,7 @@ def literal(value: float) -> str:
         text = "NaN" if math.isnan(value) else "INF" if value > 0 else "-INF"
         return f'"{text}"^^<http://www.w3.org/2001/XMLSchema#double>'
     text = repr(float(value))
+    # Without an exponent SPARQL reads a decimal, whose arithmetic is not that of doubles.
     text = text if "e" in text else text + "e0"
     return f"({text})" if text.startswith("-") else text
 
@@ -93,6 +94,8 @@ class _Compiler:
                 return f"(-{self.number(operand)})"
             case ast.BinOp(left=left, op=ast.Div(), right=right):
                 return self.quotient(self.number(left), self.number(right))
+            # SPARQL has no remainder. This one has the sign of the divisor, as NumPy's, which the
+            # decoder uses.
             case ast.BinOp(left=left, op=ast.Mod(), right=right):
                 a, b = self.bind(self.number(left)), self.bind(self.number(right))
                 whole = self.bind(f"FLOOR({self.quotient(a, b)})")

@@ -81,6 +81,9 @@ class PropertyShape:
             values: of each individual that has the property.
             structure: of all individuals.
         """
+        # "Surely" throughout: whatever is in doubt (a spelling of a number that is not plain, a
+        # class of a user's own) is left to pyshacl, so the quick answer is never more lenient than
+        # SHACL's.
         if self.single and any(len(found) > 1 for found in values.values()):
             return False
         found = set().union(*values.values())
@@ -172,6 +175,7 @@ class Structure:
         Args:
             required: (class, property), see `requirements`.
         """
+        # Classes of a user's own may be below ours, which is what a reasoner or pyshacl follows.
         if SUBCLASS in self._values:
             return False
         for shape in property_shapes():

@@ -46,6 +46,7 @@ _WORDS = {
 }
 
 _UNIT = "|".join(re.escape(symbol) for symbol in sorted(SYMBOLS, key=len, reverse=True))
+# A unit ends where no letter or sign of a unit follows: the m of "2 min(...)" is none.
 _TOKEN = re.compile(
     rf"""\s*(?:
     (?P<number>(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]{{1,3}})?)
@@ -217,6 +218,9 @@ class _Reader:
             self.fail("before 'while' stands one comparison, 'min(gap to bv) > 2 m' say")
         extreme = left.left
         if isinstance(extreme, f.Whole):
+            # min(x) > c and max(x) < c say something of all instants, min(x) < c and max(x) > c of
+            # one at least. So "while" needs no extreme of a part of a recording, which may be
+            # empty.
             at_all = (extreme.name == "min") == (left.sign in (">", ">="))
             if extreme.name not in ("min", "max") or left.sign in ("==", "!="):
                 self.fail("before 'while' stands min(...) or max(...), compared by <, <=, > or >=")

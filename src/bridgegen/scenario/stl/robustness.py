@@ -119,6 +119,7 @@ class _Evaluation:
             left, right = right, left
         with np.errstate(invalid="ignore"):
             found = left - right
+        # One sum tells whether any value is NaN, and costs no array of flags.
         if np.isnan(found.sum()):  # equal infinities
             found[left == right] = 0.0
         if comparison.sign in ("==", "!="):
@@ -176,6 +177,7 @@ def _over_window(values: Float, low: int, high: int, neutral: float) -> Float:
     join = np.minimum if neutral > 0.0 else np.maximum
     if high < low:
         return np.full(values.shape, neutral)
+    # A window to the end is a running extreme: one pass, whatever its length.
     if high >= len(values) - 1:
         whole: Float = join.accumulate(values[::-1], axis=0)[::-1]
         return _shifted(whole, low, neutral)
@@ -186,6 +188,8 @@ def _over_window(values: Float, low: int, high: int, neutral: float) -> Float:
         have *= 2
     ahead = _shifted(found, low, neutral)
     if width > have:
+        # Two overlapping windows of a power of two cover any width: an extreme may count an instant
+        # twice. So a window costs log2(width) passes.
         ahead = join(ahead, _shifted(found, low + width - have, neutral))
     return ahead
 
@@ -199,12 +203,17 @@ def _until(left: Float, right: Float, low: int, high: int) -> Float:
     if high < low:
         return np.full(left.shape, -inf)
     found = np.empty(left.shape)
+    # Backwards: the value at an instant is that of the next one, limited by left, or right now.
     after = np.full(left.shape[1], -inf)
     for k in range(len(left) - 1, -1, -1):
         after = found[k] = np.maximum(right[k], np.minimum(left[k], after))
     if low:
+        # Until the interval begins, left must hold all the time; from there on the unbounded one
+        # counts.
         before = _over_window(left, 0, low - 1, inf)
         found = np.minimum(_shifted(found, low, -inf), before)
     if high < len(left) - 1:
+        # The unbounded value may come from behind the interval; the least of it and of right's
+        # greatest value in the interval is exact (Donzé et al.).
         found = np.minimum(found, _over_window(right, low, high, -inf))
     return found

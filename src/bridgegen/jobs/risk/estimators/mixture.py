@@ -107,6 +107,8 @@ def fit(Z: Float, weights: Float, size: float, random: np.random.Generator) -> M
     d = Z.shape[1]
     best, least, chosen = None, np.inf, 0
     for count in range(1, MOST_COMPONENTS + 1):
+        # Points of chains are worth fewer independent ones than there are; the size, not the
+        # number, says how many components they bear.
         if count > 1 and (size < 5.0 * count * (d + 1) or count > chosen + PATIENCE):
             break
         found = _maximised(Z, weights, _begin(Z, weights, count, random))

@@ -33,6 +33,7 @@ def estimate(problem: Problem, aim: Aim, seed: int) -> Weighted:
         if done == aim.budget:
             break
         if done == check:
+            # Looked at only when evaluations have doubled: each look is a chance to stop on luck.
             check *= 2
             result = _result(kept, outcomes, done)
             if result.probability(aim.threshold).precision <= aim.precision:

@@ -32,6 +32,7 @@ def estimate(problem: Problem, aim: Aim, seed: int) -> Weighted:
         Z = Z[problem.feasible(Z)]
         spent += len(Z)
         hits = int((problem.evaluate(Z, aim.least)[:, SCORE] >= aim.threshold).sum())
+        # Never 0: a shell in which a first look saw nothing still gets rows.
         p[shell] = (hits + 0.5) / (each + 1.0)
     wanted = masses * np.sqrt(p * (1.0 - p))
     rows = max(aim.budget - spent, SHELLS)
@@ -40,6 +41,8 @@ def estimate(problem: Problem, aim: Aim, seed: int) -> Weighted:
     parts: list[tuple[Float, Float, Float]] = []
     share = problem.share
     for shell, count in enumerate(counts):
+        # New rows: those that decided how many a shell gets are not counted, which would bias the
+        # estimate.
         Z = _points(shell, tails, d, int(count), block_of(seed, 1, shell))
         Z = Z[problem.feasible(Z)]
         spent += len(Z)
@@ -71,5 +74,7 @@ def _points(shell: int, tails: Float, d: int, count: int, random: np.random.Gene
     direction = random.standard_normal((count, d))
     direction /= np.linalg.norm(direction, axis=1, keepdims=True)
     tail = tails[shell + 1] + (tails[shell] - tails[shell + 1]) * random.random(count)
+    # By the upper tail, whose digits are all there at 1e-7; the quantile of 1 − 1e-7 would lose
+    # half of them.
     found: Float = direction * scipy.stats.chi.isf(tail, d)[:, np.newaxis]
     return found

@@ -128,6 +128,7 @@ def _arc_to(ahead: float, aside: float) -> tuple[float, float]:
     return 2.0 * elementary.sin(half) / chord, chord * half / elementary.sin(half)
 
 
+# cos(90°) is 6e-17 in doubles; a crossroads' coordinates are to be round numbers.
 _QUARTERS = {0: (1.0, 0.0), 90: (0.0, 1.0), 180: (-1.0, 0.0), 270: (0.0, -1.0)}
 
 LEVEL = (Cubic(0.0, 0.0, 0.0, 0.0, 0.0),)

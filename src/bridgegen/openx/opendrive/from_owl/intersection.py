@@ -151,16 +151,22 @@ def build(
     """
     roads = [arm_road(arm, 0.5 * size, junction_id) for arm in arms]
     connections: list[Connection] = []
+    # Above the junction's id, too: CARLA finds no way into a junction whose id a road has.
     free = max(int(junction_id), *(int(arm.road_id) for arm in arms)) + 1
     for number, crossing in enumerate(crossings(arms)):
+        # One-way, and one for each pair of lanes: only such connecting roads are read alike by
+        # esmini, CARLA, netconvert and CommonRoad.
         road = _connecting(crossing, str(free + number), size, junction_id)
         roads.append(road)
         incoming = crossing.arm.lane_id(crossing.lane, inbound=True)
         connections.append(
+            # Lane links stand in the connecting road and in the junction: readers look in either.
             Connection(
                 str(number), crossing.arm.road_id, road.id, "start", (LaneLink(incoming, -1),)
             )
         )
+    # No date and no offset: the same network gives the same bytes, and not all readers apply an
+    # offset.
     header = Header(1, 7, name=name, version="1.00", vendor="BridgeGen")
     junction = Junction(
         junction_id,

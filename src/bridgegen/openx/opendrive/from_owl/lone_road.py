@@ -46,6 +46,8 @@ def plan_view(bends: tuple[Bend, ...]) -> Iterator[Geometry]:
     s, x, y, h = 0.0, 0.0, 0.0, 0.0
     for length, start, end in bends:
         shape: Line | Arc | Spiral = Spiral(start, end)
+        # A spiral of equal curvatures is valid, but netconvert takes 12 GB of memory on it, and
+        # others divide by zero.
         if start == end:
             shape = Arc(start) if start else Line()
         geometry = Geometry(s, x, y, h, length, shape)

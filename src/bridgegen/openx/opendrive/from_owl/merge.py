@@ -167,6 +167,8 @@ def _sections(after: Arm, width: float, merge: float, taper: float) -> tuple[Lan
         widths = (*after.outbound, extra) if extra else after.outbound
         lanes = list(lanes_of(-1, widths, after.strips_out))
         if s == merge:
+            # The cubic from the full width to 0 that is level at both ends, so that the edge has no
+            # kink.
             narrowing = (Width(0.0, width, 0.0, -3.0 * width / taper**2, 2.0 * width / taper**3),)
             lanes[count] = replace(lanes[count], widths=narrowing, road_marks=EDGE)
         right = tuple(

@@ -52,6 +52,7 @@ def opendrive_from_owl(individuals: Individuals) -> OpenDrive:
     crossings = individuals.of_class("Intersection")
     if not crossings:
         return _lone_road(individuals, name)
+    # Several junctions exist in imported maps only, which are files already and are not made again.
     if len(crossings) > 1:
         raise UnsupportedError(
             f"a road network is made with one intersection in this version, got {len(crossings)}"
@@ -103,6 +104,7 @@ def _lone_road(individuals: Individuals, name: str) -> OpenDrive:
         for node in segments
     )
     total = sum(length for length, _, _ in bends)
+    # Relative, for the lengths are sums that another tool may have added up in another order.
     if bends and abs(total - arm.length) > 1e-6 * total:
         problems.append(
             f"has_length [m] of {individuals.describe(roads[0])} must be that of its segments, "

@@ -65,6 +65,8 @@ def for_scenario_runner(
     Raises:
         UnsupportedError: what ScenarioRunner or CARLA cannot do, by name, all of it at once.
     """
+    # What leaves by an action of the file is refused further down; what only leaves where its road
+    # ends is made to stand there.
     deleted = {node.entity_ref for node in walk(scenario) if isinstance(node, osc.EntityAction)}
     recording = recording.until_left(but={str(item) for item in deleted})
     by_name = {str(obj.name): obj.entity_object for obj in scenario.entities.scenario_objects}
@@ -93,6 +95,8 @@ def for_scenario_runner(
     act = story.act(moved, recording, weather, roads, end)
     start = osc.GlobalAction(osc.EnvironmentAction(weather[0][1]))
     header = scenario.file_header
+    # Version 1.0, the only one that ScenarioRunner takes. Its story has one act: of all positions
+    # in an entity's Init the last is its start, so trajectories stand in the story.
     return osc.OpenScenario(
         osc.FileHeader(1, 0, header.date, _file_name(name), header.author),
         osc.RoadNetwork(scenario.road_network.logic_file),

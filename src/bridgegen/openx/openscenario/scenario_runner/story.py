@@ -226,6 +226,7 @@ def criteria(roads: OpenDrive) -> osc.ConditionGroup:
 
 
 def _criterion(name: str) -> osc.Condition:
+    # ScenarioRunner reads the names of these conditions and no more.
     nothing = osc.ParameterCondition("", "", osc.Rule.LESS_THAN)  # the criterion's own defaults
     condition = osc.ByValueCondition(nothing)
     return osc.Condition(f"{osc.CRITERIA}{name}", 0.0, osc.ConditionEdge.NONE, condition)

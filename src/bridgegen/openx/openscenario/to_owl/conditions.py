@@ -203,5 +203,6 @@ def _is_gap(builder: StoryBuilder, relative: Relative) -> bool:
 
 def _put_rule(builder: StoryBuilder, node: ox.NamedNode, element: Element) -> None:
     rule = builder.choice(osc.Rule, element.rule)  # type: ignore[attr-defined]
+    # The export writes the usual rule where none is stated: a file of ours comes back the same.
     if rule is not USUAL_RULES[type(element).__name__]:
         builder.put(node, "has_rule", rule.value)

@@ -14,6 +14,7 @@ from bridgegen.openx.openscenario.element import Attribute, Element, children_of
 from bridgegen.openx.openscenario.to_owl.build import Lost
 from bridgegen.openx.openscenario.values import Expr, Kind, Literal, ParameterRef
 
+# Numbers go through formulas and units on the way, and differ by rounding.
 _REL, _ABS = 1e-9, 1e-9
 _CLEAR = 1000.0  # m: what hides less is no fog (WMO)
 
@@ -129,6 +130,7 @@ class Differences:
             if not _is_nothing(element):
                 yield Lost(element.line, _called(element), is_detail(element))
             return
+        # A step takes no time, whatever number stands beside it.
         step = isinstance(element, osc.TransitionDynamics) and (
             element.dynamics_shape
             == osc.DynamicsShape.STEP
@@ -164,12 +166,16 @@ class Differences:
         yield from self._below(element, other)
 
     def _below(self, element: Element, other: Element) -> Iterator[Lost]:
+        # Like with like, by tag and key: the order of a file's elements means nothing here, and one
+        # element that is missing must not shift all others.
         before: dict[tuple[str, Any], list[Element]] = {}
         for tag, child in children_of(other):
             before.setdefault((tag, self._key(child, self.there)), []).append(child)
         for tag, child in children_of(element):
             left = before.get((tag, self._key(child, self.here)))
             yield from self.between(child, left.pop(0) if left else None)
+        # What the second file says besides is no loss, but for a condition: a further one makes an
+        # event begin later, or not at all.
         for left in before.values():
             for child in left:
                 if isinstance(child, osc.ConditionGroup | osc.Condition):

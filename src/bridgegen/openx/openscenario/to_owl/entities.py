@@ -63,6 +63,7 @@ def add_participant(
     )
     if len(scenario_object.object_controllers) == 1:
         _add_controller(builder, node, name, scenario_object.object_controllers[0].controller)
+    # An entity that an event adds has its place in that event, and none at the start.
     if name in builder.added and not any(
         isinstance(wrapped.action, osc.TeleportAction) for wrapped in actions
     ):

@@ -86,6 +86,8 @@ def happenings(builder: StoryBuilder) -> Iterator[Happening]:
                     seen.add(name)
                     for number, action in enumerate(event.actions, start=1):
                         key = "action", builder.text(action.name)
+                        # Two actions of one name: a condition on it could mean either. The empty
+                        # name is no event's, so that such a condition is not stated.
                         names[key] = f"{name}_action_{number}" if key not in names else ""
                     names["event", wanted] = name
                     if len(maneuver.events) > 1 and event.priority in _ENDING and not together:
@@ -162,6 +164,7 @@ def add_events(builder: StoryBuilder, scenario: ox.NamedNode, all_: list[Happeni
         The names of those that are stated.
     """
     for happening in all_:
+        # Names first: a condition may wait for an event that comes later in the file.
         builder.events[happening.name] = builder.reserve(happening.name)
     waits: dict[str, set[str]] = {}
     awaited = {
@@ -192,6 +195,8 @@ def add_events(builder: StoryBuilder, scenario: ox.NamedNode, all_: list[Happeni
                 lost.append(name)
                 text = f"the Event {name}, which waits for {gone},"
                 builder.problems.append(Lost(lines[name], text))
+    # An event that waits for a lost one has been stated among the others. All is taken back, and
+    # stated again without those; the first pass has said all problems.
     problems = builder.problems[:]
     builder.take_back(kept)
     for happening in all_:

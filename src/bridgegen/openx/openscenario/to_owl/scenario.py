@@ -190,6 +190,8 @@ def individuals_from_openscenario(
     importer = _Importer(scenario, roads, map_file, in_substance)
     individuals = importer.build()
     missing = list(importer.problems(individuals))
+    # A second pass: what the comparison found to be lost (a flag, a coordinate system) is quoted as
+    # XML at its place. It is taken only where less is lost then.
     if in_substance and (lines := frozenset(item.line for item in missing if not item.is_detail)):
         again = _Importer(scenario, roads, map_file, in_substance, lines - {0})
         quoted = again.build()
@@ -306,6 +308,8 @@ class _Importer:
             for event in maneuver.events
         }
         for happening in happenings(builder):
+            # Events that follow from the controllers' phases are written beside them for readers
+            # that do not run phases; stated twice, they would come back twice.
             if self.derived.get(happening.name) != happening.event:
                 self.happenings.append(happening)
         self.stated = add_events(builder, node, self.happenings)
@@ -479,6 +483,8 @@ class _Importer:
             return
         file = self.scenario.road_network.logic_file
         try:
+            # Written again and compared: what no class stands for is not found by elements alone,
+            # for an attribute may be lost of one that a class does stand for.
             again = openscenario_from_owl(individuals, "" if file is None else str(file.filepath))
         except InputError as error:
             self.refused += error.problems

@@ -145,6 +145,8 @@ class Starts:
         target = action.speed_action_target.target
         if isinstance(target, osc.AbsoluteTargetSpeed):
             return self.number(target.value)
+        # A continuous target follows the other's speed from then on, and is no number. A circle of
+        # references ends by the depth.
         other = self._speeds.get(self.text(target.entity_ref))
         if other is None or depth > len(self._speeds) or target.continuous is not False:
             return None
@@ -169,6 +171,8 @@ class Starts:
             if not isinstance(where, osc.RelativeLanePosition | osc.RelativeRoadPosition):
                 return None
             base = self._of.get(self.text(where.entity_ref))
+            # Each step leads to another entity: more steps than entities are a circle of
+            # references.
             if base is None or depth > len(self._of):
                 return None
             other = self._on_lane(base, depth + 1)
