@@ -83,6 +83,7 @@ class Trials:
         gate = plausibility(rollout)
         findings = Findings.of(conflicts, gate.labels, count)
         ok: Bool = (rollout.status == 0) & (findings.implausible == "")
+        # Only of rows that count: a place is looked for on the route in Python.
         place = np.full(n, "", dtype=object)
         rows = np.arange(n)
         other = decisive(conflicts, count)[0]
@@ -176,6 +177,7 @@ def _try(runner: Runner, rows: Float, harm: str, count: Count) -> Trials:
         return Trials.none(len(rows))
     roads, which = runner.roads_of(X)
     parts, order = [], []
+    # A batch has one driver, so rows are simulated together by what is changed.
     for number in np.unique(numbers).tolist():
         at = np.flatnonzero(numbers == number)
         fix = runner.fixes[number] if number >= 0 else None

@@ -103,11 +103,13 @@ class CarriedDriver:
         path = file_of(self.name)
         if path is None or self.data is None or _holds(path, self.data):
             return self.name
+        # The file is imported as code, so its folder is this user's alone.
         home = Path(tempfile.gettempdir()) / f"bridgegen-drivers-{os.getuid()}"
         folder = home / hashlib.blake2b(self.data, digest_size=16).hexdigest()
         folder.mkdir(parents=True, exist_ok=True, mode=0o700)
         copy = folder / path.name
         if not _holds(copy, self.data):
+            # Workers of one machine write at the same time: each reads a whole file.
             part = folder / f".{path.name}.{os.getpid()}"
             part.write_bytes(self.data)
             part.replace(copy)
