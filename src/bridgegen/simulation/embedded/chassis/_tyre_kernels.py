@@ -135,6 +135,8 @@ def longitudinal(wanted, alpha, load, mu, chassis):
     peak = mu * chassis[MU_X]
     most, b = peak * load, chassis[K_X] / (chassis[C_X] * peak)
     share, best = abs(wanted) / most, chassis[SLIP] / b
+    # The slip follows from the force that is wanted, the other way round than in the formula: by a
+    # table of its inverse, and rounds for the combined slip.
     kappa, left = 0.0, longitudinal_left(alpha, 0.0, chassis)
     for i in range(ROUNDS):
         before, kappa = kappa, _slip_of(share / left, chassis) / b

@@ -134,6 +134,8 @@ def look_ahead(p, k, plan, roads, state, record):
             gap = between_boxes(gap, own, length, width, ahead, turn, other_turn, measure)
     if kind == DISTANCE:
         return True, abs(gap)
+    # Where a headway or a time to collision is not defined, the condition is false, whatever its
+    # rule: "greater than" is, too.
     if kind == TIME_HEADWAY:
         is_ahead = gap >= 0.0 and (measure != EUCLIDIAN or in_frame(ox - x, oy - y, h)[0] >= 0.0)
         return v > 0.0 and is_ahead, gap / max(v, 1e-9)
@@ -528,6 +530,7 @@ def touch(e, other, k, plan, roads, state, record):
 def lasts(p, k, seen, limit, plan, roads, state, record):
     """Return whether a probe has seen so long [s] what it sees now."""
     seen = seen and state.present[plan.probes[p, WHO]]
+    # A duration of 0 is met at the first instant at which it is so.
     before = state.held[p] if k > 0 else -plan.dt
     state.held[p] = before + plan.dt if seen else -plan.dt
     return seen and state.held[p] >= limit - AT_END

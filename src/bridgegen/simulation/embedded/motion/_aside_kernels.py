@@ -120,6 +120,8 @@ def _beside(e, row, station, seen, roads, state, record):
     if row[BY_BODY]:
         px, py, ph = pose(path, n, ds, station)
         along = elementary.cos(ph - h)
+        # The factor 1/along would throw the entity far across the road for the least turn of the
+        # other.
         if abs(along) < CROSSING:
             return state.aside[e] - state.lateral_target[e], 1.0
         return ((x - px) * -elementary.sin(h) + (y - py) * elementary.cos(h)) / along, 1.0 / along

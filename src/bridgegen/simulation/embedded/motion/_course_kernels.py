@@ -19,6 +19,7 @@ from bridgegen.simulation.embedded._motion_kernels import (
     progress,
 )
 
+# esmini's figure; the standard leaves open how a distance is reached.
 STIFFNESS = 0.4  # 1/m, of the spring that closes a gap, per m/s² of the strongest acceleration
 T, V, A, J = 0, 1, 2, 3  # columns of a profile: from when on [s], speed, acceleration, jerk there
 
@@ -49,6 +50,8 @@ def change_time(shape, dimension, value, before, after, most):
         return max(value, least)
     if dimension == RATE:
         return max(steepest(shape) * change / abs(value), least)
+    # Over the time, not the distance itself: by distance, braking to rest would never end, and a
+    # start from rest never begin.
     return max(2.0 * value / max(before + after, 1e-9), least)
 
 

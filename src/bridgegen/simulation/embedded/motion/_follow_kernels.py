@@ -142,6 +142,7 @@ def stop_follow(j, k, plan, roads, state, record):
 def at_time(table, n, t):
     """Return (x, y, heading, speed, metres travelled) by a timetable at a time."""
     i = 0
+    # An instant is k·dt, which in binary is not the decimal time that a vertex states.
     while i < n - 1 and table[i, ENDS_AT] < t - SAME_TIME:
         i += 1
     row = table[i]

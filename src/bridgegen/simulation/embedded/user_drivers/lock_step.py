@@ -69,6 +69,7 @@ def drive_in_lock_step(
                 raise
             if len(rows) > 1:
                 half = len(rows) // 2
+                # The rows were asked about together, so the one that fails is not known.
                 waiting += [rows[half:], rows[:half]]
                 continue
             batch.fail(FAILURES[error.kind], str(error))
