@@ -127,6 +127,9 @@ def drive_un_r157(
     if lead > 0 and lead_gap <= CRITICAL_HEADWAY * v:
         if leaves and beyond > 0 and v > beyond_along:
             risky = beyond
+        # The text's 5 m/s² in front of an emergency. The Commission's code reacts to any
+        # deceleration, or the regulation's own charts below 5 m/s² would have no reaction; here,
+        # below that, ``follow`` brakes as hard as needed. No cell differs by it.
         elif lead_slowing > BRAKES_HARD:
             risky = lead
     if cut_in > 0:

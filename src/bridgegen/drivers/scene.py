@@ -121,6 +121,7 @@ def survey(
     first = [0]
     for e, lanes in enumerate(starts):
         for way in [way for stretch, s in lanes for way in ways_from(model, stretch, s)]:
+            # A whole number of equal steps, so that the last sample is the way's end.
             way_step = way.length / math.ceil(way.length / SAMPLE)
             line_ = way.sample(way_step)
             columns = (

@@ -490,7 +490,6 @@ def _state(
 ) -> memory.State:
     """Return the state of N rows before they start; ``start`` sets what else is not 0."""
     n, e = len(rows), len(program.names)
-    # Not by ``where``: an index of −1 would take the last slot.
     start = slots[:, np.maximum(program.start_slots, 0)]  # of no effect where there is no slot
     varied = slots[:, np.maximum(program.aside_slots, 0)]
     hypotheses = roads.scene.hypotheses.shape[1]
