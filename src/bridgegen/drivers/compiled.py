@@ -203,8 +203,8 @@ def _compile(function: Callable[..., Any], wants: Sequence[str]) -> Any:
     names = ["scene", "ego", "route", "tracks", "memory", *(name for name, *_ in further)]
     if len(inspect.signature(function).parameters) != len(names):
         raise InputError(f"{_place(function)}: {function.__name__} must take {', '.join(names)}")
-    # Indices are checked here, other than in our kernels: this is a stranger's code, on arrays that
-    # the simulation reads.
+    # Indices are checked here, other than in our kernels: a write beyond an array would take the
+    # driver's process down, where an error names the line.
     code = numba.njit(nogil=True, error_model="numpy", boundscheck=True)(function)
     shapes = [(), (), *[(ANY,)] * 3, *(shape for *_, shape in further)]
     types = [*ARGUMENT_TYPES, *(kind for _, kind, _ in further)]

@@ -295,6 +295,8 @@ class Runner:
         if self.scenario.checks and not self.refused:
             wrong = np.zeros(len(X), np.bool_)
             for rule, rows in self.scenario.broken(self.columns(X)).items():
+                # A row that breaks several rules is refused by the first one only, for it is
+                # yielded once.
                 if (fresh := rows & ~wrong).any():
                     yield np.flatnonzero(fresh), self._refusing(rule)
                 wrong |= rows
@@ -326,6 +328,7 @@ class Runner:
 
     def _make_variant(self, key: tuple[float, ...]) -> "Runner":
         """Return the runner of the rows that have these values of what storyboards differ in."""
+        # Shallow: source, space and road map are shared, the storyboard is its own.
         runner = copy(self)
         runner._variants = replace(self._variants, names=())
         try:
@@ -352,6 +355,7 @@ class Runner:
 
     def roads_of(self, X: Float) -> Roads:
         """Return the compiled road networks of rows, and each row's network, ``(N,)``."""
+        # The usual case: nothing that the roads depend on is searched, and they are compiled once.
         if self._roads is not None:
             return self._roads, np.zeros(len(X), dtype=np.int64)
         source, names = self.source, self._road_names

@@ -302,6 +302,7 @@ def read_recording(
         states = {key: np.array(values) for key, values in track.states.items()}
         states["h"] = np.unwrap(states["h"]) if _jumps(states["h"]) else states["h"]
         if "acceleration" not in states:
+            # Forward differences, as ours are: from this instant on.
             states["acceleration"] = _accelerations(states["speed"], states["time"])
         at = (states["time"] - start) / step
         # Unequal steps are refused by default: linear interpolation flattens what brakes and turns.

@@ -158,6 +158,8 @@ class Cluster(WorkerPool[int]):
         return super()._missing(chunks)
 
     def _start_worker(self) -> int:
+        # A new number at each start, and an old slot if one is free: messages that come late for an
+        # earlier number are then nobody's, and the actor of the slot is used again.
         number, taken = next(self._numbers), set(self._slots.values())
         slot = next(item for item in itertools.count() if item not in taken)
         self._slots[number] = slot

@@ -170,6 +170,8 @@ class WorkerPool(ABC, Generic[WorkerHandle]):
     ) -> list[Part[Result]]:
         """See `Workers`."""
         job = Job(portable.recipe, work, args, lambda chunk: X[chunk.start : chunk.stop])
+        # Bounds do not depend on how long rows take, nor on which worker is free: results come back
+        # in the order of rows.
         bounds = cut(len(X), self.count, portable.rows_at_once)
         job.waiting.extend(Chunk(start, stop) for start, stop in bounds)
         try:
@@ -270,6 +272,8 @@ class WorkerPool(ABC, Generic[WorkerHandle]):
             job.done[chunk.start] = Part(chunk.rows, Lost(reason))
 
 
+# Told in the order of submission, however late a row is: else a search would depend on the
+# machine's load.
 class PoolStream(Generic[Result]):
     """A `Stream` of a pool. A thread gives rows to workers while the caller is busy.
 

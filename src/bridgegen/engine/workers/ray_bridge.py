@@ -98,6 +98,7 @@ class RayBridge:
         import ray
 
         self._ray, self._say, self._device = ray, say, device
+        # By version: campaigns of another one have actors of their own.
         self._namespace = f"bridgegen-{version('bridgegen')}"
         self._actors: dict[int, Any] = {}
         self._recipes: dict[str, Any] = {}
@@ -207,6 +208,7 @@ class _RemoteActor(RayActor):
         import ray
 
         def leave() -> None:
+            # Ray would begin it again otherwise, without limit (``max_restarts=-1``).
             ray.kill(ray.get_runtime_context().current_actor, no_restart=True)
 
         super().__init__(leave, idle_seconds)

@@ -61,6 +61,7 @@ class Threads:
 
     def close(self) -> None:
         """See `Workers`."""
+        # A kernel cannot be interrupted, so what runs is not waited for.
         self._pool.shutdown(wait=False, cancel_futures=True)
 
 

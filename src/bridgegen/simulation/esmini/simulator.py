@@ -127,6 +127,7 @@ class EsminiSimulator:
         self._lock, self._is_stopped = threading.Lock(), threading.Event()
         self._processes: list[EsminiProcess] = []
         self._idle: list[EsminiProcess] = []
+        # Started now, so that a library that is none is reported before rows are simulated.
         with self._idle_process() as process:
             process.start()
             self.version = process.version
