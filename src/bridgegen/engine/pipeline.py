@@ -277,6 +277,7 @@ class Pipeline:
                 self._margins_that_count(margins)
             sample = None
             if needs_sample(spec.weights, spec.scale, objectives):
+                # A stream of its own: other parts draw by the same seed and another second number.
                 rng = np.random.Generator(np.random.PCG64([seed, 1]))
                 U = rng.random((SAMPLE, self.space.n_var))
                 parts = self._map(type(self)._measure_rows, self.space.decode(U))
@@ -602,6 +603,7 @@ def _remade(carried: Carried, options: PipelineOptions, **made_with: Any) -> Pip
     """Return a pipeline for a worker, in one thread, with its kernels compiled."""
     ego, baseline = (driver.here() if driver else None for driver in carried)
     options = replace(options, ego=ego, worse_than=baseline)
+    # One thread: a worker is one core, and its chunks come from outside.
     pipeline = Pipeline(options=options, **made_with, workers=Threads(1))
     pipeline.warm_up()
     return pipeline

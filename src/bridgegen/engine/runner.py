@@ -272,6 +272,7 @@ class Runner:
     def _failed(self, X: Float) -> Rollout:
         """Return the rollout of N rows whose values make no scenario."""
         fixed = self.embedded.fixed
+        # The nominal storyboard has other values as constants, and would refuse these.
         columns = {name: column for name, column in self.columns(X).items() if name not in fixed}
         batch = self.embedded.batch(*self.roads_of(X), columns)
         batch.start()

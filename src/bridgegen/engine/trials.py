@@ -175,6 +175,7 @@ def _try(runner: Runner, rows: Float, harm: str, count: Count) -> Trials:
     X, keys, numbers = rows[:, :n], rows[:, n : 2 * n], rows[:, -1].astype(np.int64)
     if runner.refused:
         return Trials.none(len(rows))
+    # Once for all changes: they are of driver, vehicle and grip, not of roads.
     roads, which = runner.roads_of(X)
     parts, order = [], []
     # A batch has one driver, so rows are simulated together by what is changed.

@@ -28,6 +28,8 @@ from bridgegen.engine.options.option import SIMULATOR as OF_SIMULATOR
 from bridgegen.simulation.choice import EMBEDDED, SimulatorChoice, Value
 from bridgegen.simulation.vehicles import KINEMATIC
 
+# The parts that stages take are base classes of `SearchOptions`, and what a run records derives
+# from that: so a restored run hands itself to the pipeline.
 MAX_BUDGET = 10**7
 MAX_SEED = 2**32 - 1
 MAX_KEEP = 1000

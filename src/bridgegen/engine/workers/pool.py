@@ -178,6 +178,7 @@ class WorkerPool(ABC, Generic[WorkerHandle]):
             while job.waiting or any(state.chunk for state in self._workers.values()):
                 self.step(job)
         except BaseException:
+            # Also at Ctrl-C, and at an error of the work: what workers still do is for nobody.
             self.close()  # stops the chunks that are being evaluated
             raise
         return [job.done[start] for start in sorted(job.done)]
@@ -246,6 +247,7 @@ class WorkerPool(ABC, Generic[WorkerHandle]):
             # A chunk is blamed for its worker's end only if the worker certainly ran when it got
             # it: a machine that fails takes idle workers with it, too.
             elif job.waiting[0].doubted and not state.pinged:
+                # Until it answers it is not idle, so it gets no chunk.
                 state.started = False
                 self._ping(state.handle)
             else:

@@ -89,6 +89,8 @@ class CarriedDriver:
         """
         path = file_of(name)
         try:
+            # The file's bytes, now: a search that takes days goes on with the driver that it began
+            # with.
             return cls(name, path.read_bytes() if path and path.is_file() else None)
         except OSError as error:
             raise InputError(f"{path}: cannot be read: {error.strerror}") from None

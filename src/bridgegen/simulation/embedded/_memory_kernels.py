@@ -21,6 +21,7 @@ N_STEPS, STATUS, STOPS, TICKS = 0, 1, 2, 3  # columns of State.ending
 
 # See rollout.STATUS_MESSAGES.
 OK, NOT_FINITE, OFF_ROUTE, NO_LANE, NO_PLACE, NO_WAY, NOT_THERE, OFF_LANES, BAD_TIMES = range(9)
+# As in `rollout.FAILURES`.
 RAISED, NO_CONTROL = 20, 23  # of a driver of the user's own
 UNPLANNED = -1  # the row needs a way that is not planned yet, and runs again when it is
 

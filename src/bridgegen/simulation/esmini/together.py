@@ -116,6 +116,7 @@ class _Row:
             self._impose(k)
             joint.decide(k)
             is_through = self._drives and joint.stops and joint.is_through
+            # esmini runs the storyboard, so its stop trigger counts, and not ours.
             joint.go_on()
             demand = joint.demand(k)
             if is_through or library.is_over:
