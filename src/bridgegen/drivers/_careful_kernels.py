@@ -88,6 +88,8 @@ def drive_careful(
             paths[p], path_n[p], path_ds[p], station[e], x[e, k], y[e, k], h[e, k], w, turn,
             bodies[e], CLEAR, reach, attention[e],
         )  # fmt: skip
+        # A lane change counts once the centre has come 0.375 m nearer: less is wandering in its
+        # lane.
         wanders = lateral > 0.0 and attention[e, FARTHEST] - attention[e, ASIDE] <= WANDERING
         if what == NO_CONFLICT or (what == LEADER and wanders):
             attention[e, KNOWN] = 0.0

@@ -120,6 +120,8 @@ def drive_un_r157(
         if ahead < lead_ahead:
             beyond, beyond_ahead, beyond_along = lead, lead_ahead, lead_along
             lead, lead_ahead, lead_gap, lead_along, lead_slowing = e, ahead, gap, along, slowing
+            # Nobody beyond the vehicle ahead is seen until then, so a cut-out is noticed later than
+            # by a driver that sees through cars.
             leaves = was_on_way and before <= WANDERING < aside
         elif ahead < beyond_ahead:
             beyond, beyond_ahead, beyond_along = e, ahead, along

@@ -158,6 +158,8 @@ def give_way(s, v, pace, front, rear, zone, q, w, gain, rank, other_front, other
         return math.inf, math.inf
     to_enter = zone[ENTER] - front - s  # from the ego's bumper to the zone
     inside = q + other_front > zone[OTHER_ENTERS]
+    # In the ring of a roundabout, or a queue, it is followed and not waited for: in
+    # roundabout-entry the ego comes 128 m far in 20 s instead of 91.
     if together and inside:
         # It is ahead of the ego, or will be: its station on the ego's route.
         ahead = place_on_route(zone, q)

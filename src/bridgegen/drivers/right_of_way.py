@@ -201,6 +201,7 @@ def _waiting(
     difference = _priority(our_signs) - _priority(their_signs)
     if difference:
         return THEY_WAIT if difference > 0 else WE_WAIT
+    # Priority to the right makes the ego wait, and never the other: a driver does not rely on it.
     from_ours = _turn(_heading(model, ours.before), _heading(model, theirs.before))
     from_the_right = ASIDE < from_ours < math.pi - ASIDE
     towards = abs(from_ours) >= math.pi - ASIDE

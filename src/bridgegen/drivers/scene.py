@@ -148,6 +148,7 @@ def survey(
             )
             zones.append(zone)
             rank = right_of_way(model, route, way, lights) if route is not None else NO_RULE
+            # An emergency vehicle on a call goes first on every way that it may take.
             lane_ranks.append(WE_WAIT if ranks[e] > 0 else rank)
         first.append(len(tables))
     ways = np.zeros((len(tables), max(map(len, tables), default=0), 6))

@@ -28,8 +28,6 @@ from bridgegen.engine.options.option import SIMULATOR as OF_SIMULATOR
 from bridgegen.simulation.choice import EMBEDDED, SimulatorChoice, Value
 from bridgegen.simulation.vehicles import KINEMATIC
 
-# The parts that stages take are base classes of `SearchOptions`, and what a run records derives
-# from that: so a restored run hands itself to the pipeline.
 MAX_BUDGET = 10**7
 MAX_SEED = 2**32 - 1
 MAX_KEEP = 1000
@@ -43,6 +41,8 @@ _CAUSES = option(
 )
 
 
+# The parts that stages take are base classes of `SearchOptions`, and what a run records derives
+# from that: so a restored run hands itself to the pipeline.
 @dataclass(frozen=True, kw_only=True)
 class PipelineOptions(Declared):
     """The options of how a scenario is evaluated."""

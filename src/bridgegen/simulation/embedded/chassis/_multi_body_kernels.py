@@ -212,6 +212,9 @@ def _changes(motion, at, weight, cosine, sine, force, acts, mu, press, uphill, a
             x = y = 0.0
             if weight > 0.0 and load > 0.0 and mu[side] > LEAST_FRICTION:
                 kappa = (radius * motion[w] - along) / max(abs(along), ROLLING)
+                # With another sign than CommonRoad's. Its coefficients are Pacejka's, with y to the
+                # left, its equations have y to the right, in which slip angle and lateral force
+                # change their sign and camber does not. Wheels push to the side to which they lean.
                 camber = roll + chassis[c + CAMBER] * (tilt + to_left * travel)
                 x, y = rolling_tyre(
                     kappa, slip_angle(past, along), camber, load, mu[side], stiffness, chassis

@@ -132,6 +132,8 @@ def longitudinal(wanted, alpha, load, mu, chassis):
     """
     if wanted == 0.0 or load <= 0.0:
         return 0.0, 0.0
+    # All forces go with the load, so the mass cancels, and classes of vehicles differ by geometry,
+    # stiffness and lags alone.
     peak = mu * chassis[MU_X]
     most, b = peak * load, chassis[K_X] / (chassis[C_X] * peak)
     share, best = abs(wanted) / most, chassis[SLIP] / b

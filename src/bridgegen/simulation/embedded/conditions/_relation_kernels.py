@@ -308,6 +308,7 @@ def is_clear(p, k, plan, roads, state, record):
         exists = exists or (
             counts and is_in_ranges(count, row[RANGES], row[RANGES_END], plan.ranges)
         )
+    # As esmini has it: a lane that is not there is not clear.
     if not exists:
         return False
     shift = lanes_left(roads.nodes[node, LANE], lane, way)
@@ -407,6 +408,7 @@ SAME_ANGLE = 1e-9  # rad, the rounding of a turn
 @kernel
 def compare(value, rule, limit):
     """Apply an OpenSCENARIO Rule; what is the limit up to rounding is the limit."""
+    # Speeds and distances are sums of steps: 0.1 m/s added forty times are not 4.
     if abs(value - limit) <= SAME_VALUE:
         value = limit
     if rule == GREATER:
@@ -483,11 +485,14 @@ def look_one(p, k, plan, roads, state, record):
             record,
         )
     if kind == OFFROAD:
+        # By the reference point, and on any type of lane but ``none``: on a sidewalk it is on the
+        # road, as in esmini.
         on_road = find_cell(roads.cells, 0, record.x[e, k], record.y[e, k]) >= 0
         return lasts(p, k, not on_road, limit, plan, roads, state, record)
     if kind == CLEARANCE:
         return is_clear(p, k, plan, roads, state, record)
     if kind == SPEED_DIFFERENCE:
+        # Along the axes of the triggering entity (1.2); esmini takes the other one's.
         turn = record.h[other, k] - record.h[e, k]
         along, aside = (
             record.v[other, k] * elementary.cos(turn),

@@ -171,6 +171,8 @@ def is_steered(plan, state):
 def move_paced(k, demanded, plan, roads, state, record):
     """Move the ego on along the storyboard's way, as fast as its driver asks for."""
     body, v = plan.bodies[0], record.v[0, k]
+    # Drivers do not know the grade, as a vehicle without a map would not; what engine, brakes and
+    # tyres can give changes with it.
     uphill, _, press = slope(0, roads, state)
     grip = press * state.weather[FRICTION]
     a = min(max(demanded, -min(body[5], grip) - uphill), min(body[4], grip) - uphill)
@@ -293,6 +295,7 @@ def heed(k, plan, roads, state, record):
         if plan.others[e] == SCRIPTED:
             continue
         p, mind = state.on[e], state.minds[e]
+        # Off the lanes, and on a timetable, there is nothing that a driver could follow.
         if not state.present[e] or state.placed[e] or p < 0 or state.follow[e] >= 0:
             mind[:] = 0.0
             mind[ASKED] = math.inf

@@ -99,6 +99,7 @@ def begin_course(j, k, plan, roads, state, record):
             plan.actions[j, SHAPE], plan.actions[j, DIMENSION], value, before, after, most
         )
     elif kind == SPEED_PROFILE:
+        # The other's speed as the profile begins; the standard leaves that open.
         base = record.v[row[REF], k] if row[REF] >= 0 else 0.0
         n = row[PAST_ENTRY] - row[FIRST_ENTRY]
         speeds, times = np.empty(n), np.empty(n)

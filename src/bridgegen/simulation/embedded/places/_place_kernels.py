@@ -105,6 +105,8 @@ def way_along(e, step, passed, state):
 
     Who reverses where it begins follows it tail first; who reverses later goes back along it.
     """
+    # Settled where it begins, as Vector's Euro NCAP files mean it: a nose must not jump where a
+    # speed changes its sign.
     state.tail_first[e] |= step < 0.0 and passed <= 0.0
     return -step if state.tail_first[e] else step
 
@@ -116,6 +118,8 @@ def way_from(route, node, roads, state):
     -1: it is asked for, and the row ends.
     """
     path = roads.ways[route, node] if roads.ways.shape[1] else -1
+    # Straight on then, on the lane whose end differs least in heading. The standard leaves the way
+    # open; esmini draws it.
     if path == -2 and route > 0:  # the route cannot be reached: no route
         route = 0
         path = roads.ways[0, node]

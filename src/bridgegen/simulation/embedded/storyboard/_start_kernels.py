@@ -174,5 +174,6 @@ def start_globals(plan, state):
                 state.lights,
             )
     for i in range(state.lights.shape[0]):
+        # After the controllers: what the start says of a light goes before its first phase.
         if plan.first_states[i] >= 0:
             state.lights[i] = plan.first_states[i]
