@@ -30,6 +30,8 @@ def bicycle(x, y, h, v, demanded, curvature, limits, friction_limit, uphill, asi
     # production vehicle makes up for the grade.
     a = min(max(demanded, -limits[2] - uphill), limits[1] - uphill)
     bend = min(max(curvature, -limits[3]), limits[3])
+    # What the tyres must give, gravity included: on a downgrade of 6 % a dry road leaves 7.7 m/s²
+    # of braking instead of 8.3.
     total = elementary.hypot(a + uphill, v * v * bend + aside)
     if total > friction_limit:
         share = friction_limit / total
