@@ -24,6 +24,8 @@ def as_float(
     Raises:
         ValueError: the shape differs, or a value is not finite.
     """
+    # A kernel is compiled anew for every layout and type of its arguments, and reads past the end
+    # of an array that is too short: so both are settled here.
     array = np.ascontiguousarray(value, dtype=np.float64)
     if array.ndim != len(shape) or any(
         want is not None and have != want for have, want in zip(array.shape, shape, strict=True)

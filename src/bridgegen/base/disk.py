@@ -39,8 +39,10 @@ def writing_whole(path: Path) -> Iterator[IO[bytes]]:
     Raises:
         StorageError: it cannot be written (no such folder, read-only, disk full).
     """
+    # Beside the file, for a rename is atomic within one file system only.
     part = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:
+        # A rename would replace /dev/stdout or a named pipe by a file.
         if path.exists() and not path.is_file():
             with path.open("wb") as file:
                 yield file
@@ -71,8 +73,11 @@ def read_inside(folder: Path, name: str) -> bytes:
     """
     path = folder / name
     try:
+        # A run's folder may come from another person: a link in it must not publish a file of this
+        # user's, in a report say.
         if not path.resolve(strict=True).is_relative_to(folder.resolve(strict=True)):
             raise StorageError(f"{path}: is a link to a place outside {folder}, and is not read")
+        # Reading a pipe would wait for ever, and a device may have no end.
         if not path.is_file():
             raise StorageError(f"{path}: is not a file")
         return path.read_bytes()

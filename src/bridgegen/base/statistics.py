@@ -173,6 +173,8 @@ def holm(p_values: Sequence[float]) -> list[float]:
     corrected, worst = [float("nan")] * len(p_values), 0.0
     known = sorted((p, k) for k, p in enumerate(p_values) if p == p)
     for rank, (p, k) in enumerate(known):
+        # A corrected p value is never below that of a smaller one: the step-down stops at the first
+        # that is kept.
         worst = max(worst, min(1.0, (len(known) - rank) * p))
         corrected[k] = worst
     return corrected

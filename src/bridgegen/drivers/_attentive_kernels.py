@@ -70,6 +70,7 @@ CX, CY, C, S, W, GAIN, LENGTH, WIDTH, LAMPS = range(SEEN)
 heading, the speed [m/s], its rate of change [m/s²], length and width [m], and the indicators that
 it shows, see `bridgegen.drivers.kinds`."""
 
+# A look at every instant would cost four times as much.
 LOOK = 0.2  # s, between two looks around; the acceleration of one holds until the next
 CONCERNS = 0.75 * COMFORT_ACCELERATION  # m/s²; a leader that allows more (its gap is twice the
 # desired one) is no concern
@@ -82,6 +83,8 @@ CALM = 2.0 * math.sqrt(COMFORT_ACCELERATION * COMFORT_DECELERATION)  # m/s²
 # The most that the vehicle behind may need to avoid the one that changes lane; UN R157, 5.2.5.2.
 # The German AFGBV, annex 1, has the same form, and scales it where the road allows less
 # deceleration.
+# The larger gap of UN R79's lane-change systems (3 m/s² after 0.4 s, then 1 s of headway) needs 26
+# m at 25 m/s: no cut-in that tests an ego would begin.
 CUT_IN_DECELERATION = 6.0  # m/s²
 CUT_IN_DELAY = 0.35  # s
 FARTHEST = 300.0  # m; vehicles farther along the other lane are ignored: at a closing speed of
@@ -220,6 +223,7 @@ def look(
                 continue
             if s - rear > zone[1] or zone[0] - front - s > max(v, pace) * HORIZON:
                 continue
+            # Pedestrians always go first, whatever the map says of vehicles.
             rank = -1 if IS_PEDESTRIAN[kinds[o]] else min(max(claims[o], -1), 1)
             other_front = bodies[o, 2] + 0.5 * bodies[o, 0]
             follows, stops_at = give_way(
@@ -238,6 +242,8 @@ def look(
             )
             if follows < CONCERNS:
                 asked = min(asked, follows)
+            # Who would need nearly all of the grip to stop goes on, for it would stop in the
+            # other's way.
             if v * v <= 2.0 * COMMITTED * grip * (stops_at - front - s):
                 stop = min(stop, stops_at)
         item, light = stop_at_lights(stops, lights, s, front, v, math.inf, int(mind[STOPS_FOR]) - 1)
@@ -259,6 +265,8 @@ def react(k, dt, asked, mind):
     if mind[BRAKES] > 0.0 and asked > -EASY_TO_STOP:
         mind[BRAKES] = mind[RISK] = 0.0
     given = asked
+    # Braking for a yellow light takes 4 m/s² at most, which stays below an emergency: with the
+    # reaction time of one the car would pass the line.
     if mind[BRAKES] > 0.0 or asked < -EMERGENCY_FROM:
         if mind[RISK] == 0.0:
             mind[RISK] = k + 1.0

@@ -55,6 +55,8 @@ def clarity(weather, d, veil, lamp, headlit):
     light = weather[BACKGROUND]
     dazzle = veil + DARK_LUMINANCE + HEADLAMP * BACKSCATTER * beta
     lit = (TARGET_CONTRAST * light + own) / (TARGET_CONTRAST * (light + dazzle))
+    # A product, in which what darkness and glare take cannot exceed 1: so every law is monotone,
+    # and fog, rain, snow, night and glare can only take away.
     return air * weather[GLASS] * min(lit, 1.0)
 
 

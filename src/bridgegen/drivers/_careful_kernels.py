@@ -50,6 +50,7 @@ EVALUATION = 0.4  # s, until the risk is perceived
 BRAKES_HARD = 5.0  # m/s², of the vehicle ahead
 CRITICAL_TTC = 2.0  # s
 
+# The regulation's 2 s are too late for a car that stands, above 52 km/h.
 HARD_TO_STOP = 3.0  # m/s² that avoiding a body takes, after the reaction: a risk from here …
 EASY_TO_STOP = 1.0  # … until down to here
 CLEAR = 4.0  # s, within which no meeting may be predicted when the brake is released
@@ -87,12 +88,15 @@ def drive_careful(
             paths[p], path_n[p], path_ds[p], station[e], x[e, k], y[e, k], h[e, k], w, turn,
             bodies[e], CLEAR, reach, attention[e],
         )  # fmt: skip
+        # A lane change counts once the centre has come 0.375 m nearer: less is wandering in its
+        # lane.
         wanders = lateral > 0.0 and attention[e, FARTHEST] - attention[e, ASIDE] <= WANDERING
         if what == NO_CONFLICT or (what == LEADER and wanders):
             attention[e, KNOWN] = 0.0
             continue
         if attention[e, KNOWN] == 0.0:
             attention[e, KNOWN] = k + 1.0 if k > 0 else ALWAYS
+        # Instants are counted, and rounding must not add one to a reaction.
         known_for = (k + 1.0 - attention[e, KNOWN]) * dt + 1e-9
         if known_for < EVALUATION:
             continue
@@ -123,6 +127,8 @@ def drive_careful(
 def drive(k, plan, roads, state, record):
     """Return what the driver demands at instant k: acceleration [m/s²] and curvature [1/m]."""
     planned, asked = cruise(k, plan, roads, state, record)
+    # The driver's part alone; lights are the reference's rule, in ``cruise``, so that a
+    # counterfactual neither runs a red light nor is saved by that.
     demanded = drive_careful(
         k, plan.dt, roads.paths, roads.counts, roads.steps, state.station, state.on, state.to,
         planned, state.visible, record.x, record.y, record.h, record.v, plan.bodies,

@@ -37,6 +37,7 @@ def actuate(state, demanded, bend, dt, ideal, lags):
     state[COMMAND] += min(max(demanded - state[COMMAND], -jerk * dt), jerk * dt)
     if not lags:
         return state[COMMAND], bend
+    # The exact lag over a step, so that it does not depend on the step.
     share = 1.0 - elementary.exp(-dt / LAG)
     state[BUILD_UP] += share * (state[COMMAND] - state[BUILD_UP])
     state[APPLIED] += share * (state[BUILD_UP] - state[APPLIED])

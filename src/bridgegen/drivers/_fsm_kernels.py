@@ -126,6 +126,7 @@ def drive_fsm(
     wanted = min(max(hold_speed(v, planned), -2.0 * COMFORT_DECELERATION), COMFORT_ACCELERATION)
     reach = v * REACTION + v * v / (2.0 * COMFORT_BRAKING) + STANDSTILL + SAFE_MARGIN
     horizon = min(reach / max(v, 1.0), HORIZON)
+    # As in the Commission's code; `careful-fsm` sees through vehicles.
     hides = math.inf  # how far ahead the vehicle is that hides those beyond
     for e in range(1, len(speed) if len(speed) > 2 else 1):
         if present[e] and USES_LANES[kinds[e]]:

@@ -226,6 +226,8 @@ def change_lane(
     home += shift_length(max(road[i, LEFT], -road[i, RIGHT]), pace, friction_limit)
     if actor_crosses(passages, n_passages, s, home):
         return math.inf
+    # Who comes from beyond the sight is as fast as limit and fog allow: so in fog the ego stays
+    # behind the jam that it passes with ideal perception.
     fastest = min(road[i, LIMIT], sight_speed(seen, friction_limit))
     past = min(v, PARKED_SPEED) if w == 0.0 and road[i, LIMIT] <= FAST_ROAD else v
     possible = False

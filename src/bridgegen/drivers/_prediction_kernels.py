@@ -134,6 +134,9 @@ def predict(path, n, ds, s, ahead, own_width, tracks, around, known, ways, count
             continue
         x, y, h = tracks[e, TRACK_X], tracks[e, TRACK_Y], tracks[e, H]
         gain = around[e, QUICKENING]
+        # Every way that the map offers is a hypothesis, as long as the track is on it. To predict
+        # at constant velocity made the ego stop inside the path of a turning car: collisions in 25
+        # % of the random rows of crossroads-s3, with ways 1.6 %.
         on_way = False
         for j in range(first[e], first[e + 1] if known else first[e]):
             if feet[j] < LOST:

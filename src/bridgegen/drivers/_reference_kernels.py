@@ -47,6 +47,7 @@ HALTED = LAST
 
 MIND = LAST + 1
 
+# As often as the sensors take a frame; control acts at every instant.
 CYCLE = 0.1  # s, between two plans
 PLANNING_REACH = 30.0  # m, how far it looks at least …
 PLANNING_TIME = 6.0  # s, … and how far in time, at the present speed
@@ -94,6 +95,8 @@ def plan(path, bends, road, drops, n, road_n, ds, s, v, body, target, friction_l
     front, rear, half_width = body[2] + 0.5 * body[0], 0.5 * body[0] - body[2], 0.5 * body[1]
     speed = bend_speed(path, bends, n, ds, s, v, target, friction_limit)
     speed = min(speed, sight_speed(seen, friction_limit))
+    # Lights, limits and ways of others are known along the first route only; on another one it goes
+    # by sight.
     if road_n == 0:
         crosswalks, stop_stations, halts = crosswalks[:0], stop_stations[:0], halts[:0]
     else:
@@ -104,6 +107,8 @@ def plan(path, bends, road, drops, n, road_n, ds, s, v, body, target, friction_l
             road, road_n, ds, s, v, speed, front, rear, half_width, around, tracks, passages,
             n_passages, crosswalks, stop_stations, seen, friction_limit, elapsed, mind,
         )  # fmt: skip
+    # After the lane change, which may have begun a shift: following, caution and emergency braking
+    # use the ego's future place beside its route.
     shift = shift_of(mind) if road_n > 0 else UNSHIFTED
     careful = careful_speed(
         around, tracks, crosswalks, s, front, half_width, shift, in_town, friction_limit
@@ -123,6 +128,7 @@ def plan(path, bends, road, drops, n, road_n, ds, s, v, body, target, friction_l
         wanted,
         yield_to_all(s, v, speed, front, rear, shift, friction_limit, passages, n_passages),
     )
+    # Last, and without regard to all that is wanted: full braking for an imminent contact.
     if must_brake(path, n, ds, s, v, body, shift, around, tracks, friction_limit):
         wanted = -friction_limit
     return max(wanted, -friction_limit)
@@ -147,6 +153,7 @@ def drive(k, plan_, roads, state, record):
         record.h, record.v, plan_.bodies, plan_.kinds, state.lamps, state.weather, state.sensors,
         state.tracks, record.detections,
     )  # fmt: skip
+    # By time, not by instants: so it plans as often at any step up to `CYCLE`.
     if k * plan_.dt > mind[NEXT_PLAN] - 1e-6:
         mind[NEXT_PLAN] += max(CYCLE, plan_.dt)
         p = state.on[0]
@@ -195,5 +202,6 @@ def drive(k, plan_, roads, state, record):
             record.h[0, k],
             preview(v),
         )
+    # A vehicle with dynamics has lags of its own; with both they would count twice.
     lags = plan_.moves_chassis == 0
     return control.actuate(mind, mind[PLANNED], curvature, plan_.dt, plan_.ideal_control, lags)

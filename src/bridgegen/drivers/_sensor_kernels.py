@@ -124,6 +124,8 @@ def observe(memory, e, bodies, kind, weather, heading, height, share, detections
     headlit = camera.beam(ux * cosine + uy * sine, uy * cosine - ux * sine)
     clear = camera.clarity(weather, d, dazzle, LAMPS[kind] / area, headlit)
     on_target = camera.pixels(math.sqrt(area * share), d, clear)
+    # The same number until it is drawn anew: so worse weather hides what better weather shows,
+    # frame by frame, and never the reverse.
     by_camera = memory[e, BY_CAMERA] < camera.detection(on_target)
     echoes, ratio = lidar.returns(area * share, REFLECTANCE[kind], weather[ATTENUATION], d)
     by_lidar = memory[e, BY_LIDAR] < lidar.detection(echoes)
@@ -157,6 +159,7 @@ def observe(memory, e, bodies, kind, weather, heading, height, share, detections
     if by_camera:
         sure = max(sure, recognised(on_target / SURE_PIXELS))
     detections[e, k, CONFIDENCE] = LEAST_CONFIDENCE + (1.0 - LEAST_CONFIDENCE) * sure
+    # Without any certainty the class is a toss of a coin.
     known = memory[e, BY_CLASS] < 0.5 * (1.0 + sure)
     detections[e, k, KIND] = kind if known else MISTAKEN_FOR[kind]
     return 1.0 / weight_along, 1.0 / weight_across

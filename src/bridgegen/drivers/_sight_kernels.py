@@ -92,6 +92,7 @@ def range_of(weather, thing, i):
 def tabulated(weather, thing, i):
     """Return a number of the table, which is computed when it is first asked for."""
     at = SIGHT + thing * N_GLARES + i
+    # 0 is no range: they begin at `NEAREST`.
     if weather[at] == 0.0:
         weather[at] = range_of(weather, thing, i)
     return weather[at]

@@ -61,6 +61,8 @@ def surround(path, n, ds, s, behind, ahead, elapsed, tracks, around):
         x, y = tracks[e, TRACK_X], tracks[e, TRACK_Y]
         if (x - mx) ** 2 + (y - my) ** 2 > widest * widest:
             continue
+        # All points are tried. To leap over those that cannot be nearest, by the triangle
+        # inequality, saved nothing: those before the nearest must be visited all the same.
         nearest, at = math.inf, first
         for i in range(first, last + 1, stride):
             gap = (path[i, X] - x) ** 2 + (path[i, Y] - y) ** 2

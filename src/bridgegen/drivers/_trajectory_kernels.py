@@ -103,10 +103,14 @@ def follow(plan, since, dt, x, y, h, v):
     _, later = schedule(plan, since + dt)
     s = planned
     px, py, ph = pose(plan, s)
+    # By the foot on the path, not by the state planned for now: on a bend of 20 m, ten metres late,
+    # that is 2.4 m to the side, and would be steered towards.
     for _ in range(FEET):
         s += elementary.cos(ph) * (x - px) + elementary.sin(ph) * (y - py)
         px, py, ph = pose(plan, s)
     ahead = min(max(s - planned, -MOST), MOST)
+    # The plan's mean over the step, not its value now: so a plan that the kinematic bicycle can
+    # drive leaves no error.
     a = (later - pace) / dt - 2.0 * RATE * (v - pace) - RATE * RATE * ahead
     if pace <= STANDS and later <= STANDS and v <= STOPS:
         a = -v / dt

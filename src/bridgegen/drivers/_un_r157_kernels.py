@@ -120,6 +120,8 @@ def drive_un_r157(
         if ahead < lead_ahead:
             beyond, beyond_ahead, beyond_along = lead, lead_ahead, lead_along
             lead, lead_ahead, lead_gap, lead_along, lead_slowing = e, ahead, gap, along, slowing
+            # Nobody beyond the vehicle ahead is seen until then, so a cut-out is noticed later than
+            # by a driver that sees through cars.
             leaves = was_on_way and before <= WANDERING < aside
         elif ahead < beyond_ahead:
             beyond, beyond_ahead, beyond_along = e, ahead, along
@@ -127,6 +129,9 @@ def drive_un_r157(
     if lead > 0 and lead_gap <= CRITICAL_HEADWAY * v:
         if leaves and beyond > 0 and v > beyond_along:
             risky = beyond
+        # The text's 5 m/s² in front of an emergency. The Commission's code reacts to any
+        # deceleration, or the regulation's own charts below 5 m/s² would have no reaction; here,
+        # below that, ``follow`` brakes as hard as needed. No cell differs by it.
         elif lead_slowing > BRAKES_HARD:
             risky = lead
     if cut_in > 0:

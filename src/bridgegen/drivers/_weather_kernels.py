@@ -77,6 +77,8 @@ def change(weather, environments, row, slots):
 @kernel
 def derive(weather):
     """Set the numbers from ``EXTINCTION`` to ``SUN_Y`` by what is stated; forget ``SIGHT``."""
+    # Ranges of sight are bisections, 21 of them, of which a driver asks for some four: so each is
+    # computed when it is asked for.
     weather[SIGHT:] = 0.0
     rain = RAIN_EXTINCTION * elementary.power(max(weather[RAIN], 0.0), RAIN_POWER)
     snow = SNOW_EXTINCTION * elementary.power(max(weather[SNOW], 0.0), SNOW_POWER)
@@ -97,6 +99,7 @@ def derive(weather):
     weather[BACKGROUND] = GROUND_ALBEDO * lit / math.pi
     weather[GLARE] = 0.0
     if altitude > 0.0:
+        # A file's own illuminance bounds the beam: a dark scene with the sun up does not glare.
         beam = min(sunbeam(altitude), ground / max(sine, 0.01))
         weather[GLARE] = beam * (1.0 - cloud)
 

@@ -41,6 +41,7 @@ INPUTS, OUTPUTS = (5, 17, 89, 256, 512), (2, 17, 64, 100, 256)
 
 ALIGNED = 64  # bytes, a line of the processor's cache
 
+# When imported, since MKL reads it at its first use.
 os.environ.setdefault("MKL_CBWR", "COMPATIBLE")
 
 

@@ -84,6 +84,7 @@ class DriverProcess:
             self._process = RemoteProcess(spec, DriverError, answering_of)
         else:
             # Threads change how products round, and slow a small network down.
+            # What the user has set stays.
             own = {name: n for name, n in ONE_THREAD.items() if name not in os.environ}
             self._process = IsolatedProcess(
                 "bridgegen.drivers.driver_process", [spec], DriverError, own
@@ -112,6 +113,8 @@ class DriverProcess:
         """
         self.start()
         sent = self._maps.send(scene.maps) if scene.maps else None
+        # Maps go once, then their numbers: Town05 is 5.7 MB, and a batch that is halved would send
+        # it again.
         scene = replace(scene, maps=())
         self._process.ask("reset", n, scene, sent, seconds=self.time_limit)
 
@@ -134,6 +137,7 @@ class DriverProcess:
             "act", observation, views or {}, seconds=self.time_limit
         )
         self.call_seconds.append(time.perf_counter() - start)
+        # It has been checked: another shape would have raised.
         self.answers_each_row = self.answers_each_row or len(observation.x) > 1
         self.answers.add("trajectory" if isinstance(answer, Plans) else "control")
         return answer
@@ -186,6 +190,8 @@ def make(spec: str) -> BatchDriver | CompiledDriver:
         return FmuDriver(spec)
     where, _, name = spec.rpartition(":")
     try:
+        # In the driver's own process. Only what a person has typed comes here: a name in a file or
+        # folder is never imported.
         module = module_of(where)
     except ImportError as error:
         raise InputError(f"{where} cannot be imported: {error}") from error

@@ -88,12 +88,15 @@ def _grid(roads: RoadMap) -> Grid:
     rows["speed_limit"] = np.inf
     _add_lanes(roads, rows)
     points = roads.pieces[:, :, :2]
+    # Near is by the middle of a piece's box, as learned planners cull their maps.
     middles = 0.5 * (points.min(axis=1) + points.max(axis=1)) if n else np.zeros((0, 2))
     offset = points - middles[:, None]
     away = elementary.hypot(offset[..., 0], offset[..., 1])
     reach = float((away + rows["width"][:, 0]).max(initial=0.0))
     low = middles.min(axis=0, initial=0.0) if n == 0 else middles.min(axis=0)
     span = middles.max(axis=0) - low if n else np.zeros(2)
+    # Cells grow with the map where there are few pieces: else a long road would be mostly empty
+    # cells.
     width = max(CELL, math.sqrt(float(np.prod(span)) / (4 * n + 16)), float(span.max()) / (n + 16))
     cells = np.floor(span / width).astype(np.int64) + 1
     at = np.floor((middles - low) / width).astype(np.int64)

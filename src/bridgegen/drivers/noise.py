@@ -35,6 +35,7 @@ def noise_key(values: Mapping[str, npt.ArrayLike], n_rows: int) -> npt.NDArray[n
     key = np.zeros(n_rows, dtype=np.uint64)
     for name in sorted(values):
         column = np.broadcast_to(np.asarray(values[name], dtype=np.float64), n_rows)
+        # Adding 0.0 makes 0.0 of −0.0, which is equal and has other bits.
         bits = (as_float(name, column, (n_rows,)) + 0.0).view(np.uint64)
         digest = hashlib.blake2b(name.encode(), digest_size=8).digest()
         word = np.frombuffer(digest, dtype="<u8").astype(np.uint64)

@@ -130,6 +130,8 @@ def avoids_cut_in(
     def place(_: int) -> _Place:
         nonlocal travelled, drifted
         inward = np.where(drifted / RATE < beside + width, lateral, 0.0)
+        # Cells on an edge (a TTC of 2 s exactly, bodies that touch) are decided by rounding, so
+        # sums run as in the Commission's code.
         travelled, drifted = travelled + w, drifted + lateral
         away = np.maximum(beside + width - drifted / RATE, 0.0)
         side = away - 0.5 * ego_size[1] - 0.5 * other_size[1]
@@ -286,6 +288,8 @@ def _avoids(
             over |= (ahead < -half) | ((gap >= 0.0) & reacts & (closing <= 0.0))
         if over.all():
             break
+        # By the speed at the step's end, as theirs; our own rule is the trapezoidal one, with which
+        # 99.4 % of the cells agree at 20 Hz.
         x = x + v / RATE
     return ~collided
 
@@ -297,6 +301,8 @@ def _un_r157_risk(
     if not cut_in:
         return np.ones(len(ahead), dtype=np.bool_), np.zeros(len(ahead), dtype=np.bool_)
     overlaps = (ahead >= 0.0) & (side <= 0.0)
+    # Beyond 2 s their run ends, and counts as no crash, so it does here; the driver `un-r157`
+    # drives on.
     far = np.abs(gap) > CRITICAL_TTC * np.abs(closing)
     return overlaps & ~far, overlaps & far
 

@@ -94,6 +94,7 @@ def claim(model: OpenDrive, own: Route, other: Route, lights: Collection[str] | 
     for ours in crossings(model, own):
         if ours.junction in theirs:
             they = theirs[ours.junction]
+            # Antisymmetric by this difference: both cannot have to wait, nor both go.
             return _claim(model, ours, they, lights) - _claim(model, they, ours, lights)
     return 0
 
@@ -194,11 +195,13 @@ def _waiting(
         if (priority.low, priority.high) == (ours.inside.road_id, theirs.inside.road_id):
             return WE_WAIT
     our_signs, their_signs = _signs(model, ours.before), _signs(model, theirs.before)
+    # Lights go before signs (StVO § 37), and signs before the right.
     if _is_lit(model, ours, lights) or _is_lit(model, theirs, lights):
         return NO_RULE
     difference = _priority(our_signs) - _priority(their_signs)
     if difference:
         return THEY_WAIT if difference > 0 else WE_WAIT
+    # Priority to the right makes the ego wait, and never the other: a driver does not rely on it.
     from_ours = _turn(_heading(model, ours.before), _heading(model, theirs.before))
     from_the_right = ASIDE < from_ours < math.pi - ASIDE
     towards = abs(from_ours) >= math.pi - ASIDE

@@ -121,6 +121,7 @@ def survey(
     first = [0]
     for e, lanes in enumerate(starts):
         for way in [way for stretch, s in lanes for way in ways_from(model, stretch, s)]:
+            # A whole number of equal steps, so that the last sample is the way's end.
             way_step = way.length / math.ceil(way.length / SAMPLE)
             line_ = way.sample(way_step)
             columns = (
@@ -147,6 +148,7 @@ def survey(
             )
             zones.append(zone)
             rank = right_of_way(model, route, way, lights) if route is not None else NO_RULE
+            # An emergency vehicle on a call goes first on every way that it may take.
             lane_ranks.append(WE_WAIT if ranks[e] > 0 else rank)
         first.append(len(tables))
     ways = np.zeros((len(tables), max(map(len, tables), default=0), 6))

@@ -70,6 +70,7 @@ def checked_plans(planned: Trajectory, seen: Observation, period: float) -> Plan
     states[running, 1:, :5] = columns.transpose(1, 2, 0)
     late = columns[0, :, 0] > SAME_TIME
     states[running[late], 0, 1:5] = now.T[late]
+    # All rows need the same number of states; a second before has no effect on what follows.
     states[running[~late], 0, :5] = states[running[~late], 1, :5] - (1.0, 0.0, 0.0, 0.0, 0.0)
     return Plans(states)
 

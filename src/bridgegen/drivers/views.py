@@ -105,6 +105,7 @@ class MapSender:
 
     def send(self, maps: Sequence[RoadMap]) -> SentMaps:
         """Return what to send for a scene with some maps."""
+        # All are forgotten at once: both ends can tell that by ``kept`` alone.
         if sum(len(map_.pieces) for map_ in self._maps) > MOST_PIECES:
             self._known, self._maps = {}, []
         kept = len(self._maps)
@@ -142,6 +143,8 @@ class History:
             found = self._frames[:, :, at : at + self._back[-1] + 1 : max(step, 1)]
         else:
             found = self._frames[:, :, [at + number for number in self._back]]
+        # A view of the frames that later histories share: a driver that writes into it would change
+        # its own past.
         found.flags.writeable = False
         return found
 

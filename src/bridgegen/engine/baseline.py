@@ -41,6 +41,7 @@ def difference(
         baseline_names: of its metrics.
         gated: whether implausible scenarios are no results.
     """
+    # Of a row that one of the two did not get through, nothing can be said of who is worse.
     both = _usable(found, gated) & _usable(baseline, gated)
     F = np.where(both[:, np.newaxis], found.F - baseline.F, 0.0)
     lost = (found.status == 0) & (baseline.status != 0)
@@ -72,6 +73,7 @@ def difference_of_trials(found: Trials, baseline: Trials) -> Trials:
     """Return trials in which only what the baseline's driver avoids is harmful."""
     ok: Bool = found.ok & baseline.ok
     harm = np.where(ok & ~baseline.harmful, found.harm, 0.0)
+    # What the baseline fails in, too, counts as harmless here.
     until = np.where(ok & baseline.harmful, np.inf, found.harmless_until)
     return replace(found, harm=harm, ok=ok, harmless_until=until)
 

@@ -66,6 +66,7 @@ def needed_by(runner: "Runner") -> tuple[frozenset[str], bool]:
     cyclist takes part.
     """
     nominal = runner.space.row({})[np.newaxis]
+    # The row of the defaults may have a storyboard of its own, and roads by it.
     _, item = next(runner.by_variant(nominal))
     model = item.source.roads(item.space.values(nominal[0]))
     embedded = item.embedded

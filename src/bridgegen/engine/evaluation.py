@@ -62,6 +62,7 @@ class Evaluation:
         """
         if len(parts) == 1:
             return parts[0][1]
+        # Parts come storyboard by storyboard, and go back into the order of X.
         rows = np.concatenate([at for at, _ in parts])
         order, whole = np.argsort(rows), cls.join([part for _, part in parts])
         return cls(

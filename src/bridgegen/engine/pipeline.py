@@ -44,6 +44,7 @@ from bridgegen.simulation.choice import EMBEDDED, SimulatorChoice
 from bridgegen.simulation.rollout import WORKER_ENDED, Rollout, joined
 from bridgegen.simulation.vehicles import KINEMATIC
 
+# The simulator, which knows its own number, is not on this machine.
 REMOTE_CHUNK_ROWS = 8
 """Number of rows per chunk if only the workers' machines have the simulator."""
 
@@ -116,6 +117,8 @@ class Pipeline:
         self.cause = None if options.cause is None else Cause.named(options.cause)
         self.seeks_causes = options.causes or self.cause is not None
         self._workers = workers or Threads()
+        # A machine that only searches need not have CARLA or esmini: the embedded simulator of the
+        # same storyboard knows the same parameters, drivers and roads.
         self._runs_remotely_only = simulator != EMBEDDED and not self._workers.are_here
         self.runner = Runner(
             scenario,
@@ -199,11 +202,15 @@ class Pipeline:
     @cached_property
     def recipe(self) -> Recipe:
         """Builds this pipeline in a worker, without the objective, which is sent with the rows."""
+        # Pickled once: with Town05 it is 4 MB, and takes 50 ms; reading the map's text again takes
+        # six times as long.
         return self._recipe_of(_remade)
 
     def _recipe_of(self, make: Callable[..., Any]) -> Recipe:
         named = (self._options.ego, self._options.worse_than)
         carried = tuple(CarriedDriver.of(name) if name else None for name in named)
+        # The drivers go with the bytes of their files: a path on this machine says nothing on
+        # another, and the file may be edited while the search runs.
         options = replace(self._options, ego=None, worse_than=None)
         return Recipe.of(make, carried, options, recorded=self.metrics, **self._made_with)
 
@@ -270,6 +277,7 @@ class Pipeline:
                 self._margins_that_count(margins)
             sample = None
             if needs_sample(spec.weights, spec.scale, objectives):
+                # A stream of its own: other parts draw by the same seed and another second number.
                 rng = np.random.Generator(np.random.PCG64([seed, 1]))
                 U = rng.random((SAMPLE, self.space.n_var))
                 parts = self._map(type(self)._measure_rows, self.space.decode(U))
@@ -318,6 +326,9 @@ class Pipeline:
         if not self._workers.are_here:
             self._map(type(self)._measure_rows, nominal)
             return
+        # How two processes divide the first compilation matters: with an empty cache and two cores
+        # crossroads-s4 had its report after 40.8 s where this one waited and then compiled alone,
+        # after 31 s as it is.
         with compiled_ahead(self._recipe_of(_compile_ahead)) as is_shared:
             if is_shared and self.tries:
                 self._compile_first()
@@ -325,6 +336,8 @@ class Pipeline:
         if self.baseline is not None:
             self.baseline.warm_up()
 
+    # What a rollout's start, the metrics and the gate need, in an order that keeps this process off
+    # what the other one compiles: instants and the conflict analysis, see ``_compile_rest``.
     def _compile_first(self) -> None:
         batch = self.runner.nominal_batch()
         batch.compile_start()
@@ -374,6 +387,7 @@ class Pipeline:
 
     def _evaluate(self, runner: Runner, X: Float, objective: Objective) -> Evaluation:
         """Evaluate N rows of one storyboard."""
+        # Once: the rollouts by which causes are found take place on the same roads.
         roads, rows = runner.roads_of(X)
         rollout = runner.run(X, roads=(roads, rows))
         metrics = self.measure(rollout)
@@ -393,6 +407,7 @@ class Pipeline:
             return found
 
         def harmless(at: Int, fix: Counterfactual) -> Bool:
+            # With the noise of the row's values, as before: so the fix is all that differs.
             changed = runner.run(X[at], fix=fix, roads=(roads, rows[at]))
             return self._harmless(changed, objective)
 
@@ -438,6 +453,7 @@ class Pipeline:
         """
         numbers = np.full(len(X), -1) if fix is None else fix
         keys = X if noise is None else noise
+        # Workers cut one array into chunks, so all that belongs to a row travels in its columns.
         rows = np.concatenate([X, keys, numbers[:, np.newaxis].astype(np.float64)], axis=1)
         if not len(rows):
             return Trials.none(0)
@@ -458,6 +474,7 @@ class Pipeline:
         found = try_rows(self.runner, rows, harm, count)
         if self.baseline is None:
             return found
+        # The changes are numbered for the ego's driver; the baseline drives as it is.
         unchanged = rows.copy()
         unchanged[:, -1] = -1.0
         return difference_of_trials(found, try_rows(self.baseline.runner, unchanged, harm, count))
@@ -474,6 +491,8 @@ class Pipeline:
         for part in self._map(type(self).rollout, X):
             rows, rollout = np.arange(start, start := start + part.rows), part.result
             if isinstance(rollout, Lost):
+                # The embedded simulator's motion fills the arrays; the status says that it does not
+                # count.
                 lost = self.runner.run(X[rows])
                 status = np.full(part.rows, WORKER_ENDED, np.int8)
                 rollout = replace(lost, status=status, messages={0: rollout.reason})
@@ -537,6 +556,7 @@ class Pipeline:
     def _lost(self, rows: int, lost: Lost) -> Evaluation:
         """Return the evaluation of rows that ended their workers."""
         metrics = np.full((rows, len(self.metrics)), np.nan)
+        # Of metrics that are NaN no row is valid, so what `F` returns second is False in all.
         F, critical = self.objective.F(metrics, self.metrics)
         status = np.full(rows, WORKER_ENDED, np.int8)
         cause = np.full(rows, Cause.NONE, np.int8) if self.seeks_causes else None
@@ -569,6 +589,7 @@ class EvaluationStream:
         return self
 
     def __exit__(self, *_: object) -> None:
+        # A simulator may be in the middle of a row that nobody will take.
         if self._pending:
             self._pipeline.runner.simulator.stop()
         self._rows.close()
@@ -582,6 +603,7 @@ def _remade(carried: Carried, options: PipelineOptions, **made_with: Any) -> Pip
     """Return a pipeline for a worker, in one thread, with its kernels compiled."""
     ego, baseline = (driver.here() if driver else None for driver in carried)
     options = replace(options, ego=ego, worse_than=baseline)
+    # One thread: a worker is one core, and its chunks come from outside.
     pipeline = Pipeline(options=options, **made_with, workers=Threads(1))
     pipeline.warm_up()
     return pipeline

@@ -75,6 +75,8 @@ def replay_of(runner: Runner, X: Float, rollout: Rollout, *, plans: bool) -> Rep
     intentions, ways = None, []
     if plans and runner.simulator is embedded:
         roads, rows = runner.roads_of(X)
+        # A rollout keeps no plans: the driver's state is overwritten at every instant. It is driven
+        # once more, which gives the plans that it had, for a rollout depends on nothing else.
         intentions = embedded.intentions(roads, rows, columns, rollout)
         ways = [
             {way: roads.way(p, way) for way in np.unique(named[named >= 0]).tolist()}

@@ -155,6 +155,8 @@ def simulate_file(
     names = (*measures.existing(tuple(measures.METRICS), held), *quantities.MEASURED)
     asked = tuple(dict.fromkeys((*(metrics or names), *also)))
     names = quantities.require(asked, held, f"the driver '{embedded.driver}'")
+    # The cause in the header was found with the file's own drivers and vehicle; it says nothing of
+    # others.
     changes = any(iterable is not None for iterable in (ego, ideal, vehicle, others))
     stated, unknown = stated_criteria(scenario)
     monitor = Monitor(
@@ -165,6 +167,7 @@ def simulate_file(
         f"the driver '{embedded.driver}'",
     )
     network = embedded.roads([roads])
+    # Ways are planned once: another simulator's roads are files besides.
     made = network if runs is embedded else runs.roads([roads])
     rollout = runs.run(made, np.zeros(1, dtype=np.int64), {})
     values = quantities.evaluate(rollout, names)[0]

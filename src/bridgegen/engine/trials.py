@@ -83,6 +83,7 @@ class Trials:
         gate = plausibility(rollout)
         findings = Findings.of(conflicts, gate.labels, count)
         ok: Bool = (rollout.status == 0) & (findings.implausible == "")
+        # Only of rows that count: a place is looked for on the route in Python.
         place = np.full(n, "", dtype=object)
         rows = np.arange(n)
         other = decisive(conflicts, count)[0]
@@ -174,8 +175,10 @@ def _try(runner: Runner, rows: Float, harm: str, count: Count) -> Trials:
     X, keys, numbers = rows[:, :n], rows[:, n : 2 * n], rows[:, -1].astype(np.int64)
     if runner.refused:
         return Trials.none(len(rows))
+    # Once for all changes: they are of driver, vehicle and grip, not of roads.
     roads, which = runner.roads_of(X)
     parts, order = [], []
+    # A batch has one driver, so rows are simulated together by what is changed.
     for number in np.unique(numbers).tolist():
         at = np.flatnonzero(numbers == number)
         fix = runner.fixes[number] if number >= 0 else None

@@ -200,6 +200,8 @@ def _on_lanes(x: Float, y: Float, asked: Bool, lines: Sequence[_Line]) -> tuple[
     lane, station = np.full(x.shape, -1), np.zeros(x.shape)
     which = np.flatnonzero(asked)
     for number, line in enumerate(lines):
+        # Each point is compared with each sample of a lane: in chunks, for a long lane would need
+        # gigabytes.
         chunk = max(1, _AT_ONCE // len(line.x))
         for some in (which[i : i + chunk] for i in range(0, len(which), chunk)):
             px, py = x.flat[some], y.flat[some]

@@ -74,6 +74,7 @@ class Tracks:
             value = float(text)
         except ValueError:
             value = float("nan")
+        # Python reads "1_000" as a number; a table that says so is damaged.
         if not isfinite(value) or "_" in text or abs(value) > MOST:
             shown = text if len(text) <= 40 else f"{text[:40]}…"
             self.say(line, f"{column} must be a number within ±{MOST:g}, got '{shown}'")
@@ -301,8 +302,10 @@ def read_recording(
         states = {key: np.array(values) for key, values in track.states.items()}
         states["h"] = np.unwrap(states["h"]) if _jumps(states["h"]) else states["h"]
         if "acceleration" not in states:
+            # Forward differences, as ours are: from this instant on.
             states["acceleration"] = _accelerations(states["speed"], states["time"])
         at = (states["time"] - start) / step
+        # Unequal steps are refused by default: linear interpolation flattens what brakes and turns.
         if time_step is None:
             k = np.rint(at).astype(np.int64)
             off = np.flatnonzero(np.abs(at - k) * step > ROUNDING + TOLERANCE * step)

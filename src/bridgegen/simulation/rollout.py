@@ -243,6 +243,8 @@ def joined(parts: Sequence[tuple[Int, Rollout]]) -> Rollout:
     first = parts[0][1]
     if len(parts) == 1:
         return first
+    # A rollout has one box for each entity. Storyboards of one search may differ in bodies; their
+    # rows stay apart.
     if any(not np.array_equal(part.box, first.box) for _, part in parts):
         raise ValueError("rollouts of bodies of different sizes are no one rollout")
     most = max(part.shape[2] for _, part in parts)
@@ -252,6 +254,7 @@ def joined(parts: Sequence[tuple[Int, Rollout]]) -> Rollout:
     parts, whole = _with_corridors(parts)
     for name in _BY_ROW:
         arrays = [getattr(part, name) for _, part in parts]
+        # A part in which all are always there does not record it.
         if name == "present" and any(len(array) for array in arrays):
             arrays = [
                 array if len(array) else np.ones(rollout.shape, np.bool_)

@@ -131,6 +131,8 @@ class KernelCache(caching.FunctionCache):  # type: ignore[misc]
         return True
 
     def _index_key(self, signature: Any, codegen: Any) -> Any:
+        # The same signature has two codes: one with a wrapper for Python, one for other kernels
+        # only.
         return (*super()._index_key(signature, codegen), is_for_kernel())
 
     def _load(self, signature: Any, context: Any) -> Any:
@@ -148,6 +150,8 @@ class KernelCache(caching.FunctionCache):  # type: ignore[misc]
             return None
         folder = carried.folder / Path(self.cache_path).name
         key = super()._index_key(signature, context.codegen())
+        # Numba's key names the processor of this machine; the wheel's code was compiled for its
+        # baseline.
         key = (key[0], carried.machine, *key[2:], is_for_kernel())
         try:
             file = caching.IndexDataCacheFile(

@@ -26,6 +26,9 @@ from bridgegen.base.compilation.folder import digest, shipped
 from bridgegen.base.disk import write_whole
 from bridgegen.base.errors import StorageError
 
+# Measured against Numba's way, which inlines all: with 6 kB rollouts take 7 to 18 % longer, with 15
+# kB 2 to 3 %. With 12 kB, and what runs at every instant inlined, they take 0.87 to 0.99 of the
+# time.
 LARGE = 12_000
 """Size of bitcode from which on a kernel is called rather than linked [bytes]."""
 
@@ -51,6 +54,8 @@ class CodeStore:
             paths.append(_path(carried.folder, carried.machine, symbol, kind))
         for path in paths:
             with suppress(OSError, pickle.UnpicklingError, EOFError):
+                # Unpickling runs code; `cache_folder` returns only folders in which nobody else can
+                # write.
                 return pickle.loads(path.read_bytes())
         return None
 
@@ -114,6 +119,8 @@ class KernelLibrary(JITCodeLibrary):  # type: ignore[misc]
             self = cls(codegen, symbol)
             self.inner, self.symbol, self._finalized = True, symbol, True
             self.callees, self._bitcode, self.is_inlined = found
+            # Found now, so that a missing one is noticed while the kernel can still be compiled
+            # again, and not while machine code is loaded.
             for callee in self.callees:
                 cls.find(codegen, callee)
             cls.by_symbol[symbol] = self
@@ -130,6 +137,9 @@ class KernelLibrary(JITCodeLibrary):  # type: ignore[misc]
 
     def _optimize_final_module(self) -> None:
         # Numba runs a cheap pass before, and at level 3: longer, and no faster code.
+        # Measured: both together take 8 % more of a compilation, and rollouts of four scenarios
+        # take 0.95 to 1.0 of the time at level 2. The loop vectoriser stays: without it metrics are
+        # 15 % slower and compilation is no shorter.
         manager, builder = self._codegen._module_pass_manager(opt=2)
         manager.run(self._final_module, builder)
 
@@ -142,6 +152,7 @@ class KernelLibrary(JITCodeLibrary):  # type: ignore[misc]
                 if library.is_large:
                     callees[library.symbol] = None
                     continue
+                # A kernel that is linked leaves the large ones that it calls to its caller.
                 callees |= dict.fromkeys(library.callees)
             linked.append(library)
         self._linking_libraries, self.callees = linked, tuple(callees)

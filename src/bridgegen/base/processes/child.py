@@ -56,6 +56,8 @@ class Child:
         errors: IO[bytes] | None = None,
     ) -> None:
         path = {"PYTHONPATH": os.pathsep.join(["", *sys.path])}
+        # The child imports from where this process does: a source tree or a thin virtual
+        # environment may be on ``sys.path`` only.
         self._process = process = _start(
             [sys.executable, *program], errors, os.environ | (environment or {}) | path
         )
@@ -133,11 +135,15 @@ def _start(
 ) -> subprocess.Popen[bytes]:
     """Start a program below a supervisor."""
     return subprocess.Popen(
+        # The supervisor needs the standard library only: without site-packages it starts in a few
+        # ms, and no variable of the environment changes what it runs.
         [sys.executable, "-I", "-S", str(SUPERVISOR), *words],
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         stderr=errors,
         env=environment,
+        # A terminal sends Ctrl-C to all processes of the foreground group. Here the search alone
+        # gets it, and ends its children.
         start_new_session=True,
     )
 
@@ -186,6 +192,7 @@ def _wait(
     """Wait for the end of the process itself: a descendant may hold its pipe open."""
     process.wait()
     ended.set()
+    # Its last messages may still be in the pipe: they come before "died".
     read.wait(DRAIN_SECONDS)
     take(("died",))
 
@@ -249,6 +256,7 @@ def connect(
 
     def say(*message: Any) -> None:
         data = pickle.dumps(message, protocol=5)
+        # A message is two writes; those of two threads must not mix.
         with lock:
             _write(answers, data)
 

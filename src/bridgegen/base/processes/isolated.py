@@ -64,6 +64,7 @@ class IsolatedProcess:
         Raises:
             CallError: it cannot be started.
         """
+        # A new queue: the last messages of an earlier process must not be taken for this one's.
         self._answers = queue.SimpleQueue()
         self._child = Child(self._program, self._answers.put, environment=self._environment)
         try:
@@ -109,7 +110,11 @@ class IsolatedProcess:
                 kind, *rest = self._answers.get(timeout=seconds)
                 break
             except queue.Empty:
+                # A request may be a whole row of a slow simulator. The counter makes the limit one
+                # for an instant, so that a long row is not a hanging one.
                 before, so_far = so_far, progress() if progress else so_far
+                # The process is ended, not asked: compiled code that loops for ever takes no
+                # exception.
                 if so_far == before:
                     self.close()
                     raise self._error("timed out", f"no answer within {seconds:g} s") from None

@@ -51,10 +51,13 @@ def supervise(program: list[str]) -> int:
     woken, wakes = os.pipe()
     for end in (woken, wakes):
         os.set_blocking(end, False)
+    # A signal between the test of the loop and `poll` would go unnoticed; its byte in this pipe
+    # ends the poll.
     signal.set_wakeup_fd(wakes, warn_on_full_buffer=False)
     terminations: list[int] = []
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent ends this process
     signal.signal(signal.SIGTERM, lambda number, frame: terminations.append(number))
+    # Without a handler SIGCHLD is dropped, and no byte arrives.
     signal.signal(signal.SIGCHLD, lambda number, frame: None)
     _prctl(_PR_SET_CHILD_SUBREAPER, 1)
     child = _start(program)
@@ -88,6 +91,7 @@ def _start(program: list[str]) -> int:
     try:
         os.setpgid(0, 0)
         _prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
+        # The parent may have ended before the kernel was asked to signal that: then nobody would.
         if os.getppid() == parent:
             os.execv(program[0], program)
     finally:
@@ -124,6 +128,7 @@ def _end_all(child: int, status: int | None) -> int:
         while time.monotonic() < deadline:
             ended = _reap(child)
             status = ended if status is None else status
+            # Listed anew in each round: a process may fork between the list and its end.
             for number in _descendants():
                 with suppress(OSError):
                     os.kill(number, signal.SIGKILL)
@@ -141,6 +146,8 @@ def _descendants() -> list[int]:
     for number in numbers:
         try:
             with open(f"/proc/{number}/stat", "rb") as file:
+                # The second field is the program's name in parentheses, which may hold blanks and
+                # parentheses.
                 fields = file.read().rpartition(b")")[2].split()
         except OSError:  # it has ended
             continue

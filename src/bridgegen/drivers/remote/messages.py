@@ -17,6 +17,8 @@ import numpy as np
 PROTOCOL = 1
 """The version of the protocol."""
 
+# The other end may be anybody's program, so bounds hold while a message is read, not after. A map
+# as large as Town05 is 7.5 MB.
 MAX_FRAME = 64 * 2**20
 """Largest size of a message [bytes]."""
 
@@ -58,6 +60,8 @@ def pack(message: Message) -> bytes:
         return b"".join((struct.pack("<I", len(data)), data))
 
 
+# msgpack's own C code reads and writes the rest. 330 lines of ours took 59 µs instead of 76 with
+# one row, but 400 instead of 180 with 256: no search shows it.
 def _plain(value: Any) -> Any:
     """Return a value that msgpack does not know in terms of those that it does."""
     if isinstance(value, np.ndarray):
@@ -103,6 +107,7 @@ def length(head: bytes | bytearray) -> int:
     Raises:
         ProtocolError: longer than `MAX_FRAME`.
     """
+    # Before anything is allocated: four bytes could ask for 4 GiB.
     (found,) = struct.unpack("<I", head)
     if found > MAX_FRAME:
         raise ProtocolError(_too_long(found))
@@ -139,6 +144,7 @@ def unpack(data: bytes, max_items: int = MAX_ITEMS) -> Message:
             raise ProtocolError("the keys of a map must be texts")
         return _array(part) if "dtype" in part else part
 
+    # A list cannot have more parts than the message has bytes.
     most = min(max_items, len(data))
     try:
         found = msgpack.unpackb(
@@ -206,4 +212,5 @@ def _array(part: Message) -> Any:
         )
     if extent > MAX_FRAME:  # NumPy refuses huge shapes, of no elements, too
         raise ProtocolError(f"an array of shape {tuple(shape)} is too large")
+    # A copy: ``data`` is read-only, and little-endian on any machine.
     return np.ndarray(shape, sent, data).astype(dtype)

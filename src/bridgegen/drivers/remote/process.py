@@ -24,6 +24,9 @@ from bridgegen.drivers.remote.wire import ClosedError, Wire, connected
 from bridgegen.drivers.user_drivers import NAMES, Traits
 from bridgegen.drivers.views import MapSender
 
+# A server cannot be started from here. A thousand rows that fail because nobody listens would say
+# nothing about the driver, so the job ends; what is evaluated is kept, and `resume` goes on to the
+# same bits.
 AGAIN_SECONDS = 10.0
 """Time for which a server that has answered before is tried again [s]: it may be starting again."""
 
@@ -193,6 +196,7 @@ def exchange(wire: Wire, message: Message, seconds: float, error: type[CallError
     """
     try:
         answer = unpack(wire.ask(pack(message), seconds), MAX_ITEMS)
+        # One answer to one message: else each answer from here on would be the one before.
         if wire.has_more:
             raise ProtocolError("more than one message came as an answer")
     except TimeoutError:
@@ -264,5 +268,6 @@ def _short(value: Any) -> str:
 
 def _line(text: str) -> str:
     """Return a text from elsewhere as one line without control characters."""
+    # A text from another program must not steer a terminal, nor fill a report.
     shown = "".join(name if name.isprintable() else " " for name in text[:MAX_MESSAGE])
     return " ".join(shown.split())

@@ -107,6 +107,7 @@ def _converse(make: Callable[[], Any], reads: BinaryIO, writes: BinaryIO) -> Non
     maps: list[Any] = []
     while is_sound and len(head := reads.read(4)) == 4:
         try:
+            # A message that cannot be read leaves no way to tell where the next one begins.
             is_sound = False
             message = messages.unpack(reads.read(messages.length(head)))
             is_sound = True
@@ -141,6 +142,7 @@ def _answer(driver: Any, message: messages.Message, maps: list[Any]) -> messages
     if kind == "reset":
         scene = message["scene"]
         if (sent := message.get("maps")) is not None:
+            # 235 kB a reset of cut-in without, 0.3 kB with it.
             maps[sent["kept"] :] = _part("maps", sent["new"])
             scene["maps"] = tuple(maps[i] for i in sent["numbers"])
         driver.reset(message["n"], _record("Scene", scene))

@@ -48,6 +48,8 @@ class Wire:
         self._end = weakref.finalize(self, _end, kill, release)
         self._reads, self._writes = reads, writes
         for descriptor in (reads, writes):
+            # A blocking read or write could wait beyond the time limit, and a full pipe on both
+            # sides for ever.
             os.set_blocking(descriptor, False)
         self._readable, self._writable = select.poll(), select.poll()
         self._readable.register(reads, select.POLLIN)
@@ -166,6 +168,7 @@ def connected(address: Address) -> Wire:
 def _socket(address: Tcp | Unix) -> socket.socket:
     if isinstance(address, Tcp):
         connection = socket.create_connection((address.host, address.port), CONNECT_SECONDS)
+        # Messages are small and each is waited for; Nagle's algorithm would hold them back.
         connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
     else:
         connection = socket.socket(socket.AF_UNIX)

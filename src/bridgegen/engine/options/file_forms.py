@@ -24,6 +24,7 @@ class FileForm:
 
 def _typed(kind: type | tuple[type, ...], what: str) -> Callable[[Any], Any]:
     def parse(value: Any) -> Any:
+        # A Boolean is an int to Python, and no whole number to a user.
         if not isinstance(value, kind) or (isinstance(value, bool) and kind is not bool):
             raise ValueError(f"must be {what}")
         return value

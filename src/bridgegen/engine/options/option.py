@@ -10,6 +10,8 @@ from typing import Any, Final, ParamSpec, TypeVar
 from bridgegen.base.errors import InputError, UnknownNameError
 from bridgegen.engine.options.forms import Form
 
+# An option used to be listed in nine to fourteen files: two commands, five signatures, the record
+# and its reader among them. All are derived from one declaration.
 WHAT, SEARCH, OBJECTIVE, DRIVER, SIMULATOR, OUTPUT = GROUPS = (
     "What to search",
     "Search",
@@ -101,6 +103,8 @@ def options_of(kind: type[Any]) -> tuple[Option, ...]:
         for field in fields(base)
         if "option" in field.metadata
     }
+    # The last one wins: a field that a derived class only annotates anew stays where it was
+    # declared.
     first = {name: base for base in classes for name in vars(base)["__annotations__"]}
     return tuple(
         replace(
@@ -227,6 +231,7 @@ def _require_types(arguments: Any) -> None:
         value = getattr(arguments, field.name)
         is_whole = isinstance(value, Integral) and not isinstance(value, bool)
         try:
+            # Whole numbers of NumPy are as good as Python's.
             fits = isinstance(int(value) if is_whole else value, field.type)  # type: ignore[arg-type]
         except TypeError:  # the type is of elements, too
             continue

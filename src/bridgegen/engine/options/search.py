@@ -41,6 +41,8 @@ _CAUSES = option(
 )
 
 
+# The parts that stages take are base classes of `SearchOptions`, and what a run records derives
+# from that: so a restored run hands itself to the pipeline.
 @dataclass(frozen=True, kw_only=True)
 class PipelineOptions(Declared):
     """The options of how a scenario is evaluated."""

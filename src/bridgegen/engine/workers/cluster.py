@@ -92,6 +92,8 @@ class Cluster(WorkerPool[int]):
         self.close()
         self._device = device
         self._log = tempfile.TemporaryFile()  # noqa: SIM115 (``close`` does)
+        # Ray ends a process that has lost its cluster, with exit status 1 and no exception, after a
+        # minute of trying: so it must not be this one, which says what is lost and how to go on.
         self._bridge = Process(self._said, "bridgegen.engine.workers.ray_bridge", self._log)
         self._bridge.ask(self._address, self._device)
         try:
@@ -138,6 +140,8 @@ class Cluster(WorkerPool[int]):
             number, message = received
             if number is None:
                 return received
+            # Recipes are pickles of this version's classes, and results must have this version's
+            # bits.
             if message[0] == "started" and message[1] != version("bridgegen"):
                 raise InputError(
                     f"{self._where} must have bridgegen {version('bridgegen')}, as this machine "
@@ -154,6 +158,8 @@ class Cluster(WorkerPool[int]):
         return super()._missing(chunks)
 
     def _start_worker(self) -> int:
+        # A new number at each start, and an old slot if one is free: messages that come late for an
+        # earlier number are then nobody's, and the actor of the slot is used again.
         number, taken = next(self._numbers), set(self._slots.values())
         slot = next(item for item in itertools.count() if item not in taken)
         self._slots[number] = slot

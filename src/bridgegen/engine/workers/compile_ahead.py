@@ -36,6 +36,8 @@ def compiled_ahead(recipe: Recipe) -> Iterator[bool]:
         yield helper is not None
     finally:
         if helper is not None:
+            # What it has not finished is compiled by whoever needs it; the cache holds whole
+            # kernels only.
             helper.end()
 
 

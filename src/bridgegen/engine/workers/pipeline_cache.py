@@ -61,6 +61,8 @@ def picklable(error: BaseException) -> BaseException:
     """Return an exception that another process can raise, with its traceback in a note."""
     trace = "".join(traceback.format_exception(error))
     try:
+        # Tried here: one that the campaign cannot unpickle counts as an invalid message there, at
+        # which the worker is ended and its error is lost.
         copy: BaseException = pickle.loads(pickle.dumps(error))
     except Exception:  # its arguments do not rebuild it
         copy = RuntimeError(f"{type(error).__name__}: {error}")

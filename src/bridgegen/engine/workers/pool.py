@@ -61,6 +61,8 @@ class Chunk:
         """
         self.doubted = True
         self.ends += was_alive
+        # A whole chunk and a single row may end two workers, a half of a chunk one: a row that
+        # kills costs 4 + log2(rows) processes.
         if self.ends < (1 if self.suspect and self.rows > 1 else 2):
             return [self]
         if self.rows <= 1:
@@ -168,12 +170,15 @@ class WorkerPool(ABC, Generic[WorkerHandle]):
     ) -> list[Part[Result]]:
         """See `Workers`."""
         job = Job(portable.recipe, work, args, lambda chunk: X[chunk.start : chunk.stop])
+        # Bounds do not depend on how long rows take, nor on which worker is free: results come back
+        # in the order of rows.
         bounds = cut(len(X), self.count, portable.rows_at_once)
         job.waiting.extend(Chunk(start, stop) for start, stop in bounds)
         try:
             while job.waiting or any(state.chunk for state in self._workers.values()):
                 self.step(job)
         except BaseException:
+            # Also at Ctrl-C, and at an error of the work: what workers still do is for nobody.
             self.close()  # stops the chunks that are being evaluated
             raise
         return [job.done[start] for start in sorted(job.done)]
@@ -194,12 +199,17 @@ class WorkerPool(ABC, Generic[WorkerHandle]):
         state = None if worker is None else self._workers.get(worker)
         if state is None:  # it has been released; or nobody says anything
             return
+        # A worker that has been pinged is marked as not started, so its answer is not taken for a
+        # result.
         if kind == "started" or (kind == "answer" and not state.started):
             state.started = state.pinged = True
         elif kind == "died":
             self._on_worker_died(state, job)
         elif kind == "raised" and isinstance(rest[0], NotPrepared) and state.chunk:
+            # Ray has restarted the actor, or other campaigns have evicted the pipeline.
             state.prepared.clear()
+            # In front: a stream takes its results in the order of submission, and waits for this
+            # one first.
             job.waiting.appendleft(state.chunk)
             state.chunk, state.pinged = None, False
         elif kind == "raised":
@@ -234,7 +244,10 @@ class WorkerPool(ABC, Generic[WorkerHandle]):
             if job.recipe.key not in state.prepared:
                 state.preparing = job.recipe.key
                 self._prepare(state.handle, job.recipe)
+            # A chunk is blamed for its worker's end only if the worker certainly ran when it got
+            # it: a machine that fails takes idle workers with it, too.
             elif job.waiting[0].doubted and not state.pinged:
+                # Until it answers it is not idle, so it gets no chunk.
                 state.started = False
                 self._ping(state.handle)
             else:
@@ -247,6 +260,7 @@ class WorkerPool(ABC, Generic[WorkerHandle]):
         del self._workers[state.handle]
         reason, chunk = self._release(state.handle), state.chunk
         if chunk is None:
+            # It had no chunk, so its end is no row's fault.
             self._start_failures += not state.prepared
             if self._start_failures >= max(MAX_START_FAILURES, self.count):
                 raise WorkersError(
@@ -260,6 +274,8 @@ class WorkerPool(ABC, Generic[WorkerHandle]):
             job.done[chunk.start] = Part(chunk.rows, Lost(reason))
 
 
+# Told in the order of submission, however late a row is: else a search would depend on the
+# machine's load.
 class PoolStream(Generic[Result]):
     """A `Stream` of a pool. A thread gives rows to workers while the caller is busy.
 
@@ -290,6 +306,7 @@ class PoolStream(Generic[Result]):
     def submit(self, X: Float) -> None:
         """See `Stream`."""
         for row in X:
+            # Before its chunk is queued: the thread may take that at once.
             self._X[self._submitted] = row[np.newaxis]
             self._job.waiting.append(Chunk(self._submitted, self._submitted + 1))
             self._submitted += 1
@@ -316,6 +333,7 @@ class PoolStream(Generic[Result]):
                     raise self._error
                 self._wait()
         self._taken += 1
+        # Not before the result is there: a worker's end queues the row again.
         del self._X[k]
         return self._job.done.pop(k)
 
@@ -329,6 +347,8 @@ class PoolStream(Generic[Result]):
             error = None
             try:
                 self._pool.step(self._job)
+            # An exception in this thread would only be printed; `take` raises it where it is
+            # noticed.
             except BaseException as one:
                 error = one
             with self._changed:

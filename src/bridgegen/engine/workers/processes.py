@@ -25,6 +25,7 @@ process end the wait for one."""
 
 def cores() -> int:
     """Return the number of cores that this process may use."""
+    # A container or a batch system may allow fewer cores than the machine has.
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1

@@ -98,6 +98,7 @@ class RayBridge:
         import ray
 
         self._ray, self._say, self._device = ray, say, device
+        # By version: campaigns of another one have actors of their own.
         self._namespace = f"bridgegen-{version('bridgegen')}"
         self._actors: dict[int, Any] = {}
         self._recipes: dict[str, Any] = {}
@@ -124,6 +125,8 @@ class RayBridge:
         """Start the actor of a slot, or use it if it exists."""
         self._actors[number] = self._class.options(
             name=f"{self._device}-{slot}",
+            # Actors of a campaign's own would hold the cluster until it ends; tasks would lose what
+            # is compiled whenever Ray reuses a process.
             lifetime="detached",
             get_if_exists=True,
             num_cpus=1 if self._device == "CPU" else 0,
@@ -136,11 +139,15 @@ class RayBridge:
 
     def ping(self, number: int) -> None:
         """Have an actor answer, as soon as Ray has started or restarted it."""
+        # Only a greeting waits for a restarted actor. Work does not: the actor may be waiting for a
+        # machine that is gone.
         ping = self._actors[number].ping.options(max_task_retries=-1)
         self._forward(number, ping.remote())
 
     def prepare(self, number: int, recipe: Recipe) -> None:
         """Have an actor build a recipe's pipeline."""
+        # Once for the cluster: a recipe with a large map is 4 MB, and each actor fetches it from
+        # the store of its machine.
         if recipe.key not in self._recipes:
             self._recipes[recipe.key] = self._ray.put(recipe)
         # In a list, Ray passes the reference instead of the recipe.
@@ -201,6 +208,7 @@ class _RemoteActor(RayActor):
         import ray
 
         def leave() -> None:
+            # Ray would begin it again otherwise, without limit (``max_restarts=-1``).
             ray.kill(ray.get_runtime_context().current_actor, no_restart=True)
 
         super().__init__(leave, idle_seconds)

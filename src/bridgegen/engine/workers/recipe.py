@@ -89,6 +89,8 @@ class CarriedDriver:
         """
         path = file_of(name)
         try:
+            # The file's bytes, now: a search that takes days goes on with the driver that it began
+            # with.
             return cls(name, path.read_bytes() if path and path.is_file() else None)
         except OSError as error:
             raise InputError(f"{path}: cannot be read: {error.strerror}") from None
@@ -103,11 +105,13 @@ class CarriedDriver:
         path = file_of(self.name)
         if path is None or self.data is None or _holds(path, self.data):
             return self.name
+        # The file is imported as code, so its folder is this user's alone.
         home = Path(tempfile.gettempdir()) / f"bridgegen-drivers-{os.getuid()}"
         folder = home / hashlib.blake2b(self.data, digest_size=16).hexdigest()
         folder.mkdir(parents=True, exist_ok=True, mode=0o700)
         copy = folder / path.name
         if not _holds(copy, self.data):
+            # Workers of one machine write at the same time: each reads a whole file.
             part = folder / f".{path.name}.{os.getpid()}"
             part.write_bytes(self.data)
             part.replace(copy)

@@ -11,6 +11,8 @@ from bridgegen.base.arrays import Float
 from bridgegen.engine.workers.workers import Args, Evaluator, Part, Result, cut
 
 
+# Not Numba's `prange`: its threading layers must not be entered by two threads at once, nor after a
+# fork. Measured: 2048 rows take 1.03 to 1.12 times as long as with it, 40 rows 2 ms more.
 class Threads:
     """`Workers` that share one evaluator; a crash of one ends this process.
 
@@ -43,6 +45,7 @@ class Threads:
             return Part(stop - start, work(portable, X[start:stop], *args))
 
         each = min(self._count, portable.runs_at_once)
+        # `map` keeps the order of the chunks, however late each ends.
         return list(self._pool.map(one, cut(len(X), each, portable.rows_at_once)))
 
     def stream(
@@ -58,6 +61,7 @@ class Threads:
 
     def close(self) -> None:
         """See `Workers`."""
+        # A kernel cannot be interrupted, so what runs is not waited for.
         self._pool.shutdown(wait=False, cancel_futures=True)
 
 

@@ -47,6 +47,8 @@ Act = Callable[[Float, Bool], Float]
 right to left."""
 
 
+# An agent plays a scenario once, to fill its row; the row is then evaluated, stored, resumed and
+# exported like every other.
 class Arena:
     """Where an agent drives the participant in closed loop, many scenarios at a time.
 

@@ -83,6 +83,8 @@ class Course:
         self.points[:] = self.points[0]  # until it is decided otherwise
         self.points[:, 0] = np.arange(n_steps) * time_step
 
+    # A speed that it makes for, not an acceleration: at random these brake more than they
+    # accelerate (8 m/s² against 3), so that random search left the participant standing.
     def decide(self, k: int, pace: float, place: float) -> None:
         """Move on by one period.
 
@@ -131,6 +133,8 @@ class Course:
         for k in range(count):
             now[0] += BEYOND
             note(lane.path, len(lane.path), lane.step, now, k, self.points[-1, 0] + k + 1, left)
+        # As the file has them (9 decimals), with a vertex at every instant: so the rollout of the
+        # file has the bits of the evaluation.
         return rounded(np.concatenate([self.points, left]))
 
 

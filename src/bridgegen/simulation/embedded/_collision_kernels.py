@@ -25,6 +25,7 @@ def collides(k, plan, record):
         other, turned = plan.bodies[e], record.h[e, k]
         reach = 0.5 * (own[0] + own[1] + other[0] + other[1]) + abs(other[2])
         dx, dy = record.x[e, k] - x, record.y[e, k] - y
+        # A cheap test first: most entities are far away at most instants.
         if abs(dx) > reach or abs(dy) > reach or not (always or record.present[e, k]):
             continue
         dx += other[2] * elementary.cos(turned)

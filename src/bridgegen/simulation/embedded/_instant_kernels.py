@@ -54,6 +54,8 @@ def before_driver(k, plan, roads, state, record):
         state.phase_until,
         state.lights,
     )
+    # The order of an instant: what is over ends, conditions are looked at, then triggers start and
+    # stop elements. An action that ends here can so be what a trigger waits for.
     arrive(k, plan, state, record)
     finish(k, plan, state)
     observe(k, plan, roads, state, record)
@@ -61,6 +63,7 @@ def before_driver(k, plan, roads, state, record):
     show_lamps(k, plan, state, record)
     if plan.attends:
         run_kernel_at(plan.begins_waiting, (k, plan, roads, state, record))
+    # The driver is asked between the halves, and its target speed is this command.
     if plan.is_driven:  # else its turn comes with the others'
         command_speed(0, k, plan, roads, state, record)
     drives = state.drives[LATERALLY] == 1 or state.drives[LONGITUDINALLY] == 1
@@ -82,6 +85,8 @@ def after_driver(k, demanded, curvature, plan, roads, state, record):
                 demanded = (state.command[0] - record.v[0, k]) / plan.dt
             demanded = pressed(0, demanded, plan, state)
             curvature = steered(curvature, state)
+    # All drivers of others decide by the states at instant k, before any entity moves: so their
+    # order does not matter.
     if plan.attends:
         run_kernel_at(plan.heeds, (k, plan, roads, state, record))
     if is_steered(plan, state):
@@ -96,6 +101,8 @@ def after_driver(k, demanded, curvature, plan, roads, state, record):
             run_kernel_at(plan.moves_laid, (e, k, plan, roads, state, record))
         elif state.timed[e]:
             move_by_timetable(e, k, plan, roads, state, record)
+    # Who refers to another entity is moved after it, and uses its state at the next instant: so a
+    # distance is kept to 1e-6 m while the other brakes.
     for i in range(record.x.shape[0]):
         e = plan.order[0, i]
         if e < first or state.timed[e]:
@@ -114,10 +121,12 @@ def after_driver(k, demanded, curvature, plan, roads, state, record):
             move_heeding(e, before, k, plan, roads, state, record)
         else:
             move_along_path(e, k, plan, roads, state, record)
+    # Trailers come last: their hitch is where what tows them is by then.
     if record.present.shape[0] > 0:
         note_presence(k, plan, roads, state, record)
     if plan.until_collision and collides(k, plan, record):
         state.ending[STOPS] = 1
+    # A driver may demand what overflows, and kernels do not raise: the row ends with a status.
     if not (math.isfinite(x) and math.isfinite(y) and math.isfinite(h)):
         state.ending[STATUS], state.ending[STOPS] = NOT_FINITE, 1
     if state.ending[STOPS]:

@@ -21,6 +21,7 @@ N_STEPS, STATUS, STOPS, TICKS = 0, 1, 2, 3  # columns of State.ending
 
 # See rollout.STATUS_MESSAGES.
 OK, NOT_FINITE, OFF_ROUTE, NO_LANE, NO_PLACE, NO_WAY, NOT_THERE, OFF_LANES, BAD_TIMES = range(9)
+# As in `rollout.FAILURES`.
 RAISED, NO_CONTROL = 20, 23  # of a driver of the user's own
 UNPLANNED = -1  # the row needs a way that is not planned yet, and runs again when it is
 
@@ -395,6 +396,8 @@ def states(n: int, sizes: Mapping[str, int], given: Mapping[str, np.ndarray]) ->
     return State(**arrays)
 
 
+# Derived once: sizes and types, derived in every batch, took 6 of the 25 ms of 128 rows, under the
+# GIL.
 @cache
 def _declared() -> tuple[tuple[str, Any, tuple[Any, ...]], ...]:
     """Return name, type of number and axes of each array of a `State`."""

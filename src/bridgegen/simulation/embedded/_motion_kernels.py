@@ -26,16 +26,24 @@ def bicycle(x, y, h, v, demanded, curvature, limits, friction_limit, uphill, asi
     the right by ``aside`` [m/s²]; engine, brakes and tyres act against it. Inside the friction
     circle the demand is met; outside, both parts of the tyres' force shrink to the circle.
     """
+    # Gravity changes what engine and brakes can give, not what the driver gets: the control of a
+    # production vehicle makes up for the grade.
     a = min(max(demanded, -limits[2] - uphill), limits[1] - uphill)
     bend = min(max(curvature, -limits[3]), limits[3])
+    # What the tyres must give, gravity included: on a downgrade of 6 % a dry road leaves 7.7 m/s²
+    # of braking instead of 8.3.
     total = elementary.hypot(a + uphill, v * v * bend + aside)
     if total > friction_limit:
         share = friction_limit / total
         a = share * (a + uphill) - uphill
+        # What the tyres cannot hold against the bank lets the vehicle slide down it.
         bend = share * bend - (1.0 - share) * aside / max(v * v, SLOW * SLOW)
         bend = min(max(bend, -limits[3]), limits[3])
+    # A brake does not drive backwards: within the step the car comes to a stand.
     end = min(max(v + a * dt, 0.0), limits[0])
     a = (end - v) / dt
+    # The trapezoidal rule, exact for a constant acceleration. esmini moves by the speed at the
+    # step's end.
     travelled = 0.5 * (v + end) * dt
     middle = h + 0.5 * travelled * bend
     return (
@@ -62,6 +70,8 @@ def ramp_mean(value, target, rate, dt):
     lasts = abs(target - value) / rate if rate > 0.0 else 0.0
     if lasts >= dt:
         return 0.5 * (value + ramped(value, target, rate * dt))
+    # The trapezoidal rule over the whole step would lose half a step's way where the speed jumps:
+    # 0.5 m of the 40 m of 10 m/s for 1 s, then 30 m/s.
     return target - 0.5 * (target - value) * (lasts / dt)
 
 
@@ -98,6 +108,7 @@ def nearest(path, n, ds, x, y):
         gap = (path[i, X] - x) ** 2 + (path[i, Y] - y) ** 2
         if gap < best:
             best, at = gap, i
+    # Twice: from up to half a search step away, the first foot is not yet exact.
     s, _ = project(path, n, ds, at * ds, x, y)
     s, _ = project(path, n, ds, s, x, y)
     return s

@@ -30,6 +30,8 @@ def simulate_rows(plan, networks, rows, states, records):
 def simulate_row(plan, roads, state, record):
     """Roll out one row from its first instant to its last; all four are bundles."""
     start(plan, roads, state, record)
+    # A ``for`` over a range, not a counter before a ``while``: that has two types for Numba, which
+    # compiles the whole chain of an instant twice.
     for k in range(record.x.shape[1]):
         if state.ending[N_STEPS] > 0:
             break

@@ -34,6 +34,7 @@ from bridgegen.simulation.embedded.motion import (
     tow,
 )
 
+# With the branches of all conditions in the inlined instant, crossroads-s4 ran at 0.4 of the speed.
 _BY_FIELD = {
     "follows_courses": follow_course,
     "poses_along": pose_along,

@@ -97,6 +97,8 @@ def _ask(
     from bridgegen.simulation.embedded.batch import Batch  # numba is slow to import
 
     for i, k in enumerate(out.steps.tolist()):
+        # From the start each time. To go in lock-step would be fewer instants, but its kernels
+        # would have to be compiled for this alone.
         batch = Batch(replace(program, n_steps=k + 1), roads, rows, values)
         batch.run()
         state = batch.state

@@ -155,6 +155,7 @@ def _bundle(arrays: NamedTuple, data: bytearray, row: int | None = None) -> list
         array = np.ascontiguousarray(value if row is None else value[row])
         at = -1
         if array.view(np.uint8).any() if array.size else False:
+            # A typed array of JavaScript begins at a multiple of its elements' size.
             data += bytes(-len(data) % 8)
             at = len(data)
             data += array.tobytes()
@@ -165,6 +166,7 @@ def _bundle(arrays: NamedTuple, data: bytearray, row: int | None = None) -> list
 def _noise(program: Program) -> dict[str, Any]:
     """Return the key of the row's random numbers, or what it is made of; see `drivers.noise`."""
     if program.noise_key is not None:
+        # As text: a number of JSON has 53 bits, a key 64.
         return {"key": str(program.noise_key)}
     words = {
         name: str(int.from_bytes(hashlib.blake2b(name.encode(), digest_size=8).digest(), "little"))

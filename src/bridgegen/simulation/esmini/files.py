@@ -89,6 +89,8 @@ class ScenarioFile:
 
     def __init__(self, storyboard: OpenScenario, driven: Collection[str]) -> None:
         root = etree.fromstring(to_xml(storyboard))
+        # esmini writes "unsupported controller type" for those that it does not know, and one that
+        # an ObjectController merely names is not on: its default controller would drive.
         for controller in [*root.iterfind("./Entities/ScenarioObject/ObjectController")]:
             _remove(controller)
         for name in driven:
@@ -152,6 +154,7 @@ class Template:
             if name in self._declared:
                 declared = self._declared[name]
                 is_whole = declared.get("parameterType") != "double"
+                # In full: esmini's functions for parameters keep six decimals.
                 declared.set("value", str(int(value)) if is_whole else repr(float(value)))
         for node, attribute, expression in self._expressions:
             node.set(attribute, _worked_out(expression, values))

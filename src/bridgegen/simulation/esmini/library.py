@@ -117,8 +117,11 @@ class Library:
         call = self._functions
         call.SE_LogToConsole(False)
         call.SE_SetLogFilePath(str(log).encode())
+        # By default esmini drops vertices less than 0.1 m apart: 16 of 34 recorded files were
+        # within 0.05 m. Without the filter all agree to a micrometre.
         for option, value in (("log_level", "warn"), ("traj_filter", "0")):
             call.SE_SetOptionValuePersistent(option.encode(), value.encode())
+        # Without a route esmini takes a random way at a junction.
         call.SE_SetSeed(0)
 
         def changed(name: bytes, kind: int, state: int, path: bytes) -> None:

@@ -149,6 +149,8 @@ class EsminiProcess:
             if not self._is_warm:
                 self._process.ask("warm", sent, row.network, seconds=WARM_SECONDS)
                 sent, self._is_warm = None, True
+            # One request is one row, so that what goes wrong costs that row. The counter says that
+            # it gets on, so the limit is for an instant.
             rollout: Rollout = self._process.ask(
                 "run", sent, row, seconds=self._seconds, progress=lambda: int(self._beats[0])
             )

@@ -35,6 +35,8 @@ SECONDS = 30.0
 """Time limit for a step of esmini, and for loading a scenario with its map [s]."""
 
 
+# More steps take away most of what esmini's rule of integration is off, but conditions are then
+# looked at in each of them, so that events begin up to 0.04 s early: no nearer in all.
 STEPS = 1
 """Default number of esmini's steps per time step of the scenario."""
 
@@ -125,6 +127,7 @@ class EsminiSimulator:
         self._lock, self._is_stopped = threading.Lock(), threading.Event()
         self._processes: list[EsminiProcess] = []
         self._idle: list[EsminiProcess] = []
+        # Started now, so that a library that is none is reported before rows are simulated.
         with self._idle_process() as process:
             process.start()
             self.version = process.version

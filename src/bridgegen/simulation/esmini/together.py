@@ -100,6 +100,7 @@ class _Row:
         ):
             if is_there and number < 0:
                 raise EsminiError(f"esmini has no entity '{name}'")
+        # A structure of another version would be read at the wrong places; sizes are at its end.
         if not np.allclose(library.size(self._ego), boxes[0, :2], atol=SAME):
             raise EsminiError(
                 "the ego's size is not the file's: this is an esmini whose states are others than "
@@ -115,11 +116,14 @@ class _Row:
             self._impose(k)
             joint.decide(k)
             is_through = self._drives and joint.stops and joint.is_through
+            # esmini runs the storyboard, so its stop trigger counts, and not ours.
             joint.go_on()
             demand = joint.demand(k)
             if is_through or library.is_over:
                 joint.end()
             elif k < joint.n_steps - 1:
+                # For the present instant, before the step: esmini looks at conditions at the time
+                # that is, and moves afterwards. So nothing lags.
                 self._report(k, joint.states(k))
                 library.step(self._own_step)
                 if library.is_over:
@@ -147,6 +151,7 @@ class _Row:
                 if not all(map(math.isfinite, state)):
                     raise EsminiError(f"a state of '{name}' became NaN or infinite")
                 x, y, h, v = state
+                # Only with several steps, of which one may fire the stop trigger.
                 way = v * late  # it stopped between two instants: they go on as they were going
                 bodies.append(e)
                 states.append(

@@ -89,8 +89,12 @@ from bridgegen.simulation.embedded.chassis._single_track_kernels import (
 from bridgegen.simulation.embedded.chassis._tyre_kernels import rolling_tyre, slip_angle
 
 FINENESS = 1.0  # sub-step times the rate at which a wheel answers, at most
+# Halving changes no signal of 10 manoeuvres with three cars by more than 0.005 % of its peak. With
+# 7.5 ms and a fineness of 2.4 it was up to 6 %, with 10 ms up to 15 %.
 LONGEST = 0.004  # s, sub-step
 ROLLED_OVER = 0.7  # rad of roll, from which on the model says nothing
+# A locked wheel so rolls on at some 0.3 m/s; CommonRoad's stands from then on, whatever its tyre
+# does.
 FADES = 0.5  # m/s of the rim, below which a brake's torque fades, so that a locked wheel is calm
 LEAST_FRICTION = 1e-6
 SCRAPES = 0.45  # friction of a body on the road, ours
@@ -193,6 +197,8 @@ def _changes(motion, at, weight, cosine, sine, force, acts, mu, press, uphill, a
         left, right = held - rights, held + rights
         # The tyres.
         arm, deep = radius - pressed, pressed + radius * (cl - 1.0)
+        # A wheel that lifts carries nothing; CommonRoad's tyre pulls at the road then (−215 N in a
+        # double lane change of the Vanagon).
         load_left = max(chassis[K_TYRE] * (deep - half * sl), 0.0)
         load_right = max(chassis[K_TYRE] * (deep + half * sl), 0.0)
         across = vy + ahead * turn + leans * arm
@@ -206,6 +212,9 @@ def _changes(motion, at, weight, cosine, sine, force, acts, mu, press, uphill, a
             x = y = 0.0
             if weight > 0.0 and load > 0.0 and mu[side] > LEAST_FRICTION:
                 kappa = (radius * motion[w] - along) / max(abs(along), ROLLING)
+                # With another sign than CommonRoad's. Its coefficients are Pacejka's, with y to the
+                # left, its equations have y to the right, in which slip angle and lateral force
+                # change their sign and camber does not. Wheels push to the side to which they lean.
                 camber = roll + chassis[c + CAMBER] * (tilt + to_left * travel)
                 x, y = rolling_tyre(
                     kappa, slip_angle(past, along), camber, load, mu[side], stiffness, chassis
@@ -323,6 +332,7 @@ def advance_bodies(motion, steer, force, mu, press, uphill, aside, dt, chassis):
         dt: the sub-step [s].
         chassis: the vehicle, see ``_multi_body_columns``.
     """
+    # The model has long stopped being one of a car by then.
     if abs(motion[ROLL]) >= ROLLED_OVER:
         _slide_on(motion, mu, press, dt, chassis)
         return

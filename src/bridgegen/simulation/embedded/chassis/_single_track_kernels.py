@@ -36,6 +36,8 @@ from bridgegen.simulation.embedded.chassis._tyre_kernels import (
 ROLLING, SLIPPING = 1.0, 3.0  # m/s, up to which the body is kinematic, and from which it is dynamic
 RELAXES = 0.05  # s, in which it becomes kinematic
 TURNS = 0.1  # m/s, below which the sense in which a wheel rolls is not clear-cut
+# At 1.0 the slip angle of an abrupt step at 15 m/s was off by 2.4 % of its peak, at 0.5 nothing
+# changed by more than 0.8 %; at 0.7 all signals of all manoeuvres are within 1 %.
 FINENESS = 0.7  # sub-step times the fastest rate of the lateral motion, at most
 LONGEST = 0.05  # s, sub-step
 ALMOST = 1.0 - 1e-9  # rounds up
@@ -59,6 +61,7 @@ def axle_loads(force, press, mu, chassis):
     front, rear = chassis[TO_FRONT], chassis[TO_REAR]
     weight = press * GRAVITY
     moved = min(max(force, -mu * weight), mu * weight) * chassis[HEIGHT]
+    # An axle that lifts carries nothing; it does not pull at the road.
     load = min(max((weight * rear - moved) / (front + rear), 0.0), weight)
     return load, weight - load
 
@@ -157,6 +160,8 @@ def advance(
     of_front = of_rear = 0.0
     if weight > 0.0:
         of_front, of_rear = _slip_angles(vx, vy, turn, c0, s0, chassis)
+    # Held over the sub-step's four stages. A wheel is in balance with its torque within 5 ms at 30
+    # m/s; as a state it would need sub-steps of 2 ms.
     fx, slip = longitudinal(ahead, of_front, loads[0], mu, chassis)
     rx, slide = longitudinal(behind, of_rear, loads[1], mu, chassis)
     given = (fx, rx)

@@ -132,9 +132,13 @@ def longitudinal(wanted, alpha, load, mu, chassis):
     """
     if wanted == 0.0 or load <= 0.0:
         return 0.0, 0.0
+    # All forces go with the load, so the mass cancels, and classes of vehicles differ by geometry,
+    # stiffness and lags alone.
     peak = mu * chassis[MU_X]
     most, b = peak * load, chassis[K_X] / (chassis[C_X] * peak)
     share, best = abs(wanted) / most, chassis[SLIP] / b
+    # The slip follows from the force that is wanted, the other way round than in the formula: by a
+    # table of its inverse, and rounds for the combined slip.
     kappa, left = 0.0, longitudinal_left(alpha, 0.0, chassis)
     for i in range(ROUNDS):
         before, kappa = kappa, _slip_of(share / left, chassis) / b

@@ -288,6 +288,7 @@ class Actions:
                 lane = int(str(target.value))
             except ValueError:
                 self._tables.unsupported(target, f'value="{target.value}" (a lane id is needed)')
+        # Where lanes count from another entity, its lane is known only when the action begins.
         if other in (-1, entity):
             self.lane_checks.append(LaneCheck(entity, lanes, lane, action.line))
         offset = self._tables.slot(action.target_lane_offset or 0.0)

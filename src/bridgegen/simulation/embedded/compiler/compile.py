@@ -153,6 +153,8 @@ def compile_storyboard(
         UnsupportedError: what the rollout cannot do, by name and line, all of it at once.
         InputError: an entity without a start, or no entity at all; stages that the driver has not.
     """
+    # What was cut may have been what another element waits for, so the rest is compiled again,
+    # until nothing is left to cut.
     while True:
         compiler = _Compiler(scenario, place)
         try:
@@ -228,6 +230,7 @@ class _Compiler:
         self.start.compile(storyboard, has_driver)
         chosen = driver or self._declared_driver()
         self.controllers.has_driver = has_driver = chosen is not STORYBOARD
+        # Positions by a timetable leave nothing to a driver.
         if driver and self.actions.is_timed(0):
             self.tables.problems.append(
                 f"{self.place}: the driver '{driver.name}' cannot drive an ego that follows a "
@@ -263,6 +266,8 @@ class _Compiler:
         if self.tables.problems:
             raise UnsupportedError(*self.tables.problems)
         conditions = table(self.triggers.conditions, 5)
+        # The history of conditions is as long as the longest delay; one beyond the end is never
+        # over.
         conditions[:, DELAY] = np.minimum(conditions[:, DELAY], n_steps)
         global_actions, signals = self.global_actions, self.global_actions.signals
         time, tows = global_actions.first_time, self.towing.tows()

@@ -62,6 +62,8 @@ class Controllers:
         Where the start does not say, it does, unless the first event that says anything switches
         it on.
         """
+        # The standard has a controller off until it is switched on. A driver that the file says
+        # nothing about drives from the start all the same, as one expects of ``--ego``.
         lateral, longitudinal = (
             first if first != UNSAID else int(self._later[which][:1] != [1])
             for which, first in self._first.items()
@@ -130,6 +132,8 @@ class Controllers:
 
     def _is_drivers(self, part: Switching) -> bool:
         """Return whether an action is on the controller that the ego's driver is, or stands for."""
+        # The user's driver is the system under test, whatever controller the file has in that
+        # place.
         if self.replaces:
             return True
         if isinstance(part, osc.AssignControllerAction):
@@ -158,6 +162,8 @@ class Controllers:
         if any(_names_driver(controller) for controller in self.of(entity)):
             what = f"switching on another controller of '{name}' than its driver"
             self._tables.unsupported(part, what)
+        # Not refused: that stopped every ALKS template and every fourth of esmini's files, though
+        # what they say of the others runs.
         elif name not in self._unknown:
             self._unknown.add(name)
             hint = "; a driver in its place: --ego NAME" if entity == 0 else ""

@@ -79,6 +79,7 @@ def driver(controllers: Controllers, place: str) -> Driver:
         properties = controller.properties
         name = properties.get(DRIVER) if properties else None
         if name is not None:
+            # A file from another person may name ``os:system``. Only what is typed runs code.
             if is_spec(str(name)):
                 raise UnsupportedError(
                     f"{place}, line {controller.line}: the ego is driven by '{name}', "

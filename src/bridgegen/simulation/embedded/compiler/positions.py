@@ -101,6 +101,8 @@ class Positions:
         if isinstance(where, osc.RoadPosition | osc.RoutePosition):
             return self._append(where, ON_ROAD, 0.0, 0.0, spot=self.spot(position))
         if isinstance(where, osc.RelativeLanePosition):
+            # ``ds`` counts along the road, ``dsLane`` along the traffic of the other entity's lane,
+            # and with it what is to the left, as in esmini.
             by_lane = where.ds_lane is not None
             metres = where.ds_lane if where.ds_lane is not None else where.ds
             return self._append(
@@ -205,6 +207,7 @@ class Positions:
         spot: Spot | None = None,
     ) -> int:
         turned = getattr(where, "orientation", None)
+        # A WorldPosition without ``h`` faces 0; all others face along something.
         absolute = kind == IN_WORLD
         if turned is not None:
             heading, absolute = turned.h, self._is_absolute(turned)

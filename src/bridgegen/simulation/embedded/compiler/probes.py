@@ -445,6 +445,7 @@ class Triggers:
         seconds = self._tables.literal(condition, "delay", condition.delay)
         delay = MAX_STEPS  # no run is longer: it never comes
         if seconds < MAX_STEPS * self._time_step:
+            # A delay is over at the first instant after it; 0.15 s is not 3 · 0.05 s in binary.
             delay = max(math.ceil(seconds / self._time_step - SAME_STEP), 0)
         kind, quantity = condition.condition, codes.ANY
         if isinstance(kind, osc.ByValueCondition):

@@ -102,6 +102,7 @@ class Tables:
     def unsupported(self, element: Element, what: str) -> None:
         """Record an unsupported element, with its line."""
         line = f", line {element.line}" if element.line else ""
+        # Collected, not raised: a user sees all that is wrong in a file at once.
         self.problems.append(f"{self.place}{line}: {what} is not supported")
         self.culprits.append(element)
 

@@ -77,6 +77,8 @@ def check_times(
         if time is None:
             tables.unsupported(element, f"{what} without a time in a trajectory with times")
             continue
+        # As the standard says: a scale of 2 takes twice as long. esmini divides by the scale, and
+        # subtracts the offset.
         times.append(scale * time + offset)
         if not math.isfinite(times[-1]):
             tables.unsupported(element, f"{what} at {times[-1]:g} s")

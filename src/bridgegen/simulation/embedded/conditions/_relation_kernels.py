@@ -134,6 +134,8 @@ def look_ahead(p, k, plan, roads, state, record):
             gap = between_boxes(gap, own, length, width, ahead, turn, other_turn, measure)
     if kind == DISTANCE:
         return True, abs(gap)
+    # Where a headway or a time to collision is not defined, the condition is false, whatever its
+    # rule: "greater than" is, too.
     if kind == TIME_HEADWAY:
         is_ahead = gap >= 0.0 and (measure != EUCLIDIAN or in_frame(ox - x, oy - y, h)[0] >= 0.0)
         return v > 0.0 and is_ahead, gap / max(v, 1e-9)
@@ -306,6 +308,7 @@ def is_clear(p, k, plan, roads, state, record):
         exists = exists or (
             counts and is_in_ranges(count, row[RANGES], row[RANGES_END], plan.ranges)
         )
+    # As esmini has it: a lane that is not there is not clear.
     if not exists:
         return False
     shift = lanes_left(roads.nodes[node, LANE], lane, way)
@@ -405,6 +408,7 @@ SAME_ANGLE = 1e-9  # rad, the rounding of a turn
 @kernel
 def compare(value, rule, limit):
     """Apply an OpenSCENARIO Rule; what is the limit up to rounding is the limit."""
+    # Speeds and distances are sums of steps: 0.1 m/s added forty times are not 4.
     if abs(value - limit) <= SAME_VALUE:
         value = limit
     if rule == GREATER:
@@ -481,11 +485,14 @@ def look_one(p, k, plan, roads, state, record):
             record,
         )
     if kind == OFFROAD:
+        # By the reference point, and on any type of lane but ``none``: on a sidewalk it is on the
+        # road, as in esmini.
         on_road = find_cell(roads.cells, 0, record.x[e, k], record.y[e, k]) >= 0
         return lasts(p, k, not on_road, limit, plan, roads, state, record)
     if kind == CLEARANCE:
         return is_clear(p, k, plan, roads, state, record)
     if kind == SPEED_DIFFERENCE:
+        # Along the axes of the triggering entity (1.2); esmini takes the other one's.
         turn = record.h[other, k] - record.h[e, k]
         along, aside = (
             record.v[other, k] * elementary.cos(turn),
@@ -528,6 +535,7 @@ def touch(e, other, k, plan, roads, state, record):
 def lasts(p, k, seen, limit, plan, roads, state, record):
     """Return whether a probe has seen so long [s] what it sees now."""
     seen = seen and state.present[plan.probes[p, WHO]]
+    # A duration of 0 is met at the first instant at which it is so.
     before = state.held[p] if k > 0 else -plan.dt
     state.held[p] = before + plan.dt if seen else -plan.dt
     return seen and state.held[p] >= limit - AT_END

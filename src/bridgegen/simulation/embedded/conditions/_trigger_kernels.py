@@ -42,7 +42,7 @@ from bridgegen.simulation.embedded.places._place_kernels import pose_of, way_ahe
 
 # --- What a probe sees: an entity, two of them, a value, or an element of the storyboard ---
 # A condition has a probe per triggering entity. Another kind of condition is a branch in
-# ``look_one`` # of ``_relation_kernels``, where all is that is seldom asked for.
+# ``look_one`` of ``_relation_kernels``, where all is that is seldom asked for.
 
 
 # mypy: allow-untyped-defs
@@ -160,6 +160,8 @@ def holds(c, k, conditions, history):
     if j < 0:
         return False
     depth = history.shape[1]
+    # A delay asks for the condition's value that long ago, also from before its element was in
+    # standby (1.2, delay of a condition).
     then = history[c, j % depth]
     if edge == NO_EDGE:
         return then
@@ -182,6 +184,8 @@ def group_fires(g, k, plan, state):
         first = conditions[c, PROBES]
         if probes[first, PROBE] == ELEMENT_STATE:
             for p in range(first, conditions[c, PROBES_END]):
+                # Only of elements' states: a condition on what an action changes in the same
+                # instant (values, lights, presence) sees it at the next one.
                 state.observed[p] = is_in_state(p, probes, state.phase, state.stamps, state.looked)
                 state.looked[p, 1] = state.ending[TICKS]
             conclude(c, k, conditions, state.observed, state.history)

@@ -79,11 +79,14 @@ def _asked_of(k, demanded, curvature, plan, roads, state, record):
     friction = state.weather[FRICTION]
     front, rear = chassis[TO_FRONT], chassis[TO_REAR]
     wheelbase = front + rear
+    # By the kinematic bicycle's inverse, which knows no slip: so the vehicle understeers, a car by
+    # 1.6 °/g, and its driver has to cope with that.
     asked = min(max(elementary.atan(wheelbase * curvature), -chassis[LOCK]), chassis[LOCK])
     came = motion[X] == x and motion[Y] == y and motion[H] == h and motion[SPEED] == v
     if not came:
         most = TRIMMED * press * friction / max(v * v, 1e-6)
         bend = min(max(elementary.tan(asked) / wheelbase, -most), most)
+        # Rolling, without sideslip: what it did before is not known.
         motion[VX], motion[YAW_RATE] = v, v * bend
         motion[VY], motion[STEER] = rear * motion[YAW_RATE], elementary.atan(wheelbase * bend)
         motion[FORCE] = uphill
@@ -128,6 +131,7 @@ def move_chassis(k, demanded, curvature, plan, roads, state, record):
     motion[STEER], motion[FORCE] = angle, force
     motion[X], motion[Y] = place[0] - rear * heads[0], place[1] - rear * heads[1]
     motion[H] = place[2]
+    # Of the rear axle's centre, in whatever direction it moves: OpenSCENARIO's reference point.
     motion[SPEED] = math.sqrt(vx * vx + (vy - rear * turn) ** 2)
 
 

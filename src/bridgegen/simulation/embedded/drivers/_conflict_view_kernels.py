@@ -29,6 +29,7 @@ def see_conflicts(k, plan, roads, state, record, found):
     """Fill ``found`` ``(M, W, CONFLICT)``; the tracks must be those of instant k."""
     on, s, body = state.on[0], state.station[0], plan.bodies[0]
     path, n, ds = roads.paths[on], roads.counts[on], roads.steps[on]
+    # By the reference driver's own kernel, so that what a driver is told is what ours goes by.
     count = predict(
         path, n, ds, s, reach_of(record.v[0, k]), body[1], state.tracks, state.around, on == 0,
         roads.hypotheses, roads.hypothesis_counts, roads.hypothesis_steps, roads.hypothesis_zones,

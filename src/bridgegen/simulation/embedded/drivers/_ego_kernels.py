@@ -57,6 +57,8 @@ def demand(k, plan, roads, state, record):
     The driver is called where its machine code lies (`demands.code_of`); one in Python gives the
     same two numbers.
     """
+    # By its address, so that a run compiles its own driver only: with a branch for each of them it
+    # compiled six.
     if plan.driver_code == 0:
         return 0.0, 0.0
     return call_kernel_at(plan.driver_code, (k, plan, roads, state, record))
@@ -107,6 +109,7 @@ def move_ego(k, demanded, curvature, plan, roads, state, record):
         )
         state.aside[0] = record.offset[0, k + 1]
         at_end = state.station[0] >= (roads.counts[p] - 1) * roads.steps[p]
+        # On its first path with a route the end is its goal, and ends the scenario.
         if at_end and (p > 0 or state.route[0] == 0):
             pass_end(0, 0.0, roads, state)
     return x, y, h
@@ -168,6 +171,8 @@ def is_steered(plan, state):
 def move_paced(k, demanded, plan, roads, state, record):
     """Move the ego on along the storyboard's way, as fast as its driver asks for."""
     body, v = plan.bodies[0], record.v[0, k]
+    # Drivers do not know the grade, as a vehicle without a map would not; what engine, brakes and
+    # tyres can give changes with it.
     uphill, _, press = slope(0, roads, state)
     grip = press * state.weather[FRICTION]
     a = min(max(demanded, -min(body[5], grip) - uphill), min(body[4], grip) - uphill)
@@ -175,6 +180,8 @@ def move_paced(k, demanded, plan, roads, state, record):
     state.command[0] = min(max(v + a * plan.dt, 0.0), body[3])
     state.mean[0] = math.nan
     move_along_path(0, k, plan, roads, state, record)
+    # The storyboard's speed stays what the driver is asked for; it goes at its own only for this
+    # step.
     state.command[0], state.target[0] = asked, target
 
 
@@ -217,6 +224,7 @@ def impose(e, k, x, y, h, v, plan, roads, state, record):
                 stands -= 1
         state.stood[e] = (k - stands) * plan.dt
     before = record.h[e, k - 1] if k > 0 else record.h[e, k]
+    # Another simulator's heading jumps by 2π; ours is continuous, since turn rates are differences.
     turns = round((before - h) / (2.0 * math.pi))
     record.x[e, k], record.y[e, k], record.v[e, k] = x, y, v
     record.h[e, k] = h + 2.0 * math.pi * turns
@@ -261,7 +269,7 @@ def egos_are_through(plan, networks, rows, states, through):
 # --- Participants other than the ego that have a driver, which limits their script ---
 # The storyboard commands a speed, and when a change of lane begins; the driver
 # (`bridgegen.drivers._attentive_kernels`) may slow them, and delay the change. All drivers decide
-# by # the states at instant k, before any entity moves, so the order of the entities does not
+# by the states at instant k, before any entity moves, so the order of the entities does not
 # matter.
 
 
@@ -276,6 +284,8 @@ SETTLES = 2.0  # m/s³, with which it releases the accelerator as it catches up 
 def heed(k, plan, roads, state, record):
     """Set ``allowed``: the acceleration [m/s²] that each driver allows from instant k on."""
     every = max(round(LOOK / plan.dt), 1)
+    # Every 0.2 s, which costs a quarter of a look at every instant. The reaction time and the jerk
+    # count instants.
     if k % every == 0:
         see(
             k, plan.dt, record.x, record.y, record.h, record.v, plan.bodies, state.lamps, state.seen
@@ -285,6 +295,7 @@ def heed(k, plan, roads, state, record):
         if plan.others[e] == SCRIPTED:
             continue
         p, mind = state.on[e], state.minds[e]
+        # Off the lanes, and on a timetable, there is nothing that a driver could follow.
         if not state.present[e] or state.placed[e] or p < 0 or state.follow[e] >= 0:
             mind[:] = 0.0
             mind[ASKED] = math.inf

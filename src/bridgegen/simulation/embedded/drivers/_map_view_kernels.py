@@ -16,6 +16,9 @@ from bridgegen.drivers.interface import CENTRE, NEAR_PIECES, PIECE_POINTS
 from bridgegen.drivers.map_grid import ACROSS, BOTTOM, LEFT, REACH, UP, WIDTH
 from bridgegen.simulation.embedded._memory_kernels import N_STEPS
 
+# The grid is searched when the ego has moved so far; what may be among the nearest until then is
+# sorted at every instant. So these are exactly the nearest, at a cost that does not grow with the
+# map.
 SLACK = 8.0  # m
 MOST = 512  # candidates that are kept
 HALVINGS = 6  # of the radius in which they lie

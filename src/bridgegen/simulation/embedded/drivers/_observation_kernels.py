@@ -20,6 +20,8 @@ def observe(k, plan, roads, state, record, step, route, tracks):
     Returns:
         the distance to the next stop line of a light [m], +inf if there is none; and its state.
     """
+    # Also with ideal perception: a replay in which a user's driver kept its own sensors would never
+    # put harm down to perception.
     perceive(
         k, plan.dt, state.key[0], plan.ideal_perception, state.visible, record.x, record.y,
         record.h, record.v, plan.bodies, plan.kinds, state.lamps, state.weather, state.sensors,

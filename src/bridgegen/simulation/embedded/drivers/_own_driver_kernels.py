@@ -59,6 +59,7 @@ def ask(k, plan, roads, state, record):
     """
     inputs, answer = state.inputs, state.answer
     fill_inputs(k, plan, roads, state, record)
+    # A C callback cannot raise: it prints the error and returns, before it has set this.
     answer[RETURNED] = 0.0
     call_at(
         plan.own_code,

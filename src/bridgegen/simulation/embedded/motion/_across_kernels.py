@@ -137,6 +137,8 @@ def begin_lane_change(j, k, plan, roads, state, record):
     state.station[e], state.aside[e] = project(
         roads.paths[p], roads.counts[p], roads.steps[p], station, record.x[e, k], record.y[e, k]
     )
+    # While it changes, both ways are known to those who predict it: the one that it is on, and the
+    # one that it leaves.
     if target != node:
         state.to[e], state.foot[e] = left, left_at
     offset = way * state.slots[plan.actions[j, TARGET]]

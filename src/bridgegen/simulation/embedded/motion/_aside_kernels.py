@@ -51,6 +51,7 @@ def begin_lateral_distance(j, k, plan, roads, state, record):
     state.turn[e] = 0.0
     middle, way = _beside(e, row, state.station[e], k, roads, state, record)
     present = (state.aside[e] - middle) * way  # how far left of the other one
+    # ``any`` keeps the side on which the entity is; esmini takes the left one.
     side = row[SIDE]
     if side == EITHER_SIDE:
         side = LEFT_SIDE if present >= 0.0 else RIGHT_SIDE
@@ -70,6 +71,7 @@ def keep_aside(j, k, step, plan, roads, state, record):
     Without limits it is there at once; else it never moves farther than its step.
     """
     e, row = plan.actions[j, WHOM], plan.courses[plan.actions[j, ROW]]
+    # Where the other will be, if that is known; that it goes on moving across is not foreseen.
     seen = seen_at(e, row[REF], k, plan, state, record)
     middle, way = _beside(e, row, state.station[e] + step, seen, roads, state, record)
     left = middle + way * state.lateral_target[e] - state.aside[e]
@@ -120,6 +122,8 @@ def _beside(e, row, station, seen, roads, state, record):
     if row[BY_BODY]:
         px, py, ph = pose(path, n, ds, station)
         along = elementary.cos(ph - h)
+        # The factor 1/along would throw the entity far across the road for the least turn of the
+        # other.
         if abs(along) < CROSSING:
             return state.aside[e] - state.lateral_target[e], 1.0
         return ((x - px) * -elementary.sin(h) + (y - py) * elementary.cos(h)) / along, 1.0 / along

@@ -92,6 +92,7 @@ def begin_motion(j, k, plan, roads, state, record):
     """Begin action j, which moves an entity, at instant k."""
     if FIRST_ALONG <= plan.actions[j, DOES] < FIRST_ACROSS:
         take_speed(j, plan, state)
+    # By an address for each action: kinds that the storyboard does not have are not compiled.
     run_kernel_at(plan.begins[j], (j, k, plan, roads, state, record))
 
 

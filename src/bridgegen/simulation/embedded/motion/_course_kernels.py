@@ -19,6 +19,7 @@ from bridgegen.simulation.embedded._motion_kernels import (
     progress,
 )
 
+# esmini's figure; the standard leaves open how a distance is reached.
 STIFFNESS = 0.4  # 1/m, of the spring that closes a gap, per m/s² of the strongest acceleration
 T, V, A, J = 0, 1, 2, 3  # columns of a profile: from when on [s], speed, acceleration, jerk there
 
@@ -26,6 +27,8 @@ T, V, A, J = 0, 1, 2, 3  # columns of a profile: from when on [s], speed, accele
 @kernel
 def steepest(shape):
     """Return the largest slope of a shape from 0 to 1 over 0 to 1."""
+    # A rate is a limit, so it counts at the steepest place, as in esmini: 3/2 of a cubic's mean,
+    # π/2 of a sinusoidal's.
     if shape == CUBIC:
         return 1.5
     if shape == SINUSOIDAL:
@@ -49,6 +52,8 @@ def change_time(shape, dimension, value, before, after, most):
         return max(value, least)
     if dimension == RATE:
         return max(steepest(shape) * change / abs(value), least)
+    # Over the time, not the distance itself: by distance, braking to rest would never end, and a
+    # start from rest never begin.
     return max(2.0 * value / max(before + after, 1e-9), least)
 
 
@@ -105,6 +110,7 @@ def meeting_speed(left, time, v, final, has_final, dt):
     mean = left / time
     root = math.sqrt((mean - 0.5 * (v + final)) ** 2 + 0.25 * (v - final) ** 2)
     apex = mean + root if mean > 0.5 * (v + final) else mean - root
+    # The speed in between would be below 0.
     if apex < 0.0 or time == math.inf:  # it stops on the way, and waits
         return max(v - 0.5 * (v * v + final * final) / left * dt, 0.0)
     slope = (2.0 * apex - v - final) / time
@@ -156,6 +162,8 @@ def lay_out(v, acceleration, speeds, times, n, follow, limits, profile):
     if not follow or count == 1 or (limits[3] == math.inf and limits[4] == math.inf):
         return count
     if count == 2:
+        # One entry is the trapezoid of acceleration that a change of speed with a jerk means;
+        # esmini, too, treats it as a case of its own.
         rows = _one_change(profile[1, T], acceleration, limits, profile[count:], profile)
     else:
         rows = _rounded(count, acceleration, limits, profile[count:], profile)

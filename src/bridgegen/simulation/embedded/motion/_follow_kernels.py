@@ -30,6 +30,7 @@ BEGINS, ENDS_AT, X, Y, X_END, Y_END, H, H_END, PASSED, PASSED_END = range(10)
 """Columns of a segment: begin and end [s]; x, y [m] of both; the headings [rad]; metres
 travelled."""
 
+# The way to a position may lead along a lane beside it. esmini's action is over at once.
 ABREAST = 5.0  # m, a position is passed so far aside at most
 NEAR = 0.1  # m, within which an entity has reached a position
 SAME_TIME = 1e-9  # s, an instant this close to a vertex's is the vertex's
@@ -142,6 +143,7 @@ def stop_follow(j, k, plan, roads, state, record):
 def at_time(table, n, t):
     """Return (x, y, heading, speed, metres travelled) by a timetable at a time."""
     i = 0
+    # An instant is k·dt, which in binary is not the decimal time that a vertex states.
     while i < n - 1 and table[i, ENDS_AT] < t - SAME_TIME:
         i += 1
     row = table[i]
@@ -172,6 +174,8 @@ def move_by_timetable(e, k, plan, roads, state, record):
     state.travelled[e] += station - state.station[e]
     state.station[e] = station
     state.stood[e] = standing(state.stood[e], record.v[e, k], v, plan.dt)
+    # Where a speed action meets a timetable, the timetable moves the entity; the action's speed
+    # counts from its end on.
     if state.speed_action[e] < 0:
         state.command[e] = state.target[e] = v
     record.a[e, k] = (v - record.v[e, k]) / plan.dt

@@ -100,6 +100,8 @@ def glide(shape, dimension, lasts, passed, origin, target, step, dt, curvature):
         if step <= SLOWEST:
             return before, 0.0, passed, 0.0
         return _by_distance(shape, lasts, passed, origin, span, before, step)
+    # A bus at 1 m/s would stand across the road at 90° if it were across in the time asked for.
+    # Where the speed is enough, nothing changes, to the bit.
     length = least_length(shape, curvature, span)
     if step <= SLOWEST:
         if length == 0.0 or passed <= 0.0:
@@ -175,6 +177,7 @@ def approach(left, speed, most_speed, most_acceleration, most_deceleration, dt):
     """
     wanted = min(most_speed, abs(left) / dt)
     if most_deceleration < math.inf:
+        # The root of v·dt + v²/(2·d) = |left|.
         least = most_deceleration * dt
         stops = math.sqrt(least * least + 2.0 * most_deceleration * abs(left)) - least
         wanted = min(wanted, stops)

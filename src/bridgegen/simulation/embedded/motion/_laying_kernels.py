@@ -241,6 +241,8 @@ def move_laid(e, k, plan, roads, state, record):
         record.a[e, k] = record.a[e, k - 1] if k > 0 else 0.0
         return
     stand_at(e, x, y, h, state)
+    # It goes on at its speed: no body stops within a step. In esmini it stands at once, from 20
+    # m/s.
     if ends:
         end_follow(e, state)
         put_in_world(e, x, y, h, roads, state)

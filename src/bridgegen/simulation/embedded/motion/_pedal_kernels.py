@@ -76,6 +76,7 @@ def pressed(e, demanded, plan, state):
         drive = 0.0
     if held >> BRAKE & 1:
         brake = min(max(pedals[BRAKE, NOW], 0.0), 1.0) * plan.bodies[e, 5]
+        # As brake-throttle overrides of cars do.
         if brake > 0.0 and held >> THROTTLE & 1 == 0:
             drive = 0.0
     if held >> PARKING_BRAKE & 1:

@@ -141,6 +141,7 @@ def leave(gone, plan, roads, state):
     end_follow(gone, state)
     end_quest(gone, state)
     state.stood[gone] = 0.0
+    # Dropped, not coasted: the storyboard decides that it is gone, which no sensor could explain.
     forget(state.tracks, gone)
     for array in (state.sensors, state.around, state.attention):
         array[gone] = 0.0
@@ -183,6 +184,8 @@ def leave_out_absent(conditions, probes, present, observed):
         first, last = conditions[c, PROBES], conditions[c, PROBES_END]
         if probes[first, PROBE] < FIRST_BY_ENTITY:
             continue
+        # The standard is silent on who is absent. esmini lets those count that are there, and asks
+        # for one at least.
         there = 0
         for p in range(first, last):
             there += present[probes[p, WHO]]

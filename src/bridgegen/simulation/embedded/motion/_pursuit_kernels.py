@@ -99,6 +99,7 @@ def begin_course(j, k, plan, roads, state, record):
             plan.actions[j, SHAPE], plan.actions[j, DIMENSION], value, before, after, most
         )
     elif kind == SPEED_PROFILE:
+        # The other's speed as the profile begins; the standard leaves that open.
         base = record.v[row[REF], k] if row[REF] >= 0 else 0.0
         n = row[PAST_ENTRY] - row[FIRST_ENTRY]
         speeds, times = np.empty(n), np.empty(n)
@@ -185,6 +186,7 @@ def follow_course(j, k, plan, roads, state, record):
 def seen_at(e, other, k, plan, state, record):
     """Return the instant at which an entity sees another one: the next, if that is known."""
     first = e == 0 and plan.is_driven
+    # A cycle of references has no first one: there the present state counts.
     known = not first and (state.timed[other] or plan.order[1, other] < plan.order[1, e])
     return min(k + 1, record.v.shape[1] - 1) if known else k
 
@@ -222,6 +224,8 @@ def _follow_speed(j, e, k, passed, plan, state, record):
         after = changed(shape, state.origin[e], target, share)
     else:
         after = target
+    # After a step, too, who keeps to another's speed is limited by its Performance: without, one
+    # accelerated by 833 m/s².
     most = (plan.bodies[e, 4] if after > before else plan.bodies[e, 5]) * plan.dt
     is_within = shape == STEP and abs(after - before) <= most  # then to the bit
     state.command[e] = after if is_within else ramped(before, after, most)
@@ -339,8 +343,11 @@ def _synchronise(j, e, k, plan, roads, state, record):
             final = final + speed if row[FINAL] == FINAL_DELTA else final * speed
         final = min(max(final, 0.0), plan.bodies[e, 3])
     near, master_near = _slot(row[TOLERANCE], state), _slot(row[MASTER_TOLERANCE], state)
+    # Asked anew at every instant, by the master's present speed: the plan heals itself where the
+    # master changes its speed.
     time = max(other - master_near, 0.0) / speed if speed > SLOW else math.inf
     over = left <= near or other <= master_near or time < plan.dt
+    # Whoever gets farther away has passed its place, if between two instants.
     over = over or left > memory[LEFT] + 1e-9 or other > memory[MASTER_LEFT] + 1e-9
     memory[LEFT], memory[MASTER_LEFT] = left, other
     v = record.v[e, k]

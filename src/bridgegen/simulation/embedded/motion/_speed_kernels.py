@@ -67,6 +67,7 @@ def stop_longitudinal(j, plan, state):
 def command_speed(e, k, plan, roads, state, record):
     """Set ``command`` of an entity to the speed [m/s] at the instant after k."""
     j, before = state.speed_action[e], state.command[e]
+    # NaN: a constant acceleration over the step, unless a branch below knows better.
     state.mean[e] = math.nan
     if j >= 0 and plan.actions[j, DOES] >= RELATIVE_SPEED:
         run_kernel_at(plan.follows_courses, (j, k, plan, roads, state, record))
@@ -76,12 +77,17 @@ def command_speed(e, k, plan, roads, state, record):
         passed, lasts = k * plan.dt + plan.dt - state.speed_began[e], state.speed_lasts[e]
         state.command[e] = changed(shape, origin, target, passed / lasts)
         half = changed(shape, origin, target, (passed - 0.5 * plan.dt) / lasts)
+        # The speed is known at every time, not only at instants: so a cubic shape's way is exact, a
+        # sinusoidal one's to 0.1 mm.
         mean = (before + 4.0 * half + state.command[e]) / 6.0  # Simpson's rule
     else:
         state.command[e] = ramped(before, state.target[e], state.rate[e] * plan.dt)
         mean = ramp_mean(before, state.target[e], state.rate[e], plan.dt)
+    # Else somebody else (a driver, a pedal) has set the speed, and the mean of the script is not
+    # the body's.
     if record.v[e, k] == before:
         state.mean[e] = mean
+    # Up to rounding: 0.1 m/s added forty times are not 4.
     if j >= 0 and abs(state.command[e] - state.target[e]) <= SAME_SPEED:
         state.action_ended[j] = True
         state.speed_action[e] = -1

@@ -59,6 +59,7 @@ def steer(path, n, ds, state, speed, place, rate, braking, dt, first, steps, cou
         bend = path[i, CURVATURE_COLUMN] + f * (
             path[i + 1, CURVATURE_COLUMN] - path[i, CURVATURE_COLUMN]
         )
+        # Its way is along its own line, which is longer or shorter than the path's in a bend.
         state[STATION] += along / (1.0 - bend * state[ASIDE])
         state[ASIDE] += 0.5 * (w + slide) * dt
         state[SPEED], state[SLIDE] = faster, slide

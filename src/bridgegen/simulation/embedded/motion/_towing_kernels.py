@@ -43,6 +43,8 @@ def drawn(h, dx, dy, length):
     if way == 0.0:
         return h
     along = elementary.atan2(dy, dx)
+    # The exact tractrix of a straight pull gives the same in one step or in ten. esmini aims the
+    # old axle at the new hitch, which depends on the step.
     phi = turned(h, along)
     return along + 2.0 * elementary.atan(elementary.tan(0.5 * phi) * elementary.exp(-way / length))
 
@@ -65,6 +67,7 @@ def start_towed(plan, roads, state, record):
         y = record.y[t, 0] + plan.couplings[t, HITCH] * elementary.sin(h)
         if plan.stands_apart[e]:
             apart = elementary.atan2(y - record.y[e, 0], x - record.x[e, 0])
+            # A trailer that its file puts ahead of its hitch would be folded into what tows it.
             if abs(turned(apart, h)) <= 0.5 * math.pi:
                 h = apart
         record.h[e, 0] = h

@@ -183,8 +183,11 @@ def nearest_lane(points, point_nodes, x, y, h):
             turn, cost, node = math.pi - turn, cost + AGAINST, node ^ 1
             c, s, along = -c, -s, -along
         cost += PER_RADIAN * turn
+        # A body less than 1 m before a lane's start was moved to the start, 0.77 m in Vector's
+        # CBNAO; now it is on the lane that is there, that of the junction.
         if along < -SLACK and _begins(points, point_nodes, i, c, s):
             cost += BEFORE
+        # The first of two alike: rounding must not choose.
         if turn <= MOST_TURN and cost < best - 1e-9:
             best, found = cost, node
     return found

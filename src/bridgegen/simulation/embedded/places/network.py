@@ -62,6 +62,8 @@ class Network:
             Ways(program.on_course(course), model)
             for model, course in zip(models, given, strict=True)
         ]
+        # Threads share a network. ``tables`` is replaced as a whole and holds all that an older one
+        # does, so a thread that still reads the older one reads nothing wrong.
         self._lock = Lock()
         self._corridors: dict[int, Float] = {}
         self._points = np.zeros((len(models), len(program.points), 2))
@@ -223,6 +225,8 @@ class Network:
             wanted: road network, route and node of each way; see `Ways.plan`.
         """
         with self._lock:
+            # Ways are numbered in the order of planning, and that is not the same in any batch: so
+            # no result may depend on a way's number.
             for p, route, node in sorted(set(wanted)):
                 self._ways[p].plan(route, node)
             self.tables = self._tables()

@@ -33,6 +33,7 @@ def slopes(model: OpenDrive, route: Route, step: float, count: int) -> Float:
     """
     roads = {piece.road_id: model.road(piece.road_id) for piece in route.pieces}
     if not any(map(_is_sloped, roads.values())):
+        # No table at all: on level roads no bit changes, and kernels do not look anything up.
         return LEVEL
     stations = np.arange(count) * step
     starts = np.array([piece.station for piece in route.pieces])
@@ -43,6 +44,8 @@ def slopes(model: OpenDrive, route: Route, step: float, count: int) -> Float:
         road = roads[piece.road_id]
         s = piece.s + (stations[on] - piece.station) * piece.rate
         s = np.clip(s, min(piece.s, piece.s_end), max(piece.s, piece.s_end))
+        # Of the reference line: for 6 % of bank that changes over 50 m, a lane 5 m aside rises by
+        # 0.6 %, which is left out.
         rise[on] = values(_derived(road.elevations), s) * piece.rate
         bank[on] = values(road.superelevations, s) * np.sign(piece.rate)
     grade = elementary.atan(rise)

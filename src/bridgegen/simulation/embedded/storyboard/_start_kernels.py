@@ -71,6 +71,7 @@ def begin_initially(plan, roads, state, record):
             start_at_speed(j, plan, state, record)
         elif plan.actions[j, DOES] == KEEP_DISTANCE:
             start_at_distance(j, plan, roads, state, record)
+        # Later on a teleport is seen at the next instant; at the start there is no earlier one.
         elif plan.actions[j, DOES] == TELEPORT:
             e = plan.actions[j, WHOM]
             state.placed[e] = False
@@ -119,6 +120,7 @@ def start(plan, roads, state, record):
             record.h[e, 0] = h
         state.command[e] = state.target[e] = record.v[e, 0]
     look_round(state)
+    # After all others are placed: such a start counts from where another entity is.
     for i in range(plan.starts.shape[0]):
         e = plan.starts[i, 0]
         put(e, plan.starts[i, 1], 0, plan, roads, state, record)
@@ -172,5 +174,6 @@ def start_globals(plan, state):
                 state.lights,
             )
     for i in range(state.lights.shape[0]):
+        # After the controllers: what the start says of a light goes before its first phase.
         if plan.first_states[i] >= 0:
             state.lights[i] = plan.first_states[i]

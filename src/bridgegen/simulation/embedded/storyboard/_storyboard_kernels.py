@@ -68,6 +68,7 @@ def trigger_event(x, k, plan, roads, state, record):
         if other != x and state.phase[other] == RUNNING:
             if priority == OVERRIDE:
                 stop_element(other, k, plan, roads, state, record)
+            # A skipped event counts as an execution (8.4.2.1); esmini has it wait.
             elif priority == SKIP:
                 enter(x, SKIPPED, state)
                 state.executions[x] += 1
@@ -106,6 +107,8 @@ def stop_element(x, k, plan, roads, state, record):
                 if not state.action_ended[j]:
                     stop_motion(j, k, plan, roads, state, record)
                     state.action_ended[j] = True
+        # A stopTransition, after which it does not run again (8.4.2); in esmini an overridden event
+        # has an endTransition, and may.
         state.phase[y] = COMPLETE
         enter(y, STOPPED, state)
 
@@ -120,6 +123,8 @@ def finish(k, plan, state):
 
     An event or a group that may run again goes back to standby.
     """
+    # Backwards, for children stand after their parents: an element can end in the same instant as
+    # its last child.
     for x in range(plan.elements.shape[0] - 1, -1, -1):
         if state.phase[x] != RUNNING:
             continue

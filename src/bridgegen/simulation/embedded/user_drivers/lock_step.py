@@ -69,6 +69,7 @@ def drive_in_lock_step(
                 raise
             if len(rows) > 1:
                 half = len(rows) // 2
+                # The rows were asked about together, so the one that fails is not known.
                 waiting += [rows[half:], rows[:half]]
                 continue
             batch.fail(FAILURES[error.kind], str(error))
@@ -153,10 +154,14 @@ class Wheel:
             DriverError: it failed.
         """
         batch, record = self._batch, self._batch.record
+        # At every instant, though the driver is asked once a period: sensors look on, and tracks
+        # have no gaps.
         batch.observe(k, ROUTE_STEP, self._route, self._tracks, self._stop, self._light)
         if k % self._every == 0:
             answer, self._asked = self._ask(k), k
             if isinstance(answer, Plans):
+                # Here, not in the driver's process: between two calls nothing is sent, and each row
+                # is followed by itself, so that its bits do not depend on the batch.
                 self._answer = Follower(answer, self._time_step)
                 if self._note:
                     self._note(k, answer, batch.running)

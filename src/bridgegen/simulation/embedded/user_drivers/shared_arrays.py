@@ -40,6 +40,7 @@ class SharedArrays:
             placed.append((array.dtype.str, array.shape, size))
             size += -(-array.nbytes // ALIGNED) * ALIGNED
         size = max(size, 1)  # nothing cannot be mapped
+        # Grown, never made anew: the other process keeps its map while the size is the same.
         if size > self._size:
             if not self._path:
                 number, self._path = tempfile.mkstemp(prefix="bridgegen-")

@@ -92,6 +92,8 @@ class OwnDriver:
                     program, setup, n, self._first.process, self._is_stopped.is_set
                 )
         with self._lock:
+            # A process for each thread that drives at the same time: a compiled loop cannot be
+            # interrupted, and code that writes where it should not takes its process down.
             if not self._idle:
                 self._idle.append(self._seat())
                 self._seats.append(self._idle[0])
@@ -187,10 +189,12 @@ class Seat:
         layout, views = self._arrays.put(whole)
         ending = views[State._fields.index("ending")]
 
+        # Rows that have ended are the progress: the time limit is for one row, not for the batch.
         def ended() -> int:
             return int(np.count_nonzero(ending[:, N_STEPS]))
 
         sent = None if roads is self._roads else roads
+        # A process that has died takes the road networks with it.
         self._roads = None  # until it is known to have them
         try:
             messages: dict[int, str] = self.process.call(
@@ -240,6 +244,8 @@ def _drive(
         except DriverError as error:
             if is_stopped():
                 raise
+            # So the first that has not ended is the one that hung or crashed, and no halving is
+            # needed.
             at = int(np.argmax(batch.running))  # they are driven one after the other
             waiting += [each for each in (rows[at + 1 :], rows[:at]) if len(each)]
             culprit = setup(rows[at : at + 1])
@@ -301,6 +307,7 @@ def _simulate(
     arrays: Any = seen(layout)
     state, record = State(*arrays[: len(State._fields)]), Record(*arrays[len(State._fields) :])
     raised: list[str] = []
+    # What a C callback raises cannot reach its caller; Python hands it to this hook.
     sys.unraisablehook = lambda error: raised.append(_described(error))
     try:
         plan = addressed(plan, ask, here(plan, _roads[0], state, record))

@@ -74,11 +74,15 @@ def run_controllers(now, controllers, phases, changes, slots, phase_now, phase_u
     """Take every controller to its next phase where the present one is over."""
     for c in range(controllers.shape[0]):
         first, last = controllers[c, FIRST], controllers[c, LAST]
+        # Phases may last 0 s, and a step may be longer than a phase; a whole cycle of phases
+        # without a duration ends the loop.
         for _ in range(last - first):
             i = phase_now[c]
             if i < 0 or now < phase_until[c] - SAME_TIME:
                 break
             i = first if i + 1 == last else i + 1
+            # From when the last phase was over, not from now: else each cycle would be later by a
+            # part of a step.
             until = phase_until[c] + max(slots[phases[i, DURATION]], 0.0)
             enter_phase(c, i, until, phases, changes, phase_now, phase_until, lights)
 
