@@ -45,7 +45,16 @@ def approve(text: str | Iterable[str], *named: object) -> None:
     Of several lines those count that name one of them; without names, all.
     """
     whole = text if isinstance(text, str) else "\n".join(text)
-    lines = [line for line in whole.splitlines() if not named or any(str(n) in line for n in named)]
+    # A number is looked for in what is the same everywhere: a temporary folder has numbers, too.
+    lines = [
+        line
+        for line in whole.splitlines()
+        if not named
+        or any(
+            name in (_same_everywhere(line, _Now.item.config) if name.isdigit() else line)
+            for name in map(str, named)
+        )
+    ]
     _compare("\n".join(lines), named)
 
 

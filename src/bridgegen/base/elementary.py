@@ -1,7 +1,8 @@
 """Elementary functions of numbers and arrays, with the bits that kernels get.
 
 NumPy's and the system's own round otherwise on other processors; see `_elementary_kernels`. What
-Python works out for a rollout, or as a kernel does, uses these.
+Python works out for a rollout, or as a kernel does, uses these. What helps users' drivers does not:
+they run in processes of their own, where the compiler would first have to be imported.
 """
 
 from functools import cache
@@ -33,9 +34,13 @@ def _function(number: int) -> Function:
     def apply(x: Any, y: Any = 0.0, /) -> Any:
         if isinstance(x, float | int) and isinstance(y, float | int):
             return _kernels().value(number, float(x), float(y))
-        x, y = np.broadcast_arrays(np.asarray(x, np.float64), np.asarray(y, np.float64))
-        out = np.empty(x.shape)
-        _kernels().each(number, x.ravel(), y.ravel(), out.reshape(-1))
+        x, y = np.asarray(x, np.float64), np.asarray(y, np.float64)
+        out = np.empty(np.broadcast_shapes(x.shape, y.shape))
+        # Copies, where need be: an array that may not be written has another type for the compiler.
+        flat = [
+            np.array(np.broadcast_to(value, out.shape), order="C").reshape(-1) for value in (x, y)
+        ]
+        _kernels().each(number, *flat, out.reshape(-1))
         return out
 
     return apply

@@ -18,7 +18,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from bridgegen.base import elementary
 from bridgegen.base.arrays import Bool, Float, Int
 from bridgegen.drivers.batches import SIZE as BLOCK
 from bridgegen.drivers.batches import blocks, checked_size, equal_places
@@ -114,7 +113,7 @@ def vectors(observation: Observation) -> npt.NDArray[np.float32]:
     """
     o = observation
     n = len(o.x)
-    ahead, left = elementary.cos(o.h)[:, None], elementary.sin(o.h)[:, None]
+    ahead, left = np.cos(o.h)[:, None], np.sin(o.h)[:, None]
     out = np.zeros((n, SIZE))
     stop = np.isfinite(o.stop_distance)
     out[:, 0] = o.v / SPEED
@@ -131,14 +130,14 @@ def vectors(observation: Observation) -> npt.NDArray[np.float32]:
     for values in (
         (dx * ahead + dy * left) / LENGTH,
         (dy * ahead - dx * left) / LENGTH,
-        elementary.atan2(elementary.sin(turn), elementary.cos(turn)) / np.pi,
+        np.arctan2(np.sin(turn), np.cos(turn)) / np.pi,
     ):
         out[:, at : at + values.shape[1]] = values
         at += values.shape[1]
     tracks = o.tracks
     there = tracks[:, :, 0] >= 2.0
     dx, dy = tracks[:, :, 1] - o.x[:, None], tracks[:, :, 2] - o.y[:, None]
-    distance = np.where(there, elementary.hypot(dx, dy), np.inf)
+    distance = np.where(there, np.hypot(dx, dy), np.inf)
     nearest = np.argsort(distance, axis=1, kind="stable")[:, :NEAREST]
     turn = tracks[:, :, 3] - o.h[:, None]
     vx = tracks[:, :, 4] - o.v[:, None] * ahead
@@ -148,8 +147,8 @@ def vectors(observation: Observation) -> npt.NDArray[np.float32]:
             np.ones_like(dx),
             (dx * ahead + dy * left) / LENGTH,
             (dy * ahead - dx * left) / LENGTH,
-            elementary.cos(turn),
-            elementary.sin(turn),
+            np.cos(turn),
+            np.sin(turn),
             (vx * ahead + vy * left) / SPEED,
             (vy * ahead - vx * left) / SPEED,
             tracks[:, :, 7] / 5.0,

@@ -15,7 +15,6 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from bridgegen.base import elementary
 from bridgegen.base.arrays import Bool, Int
 from bridgegen.base.errors import InputError
 from bridgegen.drivers.interface import PIECE_POINTS, Observation, RoadMap, Scene
@@ -54,7 +53,7 @@ class _Tables:
         self.first: Int = np.cumsum([0, *map(len, pieces)])
         self.pieces = np.concatenate([*pieces, np.zeros((1, PIECE_POINTS, 3))])
         h = self.pieces[:, :, 2]
-        self.directions = np.stack((elementary.cos(h), elementary.sin(h)), axis=-1)
+        self.directions = np.stack((np.cos(h), np.sin(h)), axis=-1)
         self.counts: Int = np.concatenate([*(map_.piece_points for map_ in maps), [0]])
         self.light: Int = np.concatenate([*(map_.piece_light for map_ in maps), [-1]])
         self.attributes = np.zeros((len(self.pieces), ATTRIBUTES), dtype=np.float32)
@@ -109,8 +108,8 @@ def gather(scene: Scene, observation: Observation) -> Polylines:
         tables.directions,
         observation.x,
         observation.y,
-        elementary.cos(observation.h),
-        elementary.sin(observation.h),
+        np.cos(observation.h),
+        np.sin(observation.h),
         points,
         mask,
     )

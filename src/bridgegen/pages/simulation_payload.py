@@ -40,6 +40,8 @@ def simulation_payload(pipeline: Pipeline) -> dict[str, Any]:
         roads, _ = runner.roads_of(X[:1])
         rollout = runner.nominal_batch().run()
         facts = facts_of(rollout, 0, roads.corridors([0])[0])
+        if facts.own_bodies != 1:
+            raise InputError("the ego has a trailer")
         room = verdict_of(*rollout.shape[1:])
         program = runner.embedded.program
         found = portable.tables(program, roads, facts=facts, verdict=room)

@@ -26,7 +26,7 @@ function simulator() {
 
 /** The row with some values, as `SearchSpace.row` completes it: derived ones follow, bounds hold. */
 function completed(simulator, values) {
-  const row = {}, limits = {};
+  const row = {};
   for (const part of given.space) {
     if (part.formula) { row[part.name] = simulator.evaluate(part.formula, row); continue; }
     let { low, high } = part;
@@ -36,10 +36,9 @@ function completed(simulator, values) {
     }
     if (part.whole) { low = Math.ceil(low - 1e-9); high = Math.floor(high + 1e-9); }
     high = Math.min(Math.max(high, part.low), part.high);
-    limits[part.name] = [low, high];
     row[part.name] = Math.min(Math.max(values[part.name] ?? part.default, low), high);
   }
-  return { row, limits };
+  return row;
 }
 
 // The motion of a row as a playback, with what the chosen one has of road, bodies and lamps.
@@ -136,7 +135,7 @@ export async function simulated(i, facts) {
   const kernels = await simulator(), values = await exactValues(i);
   if (!agrees(kernels)) return null;
   kernels.choose(given.driver);
-  const row = { ...completed(kernels, values).row, ...values };
+  const row = { ...completed(kernels, values), ...values };
   const { made, status } = playbackOf(unpack(base), kernels, row);
   return status === 0 ? { ...made, ...facts, tried: false, parameters: row, picture: null } : null;
 }
@@ -209,7 +208,7 @@ export class Explorer {
       const kernels = await simulator();
       return (values) => {
         kernels.choose(this.driver);
-        const { steps, status } = kernels.run(completed(kernels, { ...this.values, ...values }).row);
+        const { steps, status } = kernels.run(completed(kernels, { ...this.values, ...values }));
         if (status !== 0) return -1;
         kernels.judge(steps, status);
         const found = conflictOf(this.base, kernels);
@@ -246,7 +245,7 @@ export class Explorer {
       const kernels = await simulator(); // the first time some 50 ms
       if (!agrees(kernels)) return this.refuse("the kernels of this page give another motion than the run recorded");
       kernels.choose(this.driver);
-      const { row } = completed(kernels, this.values);
+      const row = completed(kernels, this.values);
       for (const name of this.sliders.keys()) this.write(name, row[name], name === moved && row[name] === Number(this.sliders.get(name).range.value));
       const { made, status } = playbackOf(this.base, kernels, row);
       this.row = row;
