@@ -81,6 +81,7 @@ def test_any_evaluation_has_its_motion(view, finished):
 
 
 def test_what_is_no_evaluation_has_none(view):
+    view.page()  # which reads the rows; no other test need have been here before
     assert view.motion(len(view._rows)) is None
     with refuses(InputError, "120", "121"):
         view.fragment(121)
