@@ -95,6 +95,10 @@ def test_a_page_gets_the_same_bits(scenario, driver, tmp_path):
     assert elsewhere(pipeline, X, tmp_path) == want
 
 
+def test_the_module_names_no_file_of_the_machine_that_made_it():
+    assert b"_kernels.py" not in portable.MODULE.read_bytes()
+
+
 @pytest.mark.parametrize(("own", "other"), [("route-follower", "fsm"), ("reference", "careful")])
 def test_another_driver_at_the_wheel_drives_as_in_its_own_run(own, other, tmp_path):
     pipeline = made("crossroads-s2", own)
