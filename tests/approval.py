@@ -17,8 +17,13 @@ from typing import Any
 
 import pytest
 
+import bridgegen
+
 TABLE = Path(__file__).with_name("messages.txt")
 ROOT = Path(__file__).parents[1]
+OURS = (Path(bridgegen.__file__).parent, Path(__file__).parent)
+"""The package lies beside the tests only where it is installed to be edited."""
+
 HEAD = "# Approved by: pytest --approve-messages; see tests/approval.py\n"
 
 
@@ -121,7 +126,7 @@ def _is_foreign(error: BaseException) -> bool:
     """
     for frame, number in reversed(list(walk_tb(error.__traceback__))):
         file = Path(frame.f_code.co_filename)
-        ours = any(file.is_relative_to(ROOT / folder) for folder in ("src", "tests"))
+        ours = any(file.is_relative_to(folder) for folder in OURS)
         return not (ours and getline(str(file), number).lstrip().startswith("raise "))
     return False
 
