@@ -7,6 +7,7 @@ import pytest
 
 from bridgegen.assess.conflict.analysis import CONTACT, COURSE, NEAR_MISS, ConflictType, analyse
 from bridgegen.assess.conflict.harm import decisive
+from bridgegen.assess.conflict.summary import sentence
 from bridgegen.assess.conflict.types import RULES, Responsible, Rule
 from bridgegen.drivers.kinds import BICYCLE, CAR, OTHER, PEDESTRIAN
 from bridgegen.drivers.preventable import avoids_cut_in
@@ -464,11 +465,14 @@ def test_priority_does_not_allow_to_drive_into_what_has_long_been_in_the_way(tra
     other = track(y=-6.0, h=RIGHT_ANGLE, v=1.0, t=8.0)
     rollout = meeting(track(x=-62.0, v=10.0, t=8.0), other, claims=[BY_SIGNS])
     assert verdict(rollout) == (EGO, Rule.JUNCTION_OCCUPIED)
-    # the other way round the ego creeps, and the other is the one who could have braked
+    # the other way round the other could have braked, but the ego, which creeps, had to give way
     ego, other = track(x=-6.0, v=1.0, t=8.0), track(y=-62.0, h=RIGHT_ANGLE, v=10.0, t=8.0)
     rollout = meeting(ego, other, claims=[-BY_SIGNS])
-    assert verdict(rollout) == (BV, Rule.JUNCTION_OCCUPIED)
-    assert not at_fault(rollout)
+    assert verdict(rollout) == (Responsible.SHARED, Rule.SIGNS)
+    assert at_fault(rollout)
+    assert "the ego disregarded signs of priority, and" in sentence(analyse(rollout), 0, 1)
+    # no duty is known: the other is the one who could have braked
+    assert verdict(meeting(ego, other, claims=[0])) == (BV, Rule.JUNCTION_OCCUPIED)
 
 
 def test_who_turns_gives_way_to_who_comes_along_the_same_road(track, meeting, course):

@@ -143,6 +143,11 @@ def _responsibility(conflicts: Conflicts, row: int, other: int, name: str) -> st
     elif who == Responsible.SHARED and rule in _BY_BOTH:
         return f"both are responsible: {_BY_BOTH[rule]} ({source})"
     words = words.replace("the other", "the ego" if who == Responsible.OTHER else name)
+    kind = ConflictType(int(conflicts.type[row, other]))
+    if who == Responsible.SHARED and kind in _CROSSINGS:
+        words += f", and {name} drove on although comfortable braking would have done"
+    elif who == Responsible.SHARED and kind == ConflictType.SIDE_SWIPE:
+        return f"both are responsible: {name} {words}, and the ego could have avoided it ({source})"
     return f"{_BEARS[who].format(rule=words, other=name)} ({source})"
 
 
