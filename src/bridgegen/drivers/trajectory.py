@@ -8,7 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from bridgegen.base import elementary
 from bridgegen.base.arrays import Bool, Float
 from bridgegen.base.errors import InputError
 from bridgegen.drivers.interface import Observation, Trajectory
@@ -142,7 +141,9 @@ def _refuse_motion(columns: Float, now: Float) -> None:
         now: ``(4, N)`` x, y, h, v of the egos.
     """
     time, x, y, h, v = columns
-    off = elementary.hypot(x[:, 0] - now[0], y[:, 0] - now[1])
+    # Not `elementary`: it runs in the driver's process, which must not wait for the compiler, and
+    # what it decides are refusals.
+    off = np.hypot(x[:, 0] - now[0], y[:, 0] - now[1])
     allowed = JUMP + ROUNDED * time[:, 0] * np.maximum(v[:, 0], now[3])
     if (at := _first(off > allowed)) is not None:
         raise InputError(
@@ -156,7 +157,7 @@ def _refuse_motion(columns: Float, now: Float) -> None:
             f"got a first heading {np.degrees(turned[at]):.0f}° off"
         )
     dx, dy = np.diff(x), np.diff(y)
-    far = elementary.hypot(dx, dy)
+    far = np.hypot(dx, dy)
     limit = ROUNDED * np.diff(time) * np.maximum(v[:, :-1], v[:, 1:]) + SLACK
     if (at := _first(far > limit)) is not None:
         raise InputError(
@@ -164,7 +165,7 @@ def _refuse_motion(columns: Float, now: Float) -> None:
             f"{time[at[0], at[1] + 1]:.4g} s, where its speeds allow {limit[at]:.2f} m"
         )
     middle = h[:, :-1] + 0.5 * _wrapped(np.diff(h))
-    along = dx * elementary.cos(middle) + dy * elementary.sin(middle)
+    along = dx * np.cos(middle) + dy * np.sin(middle)
     if (at := _first(along < -SLACK)) is not None:
         raise InputError(
             f"a trajectory must not go backwards, got {-along[at]:.2f} m against its heading from "

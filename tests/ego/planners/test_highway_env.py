@@ -109,9 +109,9 @@ def test_a_marking_that_forbids_a_change_forbids_the_lane():
 def test_without_the_planner_the_error_says_how_to_get_it(monkeypatch):
     from dataclasses import replace
 
-    wanting = replace(highway_env.PLANNER, requires=("highway-env==0.0.1",))
+    wanting = replace(highway_env.PLANNER, requires=("no-such-planner==0.0.1",))
     monkeypatch.setattr(highway_env, "PLANNER", wanting)
-    with refuses(InputError, "highway-env"):
+    with refuses(InputError, "no-such-planner"):
         highway_env.HighwayEnvDriver()
 
 
