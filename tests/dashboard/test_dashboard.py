@@ -11,6 +11,7 @@ from urllib.parse import unquote
 import pytest
 from tests.approval import approve, refuses
 from tests.dashboard.conftest import R_12
+from tests.pages import without_theme
 
 import bridgegen as bg
 from bridgegen.base.errors import FileFormatError, StorageError
@@ -36,7 +37,7 @@ class Tags(HTMLParser):
 
     def __init__(self, page: Path) -> None:
         super().__init__()
-        self.text = page.read_text("utf-8")
+        self.text = without_theme(page.read_text("utf-8"))
         self.open: list[str] = []
         self.links: list[str] = []
         self.names: set[str] = set()

@@ -163,7 +163,7 @@ def test_a_hostile_title_is_text(tmp_path, with_summary, title):
     shown = title.encode("utf-8", "replace").decode()
     assert Page(text).text["title"].strip() == f"{shown}: {shown} – BridgeGen"
     assert json.loads(embedded(text))["summary"]["title"] == title
-    assert sum(tag == "script" for tag, _ in Page(text).elements) == 2
+    assert sum(tag == "script" for tag, _ in Page(text).elements) == 3
 
 
 @pytest.mark.parametrize(("n", "kept"), [(0, 0), (1, 1), (2, 0), (41, 3)])

@@ -71,7 +71,7 @@ def test_junit_and_the_page_tell_outcomes(turn, tmp_path):
     approve(text, "19.4 m/s")
     found = payload(turn, {}, {})["suite"]
     assert found["outcomes"][0] == [
-        "Collisions: 2 of 2 (100.0%), 0 of them after slowing down; impact 16.7 m/s on average, "
+        "Collisions: 2 of 2 (100 %), 0 of them after slowing down; impact 16.7 m/s on average, "
         "19.4 m/s at most"
     ]
     assert found["entries"][0]["results"][0]["hits"] == [0, 2]
@@ -157,7 +157,7 @@ def test_points_are_the_mean_of_sub_scores():
 def test_a_suite_without_collisions_tells_none():
     assert outcomes([result(RowResult(), RowResult())]) == ""
     some = outcomes([result(RowResult(), hit(36, 18), RowResult(problem="lost"))])
-    approve(some, "50.0", "5.0 m/s")
+    approve(some, "50 %", "5.0 m/s")
 
 
 def test_the_page_s_command_runs_the_same_row(turn):

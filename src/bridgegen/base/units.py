@@ -85,3 +85,12 @@ def in_unit(text: str, unit: str) -> float:
         raise ValueError(rule)
     factor, offset = known[symbol]
     return float(Fraction(found[1]) * factor + offset)
+
+
+def percent(share: float) -> str:
+    """Return a share in per cent, with enough digits to differ from 0 % and 100 %."""
+    if 0.0 < share < 0.0995:
+        return f"{100.0 * share:.2g} %"
+    if 0.995 <= share < 1.0:
+        return f"{min(100.0 * share, 99.9):.1f} %"
+    return f"{100.0 * share:.0f} %"

@@ -73,6 +73,7 @@ def build_report(
     version: str,
     notes: Mapping[str, Any],
     view: str = "",
+    keep: str = "",
     regions: Mapping[str, Any] | None = None,
     confirmations: Sequence[Record] = (),
     hashes: Mapping[str, str] | None = None,
@@ -100,6 +101,7 @@ def build_report(
         finished: whether the budget is spent.
         version: of BridgeGen.
         notes: the algorithm's notes on the run.
+        keep: the command line that keeps its failures in a suite.
         view: the command line that shows this run with the motion of every scenario, if any.
         regions: the critical ones, in the form of `regions.record`, if they are known.
         confirmations: of its scenarios in other simulators.
@@ -146,6 +148,7 @@ def build_report(
         version=version,
         command=command,
         view=view,
+        keep=keep,
         independent=algorithm == INDEPENDENT,
         harm=pipeline.objective.harm if rule != "thresholds" else "",
         criteria=pipeline.objective.criteria,

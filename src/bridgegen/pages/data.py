@@ -54,6 +54,7 @@ class RunSummary:
         version: BridgeGen's version.
         command: the exact command line that starts this run again.
         started: when the run began, as ISO 8601 text; may be empty.
+        keep: the command line that keeps its failures in a suite.
         view: the command line that shows this run's page with the motion of every scenario.
         independent: whether each row was drawn by itself, as random search draws them.
         harm: the metric that makes a scenario critical, "harm" or "harm_any"; "" where the paper's
@@ -88,6 +89,7 @@ class RunSummary:
     command: str
     started: str = ""
     view: str = ""
+    keep: str = ""
     independent: bool = False
     harm: str = ""
     criteria: tuple[str, ...] = ()

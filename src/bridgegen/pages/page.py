@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from functools import cache, cached_property
 from importlib.resources import files
 from pathlib import Path
+from typing import Any
 
 from markupsafe import Markup
 
@@ -196,7 +197,7 @@ def report_page(data: ReportData, *, live: bool = False) -> bytes:
     return _page("page.html", modules, title, text, connect=connect)
 
 
-def write_page(path: Path, entry: str, title: str, data: str) -> None:
+def write_page(path: Path, entry: str, title: str, data: str, **more: Any) -> None:
     """Write a page, whole or not at all.
 
     Args:
@@ -204,16 +205,17 @@ def write_page(path: Path, entry: str, title: str, data: str) -> None:
         entry: a module of ``web`` with a template beside it ("show.js", "show.html").
         title: plain text.
         data: JSON that is safe inside a ``<script>`` element, see `payload.script_json`.
+        **more: values of the template: "verdict", "heading".
 
     Raises:
         StorageError: the file cannot be written.
     """
-    write_whole(path, [page_of(entry, title, data)])
+    write_whole(path, [page_of(entry, title, data, **more)])
 
 
-def page_of(entry: str, title: str, data: str) -> bytes:
+def page_of(entry: str, title: str, data: str, **more: Any) -> bytes:
     """Return a page; see `write_page`."""
-    return _page(entry.replace(".js", ".html"), (entry,), title, data)
+    return _page(entry.replace(".js", ".html"), (entry,), title, data, **more)
 
 
 def code_of(entry: str) -> int:
@@ -221,7 +223,7 @@ def code_of(entry: str) -> int:
     return len(page_of(entry, "", ""))
 
 
-def _page(template: str, modules: tuple[str, ...], title: str, data: str, **more: str) -> bytes:
+def _page(template: str, modules: tuple[str, ...], title: str, data: str, **more: Any) -> bytes:
     script, style = _bundled(modules)
     return templates.page(
         f"pages/web/{template}", title=title, css=style, script=script, data=Markup(data), **more

@@ -160,6 +160,7 @@ def _summary(data: ReportData) -> dict[str, Any]:
         "provenance": sentences.provenance(s),
         "command": s.command,
         "view": s.view,
+        "next": s.keep,
         "critical_distance": _number(s.critical_distance),
         "hard_braking": HARD_BRAKING,
         "harm": s.harm,

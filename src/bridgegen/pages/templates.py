@@ -5,6 +5,8 @@ same name, and extends ``pages/web/base.html``; ``pages/web/macros.html`` has ta
 What a template prints is escaped, unless it is `Markup` of our own.
 """
 
+import hashlib
+from base64 import b64encode
 from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -18,11 +20,14 @@ from typing import TYPE_CHECKING, Any
 from markupsafe import Markup
 
 from bridgegen.base.disk import write_whole
+from bridgegen.base.units import percent
 
 if TYPE_CHECKING:
     from jinja2 import Environment
 
 ROOT = files("bridgegen")
+THEME = ROOT.joinpath("pages/web/theme.js").read_text("utf-8")
+
 STYLES = ("pages/web/base.css", "pages/web/still.css")
 """Style sheets of every page without scripts, before its own."""
 
@@ -71,7 +76,27 @@ def _environment(package: str) -> "Environment":
     )
     made.filters |= {"counted": counted, "shown": shown}
     made.globals["version"] = version("bridgegen")
+    # A page without other scripts allows this one by its digest.
+    digest = b64encode(hashlib.sha256(THEME.encode()).digest()).decode()
+    made.globals["theme"] = {"script": Markup(THEME), "digest": f"sha256-{digest}"}
     return made
+
+
+@dataclass(frozen=True)
+class Banner:
+    """The verdict at the top of a page: what failed, how badly, and what to do.
+
+    Attributes:
+        text: a sentence.
+        kind: "fails", "passes", "open" (not judged), or "": the page gives none.
+        word: in capitals, before the sentence.
+        command: the next one, if any.
+    """
+
+    text: str
+    kind: str = ""
+    word: str = ""
+    command: str = ""
 
 
 @dataclass(frozen=True)
@@ -123,6 +148,13 @@ def number(value: float) -> str:
         return f"{value:.3g}"
     digits, power = f"{value:.2e}".split("e")
     return f"{digits}e{int(power)}"
+
+
+def odds(probability: float) -> str:
+    """Return a small probability as people read it: "1 in 3,200"; one from 10 % on in per cent."""
+    if probability >= 0.1:
+        return percent(probability)
+    return f"1 in {float(f'{1.0 / probability:.2g}'):,.0f}" if probability > 0.0 else "0"
 
 
 def counted(count: int, noun: str, many: str = "") -> str:

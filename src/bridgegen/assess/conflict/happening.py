@@ -18,6 +18,7 @@ from pydantic import BaseModel
 
 from bridgegen.base import elementary
 from bridgegen.base.arrays import Bool, Float, Int
+from bridgegen.base.units import percent
 from bridgegen.drivers.kinds import IS_OBSTACLE, IS_ON_FOOT
 from bridgegen.simulation.rollout import Rollout
 
@@ -417,12 +418,12 @@ class Happening:
         if self.near:
             parts.append("came near the ego: " + ", ".join(map(_in_words, self.near)))
         if self.end is not None and (self.end.rows or self.stuck):
-            parts.append(f"the ego reached its end in {self.end.value:.0%}")
+            parts.append(f"the ego reached its end in {percent(self.end.value)}")
         return "; ".join(filter(None, [*parts, self.stuck_in_words, self.domain]))
 
 
 def _in_words(share: Share) -> str:
-    return f"{share.name} {share.value:.0%}"
+    return f"{share.name} {percent(share.value)}"
 
 
 def _share(name: str, found: Iterable[tuple[bool, int]]) -> Share:

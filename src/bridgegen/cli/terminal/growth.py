@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from rich.console import Console
 from rich.table import Table
 
+from bridgegen.base.units import percent
 from bridgegen.cli.terminal.tables import WHOLE
 
 if TYPE_CHECKING:
@@ -96,7 +97,7 @@ def print_replayed(made: "Replayed", page: Path, *, as_json: bool = False) -> No
 
         responsible = f", {row.responsible} responsible" if row.responsible else ""
         kind = f" ({row.conflict_type}{responsible})" if row.conflict_type else ""
-        print(f"  {with_whom(row.conflict, row.partner)}{kind}, MAIS3+ {row.severity:.2%}")
+        print(f"  {with_whom(row.conflict, row.partner)}{kind}, MAIS3+ {percent(row.severity)}")
     if row.problem or row.implausible:
         print(f"  {row.problem or f'implausible: {row.implausible}'}")
     for criterion, margin in zip(result.criteria, row.margins, strict=False):

@@ -118,6 +118,6 @@ def _shares(evidence: "Evidence") -> str:
 
 
 def _percent(share: float) -> str:
-    from bridgegen.search.regions.box import percent
+    from bridgegen.base.units import percent
 
     return percent(share)

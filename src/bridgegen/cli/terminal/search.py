@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from bridgegen.base.units import percent
 from bridgegen.cli.terminal.live import Live
 from bridgegen.cli.terminal.tables import print_table
-from bridgegen.search.regions.box import percent
 
 if TYPE_CHECKING:
     from bridgegen.engine.workers import Workers

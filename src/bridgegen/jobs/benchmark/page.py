@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Iterator, Sequence
+from math import inf
 from pathlib import Path
 
 from bridgegen.drivers.drivers import available
@@ -27,7 +28,7 @@ def write_page(
     templates.write_page(
         path, "jobs/benchmark/page.html",
         title="Benchmark of planners",
-        facts=[*_facts(plan, found)],
+        facts=[*_facts(plan, found)], verdict=templates.Banner(_lead(standings)),
         standings=[(standing, _measured(standing)) for standing in standings],
         entrants=[_entrant(entrant, found) for entrant in plan.entrants],
         scenarios=[
@@ -40,6 +41,16 @@ def write_page(
         careful=CAREFUL, columns=COLUMNS, sensed=COLUMNS[SENSED], domains=DOMAINS,
         seeds=plan.seeds, command=plan.command(), anchor=_anchor, short=_short, said=_said,
     )  # fmt: skip
+
+
+def _lead(standings: Sequence[Standing]) -> str:
+    """Return which driver has the fewest failure modes, in each column of perception."""
+    best: dict[str, Standing] = {}
+    for one in standings:
+        if one.driven and one.modes < getattr(best.get(one.column), "modes", inf):
+            best[one.column] = one
+    said = [f"{_short(one.driver)} ({one.modes}, {COLUMNS[name]})" for name, one in best.items()]
+    return f"Fewest failure modes: {'; '.join(said)}." if said else "No driver drove."
 
 
 def _facts(plan: Plan, found: Sequence[Outcome]) -> Iterator[str]:

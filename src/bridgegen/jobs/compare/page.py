@@ -44,6 +44,7 @@ def write_page(comparison: Comparison) -> None:
         "jobs/compare/page.html",
         title=f"Comparison: {', '.join(plan.scenarios)}",
         facts=[*_facts(comparison)],
+        verdict=templates.Banner(_lead(comparison)),
         scenarios=[_scenario(comparison, name, settled) for name in plan.scenarios],
         measures=settled,
         shown=[measure for measure in settled if measure.name != "t_critic"],
@@ -57,6 +58,13 @@ def write_page(comparison: Comparison) -> None:
         command=plan.command(),
         figure_style=figures.style(),
     )
+
+
+def _lead(comparison: Comparison) -> str:
+    """Return the first sentence on the first scenario; of several, with its name."""
+    names = [*comparison.plan.scenarios]
+    text = next(iter(words.sentences(comparison, names[0])), "")
+    return text if len(names) == 1 else f"{names[0]}: {text}"
 
 
 def _facts(comparison: Comparison) -> Iterator[str]:

@@ -18,7 +18,7 @@ from bridgegen.jobs.dashboard.taxonomy import SOURCE
 from bridgegen.jobs.dashboard.trends import Series
 from bridgegen.pages import charts, templates
 from bridgegen.pages.sentences import share
-from bridgegen.pages.templates import Cell, counted, joined, when
+from bridgegen.pages.templates import Banner, Cell, counted, joined, when
 from bridgegen.results.failures import FILE
 
 MOST_MODES = 500
@@ -61,7 +61,7 @@ def write_page(found: Dashboard) -> None:
         generator=GENERATOR,
         facts=[*_facts(found)],
         problems=found.project.problems,
-        lead=[item for item in (failing_sentence(found), requirements_sentence(found)) if item],
+        verdict=_banner(found),
         file=FILE,
         notes=found.notes[:MOST_RESULTS],
         modes=_modes("Failure modes of current results", found.failing, base),
@@ -105,6 +105,16 @@ def write_page(found: Dashboard) -> None:
         ),
         open=OPEN,
     )
+
+
+def _banner(found: Dashboard) -> Banner:
+    text = " ".join(filter(None, (failing_sentence(found), requirements_sentence(found))))
+    if found.failing or found.violated:
+        return Banner(text, "fails", "FAILS")
+    unsure = found.project.problems or any(result.unjudged for result in found.project.results)
+    if unsure or not found.project.results:
+        return Banner(text, "open", "NOT JUDGED" if found.project.results else "")
+    return Banner(text, "passes", "NO FAILURE FOUND")
 
 
 def _facts(found: Dashboard) -> Iterator[str]:

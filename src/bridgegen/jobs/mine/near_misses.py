@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 
+from bridgegen.base.units import percent
 from bridgegen.jobs.mine.mine import CRITICAL, Mined, Summary
 from bridgegen.pages.moving import moving_picture
 from bridgegen.pages.templates import counted
@@ -55,7 +56,7 @@ def in_words(summary: Summary) -> str:
         text += f", {doubtful:,} of them with motion that could not happen"
     if touching:
         share = len(touching) / max(summary.tracks, 1)
-        text += f"; boxes of {len(touching):,} participants ({share:.0%}) touch"
+        text += f"; boxes of {len(touching):,} participants ({percent(share)}) touch"
         if share > TRUSTED:
             text += ": unless these are accidents, boxes or positions are wrong, near misses too"
     return text

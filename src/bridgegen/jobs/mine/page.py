@@ -10,6 +10,7 @@ import numpy as np
 
 from bridgegen.base.disk import refuse_other, write_whole
 from bridgegen.base.errors import StorageError
+from bridgegen.base.units import percent
 from bridgegen.drivers.kinds import BICYCLE, MOTORCYCLE, NAMES, PEDESTRIAN
 from bridgegen.jobs.mine import near_misses as conflicts
 from bridgegen.jobs.mine.mine import CRITICAL, PATHS_SHOWN, Mined, Summary
@@ -118,6 +119,7 @@ def write_all(mined: Mined) -> None:
         title="What was recorded",
         generator=GENERATOR,
         facts=[*_facts(mined)],
+        verdict=_banner(mined),
         **_recordings(mined),
         **_events(mined),
         played={
@@ -205,6 +207,19 @@ def _csv(head: Iterable[str], rows: Iterable[Iterable[object]]) -> Iterator[byte
         writer.writerow([cell(value) for value in row])
     # Names come from recordings, and may hold what UTF-8 cannot.
     yield text.getvalue().encode("utf-8", "replace")
+
+
+def _banner(mined: Mined) -> templates.Banner:
+    near = sum(
+        not each.is_contact for recording in mined.recordings for each in recording.conflicts
+    )
+    text = f"{counted(near, 'near miss')} in {counted(len(mined.recordings), 'recording')}"
+    doubtful = [item for item in mined.replays if item.event.event.doubt]
+    if mined.replays:
+        text += f"; {counted(len(mined.replays), 'scenario')} written"
+    if doubtful:
+        text += f", {len(doubtful):,} of them doubtful"
+    return templates.Banner(f"{text}.")
 
 
 def _facts(mined: Mined) -> Iterator[str]:
@@ -360,7 +375,7 @@ def lanes_in_words(found: LanesFound) -> str:
     share = (
         ""
         if math.isnan(found.vehicle_share)
-        else f", {found.vehicle_share:.1%} of the states \
+        else f", {percent(found.vehicle_share)} of the states \
 of vehicles that drive on them"
     )
     ways = counted(len(found.carriageways), "carriageway")

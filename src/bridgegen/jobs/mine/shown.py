@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from dataclasses import asdict
 from typing import Any
 
+from bridgegen.base.units import percent
 from bridgegen.jobs.frame import Table
 from bridgegen.jobs.mine.mine import Mined, Summary
 from bridgegen.jobs.mine.near_misses import conflicts_as_json, recordings_in_words, screen_rows
@@ -219,7 +220,7 @@ def _lane_row(summary: Summary) -> tuple[str, str, int, str, str, str]:
         "none: give --map" if found.source == "none" else found.source,
         len(found.carriageways),
         ", ".join(str(each.lanes) for each in shown) + more,
-        "–" if math.isnan(share) else f"{share:.1%}",
+        "–" if math.isnan(share) else f"{percent(share)}",
         f"{shown[0].rms:.2f}" if shown else "–",
     )
 

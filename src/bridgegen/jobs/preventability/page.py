@@ -10,6 +10,7 @@ import numpy as np
 from PIL import Image
 
 from bridgegen.base.arrays import Float
+from bridgegen.base.units import percent
 from bridgegen.jobs.preventability.classes import CellClass, Codes
 from bridgegen.jobs.preventability.result import PreventabilityMap
 from bridgegen.pages import charts, templates
@@ -65,7 +66,7 @@ def write_page(path: Path, result: PreventabilityMap) -> None:
         "jobs/preventability/page.html",
         title=f"{result.scenario.name}: which collisions are preventable",
         facts=[*_facts(result)],
-        lead=_lead(result),
+        verdict=templates.Banner(_lead(result)),
         classes=[class_.label for class_ in CellClass],
         counts=[[name, *_counts(result, name)] for name in result.drivers],
         legend=[(COLOURS[class_], class_.label) for class_ in CellClass if class_ in there],
@@ -111,7 +112,7 @@ def _lead(result: PreventabilityMap) -> str:
 
 
 def _share(count: int, of: int) -> str:
-    return f"{count / of:.2%}" if of else "none"
+    return f"{percent(count / of)}" if of else "none"
 
 
 def _counts(result: PreventabilityMap, driver: str) -> Iterator[int | tuple[int, str]]:

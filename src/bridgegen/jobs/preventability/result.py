@@ -13,6 +13,7 @@ import numpy as np
 from bridgegen.base.disk import write_whole, writing_whole
 from bridgegen.base.extras import is_installed
 from bridgegen.base.records import read_bytes
+from bridgegen.base.units import percent
 from bridgegen.jobs.frame import Judged, Table
 from bridgegen.jobs.preventability.classes import CellClass, Codes, Outcome, classes
 from bridgegen.jobs.preventability.grid import Grid
@@ -198,7 +199,7 @@ class PreventabilityMap:
 
 def _cell(figures: Mapping[str, Any], kind: CellClass) -> str:
     count, share = figures[kind.name.lower()], figures.get(f"{kind.name.lower()}_share")
-    return f"{count:,} {share:.1%}" if isinstance(share, float) else f"{count:,}"
+    return f"{count:,} {percent(share)}" if isinstance(share, float) else f"{count:,}"
 
 
 def simulated(drivers: Sequence[str], models: Sequence[str]) -> tuple[str, ...]:

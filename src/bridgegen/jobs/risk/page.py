@@ -4,12 +4,13 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from bridgegen.base.arrays import Float
+from bridgegen.base.units import percent
 from bridgegen.jobs.risk.options import WORDS
 from bridgegen.jobs.risk.outcomes import EVENTS
 from bridgegen.jobs.risk.result import Finding, ParameterShare, Risk
 from bridgegen.jobs.risk.text import data_sentence, elsewhere_sentence, interval, sentence
 from bridgegen.pages import charts, templates
-from bridgegen.pages.templates import number
+from bridgegen.pages.templates import Banner, number, odds
 
 MOST_DRAWN = 6
 """Largest number of failure modes in the picture of all intervals; the table has all."""
@@ -26,7 +27,7 @@ def write_page(path: Path, risk: Risk) -> None:
         "jobs/risk/page.html",
         title=f"Risk of {risk.exposure.scenario.name}",
         facts=[*facts(risk)],
-        sentence=sentence(risk),
+        verdict=_banner(risk),
         doubts=risk.weighted.doubts,
         picture=_intervals(risk),
         has_rates=risk.exposure.encounters is not None,
@@ -41,12 +42,18 @@ def write_page(path: Path, risk: Risk) -> None:
     )
 
 
+def _banner(risk: Risk) -> Banner:
+    p = risk.probability(risk.event)
+    often = odds(p.estimate) if p is not None and p.estimate > 0.0 else ""
+    return Banner(sentence(risk), word=f"{often} encounters" if often else "")
+
+
 def facts(risk: Risk) -> Iterator[str]:
     """Yield what a reader wants to know first, a few words each."""
     yield f"driver {risk.driver}"
     yield f"{risk.weighted.evaluations:,} simulations"
     yield f"method {risk.estimated.method}"
-    yield f"{risk.exposure.feasible_share.estimate:.2%} of the exposure keep the constraints"
+    yield f"{percent(risk.exposure.feasible_share.estimate)} of the exposure keep the constraints"
     yield f"seed {risk.seed}"
 
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 
+from bridgegen.base.units import percent
 from bridgegen.jobs.frame import Table
 from bridgegen.jobs.risk.cross_simulator import Elsewhere, Ratio
 from bridgegen.jobs.risk.estimators.weighted import Probability
@@ -91,8 +92,8 @@ def elsewhere_sentence(found: Elsewhere) -> str:
     failed = f" {found.failed} rows have no result there." if found.failed else ""
     return (
         f"In {found.simulator} the event is {_ratio(found.factor)} times as likely: "
-        f"{found.confirmed.estimate:.0%} of the probability here are confirmed, and "
-        f"{found.new.estimate:.0%} as much comes from rows that are only close to harm here. "
+        f"{percent(found.confirmed.estimate)} of the probability here are confirmed, and "
+        f"{percent(found.new.estimate)} as much comes from rows that are only close to harm here. "
         f"{found.rows} rows were simulated there; harm that is far from harm here was not looked "
         f"for.{failed}"
     )

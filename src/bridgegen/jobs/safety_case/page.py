@@ -17,6 +17,7 @@ _STATES = {
     "incomplete": "open",
     "undeveloped": "open",
 }
+_BANNERS = {"supported": "passes", "not supported": "fails"}
 _MEANING = {
     "supported": "the evidence supports it",
     "not supported": "evidence speaks against it, or its condition does not hold",
@@ -48,7 +49,9 @@ def page(case: SafetyCase, data: bytes) -> bytes:
         "jobs/safety_case/page.html",
         title=f"Safety case: {case.title}",
         case=case,
-        top=top,
+        verdict=templates.Banner(
+            f"{top.id}: {top.statement.text}", _BANNERS.get(top.status, "open"), top.status.upper()
+        ),
         drawn=drawn,
         elements=[(element, _relations(case, element)) for element in case.elements],
         files={evidence.id: evidence for evidence in case.evidence},

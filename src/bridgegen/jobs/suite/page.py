@@ -4,6 +4,7 @@ import shlex
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 from bridgegen.base.errors import BridgeGenError
 from bridgegen.engine.options import CommonOptions
@@ -20,6 +21,7 @@ from bridgegen.pages.page import code_of, write_page
 from bridgegen.pages.payload import script_json
 from bridgegen.pages.playback import Playback
 from bridgegen.pages.playbacks import beside_others, measured_playbacks
+from bridgegen.pages.templates import Banner
 from bridgegen.simulation.choice import EMBEDDED
 
 FILE = "suite.html"
@@ -92,8 +94,23 @@ def _write(
     data = payload(suite, played, commands, searches=searches, maps=pictures, code=code_of(_MODULE))
     path = suite.folder / FILE
     title = f"{suite.folder.resolve().name}: suite"
-    write_page(path, _MODULE, title, script_json(data))
+    banner = _banner(suite, data["suite"])
+    write_page(
+        path, _MODULE, title, script_json(data), verdict=banner, heading=suite.folder.resolve().name
+    )
     return path
+
+
+def _banner(suite: SuiteRun, page: Mapping[str, Any]) -> Banner:
+    """Return the verdict on the last ego; of two, what the second fixes and breaks."""
+    found = suite.of_ego(suite.egos[-1])
+    verdicts = {result.verdict for result in found}
+    kind, word = "passes", "PASSES"
+    if "failed" in verdicts:
+        kind, word = "fails", "FAILS"
+    elif verdicts != {"passed"}:
+        kind, word = "open", "NOT JUDGED"
+    return Banner(page["changes"] or f"{'; '.join(page['headlines'])}.", kind, word)
 
 
 def command_of(folder: Path, job: Job, result: EntryResult) -> str:

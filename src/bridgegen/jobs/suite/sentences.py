@@ -5,6 +5,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
+from bridgegen.base.units import percent
 from bridgegen.jobs.suite.clauses import ClauseResult
 from bridgegen.jobs.suite.difference import Change, Difference
 from bridgegen.jobs.suite.results import (
@@ -193,8 +194,8 @@ def outcomes(results: Sequence[EntryResult]) -> str:
     speeds = [result.impact_speed for result in hit]
     mean, slowed = sum(speeds) / len(speeds), number["mitigated"]
     return (
-        f"Collisions: {len(hit):,} of {n:,} ({len(hit) / n:.1%}), {slowed:,} of them after slowing "
-        f"down; impact {mean:.1f} m/s on average, {max(speeds):.1f} m/s at most"
+        f"Collisions: {len(hit):,} of {n:,} ({percent(len(hit) / n)}), {slowed:,} of them after "
+        f"slowing down; impact {mean:.1f} m/s on average, {max(speeds):.1f} m/s at most"
     )
 
 
@@ -282,7 +283,7 @@ def changes(found: Difference) -> str:
     words = []
     for change, verb in verbs.items():
         low, high = found.interval(change)
-        sure = f" ({low:.1%} to {high:.1%})" if found.sampled else ""
+        sure = f" ({percent(low)} to {percent(high)})" if found.sampled else ""
         words.append(f"{verb} {counts[change]:,}{sure}")
     text = f"Of {n:,} variations, {found.second} {' and '.join(words)} against {found.first}"
     if not found.sampled:

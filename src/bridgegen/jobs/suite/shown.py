@@ -5,6 +5,7 @@ from dataclasses import asdict
 from typing import Any
 
 from bridgegen.assess.conflict.findings import with_whom
+from bridgegen.base.units import percent
 from bridgegen.jobs.frame import Table
 from bridgegen.jobs.suite.clauses import clause_results
 from bridgegen.jobs.suite.difference import DriverDifference
@@ -153,7 +154,7 @@ def _worst(some: Sequence[EntryResult]) -> str:
             happened = row.critical and row.conflict
             texts = [with_whom(row.conflict, row.partner)] if happened else []
             texts += [f"impact at {row.impact_speed:.1f} m/s"] if row.impact_speed else []
-            texts += [f"MAIS3+ {row.severity:.2%}"] if row.severity else []
+            texts += [f"MAIS3+ {percent(row.severity)}"] if row.severity else []
             texts += [f"violates {violated}"] if violated else []
             return "; ".join(texts)
     lost = [
@@ -196,7 +197,7 @@ def difference_shown(found: DriverDifference) -> list[str | Table]:
     lines.append(f"{made.second} against {made.first}, {n} variations")
     for change in ("broken", "fixed"):
         low, high = made.interval(change)
-        sure = f" ({low:.2%} to {high:.2%} with 95 % confidence)" if made.sampled else ""
+        sure = f" ({percent(low)} to {percent(high)} with 95 % confidence)" if made.sampled else ""
         lines.append(f"  {change:<16}{number[change]}{sure}")
     lines.append(f"  {'both fail':<16}{number['both fail']}")
     lines.append(f"  {'both pass':<16}{number['both pass']}")

@@ -9,6 +9,7 @@ import numpy as np
 from bridgegen.base import elementary
 from bridgegen.base.arrays import Float
 from bridgegen.base.errors import UnsupportedError
+from bridgegen.base.units import percent
 from bridgegen.openx.openscenario import distributions as dst
 from bridgegen.openx.openscenario.declarations import File, FileHeader
 from bridgegen.openx.openscenario.write import to_xml
@@ -57,7 +58,7 @@ def left_out(exposure: Exposure) -> list[str]:
     if exposure.feasible_share.estimate < 1.0:
         notes.append(
             "the file does not hold the scenario's constraints: "
-            f"{1.0 - exposure.feasible_share.estimate:.2%} of its values break one"
+            f"{percent(1.0 - exposure.feasible_share.estimate)} of its values break one"
         )
     if exposure.encounters is not None:
         notes.append("OpenSCENARIO has no rates: the file does not hold the encounters")

@@ -1,9 +1,8 @@
 // The colours of what is drawn, as the style has them now.
 
-export const darkScheme = matchMedia("(prefers-color-scheme: dark)");
 export let palette = {};
 readPalette();
-darkScheme.addEventListener("change", readPalette);
+document.addEventListener("theme", readPalette);
 
 function readPalette() {
   const style = getComputedStyle(document.documentElement);

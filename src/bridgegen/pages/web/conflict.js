@@ -5,13 +5,8 @@ import { $, element } from "./common.js";
 import { data } from "./data.js";
 import { conflictWord } from "./findings.js";
 import { boxCentre, isPlaced } from "./geometry.js";
+import { ZONES } from "./glyph.js";
 import { quantity, shareText } from "./numbers.js";
-
-// Zones of a body by number, see bridgegen.conflict.types: edges are stretches, corners are points; shares of half length and width.
-const ZONES = {
-  1: [[1, 1], [1, -1]], 2: [[1, 1]], 3: [[1, 1], [-1, 1]], 4: [[-1, 1]],
-  5: [[-1, 1], [-1, -1]], 6: [[-1, -1]], 7: [[1, -1], [-1, -1]], 8: [[1, -1]],
-};
 
 const ZONE_SHOWN = 1; // s, before and after the instant
 const INSTANTS = { contact: "collision", "near miss": "least time to collision", "collision course": "least time to collision", violation: "worst" };

@@ -5,6 +5,7 @@ import { anyViolated } from "./criteria_rows.js";
 import { data } from "./data.js";
 import { filters } from "./filters.js";
 import { drawn, nearestToHarm } from "./findings.js";
+import { glyph } from "./glyph.js";
 import { hook } from "./hook.js";
 import { number, shareText } from "./numbers.js";
 import { minimals } from "./playbacks.js";
@@ -30,6 +31,10 @@ class Modes {
     const n = found.modes.length + found.more;
     $("modes-title").textContent = n ? `${number(n)} ${n === 1 ? "way" : "ways"} in which ${found.ego} fails${found.baseline ? ` and ${found.baseline} does not` : ""}` : found.bound.failures ? `${capital(found.ego)} fails in fresh random draws alone` : found.bound.judged === false ? "Not judged" : data.criteria ? "No harm found" : "No failure found";
     $("modes-lead").textContent = capital(found.bound.sentence.replace(n ? /^[^:]*: / : /^(Not judged: |No (failure found|scenario in which .*? was found) in )/, "")); // the title says the rest
+    const kind = n || found.bound.failures ? "fails" : found.bound.judged === false ? "open" : data.criteria ? "" : "passes";
+    $("verdict").className = `banner ${kind}`;
+    $("verdict-word").textContent = { fails: "FAILS", open: "NOT JUDGED", passes: "NO FAILURE FOUND", "": "" }[kind];
+    $("verdict-next").textContent = kind === "fails" ? data.summary.next : "";
     this.buttons = [];
     $("modes-list").replaceChildren(...found.modes.map((mode) => this.card(mode)), ...drawn.map((kept, k) => this.draw(kept, k)));
     $("modes-list").hidden = !n && !drawn.length;
@@ -50,7 +55,8 @@ class Modes {
     const share = mode.space.share === null ? [] : [fact(shareText(mode.space.share), `of the space (95${NARROW}%: ${shareText(mode.space.low)} to ${shareText(mode.space.high)})`, `${mode.space.harmful} of ${mode.space.rows} ${mode.space.drawn} scenarios`)];
     const robust = mode.robustness === null ? fact("not tested", "for robustness") : fact(`${mode.harmful} of ${mode.rows}`, "neighbours harmful", "robustness");
     const severity = mode.severity > 0 ? [fact(shareText(mode.severity), "worst severity", "highest probability of a MAIS3+ injury")] : [];
-    const name = data.kept.find(({ evaluation }) => evaluation === mode.shown)?.name ?? `evaluation ${number(mode.shown + 1)}`;
+    const exported = data.kept.find(({ evaluation }) => evaluation === mode.shown), picture = exported && glyph(exported);
+    const name = exported?.name ?? `evaluation ${number(mode.shown + 1)}`;
     const play = element("button", { type: "button", class: "primary", "aria-label": `Play ${name}, mode ${mode.number}` }, `▶ ${name}`);
     play.addEventListener("click", () => this.play(mode.shown));
     const only = element("button", { type: "button", class: "quiet", "aria-pressed": "false", title: "Show only scenarios of this conflict, responsibility and rule below" }, "Its scenarios");
@@ -75,6 +81,7 @@ class Modes {
         "div", { class: "mode-head" },
         element("span", { class: "mode-number", "aria-hidden": "true" }, `${mode.number}`),
         element("h3", {}, capital(mode.title)),
+        ...(picture ? [picture] : []),
         element("ul", { class: "mode-facts" }, fact(number(mode.count), mode.count === 1 ? "scenario" : "scenarios"), ...severity),
         element("p", { class: "mode-buttons" }, play, fold),
       ),

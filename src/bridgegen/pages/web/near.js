@@ -1,6 +1,5 @@
 // Charts are drawn when they come near the screen, and anew, after something has changed, when they are near it.
 
-import { darkScheme } from "./colours.js";
 import { hook } from "./hook.js";
 
 class NearScreen {
@@ -17,7 +16,7 @@ class NearScreen {
     addEventListener("beforeprint", () => {
       for (const plot of [...this.stale]) this.draw(plot); // paper shows what no screen has shown
     });
-    darkScheme.addEventListener("change", () => this.all());
+    document.addEventListener("theme", () => this.all());
     document.addEventListener("grown", () => this.all());
   }
 

@@ -1,6 +1,5 @@
 // The report: its sections, and the list of critical scenarios with the player.
 
-import { darkScheme } from "./colours.js";
 import { $, copy } from "./common.js";
 import "./contents.js";
 import { anyViolated } from "./criteria_rows.js";
@@ -49,5 +48,5 @@ function hideScenario(hidden) {
 function begin(opener) {
   opener.begin();
   $("copy-no-motion").addEventListener("click", (event) => copy($("no-motion-command").textContent, event.currentTarget));
-  darkScheme.addEventListener("change", () => opener.made?.redraw());
+  document.addEventListener("theme", () => opener.made?.redraw());
 }

@@ -1,6 +1,5 @@
 // The page of a suite: the result in words, pass criteria, scenarios with their variations and playbacks.
 
-import { darkScheme } from "./colours.js";
 import { $, element } from "./common.js";
 import { hook } from "./hook.js";
 import { showClauses } from "./suite_clauses.js";
@@ -12,14 +11,12 @@ import { table } from "./suite_table.js";
 import { bar, suite } from "./suite_words.js";
 
 function showResult() {
-  $("name").textContent = suite.name;
-  $("facts").hidden = !suite.facts.length;
   $("facts").append(...suite.facts.map((fact) => element("li", {}, fact)));
   suite.headlines.forEach((headline, e) => {
     const count = (v) => suite.entries.filter(({ results }) => results[e]?.v === v).length;
     $("result").append(element("p", { class: "headline" }, `${headline}.`), bar(["p", "f", "n", "u"].map(count)), ...suite.outcomes[e].map((text) => element("p", { class: "outcome" }, `${text}.`)));
   });
-  for (const text of [suite.differences, suite.changes]) {
+  for (const text of [suite.differences]) {
     if (text) $("result").append(element("p", { class: "differences" }, text));
   }
 }
@@ -33,4 +30,4 @@ table.fill();
 table.go();
 hook.open = (name) => table.show(suite.entries.findIndex((one) => one.name === name));
 hook.shown = () => table.order.map((k) => suite.entries[k].name);
-darkScheme.addEventListener("change", () => motions.player?.redraw());
+document.addEventListener("theme", () => motions.player?.redraw());

@@ -9,6 +9,7 @@ import numpy as np
 
 from bridgegen.base.arrays import Bool, Float
 from bridgegen.base.statistics import clopper_pearson
+from bridgegen.base.units import percent
 from bridgegen.scenario.language.space import SearchSpace
 from bridgegen.search.algorithms.tree import Leaf
 
@@ -188,15 +189,6 @@ def sentence(box: Box, space: SearchSpace, driver: str, fresh: Evidence) -> str:
         f"{driver} ({fresh.critical} of {fresh.rows} that were simulated; {percent(low)} to "
         f"{percent(high)} with 95 % confidence)."
     )
-
-
-def percent(share: float) -> str:
-    """Return a share in per cent, with enough digits to differ from 0 % and 100 %."""
-    if 0.0 < share < 0.0995:
-        return f"{100.0 * share:.2g} %"
-    if 0.995 <= share < 1.0:
-        return f"{min(100.0 * share, 99.9):.1f} %"
-    return f"{100.0 * share:.0f} %"
 
 
 def number(value: float) -> str:

@@ -16,7 +16,7 @@ from bridgegen.assess.conflict.quantities import QUANTITIES
 from bridgegen.assess.conflict.types import Rule
 from bridgegen.base.arrays import Bool, Float, Int, Numbers
 from bridgegen.base.statistics import clopper_pearson
-from bridgegen.search.regions.box import percent
+from bridgegen.base.units import percent
 from bridgegen.search.triage.record import NOT_JUDGED, Bound, Drawn, Estimate, Least, Verdict
 
 Avoids = Callable[[Int], Bool]

@@ -1,6 +1,6 @@
 """A run's triage in lines of text, for the terminal."""
 
-from bridgegen.search.regions.box import percent
+from bridgegen.base.units import percent
 from bridgegen.search.triage.influence import ends_in_words, in_words
 from bridgegen.search.triage.record import Mode, Triage
 

@@ -1,0 +1,26 @@
+// Light or dark: what the reader chose last, or else the system's. It is in every page, after all that draws.
+{
+  const root = document.documentElement, button = document.getElementById("theme"), system = matchMedia("(prefers-color-scheme: dark)");
+  const rules = [...document.styleSheets].flatMap((sheet) => [...sheet.cssRules]).filter((rule) => rule.media?.mediaText.includes("prefers-color-scheme"));
+  let dark = system.matches;
+  const apply = () => {
+    for (const { media } of rules) media.mediaText = dark ? "screen" : "not all";
+    root.style.colorScheme = dark ? "dark" : "light";
+    button.textContent = dark ? "Light" : "Dark";
+    document.dispatchEvent(new Event("theme"));
+  };
+  const kept = (value) => {
+    try { // a page in a frame, or without storage, forgets it
+      if (value) localStorage.setItem("bridgegen-theme", value);
+      return localStorage.getItem("bridgegen-theme");
+    } catch { return null; }
+  };
+  if (button) {
+    const chosen = kept();
+    dark = chosen ? chosen === "dark" : dark;
+    apply();
+    button.hidden = false;
+    button.addEventListener("click", () => { dark = !dark; kept(dark ? "dark" : "light"); apply(); });
+  }
+  system.addEventListener("change", () => { dark = system.matches; apply(); });
+}
