@@ -2,37 +2,39 @@
 //
 // `tables` is what `portable.tables` made: bundles of arrays, and how a row's state follows from its values.
 
-const STACK = 1 << 20; // bytes below the arrays, for the module's stack
-const SIZE = { f8: 8, i8: 8, u8: 8, i1: 1, b1: 1 };
-const VIEWS = { f8: Float64Array, i8: BigInt64Array, u8: BigUint64Array, i1: Int8Array, b1: Uint8Array };
-const NUMBER = new Float64Array(1);
-const BITS = new BigUint64Array(NUMBER.buffer);
-
-// What a formula's operators do; those of IEEE 754 are the same everywhere, functions are the module's.
-const OPERATORS = {
-  "+": (a, b) => a + b, "-": (a, b) => a - b, "*": (a, b) => a * b, "/": (a, b) => a / b, neg: (a) => -a,
-  "%": (a, b) => { const rest = a % b; return rest && (rest < 0) !== (b < 0) ? rest + b : rest; },
-  "<": (a, b) => a < b, "<=": (a, b) => a <= b, ">": (a, b) => a > b, ">=": (a, b) => a >= b,
-  "==": (a, b) => a === b, "!=": (a, b) => a !== b,
-  and: (...parts) => parts.every(Boolean), or: (...parts) => parts.some(Boolean), not: (a) => !a,
-  abs: Math.abs, ceil: Math.ceil, floor: Math.floor, max: Math.max, min: Math.min, sign: Math.sign, sqrt: Math.sqrt,
-  round: (a) => Math.floor(a) + (a - Math.floor(a) >= 0.5 ? 1 : 0),
-};
-const RENAMED = { "**": "power" };
-
 export class Simulator {
+  // Constants are the class's own: its text alone makes a worker, see explore_workers.js.
+  static STACK = 1 << 20; // bytes below the arrays, for the module's stack
+  static SIZE = { f8: 8, i8: 8, u8: 8, i1: 1, b1: 1 };
+  static VIEWS = { f8: Float64Array, i8: BigInt64Array, u8: BigUint64Array, i1: Int8Array, b1: Uint8Array };
+  static NUMBER = new Float64Array(1);
+  static BITS = new BigUint64Array(Simulator.NUMBER.buffer);
+
+  // What a formula's operators do; those of IEEE 754 are the same everywhere, functions are the module's.
+  static OPERATORS = {
+    "+": (a, b) => a + b, "-": (a, b) => a - b, "*": (a, b) => a * b, "/": (a, b) => a / b, neg: (a) => -a,
+    "%": (a, b) => { const rest = a % b; return rest && (rest < 0) !== (b < 0) ? rest + b : rest; },
+    "<": (a, b) => a < b, "<=": (a, b) => a <= b, ">": (a, b) => a > b, ">=": (a, b) => a >= b,
+    "==": (a, b) => a === b, "!=": (a, b) => a !== b,
+    and: (...parts) => parts.every(Boolean), or: (...parts) => parts.some(Boolean), not: (a) => !a,
+    abs: Math.abs, ceil: Math.ceil, floor: Math.floor, max: Math.max, min: Math.min, sign: Math.sign, sqrt: Math.sqrt,
+    round: (a) => Math.floor(a) + (a - Math.floor(a) >= 0.5 ? 1 : 0),
+  };
+  static RENAMED = { "**": "power" };
+
   /**
    * @param {WebAssembly.Module} module
    * @param {any} tables
    * @param {Uint8Array} data the tables' data, inflated
    */
   constructor(module, tables, data) {
+    this.module = module;
     this.tables = tables;
     this.data = data;
     this.memory = new WebAssembly.Memory({ initial: 64, maximum: 4096 });
     const { exports } = new WebAssembly.Instance(module, { env: {
       __linear_memory: this.memory,
-      __stack_pointer: new WebAssembly.Global({ value: "i32", mutable: true }, STACK),
+      __stack_pointer: new WebAssembly.Global({ value: "i32", mutable: true }, Simulator.STACK),
       __indirect_function_table: new WebAssembly.Table({ initial: 256, element: "anyfunc" }),
       fmod: (a, b) => a % b, // exact, as the processor's
     } });
@@ -41,7 +43,7 @@ export class Simulator {
     this.unset = new Set(tables.unset);
     this.numbers = new Map(tables.functions.map((name, i) => [name, i]));
     this.words = Object.entries(tables.noise.words ?? {}).map(([name, word]) => [name, BigInt(word)]);
-    this.top = STACK;
+    this.top = Simulator.STACK;
     this.at = {};
     this.initial = {};
     this.bundles = {};
@@ -69,7 +71,7 @@ export class Simulator {
     const from = this.take(0);
     let to = from;
     for (const part of [...own.filter((one) => !isFilled(one)), ...own.filter(isFilled)]) {
-      const [field, kind, shape, begin] = part, count = shape.reduce((a, b) => a * b, 1), size = count * SIZE[kind], at = this.take(size + 8);
+      const [field, kind, shape, begin] = part, count = shape.reduce((a, b) => a * b, 1), size = count * Simulator.SIZE[kind], at = this.take(size + 8);
       if (begin >= 0) new Uint8Array(this.memory.buffer).set(this.data.subarray(begin, begin + size), at);
       arrays[field] = { kind, count, shape, place: at };
       if (!isFilled(part)) to = at + size;
@@ -89,11 +91,11 @@ export class Simulator {
       }
       const [field, kind, shape] = part, { count, place: begin } = arrays[field];
       whole(count, at + 8);
-      whole(SIZE[kind], at + 16);
+      whole(Simulator.SIZE[kind], at + 16);
       view.setInt32(at + 24, begin, true);
       at += 32;
       for (const length of shape) { whole(length, at); at += 8; }
-      let stride = SIZE[kind];
+      let stride = Simulator.SIZE[kind];
       const strides = shape.map((_, axis) => shape.slice(axis + 1).reduce((a, b) => a * b, stride));
       for (const each of strides) { whole(each, at); at += 8; }
     });
@@ -134,7 +136,7 @@ export class Simulator {
   /** An array of a bundle, as long as no memory is added. */
   array(name, field) {
     const one = this.at[name][field];
-    if (one.view?.buffer !== this.memory.buffer) one.view = new VIEWS[one.kind](this.memory.buffer, one.place, one.count);
+    if (one.view?.buffer !== this.memory.buffer) one.view = new Simulator.VIEWS[one.kind](this.memory.buffer, one.place, one.count);
     return one.view;
   }
 
@@ -146,12 +148,29 @@ export class Simulator {
     if (operator === "if") return this.evaluate(parts[this.evaluate(parts[0], values) ? 1 : 2], values);
     if (operator === "lookup") return parts[1 + values[parts[0]]];
     const given = parts.map((part) => this.evaluate(part, values));
-    if (OPERATORS[operator]) return OPERATORS[operator](...given);
-    return this.call(RENAMED[operator] ?? operator, given[0], given[1]);
+    if (Simulator.OPERATORS[operator]) return Simulator.OPERATORS[operator](...given);
+    return this.call(Simulator.RENAMED[operator] ?? operator, given[0], given[1]);
   }
 
   call(name, x, y = 0) {
     return this.exports.function(this.numbers.get(name), x, y);
+  }
+
+  /** The row with some values, as `SearchSpace.row` completes it: derived ones follow, bounds hold. */
+  complete(values) {
+    const row = {};
+    for (const part of this.tables.space) {
+      if (part.formula) { row[part.name] = this.evaluate(part.formula, row); continue; }
+      let { low, high } = part;
+      for (const [least, most] of part.bounds) {
+        if (least !== null) low = Math.max(low, this.evaluate(least, row));
+        if (most !== null) high = Math.min(high, this.evaluate(most, row));
+      }
+      if (part.whole) { low = Math.ceil(low - 1e-9); high = Math.floor(high + 1e-9); }
+      high = Math.min(Math.max(high, part.low), part.high);
+      row[part.name] = Math.min(Math.max(values[part.name] ?? part.default, low), high);
+    }
+    return row;
   }
 
   /**
@@ -198,23 +217,57 @@ export class Simulator {
     this.exports.judge(steps, status, path, friction, facts, record, verdict);
   }
 
+  /**
+   * The conflict of the row judged last that decides, or null: one that counts before one that does not, contacts first, then the more severe one.
+   * @param {boolean} any whether conflicts count for which the ego is not responsible
+   */
+  decisive(any) {
+    const { shape: [count, width] } = this.at.verdict.whole, whole = this.array("verdict", "whole"), { columns, kinds } = this.tables.judged;
+    const [fault, breach, potential] = ["at_fault", "breach", "potential"].map((name) => this.array("verdict", name));
+    const read = (e, column) => Number(whole[e * width + columns[column]]);
+    let best = null;
+    for (let e = 0; e < count; e++) {
+      const kind = kinds[read(e, "kind")];
+      if (!kind || kind === "collision course") continue;
+      const counts = kind === "violation" ? breach[e] >= 1 : any || Boolean(fault[e]);
+      const merit = [counts, kind === "contact", potential[e]];
+      if (!best || merit.map((value, i) => Number(value) - Number(best.merit[i])).find((d) => d) > 0) best = { e, kind, counts, merit, read };
+    }
+    return best;
+  }
+
+  /**
+   * Numbers of verdicts on rows: −1 none, 0 no conflict, 1 one that does not count, 2 one that does, 3 a collision.
+   * @param {{driver: string, any: boolean, values: Record<string, number>, others: Record<string, number>[]}} asked rows are `values` with each of `others`
+   */
+  verdicts({ driver, any, values, others }) {
+    this.choose(driver);
+    return others.map((other) => {
+      const { steps, status } = this.run(this.complete({ ...values, ...other }));
+      if (status !== 0) return -1;
+      this.judge(steps, status);
+      const found = this.decisive(any);
+      return !found ? 0 : !found.counts ? 1 : found.kind === "contact" ? 3 : 2;
+    });
+  }
+
   // The key of a row's random numbers: SplitMix64 over the bits of its values.
   key(values) {
     const { noise } = this.tables;
     if (noise.key) return BigInt(noise.key);
     let key = 0n;
     for (const [name, word] of this.words) {
-      NUMBER[0] = values[name] + 0;
-      key = mix(mix(key ^ word) + BITS[0]);
+      Simulator.NUMBER[0] = values[name] + 0;
+      key = Simulator.mix(Simulator.mix(key ^ word) + Simulator.BITS[0]);
     }
     return key;
   }
-}
 
-// Words of 64 bits, which engines keep in registers where `asUintN` says so.
-function mix(word) {
-  let mixed = BigInt.asUintN(64, word + 0x9E3779B97F4A7C15n);
-  mixed = BigInt.asUintN(64, (mixed ^ (mixed >> 30n)) * 0xBF58476D1CE4E5B9n);
-  mixed = BigInt.asUintN(64, (mixed ^ (mixed >> 27n)) * 0x94D049BB133111EBn);
-  return mixed ^ (mixed >> 31n);
+  // Words of 64 bits, which engines keep in registers where `asUintN` says so.
+  static mix(word) {
+    let mixed = BigInt.asUintN(64, word + 0x9E3779B97F4A7C15n);
+    mixed = BigInt.asUintN(64, (mixed ^ (mixed >> 30n)) * 0xBF58476D1CE4E5B9n);
+    mixed = BigInt.asUintN(64, (mixed ^ (mixed >> 27n)) * 0x94D049BB133111EBn);
+    return mixed ^ (mixed >> 31n);
+  }
 }
