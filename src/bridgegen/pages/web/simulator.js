@@ -218,22 +218,27 @@ export class Simulator {
   }
 
   /**
-   * The conflict of the row judged last that decides, or null: one that counts before one that does not, contacts first, then the more severe one.
+   * The conflict of the row judged last that decides, as `harm.decisive` has it; null if there is none.
    * @param {boolean} any whether conflicts count for which the ego is not responsible
    */
   decisive(any) {
-    const { shape: [count, width] } = this.at.verdict.whole, whole = this.array("verdict", "whole"), { columns, kinds } = this.tables.judged;
-    const [fault, breach, potential] = ["at_fault", "breach", "potential"].map((name) => this.array("verdict", name));
+    const { columns, kinds, harm } = this.tables.judged, { whole: { shape: [count, width] }, real: { shape: [, wide] } } = this.at.verdict;
+    const [whole, real, fault, breach, potential] = ["whole", "real", "at_fault", "breach", "potential"].map((name) => this.array("verdict", name));
     const read = (e, column) => Number(whole[e * width + columns[column]]);
     let best = null;
     for (let e = 0; e < count; e++) {
-      const kind = kinds[read(e, "kind")];
-      if (!kind || kind === "collision course") continue;
-      const counts = kind === "violation" ? breach[e] >= 1 : any || Boolean(fault[e]);
-      const merit = [counts, kind === "contact", potential[e]];
-      if (!best || merit.map((value, i) => Number(value) - Number(best.merit[i])).find((d) => d) > 0) best = { e, kind, counts, merit, read };
+      const kind = kinds[read(e, "kind")], [ttc, needed, nearness] = ["ttc", "needed", "nearness"].map((name) => real[e * wide + columns[name]]);
+      const urgent = (1 - Math.min(ttc, harm.horizon) / harm.horizon) * (1 - this.call("exp", -needed / harm.serious));
+      const worth = (share) => harm.near + (1 - harm.near) * (Math.log1p((share * potential[e]) / harm.light) / Math.log1p(1 / harm.light));
+      const partly = (share) => harm.course + (harm.near - harm.course) * share;
+      const touches = kind === "contact", happens = touches || kind === "near miss", violates = kind === "violation";
+      let value = happens ? worth(touches ? 1 : harm.nearly * urgent) : kind && ttc < Infinity ? partly(urgent) : harm.course * nearness;
+      if (e === 0 || (happens && !any && !fault[e])) value = 0;
+      if (violates) value = Math.max(value, breach[e] < 1 ? partly(breach[e]) : worth(harm.violates));
+      const order = e === 0 && !violates ? -1 : value + (value >= harm.course ? 4 + Number(touches) : read(e, "kind"));
+      if (!best || order > best.order) best = { e, kind, order, read, counts: violates ? breach[e] >= 1 : any || Boolean(fault[e]) };
     }
-    return best;
+    return best.kind && best.kind !== "collision course" ? best : null;
   }
 
   /**
