@@ -2,11 +2,14 @@
 
 python -m benchmarks.bits            # compare with those published; 10 to 15 minutes
 python -m benchmarks.bits --write    # after a change of results that CHANGELOG names
+python -m benchmarks.bits --pages    # of runs' rows, as their reports simulate them; 10 minutes
 """
 
 import argparse
 import json
 from pathlib import Path
+
+from benchmarks import bits_pages
 
 from bridgegen.base.errors import InputError
 from bridgegen.engine import conformance
@@ -16,7 +19,12 @@ from bridgegen.scenario.language.reader import names
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--write", action="store_true", help="publish this machine's digests")
-    write = parser.parse_args().write
+    parser.add_argument("--pages", action="store_true", help="compare what reports simulate")
+    options = parser.parse_args()
+    if options.pages:
+        bits_pages.main()
+        return
+    write = options.write
     known = {} if write else conformance.published()["rows"]
     found = {}
     for scenario in names():

@@ -125,7 +125,7 @@ CONTEXTUAL = {"as", "async", "from", "get", "of", "static"}
 """Those that may be names as well."""
 GLOBALS = {*re.findall(r"\w+", """
     ArrayBuffer BigInt BigInt64Array BigUint64Array DataView Date Int8Array MediaRecorder
-    MessageChannel WebAssembly
+    MessageChannel WebAssembly Worker
     Array Blob Boolean CSS CustomEvent DecompressionStream Error Event Float64Array Infinity
     Int32Array IntersectionObserver JSON Map Math Number Object Path2D ResizeObserver Response Set
     String TextDecoder TypeError URL Uint8Array addEventListener atob clearTimeout
@@ -204,7 +204,7 @@ def bound(all_: list[str]) -> Iterator[str]:
     for k, (one, after) in enumerate(pairwise(all_)):
         if one in ("const", "let", "var"):
             yield from declarators(all_, k + 1)
-        elif one in ("class", "function") and is_name(after):
+        elif one in ("class", "function", "static") and is_name(after):
             yield after
         elif one == "import" and after == "{":
             yield from filter(is_name, all_[k + 2 : close(all_, k + 1)])
@@ -251,7 +251,7 @@ def undefined(text: str) -> set[str]:
         ("f(x);", {"f", "x"}),
         ("const a = 1, { b, k: [c] } = a;\nf(a, b, c);", {"f"}),
         ("const g = (x, { y }) => x + y + z;", {"z"}),
-        ("class A {\n  draw(c) {\n    c.f(this.g, h);\n  }\n}\n", {"h"}),
+        ("class A {\n  static B = b;\n  draw(c) {\n    c.f(this.g, h);\n  }\n}\n", {"b", "h"}),
         ("const t = `a ${b.c} d ${`${e}`}`;", {"b", "e"}),
         ("const o = { a: b, c };", {"b", "c"}),
         ('const r = /[/"]a"/.test(q); // not x\n/* y */', {"q"}),

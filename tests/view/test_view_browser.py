@@ -42,6 +42,20 @@ def test_the_page_that_the_browser_is_started_with_leads_there(opened, tmp_path)
     assert page.complaints == []
 
 
+def test_a_served_page_simulates(opened):
+    page, _ = opened
+    page.wait_for_selector("#explore input")
+    page.evaluate(
+        """() => { const slider = document.querySelector("#explore input");
+        slider.value = slider.max; slider.dispatchEvent(new Event("input")); }"""
+    )
+    page.wait_for_selector(".tried:has-text('route-follower')")
+    page.click("#explore summary")
+    page.wait_for_selector(".map p:has-text('3,600 encounters')")
+    assert page.workers
+    assert page.complaints == []
+
+
 def test_it_grows_with_its_run_and_says_so(opened, growing):
     page, server = opened
     critical = growing.rows.critical

@@ -6,7 +6,9 @@ from typing import Any
 import numpy as np
 
 from bridgegen.assess.conflict import _codes as codes
+from bridgegen.assess.conflict import harm
 from bridgegen.assess.conflict._judge_kernels import Facts, Verdict
+from bridgegen.assess.conflict._limits import HORIZON, SERIOUS_DECELERATION
 from bridgegen.assess.conflict._violation_kernels import LEAVINGS, PASSINGS
 from bridgegen.assess.conflict.findings import KINDS
 from bridgegen.assess.conflict.types import ConflictType, Responsible, Rule
@@ -26,8 +28,22 @@ TRIED = 64
 MOST = 450_000
 """Maximum number of characters of the tables: those of the catalogue take 16,000 to 400,000."""
 
-COLUMNS = ("KIND", "TYPE", "RESPONSIBLE", "RULE", "INSTANT", "DECIDED", "ZONE_EGO", "ZONE_OTHER")
-"""Columns of a verdict's whole numbers that the page reads."""
+COLUMNS = (
+    *("KIND", "TYPE", "RESPONSIBLE", "RULE", "INSTANT", "DECIDED", "ZONE_EGO", "ZONE_OTHER"),
+    *("TTC", "NEEDED", "NEARNESS"),
+)
+"""Columns of a verdict's numbers that the page reads."""
+
+HARM = {
+    "course": harm.COURSE,
+    "near": harm.NEAR_MISS,
+    "light": harm.LIGHT,
+    "nearly": harm.NEARLY,
+    "violates": harm.VIOLATES,
+    "horizon": HORIZON,
+    "serious": SERIOUS_DECELERATION,
+}
+"""What the page tells by which conflict decides; see `harm`."""
 
 
 def simulation_payload(pipeline: Pipeline) -> dict[str, Any]:
@@ -55,6 +71,7 @@ def simulation_payload(pipeline: Pipeline) -> dict[str, Any]:
         "space": _space(space),
         "judged": {
             "columns": {name.lower(): getattr(codes, name) for name in COLUMNS},
+            "harm": HARM,
             "kinds": [KINDS.get(kind, "") for kind in range(codes.VIOLATION + 1)],
             "types": [kind.label for kind in ConflictType],
             "responsible": [who.label for who in Responsible],

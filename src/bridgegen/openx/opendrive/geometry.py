@@ -26,8 +26,8 @@ STEEPEST = 10.0
 """Largest slope of a poly3 in its own frame."""
 
 # Eight nodes, moved from [-1, 1] to [0, 1].
-_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(8)
-_NODES, _WEIGHTS = (_NODES + 1) / 2, _WEIGHTS / 2
+NODES, WEIGHTS = np.polynomial.legendre.leggauss(8)
+NODES, WEIGHTS = (NODES + 1) / 2, WEIGHTS / 2
 _BLOCK = 4096
 
 
@@ -196,8 +196,8 @@ def _spiral(curvature: float, rate: float, u: Float) -> tuple[Float, Float]:
     turn = far * max(abs(curvature), abs(curvature + rate * far))
     panels = 1 + int(turn)
     # Each panel turns by about 1 rad at most, where eight nodes are exact to rounding.
-    nodes = ((np.arange(panels)[:, None] + _NODES) / panels).ravel()
-    weights = np.tile(_WEIGHTS / panels, panels)
+    nodes = ((np.arange(panels)[:, None] + NODES) / panels).ravel()
+    weights = np.tile(WEIGHTS / panels, panels)
     # In blocks, since points times nodes would be one large array on long spirals.
     block = max(1, _BLOCK * 8 // len(nodes))
     for first in range(0, len(u), block):
@@ -281,8 +281,8 @@ def _derivatives(c: tuple[float, ...], p: Float) -> tuple[Float, Float, Float, F
 def integrate(rate: Callable[[Float], Float], low: Float, high: Float) -> Float:
     """Return the integrals of ``rate`` from each ``low`` to each ``high``; ``(P,)`` float64."""
     width = high - low
-    points = low[:, None] + width[:, None] * _NODES
-    return np.asarray(width * (rate(points) * _WEIGHTS).sum(axis=1))
+    points = low[:, None] + width[:, None] * NODES
+    return np.asarray(width * (rate(points) * WEIGHTS).sum(axis=1))
 
 
 def invert(rate: Callable[[Float], Float], p: Float, total: Float, wanted: Float) -> Float:

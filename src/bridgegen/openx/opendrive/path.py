@@ -9,7 +9,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -17,6 +17,8 @@ from bridgegen.base import elementary
 from bridgegen.base.arrays import Float
 from bridgegen.base.errors import InputError
 from bridgegen.openx.opendrive.geometry import (
+    NODES,
+    WEIGHTS,
     Curve,
     evaluate,
     geometry_index,
@@ -33,7 +35,7 @@ from bridgegen.openx.opendrive.lanes import (
     width_of,
 )
 from bridgegen.openx.opendrive.model import Lane, LaneSection, Road
-from bridgegen.openx.opendrive.plan_view import Arc, Geometry, Line
+from bridgegen.openx.opendrive.plan_view import Arc, Geometry, Line, Spiral
 
 # Records that begin at nearly the same s are one change; a piece of no length would have no
 # direction.
@@ -116,6 +118,20 @@ class Piece(NamedTuple):
             return (self.station - b * self.s) + b * s
         return self.station + self.taper.reached((s - self.s) * (1 if self.rate > 0.0 else -1))
 
+    def as_json(self) -> dict[str, Any]:
+        """Return what gives `stations` elsewhere: ``first + each * s``, or a taper.
+
+        Raises:
+            InputError: it follows a cubic.
+        """
+        low, high = sorted((self.s, self.s_end))
+        if self.taper is not None:
+            found = {"first": self.station, "s": self.s, **self.taper.as_json()}
+        else:
+            b = self.length / (self.s_end - self.s)
+            found = {"first": self.station - b * self.s, "each": b}
+        return {"low": low, "high": high, **found}
+
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Taper:
@@ -170,6 +186,30 @@ class Taper:
         travelled = self.travelled[cell] + integrate(self.speed, self.nodes[cell], within)
         beyond: Float = travelled + (distance - within)
         return beyond
+
+    def as_json(self) -> dict[str, Any]:
+        """Return what gives `reached` elsewhere; "curvature": at the geometry's start, its rate.
+
+        Raises:
+            InputError: it lies along a cubic.
+        """
+        shape = self.geometry.shape
+        match shape:
+            case Spiral():
+                rate = (shape.curv_end - shape.curv_start) / self.geometry.length
+                curvature = [shape.curv_start, rate]
+            case Arc():
+                curvature = [shape.curvature, 0.0]
+            case Line():
+                curvature = [0.0, 0.0]
+            case _:
+                raise InputError("an entity starts beside a cubic")
+        return {
+            **{"start": self.start, "t": self.t, "curvature": curvature, "entry": self.entry},
+            **{"direction": self.direction, "nodes": self.nodes.tolist()},
+            **{"travelled": self.travelled.tolist(), "weights": WEIGHTS.tolist()},
+            "quadrature": NODES.tolist(),
+        }
 
     def at(self, travelled: Float) -> tuple[Float, Float, Float, Float, Float]:
         """Return x, y, h, curvature, and the distance along the road from ``start``."""

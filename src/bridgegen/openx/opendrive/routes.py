@@ -98,7 +98,7 @@ class Route:
         Raises:
             InputError: the route does not use the road.
         """
-        nearest = min(self._on_road(road_id), key=lambda piece: _away(piece, s))
+        nearest = min(self.on_road(road_id), key=lambda piece: _away(piece, s))
         if nearest.taper is not None:
             here, further = nearest.stations(np.array([s, s + NEAR]))
             b = float(further - here) / NEAR
@@ -116,7 +116,7 @@ class Route:
         Raises:
             InputError: the route does not use the road.
         """
-        on_road = self._on_road(road_id)
+        on_road = self.on_road(road_id)
         away = np.array([[_away(piece, item) for piece in on_road] for item in s.tolist()])
         away = away.reshape(len(s), len(on_road))  # also of no places
         nearest, found = away.argmin(axis=1), np.empty(len(s))
@@ -126,10 +126,15 @@ class Route:
 
     def is_even(self, road_id: str) -> bool:
         """Whether ``station`` is exact for all places on a road: it is one line or arc."""
-        pieces = self._on_road(road_id)
+        pieces = self.on_road(road_id)
         return len(pieces) == 1 and pieces[0].taper is None
 
-    def _on_road(self, road_id: str) -> list[Piece]:
+    def on_road(self, road_id: str) -> list[Piece]:
+        """Return the pieces on a road; the first of the nearest ones counts.
+
+        Raises:
+            InputError: the route does not use the road.
+        """
         found = [piece for piece in self.pieces if piece.road_id == road_id]
         if not found:
             roads = ", ".join(dict.fromkeys(step.road_id for step in self.steps))

@@ -1,7 +1,8 @@
 // Other values of the chosen scenario's parameters, simulated in the page while they change.
 
 import { $, copy, element } from "./common.js";
-import { ExploreMap } from "./explore_map.js";
+import { breathe, ExploreMap } from "./explore_map.js";
+import { workers } from "./explore_workers.js";
 import { columns, data } from "./data.js";
 import { inflated } from "./inflate.js";
 import { quantity, shareText, turned, worded } from "./numbers.js";
@@ -15,6 +16,9 @@ const ROUNDED = 0.001; // m: the page holds whole millimetres
 /** @type {Promise<Simulator> | null} */
 let started = null;
 
+/** @type {Promise<((asked: any) => Promise<number[]>)[]> | null} */
+let helpers = null;
+
 // Compiled when it is first used, so that a page that is only read costs nothing.
 function simulator() {
   started ??= (async () => {
@@ -22,23 +26,6 @@ function simulator() {
     return new Simulator(await WebAssembly.compile(kernels), given, tables);
   })();
   return started;
-}
-
-/** The row with some values, as `SearchSpace.row` completes it: derived ones follow, bounds hold. */
-function completed(simulator, values) {
-  const row = {};
-  for (const part of given.space) {
-    if (part.formula) { row[part.name] = simulator.evaluate(part.formula, row); continue; }
-    let { low, high } = part;
-    for (const [least, most] of part.bounds) {
-      if (least !== null) low = Math.max(low, simulator.evaluate(least, row));
-      if (most !== null) high = Math.min(high, simulator.evaluate(most, row));
-    }
-    if (part.whole) { low = Math.ceil(low - 1e-9); high = Math.floor(high + 1e-9); }
-    high = Math.min(Math.max(high, part.low), part.high);
-    row[part.name] = Math.min(Math.max(values[part.name] ?? part.default, low), high);
-  }
-  return row;
 }
 
 // The motion of a row as a playback, with what the chosen one has of road, bodies and lamps.
@@ -79,23 +66,12 @@ function judge(made, simulator, status) {
 }
 
 const labels = given?.judged;
+const harmsAny = data.summary.harm === "harm_any";
 
-// The conflict that decides: one that counts before one that does not, contacts first, then the more severe one.
 function conflictOf(made, simulator) {
-  const { shape: [count, width] } = simulator.at.verdict.whole, whole = simulator.array("verdict", "whole");
-  const [fault, breach, potential] = ["at_fault", "breach", "potential"].map((name) => simulator.array("verdict", name));
-  const read = (e, column) => Number(whole[e * width + labels.columns[column]]);
-  const any = data.summary.harm === "harm_any";
-  let best = null;
-  for (let e = 0; e < count; e++) {
-    const kind = labels.kinds[read(e, "kind")];
-    if (!kind || kind === "collision course") continue;
-    const counts = kind === "violation" ? breach[e] >= 1 : any || Boolean(fault[e]);
-    const merit = [counts, kind === "contact", potential[e]];
-    if (!best || merit.map((value, i) => Number(value) - Number(best.merit[i])).find((d) => d) > 0) best = { e, kind, counts, merit };
-  }
+  const best = simulator.decisive(harmsAny);
   if (!best) return null;
-  const { e, kind, counts } = best, words = (list, column) => labels[list][read(e, column)] ?? "";
+  const { e, kind, counts, read } = best, words = (list, column) => labels[list][read(e, column)] ?? "";
   return {
     conflict: kind, counts, type: words("types", "type"), responsible: words("responsible", "responsible"), rule: words("rules", "rule"),
     partner: e ? made.entities[e].name : "", partner_number: e, instant: read(e, "instant"), decided: read(e, "decided"),
@@ -135,7 +111,7 @@ export async function simulated(i, facts) {
   const kernels = await simulator(), values = await exactValues(i);
   if (!agrees(kernels)) return null;
   kernels.choose(given.driver);
-  const row = { ...completed(kernels, values), ...values };
+  const row = { ...kernels.complete(values), ...values };
   const { made, status } = playbackOf(unpack(base), kernels, row);
   return status === 0 ? { ...made, ...facts, tried: false, parameters: row, picture: null } : null;
 }
@@ -205,16 +181,10 @@ export class Explorer {
     const telling = data.rows.telling.filter((name) => this.sliders.has(name));
     parts.sort((a, b) => (telling.indexOf(a.name) + 1 || 99) - (telling.indexOf(b.name) + 1 || 99));
     const ready = async () => {
-      const kernels = await simulator();
-      return (values) => {
-        kernels.choose(this.driver);
-        const { steps, status } = kernels.run(completed(kernels, { ...this.values, ...values }));
-        if (status !== 0) return -1;
-        kernels.judge(steps, status);
-        const found = conflictOf(this.base, kernels);
-        if (!found) return 0;
-        return !found.counts ? 1 : found.conflict === "contact" ? 3 : 2;
-      };
+      const kernels = await simulator(), own = async (asked) => { await breathe(); return kernels.verdicts(asked); };
+      helpers ??= workers(kernels);
+      const judges = await helpers;
+      return (judges.length ? judges : [own]).map((judge) => (others) => judge({ driver: this.driver, any: harmsAny, values: this.values, others }));
     };
     this.map = new ExploreMap(parts, ready, (values) => this.set({ ...this.values, ...values }));
     this.box.append(this.map.box);
@@ -245,7 +215,7 @@ export class Explorer {
       const kernels = await simulator(); // the first time some 50 ms
       if (!agrees(kernels)) return this.refuse("the kernels of this page give another motion than the run recorded");
       kernels.choose(this.driver);
-      const row = completed(kernels, this.values);
+      const row = kernels.complete(this.values);
       for (const name of this.sliders.keys()) this.write(name, row[name], name === moved && row[name] === Number(this.sliders.get(name).range.value));
       const { made, status } = playbackOf(this.base, kernels, row);
       this.row = row;

@@ -6,7 +6,7 @@ import { quantity } from "./numbers.js";
 
 const CELLS = 60;
 const COARSE = [8, 4, 2, 1]; // strides of the passes: the whole is seen at once, then in full
-const BREATH = 12; // ms between two frames
+const AT_ONCE = 24; // cells, some milliseconds
 
 /** Verdicts by what they are called, with their colour. */
 const SHADES = [
@@ -15,7 +15,7 @@ const SHADES = [
 ];
 
 // Lets the page draw and hear; a timer would wait for 4 ms each time.
-function breathe() {
+export function breathe() {
   return new Promise((resolve) => {
     const { port1, port2 } = new MessageChannel();
     port1.onmessage = resolve;
@@ -26,7 +26,7 @@ function breathe() {
 export class ExploreMap {
   /**
    * @param {{name: string, low: number, high: number}[]} parameters
-   * @param {() => Promise<(values: Record<string, number>) => number>} ready what gives the number of the verdict, −1: none, at values of two parameters
+   * @param {() => Promise<((others: Record<string, number>[]) => Promise<number[]>)[]>} ready each gives verdicts at values of two parameters, see `Simulator.verdicts`
    * @param {(values: Record<string, number>) => void} choose
    */
   constructor(parameters, ready, choose) {
@@ -66,22 +66,25 @@ export class ExploreMap {
   async draw() {
     const run = ++this.run;
     if (!this.box.open) return;
-    const judge = await this.ready(), context = this.canvas.getContext("2d"), began = performance.now();
-    let done = 0, breath = began;
+    const judges = await this.ready(), context = this.canvas.getContext("2d"), began = performance.now();
+    let done = 0;
     for (const stride of COARSE) {
+      const left = [];
       for (let j = 0; j < CELLS; j += stride) {
-        for (let i = 0; i < CELLS; i += stride) {
-          if (stride < COARSE[0] && i % (2 * stride) === 0 && j % (2 * stride) === 0) continue; // of the pass before
-          const verdict = judge(this.at(i, j));
-          context.fillStyle = verdict < 0 ? palette.card : SHADES[verdict][1]();
-          context.fillRect(i, CELLS - j - stride, stride, stride);
-          done++;
-          if (performance.now() - breath < BREATH) continue;
-          await breathe();
-          if (run !== this.run) return;
-          breath = performance.now();
-        }
+        for (let i = 0; i < CELLS; i += stride) if (stride === COARSE[0] || i % (2 * stride) || j % (2 * stride)) left.push([i, j]); // else of the pass before
       }
+      done += left.length;
+      await Promise.all(judges.map(async (judge) => {
+        while (left.length) {
+          const cells = left.splice(0, AT_ONCE), verdicts = await judge(cells.map(([i, j]) => this.at(i, j)));
+          if (run !== this.run) return;
+          cells.forEach(([i, j], k) => {
+            context.fillStyle = verdicts[k] < 0 ? palette.card : SHADES[verdicts[k]][1]();
+            context.fillRect(i, CELLS - j - stride, stride, stride);
+          });
+        }
+      }));
+      if (run !== this.run) return;
     }
     this.note.textContent = `${done.toLocaleString("en")} encounters in ${quantity((performance.now() - began) / 1000, "s", 2)}; the other parameters as above.`;
   }

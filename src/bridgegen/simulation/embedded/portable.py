@@ -79,13 +79,10 @@ def tables(
 
     if program.driver.is_own or program.driver.home:
         raise InputError(f"the driver '{program.driver.name}' is no compiled one of BridgeGen's")
-    if roads.is_uneven(network):
-        raise InputError("an entity starts on a road whose length its path does not share")
     batch = Batch(program, roads, np.array([network]), {})
     plan = _coded(batch.plan, program)
     unset: Any = {name: np.zeros_like(getattr(batch.record, name)) for name in UNSET}
     data = bytearray()
-    first, each = np.moveaxis(roads.station[network], -1, 0).tolist()
     return {
         "plan": _bundle(plan, data),
         "roads": _bundle(roads.tables, data, network),
@@ -101,7 +98,7 @@ def tables(
         "functions": FUNCTIONS,
         "parameters": dict(program.parameters),
         "slots": [_as_json(slot) for slot in program.slots],
-        "station": {"slots": program.start_slots.tolist(), "first": first, "each": each},
+        "station": {"slots": program.start_slots.tolist(), "pieces": roads.starts(network)},
         "aside": {"slots": program.aside_slots.tolist(), "each": roads.sides[network].tolist()},
         "noise": _noise(program),
     }

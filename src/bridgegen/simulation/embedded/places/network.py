@@ -112,9 +112,19 @@ class Network:
                 found[at, e] = route.stations(road, s[at, e])
         return np.ascontiguousarray(found)
 
-    def is_uneven(self, p: int) -> bool:
-        """Return whether an entity's place along its path is no linear function of its road's."""
-        return bool(self._ways[p].uneven)
+    def starts(self, p: int) -> list[list[dict[str, Any]]]:
+        """Return what gives `stations` elsewhere: for each entity pieces, see `Piece.as_json`.
+
+        Raises:
+            InputError: an entity may start beside a cubic.
+        """
+        even = self.station[p].tolist()
+        found = [[{"low": 0.0, "high": 0.0, "first": a, "each": b}] for a, b in even]
+        for e, road in self._ways[p].uneven.items():
+            route = self._ways[p].routes[e]
+            assert route is not None
+            found[e] = [piece.as_json() for piece in route.on_road(road)]
+        return found
 
     @property
     def n_networks(self) -> int:
