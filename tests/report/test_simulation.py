@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+import shlex
 import shutil
 import subprocess
 from importlib.resources import files
@@ -138,7 +139,7 @@ def test_a_drivers_page_says_why_it_replays_only(tmp_path):
 
 
 @pytest.mark.browser
-def test_a_slider_changes_the_encounter_and_rows_play_without_their_motion(browser, tmp_path):
+def test_a_slider_changes_the_encounter_and_rows_play_without_their_motion(browser, cli, tmp_path):
     run = bg.run_search("crossroads-s4", budget=60, keep=2, triage="none", out=tmp_path / "run")
     page = browser.new_page(viewport={"width": 1280, "height": 900})
     asked = []
@@ -160,6 +161,25 @@ def test_a_slider_changes_the_encounter_and_rows_play_without_their_motion(brows
     assert conflict["type"] in said
     assert conflict["rule"] in said
     assert f"responsible: {conflict['responsible']}" in said
+    with page.expect_download() as saved:
+        page.click("text=Save .xosc")
+    metrics_of = {k: v["value"] for k, v in metrics["metrics"].items()}
+    folder = tmp_path / "saved"
+    folder.mkdir()
+    saved.value.save_as(folder / saved.value.suggested_filename)
+    with page.expect_download() as road:
+        page.click("text=Save map")
+    road.value.save_as(folder / road.value.suggested_filename)
+    again = bg.simulate_file(folder / "crossroads-s4.xosc").metrics
+    assert {name: again[name] for name in ("d_min", "v_d", "harm")} == {
+        name: metrics_of[name] for name in ("d_min", "v_d", "harm")
+    }
+    page.evaluate("navigator.clipboard.writeText = async (text) => { window.copied = text; }")
+    page.click("text=Copy command")
+    page.wait_for_function("window.copied")
+    code, out, err = cli(*shlex.split(page.evaluate("window.copied"))[1:], "--json")
+    assert code == 0, err
+    assert json.loads(out)["metrics"]["v_d"] == metrics_of["v_d"]
     page.select_option("#explore select[aria-label=Driver]", "un-r157")
     page.wait_for_selector(".tried:has-text('un-r157')")
     page.click("#explore summary")

@@ -73,6 +73,7 @@ def build_report(
     version: str,
     notes: Mapping[str, Any],
     view: str = "",
+    simulated: tuple[str, str] = ("", ""),
     regions: Mapping[str, Any] | None = None,
     confirmations: Sequence[Record] = (),
     hashes: Mapping[str, str] | None = None,
@@ -101,6 +102,7 @@ def build_report(
         version: of BridgeGen.
         notes: the algorithm's notes on the run.
         view: the command line that shows this run with the motion of every scenario, if any.
+        simulated: see `simulation_payload`.
         regions: the critical ones, in the form of `regions.record`, if they are known.
         confirmations: of its scenarios in other simulators.
         hashes: digests of the run's inputs and results.
@@ -188,7 +190,7 @@ def build_report(
         criteria=judged,
         screened=screened_payload(notes, pipeline.space),
         happening=happening,
-        simulation=simulation_payload(pipeline) if coverage else None,
+        simulation=simulation_payload(pipeline, simulated) if coverage else None,
     )
 
 

@@ -5,7 +5,9 @@ import { ExploreMap } from "./explore_map.js";
 import { columns, data } from "./data.js";
 import { inflated } from "./inflate.js";
 import { quantity, shareText, turned, worded } from "./numbers.js";
+import { download } from "./save.js";
 import { Simulator } from "./simulator.js";
+import { fileOf, shellWord } from "./storyboard.js";
 import { unpack } from "./unpack.js";
 
 const given = data.simulation;
@@ -168,6 +170,7 @@ export class Explorer {
     this.base = kept;
     if (given.refused) return this.refuse(given.refused);
     this.values = { ...kept.parameters };
+    this.row = null;
     this.driver = given.driver;
     this.sliders = new Map();
     const lines = given.space.filter(({ searched, name }) => searched && !given.unused.includes(name)).map((part) => this.slider(part));
@@ -182,8 +185,9 @@ export class Explorer {
       element("div", { class: "said" }, this.said, element("div", { class: "presets" },
         ...(drivers.length > 1 ? [this.drivers(drivers)] : []), button("As found", () => this.set(this.base.parameters), "The values of the chosen scenario"),
         button("Defaults", () => this.set(Object.fromEntries(given.space.map((part) => [part.name, part.default]))), "The scenario's own defaults"),
-        button("Copy values", (event) => this.copy(event.currentTarget), "The values, as options of bridgegen search"))),
+        button("Copy command", (event) => this.copy(event.currentTarget), "The command line that simulates what is shown, to the last bit"), ...this.savers(button))),
       element("div", { class: "sliders" }, ...lines));
+    if (given.file.refused) this.box.append(element("p", { class: "muted small" }, `What is shown is not saved as a file here: ${given.file.refused}.`));
     if (this.sliders.size > 1) this.addMap();
   }
 
@@ -275,8 +279,30 @@ export class Explorer {
     this.player.swap(made);
   }
 
-  copy(button) {
-    const row = this.row ?? this.values;
-    copy([...this.sliders.keys()].map((name) => `--fix ${name}=${row[name]}`).join(" "), button);
+  // All values of what is shown, derived ones among them.
+  async shown() {
+    return this.row ?? { ...completed(await simulator(), this.values), ...this.values };
+  }
+
+  async copy(button) {
+    const row = await this.shown(), [own, others] = given.commands;
+    const begun = this.driver === given.driver ? own : `${others} --ego ${shellWord(this.driver)}`;
+    const fixed = given.space.filter(({ name, formula }) => !formula && !given.unused.includes(name));
+    copy([begun, ...fixed.map(({ name }) => `--fix ${shellWord(`${name}=${row[name]}`)}`)].join(" "), button);
+  }
+
+  // Buttons that save the scenario file of what is shown, and the map that it names.
+  savers(button) {
+    const { file } = given;
+    if (file.refused) return [];
+    const save = async () => {
+      const kernels = await simulator(), row = await this.shown(), template = new TextDecoder().decode(await inflated(file.template));
+      if (this.driver !== given.driver && !file.drivers) this.said.textContent = "The file states the ideal stages of the run's own driver: choose that one to save it.";
+      else download(new Blob([fileOf(template, file.holes, (...asked) => kernels.evaluate(...asked), row, this.driver)]), `${file.stem}.xosc`);
+    };
+    return [
+      button("Save .xosc", save, "The scenario file of what is shown, as the search exports it; its map is beside it"),
+      button("Save map", async () => download(new Blob([await inflated(file.road)]), `${file.stem}.xodr`), "The OpenDRIVE file that the scenario file names"),
+    ];
   }
 }
