@@ -68,10 +68,26 @@ def simulation_payload(pipeline: Pipeline, commands: tuple[str, str] = ("", ""))
             "types": [kind.label for kind in ConflictType],
             "responsible": [who.label for who in Responsible],
             "rules": [rule.label for rule in Rule],
+            **_verdict(pipeline),
         },
         "commands": list(commands),
         "file": storyboard_payload(pipeline, X[:FILES]),
         "unused": [name for name in space.names if name in runner.source.unused_names],
+    }
+
+
+def _verdict(pipeline: Pipeline) -> dict[str, bool]:
+    """Return what the search's verdict on a row depends on besides conflicts.
+
+    "alone": on no pass criteria, thresholds, cause or other driver; "gated": on plausibility;
+    "criteria": whether some are measured.
+    """
+    objective = getattr(pipeline, "objective", None) or pipeline.scenario.objective
+    beside = pipeline.cause is not None or pipeline.baseline is not None
+    return {
+        "alone": objective.rule == "harm" and not beside,
+        "gated": objective.gated,
+        "criteria": bool(pipeline.monitor.names),
     }
 
 

@@ -82,6 +82,19 @@ function judge(made, simulator, status) {
 
 const labels = given?.judged;
 
+// What the search would also look at, and the page does not compute.
+function limits() {
+  const { alone, gated, criteria } = given.judged, beside = criteria && alone ? "pass criteria and " : "";
+  const rule = alone ? "" : `Conflicts only, none of which is called a failure here: in this run critical means ${data.summary.critical_rule}, which the page does not compute. `;
+  return `${rule}Not computed here: ${beside}further metrics${gated ? ", and whether the traffic is plausible (the search leaves implausible rows out)" : ""}.`;
+}
+
+// The metrics that follow from the motion with the bits of the search's.
+function figuresOf({ closest, distance, v }) {
+  if (closest === null) return "";
+  return `d_min ${quantity(distance[closest], "m")}, v_d ${quantity(Math.abs(v[0][closest]), "m/s")}`;
+}
+
 // The conflict that decides: one that counts before one that does not, contacts first, then the more severe one.
 function conflictOf(made, simulator) {
   const { shape: [count, width] } = simulator.at.verdict.whole, whole = simulator.array("verdict", "whole");
@@ -175,6 +188,7 @@ export class Explorer {
     this.sliders = new Map();
     const lines = given.space.filter(({ searched, name }) => searched && !given.unused.includes(name)).map((part) => this.slider(part));
     this.said = element("p", { class: "tried", role: "status" }, "Try other values: move a slider.");
+    this.figures = element("p", { class: "muted small" });
     const button = (text, act, title) => {
       const made = element("button", { type: "button", class: "quiet", title }, text);
       made.addEventListener("click", act);
@@ -186,7 +200,7 @@ export class Explorer {
         ...(drivers.length > 1 ? [this.drivers(drivers)] : []), button("As found", () => this.set(this.base.parameters), "The values of the chosen scenario"),
         button("Defaults", () => this.set(Object.fromEntries(given.space.map((part) => [part.name, part.default]))), "The scenario's own defaults"),
         button("Copy command", (event) => this.copy(event.currentTarget), "The command line that simulates what is shown, to the last bit"), ...this.savers(button))),
-      element("div", { class: "sliders" }, ...lines));
+      this.figures, element("div", { class: "sliders" }, ...lines), element("p", { class: "muted small" }, limits()));
     if (given.file.refused) this.box.append(element("p", { class: "muted small" }, `What is shown is not saved as a file here: ${given.file.refused}.`));
     if (this.sliders.size > 1) this.addMap();
   }
@@ -265,17 +279,18 @@ export class Explorer {
 
   tell(made) {
     const seconds = (k) => `${(k * made.time_step).toFixed(2)}\u00a0s`, found = made.conflict;
-    const fails = Boolean(found?.counts && data.summary.harm); // other rules count otherwise, which the page does not know
+    const fails = Boolean(found?.counts && given.judged.alone);
     this.said.classList.toggle("hit", fails);
     const least = made.closest === null ? "" : `; closest ${quantity(made.distance[made.closest], "m")} at ${seconds(made.closest)}`;
     let text = `${this.driver}: no conflict${least}.`;
     if (found) {
       const whom = found.partner ? ` with ${found.partner}` : "", severe = found.conflict === "contact" ? `, MAIS3+ ${shareText(found.severity)}` : "";
       const named = found.conflict === "contact" ? "collision" : found.conflict;
-      text = `${fails ? `${this.driver} FAILS: ` : ""}${named}${whom} at ${seconds(found.instant)}: ${[found.type, found.rule].filter(Boolean).join(", ")}; responsible: ${found.responsible}${severe}${fails || !data.summary.harm ? "" : ". Not counted"}.`;
+      text = `${fails ? `${this.driver} FAILS: ` : ""}${named}${whom} at ${seconds(found.instant)}: ${[found.type, found.rule].filter(Boolean).join(", ")}; responsible: ${found.responsible}${severe}${fails || !given.judged.alone ? "" : ". Not counted"}.`;
       found.sentence = found.bare = text;
     }
     this.said.textContent = text;
+    this.figures.textContent = figuresOf(made);
     this.player.swap(made);
   }
 
