@@ -186,7 +186,7 @@ def _trial(pipeline: Pipeline, name: str) -> dict[str, object]:
     words = ["bridgegen", "simulate", name]
     driven = [*words, "--ego", pipeline.driver.name]  # a logical scenario always has one
     simulation = simulation_payload(pipeline, (shlex.join(driven), shlex.join(words)))
-    none = {"data": "", "script": "", "player_css": ""}
+    none: dict[str, object] = {"data": "", "script": "", "player_css": ""}
     if "refused" in simulation:
         return none | {"refused": simulation["refused"]}
     try:
