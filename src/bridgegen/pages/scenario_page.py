@@ -2,6 +2,7 @@
 
 import shlex
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 from markupsafe import Markup
@@ -176,13 +177,15 @@ def write_scenario_page(path: Path, scenario: LogicalScenario, name: str) -> Non
         story=[*story_lines(scenario)],
         parameters=[_parameter(parameter) for parameter in scenario.parameters.values()],
         rules=(*scenario.bounds, *scenario.derived),
-        **_trial(pipeline, name),
+        **_trial(scenario, name),
     )
 
 
-def _trial(pipeline: Pipeline, name: str) -> dict[str, object]:
+def _trial(scenario: LogicalScenario, name: str) -> dict[str, object]:
     """Return the player with its sliders for the template, or why there is none."""
-    scenario = pipeline.scenario
+    if scenario.objective.gated:  # as a search has it, see ``scenarios.as_judged``
+        scenario = replace(scenario, road_end="leave")
+    pipeline = Pipeline(scenario, scenario.space())
     words = ["bridgegen", "simulate", name]
     driven = [*words, "--ego", pipeline.driver.name]  # a logical scenario always has one
     simulation = simulation_payload(pipeline, (shlex.join(driven), shlex.join(words)))
